@@ -18,6 +18,7 @@ from orbiflow.tiles import (
     Target,
     TileMap,
     colouring,
+    overlay_png,
     overview_png,
     search_classes,
     tile_svg,
@@ -25,7 +26,6 @@ from orbiflow.tiles import (
     tiling_svg,
     write_gallery,
 )
-from orbiflow.tiles.pages.tile_folder import overlay
 
 TURTLE = Path(__file__).parents[1] / "examples" / "silhouettes" / "turtle.png"
 
@@ -47,7 +47,7 @@ def main() -> None:
     row("tile.svg", lambda: [tile_svg(r.tile, y_down=y_down) for r in results])
     row("tiling.svg", lambda: [tiling_svg(r.tile, y_down=y_down, colours=c) for r, c in both])
     row("tiling.png", lambda: [tiling_png(r.tile, y_down=y_down, colours=c) for r, c in both])
-    row("overlay.png", lambda: [overlay(r, target) for r in results])
+    row("overlay.png", lambda: [overlay_png(r.tile, target.outline) for r in results])
     row("model", lambda: [(r.map or TileMap()).to_bytes() for r in results])
     row("overview.png", lambda: overview_png(results, target, colours))
     with tempfile.TemporaryDirectory() as folder:

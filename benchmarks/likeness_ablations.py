@@ -24,7 +24,7 @@ from likeness_methods import silhouette
 from orbiflow.runtime import one_blas_thread
 from orbiflow.tiles import CLASSES, LikenessSearch, fidelity
 from orbiflow.tiles.likeness.faithful import USUAL_VALUES
-from orbiflow.tiles.search import bending, corner_shifts
+from orbiflow.tiles.search import bending, co_deformation
 from orbiflow.tiles.search.co_deformation import FIRM, SOFT, TIGHTER, drawn_to_tiles, hands
 
 NAMES = ("bat_60", "camel_60", "octpus_94", "squirrel1_60")
@@ -50,7 +50,7 @@ def stiff(**values: Any) -> dict[str, Any]:
 
 CHANGES: dict[str, Change] = {
     "as it is": (PLAIN, {}),
-    "corners not moved": (PLAIN, {"corner_shifts.MOST_MOVES": 0}),
+    "corners not moved": (PLAIN, {"co_deformation.MOST_MOVES": 0}),
     "all neighbours worked out": (replace(PLAIN, share=1.0), {}),
     "placements chosen rigidly": (replace(PLAIN, placements=32, held=32), {}),
     "springs in one stage": (PLAIN, springs(1)),
@@ -72,7 +72,7 @@ CHANGES: dict[str, Change] = {
 @contextmanager
 def changed(values: dict[str, Any]) -> Iterator[None]:
     """Constants of the search's modules changed for a while."""
-    modules = {"bending": bending, "corner_shifts": corner_shifts}
+    modules = {"bending": bending, "co_deformation": co_deformation}
     places = {name: (modules[name.split(".")[0]], name.split(".")[1]) for name in values}
     before = {name: getattr(*place) for name, place in places.items()}
     try:

@@ -47,7 +47,7 @@ PRESENT = Renamed(
         "* density.safetensors": "saved as a mixture, in format 5",
         "*fit-torus4-flow*": "flows on tori of four or more angles are gone",
         "*batch* batch.csv": "the settings of a line are those of the operation",
-        "density-marginal samples.csv": "no sham kernel stands for the uniform density: others are drawn",
+        "density-marginal samples.csv": "no sham kernel for the uniform density: others are drawn",
         "density-marginal density.png": "has a histogram of such samples",
         "density-conditional density.png": "has a histogram of such samples",
     },

@@ -11,7 +11,7 @@ from .loading import save as save
 from .symmetry.catalogue import wallpaper_group as wallpaper_group
 from .symmetry.equivariance import assert_equivariant as assert_equivariant
 from .symmetry.group import CrystallographicGroup as CrystallographicGroup
-from .tiles.art.scene import draw_art as draw_art
+from .tiles.art.making import draw_art as draw_art
 from .tiles.search.certifying import certified_tiles as certified_tiles
 from .tiles.search.escherize_settings import EscherizeSettings as EscherizeSettings
 from .tiles.search.escherizing import escherize as escherize

@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import types
 import typing
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import repeat
 from numbers import Integral, Real
 from pathlib import Path
@@ -72,28 +71,31 @@ class Refused(ValueError):
         self.hint = hint
 
 
-class Kind(ABC):
-    """A kind of value."""
+@dataclass(eq=False)
+class Kind:
+    """A kind of value.
 
+    - `wanted`: What a value must be, in words.
+    - `schema`: The kind as JSON Schema.
+    - `limits`: Which values are allowed, where the help should say so.
+    - `unit`, `metavar`: Its unit, and what stands for it in the help.
+    - `choices`: The words that are allowed, if there are only some.
+    - `repeated`: Whether its option is repeated.
+    - `needs`: A field without whose value a text cannot be read.
+    """
+
+    wanted: str
+    schema: dict[str, Any]
+    limits: str = ""
     unit: str = ""
     metavar: str = "TEXT"
     choices: tuple[str, ...] = ()
     repeated: bool = False
     needs: str = ""
 
-    @property
-    @abstractmethod
-    def wanted(self) -> str:
-        """What a value must be, in words."""
-
-    @property
-    def limits(self) -> str:
-        """Which values are allowed, where the help should say so."""
-        return ""
-
-    @abstractmethod
     def read(self, value: Any) -> Any:
         """Return a value from Python or JSON as it will be used; raise `Refused` otherwise."""
+        raise NotImplementedError
 
     def parse(self, text: str) -> Any:
         """Return a text of the command line as it will be used; raise `Refused` otherwise."""
@@ -107,37 +109,25 @@ class Kind(ABC):
         """Return a value as JSON has it."""
         return value
 
-    @property
-    @abstractmethod
-    def schema(self) -> dict[str, Any]:
-        """The kind as JSON Schema."""
-
 
 class TextKind(Kind):
     """Any text."""
 
-    @property
-    def wanted(self) -> str:
-        return "text"
+    def __init__(self) -> None:
+        super().__init__("text", {"type": "string"})
 
     def read(self, value: Any) -> str:
         if not isinstance(value, str):
             raise Refused
         return str(value)
 
-    @property
-    def schema(self) -> dict[str, Any]:
-        return {"type": "string"}
-
 
 class PathKind(Kind):
     """The path of a file or folder."""
 
-    metavar = "PATH"
-
-    @property
-    def wanted(self) -> str:
-        return "a path"
+    def __init__(self) -> None:
+        schema = {"type": "string", "minLength": 1, "format": "path"}
+        super().__init__("a path", schema, metavar="PATH")
 
     def read(self, value: Any) -> Path:
         text = path_text(value)
@@ -148,17 +138,12 @@ class PathKind(Kind):
     def plain(self, value: Any) -> str:
         return str(value)
 
-    @property
-    def schema(self) -> dict[str, Any]:
-        return {"type": "string", "minLength": 1, "format": "path"}
-
 
 class FlagKind(Kind):
     """True or false."""
 
-    @property
-    def wanted(self) -> str:
-        return "true or false"
+    def __init__(self) -> None:
+        super().__init__("true or false", {"type": "boolean"})
 
     def read(self, value: Any) -> bool:
         if not isinstance(value, bool):
@@ -171,30 +156,19 @@ class FlagKind(Kind):
             raise Refused
         return known[text.lower()]
 
-    @property
-    def schema(self) -> dict[str, Any]:
-        return {"type": "boolean"}
 
-
-@dataclass(frozen=True)
 class NumberKind(Kind):
     """A finite number in a range; a Boolean is not a number."""
 
-    allowed: Range = ANY
-    whole: bool = False
-    unit: str = ""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "metavar", "INT" if self.whole else "NUMBER")
-
-    @property
-    def wanted(self) -> str:
-        return number_wanted(self.allowed, whole=self.whole)
-
-    @property
-    def limits(self) -> str:
-        limits = str(self.allowed)
-        return f"{limits} {self.unit}" if limits and self.unit else limits or self.unit
+    def __init__(self, allowed: Range, unit: str, *, whole: bool) -> None:
+        self.allowed, self.whole = allowed, whole
+        super().__init__(
+            number_wanted(allowed, whole=whole),
+            {"type": "integer" if whole else "number", **allowed.schema},
+            limits=" ".join(filter(None, (str(allowed), unit))),
+            unit=unit,
+            metavar="INT" if whole else "NUMBER",
+        )
 
     def read(self, value: Any) -> float:
         abstract: type = Integral if self.whole else Real
@@ -216,52 +190,34 @@ class NumberKind(Kind):
             raise Refused from None
         return self.read(number)
 
-    @property
-    def schema(self) -> dict[str, Any]:
-        return {"type": "integer" if self.whole else "number", **self.allowed.schema}
 
-
-@dataclass(frozen=True)
 class ChoiceKind(Kind):
     """One of several words."""
 
-    choices: tuple[str, ...]
-
-    @property
-    def wanted(self) -> str:
-        return one_of(self.choices)
+    def __init__(self, choices: tuple[str, ...]) -> None:
+        super().__init__(one_of(choices), {"enum": list(choices)}, choices=choices)
 
     def read(self, value: Any) -> str:
         if not isinstance(value, str) or value not in self.choices:
             raise Refused(hint=meant(value, self.choices))
         return str(value)
 
-    @property
-    def schema(self) -> dict[str, Any]:
-        return {"enum": list(self.choices)}
 
-
-@dataclass(frozen=True)
 class ListKind(Kind):
     """A tuple of any length; a list in JSON."""
 
-    item: Kind
-    repeated: bool = False
-    may_be_empty: bool = True
-
-    def __post_init__(self) -> None:
-        if self.repeated:
-            object.__setattr__(self, "metavar", self.item.metavar)
-
-    @property
-    def wanted(self) -> str:
-        entries = "" if self.may_be_empty else " of one or more entries"
-        return f"a list{entries}, each {self.item.wanted}"
-
-    @property
-    def limits(self) -> str:
-        limits = self.item.limits or ", ".join(self.item.choices)
-        return f"each {limits}" if limits else ""
+    def __init__(self, item: Kind, *, repeated: bool, may_be_empty: bool = True) -> None:
+        self.item, self.may_be_empty = item, may_be_empty
+        entries = "" if may_be_empty else " of one or more entries"
+        least = {} if may_be_empty else {"minItems": 1}
+        limits = item.limits or ", ".join(item.choices)
+        super().__init__(
+            f"a list{entries}, each {item.wanted}",
+            {"type": "array", "items": item.schema, **least},
+            limits=f"each {limits}" if limits else "",
+            metavar=item.metavar if repeated else "TEXT",
+            repeated=repeated,
+        )
 
     def read(self, value: Any) -> tuple[Any, ...]:
         return self._whole(_entries(_sequence(value), repeat(self.item), _read))
@@ -278,34 +234,25 @@ class ListKind(Kind):
     def plain(self, value: Any) -> list[Any]:
         return [self.item.plain(part) for part in value]
 
-    @property
-    def schema(self) -> dict[str, Any]:
-        least = {} if self.may_be_empty else {"minItems": 1}
-        return {"type": "array", "items": self.item.schema, **least}
 
-
-@dataclass(frozen=True)
 class TupleKind(Kind):
     """A tuple of a fixed length; a list in JSON."""
 
-    items: tuple[Kind, ...]
-    unit: str = ""
-
-    @property
-    def wanted(self) -> str:
-        return f"{len(self.items)} values, each {self.items[0].wanted}"
-
-    @property
-    def limits(self) -> str:
-        limits = self.items[0].limits
-        return f"each {limits}{self.unit and ' ' + self.unit}" if limits else self.unit
+    def __init__(self, items: tuple[Kind, ...], unit: str) -> None:
+        self.items, size, limits = items, len(items), items[0].limits
+        schema = {"type": "array", "prefixItems": [item.schema for item in items]}
+        super().__init__(
+            f"{size} values, each {items[0].wanted}",
+            {**schema, "minItems": size, "maxItems": size},
+            limits=" ".join(filter(None, (f"each {limits}" if limits else "", unit))),
+            unit=unit,
+        )
 
     def read(self, value: Any) -> tuple[Any, ...]:
         return self._taken(_sequence(value), _read)
 
     def parse(self, text: str) -> tuple[Any, ...]:
-        parts = [part.strip() for part in text.split(",")]
-        return self._taken(parts, _parse)
+        return self._taken([part.strip() for part in text.split(",")], _parse)
 
     def _taken(self, parts: Sequence[Any], take: Callable[[Kind, Any], Any]) -> tuple[Any, ...]:
         if len(parts) != len(self.items):
@@ -315,105 +262,69 @@ class TupleKind(Kind):
     def plain(self, value: Any) -> list[Any]:
         return [item.plain(part) for item, part in zip(self.items, value, strict=True)]
 
-    @property
-    def schema(self) -> dict[str, Any]:
-        size = len(self.items)
-        items = [item.schema for item in self.items]
-        return {"type": "array", "prefixItems": items, "minItems": size, "maxItems": size}
 
-
-@dataclass(frozen=True)
 class EitherKind(Kind):
     """A value of the first of several kinds that takes it."""
 
-    kinds: tuple[Kind, ...]
-    unit: str = ""
-
-    @property
-    def wanted(self) -> str:
-        return " or ".join(kind.wanted for kind in self.kinds)
-
-    @property
-    def limits(self) -> str:
-        return " or ".join(kind.limits or ", ".join(kind.choices) for kind in self.kinds)
+    def __init__(self, kinds: tuple[Kind, ...], unit: str) -> None:
+        self.kinds = kinds
+        super().__init__(
+            " or ".join(kind.wanted for kind in kinds),
+            {"anyOf": [kind.schema for kind in kinds]},
+            limits=" or ".join(kind.limits or ", ".join(kind.choices) for kind in kinds),
+            unit=unit,
+        )
 
     def read(self, value: Any) -> Any:
-        return self._first(lambda kind: kind.read(value))[1]
+        return self._first(_read, value)[1]
 
     def parse(self, text: str) -> Any:
-        return self._first(lambda kind: kind.parse(text))[1]
+        return self._first(_parse, text)[1]
 
     def plain(self, value: Any) -> Any:
-        kind, value = self._first(lambda kind: kind.read(value))
+        kind, value = self._first(_read, value)
         return kind.plain(value)
 
-    def _first(self, take: Callable[[Kind], Any]) -> tuple[Kind, Any]:
+    def _first(self, take: Callable[[Kind, Any], Any], value: Any) -> tuple[Kind, Any]:
         for kind in self.kinds:
             try:
-                return kind, take(kind)
+                return kind, take(kind, value)
             except Refused:
                 continue
         raise Refused
 
-    @property
-    def schema(self) -> dict[str, Any]:
-        return {"anyOf": [kind.schema for kind in self.kinds]}
 
-
-@dataclass(frozen=True)
 class OptionalKind(Kind):
     """A value of a kind, or None."""
 
-    inner: Kind
-
-    def __post_init__(self) -> None:
-        for name in ("unit", "metavar", "choices", "repeated", "needs"):
-            object.__setattr__(self, name, getattr(self.inner, name))
-
-    @property
-    def wanted(self) -> str:
-        return self.inner.wanted
-
-    @property
-    def limits(self) -> str:
-        return self.inner.limits
+    def __init__(self, inner: Kind) -> None:
+        for name in ("wanted", "limits", "unit", "metavar", "choices", "repeated", "needs"):
+            setattr(self, name, getattr(inner, name))
+        self.schema = {"anyOf": [inner.schema, {"type": "null"}]}
+        self.inner, self.parse, self.finish = inner, inner.parse, inner.finish
 
     def read(self, value: Any) -> Any:
         return None if value is None else self.inner.read(value)
 
-    def parse(self, text: str) -> Any:
-        return self.inner.parse(text)
-
-    def finish(self, text: str, known: Any) -> Any:
-        return self.inner.finish(text, known)
-
     def plain(self, value: Any) -> Any:
         return None if value is None else self.inner.plain(value)
 
-    @property
-    def schema(self) -> dict[str, Any]:
-        return {"anyOf": [self.inner.schema, {"type": "null"}]}
 
-
-@dataclass(frozen=True)
 class ParsedKind(Kind):
     """Text that a function reads, or what the function returns."""
 
-    parsed: Parsed
-    inner: Kind
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "unit", self.inner.unit)
-        object.__setattr__(self, "metavar", self.parsed.metavar)
-        object.__setattr__(self, "needs", self.parsed.needs)
-
-    @property
-    def wanted(self) -> str:
-        return f"{self.parsed.wanted}{self.inner.limits and ', ' + self.inner.limits}"
-
-    @property
-    def limits(self) -> str:
-        return self.parsed.values or self.inner.limits
+    def __init__(self, parsed: Parsed, inner: Kind) -> None:
+        self.parsed, self.inner, self.plain = parsed, inner, inner.plain
+        text = {"type": "string", "description": parsed.wanted}
+        is_text = inner.schema == {"type": "string"}
+        super().__init__(
+            ", ".join(filter(None, (parsed.wanted, inner.limits))),
+            text if is_text else {"anyOf": [inner.schema, text]},
+            limits=parsed.values or inner.limits,
+            unit=inner.unit,
+            metavar=parsed.metavar,
+            needs=parsed.needs,
+        )
 
     def read(self, value: Any) -> Any:
         return self.parse(value) if isinstance(value, str) else self.inner.read(value)
@@ -430,15 +341,6 @@ class ParsedKind(Kind):
         except OrbiflowError as error:
             raise Refused(str(error)) from error
         return self.inner.read(value)
-
-    def plain(self, value: Any) -> Any:
-        return self.inner.plain(value)
-
-    @property
-    def schema(self) -> dict[str, Any]:
-        text = {"type": "string", "description": self.parsed.wanted}
-        inner = self.inner.schema
-        return text if inner == {"type": "string"} else {"anyOf": [inner, text]}
 
 
 def kind_of(annotation: Any) -> Kind:
@@ -462,16 +364,14 @@ def kind_of(annotation: Any) -> Kind:
 def _plain_kind(annotation: Any, allowed: Range, unit: str, repeated: bool) -> Kind:
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
     if annotation in (int, float):
-        return NumberKind(allowed, annotation is int, unit)
-    simple: dict[Any, type[Kind]] = {
-        str: TextKind, Path: PathKind, bool: FlagKind
-    }  # fmt: skip
+        return NumberKind(allowed, unit, whole=annotation is int)
+    simple = {str: TextKind, Path: PathKind, bool: FlagKind}
     if annotation in simple:
         return simple[annotation]()
     if origin is Literal:
         return ChoiceKind(arguments)
     if origin is tuple and arguments[-1] is ...:
-        return ListKind(kind_of(arguments[0]), repeated)
+        return ListKind(kind_of(arguments[0]), repeated=repeated)
     if origin is tuple:
         return TupleKind(tuple(map(kind_of, arguments)), unit)
     if origin in (Union, types.UnionType):
@@ -486,7 +386,7 @@ def _plain_kind(annotation: Any, allowed: Range, unit: str, repeated: bool) -> K
         if len(plain) == len(arguments):
             return kind
         if isinstance(kind, ListKind):  # None is for nothing
-            kind = replace(kind, may_be_empty=False)
+            kind = ListKind(kind.item, repeated=kind.repeated, may_be_empty=False)
         return OptionalKind(kind)
     raise TypeError(f"no setting can be annotated {annotation!r}")
 

@@ -47,11 +47,7 @@ class LoadedRun:
         return iter(self.tiles)
 
     def __getitem__(self, which: str | int) -> EscherTile:
-        """Return a tile by class, such as "IH4" (its best tile), or by rank from 1.
-
-        Raises:
-            OrbiflowError: if there is no such tile.
-        """
+        """Return a tile by class, such as "IH4" (its best tile), or by rank from 1."""
         for tile in self.tiles:
             if which in (tile.isohedral_class, tile.rank):
                 return tile

@@ -17,10 +17,10 @@ OPERATIONS = {
     "density region": "orbiflow.density.operations.drawing:region",
     "density cv": "orbiflow.density.cross_validation.operations:cross_validate",
     "density patches": "orbiflow.density.operations.drawing:patches",
-    "density batch": "orbiflow.density.operations.batches:batch",
+    "density batch": "orbiflow.density.operations.fitting:batch",
 }
 
-WORK = {"density fold": "orbiflow.density.cross_validation.operations:fold"}
+WORK = {"density fold": "orbiflow.density.cross_validation.fold:fold"}
 """Operations that others give to workers, and that are no commands."""
 
 RUN_FOLDERS = {

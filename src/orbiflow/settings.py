@@ -22,8 +22,7 @@ Types are those of `orbiflow.kinds` and `orbiflow.units`: `bool`, `int`, `float`
   apply to fields that were given (`settings.fields_given`), so a default never offends.
   `because=...` adds a reason to the message, with names of fields in braces.
 - `Ending(".png", ".svg")`: what the name of a file must end in.
-- `Parsed(function, "a length such as 40mm")`: text is read by a function, with `needs="dpi"` when
-  the field `dpi` is known.
+- `Parsed(function, "a length such as 40mm")`: text is read by a function; see `orbiflow.kinds`.
 
 What rules cannot say goes into a method `check`, which raises a `SettingError` with the names of
 fields in braces. A default that depends on other fields goes into a method `defaults`, which returns
@@ -40,6 +39,7 @@ from __future__ import annotations
 import ast
 import dataclasses
 import inspect
+import itertools
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -72,7 +72,6 @@ __all__ = [
     "check_names",
     "check_rules",
     "fields_of",
-    "make_field",
 ]
 
 
@@ -86,8 +85,7 @@ class Option:
     """
 
     def __init__(self, *names: str, off: str = "") -> None:
-        self.names = names
-        self.off = off
+        self.names, self.off = names, off
 
 
 @dataclass(frozen=True)
@@ -109,10 +107,27 @@ class DefaultText:
     text: str
 
 
-class OnlyWith:
+class Rule:
+    """A rule about a field; as a string, what it needs, for the help."""
+
+    because: str = ""
+
+    def check(self, name: str, values: Mapping[str, Any]) -> None:
+        """Raise a `SettingError` where the field that has this name must not be given."""
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        return ""
+
+    @property
+    def reason(self) -> str:
+        return f" ({self.because})" if self.because else ""
+
+
+class OnlyWith(Rule):
     """A field that applies only where other fields have one of these values.
 
-    A value may be a tuple of several. `because` is a reason, for the message.
+    A value may be a tuple of several; `because` is a reason, for the message.
     """
 
     def __init__(self, *, because: str = "", **others: Any) -> None:
@@ -122,7 +137,6 @@ class OnlyWith:
         self.because = because
 
     def check(self, name: str, values: Mapping[str, Any]) -> None:
-        """Refuse the field where another has a value that it does not apply to."""
         for other, allowed in self.others.items():
             value = values[other]
             if value in allowed:
@@ -130,32 +144,31 @@ class OnlyWith:
             here = "" if isinstance(value, bool) else f", not to {literal(_word(value))}"
             raise SettingError(
                 f"{{{name}}} applies only to {_condition(other, allowed)}{here}"
-                f"{_reason(self.because)}; leave {{{name}}} out or change {{{other}}}"
+                f"{self.reason}; leave {{{name}}} out or change {{{other}}}"
             )
 
     def __str__(self) -> str:
         return " and ".join(_condition(*other) for other in self.others.items())
 
 
-class Needs:
+@dataclass(frozen=True)
+class Needs(Rule):
     """A field that applies only where another is given, too."""
 
-    def __init__(self, other: str, *, because: str = "") -> None:
-        self.other = other
-        self.because = because
+    other: str
+    because: str = ""
 
     def check(self, name: str, values: Mapping[str, Any]) -> None:
-        """Refuse the field where the other is missing."""
         if not values[self.other]:
             raise SettingError(
-                f"{{{name}}} needs {{{self.other}}}{_reason(self.because)}; give both or neither"
+                f"{{{name}}} needs {{{self.other}}}{self.reason}; give both or neither"
             )
 
     def __str__(self) -> str:
         return f"{{{self.other}}}"
 
 
-class NotWith:
+class NotWith(Rule):
     """A field that excludes others."""
 
     def __init__(self, *others: str, because: str = "") -> None:
@@ -163,36 +176,24 @@ class NotWith:
         self.because = because
 
     def check(self, name: str, values: Mapping[str, Any]) -> None:
-        """Refuse the field where one of the others is given, too."""
         for other in self.others:
             if values[other] not in (None, False, ()):
                 raise SettingError(
-                    f"{{{name}}} and {{{other}}} exclude each other{_reason(self.because)}; "
-                    "give one of them"
+                    f"{{{name}}} and {{{other}}} exclude each other{self.reason}; give one of them"
                 )
 
-    def __str__(self) -> str:
-        return ""
 
-
-class Ending:
+class Ending(Rule):
     """The endings that the name of a file may have."""
 
     def __init__(self, *endings: str) -> None:
         self.endings = endings
 
     def check(self, name: str, values: Mapping[str, Any]) -> None:
-        """Refuse a file whose name ends in anything else."""
         file: Path = values[name]
         if file.suffix.lower() not in self.endings:
             endings = one_of(list(filter(None, self.endings)))
             raise refusal(name, f"a file that ends in {endings}", file.name)
-
-    def __str__(self) -> str:
-        return ""
-
-
-Rule = OnlyWith | Needs | NotWith | Ending
 
 
 @dataclass(frozen=True)
@@ -203,7 +204,7 @@ class Field:
     - `annotation`: The type as written.
     - `default`: The default, or `dataclasses.MISSING` if it is required.
     - `doc`: Its sentence.
-    - `group`: Its heading in the help, "" for the command's own.
+    - `class_group`: The heading in the help of its class, "" for the command's own.
     - `positional`: Whether the command line takes it as an argument rather than an option.
     """
 
@@ -211,8 +212,14 @@ class Field:
     annotation: Any
     default: Any = MISSING
     find_doc: Callable[[], str] = field(default=str, compare=False)
-    group: str = ""
+    class_group: str = ""
     positional: bool = False
+
+    @cached_property
+    def group(self) -> str:
+        """Its heading in the help."""
+        own = self.of_class(Group)
+        return self.class_group if own is None else own.name
 
     @cached_property
     def kind(self) -> Kind:
@@ -238,9 +245,7 @@ class Field:
     @cached_property
     def alternatives(self) -> set[Any]:
         """The types of its values, None apart."""
-        annotation = self.annotation
-        if self.metadata:
-            annotation = typing.get_args(annotation)[0]
+        annotation = typing.get_args(self.annotation)[0] if self.metadata else self.annotation
         is_union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
         parts = typing.get_args(annotation) if is_union else (annotation,)
         return {part for part in parts if part is not type(None)}
@@ -253,19 +258,18 @@ class Field:
     @cached_property
     def option(self) -> Option:
         """What the command line calls it, always with a long name."""
-        found = self.of_class(Option) or Option()
+        found, own = self.of_class(Option) or Option(), self.name.replace("_", "-")
         long = any(name.startswith("--") for name in found.names)
-        names = found.names if long else (f"--{self.name.replace('_', '-')}", *found.names)
-        off = found.off
-        if not off and bool in self.alternatives and self.default is not False:
-            off = f"--no-{self.name.replace('_', '-')}"
-        return Option(*names, off=off)
+        has_off = bool in self.alternatives and self.default is not False
+        return Option(
+            *(found.names if long else (f"--{own}", *found.names)),
+            off=found.off or (f"--no-{own}" if has_off else ""),
+        )
 
     @property
     def default_text(self) -> str:
         """The default in words, "" for none and for flags."""
-        found = self.of_class(DefaultText)
-        if found is not None:
+        if (found := self.of_class(DefaultText)) is not None:
             return found.text
         if self.required or self.default is None or self.default is False or self.default == ():
             return ""
@@ -276,19 +280,14 @@ class Field:
         return next((entry for entry in self.metadata if isinstance(entry, kind)), None)
 
     def read(self, value: Any, *, text: bool = False) -> Any:
-        """Return a value as it will be used; with `text`, from the command line.
+        """Return a value as it will be used, or raise a `SettingError`.
 
-        Raises:
-            SettingError: If it is not allowed.
+        With `text`, it comes from the command line.
         """
         return self._read(self.kind.parse if text else self.kind.read, value)
 
     def finish(self, value: Any, values: Mapping[str, Any]) -> Any:
-        """Return the value of a text that could not be read without another field.
-
-        Raises:
-            SettingError: If it is not allowed.
-        """
+        """Return the value of a text that could not be read without another field."""
         if not isinstance(value, str):
             return value
         return self._read(lambda text: self.kind.finish(text, values[self.kind.needs]), value)
@@ -361,8 +360,7 @@ class Settings:
                 object.__setattr__(self, name, known[name].read(value))
         for name, entry in known.items():
             if entry.kind.needs:
-                value = entry.finish(getattr(self, name), vars(self))
-                object.__setattr__(self, name, value)
+                object.__setattr__(self, name, entry.finish(getattr(self, name), vars(self)))
         check_rules(known.values(), vars(self), self.fields_given)
         self.check()
 
@@ -371,38 +369,29 @@ class Settings:
         return {}
 
     def check(self) -> None:
-        """Check what types and rules cannot say.
-
-        Raises:
-            SettingError: If a setting is not allowed, with its name in braces.
-        """
+        """Raise a `SettingError`, with names in braces, for what types and rules cannot say."""
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with other values of some fields."""
-        return type(self)(
-            **{**{name: getattr(self, name) for name in self.fields_given}, **changes}
-        )
+        given = {name: getattr(self, name) for name in self.fields_given}
+        return type(self)(**{**given, **changes})
 
     def values(self) -> dict[str, Any]:
         """Return all fields as JSON has them, whether given or not."""
         return {f.name: f.kind.plain(getattr(self, f.name)) for f in fields_of(type(self))}
 
     def to_json(self) -> dict[str, Any]:
-        """Return the fields that were given, as JSON has them; `from_json` restores an equal object."""
+        """Return the fields that were given, as JSON has them: keywords of an equal object."""
         return {name: value for name, value in self.values().items() if name in self.fields_given}
-
-    @classmethod
-    def from_json(cls, document: Mapping[str, Any]) -> Self:
-        """Return settings from a JSON object.
-
-        Raises:
-            SettingError: If a setting is unknown, missing or not allowed.
-        """
-        return cls(**document)
 
 
 class FileSettings(Settings):
     """Settings of a file, whose `format` its ending decides if it is not given."""
+
+    @property
+    def _formats(self) -> tuple[str, ...]:
+        (found,) = (entry for entry in fields_of(type(self)) if entry.name == "format")
+        return found.kind.choices
 
     @property
     def usual_format(self) -> str:
@@ -414,18 +403,8 @@ class FileSettings(Settings):
         """The format that is written."""
         return vars(self)["format"] or self.usual_format
 
-    @property
-    def _formats(self) -> tuple[str, ...]:
-        (found,) = (entry for entry in fields_of(type(self)) if entry.name == "format")
-        return found.kind.choices
-
     def for_file(self, out: Path | None) -> Self:
-        """Return these settings with the format that a file's ending decides.
-
-        Raises:
-            SettingError: If the ending is that of another format than the one that was given, or none
-                was given and the ending is unknown.
-        """
+        """Return these settings with the format that a file's ending decides, if it fits the field."""
         given, formats = vars(self)["format"], self._formats
         ending = out.suffix.lower().lstrip(".") if out else ""
         if given is None and ending and ending not in formats:
@@ -445,7 +424,7 @@ def fields_of(cls: type[Settings]) -> tuple[Field, ...]:
     """Return the fields of a settings class, in the order in which they were written."""
     hints = typing.get_type_hints(cls, include_extras=True)
     return tuple(
-        make_field(
+        Field(
             entry.name,
             hints[entry.name],
             entry.default,
@@ -456,45 +435,20 @@ def fields_of(cls: type[Settings]) -> tuple[Field, ...]:
     )
 
 
-def make_field(
-    name: str,
-    annotation: Any,
-    default: Any,
-    find_doc: Callable[[], str],
-    group: str = "",
-    *,
-    positional: bool = False,
-) -> Field:
-    """Return a field; a `Group` in its annotation goes before `group`."""
-    made = Field(name, annotation, default, find_doc, group, positional)
-    own = made.of_class(Group)
-    return made if own is None else dataclasses.replace(made, group=own.name)
-
-
 def check_names(given: Iterable[str], known: Iterable[Field], what: str) -> None:
-    """Refuse names that are not known, and missing ones that are required.
-
-    Raises:
-        SettingError: For the first of them.
-    """
+    """Raise a `SettingError` for a name that is not known, or one that is required and missing."""
     fields = {entry.name: entry for entry in known}
     for name in given:
         if name not in fields:
-            hint = meant(name, list(fields)) or f"there are {', '.join(fields)}"
-            raise SettingError(
-                f"{literal(what)} has no setting {literal(described(name))}; {literal(hint)}"
-            )
+            hint = literal(meant(name, list(fields)) or f"there are {', '.join(fields)}")
+            raise SettingError(f"{literal(what)} has no setting {literal(described(name))}; {hint}")
     for name, entry in fields.items():
         if entry.required and name not in given:
             raise SettingError(f"{{{name}}} is missing; give {literal(entry.kind.wanted)}")
 
 
 def check_rules(fields: Iterable[Field], values: Mapping[str, Any], given: Iterable[str]) -> None:
-    """Apply the rules of all fields that were given and have an effect.
-
-    Raises:
-        SettingError: For the first rule that is broken.
-    """
+    """Apply the rules of all fields that were given and have an effect, up to one that is broken."""
     for entry in fields:
         value = values[entry.name]
         if entry.name in given and (value or value != entry.default):
@@ -514,13 +468,14 @@ def _docs(cls: type) -> dict[str, str]:
     (found,) = ast.parse(inspect.cleandoc("\n" + inspect.getsource(cls))).body
     assert isinstance(found, ast.ClassDef)
     docs: dict[str, str] = {}
-    for before, after in zip(found.body, found.body[1:], strict=False):
-        if isinstance(before, ast.AnnAssign) and isinstance(before.target, ast.Name):
-            match after:
-                case ast.Expr(value=ast.Constant(value=str(text))):
-                    docs[before.target.id] = text
-                case _:
-                    pass
+    for pair in itertools.pairwise(found.body):
+        match pair:
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(
+                value=ast.Constant(value=str(text))
+            ):
+                docs[name] = text
+            case _:
+                pass
     return docs
 
 
@@ -539,7 +494,3 @@ def _word(value: Any) -> str:
     if isinstance(value, list | tuple):
         return ",".join(map(_word, cast(Sequence[Any], value)))
     return "nothing" if value is None else str(value)
-
-
-def _reason(because: str) -> str:
-    return f" ({because})" if because else ""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import partial
 from typing import Annotated
 
 from orbiflow.arguments import Range
@@ -49,11 +50,6 @@ def length(text: str, *, zero: bool = False) -> float:
     if zero and number == 0 and not unit:
         return 0.0
     return _checked(number * _unit(unit, found[1], text), text, zero=zero)
-
-
-def length_or_zero(text: str) -> float:
-    """Return a length in mm, which may be 0."""
-    return length(text, zero=True)
 
 
 def size(text: str) -> tuple[float, float]:
@@ -152,7 +148,7 @@ Length = Annotated[
 
 LengthOrZero = Annotated[
     float,
-    Parsed(length_or_zero, "a length such as 2mm", "LENGTH"),
+    Parsed(partial(length, zero=True), "a length such as 2mm", "LENGTH"),
     Range(0, LONGEST_SIDE),
     Unit("mm"),
 ]

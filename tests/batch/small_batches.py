@@ -7,11 +7,10 @@ import json
 import os
 from collections.abc import Callable, Generator, Iterable
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
-from orbiflow.batch import Answer, Parcel
-from orbiflow.batch.parcels import carry_out
+from orbiflow.batch import Answer, Executor, Parcel
+from orbiflow.batch.executors import carry_out
 from orbiflow.runtime import Call, Cancel, Event, Failed, Finished, Sink, find
 from runtime.searches import BOOT, run
 
@@ -38,24 +37,15 @@ def boot_parcels(count: int) -> list[Parcel]:
     return [Parcel(f"boot {k}", call, "image", "out", "boot.json", data) for k in range(count)]
 
 
-class Here:
+class Here(Executor):
     """An executor without processes; remembers the keys of what it has done."""
-
-    place = "this process"
 
     def __init__(self) -> None:
         self.done: list[str] = []
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-        /,
-    ) -> None: ...
+    @property
+    def place(self) -> str:
+        return "this process"
 
     def answers(
         self,

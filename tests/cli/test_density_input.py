@@ -104,7 +104,7 @@ def test_the_mean_says_of_how_many_rows_it_is(
     scores = fitted.score_samples(values)
     assert (count, mean) == (60, pytest.approx(scores.mean()))
     # few of many are drawn by the seed: the same at every run, and not every so many-th
-    monkeypatch.setattr("orbiflow.density.operations.fitted.MOST_SCORED", 25)
+    monkeypatch.setattr("orbiflow.density.operations.fitting.MOST_SCORED", 25)
     count, mean = mean_of(orbiflow(*fit), "25 of them")
     assert (count, mean_of(orbiflow(*fit), "25 of them")) == (25, (25, mean))
     assert mean != pytest.approx(scores.mean(), abs=1e-9)

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.density import FlowDensity, FlowSettings, fit_density, make_space
-from orbiflow.density.fitting.budget import Budget, Spent
-from orbiflow.density.fitting.likelihood import EVERY, refine
+from orbiflow.density.fitting.likelihood import EVERY, Budget, Spent, refine
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 
@@ -36,7 +35,7 @@ def striking_after_fixture(monkeypatch):
 
     def put(looks: float) -> Clock:
         clock = Clock(looks)
-        monkeypatch.setattr("orbiflow.density.fitting.budget.clock", clock)
+        monkeypatch.setattr("orbiflow.density.fitting.likelihood.clock", clock)
         return clock
 
     return put

@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.density import Torus, VonMisesChains, midpoints
-from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.chains import concentration, fit_chain_mixture, spread_chains
 from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.models import SCALES, chained
@@ -144,7 +143,7 @@ def test_a_fit_finds_correlations_and_repeats() -> None:
     def fitted() -> VonMisesChains:
         generator = torch.Generator().manual_seed(0)
         start = spread_chains(space, train, 16, torch.arange(4), generator)
-        return fit_chain_mixture(start, train, held, 60, Budget())
+        return fit_chain_mixture(start, train, held, 60)
 
     # of the data's own chain: three normals of width 0.03 and a mixture of two of width 0.05
     fresh = chained_angles(2000, seed=1)

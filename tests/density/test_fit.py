@@ -19,7 +19,7 @@ from orbiflow.density import (
     fit_density,
     make_space,
 )
-from orbiflow.density.fitting.flow_matching import conjugate_gradients, coupled, match_flow
+from orbiflow.density.fitting.flow import conjugate_gradients, coupled, match_flow
 from orbiflow.density.fitting.likelihood import LEVELS, Objective, merged
 from orbiflow.density.fitting.report import sides
 from orbiflow.errors import OrbiflowError

@@ -8,13 +8,19 @@ import pytest
 import torch
 
 from orbiflow.density import DensitySettings, FlowSettings, Torus, fit_automatic, weighed
-from orbiflow.density.fitting import COMPONENTS, flow_trial
+from orbiflow.density.fitting import COMPONENTS
 from orbiflow.density.fitting.automatic import BEFORE_END
-from orbiflow.density.fitting.budget import Budget
-from orbiflow.density.fitting.evidence import Candidates, candidates_of, judged
+from orbiflow.density.fitting.evidence import (
+    FIRST,
+    Candidates,
+    TriedFlow,
+    candidates_of,
+    judged,
+    try_flow,
+)
 from orbiflow.density.fitting.families import KernelFamily
-from orbiflow.density.fitting.flow_trial import FIRST, TriedFlow, try_flow
 from orbiflow.density.fitting.folds import Folds, folds_of
+from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence
 from orbiflow.density.fitting.settings import Component
 from orbiflow.density.fitting.weights import Gain, stacked, supported_weights
@@ -52,7 +58,7 @@ def test_progress_goes_on_from_one_tenth_to_the_next(
     tenths: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Gain, "is_sure", property(lambda _: tenths == 1))
-    monkeypatch.setattr(flow_trial, "_is_worth_it", lambda _: True)
+    monkeypatch.setattr("orbiflow.density.fitting.evidence._is_worth_it", lambda _: True)
     said: list[tuple[float, str]] = []
     tried(*evidence(), told=lambda done, what: said.append((done, what)))
     shares = [done for done, _ in said]
@@ -79,7 +85,7 @@ def test_a_flow_is_compared_at_the_rows_that_it_was_tried_on(
 ) -> None:
     # sure at once, or never: then a second tenth is asked
     monkeypatch.setattr(Gain, "is_sure", property(lambda _: tenths == 1))
-    monkeypatch.setattr(flow_trial, "_is_worth_it", lambda _: True)
+    monkeypatch.setattr("orbiflow.density.fitting.evidence._is_worth_it", lambda _: True)
     own = np.random.default_rng(1).uniform(0.5, 2.0, 700) if weighted else None
     folds, candidates, weights = evidence(own)
     (flow,) = tried(folds, candidates, weights).evidence

@@ -21,7 +21,7 @@ from orbiflow.density import (
     fit_automatic,
     log_prob_observed,
 )
-from orbiflow.density.fitting.mixtures import fit_mixture
+from orbiflow.density.fitting.kernels import fit_mixture
 from orbiflow.density.fitting.rows import Rows, with_incomplete
 from orbiflow.errors import OrbiflowError
 

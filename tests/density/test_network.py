@@ -29,7 +29,7 @@ from orbiflow.density import (
     marginal,
     read_density,
 )
-from orbiflow.density.fitting.network import Screen, fit_network, network_shapes
+from orbiflow.density.fitting.chains import Screen, fit_network, network_shapes
 from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.models import Split, averaged_networks, log_conditional
 from orbiflow.density.models import network as network_of_some

@@ -23,8 +23,7 @@ from orbiflow.density import (
     outlines,
     to_geojson,
 )
-from orbiflow.density.regions.contours import filled
-from orbiflow.density.regions.grid import LevelGrid, Seeds
+from orbiflow.density.regions.grid import LevelGrid, Seeds, filled
 from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
@@ -39,7 +38,7 @@ def test_a_disc_on_the_grid_is_a_disc(x: float, y: float, radius: float, level: 
 
     levels = np.array([level])
     low, high = np.zeros(2), np.ones(2)
-    grid = LevelGrid.refined(function, low, high, (16, 16), levels, NO_SEEDS, 4, 10**6)
+    grid = LevelGrid(function, low, high, (16, 16), levels, NO_SEEDS, 4, 10**6)
     assert grid.evaluations < 6000  # of 66,049 nodes
     shape, off = filled(grid.values, grid.low, grid.step, level, function)
     assert off < 2e-3
@@ -53,7 +52,7 @@ def test_a_region_is_cut_at_the_border_and_may_have_holes() -> None:
         return np.sin(2 * math.pi * points[:, 0])  # half of the window, at its left edge
 
     low, high = np.zeros(2), np.ones(2)
-    grid = LevelGrid.refined(function, low, high, (8, 8), np.zeros(1), NO_SEEDS, 3, 10**6)
+    grid = LevelGrid(function, low, high, (8, 8), np.zeros(1), NO_SEEDS, 3, 10**6)
     shape, _ = filled(grid.values, low, grid.step, 0.0, function)
     assert shapely.area(shape) == pytest.approx(0.5, abs=1e-9)
     assert shapely.bounds(shape) == pytest.approx((0, 0, 0.5, 1), abs=1e-9)
@@ -64,7 +63,7 @@ def test_a_region_is_cut_at_the_border_and_may_have_holes() -> None:
     def ring(points: np.ndarray) -> np.ndarray:
         return 0.1 - abs(np.hypot(*(points - 0.5).T) - 0.3)
 
-    grid = LevelGrid.refined(ring, low, high, (16, 16), np.zeros(1), NO_SEEDS, 3, 10**6)
+    grid = LevelGrid(ring, low, high, (16, 16), np.zeros(1), NO_SEEDS, 3, 10**6)
     shape, _ = filled(grid.values, low, grid.step, 0.0, ring)
     assert isinstance(shape, shapely.Polygon)
     assert len(shape.interiors) == 1

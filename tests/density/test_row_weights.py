@@ -12,11 +12,9 @@ from hypothesis import strategies as st
 
 from density.blends import flow_of
 from orbiflow.density import DensityEstimator, density_to_bytes, make_space, mean_of, weighed
-from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.chains import fit_chain_mixture, spread_chains
-from orbiflow.density.fitting.kernels import kernel_estimates
+from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
 from orbiflow.density.fitting.likelihood import Objective, merged
-from orbiflow.density.fitting.mixtures import fit_mixture
 from orbiflow.density.fitting.rows import Rows, effective_rows
 from orbiflow.density.fitting.weights import gain_of, sparse_weights, stacked, stacking_weights
 from orbiflow.errors import OrbiflowError
@@ -91,8 +89,7 @@ def test_chains_from_one_start_are_those_of_repeated_rows(seed: int, count: int)
     order = torch.randperm(2, generator=generator)
     start = spread_chains(space, Rows(points, weights), count, order, generator)
     weighted, plain = (
-        fit_chain_mixture(start, rows, rows, 40, Budget())
-        for rows in (Rows(points, weights), Rows(repeats))
+        fit_chain_mixture(start, rows, rows, 40) for rows in (Rows(points, weights), Rows(repeats))
     )
     at = space.uniform(30, generator)
     assert torch.allclose(weighted.log_prob(at), plain.log_prob(at), atol=1e-6)

@@ -19,8 +19,7 @@ from orbiflow.density import (
 )
 from orbiflow.density.fitting import group_numbers
 from orbiflow.density.fitting.folds import FOLDS, folds_of, repeats_of
-from orbiflow.density.fitting.kernels import kernel_estimates
-from orbiflow.density.fitting.mixtures import fit_mixture
+from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
 from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.fitting.weights import (
     TOLERANCE,

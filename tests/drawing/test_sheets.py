@@ -47,7 +47,7 @@ every_width = pytest.mark.parametrize("width", ["single", "double"])
 @pytest.fixture(autouse=True)
 def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orbiflow.density.pictures.square._GRID", 24)
-    monkeypatch.setattr("orbiflow.density.pictures.values._COARSE", 24)
+    monkeypatch.setattr("orbiflow.density.pictures.colours._COARSE", 24)
     monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 40)
 
 

@@ -22,7 +22,7 @@ from orbiflow.runtime import (
     Written,
     find,
 )
-from orbiflow.tiles.pages.tile_folder import TILE_FILES
+from orbiflow.tiles.pages.run_folder import TILE_FILES
 from runtime.searches import BOOT, ENDLESS, boot_call, check_order, run
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from orbiflow.cli import app
-from orbiflow.runtime import Operation, Outcome, all_operations, find
+from orbiflow.runtime import Call, Operation, Outcome, all_operations, find
 
 
 @pytest.fixture
@@ -17,14 +17,11 @@ def called(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
     """The JSON forms of what the command line called, without doing it."""
     calls: list[dict[str, Any]] = []
 
-    def run(self: Operation, arguments: Any, *_: object) -> Outcome:
-        names = {entry.name for entry in self.fields}
-        flat = {**arguments, **{k: v for s in arguments.values() if hasattr(s, "fields_given")
-                                for k, v in s.to_json().items()}}  # fmt: skip
-        calls.append({name: value for name, value in flat.items() if name in names})
+    def run(self: Call, *_: object) -> Outcome:
+        calls.append(self.to_json())
         return Outcome()
 
-    monkeypatch.setattr(Operation, "run", run)
+    monkeypatch.setattr(Call, "run", run)
     return calls
 
 
@@ -134,14 +131,14 @@ def test_alone_it_prints_its_help(capsys: pytest.CaptureFixture[str]) -> None:
 def test_exit_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
     outcomes = {0: Outcome(), 1: Outcome(state="nothing found"), 130: Outcome(state="cancelled")}
     for status, outcome in outcomes.items():
-        monkeypatch.setattr(Operation, "run", lambda *_, outcome=outcome: outcome)
+        monkeypatch.setattr(Call, "run", lambda *_, outcome=outcome: outcome)
         assert app.run(["export", "X"]) == status
     assert Outcome(failed=2).exit_status == 1
 
     def interrupted(*_: object) -> Outcome:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Operation, "run", interrupted)
+    monkeypatch.setattr(Call, "run", interrupted)
     assert app.run(["export", "X"]) == 130
 
 

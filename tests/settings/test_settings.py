@@ -6,7 +6,6 @@ import copy
 import json
 import math
 import pickle
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -97,7 +96,7 @@ WORD = st.text("abcxyz{}0 ", min_size=1).map(str.strip).filter(bool)
 def values_of(kind: Kind) -> st.SearchStrategy[Any]:
     """Values that a kind takes, as Python has them."""
     match kind:
-        case NumberKind(allowed, whole):
+        case NumberKind(allowed=allowed, whole=whole):
             low = allowed.least if allowed.least is not None else allowed.above
             high = allowed.most if allowed.most is not None else allowed.below
             if whole:
@@ -106,17 +105,17 @@ def values_of(kind: Kind) -> st.SearchStrategy[Any]:
                 )
             numbers = st.floats(low, high, allow_nan=False, allow_infinity=False)
             return numbers.filter(lambda number: number in allowed)
-        case ChoiceKind(choices):
+        case ChoiceKind(choices=choices):
             return st.sampled_from(choices)
-        case ListKind(item):
+        case ListKind(item=item):
             return st.lists(values_of(item), min_size=1, max_size=3).map(tuple)
-        case TupleKind(items):
+        case TupleKind(items=items):
             return st.tuples(*map(values_of, items))
-        case EitherKind(kinds):
+        case EitherKind(kinds=kinds):
             return st.one_of(*map(values_of, kinds))
-        case OptionalKind(inner):
+        case OptionalKind(inner=inner):
             return st.none() | values_of(inner)
-        case ParsedKind(_, inner):
+        case ParsedKind(inner=inner):
             if kind.metavar == "COLOUR":
                 return st.integers(0, 0xFFFFFF).map(lambda number: f"#{number:06x}")
             if kind.metavar == "PALETTE":
@@ -145,9 +144,9 @@ def test_a_value_survives_json(drawn: tuple[Field, Any]) -> None:
     assert entry.read(plain) == entry.read(value) == value
 
 
-def _made(make: Callable[..., Sheet], values: dict[str, Any]) -> Sheet | str:
+def _made(values: dict[str, Any]) -> Sheet | str:
     try:
-        return make(**values) if make is Sheet else make(values)
+        return Sheet(**values)
     except SettingError as error:
         return str(error)
 
@@ -157,13 +156,13 @@ def test_python_json_and_command_line_agree(data: st.DataObject) -> None:
     names = data.draw(st.sets(st.sampled_from(sorted(FIELDS))))
     given_values = {name: data.draw(values_of(FIELDS[name].kind)) for name in names}
     plain = {name: FIELDS[name].kind.plain(value) for name, value in given_values.items()}
-    made, again = _made(Sheet, given_values), _made(Sheet.from_json, plain)
+    made, again = _made(given_values), _made(plain)
     if not isinstance(made, Sheet):
         assert made == again  # refused in the same words
         return
     assert made == again
     assert made.fields_given == names
-    assert Sheet.from_json(json.loads(json.dumps(made.to_json()))) == made
+    assert Sheet(**json.loads(json.dumps(made.to_json()))) == made
     assert pickle.loads(pickle.dumps(made)).fields_given == names
     assert copy.copy(made) == made == made.replace()
     assert made.replace().fields_given == names
@@ -241,7 +240,7 @@ def test_mistakes_name_the_setting_and_the_kind(name: str) -> None:
     assert error.value.names == names
     assert all("--" + field in error.value.named(lambda field: "--" + field) for field in names)
     with pytest.raises(SettingError, match=kind):
-        Sheet.from_json(values)
+        Sheet(**values)
 
 
 def test_a_required_setting_is_missed_by_name() -> None:

@@ -12,17 +12,15 @@ import contextlib
 import ctypes
 import importlib
 import os
-import secrets
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any, Self, TypeAlias
 
 from orbiflow import __version__
-from orbiflow.batch.parcels import Answer, Parcel, carry_out
+from orbiflow.batch.executors import Answer, Executor, Parcel, carry_out
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Note, Sink, one_thread
 
@@ -45,8 +43,8 @@ USUAL_MMAP_BYTES = 128 * 2**10
 TRIM_VARIABLE = "MALLOC_TRIM_THRESHOLD_"
 
 
-class DaskCluster:
-    """An `Executor` of the workers of the scheduler at an address.
+class DaskCluster(Executor):
+    """The workers of the scheduler at an address.
 
     Dask gives the work of a lost worker to another one, three times (the scheduler's setting
     `distributed.scheduler.allowed-failures`), and then gives up all that the last one worked on. These
@@ -62,12 +60,7 @@ class DaskCluster:
         self._client: Client | None = None
 
     def __enter__(self) -> Self:
-        """Connect.
-
-        Raises:
-            OrbiflowError: If dask.distributed is not installed, no scheduler answers, or there is no
-                worker or one with another version of orbiflow.
-        """
+        """Connect, if there is a scheduler with workers that have the same orbiflow."""
         try:
             importlib.import_module("distributed")
         except ImportError as error:
@@ -84,19 +77,16 @@ class DaskCluster:
         try:
             self._check_workers(self._client)
         except BaseException:
-            self._close()
+            self.__exit__()
             raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-        /,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Disconnect; workers stop at their next step."""
-        self._close()
+        if self._client is not None:
+            with suppress(Exception):  # a scheduler that has gone
+                self._client.close(timeout=2)
+            self._client = None
 
     @property
     def place(self) -> str:
@@ -106,25 +96,20 @@ class DaskCluster:
     def answers(
         self, parcels: Iterable[Parcel], tell: Sink, cancel: Cancel
     ) -> Generator[Answer, None, None]:
-        """Yield an answer for each parcel; see `Executor.answers`.
-
-        No more parcels are on the cluster than its workers have threads.
-        """
-        client = self._working()
-        out, crew = _Out(client), _Crew(client, self.address, tell)
+        """Yield an answer for each parcel; no more are out than the workers have threads."""
+        out = _Out(self._working(), self.address, tell)
         waiting, suspects = iter(parcels), list[Parcel]()
         alone = False
         try:
             while not cancel.cancelled:
-                room = crew.room()
+                room = out.room()
                 out.fill(waiting, room)
-                if not len(out) and room:
+                if not out.sent and room:
                     if not suspects:
                         return
                     alone = True
                     out.send(suspects.pop())
-                came = out.came()
-                for one in came:
+                for one in out.came():
                     out.fill(waiting, room)  # now: what comes next takes the caller its time
                     answer = self._answer(one, alone)
                     if answer is not None:
@@ -133,8 +118,6 @@ class DaskCluster:
                     key = one.parcel.key
                     tell(Note(f"workers died while they were at {key}; it is tried again alone"))
                     suspects.append(one.parcel)
-                if not came:
-                    time.sleep(POLL)
         finally:
             out.recall()
 
@@ -187,12 +170,6 @@ class DaskCluster:
             raise OrbiflowError("connect first: `with DaskCluster(address) as cluster:`")
         return self._client
 
-    def _close(self) -> None:
-        if self._client is not None:
-            with suppress(Exception):  # a scheduler that has gone
-                self._client.close(timeout=2)
-            self._client = None
-
 
 @dataclass(frozen=True, eq=False)
 class _Sent:
@@ -208,37 +185,48 @@ class _Sent:
 
 
 class _Out:
-    """The parcels that are on the cluster."""
+    """The parcels that are on the cluster, and the number of threads that work there."""
 
-    def __init__(self, client: Client) -> None:
-        self.client = client
-        self.run = secrets.token_hex(4)
-        self.count = 0
+    def __init__(self, client: Client, address: str, tell: Sink) -> None:
+        self.client, self.address, self.tell = client, address, tell
         self.sent: list[_Sent] = []
+        self.threads = _threads(client)
+        self.looked = self.seen = time.monotonic()
 
-    def __len__(self) -> int:
-        return len(self.sent)
+    def room(self) -> int:
+        """Return how many parcels may be here at a time; raise an error if it was none for long."""
+        now = time.monotonic()
+        if now - self.looked >= LOOK:
+            before, self.threads, self.looked = self.threads, _threads(self.client), now
+            if before and not self.threads:
+                self.tell(Note(f"no worker is left at {self.address}; waiting for one"))
+        if self.threads:
+            self.seen = now
+        elif now - self.seen > PATIENCE:
+            raise OrbiflowError(
+                f"no worker has been at {self.address} for {PATIENCE:.0f} s; the same command goes on "
+                "from here once there is one"
+            )
+        return self.threads
 
     def fill(self, waiting: Iterator[Parcel], room: int) -> None:
-        while len(self) < room and (parcel := next(waiting, None)) is not None:
+        while len(self.sent) < room and (parcel := next(waiting, None)) is not None:
             self.send(parcel)
 
     def send(self, parcel: Parcel) -> None:
-        key = f"orbiflow-{self.run}-{self.count}"
-        self.count += 1
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that a picture is large
-            future = self.client.submit(
-                _serve, parcel.header(), parcel.data, key=key, pure=False, retries=0
-            )
+            future = self.client.submit(_serve, parcel.header(), parcel.data, pure=False, retries=0)
         loop = self.client.loop.asyncio_loop
         fetched = asyncio.run_coroutine_threadsafe(_fetched(self.client, future), loop)
         self.sent.append(_Sent(parcel, future, fetched))
 
     def came(self) -> list[_Sent]:
-        """Those that have come back."""
+        """Return those that have come back; if there are none, after a while."""
         came = [one for one in self.sent if one.result.done()]
         self.sent = [one for one in self.sent if one not in came]
+        if not came:
+            time.sleep(POLL)
         return came
 
     def recall(self) -> None:
@@ -258,35 +246,6 @@ async def _fetched(client: Client, future: Future) -> Any:
     then fails, and `Client.get_executor` takes the status "lost" of a result for its failure.
     """
     return await client.gather(future, asynchronous=True)
-
-
-class _Crew:
-    """The number of threads that work, looked at now and then."""
-
-    def __init__(self, client: Client, address: str, tell: Sink) -> None:
-        self.client, self.address, self.tell = client, address, tell
-        self.threads = _threads(client)
-        self.looked = self.seen = time.monotonic()
-
-    def room(self) -> int:
-        """Return how many parcels may be on the cluster at a time.
-
-        Raises:
-            OrbiflowError: If nobody has worked for long.
-        """
-        now = time.monotonic()
-        if now - self.looked >= LOOK:
-            before, self.threads, self.looked = self.threads, _threads(self.client), now
-            if before and not self.threads:
-                self.tell(Note(f"no worker is left at {self.address}; waiting for one"))
-        if self.threads:
-            self.seen = now
-        elif now - self.seen > PATIENCE:
-            raise OrbiflowError(
-                f"no worker has been at {self.address} for {PATIENCE:.0f} s; the same command goes on "
-                "from here once there is one"
-            )
-        return self.threads
 
 
 def _connected(address: str, timeout: float) -> Client:

@@ -5,16 +5,14 @@ from __future__ import annotations
 import io
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, nullcontext, suppress
 from pathlib import Path, PurePosixPath
-from types import TracebackType
 from typing import Self
 
 from filelock import FileLock, Timeout
 
 from orbiflow.batch.journal import Entry, Journal
-from orbiflow.batch.kinds import Kind
-from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Overview
+from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Kind, Overview
 from orbiflow.errors import OrbiflowError, OutputError
 from orbiflow.runtime import LITTER, ResultFolder, make_folder, write_atomic, write_set
 
@@ -33,17 +31,8 @@ took, so that most of the time is for the work, however many results there are."
 class BatchFolder:
     """Where the results of a batch go; in a `with` block, no other batch can use it.
 
-    - `keys`: The keys of the items, in the order of the overview.
-    - `current`: The keys of those that have finished with the present settings; only these are in the
-      overview.
-
-    Args:
-        path: The folder, made if need be. An earlier batch there is resumed.
-        kind: The kind of batch.
-        overview: What shows all results.
-
-    Raises:
-        OutputError: If it holds something else, another batch works there, or it cannot be written.
+    The folder is made if need be, and an earlier batch there is resumed. `keys` are those of the items,
+    in the order of the overview; it has only the `current` ones, finished with the present settings.
     """
 
     def __init__(self, path: Path, kind: Kind, overview: Overview) -> None:
@@ -73,34 +62,16 @@ class BatchFolder:
         self._open.enter_context(self.journal)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, _kind: object, error: BaseException | None, _traceback: object) -> None:
         """Write the overview, whatever has happened."""
-        with self._open:
-            if kind is None:
-                self.write_all(last=True)
-            else:
-                with suppress(OrbiflowError):  # the first error is the one to be told
-                    self.write_all(last=True)
-
-    def has(self, name: str) -> bool:
-        """Return whether the folder of a result exists."""
-        return (self.path / name).is_dir()
+        # the first error is the one to be told
+        with self._open, suppress(OrbiflowError) if error else nullcontext():
+            self.write_all(last=True)
 
     def keep(self, entry: Entry, files: Mapping[str, bytes], picture: str | None) -> None:
-        """Put a result where it belongs, and then add it to the journal.
+        """Put the files of a result where they belong, and then add it to the journal.
 
-        Args:
-            entry: What came of the item.
-            files: The files of the result, by path; none leaves what was there.
-            picture: The path of the one that the page shows small.
-
-        Raises:
-            OutputError: If it cannot be written; the journal then does not have it.
+        No files leave what was there; `picture` is the path of the one that the page shows small.
         """
         if files:
             folder = ResultFolder(self.path / entry.name, self.kind.written)
@@ -119,11 +90,7 @@ class BatchFolder:
             self.write_all()
 
     def write_all(self, *, last: bool = False) -> None:
-        """Write the overview of all `keys` that are `current`.
-
-        Raises:
-            OutputError: If it cannot be written.
-        """
+        """Write the overview of all `keys` that are `current`."""
         begin = time.monotonic()
         entries = [self.journal.entries[key] for key in self.keys if key in self.current]
         pictures = frozenset(path.stem for path in (self.path / THUMBNAILS).glob("*.png"))
@@ -139,7 +106,8 @@ class BatchFolder:
         try:
             if not self.path.exists() or (self.path / self.overview.journal).exists():
                 return
-            found = next((p for p in sorted(self.path.iterdir()) if not _is_litter(p)), None)
+            known = (*LITTER, LOCK)
+            found = next((p for p in sorted(self.path.iterdir()) if p.name not in known), None)
         except OSError as error:
             raise OutputError(
                 f"cannot write into {self.path}: {error.strerror or error}; choose another --out"
@@ -149,10 +117,6 @@ class BatchFolder:
                 f"{self.path} holds {found.name}, which is of no earlier {self.overview.what}: "
                 "choose another --out or move it"
             )
-
-
-def _is_litter(path: Path) -> bool:
-    return path.name in LITTER or path.name == LOCK
 
 
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:

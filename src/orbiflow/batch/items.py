@@ -11,7 +11,7 @@ from fnmatch import fnmatch
 from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
-from orbiflow.batch.kinds import Kind
+from orbiflow.batch.overview import Kind
 from orbiflow.errors import InputFileError
 from orbiflow.runtime import Call
 
@@ -51,7 +51,18 @@ class FileSource:
         return self.path.name
 
     def read(self) -> bytes:
-        return content(self.path, self.most)
+        try:
+            with self.path.open("rb") as file:
+                data = file.read(self.most + 1)
+        except OSError as error:
+            why = error.strerror or error
+            raise InputFileError(f"{self.name}: cannot be read ({why}); check it") from error
+        if len(data) > self.most:
+            raise InputFileError(
+                f"{self.name}: larger than {self.most / 2**20:.0f} MB, the most that is read; simplify "
+                "it"
+            )
+        return data
 
     def code(self) -> str:
         return code_of(self.read())
@@ -82,19 +93,10 @@ class Item:
 
 
 def listed(folder: Path, endings: Collection[str], match: str | None, out: Path) -> list[str]:
-    """Return the paths of a folder's files that can be read, relative and with slashes, in order.
+    """Return the paths of a folder's files with some `endings`, relative and with slashes, in order.
 
     Folders inside are searched as well, links to folders are not. Names that begin with a dot are left
-    out.
-
-    Args:
-        folder: The folder.
-        endings: Endings of names in small letters, such as ".svg".
-        match: A pattern that the name or the path must fit.
-        out: Where the results go.
-
-    Raises:
-        InputFileError: If it is no folder, cannot be read, holds `out`, or has no such file.
+    out, and those that do not fit the pattern `match`. The results must go to an `out` elsewhere.
     """
     if not folder.is_dir():
         why = "it is a file" if folder.exists() else "there is no such folder"
@@ -174,25 +176,6 @@ def _plain(text: str) -> str:
     """A name of letters, digits, dots, dashes and underscores, neither empty nor hidden."""
     text = re.sub(r"[^\w.-]+", "-", text.replace("/", "-")).strip("-.")
     return text[:LONGEST_NAME].rstrip("-.") or "file"
-
-
-def content(path: Path, most: int) -> bytes:
-    """Return a file's bytes.
-
-    Raises:
-        InputFileError: If it cannot be read, is empty, or has more bytes than `most`.
-    """
-    try:
-        with path.open("rb") as file:
-            data = file.read(most + 1)
-    except OSError as error:
-        why = error.strerror or error
-        raise InputFileError(f"{path.name}: cannot be read ({why}); check it") from error
-    if len(data) > most:
-        raise InputFileError(
-            f"{path.name}: larger than {most / 2**20:.0f} MB, the most that is read; simplify it"
-        )
-    return data
 
 
 def code_of(data: bytes) -> str:

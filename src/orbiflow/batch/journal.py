@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal, Self, cast, get_args
 
 from orbiflow.errors import OutputError
@@ -56,14 +55,7 @@ class Entry:
 
 
 class Journal:
-    """The last entry of each item; in a `with` block more can be added.
-
-    Args:
-        path: The file, which need not exist.
-
-    Raises:
-        OutputError: If it exists and is no journal.
-    """
+    """The last entry of each item, from a file if it exists; a `with` block can add more."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -81,20 +73,11 @@ class Journal:
             raise _cannot(self.path, error) from error
         return self
 
-    def __exit__(
-        self,
-        _kind: type[BaseException] | None,
-        _error: BaseException | None,
-        _traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self._file.close()
 
     def add(self, entry: Entry) -> None:
-        """Add an entry, which is on the disk when this returns.
-
-        Raises:
-            OutputError: If it cannot be written.
-        """
+        """Add an entry, which is on the disk when this returns."""
         try:
             self._file.write(entry.line().encode())
             self._file.flush()
@@ -110,24 +93,17 @@ class Journal:
             lines = self.path.read_bytes().splitlines()
         except OSError as error:
             raise _cannot(self.path, error) from error
-        read = list(_entries(lines))
-        if lines and not read and len(lines) > 1:
+        for line in lines:
+            with suppress(ValueError, TypeError, RecursionError):  # cut short: to be done again
+                document = json.loads(line)
+                if is_object(document) and document.pop("kind", None) == "entry":
+                    entry = Entry(**document)
+                    if _is_sound(entry):
+                        self.entries[entry.file] = entry
+        if len(lines) > 1 and not self.entries:
             raise OutputError(
                 f"{self.path} is no journal of a batch; move it or choose another --out"
             )
-        self.entries = {entry.file: entry for entry in read}
-
-
-def _entries(lines: Iterable[bytes]) -> Iterator[Entry]:
-    for line in lines:
-        try:
-            document = json.loads(line)
-            if is_object(document) and document.pop("kind", None) == "entry":
-                entry = Entry(**document)
-                if _is_sound(entry):
-                    yield entry
-        except (ValueError, TypeError, RecursionError):
-            continue  # cut short: to be done again
 
 
 def _is_sound(entry: Entry) -> bool:

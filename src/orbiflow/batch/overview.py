@@ -5,14 +5,79 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
 from orbiflow.batch.journal import Entry
-from orbiflow.batch.kinds import Column, Kind
 
 TABLE, PAGE = "batch.csv", "index.html"
+
+Summary = Mapping[str, Any]
+"""The summary of a call's `Finished`."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A figure of the best result.
+
+    - `name`, `title`: What the table and the page call it.
+    - `form`: The format of the number on the page, "" for text.
+    - `falling`: Whether the best is the largest.
+    """
+
+    name: str
+    title: str
+    form: str = ""
+    falling: bool = True
+
+    def shown(self, value: Any) -> str:
+        """Return a value as the page shows it.
+
+        >>> Column("iou", "IoU", ".3f").shown(0.91234)
+        '0.912'
+        """
+        if value is None:
+            return "-"
+        return format(value, self.form) if self.form else str(value)
+
+    def rank(self, value: Any) -> str:
+        """Return what cards are sorted by, the smallest first."""
+        if not isinstance(value, int | float):
+            return ""
+        return f"{-value if self.falling else value:.9g}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kind:
+    """A kind of batch: what is done many times.
+
+    - `things`: What is worked on, in the plural.
+    - `items`: What there are so many of, in the plural.
+    - `reads`, `writes`: The parameters of the call that name the file and the folder.
+    - `modules`: Modules that the work needs.
+    - `columns`: Figures of the best result; `best` takes them from a summary, by name.
+    - `picture`: Takes from a summary the path of a picture in the result's folder, or None.
+    - `shows`: What is on the picture, before "of" and the file's name.
+    - `opens`: The page in a result's folder that a card with a picture opens, "" for the folder.
+    - `written`: Returns the paths of what an earlier run wrote into a folder.
+    - `endings`, `most_bytes`: For a folder of files, the endings and the largest size of those read.
+    """
+
+    things: str
+    items: str
+    reads: str
+    writes: str
+    modules: Sequence[str]
+    columns: Sequence[Column]
+    best: Callable[[Summary], dict[str, Any]]
+    picture: Callable[[Summary], str | None]
+    shows: str = "Picture"
+    opens: str = ""
+    written: Callable[[Path], set[str]]
+    endings: Sequence[str] = ()
+    most_bytes: int = 0
 
 
 class Overview(Protocol):
@@ -41,9 +106,10 @@ class Overview(Protocol):
 
 @dataclass(frozen=True)
 class ContactSheet:
-    """The table and the page of a folder's files.
+    """The table of a folder's files, and a page of this title: a card for each, to sort and search.
 
-    - `title`: The title of the page.
+    The page refers to nothing but files beside it. Pictures are fetched and cards laid out only where
+    they are looked at, so thousands are no burden. Without scripts it is in the order of the names.
     """
 
     journal: ClassVar[str] = "batch.jsonl"
@@ -60,29 +126,33 @@ class ContactSheet:
         *,
         last: bool,  # noqa: ARG002
     ) -> Mapping[str, bytes | None]:
-        """Return `batch.csv` and `index.html`."""
-        return {
-            TABLE: table(entries, self.kind),
-            PAGE: page(entries, self.kind, self.title, waiting, pictures),
-        }
+        """Return `batch.csv`, a line for each item, and `index.html`."""
+        from orbiflow.drawing import rendered
 
-
-def table(entries: Iterable[Entry], kind: Kind) -> bytes:
-    """Return a table with a line for each item, in order, as UTF-8.
-
-    Numbers are written so that they can be read back exactly; the cell of what there is not is empty.
-    """
-    names = [column.name for column in kind.columns]
-    heads = ["file", "state", *names, "seconds", "error", "folder", "sha256", "settings", "version"]
-    return csv_bytes(heads, (list(_row(entry, names)) for entry in entries))
+        columns = self.kind.columns
+        names = [column.name for column in columns]
+        heads = ["file", "state", *names, "seconds", "error", "folder"]
+        heads += ["sha256", "settings", "version"]
+        page = rendered(
+            "orbiflow.batch",
+            "page.html",
+            title=self.title,
+            kind=self.kind,
+            figures=[column for column in columns if column.form],
+            words=[column for column in columns if not column.form],
+            done=[entry for entry in entries if entry.state == "done"],
+            other=[entry for entry in entries if entry.state != "done"],
+            waiting=waiting,
+            pictures=pictures,
+        )
+        table = csv_bytes(heads, (list(_row(entry, names)) for entry in entries))
+        return {TABLE: table, PAGE: page.encode("utf-8", "replace")}
 
 
 def csv_bytes(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
     """Return a CSV as UTF-8."""
     text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(heads)
-    writer.writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows([heads, *rows])
     return text.getvalue().encode("utf-8", "replace")
 
 
@@ -96,42 +166,9 @@ def _row(entry: Entry, names: Sequence[str]) -> Iterator[Any]:
 
 
 def _cell(value: Any) -> str:
+    """A value that can be read back exactly, or nothing."""
     if value is None:
         return ""
     if isinstance(value, bool):
         return "yes" if value else "no"
     return repr(value) if isinstance(value, float) else str(value)
-
-
-def page(
-    entries: Sequence[Entry], kind: Kind, title: str, waiting: int, pictures: frozenset[str]
-) -> bytes:
-    """Return the contact sheet: a card for each result, which can be sorted and searched.
-
-    The page refers to nothing but files beside it. Pictures are fetched and cards laid out only where
-    they are looked at, so thousands are no burden. Without scripts it is in the order of the names.
-    """
-    from orbiflow.drawing import rendered
-
-    text = rendered(
-        "orbiflow.batch",
-        "page.html",
-        title=title,
-        kind=kind,
-        figures=[column for column in kind.columns if column.form],
-        words=[column for column in kind.columns if not column.form],
-        done=[entry for entry in entries if entry.state == "done"],
-        other=[entry for entry in entries if entry.state != "done"],
-        waiting=waiting,
-        pictures=pictures,
-        rank=_rank,
-    )
-    return text.encode("utf-8", "replace")
-
-
-def _rank(column: Column, entry: Entry) -> str:
-    """What cards are sorted by, the smallest first."""
-    value = entry.best.get(column.name)
-    if not isinstance(value, int | float):
-        return ""
-    return f"{-value if column.falling else value:.9g}"

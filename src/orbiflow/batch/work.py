@@ -11,13 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from orbiflow import __version__
-from orbiflow.batch.executors import WorkSettings, executor_for
+from orbiflow.batch.executors import Answer, Parcel, WorkSettings, executor_for
 from orbiflow.batch.folder import RESERVED, BatchFolder
 from orbiflow.batch.items import FileSource, Item, code_of, folder_names, listed
 from orbiflow.batch.journal import Entry
-from orbiflow.batch.kinds import FolderKind, Kind
-from orbiflow.batch.overview import PAGE, TABLE, ContactSheet
-from orbiflow.batch.parcels import Answer, Parcel
+from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Kind
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import (
     Call,
@@ -46,24 +44,12 @@ class Counts:
     left: int
     kept: int
 
-    @property
-    def state(self) -> State:
-        """How the batch ends."""
-        if self.left:
-            return "cancelled"
-        return "done" if self.done else "nothing found"
-
     def outcome(
         self, count: int, table: Path, page: Path, summary: dict[str, Any], tell: Sink
     ) -> Outcome:
-        """Say what was done and what to do next, and return the outcome.
+        """Tell what was done of `count` items and what to do next, and return the outcome.
 
-        Args:
-            count: The number of items.
-            table: The table of all results.
-            page: The page of all results.
-            summary: What the summary has besides the counts; with `seconds`.
-            tell: Is told.
+        Its summary has the counts and what `summary` has, with `seconds`.
         """
         done = "nothing was left to do" if self.kept == count else f"{self.done} of {count} done"
         tell(Note(f"{done}, in {summary['seconds']:.0f} s; look at {page}, or {table}"))
@@ -74,13 +60,14 @@ class Counts:
         elif without:
             text = f"{without} without a result, for the reasons in {table}"
             tell(Note(f"{text}; --retry-failed does them again", warning=True))
-        return Outcome({**summary, **asdict(self)}, self.state, without)
+        state: State = "cancelled" if self.left else "done" if self.done else "nothing found"
+        return Outcome({**summary, **asdict(self)}, state, without)
 
 
 def run_files(
     source: Path,
     out: Path,
-    kind: FolderKind,
+    kind: Kind,
     title: str,
     call_of: Callable[[str], Call],
     match: str | None,
@@ -90,24 +77,10 @@ def run_files(
 ) -> Outcome:
     """Make a call for every file of a folder, and put its result into a folder as it comes.
 
-    Args:
-        source: The folder of files.
-        out: The folder of results; an earlier batch there is resumed.
-        kind: The kind of batch.
-        title: The title of the page.
-        call_of: Returns the call for a file of this name.
-        match: A pattern of names. Default: all that can be read.
-        settings: Who works.
-        tell: Is told all that a user should see.
-        cancel: Ends the batch; what has finished is kept.
-
-    Returns:
-        An outcome whose summary has `folder`, `table` and `page`; the number of `files`, and how many
-        of them are `done`, gave `nothing`, `failed` or are `left`; how many were `kept` from before;
-        and `seconds`.
-
-    Raises:
-        OrbiflowError: For a mistake of the user; what has finished is kept.
+    `call_of` returns the call for a file's name; `match` is a pattern of names, None for all that can
+    be read. The outcome's summary has `folder`, `table` and `page`; the number of `files`, and how many
+    of them are `done`, gave `nothing`, `failed` or are `left`; how many were `kept` from before;
+    `seconds`.
     """
     begin = time.perf_counter()
     if match is not None and not match.strip():
@@ -124,13 +97,8 @@ def run_files(
         gone = f"of files that are not in {source}{left_out}"
         counts = run_items(items, settings, folder, tell, cancel, gone=gone)
     table, page = out / TABLE, out / PAGE
-    summary = {
-        "folder": str(out),
-        "table": str(table),
-        "page": str(page),
-        "files": len(files),
-        "seconds": time.perf_counter() - begin,
-    }
+    summary: dict[str, Any] = {"folder": str(out), "table": str(table), "page": str(page)}
+    summary |= {"files": len(files), "seconds": time.perf_counter() - begin}
     return counts.outcome(len(files), table, page, summary, tell)
 
 
@@ -143,18 +111,9 @@ def run_items(
     *,
     gone: str,
 ) -> Counts:
-    """Do what has not been done, and put it into the folder as it comes.
+    """Do what has not been done of items with different keys, and put it into the folder as it comes.
 
-    Args:
-        items: Items with different keys.
-        settings: Who works.
-        folder: The folder, entered.
-        tell: Is told all that a user should see.
-        cancel: Ends the batch; what has finished is kept.
-        gone: What earlier results are of that belong to no item, in words.
-
-    Raises:
-        OrbiflowError: For a mistake of the user; what has finished is kept.
+    `gone` says in words what earlier results are of that belong to no item.
     """
     folder.keys = [item.key for item in items]
     todo = list(_todo(items, settings, folder))
@@ -179,7 +138,7 @@ def _todo(items: Sequence[Item], settings: WorkSettings, folder: BatchFolder) ->
                 code = item.source.code()
             except OrbiflowError:
                 code = ""
-            there = before.state == "failed" or folder.has(before.name)
+            there = before.state == "failed" or (folder.path / before.name).is_dir()
             if there and before.same_work(code, item.settings(folder.kind), __version__):
                 continue
         yield item

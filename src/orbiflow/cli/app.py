@@ -107,10 +107,8 @@ def _command(operation: Operation) -> Callable[..., int]:
     fields = {entry.name: entry for entry in operation.fields if not entry.of_class(Hidden)}
 
     def command(*words: Any, **options: Any) -> int:
-        found = signature.bind(*words, **options).arguments
-        given = {
-            name: _value(fields[name], word) for name, word in found.items() if word is not None
-        }
+        found = signature.bind(*words, **options).arguments.items()
+        given = {name: _value(fields[name], word) for name, word in found if word is not None}
         return _do(operation, given)
 
     named = _namer(operation)
@@ -135,7 +133,7 @@ def _argument(entry: Field, groups: dict[str, Group], named: Callable[[str], str
         required=entry.required,
         show_default=False,
         allow_leading_hyphen=not entry.positional and not _is_flag(entry),
-        metavar=None if _is_flag(entry) else _metavar(entry),
+        metavar=None if _is_flag(entry) else "|".join(entry.kind.choices) or entry.kind.metavar,
         choices=entry.kind.choices or None,
         show_choices=False,
     )
@@ -167,12 +165,6 @@ def _value(entry: Field, word: Any) -> Any:
 
 def _is_flag(entry: Field) -> bool:
     return entry.alternatives == {bool}
-
-
-def _metavar(entry: Field) -> str:
-    if entry.kind.choices:
-        return "|".join(entry.kind.choices)
-    return entry.kind.metavar
 
 
 def _help(entry: Field, named: Callable[[str], str]) -> str:

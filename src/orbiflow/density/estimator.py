@@ -47,11 +47,7 @@ class Parameters:
         return {name: getattr(self, name) for name in self._names()}
 
     def set_params(self, **params: Any) -> Self:
-        """Change constructor arguments.
-
-        Raises:
-            OrbiflowError: for a name that is none.
-        """
+        """Change constructor arguments."""
         for name, value in params.items():
             if name not in self._names():
                 raise OrbiflowError(f"no parameter {name!r}; there are {', '.join(self._names())}")
@@ -90,11 +86,7 @@ RandomState: TypeAlias = int | np.integer | np.random.RandomState | np.random.Ge
 
 
 def seed_of(random_state: RandomState) -> int:
-    """A seed; None and generators give another one at every call.
-
-    Raises:
-        OrbiflowError: for another thing.
-    """
+    """A seed; None and generators give another one at every call."""
     if random_state is None:
         return int(np.random.randint(2**31))  # noqa: NPY002  scikit-learn's convention
     if isinstance(random_state, np.random.RandomState):

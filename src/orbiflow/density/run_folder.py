@@ -1,9 +1,12 @@
-"""The folder of a density, as a fit and the operations on its model leave it."""
+"""The folder of a density, as a fit and the operations on its model leave it, and other results."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
+
+from orbiflow.runtime import Note, ResultFolder, Sink, Written, write_atomic
 
 
 def written_files(folder: Path) -> set[str]:
@@ -19,3 +22,20 @@ def written_files(folder: Path) -> set[str]:
     from orbiflow.density.pictures import MODEL, PICTURES, REPORT, TABLE, THUMBNAIL
 
     return {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES}
+
+
+def write_files(folder: ResultFolder, files: Mapping[str, str | bytes], tell: Sink) -> None:
+    """Replace a folder's files by these, by their names, and tell which were written."""
+    with folder.replaced() as staged:
+        for name, content in files.items():
+            write_atomic(staged / name, content)
+    for name in files:
+        tell(Written(folder.path / name))
+
+
+def write_file(path: Path, content: str | bytes, tell: Sink, *notes: str) -> None:
+    """Write a file, and tell so before other notes."""
+    write_atomic(path, content)
+    tell(Written(path))
+    for note in notes:
+        tell(Note(note))

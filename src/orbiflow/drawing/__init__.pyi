@@ -39,7 +39,4 @@ from .sheet import Picture as Picture
 from .sheet import Sheet as Sheet
 from .sheet import column_width as column_width
 from .sheet import pdf_pages as pdf_pages
-from .web_page import CLOSING as CLOSING
-from .web_page import css as css
-from .web_page import opening as opening
 from .web_page import rendered as rendered

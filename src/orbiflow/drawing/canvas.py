@@ -22,11 +22,7 @@ MAX_PIXELS = 20_000
 
 
 def check_size(width_px: int, height_px: int) -> None:
-    """Check that a picture can have this size.
-
-    Raises:
-        OrbiflowError: If a side is below 16 or above `MAX_PIXELS` pixels.
-    """
+    """Check that a picture can have this size."""
     if not (16 <= width_px <= MAX_PIXELS and 16 <= height_px <= MAX_PIXELS):
         raise OrbiflowError(
             f"a picture of {width_px} by {height_px} pixels cannot be made: sides go from 16 to "
@@ -34,17 +30,13 @@ def check_size(width_px: int, height_px: int) -> None:
         )
 
 
-def blank_figure(width_px: int, height_px: int, paper: str = "#ffffff") -> Figure:
-    """Return an empty figure of this size in pixels.
-
-    Raises:
-        OrbiflowError: If a side is below 16 or above `MAX_PIXELS` pixels.
-    """
+def blank_figure(width_px: int, height_px: int) -> Figure:
+    """Return an empty figure of this size in pixels."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     check_size(width_px, height_px)
-    figure = Figure(figsize=(width_px / DPI, height_px / DPI), dpi=DPI, facecolor=paper)
+    figure = Figure(figsize=(width_px / DPI, height_px / DPI), dpi=DPI, facecolor="#ffffff")
     FigureCanvasAgg(figure)
     return figure
 
@@ -114,13 +106,8 @@ def mark_symmetry(
 ) -> None:
     """Mark all rotation centres and lines of a group in a window.
 
-    Args:
-        axes: The axes.
-        group: The group.
-        window: The window.
-        size: Radius of the signs, in the group's units.
-        halo: Colour of the thin rim that separates the marks from the picture.
-        pen: A function from widths of lines on a screen to those here, in points.
+    Signs have the radius `size` in the group's units; `halo` is the colour of a thin rim that separates
+    marks from the picture; `pen` makes widths of lines here, in points, from those on a screen.
     """
     low, high = np.array(window[:2]), np.array(window[2:])
     middle, reach = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
@@ -143,12 +130,11 @@ def outline_cell(
     group: CrystallographicGroup,
     middle: Array,
     *,
-    colour: str = "#111111",
     pen: Callable[[float], float] = float,
 ) -> None:
     """Outline the lattice cell `cell_ring(group, middle)`, with a pen as in `mark_symmetry`."""
     ring = cell_ring(group, middle)
-    for ink, width, alpha in (("#ffffff", 3.2, 0.7), (colour, 1.7, 1.0)):
+    for ink, width, alpha in (("#ffffff", 3.2, 0.7), ("#111111", 1.7, 1.0)):
         axes.plot(
             *ring.T, color=ink, linewidth=pen(width), alpha=alpha, solid_joinstyle="miter", zorder=5
         )

@@ -89,8 +89,6 @@ def field_picture(
     tile: HasPolygon | None = None,
     *,
     window: Window | None = None,
-    y_down: bool = False,
-    signs: bool = True,
     sheet: Sheet | None = None,
 ) -> Picture:
     """Draw a vector field: its magnitude as colour, short flow lines over it.
@@ -105,8 +103,6 @@ def field_picture(
         group: The group whose lattice cell is outlined, and whose centres and lines are marked.
         tile: A tile to draw on top.
         window: The window. Default: about four cells around the tile or the origin.
-        y_down: Whether the y axis points down, as in images.
-        signs: Whether to mark rotation centres and lines.
         sheet: The sheet. Default: a screen of 1200 pixels.
 
     Raises:
@@ -116,7 +112,7 @@ def field_picture(
     middle = np.zeros(2) if tile is None else tile.center
     window = window or _about_four_cells(group, middle)
     figure = sheet.figure(sheet.width * (window[3] - window[1]) / (window[2] - window[0]))
-    axes = plane_axes(figure, window, y_down=y_down)
+    axes = plane_axes(figure, window)
     draw_magnitude(axes, velocity, window)
     draw_flow(axes, velocity, group, window, pen=sheet.pen)
     outline_cell(axes, group, middle, pen=sheet.pen)
@@ -124,9 +120,8 @@ def field_picture(
         ring = np.concatenate([tile.polygon, tile.polygon[:1]])
         axes.plot(*ring.T, color="#111111", linewidth=sheet.pen(2.6), zorder=5)
         axes.plot(*ring.T, color="#ffd166", linewidth=sheet.pen(1.5), zorder=5)
-    if signs:
-        size = 0.03 * np.sqrt(group.cell_volume)
-        mark_symmetry(axes, group, window, size=size, pen=sheet.pen)
+    size = 0.03 * np.sqrt(group.cell_volume)
+    mark_symmetry(axes, group, window, size=size, pen=sheet.pen)
     return Picture(figure, sheet, "Vector field", "Colour is the field's magnitude.")
 
 
@@ -160,15 +155,7 @@ def draw_flow(
     *,
     pen: Callable[[float], float] = float,
 ) -> None:
-    """Draw lines with heads and fading tails.
-
-    Args:
-        axes: The axes.
-        velocity: The field, as for `field_picture`.
-        group: The group whose orbits the lines start at.
-        window: The window.
-        pen: A function from widths of lines on a screen to those here, in points.
-    """
+    """Draw lines with heads and fading tails from orbits of a group, with a pen as `mark_symmetry`."""
     from matplotlib.collections import LineCollection, PolyCollection
 
     scale = np.sqrt((window[2] - window[0]) * (window[3] - window[1]))
@@ -207,11 +194,7 @@ def _in_window(seeds: Array, group: CrystallographicGroup, window: Window, margi
 
 
 def evaluate(velocity: Callable[[Any], Any], points: Array) -> Array:
-    """Return a field that is written in torch at NumPy points (..., 2).
-
-    Raises:
-        OrbiflowError: If it does not return finite vectors of the points' shape.
-    """
+    """Return a field that is written in torch at NumPy points (..., 2)."""
     dtype = torch.float64
     if isinstance(velocity, torch.nn.Module):
         dtype = next((p.dtype for p in velocity.parameters()), dtype)

@@ -35,6 +35,9 @@ MIN_DIFFERENCE = 16
 SHARP_TURN = 0.3
 """Turn in radians beyond which a line's joint is rounded: flatter ones show no notch."""
 
+INK = "#1a1a1a"
+"""Colour of texts."""
+
 
 class Filled(NamedTuple):
     """A polygon in pixels, in the colour with this number."""
@@ -59,7 +62,6 @@ class Words(NamedTuple):
     text: str
     size: float
     anchor: str
-    colour: str
 
 
 class Raster:
@@ -74,9 +76,6 @@ class Raster:
         y_down: Whether the y axis points down, as in images.
         paper: The background, as #rrggbb.
         strip_px: Height of the strip.
-
-    Raises:
-        OrbiflowError: If there cannot be a picture of this size.
 
     >>> raster = Raster((0.0, 0.0, 2.0, 1.0), 40)
     >>> raster.fill([np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])], "#ff0000")
@@ -138,19 +137,10 @@ class Raster:
         """Fill a polygon (N, 2) in pixels of the picture."""
         self.shapes.append(Filled(np.asarray(ring, float), (), self._number(colour)))
 
-    def text(
-        self,
-        x: float,
-        y: float,
-        text: str,
-        size: float,
-        *,
-        anchor: str = "lm",
-        colour: str = "#1a1a1a",
-    ) -> None:
+    def text(self, x: float, y: float, text: str, size: float, *, anchor: str = "lm") -> None:
         """Write text at a place in pixels, `size` pixels high, with Pillow's `anchor`."""
-        self._number(colour)
-        self.texts.append(Words((x, y), text, size, anchor, colour))
+        self._number(INK)
+        self.texts.append(Words((x, y), text, size, anchor))
 
     def image(self) -> Image.Image:
         """Return the picture in RGB."""
@@ -159,8 +149,8 @@ class Raster:
         for top in range(0, self.height, rows):
             picture.paste(self._band(top, min(rows, self.height - top)), (0, top))
         pen = ImageDraw.Draw(picture)
-        for place, text, size, anchor, colour in self.texts:
-            pen.text(place, text, fill=colour, font=font(size), anchor=anchor)
+        for place, text, size, anchor in self.texts:
+            pen.text(place, text, fill=INK, font=font(size), anchor=anchor)
         return picture
 
     def png(self) -> bytes:
@@ -221,12 +211,7 @@ def _draw_with_holes(band: Image.Image, shape: Filled, top: int) -> None:
 
 
 def palette_png(picture: Image.Image, colours: Sequence[str]) -> bytes:
-    """Return a picture as PNG whose palette is these colours, and steps between any two of them.
-
-    Args:
-        picture: RGB picture of these colours and their mixtures; others become the nearest.
-        colours: The colours, 1 to 256 of them, as #rrggbb.
-    """
+    """Return an RGB picture as PNG whose palette is 1 to 256 colours, and steps between any two."""
     buffer = io.BytesIO()
     limited(picture, colours).save(buffer, "PNG", compress_level=6)
     return buffer.getvalue()
@@ -279,14 +264,9 @@ MIN_WIDTH = 0.25
 
 
 def vector_picture(raster: Raster, sheet: Sheet, *, title: str, caption: str) -> Picture:
-    """Draw a raster as curves, as wide as the sheet, with lines in proportion.
+    """Draw a raster without a strip as curves, as wide as the sheet, with lines in proportion.
 
-    Args:
-        raster: A raster without a strip, whose words would be too small on a narrow sheet; the caption
-            has them.
-        sheet: The sheet.
-        title: The title of the picture.
-        caption: Its caption.
+    The words of a strip would be too small on a narrow sheet; the caption has them.
     """
     from matplotlib.collections import LineCollection, PathCollection
 
@@ -330,14 +310,7 @@ TEXT = 0.018
 
 
 def captioned(rings: Sequence[Array], width_px: int, *, y_down: bool, text: str) -> Raster:
-    """Return a raster that shows all of `rings` (N, 2) with a margin, and a text in its strip.
-
-    Args:
-        rings: Rings in the plane's units.
-        width_px: Width in pixels; the height follows.
-        y_down: Whether the y axis points down, as in images.
-        text: The text. If it is empty there is no strip.
-    """
+    """Return a raster that shows all of `rings` (N, 2) with a margin, and a text in a strip, if any."""
     strip = round(STRIP * width_px) if text else 0
     raster = Raster(window_of(rings), width_px, y_down=y_down, strip_px=strip)
     if text:

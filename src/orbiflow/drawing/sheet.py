@@ -204,9 +204,6 @@ def _plain_texts() -> Iterator[None]:
 def column_width(text: str) -> float:
     """Return the width in mm of a printed figure, from a word of `orbiflow.units.COLUMNS` or a length.
 
-    Raises:
-        OrbiflowError: As `orbiflow.units.length`, and for a width that no figure has.
-
     >>> column_width("double"), column_width("8.5cm")
     (180.0, 85.0)
     """

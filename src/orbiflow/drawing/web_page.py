@@ -6,11 +6,8 @@ server.
 
 from __future__ import annotations
 
-import html
 from importlib import resources
 from typing import Any
-
-CLOSING = "</body>\n</html>\n"
 
 
 def rendered(package: str, template: str, **values: Any) -> str:
@@ -29,8 +26,9 @@ def rendered(package: str, template: str, **values: Any) -> str:
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     def load(name: str) -> str:
-        home = resources.files(package).joinpath(name)
-        return home.read_text("utf-8") if home.is_file() else css("orbiflow.drawing", name)
+        own = resources.files(package).joinpath(name)
+        shared = resources.files("orbiflow.drawing").joinpath(name)
+        return (own if own.is_file() else shared).read_text("utf-8")
 
     pages = Environment(
         loader=FunctionLoader(load),
@@ -41,35 +39,3 @@ def rendered(package: str, template: str, **values: Any) -> str:
         keep_trailing_newline=True,
     )
     return pages.get_template(template).render(values)
-
-
-def opening(title: str, style: str = "", *, dark: bool = True) -> str:
-    """Return a page up to its body.
-
-    Args:
-        title: The title in plain text.
-        style: CSS of its own, after what all pages share.
-        dark: Whether it is dark if the reader prefers that.
-
-    >>> opening("a < b").splitlines()[6]
-    '<title>a &lt; b</title>'
-    """
-    here = "orbiflow.drawing"
-    shared = css(here, "web_page.css") + (css(here, "web_page_dark.css") if dark else "")
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="generator" content="orbiflow">
-<title>{html.escape(title)}</title>
-<style>
-{shared}{style}</style>
-</head>
-<body>
-"""
-
-
-def css(package: str, name: str) -> str:
-    """Return the text of a file in a package."""
-    return resources.files(package).joinpath(name).read_text("utf-8")

@@ -1,7 +1,7 @@
 from .call_process import CallProcess as CallProcess
 from .call_process import start as start
-from .cancel import Cancel as Cancel
-from .cancel import Cancelled as Cancelled
+from .events import Cancel as Cancel
+from .events import Cancelled as Cancelled
 from .events import ClassFailed as ClassFailed
 from .events import Event as Event
 from .events import Failed as Failed
@@ -18,6 +18,10 @@ from .events import Written as Written
 from .events import event_from_json as event_from_json
 from .files import LITTER as LITTER
 from .files import ResultFolder as ResultFolder
+from .files import check_inputs_kept as check_inputs_kept
+from .files import check_output_file as check_output_file
+from .files import check_output_folder as check_output_folder
+from .files import check_outside_runs as check_outside_runs
 from .files import is_list as is_list
 from .files import is_object as is_object
 from .files import make_folder as make_folder
@@ -35,10 +39,6 @@ from .operations import find as find
 from .operations import ignore as ignore
 from .operations import operation as operation
 from .operations import progress_events as progress_events
-from .places import check_inputs_kept as check_inputs_kept
-from .places import check_output_file as check_output_file
-from .places import check_output_folder as check_output_folder
-from .places import check_outside_runs as check_outside_runs
 from .processes import process_context as process_context
 from .processes import work as work
 from .tensor_files import read_arrays as read_arrays

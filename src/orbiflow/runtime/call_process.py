@@ -19,11 +19,9 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime.cancel import Cancel, Cancelled
-from orbiflow.runtime.events import Event, Failed, Finished, event_from_json
+from orbiflow.runtime.events import Cancel, Cancelled, Event, Failed, Finished, event_from_json
 from orbiflow.runtime.operations import Call, call_from_json
 from orbiflow.runtime.threads import one_thread_environment
 
@@ -51,11 +49,14 @@ class CallProcess:
     def __init__(self, call: Call) -> None:
         self.call = call
         self._lock = threading.Lock()
+        # so that the process imports this very package
+        package = str(Path(__file__).parents[2])
+        paths = [package, *filter(None, [os.environ.get("PYTHONPATH")])]
         self._process = subprocess.Popen(
             [sys.executable, "-m", "orbiflow.runtime.call_process"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            env=_environment(),
+            env={**os.environ, **one_thread_environment(), "PYTHONPATH": os.pathsep.join(paths)},
             start_new_session=True,  # Ctrl-C in this terminal is this process's affair
         )
         self._send(json.dumps(call.to_json(), allow_nan=False).encode() + b"\n")
@@ -63,12 +64,7 @@ class CallProcess:
     def __enter__(self) -> CallProcess:
         return self
 
-    def __exit__(
-        self,
-        _kind: type[BaseException] | None,
-        _error: BaseException | None,
-        _traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Kill the process if it still runs, and close its pipe."""
         self.kill()
         self.wait()
@@ -105,14 +101,7 @@ class CallProcess:
             self._process.kill()
 
     def wait(self, timeout: float | None = None) -> int:
-        """Return the exit code once the process has ended.
-
-        Args:
-            timeout: Maximum time to wait, in seconds. Default: no limit.
-
-        Raises:
-            TimeoutError: If it still runs then.
-        """
+        """Return the exit code once the process has ended, or raise a `TimeoutError` after a time."""
         try:
             status = self._process.wait(timeout)
         except subprocess.TimeoutExpired as error:
@@ -132,13 +121,6 @@ class CallProcess:
         with self._lock, suppress(OSError, ValueError):  # it has ended
             self._process.stdin.write(data)
             self._process.stdin.flush()
-
-
-def _environment() -> dict[str, str]:
-    """So that the process imports this very package."""
-    package = str(Path(__file__).parents[2])
-    paths = [package, *filter(None, [os.environ.get("PYTHONPATH")])]
-    return {**os.environ, **one_thread_environment(), "PYTHONPATH": os.pathsep.join(paths)}
 
 
 class _Listening(Cancel):

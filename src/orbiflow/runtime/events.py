@@ -1,4 +1,4 @@
-"""What an operation tells while it runs.
+"""What an operation tells while it runs, and the token by which it is told to stop.
 
 `Started` comes first; then `Note`, `Table`, `Progress`, `Preview` (at most one, before any
 `TileFound`), `TileFound`, `ClassFailed`, `ItemDone` and `Written` as they happen; last `Finished` or
@@ -6,7 +6,7 @@
 of a search has exactly one outcome after its last `Progress`: `TileFound` or `ClassFailed`. `ItemDone`
 comes when the folder of an item has its final name, and `Written` when a file has.
 
-All events come in the thread that called the operation, or from `Process.events`.
+All events come in the thread that called the operation, or from `CallProcess.events`.
 """
 
 from __future__ import annotations
@@ -14,17 +14,16 @@ from __future__ import annotations
 import dataclasses
 import json
 import typing
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal
 
 from orbiflow.arguments import described
 from orbiflow.errors import SettingError, literal
 from orbiflow.runtime.files import is_object
-from orbiflow.settings import Field, check_names, make_field
+from orbiflow.settings import Field, check_names
 
 
 class Event:
@@ -39,17 +38,6 @@ class Event:
             for name, value in vars(self).items()
         }
         return {"kind": self.KIND, **values}
-
-    @classmethod
-    def from_fields(cls, document: Mapping[str, Any]) -> Self:
-        """Return an event of this class with the fields of a JSON object.
-
-        Raises:
-            SettingError: If a field is unknown, missing or not allowed.
-        """
-        fields = _fields(cls)
-        check_names(document, fields.values(), cls.KIND)
-        return cls(**{name: _read(fields[name], value) for name, value in document.items()})
 
 
 @dataclass(frozen=True)
@@ -222,14 +210,17 @@ def event_from_json(document: object) -> Event:
         raise SettingError(
             f"unknown kind of event {literal(described(kind))}; there are {', '.join(EVENTS)}"
         )
-    return EVENTS[kind].from_fields({k: v for k, v in document.items() if k != "kind"})
+    given = {name: value for name, value in document.items() if name != "kind"}
+    fields = _fields(EVENTS[kind])
+    check_names(given, fields.values(), kind)
+    return EVENTS[kind](**{name: _read(fields[name], value) for name, value in given.items()})
 
 
 @cache
 def _fields(event: type[Event]) -> dict[str, Field]:
     hints = typing.get_type_hints(event)
     return {
-        entry.name: make_field(entry.name, hints[entry.name], entry.default, str)
+        entry.name: Field(entry.name, hints[entry.name], entry.default, str)
         for entry in dataclasses.fields(typing.cast(Any, event))
     }
 
@@ -241,3 +232,38 @@ def _read(field: Field, value: Any) -> Any:
         if is_object(value) and json.dumps(value, allow_nan=False):
             return value
     raise SettingError(f"{{summary}} must be a JSON object, got {literal(described(value))}")
+
+
+class Cancelled(Exception):
+    """The work was told to stop. No mistake, hence no `OrbiflowError`."""
+
+
+class Cancel:
+    """A token that stops work: it is handed down and looked at between steps.
+
+    It can be cancelled from any thread or from a signal handler.
+
+    >>> cancel = Cancel()
+    >>> cancel.check()
+    >>> cancel.cancel()
+    >>> cancel.cancelled
+    True
+    """
+
+    def __init__(self) -> None:
+        # no lock: a signal handler may come while this very thread holds it
+        self._told = False
+
+    def cancel(self) -> None:
+        """Ask for the end; there is no way back."""
+        self._told = True
+
+    @property
+    def cancelled(self) -> bool:
+        """Whether the end was asked for."""
+        return self._told
+
+    def check(self) -> None:
+        """Raise `Cancelled` if the end was asked for; to be called between steps."""
+        if self.cancelled:
+            raise Cancelled

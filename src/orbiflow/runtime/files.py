@@ -1,4 +1,4 @@
-"""Writing a result so that it is either there whole or not at all."""
+"""Where results go: checked before the work, and written whole or not at all."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import secrets
 import shutil
 from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path, PurePosixPath
 from typing import Any, TypeGuard
 
@@ -20,7 +21,7 @@ def write_atomic(path: str | os.PathLike[str], content: bytes | str) -> Path:
     ever sees half a file.
 
     Raises:
-        OutputError: if the folder does not exist or cannot be written, or `path` is a folder, a pipe
+        OutputError: If the folder does not exist or cannot be written, or `path` is a folder, a pipe
             or a device.
     """
     target = Path(path)
@@ -47,11 +48,7 @@ def write_atomic(path: str | os.PathLike[str], content: bytes | str) -> Path:
 
 
 def make_folder(path: Path) -> Path:
-    """Create a folder (and its parents) that can be written to.
-
-    Raises:
-        OutputError: if it cannot be.
-    """
+    """Create a folder (and its parents) that can be written to, or raise an `OutputError`."""
     try:
         path.mkdir(parents=True, exist_ok=True)
         probe = path / ".orbiflow-write-test"
@@ -67,11 +64,7 @@ def make_folder(path: Path) -> Path:
 def write_set(
     folder: Path, names: Iterable[str], contents: Mapping[str, bytes | str]
 ) -> list[Path]:
-    """Write files that belong together, and take away those of `names` that are not among them.
-
-    Raises:
-        OutputError: if the folder does not exist or cannot be written.
-    """
+    """Write files that belong together, and remove those of `names` that are not among them."""
     for name in names:
         if name not in contents:
             try:
@@ -109,12 +102,12 @@ class ResultFolder:
     cannot be written to) the files themselves are moved in.
 
     Args:
-        path: of the folder.
-        known: given the folder, the paths of the files in it that an earlier run wrote, relative and
-            with slashes.
+        path: The folder.
+        known: A function that returns the paths of the files in the folder that an earlier run wrote,
+            relative and with slashes.
 
     Raises:
-        OutputError: if something else is there, by its name, or if it cannot be written to.
+        OutputError: If something else is there, by its name, or if it cannot be written to.
     """
 
     def __init__(self, path: Path, known: Callable[[Path], set[str]]) -> None:
@@ -133,12 +126,10 @@ class ResultFolder:
 
     @contextmanager
     def replaced(self) -> Generator[Path]:
-        """Yields an empty folder to write into; afterwards it stands in the place of `path`.
+        """Yield an empty folder to write into; afterwards it stands in the place of `path`.
 
-        If the block fails, `path` is left as it was.
-
-        Raises:
-            OutputError: if it cannot be put there; the message says where the results are.
+        If the block fails, `path` is left as it was. If the folder cannot be put there, an
+        `OutputError` says where the results are.
         """
         try:
             staged = self._new_sibling()
@@ -156,11 +147,7 @@ class ResultFolder:
             raise OutputError(f"{self._cannot(error)}; the results are in {staged}") from error
 
     def _refuse_others(self, staged: Path | None = None) -> bool:
-        """Whether there is anything.
-
-        Raises:
-            OutputError: for what orbiflow did not write.
-        """
+        """Return whether an earlier run is there; raise an `OutputError` for anything else."""
         if not self._real.exists():
             return False
         entries = [p for p in self._real.iterdir() if p != staged and not _is_litter(p.name)]
@@ -261,3 +248,102 @@ def is_object(value: object) -> TypeGuard[dict[str, Any]]:
 def is_list(value: object) -> TypeGuard[list[Any]]:
     """Whether it is a JSON list."""
     return isinstance(value, list)
+
+
+def check_output_file(out: Path, *reads: Path | None) -> None:
+    """Check that a file can be written where nothing that is read would be replaced.
+
+    `reads` are the files and folders of runs that the operation reads; None is passed over. Nor may the
+    file lie in the folder of a run that is read.
+    """
+    if out.is_dir():
+        raise OutputError(f"cannot write {out}: it is a folder; give a file's name in it")
+    if out.exists() and not out.is_file():
+        raise OutputError(f"cannot write {out}: it is not a file; choose another name")
+    if not out.parent.is_dir():
+        raise OutputError(f"cannot write {out}: there is no folder {out.parent}; create it first")
+    check_inputs_kept(out, *reads)
+    check_outside_runs(out, *reads)
+
+
+def check_output_folder(out: Path, *reads: Path | None, what: str = "file") -> None:
+    """Check that a folder can be replaced whole, without anything of `reads`, which are `what`."""
+    for read in filter(None, reads):
+        if _real(read).is_relative_to(_real(out)):
+            raise OutputError(
+                f"cannot write into {out}: it would replace the {what} that it reads: choose another "
+                "--out"
+            )
+    check_outside_runs(out, *reads)
+
+
+def check_inputs_kept(out: Path, *reads: Path | None) -> None:
+    """Check that a file that will be written is none that is read, by whatever name or link."""
+    from orbiflow.operations import RUN_FOLDERS
+
+    for read in filter(None, reads):
+        files = [read / name for name in RUN_FOLDERS] if read.is_dir() else [read]
+        if any(_same(out, file) for file in files):
+            raise OutputError(
+                f"cannot write {out}: it would replace what is read: choose another --out"
+            )
+
+
+def check_outside_runs(out: Path, *reads: Path | None) -> None:
+    """Check that nothing is written into the folder of a run that is read; `out` may be the folder.
+
+    The next run into such a folder would refuse the file, or replace it.
+    """
+    # a link is replaced, not followed
+    target = _real(out.parent) / out.name
+    for read in filter(None, reads):
+        folder = read if read.is_dir() else read.parent
+        known = _files_of_run(folder)
+        if not known or (folder != read and read.name not in known):
+            continue  # it is no run that is read
+        if _real(folder) not in target.parents:
+            continue
+        name = target.relative_to(_real(folder)).as_posix()
+        if name in known:
+            raise OutputError(
+                f"cannot write {out}: {name} is a file of the run in {folder}, which is read: choose "
+                "another --out"
+            )
+        if _holds_one_run(folder, known):
+            raise OutputError(
+                f"cannot write {out}: {folder}, which is read, holds the files of one run alone, and "
+                "the next run there would refuse others: choose another --out"
+            )
+
+
+def _files_of_run(folder: Path) -> set[str]:
+    """The files of earlier runs in a folder; the file that is read, alone, is somebody's copy."""
+    from orbiflow.operations import RUN_FOLDERS
+
+    found: set[str] = set()
+    for read, place in RUN_FOLDERS.items():
+        if (folder / read).is_file():
+            module, name = place.split(":")
+            names: set[str] = getattr(import_module(module), name)(folder)
+            if any((folder / name).is_file() for name in names if name != read):
+                found |= names
+    return found
+
+
+def _holds_one_run(folder: Path, known: set[str]) -> bool:
+    """Whether a folder holds nothing that the next run would refuse already."""
+    ours = {PurePosixPath(name).parts[0] for name in known} | LITTER
+    try:
+        return all(path.name in ours for path in folder.iterdir())
+    except OSError:  # its files may be read where its names may not
+        return True
+
+
+def _same(one: Path, other: Path) -> bool:
+    return _real(one) == _real(other) or (
+        one.exists() and other.exists() and one.samefile(other)  # another link, or capitals
+    )
+
+
+def _real(path: Path) -> Path:
+    return Path(os.path.realpath(path))  # unlike `resolve`, no error for links in a circle

@@ -42,9 +42,8 @@ from typing import Any, Literal, ParamSpec, TypeVar, cast
 
 from orbiflow.arguments import as_instance, described, meant
 from orbiflow.errors import OrbiflowError, SettingError, literal
-from orbiflow.runtime.cancel import Cancel, Cancelled
-from orbiflow.runtime.events import Event, Failed, Finished, Progress, Started
-from orbiflow.settings import Field, Settings, check_names, check_rules, fields_of, make_field
+from orbiflow.runtime.events import Cancel, Cancelled, Event, Failed, Finished, Progress, Started
+from orbiflow.settings import Field, Settings, check_names, check_rules, fields_of
 
 SCHEMA_VERSION = 2
 SCHEMA = "https://json-schema.org/draft/2020-12/schema"
@@ -97,7 +96,9 @@ class Operation:
     @cached_property
     def fields(self) -> tuple[Field, ...]:
         """All parameters, settings flattened, in the order of the signature."""
-        found = [entry for part in self._parts.values() for entry in _flat(part)]
+        found: list[Field] = []
+        for part in self._parts.values():
+            found += [part] if isinstance(part, Field) else fields_of(part)
         names = [entry.name for entry in found]
         if len(set(names)) < len(names):
             raise TypeError(f"settings of {self.name} share a name: {sorted(names)}")
@@ -116,7 +117,7 @@ class Operation:
                 parts[name] = hint
                 continue
             required = parameter.default is parameter.empty
-            parts[name] = make_field(
+            parts[name] = Field(
                 name,
                 hint,
                 MISSING if required else parameter.default,
@@ -140,11 +141,7 @@ class Operation:
         return dict(entry.split(": ", 1) for entry in entries if ": " in entry)
 
     def call(self, given: Mapping[str, Any]) -> Call:
-        """Return a call with these parameters and settings, all in one mapping, checked.
-
-        Raises:
-            SettingError: If one is unknown, missing or not allowed.
-        """
+        """Return a call with these parameters and settings, all in one mapping, checked."""
         check_names(given, self.fields, self.name)
         arguments: dict[str, Any] = {}
         for name, part in self._parts.items():
@@ -153,30 +150,10 @@ class Operation:
             else:
                 own = {entry.name for entry in fields_of(part)}
                 arguments[name] = part(**{key: given[key] for key in given if key in own})
-        call = Call(self, arguments, frozenset(given))
-        self._check_rules(call)
-        return call
+        return self._ruled(Call(self, arguments, frozenset(given)))
 
-    def run(self, arguments: Mapping[str, Any], on_event: Sink, cancel: Cancel) -> Outcome:
-        """Check the function's arguments, run it and tell the events."""
-        checked = self._checked(arguments)
-        tell = _Teller(on_event)
-        tell(Started(self.name))
-        try:
-            outcome = self.function(**checked, on_event=tell, cancel=cancel)
-        except Cancelled:
-            tell(Finished("cancelled", {}))
-            raise
-        except OrbiflowError as error:
-            tell.failed(Failed(str(error), "mistake"))
-            raise
-        except Exception as error:
-            tell.failed(Failed(f"{type(error).__name__}: {error}", "error"))
-            raise
-        tell(Finished(outcome.state, outcome.summary))
-        return outcome
-
-    def _checked(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    def bound(self, arguments: Mapping[str, Any]) -> Call:
+        """Return a call with these arguments of the function, checked."""
         checked = dict(arguments)
         given: set[str] = set()
         for name, part in self._parts.items():
@@ -187,13 +164,13 @@ class Operation:
                 given.add(name)
             else:
                 given |= as_instance(arguments[name], part, name).fields_given
-        self._check_rules(Call(self, checked, frozenset(given)))
-        return checked
+        return self._ruled(Call(self, checked, frozenset(given)))
 
-    def _check_rules(self, call: Call) -> None:
+    def _ruled(self, call: Call) -> Call:
         simple = [part for part in self._parts.values() if isinstance(part, Field)]
         defaults = {entry.name: entry.default for entry in simple}
         check_rules(simple, {**defaults, **call.flat}, call.given)
+        return call
 
     @property
     def schema(self) -> dict[str, Any]:
@@ -230,8 +207,24 @@ class Call:
     given: frozenset[str]
 
     def run(self, on_event: Sink = ignore, cancel: Cancel | None = None) -> Outcome:
-        """Run the operation."""
-        return self.operation.run(self.arguments, on_event, cancel or Cancel())
+        """Run the operation and tell its events."""
+        tell = _Teller(on_event)
+        tell(Started(self.operation.name))
+        try:
+            outcome = self.operation.function(
+                **self.arguments, on_event=tell, cancel=cancel or Cancel()
+            )
+        except Cancelled:
+            tell(Finished("cancelled", {}))
+            raise
+        except OrbiflowError as error:
+            tell.failed(Failed(str(error), "mistake"))
+            raise
+        except Exception as error:
+            tell.failed(Failed(f"{type(error).__name__}: {error}", "error"))
+            raise
+        tell(Finished(outcome.state, outcome.summary))
+        return outcome
 
     @property
     def flat(self) -> dict[str, Any]:
@@ -281,7 +274,7 @@ def operation(
             arguments = dict(signature.bind(*args, **kwargs).arguments)
             on_event: Any = arguments.pop("on_event", ignore)
             cancel: Any = arguments.pop("cancel", None)
-            return cast(R, made.run(arguments, on_event, cancel or Cancel()))
+            return cast(R, made.bound(arguments).run(on_event, cancel))
 
         checked.__dict__["operation"] = made
         return checked
@@ -347,10 +340,6 @@ def call_from_json(document: object) -> Call:
     if not isinstance(name, str):
         raise SettingError(f"{{operation}} must be a name, got {literal(described(name))}")
     return find(name).call(given)
-
-
-def _flat(part: Field | type[Settings]) -> tuple[Field, ...]:
-    return (part,) if isinstance(part, Field) else fields_of(part)
 
 
 class _Teller:

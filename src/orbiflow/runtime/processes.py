@@ -17,7 +17,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime.cancel import Cancel, Cancelled
+from orbiflow.runtime.events import Cancel, Cancelled
 from orbiflow.runtime.threads import imported_torch, use_one_thread
 
 Function = Callable[[Any, Callable[[Any], None], Cancel], Any]
@@ -87,9 +87,6 @@ def work(
         cancel: Stops the work; the workers' tokens follow it.
         tries: Number of workers that may die of an item. Each is replaced by a new one; the news of an
             item that has killed so many say `died`. None: no worker may die.
-
-    Raises:
-        OrbiflowError: If a worker dies without `tries`; and whatever `function` raises.
     """
     pool = _Pool(function, items, context or process_context(), cancel or Cancel(), tries)
     try:
@@ -103,7 +100,7 @@ def work(
 class _Order:
     index: int
     item: Any
-    tried: int  # workers that have died of it
+    tried: int = 0  # workers that have died of it
 
 
 @dataclass(eq=False)
@@ -112,17 +109,16 @@ class _Worker:
     order: _Order | None = None
 
 
+@dataclass(eq=False)
 class _Pool:
-    def __init__(
-        self,
-        function: Function,
-        items: Iterable[Any],
-        context: Any,
-        cancel: Cancel,
-        tries: int | None,
-    ) -> None:
-        self.function, self.context, self.cancel, self.tries = function, context, cancel, tries
-        self.items = enumerate(items)
+    function: Function
+    items: Iterable[Any]
+    context: Any
+    cancel: Cancel
+    tries: int | None
+
+    def __post_init__(self) -> None:
+        self.left = (_Order(index, item) for index, item in enumerate(self.items))
         self.again: deque[_Order] = deque()
         self.workers: dict[Connection, _Worker] = {}
         self.ended: list[Any] = []
@@ -168,10 +164,7 @@ class _Pool:
         """What is to be done next, or None at the end."""
         if self.stop_by is not None:
             return None
-        if self.again:
-            return self.again.popleft()
-        index, item = next(self.items, (None, None))
-        return None if index is None else _Order(index, item, 0)
+        return self.again.popleft() if self.again else next(self.left, None)
 
     def _new_worker(self) -> Connection:
         ours, theirs = self.context.Pipe()
@@ -183,7 +176,9 @@ class _Pool:
         )
         # a fork server would hand the blocked signal on to other people's processes
         shielded = contextlib.nullcontext() if method == "forkserver" else _without_interrupts()
-        with _quiet_fork(), shielded:
+        with warnings.catch_warnings(), shielded:
+            # of newer Pythons, about forks beside a numerical library
+            warnings.simplefilter("ignore", DeprecationWarning)
             process.start()
         theirs.close()
         self.workers[ours] = _Worker(process)
@@ -245,13 +240,10 @@ def _serve(channel: Connection, inherited: Iterable[Connection], function: Funct
     with contextlib.suppress(EOFError, OSError, Cancelled):  # nobody listens any more
         while (order := channel.recv()) is not None:
             try:
-                answer = (
-                    "done",
-                    function(order[0], lambda news: channel.send(("told", news)), cancel),
-                )
+                answer = "done", function(order[0], lambda n: channel.send(("told", n)), cancel)
+            except Cancelled:
+                raise
             except Exception as error:
-                if isinstance(error, Cancelled):
-                    raise
                 answer = "raised", _portable(error)
             channel.send(answer)
 
@@ -286,14 +278,6 @@ class _Asked(Cancel):
 def _send(channel: Connection, value: Any) -> None:
     with contextlib.suppress(OSError):  # a worker that has died is noticed when it is read from
         channel.send(value)
-
-
-@contextlib.contextmanager
-def _quiet_fork() -> Generator[None]:
-    """Hide the warning of newer Pythons about forks beside a numerical library."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)
-        yield
 
 
 @contextlib.contextmanager

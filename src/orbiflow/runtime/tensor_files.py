@@ -27,11 +27,7 @@ KEY = "orbiflow"
 def tensor_bytes(
     header: Mapping[str, Any], tensors: Mapping[str, Tensor], what: str = "tensors"
 ) -> bytes:
-    """The content of a file that `read_tensors` reads again; `what` it holds is for messages.
-
-    Raises:
-        OrbiflowError: for a header that is not JSON, or more than a file may hold.
-    """
+    """The content of a file that `read_tensors` reads again; `what` it holds is for messages."""
     from safetensors.torch import save
 
     try:
@@ -48,23 +44,11 @@ def tensor_bytes(
     return data
 
 
-def read_tensors(
-    path: str | Path, what: str, *, key: str = KEY, max_bytes: int = MAX_BYTES
-) -> tuple[dict[str, Any], dict[str, Tensor]]:
-    """Return the header and the tensors of a file.
-
-    Args:
-        path: The file.
-        what: What it is to hold, such as "a flow", for messages.
-        key: The name under which the header stands.
-        max_bytes: The largest size of the file, checked before it is read.
-
-    Raises:
-        InputFileError: if the file is missing, too large, damaged or of another kind.
-    """
+def read_tensors(path: str | Path, what: str) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """Return the header and the tensors of a file that is to hold `what`, such as "a flow"."""
     from safetensors.torch import load
 
-    return _read(path, what, key, max_bytes, load)
+    return _read(path, what, KEY, MAX_BYTES, load)
 
 
 def read_arrays(

@@ -48,11 +48,8 @@ def one_thread() -> Generator[None]:
     """Run torch on one thread in this block, or function if used as a decorator.
 
     Import torch before the block: where nobody has, there is nothing to limit. Only the calling thread
-    is limited. Blocks may be nested, and entered by any number of threads at once: each has its own
-    number of threads again when it leaves, and threads started meanwhile begin with the process's. It
-    is free of charge where the caller's number is 1, and takes about 0.1 ms otherwise.
-
-    A process that has used several threads before is no safer to fork inside the block.
+    is limited; threads started meanwhile begin with the process's number. It is free of charge where
+    the caller's number is 1, and takes about 0.1 ms otherwise.
 
     >>> import torch
     >>> with one_thread():

@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path, PurePath
 from typing import Annotated, Any
 
-from orbiflow.batch import Column, FolderKind, Summary, WorkSettings, run_files
+from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
 from orbiflow.runtime import Call, Cancel, Outcome, Sink, find, ignore, operation
 from orbiflow.settings import Option
 from orbiflow.tiles.operations import ReadingSettings
 from orbiflow.tiles.search import SearchSettings
 
+# Endings of silhouettes that are no pictures: how these are read does not apply to them
 OUTLINES = (".svg", ".json", ".geojson", ".dat")
-"""Endings of silhouettes that are no pictures: how these are read does not apply to them."""
 
 NEVER = Cancel()
 
@@ -32,10 +32,10 @@ def batch(
 ) -> Outcome:
     """Find tiles for every silhouette of a folder, here or on a Dask cluster.
 
-    Writes a folder for each silhouette, as escherize does; batch.csv, a table of all; and index.html, a
-    page of all. Both grow as results come. If it is interrupted, run the same command again to resume:
-    nothing is done twice unless a file or an option has changed. The exit status is 1 if some have no
-    tile.
+    Writes a folder for each silhouette, as escherize does; batch.csv, a table of all; and
+    index.html, a page of all. Both grow as results come. If it is interrupted, run the same command
+    again to resume: nothing is done twice unless a file or an option has changed. The exit status
+    is 1 if some have no tile.
 
     Args:
         folder: Folder of silhouettes, searched with the folders inside: PNG, JPEG, WebP, SVG, and
@@ -74,7 +74,7 @@ def _written(folder: Path) -> set[str]:
     return written_files(folder)
 
 
-TILES = FolderKind(
+TILES = Kind(
     things="silhouettes",
     items="files",
     endings=(".png", ".jpg", ".jpeg", ".webp", ".svg", ".json", ".geojson", ".dat"),

@@ -1,7 +1,7 @@
 """Closed rings of the plane: area, centroid, orientation, similarity and even sampling.
 
-A ring is a float64 array (..., N, 2) whose last vertex does not repeat the first; leading axes are a
-stack of rings. Functions with `AnyRing` take tensors as well and are differentiable.
+A ring is a float64 array (..., N, 2) whose last vertex does not repeat the first; leading axes are
+a stack of rings. Functions with `AnyRing` take tensors as well and are differentiable.
 """
 
 from collections.abc import Iterable

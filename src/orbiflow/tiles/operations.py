@@ -82,9 +82,9 @@ def escherize(
 ) -> Outcome:
     """Find tiles that look like a silhouette and tile the plane, and prove it.
 
-    Writes result.json, overview.png and index.html into the folder, and for each class a folder with
-    tile.svg, tiling.svg, tiling.png, overlay.png and model.safetensors; after a search for both,
-    front.png, too.
+    Writes result.json, overview.png and index.html into the folder, and for each class a folder
+    with tile.svg, tiling.svg, tiling.png, overlay.png and model.safetensors; after a search for
+    both, front.png, too.
 
     Args:
         image: The silhouette: PNG, JPEG, WebP, SVG, or a polygon (.json, .dat).
@@ -163,11 +163,9 @@ def _closing(out: Path, written: bool, found: bool, seconds: float) -> Note:
     if written and found:
         where = f"look at {out / 'overview.png'} first, or open {out / 'index.html'}"
         return Note(f"written to {out} in {seconds:.0f} s; {where}")
-    where = (
-        f"see {out / 'result.json'}"
-        if written
-        else f"{out} still holds the tiles of an earlier run"
-    )
+    where = f"{out} still holds the tiles of an earlier run"
+    if written:
+        where = f"see {out / 'result.json'}"
     return Note(f"no certified tile was found; {where}", warning=True)
 
 
@@ -206,6 +204,11 @@ def _measures(tile: EscherTile) -> dict[str, Any]:
     }
 
 
+def _tell(on_event: Sink, notes: Sequence[str], *files: Path) -> None:
+    for event in (*map(Note, notes), *map(Written, files)):
+        on_event(event)
+
+
 @operation("export")
 def export(
     result: Path,
@@ -234,10 +237,7 @@ def export(
     done = exporting.export(
         tile, out, settings, force=choice.force, on_event=on_event, cancel=cancel
     )
-    for note in (*done.notes, _exported(done, settings, tile.isohedral_class)):
-        on_event(Note(note))
-    for path in done.files:
-        on_event(Written(path))
+    _tell(on_event, (*done.notes, _exported(done, settings, tile.isohedral_class)), *done.files)
     return Outcome(
         {
             "files": [str(path) for path in done.files],
@@ -291,15 +291,11 @@ def art(
         tile, out, settings, picture=picture, force=choice.force, on_event=on_event, cancel=cancel
     )
     page = drawn.page
-    for note in drawn.notes:
-        on_event(Note(note))
-    on_event(
-        Note(
-            f"written {out}: {page.width} x {page.height} pixels, {page.shown:.0f} tiles of "
-            f"{tile.isohedral_class}, {page.tile_size:.0f} pixels each"
-        )
+    note = (
+        f"written {out}: {page.width} x {page.height} pixels, {page.shown:.0f} tiles of "
+        f"{tile.isohedral_class}, {page.tile_size:.0f} pixels each"
     )
-    on_event(Written(out))
+    _tell(on_event, (*drawn.notes, note), out)
     return Outcome(
         {
             "file": str(out),
@@ -344,13 +340,11 @@ def animate(
     check_output_file(out, result)
     motion.animate(tile, out, settings, force=choice.force, on_event=on_event, cancel=cancel)
     size = out.stat().st_size
-    on_event(
-        Note(
-            f"written {out}: {settings.kind} of {tile.isohedral_class}, {settings.seconds:g} s, "
-            f"{settings.size} pixels wide, {size / 1000:.0f} kB"
-        )
+    note = (
+        f"written {out}: {settings.kind} of {tile.isohedral_class}, {settings.seconds:g} s, "
+        f"{settings.size} pixels wide, {size / 1000:.0f} kB"
     )
-    on_event(Written(out))
+    _tell(on_event, (note,), out)
     return Outcome(
         {"file": str(out), "bytes": size, "class": tile.isohedral_class, "kind": settings.kind}
     )

@@ -84,14 +84,7 @@ def folder_names(classes: Iterable[str]) -> list[str]:
 
 
 def read_document(path: str | Path) -> tuple[Path, dict[str, Any]]:
-    """The result.json of a run, and what it holds: an object with `tiles`.
-
-    Args:
-        path: the run's folder, or its result.json.
-
-    Raises:
-        InputFileError: if there is no such file, or it is none of orbiflow's.
-    """
+    """Return the result.json at a path, or in a run's folder, and the object that it holds."""
     given = as_path(path, "the result")
     file = given / RESULT if given.is_dir() else given
     try:
@@ -131,14 +124,9 @@ def _index(names: list[str], which: str | int, file: Path) -> int:
 
 
 def save_tiles(tiles: Sequence[EscherTile], folder: str | Path) -> Path:
-    """Write tiles as a run's folder: a result.json, and each one's map in a folder of its own.
+    """Write tiles, best first, as a run's folder: a result.json, and each one's map in its own folder.
 
-    Args:
-        tiles: Best first, at least one.
-        folder: Tiles that were saved there before are replaced.
-
-    Returns:
-        The folder.
+    Tiles that were saved there before are replaced. Returns the folder.
 
     Raises:
         OrbiflowError: without any tile.
@@ -186,6 +174,7 @@ def group_json(group: CrystallographicGroup) -> dict[str, Any]:
 
 def tile_json(tile: EscherTile) -> dict[str, Any]:
     """Return one entry of `tiles`: polygon and group in the input's own coordinates."""
+    thin = tile.thinnest
     return {
         "class": tile.isohedral_class,
         "score": _or_none(tile.score),
@@ -202,7 +191,7 @@ def tile_json(tile: EscherTile) -> dict[str, Any]:
         "certificate": tile.certificate.as_dict(),
         "polygon": _closed(tile.tile.polygon),
         "bent": None if tile.bent is None else _closed(tile.bent),
-        "thinnest": _thinnest_json(tile.thinnest),
+        "thinnest": thin if thin is None else {**thin._asdict(), "ends": thin.ends.tolist()},
         "corners": list(tile.tile.corners),
         "group": group_json(tile.tile.group),
         "starts": tile.starts,
@@ -222,12 +211,6 @@ def _or_none(value: Any) -> Any:
 
 def _closed(ring: Array) -> list[list[float]]:
     return np.concatenate([ring, ring[:1]]).tolist()
-
-
-def _thinnest_json(found: Thinnest | None) -> dict[str, Any] | None:
-    if found is None:
-        return None
-    return {"width": found.width, "share": found.share, "ends": found.ends.tolist()}
 
 
 def _measurements(entry: dict[str, Any]) -> dict[str, Any]:
@@ -253,8 +236,8 @@ def _measurements(entry: dict[str, Any]) -> dict[str, Any]:
     return {"known_score": entry.get("score"), **found, **known}
 
 
+# Fields of an `EscherTile` that an entry states under the same name
 _PLAIN = ("objective", "front", "starts", "dropped", "seconds")
-"""Fields of an `EscherTile` that an entry states under the same name."""
 
 
 def _tile(entry: dict[str, Any]) -> Tile:

@@ -20,12 +20,11 @@ from orbiflow.tiles.tilings import Tile
 
 FORMAT = "orbiflow-tile/1"
 MAX_BYTES = 64 * 2**20
+# Arrays of the map from the silhouette. Earlier files have none, and earlier readers skip them.
 BENDING = ("bending.rest", "bending.images", "bending.triangles")
-"""Arrays of the map from the silhouette. Earlier files have none, and earlier readers skip them."""
+# Entry of the settings in a file. Files of version 0.1 lack it, and their readers skip it.
 FRAME = "frame"
-"""Entry of the settings in a file. Files of version 0.1 lack it, and their readers skip it."""
-SAME = 1e-6
-"""Largest distance of the map's outline from the tile's, in square roots of its area."""
+SAME = 1e-6  # largest distance of the map's outline from the tile's, in square roots of its area
 
 
 @dataclass(frozen=True, eq=False)

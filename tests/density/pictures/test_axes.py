@@ -6,7 +6,7 @@ import torch
 
 from orbiflow.density import KleinBottle, ProjectivePlane, Sphere, Torus
 from orbiflow.density.pictures.axes import angle_axis, angle_text, view_of
-from orbiflow.density.pictures.scale import (
+from orbiflow.density.pictures.colours import (
     DARK_SHARE,
     Shade,
     bar_label,

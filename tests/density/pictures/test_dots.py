@@ -24,7 +24,7 @@ from orbiflow.density import (
     map_picture,
 )
 from orbiflow.density.models import identity_flow
-from orbiflow.density.pictures.dots import MAX_COVER, uncrowded
+from orbiflow.density.pictures.overlays import MAX_COVER, uncrowded
 from orbiflow.drawing import Picture, Sheet
 
 SPACES = ("torus", "klein-bottle", "sphere", "projective-plane")

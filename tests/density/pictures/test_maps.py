@@ -28,9 +28,9 @@ from orbiflow.density import (
     map_picture,
     map_samples_picture,
 )
+from orbiflow.density.pictures.colours import chosen_scale, density_at, density_on_map
 from orbiflow.density.pictures.maps import Map, pixels_of
 from orbiflow.density.pictures.projections import EqualEarth, Lambert, PlateCarree
-from orbiflow.density.pictures.values import chosen_scale, density_at, density_on_map
 from orbiflow.drawing import Sheet
 from orbiflow.drawing.sheet import NARROWEST
 from orbiflow.errors import OrbiflowError
@@ -46,7 +46,7 @@ every_space = pytest.mark.parametrize("space", ROUND, ids=lambda s: s.name)
 @pytest.fixture(autouse=True)
 def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orbiflow.density.pictures.maps._PIXELS", 3000)
-    monkeypatch.setattr("orbiflow.density.pictures.values._COARSE", 24)
+    monkeypatch.setattr("orbiflow.density.pictures.colours._COARSE", 24)
 
 
 def peaked(space: RoundSpace, at: tuple[float, float], kappa: float) -> Mixture:

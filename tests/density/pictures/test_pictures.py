@@ -32,10 +32,9 @@ from orbiflow.density import (
 from orbiflow.density.models import identity_flow
 from orbiflow.density.pictures import square as density_square
 from orbiflow.density.pictures.axes import angle_axis, axis_label, view_of
+from orbiflow.density.pictures.colours import chosen_scale, density_at, is_sharp, shading
 from orbiflow.density.pictures.flow import few_colours
-from orbiflow.density.pictures.scale import shading
 from orbiflow.density.pictures.surfaces import boy_surface, mesh
-from orbiflow.density.pictures.values import chosen_scale, density_at, is_sharp
 from orbiflow.drawing import Sheet
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
@@ -97,7 +96,7 @@ def _coarse(monkeypatch):
     monkeypatch.setattr("orbiflow.density.pictures.square._GRID", 24)
     monkeypatch.setattr("orbiflow.density.pictures.square._FINE_GRID", 30)
     monkeypatch.setattr("orbiflow.density.pictures.page._FINE_CELLS", 20)
-    monkeypatch.setattr("orbiflow.density.pictures.values._COARSE", 24)
+    monkeypatch.setattr("orbiflow.density.pictures.colours._COARSE", 24)
     monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 40)
 
 
@@ -416,5 +415,5 @@ def test_kernels_are_summed_in_blocks(space, monkeypatch):
     density = blended(space, identity_flow(space), UniformDensity(space), kernels, shares)
     t = (torch.arange(30, dtype=torch.float64) + 0.5) / 30
     whole = density_on_grid(density, t, t, "natural")
-    monkeypatch.setattr("orbiflow.density.pictures.values._KERNELS", 7)
+    monkeypatch.setattr("orbiflow.density.pictures.colours._KERNELS", 7)
     np.testing.assert_allclose(density_on_grid(density, t, t, "natural"), whole, rtol=1e-12)

@@ -36,7 +36,7 @@ def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orbiflow.density.pictures.square._GRID", 12)
     monkeypatch.setattr("orbiflow.density.pictures.page._CELLS", 8)
     monkeypatch.setattr("orbiflow.density.pictures.maps._PIXELS", 900)
-    monkeypatch.setattr("orbiflow.density.pictures.values._COARSE", 12)
+    monkeypatch.setattr("orbiflow.density.pictures.colours._COARSE", 12)
     monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 20)
     monkeypatch.setattr("orbiflow.density.pictures.plots.SAMPLES", 50)
 

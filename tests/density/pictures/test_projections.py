@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 
 from orbiflow.density import PlotSettings, ProjectivePlane, Sphere, Torus, to_vectors
 from orbiflow.density.pictures.map_axes import meridian, parallel
-from orbiflow.density.pictures.map_choice import chosen_map
-from orbiflow.density.pictures.maps import pixels_of, places_on
+from orbiflow.density.pictures.maps import chosen_map, pixels_of, places_on
 from orbiflow.density.pictures.projections import (
     Azimuthal,
     EqualEarth,

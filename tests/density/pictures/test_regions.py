@@ -27,8 +27,8 @@ from orbiflow.density import (
 )
 from orbiflow.density.models import identity_flow
 from orbiflow.density.pictures.axes import view_of
+from orbiflow.density.pictures.overlays import RegionLine
 from orbiflow.density.pictures.projections import EqualEarth
-from orbiflow.density.pictures.regions import RegionLine
 from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "klein-bottle", "sphere", "projective-plane")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +12,7 @@ from artworks import checkerboard, squirrel
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import rotation_matrix
 from orbiflow.tiles import CLASSES, ArtSettings, artwork, render_artwork
-from orbiflow.tiles.art.making import render_on
-from orbiflow.tiles.art.page import rectangle, spread_page
+from orbiflow.tiles.art.page import _Colours, _page, rectangle
 
 
 @pytest.mark.parametrize("how", ["aspect", "neighbour", "one"])
@@ -22,7 +22,9 @@ def test_two_by_two_is_the_same_plane(name: str, how) -> None:
     settings = ArtSettings(repeat=True, tile_size=60, colour=how, tolerance=0.05)
     art = artwork(tile, settings, picture=None if how == "one" else checkerboard(tile))
     cell = render_artwork(art)
-    twice = render_on(art, spread_page(art.page, tile, settings, 2, 2))
+    page, size = art.page, (2 * art.page.width, 2 * art.page.height)
+    spread = _page(tile.tile, _Colours(tile.tile, how), page.linear, page.offset, size, ())
+    twice = render_artwork(replace(art, page=spread))
     apart = np.abs(np.tile(cell, (2, 2, 1)).astype(int) - twice)
     assert apart.max() <= 1
 

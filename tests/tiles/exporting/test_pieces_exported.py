@@ -12,9 +12,8 @@ from scipy.spatial.distance import pdist
 from exported import dxf_lines, polygons, svg_lines, tile_of, tiles
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import CLASSES, ExportSettings, Tile, scenes, write_scene
-from orbiflow.tiles.exporting.layouts import layout
+from orbiflow.tiles.exporting.layouts import cut_ring, layout
 from orbiflow.tiles.exporting.nesting import Arrangement, on_sheet
-from orbiflow.tiles.exporting.pieces import cut_ring
 
 
 def cut(tile: Tile, **options) -> list[list[shapely.Polygon]]:

@@ -28,10 +28,8 @@ from orbiflow.tiles import (
     animation,
     escherize_class,
 )
-from orbiflow.tiles.motion.animations import motion
-from orbiflow.tiles.motion.kinds import eased, frames, morph, progress
-from orbiflow.tiles.motion.writers import picture
-from orbiflow.tiles.pictures import BendingWay
+from orbiflow.tiles.motion.kinds import BendingWay, eased, frames, morph
+from orbiflow.tiles.motion.writers import motion, picture
 from swirled_tiles import is_sound, swirled, swirled_tile
 
 BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]
@@ -69,8 +67,8 @@ def test_a_loop_lasts_as_long_as_asked(seconds: float, fps: float) -> None:
 
 
 @given(st.floats(0, 1))
-def test_progress_is_there_and_back(time: float) -> None:
-    assert 0 <= progress(time) <= 1
+def test_the_way_back_is_the_way_there(time: float) -> None:
+    assert 0 <= eased(time) <= 1
     assert eased(1 - time) == pytest.approx(1 - eased(time), abs=1e-12)
 
 

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import CLASSES, Tile, certify, isohedral_class
-from orbiflow.tiles.motion.morph import Morph, Orbits
-from orbiflow.tiles.search import OwnFrame
+from orbiflow.tiles.motion.morph import Morph, Orbits, OwnFrame
 from swirled_tiles import is_sound, swirled, swirled_tile
 
 

@@ -17,8 +17,8 @@ from orbiflow.tiles import (
     iou,
     isohedral_class,
 )
-from orbiflow.tiles.search.boundary import extract_tile
-from orbiflow.tiles.search.polish import polish
+from orbiflow.tiles.search.descent import polish
+from orbiflow.tiles.search.stored_models import extract_tile
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 TARGET = Target.from_polygon(BOOT)

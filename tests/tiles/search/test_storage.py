@@ -25,7 +25,7 @@ from orbiflow.tiles import (
     certify,
     load_model,
 )
-from orbiflow.tiles.search.boundary import extract_tile
+from orbiflow.tiles.search.stored_models import extract_tile
 from orbiflow.tiles.tile_map import BENDING, FORMAT, MAX_BYTES
 from strategies import seeds
 
@@ -264,9 +264,12 @@ BAD_FILES: dict[str, tuple[Callable[[], bytes], str]] = {
     "steps huge": (with_settings(steps=10**12), "from 1 to 1000000"),
     "steps true": (with_settings(steps=True), "whole number from 1 to 1000000, got True"),
     "method": (with_settings(method="rk99"), "rk99"),
-    "smoothness NaN": (with_settings(smoothness=float("nan")), "smoothness from 0 to 100"),
-    "smoothness huge": (with_settings(smoothness=1e308), "smoothness from 0 to 100"),
-    "smoothness null": (with_settings(smoothness=None), "settings"),
+    "smoothness NaN": (
+        with_settings(smoothness=float("nan")),
+        "smoothness must be .*from 0 to 100",
+    ),
+    "smoothness huge": (with_settings(smoothness=1e308), "smoothness must be .*from 0 to 100"),
+    "smoothness null": (with_settings(smoothness=None), "smoothness must be"),
     "frame a number": (with_settings(frame=7), "frame is incomplete"),
     "frame empty": (with_settings(frame={}), "frame is incomplete: 'size'"),
     "frame flat": (

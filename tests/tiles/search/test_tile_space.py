@@ -173,18 +173,3 @@ def test_classes_without_glides_keep_their_turns() -> None:
             own = space(name)
             own.turn(np.full(own.count, 0.3))
             assert (own.best_turns(outlines(own, 0)) == 0.3).all()
-
-
-@settings(max_examples=5)
-@given(st.sampled_from(sorted(CLASSES)), seeds)
-def test_weights_hold_some_points_nearer(name: str, seed: int) -> None:
-    weights = np.ones(COUNT)
-    weights[:10] = 1e4
-    plain = space(name)
-    heavy = TileSpace(CLASSES[name], placements(name), weights)
-    goals = outlines(plain, seed)
-    away = [
-        abs(own.in_order(own.nearest(goals).vertices) - goals)[:, :10].max()
-        for own in (plain, heavy)
-    ]
-    assert away[1] <= away[0] + 1e-9

@@ -1,7 +1,7 @@
 from .data_sets import DataComparison as DataComparison
+from .data_sets import Divergence as Divergence
+from .data_sets import Estimate as Estimate
 from .data_sets import compare_samples as compare_samples
-from .divergence import Divergence as Divergence
-from .divergence import Estimate as Estimate
 from .known_rows import RowSketch as RowSketch
 from .paired import Difference as Difference
 from .paired import ModelComparison as ModelComparison

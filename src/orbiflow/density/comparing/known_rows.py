@@ -73,11 +73,8 @@ class RowSketch:
             assert is_a(document, Mapping)
             given = cast(Mapping[str, Any], document)
             hashes = np.array(given["hashes"], dtype=np.uint64)
-            if (
-                hashes.ndim != 1
-                or not 0 < len(hashes) <= MAX_HASHES
-                or (hashes[1:] <= hashes[:-1]).any()
-            ):
+            ordered = hashes.ndim == 1 and bool((hashes[1:] > hashes[:-1]).all())
+            if not ordered or not 0 < len(hashes) <= MAX_HASHES:
                 raise ValueError("hashes out of order")
             return cls(int(given["rows"]), hashes, bool(given["whole"]))
         except (AssertionError, KeyError, TypeError, ValueError, OverflowError) as error:
@@ -105,11 +102,7 @@ def row_hashes(space: Space, data: ArrayLike) -> NDArray[np.uint64]:
 
 
 def _mixed(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Mix 64 bits so that no pattern is left.
-
-    This is the bijection of Steele, Lea and Flood, Fast splittable pseudorandom number generators,
-    2014.
-    """
+    """Mix 64 bits by a bijection (Steele, Lea and Flood, Fast splittable generators, 2014)."""
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return x ^ (x >> np.uint64(31))

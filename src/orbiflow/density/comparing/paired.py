@@ -11,9 +11,8 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_array, is_a
+from orbiflow.arguments import as_array, as_instance, is_a
 from orbiflow.arrays import Array
-from orbiflow.density.arguments import check_kind
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
 from orbiflow.density.comparing.settings import ComparisonSettings
 from orbiflow.density.estimator import DensityEstimator
@@ -159,30 +158,24 @@ def compare_scores(
     for k, (i, j) in enumerate(pairs):
         low, high = mean[k] - reach * error[k], mean[k] + reach * error[k]
         t = _ratio(abs(mean[k]), error[k])
-        found.append(
-            Difference(
-                names[i],
-                names[j],
-                float(mean[k]),
-                float(error[k]),
-                float(low),
-                float(high),
-                float((1 + (largest >= t).sum()) / (1 + settings.bootstrap)) if t else 1.0,
-                float(np.average((rows[:, k] > 0) + (rows[:, k] == 0) / 2, weights=counts)),
-                names[i] if low > 0 else None,
-            )
-        )
+        p = float((1 + (largest >= t).sum()) / (1 + settings.bootstrap)) if t else 1.0
+        share = float(np.average((rows[:, k] > 0) + (rows[:, k] == 0) / 2, weights=counts))
+        figures = map(float, (mean[k], error[k], low, high, p, share))
+        better = names[i] if low > 0 else None
+        found.append(Difference(names[i], names[j], *figures, better=better))
     beaten = {d.second for d in found if d.first == names[0] and d.better is not None}
-    same = [f"{d.first} and {d.second} are equal at every row" for d in found if _equal(d)]
+    same = [
+        f"{d.first} and {d.second} are equal at every row" for d in found if d.mean == d.error == 0
+    ]
+    best = names[0] if len(beaten) == len(names) - 1 else None
+    scored = zip(names, means.tolist(), errors.tolist(), strict=True)
     return ModelComparison(
-        tuple(ModelScore(*s) for s in zip(names, means.tolist(), errors.tolist(), strict=True)),
+        tuple(ModelScore(*score) for score in scored),
         tuple(found),
         len(table),
         members.count if members.given else None,
-        settings.level,
-        settings.bootstrap,
-        settings.seed,
-        names[0] if len(beaten) == len(names) - 1 else None,
+        *(settings.level, settings.bootstrap, settings.seed),
+        best,
         (*members.notes(), *same),
     )
 
@@ -244,10 +237,6 @@ def _ratio(size: Any, error: Any) -> Any:
     return np.where(np.asarray(size) <= 1e-14, 0.0, t)
 
 
-def _equal(difference: Difference) -> bool:
-    return difference.mean == 0 and difference.error == 0
-
-
 def _listed(names: list[str]) -> str:
     """Return names in words.
 
@@ -293,9 +282,9 @@ def density_of(model: Density | DensityEstimator, name: str = "the model") -> De
     if isinstance(model, DensityEstimator):
         density = getattr(model, "density_", None)
         if density is None:
-            raise OrbiflowError(f"{name} is not fitted yet: call fit first")
+            raise OrbiflowError(f"{name} is not fitted yet: call fit(data) first")
         return density
-    return check_kind(model, Density, name, "or a fitted DensityEstimator")
+    return as_instance(model, Density, name, "or a fitted DensityEstimator")
 
 
 def require_one_space(spaces: Mapping[str, Space]) -> None:
@@ -307,9 +296,13 @@ def require_one_space(spaces: Mapping[str, Space]) -> None:
     (first, one), *others = spaces.items()
     for name, other in others:
         if (one.name, one.dim) != (other.name, other.dim):
+            titles = [
+                f"torus of {space.dim} angles" if space.is_torus else space.name
+                for space in (one, other)
+            ]
             raise OrbiflowError(
-                f"{first} is on the {_title(one)}, {name} on the {_title(other)}: their densities "
-                "have no common measure; compare models of one space"
+                f"{first} is on the {titles[0]}, {name} on the {titles[1]}: their densities have no "
+                "common measure; compare models of one space"
             )
         if one.unit != other.unit:
             raise OrbiflowError(
@@ -321,10 +314,7 @@ def require_one_space(spaces: Mapping[str, Space]) -> None:
 def scores_of(
     density: Density, data: ArrayLike, told: Callable[[float], None] = lambda _: None
 ) -> Array:
-    """Return log densities (N,) at data (N, k), in natural measure.
-
-    `told` is called with the share of the rows that are done.
-    """
+    """Return log densities (N,) at data (N, k) in natural measure; `told` gets the share done."""
     points = density.space.to_chart(data)
     found: list[Sequence[float] | np.ndarray] = []
     with torch.no_grad():
@@ -332,7 +322,3 @@ def scores_of(
             told(start / len(points))
             found.append(density.log_prob(points[start : start + BLOCK], measure="natural").numpy())
     return np.concatenate(found) if found else np.zeros(0)
-
-
-def _title(space: Space) -> str:
-    return f"torus of {space.dim} angles" if space.is_torus else space.name

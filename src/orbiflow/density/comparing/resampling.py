@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,11 +39,7 @@ class Groups:
 
     @classmethod
     def of(cls, labels: ArrayLike | None, rows: int) -> Groups:
-        """Return groups from a label for each row, of any kind; None means independent rows.
-
-        Raises:
-            OrbiflowError: If there is another number of labels.
-        """
+        """Return groups from a label for each row, of any kind; None means independent rows."""
         if labels is None:
             return cls(np.arange(rows), rows, False)
         index = group_numbers(labels, rows)
@@ -56,11 +51,7 @@ class Groups:
         return "groups" if self.given else "rows"
 
     def require(self) -> None:
-        """Check that there are enough for an uncertainty.
-
-        Raises:
-            OrbiflowError: If there are too few.
-        """
+        """Check that there are enough for an uncertainty."""
         if self.count < MIN_GROUPS:
             raise OrbiflowError(
                 f"{self.count} {self.what} are too few for an uncertainty: there must be at least "
@@ -82,17 +73,15 @@ class Groups:
 
 def resampled_sums(table: Array, resamples: int, rng: np.random.Generator) -> Array:
     """Return sums (B, k) of a table (G, k) over G rows drawn with replacement, `resamples` times."""
-    return np.concatenate([w @ table for w in _weights(len(table), resamples, rng)])
-
-
-def _weights(count: int, resamples: int, rng: np.random.Generator) -> Iterator[Array]:
-    """Yield how often each of `count` rows is drawn, in blocks (b, count)."""
+    count = len(table)
     size = max(1, BLOCK_ENTRIES // count)
+    found: list[Array] = []
     for start in range(0, resamples, size):
         number = min(size, resamples - start)
         drawn = rng.integers(count, size=(number, count)) + count * np.arange(number)[:, None]
-        found = np.bincount(drawn.ravel(), minlength=number * count)
-        yield found.reshape(number, count).astype(np.float64)
+        weights = np.bincount(drawn.ravel(), minlength=number * count).reshape(number, count)
+        found.append(weights.astype(np.float64) @ table)
+    return np.concatenate(found)
 
 
 MAX_FOLDS = 1000

@@ -77,16 +77,18 @@ def mmd_test(
     labels = _permuted(first, groups, permutations, rng)
     index = torch.as_tensor(groups.index)
     apart = index[:, None] != index[None, :]
-    dots = _dots(space, points)
+    images = space.features(points)
+    dots = [images[0] @ image.mT for image in images]  # their exponentials are kernels
     top = float(dots[0].diagonal().mean())
     scales = _scales(top - dots[0], apart, rng)
-    counts = _difference(apart.double(), labels, None)
-    found: list[tuple[Array, Array, Array]] = []
+    counts = np.maximum(_pair_sums(apart.double(), labels), 1)
+    found: list[Array] = []
     for scale in scales:
         kernel = sum(((dot - top) / scale).exp() for dot in dots)
         assert isinstance(kernel, Tensor)
-        found.append(_difference(kernel * apart, labels, counts))
-    table = np.stack([mean_a + mean_b - 2 * mean_ab for mean_a, mean_b, mean_ab in found])
+        own, other, between = _pair_sums(kernel * apart, labels) / counts
+        found.append(own + other - 2 * between)
+    table = np.stack(found)
     spread = table.std(axis=1, keepdims=True)
     largest = ((table - table.mean(axis=1, keepdims=True)) / np.maximum(spread, 1e-300)).max(axis=0)
     as_large = int((largest[1:] >= largest[0] - 1e-12).sum())
@@ -109,12 +111,6 @@ def chosen_rows(first: Array, groups: Groups, most: int, seed: int = 0) -> Array
     return np.sort(by_group[: total[whole - 1] if whole else most])
 
 
-def _dots(space: Space, points: Tensor) -> list[Tensor]:
-    """Return for each image the table (N, N) whose exponentials are kernels."""
-    images = space.features(points)
-    return [images[0] @ image.mT for image in images]
-
-
 def _scales(distances: Tensor, apart: Tensor, rng: np.random.Generator) -> list[float]:
     """Return quantiles of half the squared distances of pairs that are not of one group."""
     pairs = torch.as_tensor(rng.integers(len(distances), size=(2, PAIRS)))
@@ -134,29 +130,18 @@ def _permuted(first: Array, groups: Groups, permutations: int, rng: np.random.Ge
         side = own.copy()
         side[single] = own[rng.permutation(single)]
         turned = both & (rng.random(groups.count) < 0.5)
-        row = side[groups.index]
-        shared = both[groups.index]
-        found[:, k] = np.where(shared, first ^ turned[groups.index], row)
+        of_row = groups.index
+        found[:, k] = np.where(both[of_row], first ^ turned[of_row], side[of_row])
     return torch.as_tensor(found)
 
 
-def _difference(
-    kernel: Tensor, labels: Tensor, counts: tuple[Array, Array, Array] | None
-) -> tuple[Array, Array, Array]:
-    """Return sums of the kernel over pairs within the first, within the second, and between.
-
-    Each is (1 + P,). Given `counts` of the pairs, they are means.
-    """
+def _pair_sums(kernel: Tensor, labels: Tensor) -> Array:
+    """Return sums (3, 1 + P) over pairs within the first, within the second, and between."""
     rows = kernel.sum(dim=1)
-    total = float(rows.sum())
-    parts: list[Tensor] = []
-    for block in torch.split(labels, BLOCK, dim=1):
-        within = (block * (kernel @ block)).sum(dim=0)
-        parts.append(torch.stack([within, rows @ block]))
+    parts = [
+        torch.stack([(block * (kernel @ block)).sum(dim=0), rows @ block])
+        for block in torch.split(labels, BLOCK, dim=1)
+    ]
     within, touching = torch.cat(parts, dim=1).numpy()
     between = touching - within
-    sums = (within, total - touching - between, between)
-    if counts is None:
-        return sums
-    a, b, c = (s / np.maximum(n, 1) for s, n in zip(sums, counts, strict=True))
-    return a, b, c
+    return np.stack([within, float(rows.sum()) - touching - between, between])

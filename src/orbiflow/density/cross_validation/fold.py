@@ -6,97 +6,97 @@ import json
 import math
 import time
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
+from orbiflow import runtime
 from orbiflow.arrays import Array
+from orbiflow.density import tables
 from orbiflow.density.estimator import DensityEstimator
-from orbiflow.density.fitting import ComponentSettings, DensitySettings, mean_of, weighed
-from orbiflow.density.tables import (
-    RowSettings,
-    SpaceSettings,
-    Table,
-    angle_unit,
-    read_rows,
-    read_table,
-)
+from orbiflow.density.fitting import ComponentSettings, DensitySettings
+from orbiflow.density.operations import mean_of_whole
+from orbiflow.density.run_folder import write_files
 from orbiflow.errors import OrbiflowError, SettingError, literal
-from orbiflow.runtime import (
-    Cancel,
-    Note,
-    Outcome,
-    ResultFolder,
-    Sink,
-    Written,
-    one_thread,
-    progress_events,
-    write_atomic,
-)
+from orbiflow.settings import Option
 
 SCORES, REPORT = "scores.csv", "report.json"
 
 
-@one_thread()
-def fit_and_score(
+@runtime.operation("density fold")
+@runtime.one_thread()
+def fold(
     data: Path,
-    where: SpaceSettings,
-    density: ComponentSettings,
-    settings: RowSettings,
-    out: Path,
+    where: tables.SpaceSettings,
+    density: ComponentSettings = ComponentSettings(),
+    out: Annotated[Path, Option("-o")] = Path("fold"),
+    rows: tables.RowSettings = tables.RowSettings(),
+    *,
     fold: int,
-    held_column: str,
-    group: str | None,
-    tell: Sink,
-    cancel: Cancel,
-) -> Outcome:
-    """Fit, score the fold, and write the folder.
+    held: str = "fold",
+    group: str | None = None,
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
+    """Fit a density to all rows of a table but those of one fold, and score that fold.
 
-    Rows of the fold take no part in the fit, nor in where the space is turned for it.
+    Writes scores.csv, a line for each row held out, and report.json. Rows of the fold take no part in
+    the fit, nor in where the space is turned for it.
 
-    Returns:
-        An outcome whose summary has `folder`; the number of `rows` held out and `fitted`; the mean
-        `log_likelihood` of those held out, in nats, natural measure and weighted; and `seconds`.
-
-    Raises:
-        OrbiflowError: For a mistake of the user.
-        Cancelled: If it was told to stop; nothing is written.
+    Args:
+        data: The table.
+        out: Folder for the results, made if need be.
+        fold: The fold that is held out.
+        held: Column that numbers the fold of each row.
+        group: Column that names what rows belong to.
     """
     begin = time.perf_counter()
-    rows = read_rows(data, settings, tell, width=len(settings.columns or ()) or None, group=group)
-    table, weights, labels = rows.table, rows.weights, rows.labels()
-    held = _held(data, table, fold, held_column, settings.header)
+    width = len(rows.columns or ()) or None
+    read = tables.read_rows(data, rows, on_event, width=width, group=group)
+    table, weights, labels = read.table, read.weights, read.labels()
+    out_of_fit = _held(data, table, fold, held, rows.header)
     estimator = DensityEstimator.with_settings(
         where.space,
         DensitySettings(**density.to_json()),
-        unit=angle_unit(where.space, where.unit, table, tell),
-        missing="marginalise" if settings.missing == "marginalise" else "refuse",
+        unit=tables.angle_unit(where.space, where.unit, table, on_event),
+        missing="marginalise" if rows.missing == "marginalise" else "refuse",
     )
-    folder = ResultFolder(out, written_files)
+    folder = runtime.ResultFolder(out, written_files)
     estimator.fit(
-        table.values[~held],
-        sample_weight=None if weights is None else weights[~held],
-        groups=None if labels is None else labels[~held],
-        progress=progress_events(tell, cancel),
+        table.values[~out_of_fit],
+        sample_weight=None if weights is None else weights[~out_of_fit],
+        groups=None if labels is None else labels[~out_of_fit],
+        progress=runtime.progress_events(on_event, cancel),
     )
-    scores = estimator.score_samples(table.values[held])
+    scores = estimator.score_samples(table.values[out_of_fit])
     if not np.isfinite(scores).all():
         raise SettingError(
-            f"{(~np.isfinite(scores)).sum()} rows held out have no density: allow other {{components}}"
+            f"{(~np.isfinite(scores)).sum()} rows held out have no density: allow other "
+            "{components}"
         )
     cancel.check()
-    mean = _mean(scores, table.values[held], None if weights is None else weights[held])
-    document = _document(density, fold, estimator, held, mean, begin)
-    with folder.replaced() as staged:
-        write_atomic(staged / SCORES, scores_csv(table.lines[held], scores))
-        write_atomic(staged / REPORT, json.dumps(document, allow_nan=False, indent=1))
-    for name in (SCORES, REPORT):
-        tell(Written(out / name))
-    tell(Note(f"mean log density {mean:.4f} nats at {held.sum()} rows held out"))
+    mean = mean_of_whole(
+        scores, None if weights is None else weights[out_of_fit], read.whole[out_of_fit]
+    )
+    document = {
+        "space": {"name": estimator.space_.name, **estimator.space_.settings()},
+        "fold": fold,
+        "components": density.components,
+        "rows": int(out_of_fit.sum()),
+        "fitted": int((~out_of_fit).sum()),
+        "log_likelihood": mean,
+        "uniform": -math.log(estimator.space_.volume),
+        "report": estimator.report_.to_json(),
+        "seconds": time.perf_counter() - begin,
+    }
+    report = json.dumps(document, allow_nan=False, indent=1)
+    write_files(
+        folder, {SCORES: scores_csv(table.lines[out_of_fit], scores), REPORT: report}, on_event
+    )
+    on_event(runtime.Note(f"mean log density {mean:.4f} nats at {out_of_fit.sum()} rows held out"))
     names = ("rows", "fitted", "log_likelihood", "seconds")
-    return Outcome({"folder": str(out), **{name: document[name] for name in names}})
+    return runtime.Outcome({"folder": str(out), **{name: document[name] for name in names}})
 
 
 def scores_csv(rows: NDArray[np.int64], scores: Array) -> str:
@@ -114,13 +114,11 @@ def written_files(folder: Path) -> set[str]:
     return {SCORES, REPORT} if (folder / SCORES).is_file() else set()
 
 
-def _held(data: Path, table: Table, fold: int, name: str, header: bool | None) -> NDArray[np.bool_]:
-    """Which rows (N,) are of the fold.
-
-    Raises:
-        OrbiflowError: If the column numbers no folds, or there is no such fold.
-    """
-    column = read_table(data, columns=[name], width=1, has_header=header, drop_missing=True)
+def _held(
+    data: Path, table: tables.Table, fold: int, name: str, header: bool | None
+) -> NDArray[np.bool_]:
+    """Which rows (N,) are of the fold."""
+    column = tables.read_table(data, columns=[name], width=1, has_header=header, drop_missing=True)
     if not np.isin(table.lines, column.lines).all():
         raise OrbiflowError(f"{data}: some rows lack their fold in {column.columns[0]!r}")
     folds = column.values[np.isin(column.lines, table.lines), 0]
@@ -133,33 +131,3 @@ def _held(data: Path, table: Table, fold: int, name: str, header: bool | None) -
             + literal(f"{column.columns[0]!r}; give one of {some}")
         )
     return held
-
-
-def _mean(scores: Array, values: Array, weights: Array | None) -> float:
-    """The mean of the rows that lack nothing: densities of fewer angles are in another unit."""
-    whole = ~np.isnan(values).any(axis=1)
-    chosen = whole if whole.any() else np.ones_like(whole)
-    rows = weighed(torch.tensor(scores[chosen, None]), None if weights is None else weights[chosen])
-    return mean_of(rows.points[:, 0], rows.weights)
-
-
-def _document(
-    density: ComponentSettings,
-    fold: int,
-    estimator: DensityEstimator,
-    held: NDArray[np.bool_],
-    mean: float,
-    begin: float,
-) -> dict[str, Any]:
-    """What report.json says."""
-    return {
-        "space": {"name": estimator.space_.name, **estimator.space_.settings()},
-        "fold": fold,
-        "components": density.components,
-        "rows": int(held.sum()),
-        "fitted": int((~held).sum()),
-        "log_likelihood": mean,
-        "uniform": -math.log(estimator.space_.volume),
-        "report": estimator.report_.to_json(),
-        "seconds": time.perf_counter() - begin,
-    }

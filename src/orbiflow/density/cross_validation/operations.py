@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from orbiflow.arguments import refusal
+from orbiflow.arguments import as_whole
 from orbiflow.batch import WorkSettings
 from orbiflow.density.fitting import COMPONENTS, ComponentSettings, DensitySettings
 from orbiflow.density.operations import check_marginalised
@@ -19,13 +19,8 @@ from orbiflow.settings import DefaultText, Option, Range, Repeated, Settings
 DEFAULT, UNIFORM = "default", "uniform"
 """Names of what a fit chooses by itself, and of the density that is the same everywhere."""
 
-SEEDS = Range(0, 2**63 - 1)
-"""Seeds of splits, which are fewer than those of fits."""
-
-KERNELS = ("kernels",)
-"""What is compared if nothing else is asked for."""
-
-NEVER = Cancel()
+Components = tuple[str, ...] | None
+"""Those of a setting, None for what a fit chooses by itself."""
 
 
 class CvSettings(Settings, group="Cross-validation"):
@@ -53,22 +48,15 @@ class CvSettings(Settings, group="Cross-validation"):
                 _setting_in(text)
 
     @property
-    def others(self) -> dict[str, tuple[str, ...] | None]:
+    def others(self) -> dict[str, Components]:
         """The components of the other settings that are fitted, by name."""
-        asked = KERNELS if self.against is None else self.against
+        asked = ("kernels",) if self.against is None else self.against
         return dict(_setting_in(text) for text in asked if text != UNIFORM)
 
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """What is asked for, checked.
-
-    - `data`, `out`: The table, and the folder for the results.
-    - `where`, `density`: The fit in question.
-    - `rows`: How the table is read.
-    - `group`: The column that names what rows belong to.
-    - `cv`: The splits and the comparison.
-    """
+    """The table and the folder for the results, the fit in question, how rows are read and split."""
 
     data: Path
     out: Path
@@ -79,8 +67,7 @@ class CrossValidation:
     cv: CvSettings
 
     def __post_init__(self) -> None:
-        if self.density.seed not in SEEDS:
-            raise refusal("seed", f"from 0 to {SEEDS.most}", self.density.seed)
+        as_whole(self.density.seed, "seed", 0, 2**63 - 1)  # splits have fewer seeds than fits
         name, _ = setting_of(self.density.components, "components")
         if self.cv.against is not None and name in self.cv.others:
             raise SettingError(
@@ -89,10 +76,10 @@ class CrossValidation:
             )
         if self.rows.missing == "marginalise":
             for components in self.settings.values():
-                check_marginalised(self.where, DensitySettings(components=components))
+                check_marginalised(self.where, DensitySettings().replace(components=components))
 
     @property
-    def settings(self) -> dict[str, tuple[str, ...] | None]:
+    def settings(self) -> dict[str, Components]:
         """The components by the name of each setting that is fitted, the one in question first."""
         found = dict([setting_of(self.density.components, "components")])
         for name, components in self.cv.others.items():
@@ -100,14 +87,12 @@ class CrossValidation:
         return found
 
     @property
-    def beside_uniform(self) -> bool:
-        """Whether the uniform density is compared, too: if asked for, or if there is no other."""
-        return UNIFORM in (self.cv.against or ()) or len(self.settings) == 1
-
-    @property
     def names(self) -> list[str]:
-        """The names of what is compared, the setting in question first."""
-        return [*self.settings, *([UNIFORM] if self.beside_uniform else [])]
+        """The names of what is compared: the uniform density, too, if asked for or beside one alone."""
+        fitted = list(self.settings)
+        return (
+            [*fitted, UNIFORM] if UNIFORM in (self.cv.against or ()) or len(fitted) == 1 else fitted
+        )
 
 
 @operation("density cv", keeps_partial=True, starts_processes=True)
@@ -122,7 +107,7 @@ def cross_validate(
     *,
     group: str | None = None,
     on_event: Sink = ignore,
-    cancel: Cancel = NEVER,
+    cancel: Cancel = Cancel(),
 ) -> Outcome:
     """Cross-validate: how well does a density foretell rows that its fit has not seen?
 
@@ -140,46 +125,13 @@ def cross_validate(
     """
     asked = CrossValidation(data, out, where, density, rows, group, cv)
 
-    from orbiflow.density.cross_validation.fits import run
+    from orbiflow.density.cross_validation.overview import run
 
     return run(asked, work, on_event, cancel)
 
 
-@operation("density fold")
-def fold(
-    data: Path,
-    where: SpaceSettings,
-    density: ComponentSettings = ComponentSettings(),
-    out: Annotated[Path, Option("-o")] = Path("fold"),
-    rows: RowSettings = RowSettings(),
-    *,
-    fold: int,
-    held: str = "fold",
-    group: str | None = None,
-    on_event: Sink = ignore,
-    cancel: Cancel = NEVER,
-) -> Outcome:
-    """Fit a density to all rows of a table but those of one fold, and score that fold.
-
-    Writes scores.csv, a line for each row held out, and report.json.
-
-    Args:
-        data: The table.
-        out: Folder for the results, made if need be.
-        fold: The fold that is held out.
-        held: Column that numbers the fold of each row.
-        group: Column that names what rows belong to.
-    """
-    from orbiflow.density.cross_validation.fold import fit_and_score
-
-    return fit_and_score(data, where, density, rows, out, fold, held, group, on_event, cancel)
-
-
-def setting_of(components: Sequence[str] | None, field: str) -> tuple[str, tuple[str, ...] | None]:
+def setting_of(components: Sequence[str] | None, field: str) -> tuple[str, Components]:
     """Return the name of a setting, and its components in one order.
-
-    Raises:
-        SettingError: For components that there are not, by the field's name.
 
     >>> setting_of(["mixture", "kernels"], "components")
     ('kernels+mixture', ('kernels', 'mixture'))
@@ -197,8 +149,8 @@ def setting_of(components: Sequence[str] | None, field: str) -> tuple[str, tuple
     return (DEFAULT, None) if own == COMPONENTS else ("+".join(own), own)
 
 
-def _setting_in(text: str) -> tuple[str, tuple[str, ...] | None]:
-    """The setting that a word of `against` names."""
+def _setting_in(text: str) -> tuple[str, Components]:
+    """Return the setting that a word of `against` names."""
     if text == DEFAULT:
         return DEFAULT, None
     pieces = [piece.strip() for piece in text.replace("+", ",").split(",")]

@@ -1,26 +1,36 @@
-"""The files of a cross-validation: a line for each fold and row, the comparison, the page."""
+"""The work of a cross-validation, and its files: folds, rows, the comparison, the page."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
-from orbiflow import __version__
+from orbiflow import __version__, batch, runtime
 from orbiflow.arrays import Array
-from orbiflow.batch import Entry, csv_bytes
+from orbiflow.batch import Entry
 from orbiflow.density.comparing import ModelComparison
-from orbiflow.density.cross_validation.operations import CrossValidation
-from orbiflow.density.cross_validation.page import cv_page
-from orbiflow.density.cross_validation.results import HeldOut, Spread, compared, held_out
-from orbiflow.density.cross_validation.splits import Fit, Split
+from orbiflow.density.cross_validation.fold import written_files
+from orbiflow.density.cross_validation.operations import UNIFORM, CrossValidation
+from orbiflow.density.cross_validation.splits import (
+    Fit,
+    HeldOut,
+    Split,
+    compared,
+    cv_rows,
+    fits_of,
+    held_out,
+    splits_of,
+)
+from orbiflow.density.pictures import space_title
 from orbiflow.density.tables import append_columns
+from orbiflow.drawing import rendered
 from orbiflow.errors import InputFileError
 
 TABLE, ROWS, REPORT, PAGE = "cv.csv", "rows.csv", "report.json", "index.html"
@@ -29,10 +39,7 @@ FIGURES = ("rows", "fitted", "log_likelihood")
 
 @dataclass(eq=False)
 class CvOverview:
-    """Files that are written anew as fits come; the comparison once nothing more comes.
-
-    - `comparison`: The last comparison, or why there is none.
-    """
+    """Files that are written anew as fits come; the comparison, or why there is none, at the end."""
 
     journal: ClassVar[str] = "cv.jsonl"
     what: ClassVar[str] = "cross-validation"
@@ -47,7 +54,7 @@ class CvOverview:
 
     def files(
         self,
-        entries: Sequence[Entry],
+        entries: Sequence[batch.Entry],
         waiting: int,
         pictures: frozenset[str],  # noqa: ARG002
         *,
@@ -69,11 +76,7 @@ class CvOverview:
         return files
 
     def _rows(self, found: HeldOut) -> bytes | None:
-        """The table with the fold of each row and its log density by each setting.
-
-        Raises:
-            InputFileError: If the table has changed in the meantime.
-        """
+        """Return the table with the fold of each row and its log density by each setting."""
         means, data = found.means(), self.asked.data
         if np.isnan(means).all():
             return None
@@ -89,8 +92,10 @@ class CvOverview:
             added[f"log_prob_{name}"] = column
         return append_columns(self.splits[0].rows.table, data, added)
 
-    def _report(self, found: HeldOut, done: Sequence[tuple[Fit, Entry]], waiting: int) -> bytes:
-        rows = self.splits[0].rows
+    def _report(
+        self, found: HeldOut, done: Sequence[tuple[Fit, batch.Entry]], waiting: int
+    ) -> bytes:
+        rows, cv, density = self.splits[0].rows, self.asked.cv, self.asked.density
         states = [entry.state for _, entry in done]
         comparison = self.comparison
         document: dict[str, Any] = {
@@ -99,7 +104,17 @@ class CvOverview:
             "data": str(self.asked.data),
             "space": {"name": rows.space.name, "unit": rows.space.unit},
             "columns": list(rows.table.columns),
-            "settings": self._settings,
+            "settings": {
+                "folds": cv.folds,
+                "times": cv.times,
+                "group": self.asked.group,
+                "missing": self.asked.rows.missing,
+                "weights": self.asked.rows.weights,
+                "repeats": density.repeats,
+                "level": cv.level,
+                "bootstrap": cv.bootstrap,
+                "seed": density.seed,
+            },
             "components": self.asked.settings,
             "rows": len(rows.table.values),
             "groups": None if rows.labels is None else len(np.unique(rows.labels)),
@@ -116,54 +131,280 @@ class CvOverview:
         }
         return json.dumps(document, allow_nan=False, indent=1).encode()
 
-    @cached_property
-    def _settings(self) -> dict[str, Any]:
-        """What was asked for, as the report tells it."""
-        cv, rows, density = self.asked.cv, self.asked.rows, self.asked.density
-        return {
-            "folds": cv.folds,
-            "times": cv.times,
-            "group": self.asked.group,
-            "missing": rows.missing,
-            "weights": rows.weights,
-            "repeats": density.repeats,
-            "level": cv.level,
-            "bootstrap": cv.bootstrap,
-            "seed": density.seed,
-        }
-
     def _spreads(self, found: HeldOut) -> dict[str, Any]:
-        """How much folds differ, by setting."""
-        whole = self.splits[0].rows.whole
-        means = [
-            mean
-            for number, split in enumerate(self.splits)
-            for mean in found.fold_means(split, number, whole).values()
-        ]
-        spreads = {
-            name: Spread.of([float(mean[k]) for mean in means])
-            for k, name in enumerate(found.settings)
+        """Return how much folds differ, by setting."""
+        means = [mean for *_, mean in found.fold_means(self.splits)]
+        columns = {name: [mean[k] for mean in means] for k, name in enumerate(found.settings)}
+        return {
+            name: {"deviation": float(np.std(column, ddof=1)), "folds": len(column)}
+            if len(column) > 1
+            else None
+            for name, column in columns.items()
         }
-        return {name: None if one is None else one.to_json() for name, one in spreads.items()}
 
 
-def _table(done: Sequence[tuple[Fit, Entry]]) -> bytes:
-    """A line for each fit that has finished."""
+def _table(done: Sequence[tuple[Fit, batch.Entry]]) -> bytes:
+    """Return a CSV with a line for each fit that has finished."""
     heads = ["split", "fold", "setting", "state", *FIGURES, "seconds", "error", "folder"]
-    return csv_bytes(heads, (list(_cells(fit, entry)) for fit, entry in done))
-
-
-def _cells(fit: Fit, entry: Entry) -> Iterator[Any]:
-    yield from (fit.split, fit.fold, fit.setting, entry.state)
-    yield from ("" if (v := entry.best.get(name)) is None else repr(v) for name in FIGURES)
-    yield "" if entry.seconds is None else f"{entry.seconds:.3f}"
-    yield from (entry.reason, "" if entry.state == "failed" else entry.name)
+    rows: list[list[Any]] = []
+    for fit, entry in done:
+        figures = ["" if (v := entry.best.get(name)) is None else repr(v) for name in FIGURES]
+        seconds = "" if entry.seconds is None else f"{entry.seconds:.3f}"
+        folder = "" if entry.state == "failed" else entry.name
+        rows.append([fit.split, fit.fold, fit.setting, entry.state, *figures, seconds])
+        rows[-1] += [entry.reason, folder]
+    return batch.csv_bytes(heads, rows)
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
-    """What a change of a file is noticed by."""
+    """Return what a change of a file is noticed by."""
     try:
         found = path.stat()
     except OSError:
         return None
     return found.st_size, found.st_mtime_ns
+
+
+def _figures(summary: batch.Summary) -> dict[str, Any]:
+    return {name: summary[name] for name in ("rows", "fitted", "log_likelihood")}
+
+
+FITS = batch.Kind(
+    things="fits",
+    items="fits",
+    reads="data",
+    writes="out",
+    modules=("orbiflow.density.cross_validation.fold",),
+    columns=(batch.Column("log_likelihood", "held out", ".4f"), batch.Column("rows", "rows", "d")),
+    best=_figures,
+    picture=lambda _summary: None,
+    written=written_files,
+)
+
+
+def run(
+    asked: CrossValidation, work: batch.WorkSettings, tell: runtime.Sink, cancel: runtime.Cancel
+) -> runtime.Outcome:
+    """Do the fits that have not been done, then compare what they say of unseen rows."""
+    begin = time.perf_counter()
+    out = asked.out
+    runtime.check_outside_runs(out, asked.data)
+    for name in (TABLE, ROWS, REPORT, PAGE):
+        runtime.check_inputs_kept(out / name, asked.data)
+    with runtime.one_thread():
+        rows = cv_rows(asked, tell)
+    splits = splits_of(asked, rows)
+    fits = list(fits_of(asked))
+    items = [_item(fit, asked, splits[fit.split - 1]) for fit in fits]
+    overview = CvOverview(asked, fits, splits)
+    with batch.BatchFolder(out, FITS, overview) as folder:
+        counts = batch.run_items(
+            items, work, folder, tell, cancel, gone="of other folds or settings"
+        )
+    found = overview.comparison
+    words = [f"no comparison: {found}"] if isinstance(found, str) else found.words()
+    notes = () if isinstance(found, str) else found.notes
+    for text in (*words, *notes):
+        tell(runtime.Note(text))
+    summary = {
+        "folder": str(out),
+        "table": str(out / TABLE),
+        "rows": str(out / ROWS),
+        "report": str(out / REPORT),
+        "page": str(out / PAGE),
+        "fits": len(fits),
+        "comparison": None if isinstance(found, str) else found.to_json(),
+        "seconds": time.perf_counter() - begin,
+    }
+    return counts.outcome(len(fits), out / TABLE, out / PAGE, summary, tell)
+
+
+def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
+    """Return a fit as batches take it, with all that decides its result besides the rows."""
+    angles = len(split.rows.table.columns)
+    weighted, grouped = split.rows.weights is not None, split.rows.labels is not None
+    density, space = asked.density, asked.where.space
+    given: dict[str, Any] = {
+        "data": Path(split.name),
+        "space": space,
+        "fold": fit.fold,
+        "columns": tuple(str(k + 1) for k in range(angles)),
+        "held": str(angles + weighted + grouped + 1),
+        "weights": str(angles + 1) if weighted else None,
+        # a flow alone has no components to choose
+        "group": str(angles + weighted + 1) if grouped and fit.components != ("flow",) else None,
+        "missing": "marginalise" if asked.rows.missing == "marginalise" else "refuse",
+        "unit": split.rows.unit if space in ("torus", "klein-bottle") else None,
+        "components": fit.components,
+        "repeats": density.repeats,
+        "seed": density.seed,
+    }
+    call = runtime.find("density fold").call({k: v for k, v in given.items() if v is not None})
+    return batch.Item(fit.key, fit.name, call, split)
+
+
+MOST_LISTED = 200
+"""Folds of the table on the page; all are in cv.csv."""
+
+FoldMeans = Sequence[tuple[int, int, Array]]
+"""Split and fold, from 1, and the means (S,) of the rows that every setting has scored."""
+
+
+def cv_page(
+    asked: CrossValidation,
+    splits: Sequence[Split],
+    found: HeldOut,
+    comparison: ModelComparison | str,
+    done: Sequence[tuple[Fit, Entry]],
+    waiting: int,
+) -> bytes:
+    """Return the page as UTF-8, to be written beside the folders."""
+    rows = splits[0].rows
+    folds = found.fold_means(splits)
+    seconds = {(fit.split, fit.fold, fit.setting): entry.seconds for fit, entry in done}
+    first = next(iter(asked.settings))
+    made = None if isinstance(comparison, str) else comparison
+    text = rendered(
+        "orbiflow.density.cross_validation",
+        "page.html",
+        title=f"Cross-validation of {asked.data.name}",
+        asked=asked,
+        rows=rows,
+        place=space_title(rows.space),
+        groups=None if rows.labels is None else len(np.unique(rows.labels)),
+        uniform=-math.log(rows.space.volume),
+        made=made,
+        why=comparison,
+        waiting=waiting,
+        fits=waiting + len(done),
+        scores=_scores(found, made, folds),
+        differences=_differences(found, made, folds),
+        folds=[
+            {
+                "label": f"{split}.{fold}" if asked.cv.times > 1 else str(fold),
+                "folder": Fit(split, fold, first, None).name,
+                "count": int((splits[split - 1].fold == fold).sum()),
+                "means": mean,
+                "seconds": [seconds.get((split, fold, name)) for name in asked.settings],
+            }
+            for split, fold, mean in folds[:MOST_LISTED]
+        ],
+        more=max(0, len(folds) - MOST_LISTED),
+        heads=["fold", "rows", *found.settings, *(f"{name}, s" for name in asked.settings)],
+        failed=[(fit, entry) for fit, entry in done if entry.state != "done"],
+        signed=_signed,
+    )
+    return text.encode("utf-8", "replace")
+
+
+def _signed(value: float, sign: str = "-") -> str:
+    return f"{value:{sign}.4f}".replace("-", "\N{MINUS SIGN}")
+
+
+def _scores(
+    found: HeldOut, made: ModelComparison | None, folds: FoldMeans
+) -> dict[str, Any] | None:
+    """Return a picture of the mean log densities."""
+    names = list(found.settings)
+    known = {score.name: score for score in made.scores} if made else {}
+    lines = [
+        Strip(
+            name,
+            [float(mean[k]) for _, _, mean in folds],
+            *((s.mean, s.mean - s.error, s.mean + s.error) if (s := known.get(name)) else ()),
+        )
+        for k, name in enumerate(names)
+        if len(names) == 2 or name != UNIFORM
+    ]
+    return strips(lines, "mean log density of a fold, nats") if folds else None
+
+
+def _differences(
+    found: HeldOut, made: ModelComparison | None, folds: FoldMeans
+) -> dict[str, Any] | None:
+    """Return a picture of the differences between settings."""
+    names = list(found.settings)
+    lines = [
+        Strip(
+            f"{d.first} − {d.second}",
+            [float(mean[names.index(d.first)] - mean[names.index(d.second)]) for *_, mean in folds],
+            d.mean,
+            d.low,
+            d.high,
+        )
+        for d in (made.differences if made else ())
+        if len(names) == 2 or UNIFORM not in (d.first, d.second)  # far off, and in the table
+    ]
+    label = "difference of a fold, nats a row"
+    return strips(lines, label, zero=True) if folds and lines else None
+
+
+WIDTH, NAMES, MARGIN, STEP = 720, 300, 24, 34
+"""Pixels: of the picture, of names at its left at most, of the free right margin, of a strip."""
+
+LETTER = 7.6
+"""Largest width of a letter of a name, in pixels."""
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A strip of the picture: dots for the folds, the mean of all rows and its interval."""
+
+    name: str
+    dots: Sequence[float]
+    mean: float | None = None
+    low: float | None = None
+    high: float | None = None
+
+
+def strips(lines: Sequence[Strip], label: str, *, zero: bool = False) -> dict[str, Any] | None:
+    """Return what the template draws and where, in pixels; None if there is nothing to draw."""
+    values = [v for one in lines for v in (*one.dots, one.mean, one.low, one.high) if v is not None]
+    values = [v for v in values if math.isfinite(v)] + ([0.0] if zero else [])
+    if not values:
+        return None
+    ticks = _ticks(min(values), max(values))
+    low, high = min(ticks[0], *values), max(ticks[-1], *values)
+    names = min(NAMES, 30 + LETTER * max(len(one.name) for one in lines))
+    room = int((names - 20) / LETTER)
+    decimals = max(0, -math.floor(math.log10(ticks[1] - ticks[0]) + 1e-9))
+
+    def place(value: float | None) -> float | None:
+        if value is None:
+            return None
+        return names + (WIDTH - names - MARGIN) * (value - low) / (high - low)
+
+    return {
+        "width": WIDTH,
+        "names": names,
+        "middle": (names + WIDTH - MARGIN) / 2,
+        "foot": STEP * len(lines) + 8,
+        "label": label,
+        "said": f"{label}: {', '.join(one.name for one in lines)}",
+        "ticks": [(place(t), f"{t:.{decimals}f}".replace("-", "\N{MINUS SIGN}")) for t in ticks],
+        "zero": place(0.0) if zero else None,
+        "strips": [
+            {
+                "name": one.name if len(one.name) <= room else one.name[: room - 1] + "…",
+                "y": 4 + STEP * (k + 0.5),
+                "dots": [place(dot) for dot in one.dots if math.isfinite(dot)],
+                "mean": place(one.mean),
+                "low": place(one.low),
+                "high": place(one.high),
+            }
+            for k, one in enumerate(lines)
+        ],
+    }
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """Return four to eight round numbers that span both.
+
+    >>> _ticks(-9.44, -9.21)
+    [-9.45, -9.4, -9.35, -9.3, -9.25, -9.2]
+    """
+    span = high - low if high > low else max(abs(high), 1.0) * 1e-3
+    power = 10.0 ** math.floor(math.log10(span / 4))
+    step = next(m * power for m in (1, 2, 5, 10) if span / (m * power) <= 6)
+    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
+    return [round(k * step, 12) for k in range(first, max(last, first + 1) + 1)]

@@ -1,11 +1,13 @@
-"""The rows of a cross-validation and their splits, as the bytes that travel to each fit."""
+"""The rows of a cross-validation, their splits, and the scores of rows that fits had not seen."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,16 +15,16 @@ import torch
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
-from orbiflow.batch import code_of
-from orbiflow.density.comparing import cross_validation_folds
-from orbiflow.density.cross_validation.operations import CrossValidation
+from orbiflow.batch import Entry, code_of
+from orbiflow.density import comparing
+from orbiflow.density.cross_validation.fold import SCORES
+from orbiflow.density.cross_validation.operations import UNIFORM, CrossValidation
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
 from orbiflow.density.inference import chart_of_observed
-from orbiflow.density.operations import COLUMNS
 from orbiflow.density.spaces import Space, space_class
-from orbiflow.density.tables import Table, TableRows, Unit, angle_unit, read_rows
+from orbiflow.density.tables import Table, TableRows, Unit, angle_unit, read_rows, read_table
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.runtime import Note, Sink
+from orbiflow.runtime import Note, Sink, one_blas_thread
 
 MOST_BYTES = 256 * 2**20
 """The largest size of a table, which travels once for each fit."""
@@ -97,11 +99,7 @@ class Split:
 
 @dataclass(frozen=True)
 class Fit:
-    """One of many fits.
-
-    - `split`, `fold`: Their numbers, from 1.
-    - `setting`, `components`: The name of the setting, and its components.
-    """
+    """One of many fits: its split and fold, from 1, and the components of its setting."""
 
     split: int
     fold: int
@@ -120,12 +118,8 @@ class Fit:
 
 
 def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
-    """Return the rows of the table that count.
-
-    Raises:
-        OrbiflowError: If the table, its columns, weights or groups cannot be used.
-    """
-    width = COLUMNS.get(asked.where.space)
+    """Return the rows of the table that count."""
+    width = asked.where.width
     rows = _counting(read_rows(asked.data, asked.rows, tell, width=width, group=asked.group))
     table = rows.table
     unit = angle_unit(asked.where.space, asked.where.unit, table, tell)
@@ -150,38 +144,22 @@ def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
 
 
 def _counting(rows: TableRows) -> TableRows:
-    """The same without the rows of weight 0, which count for nothing."""
-    table, weights = rows.table, rows.weights
+    """Return rows without those of weight 0, which count for nothing."""
+    weights = rows.weights
     if weights is None:
         return rows
     weighed(torch.zeros(len(weights), 1), weights)  # refuses what is no weight
-    kept = weights > 0
-    kept_table = replace(
-        table,
-        values=table.values[kept],
-        lines=table.lines[kept],
-        dropped=table.dropped | frozenset(table.lines[~kept].tolist()),
-    )
-    return replace(rows, table=kept_table, weights=weights[kept])
+    return replace(rows, table=rows.table.only(weights > 0), weights=weights[weights > 0])
 
 
 def splits_of(asked: CrossValidation, rows: CvRows) -> list[Split]:
-    """Return the splits.
-
-    Raises:
-        OrbiflowError: If there are fewer rows or groups than folds.
-    """
-    count, seed = len(rows.table.values), asked.density.seed
-    return [
-        Split(
-            rows,
-            1
-            + cross_validation_folds(
-                count, asked.cv.folds, together=rows.together, seed=seed, split=number
-            ),
-        )
-        for number in range(asked.cv.times)
+    """Return the splits."""
+    count, folds, seed = len(rows.table.values), asked.cv.folds, asked.density.seed
+    numbers = [
+        comparing.cross_validation_folds(count, folds, together=rows.together, seed=seed, split=k)
+        for k in range(asked.cv.times)
     ]
+    return [Split(rows, 1 + fold) for fold in numbers]
 
 
 def fits_of(asked: CrossValidation) -> Iterator[Fit]:
@@ -190,3 +168,105 @@ def fits_of(asked: CrossValidation) -> Iterator[Fit]:
         for fold in range(1, asked.cv.folds + 1):
             for setting, components in asked.settings.items():
                 yield Fit(split, fold, setting, components)
+
+
+COLUMNS = ("row", "log_prob")
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Log densities in nats and natural measure, each by a fit that had not seen the row.
+
+    - `settings`: The names of S settings.
+    - `scores`: By setting, split and row, (S, T, N); NaN where there is none yet.
+    """
+
+    settings: tuple[str, ...]
+    scores: Array
+
+    @property
+    def common(self) -> NDArray[np.bool_]:
+        """Where every setting has a score, (T, N), so that they are compared at the same rows."""
+        return np.logical_and.reduce(np.isfinite(self.scores), axis=0)
+
+    def means(self) -> Array:
+        """Return the mean of each row over the splits where every setting has scored it, (S, N).
+
+        It is NaN if there is none. More splits are no more rows: they take away the chance of one
+        split, and the uncertainty is that of N rows.
+        """
+        counts = self.common.sum(axis=0)
+        sums = np.where(self.common, self.scores, 0.0).sum(axis=1)
+        return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
+
+    def fold_means(self, splits: Sequence[Split]) -> list[tuple[int, int, Array]]:
+        """Return split and fold, from 1, and the weighted means (S,) of its whole, common rows."""
+        rows, common = splits[0].rows, self.common
+        weights = np.ones(len(rows.whole)) if rows.weights is None else rows.weights
+        found: list[tuple[int, int, Array]] = []
+        for number, split in enumerate(splits):
+            for fold in range(1, int(split.fold.max()) + 1):
+                chosen = (split.fold == fold) & common[number] & rows.whole
+                if chosen.any():
+                    mean = self.scores[:, number, chosen] @ weights[chosen] / weights[chosen].sum()
+                    found.append((number + 1, fold, mean))
+        return found
+
+
+def held_out(
+    folder: Path,
+    entries: Mapping[str, Entry],
+    fits: Sequence[Fit],
+    splits: Sequence[Split],
+    settings: Sequence[str],
+) -> HeldOut:
+    """Return what is in the folders of the fits that are done."""
+    rows = splits[0].rows
+    scores = np.full((len(settings), len(splits), len(rows.table.values)), np.nan)
+    for fit in fits:
+        entry = entries.get(fit.key)
+        if entry is None or entry.state != "done":
+            continue
+        held = np.flatnonzero(splits[fit.split - 1].fold == fit.fold)
+        found = _read(folder / entry.name / SCORES, held)
+        scores[settings.index(fit.setting), fit.split - 1, held] = found
+    if UNIFORM in settings:
+        scores[settings.index(UNIFORM)] = -math.log(rows.space.volume)
+    return HeldOut(tuple(settings), scores)
+
+
+def _read(path: Path, held: NDArray[np.int64]) -> Array:
+    """Return the log densities of the rows of these numbers, from 0."""
+    table = read_table(path, columns=COLUMNS, width=2)
+    if not np.array_equal(table.values[:, 0], held + 1):
+        raise OrbiflowError(
+            f"{path} is not of the rows that were held out: delete its folder, and the same command "
+            "fits it again"
+        )
+    return table.values[:, 1]
+
+
+@one_blas_thread()  # sums of several threads differ in their last digits
+def compared(
+    asked: CrossValidation, found: HeldOut, split: Split
+) -> comparing.ModelComparison | str:
+    """Compare settings at all rows that every one of them has scored, or return why this cannot be."""
+    means = found.means()
+    chosen = ~np.isnan(means).any(axis=0) & split.rows.whole
+    labels, weights = split.rows.labels, split.rows.weights
+    try:
+        made = comparing.compare_scores(
+            {name: means[k, chosen] for k, name in enumerate(found.settings)},
+            comparing.ComparisonSettings(
+                bootstrap=asked.cv.bootstrap, level=asked.cv.level, seed=asked.density.seed
+            ),
+            groups=None if labels is None else labels[chosen],
+            weights=None if weights is None else weights[chosen],
+        )
+    except OrbiflowError as error:
+        return str(error)
+    count, scored = int(split.rows.whole.sum()), int(chosen.sum())
+    if scored == count:
+        return made
+    note = f"{scored} of {count} rows so far: fits are missing"
+    return replace(made, notes=(note, *made.notes))

@@ -1,6 +1,5 @@
 from .automatic import fit_automatic as fit_automatic
 from .flow import fit_density as fit_density
-from .flow_trial import flow_settings as flow_settings
 from .folds import LEAST_PLACES as LEAST_PLACES
 from .folds import lightest_folds as lightest_folds
 from .folds import places as places

@@ -11,12 +11,14 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.density.arguments import check_kind, silent
-from orbiflow.density.fitting.budget import Budget, training
 from orbiflow.density.fitting.evidence import (
     Candidates,
+    TriedFlow,
     assembled,
     candidates_of,
+    flow_settings,
     judged,
+    try_flow,
     without_idle,
 )
 from orbiflow.density.fitting.families import (
@@ -26,9 +28,9 @@ from orbiflow.density.fitting.families import (
     MixtureFamily,
     NetworkFamily,
 )
-from orbiflow.density.fitting.flow_trial import TriedFlow, flow_settings, try_flow
 from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, Repeats, folds_of, repeats_of
 from orbiflow.density.fitting.kernels import NARROWEST
+from orbiflow.density.fitting.likelihood import Budget, training
 from orbiflow.density.fitting.report import (
     ComponentEvidence,
     FitReport,
@@ -54,7 +56,6 @@ from orbiflow.density.fitting.rows import (
 )
 from orbiflow.density.fitting.settings import COMPONENTS, DensitySettings
 from orbiflow.density.fitting.weights import stacked, supported_weights
-from orbiflow.density.inference import at_observed
 from orbiflow.density.models import MOST_DIM, Mixture
 from orbiflow.density.spaces import Space, Torus, whole_turn
 from orbiflow.errors import OrbiflowError
@@ -133,13 +134,27 @@ def fit_automatic(
         weights = without_idle(candidates, weights)
     tried = TriedFlow()
     if flows and not budget.is_spent:
-        tried = _try_flow(space, folds, candidates, weights, settings, budget, say)
+        tried = try_flow(
+            space, folds, candidates, weights,
+            flow_settings(space, len(folds.rows), settings.seed).replace(**settings.of_flow),
+            budget,
+            lambda done, what: say(BEFORE_FLOW + (BEFORE_END - BEFORE_FLOW) * done, what),
+        )  # fmt: skip
     say(BEFORE_END, "putting together")
     density = assembled(space, families, candidates, weights, folds.rows, tried.flow, tried.share)
-    parts = (*tried.evidence, *_shrunk(judged(candidates, weights), tried.share))
-    return density, _report(
-        density, folds, candidates, weights, tried, parts, found, settings, budget, notes
+    beside = 1 - tried.share
+    others = [replace(one, share=one.share * beside) for one in judged(candidates, weights)]
+    parts = (*tried.evidence, *others)
+    report = _report(density, folds, candidates, weights, tried, parts, found)
+    after = (
+        *weights_note(folds.rows),
+        *report.notes,
+        *_untried_note(space, folds, settings),
+        *found.notes(settings.repeats),
+        *budget.notes(),
+        *steps_note(report.steps, report.integration_error),
     )
+    return density, replace(report, notes=(*notes, *after))
 
 
 def _rows(
@@ -231,35 +246,6 @@ def _untried_note(space: Space, folds: Folds, settings: DensitySettings) -> list
     ]
 
 
-def _try_flow(
-    space: Space,
-    folds: Folds,
-    candidates: Candidates,
-    weights: Tensor,
-    settings: DensitySettings,
-    budget: Budget,
-    say: Progress,
-) -> TriedFlow:
-    chosen = flow_settings(space, len(folds.rows), settings.seed).replace(**settings.of_flow)
-    return try_flow(
-        space, folds, candidates, weights, chosen, budget,
-        lambda done, what: say(BEFORE_FLOW + (BEFORE_END - BEFORE_FLOW) * done, what),
-    )  # fmt: skip
-
-
-def _shares_of(folds: Folds) -> str:
-    """Of the rows, in words."""
-    if folds.rows.groups is None:
-        return "of a tenth each"
-    count = len(folds.rows.groups.bincount().nonzero())
-    return f"of whole groups, of which there are {count}"
-
-
-def _shrunk(parts: list[ComponentEvidence], flow: float) -> list[ComponentEvidence]:
-    """Beside a flow of this share."""
-    return [replace(part, share=part.share * (1 - flow)) for part in parts]
-
-
 def _report(
     density: Mixture,
     folds: Folds,
@@ -268,19 +254,21 @@ def _report(
     tried: TriedFlow,
     parts: tuple[ComponentEvidence, ...],
     found: Repeats,
-    settings: DensitySettings,
-    budget: Budget,
-    notes: list[str],
 ) -> FitReport:
+    """Return what was done, with notes on how it was chosen."""
     own_weights = candidates.row_weights
     held = mean_of(stacked(candidates.table, weights), own_weights)
     held += sum(part.gain for part in parts if part.name == "flow")
     flow = tried.report if tried.share else None
-    error = flow.integration_error if flow else 0.0
     total = candidates.table.shape[1]
+    uniform = mean_of(candidates.table[-1], own_weights)
+    shares = "of a tenth each"
+    if folds.rows.groups is not None:
+        count = len(folds.rows.groups.bincount().nonzero())
+        shares = f"of whole groups, of which there are {count}"
     chosen = [
-        f"chosen by {total} rows held out, in {folds.used} parts {_shares_of(folds)}: "
-        f"{held - mean_of(candidates.table[-1], own_weights):.4f} nats above uniform",
+        f"chosen by {total} rows held out, in {folds.used} parts {shares}: "
+        f"{held - uniform:.4f} nats above uniform",
         *map(str, parts),
     ]
     some = folds.rows[:SCORED]
@@ -292,26 +280,16 @@ def _report(
         duplicates=found.rows,
         train=len(folds.rows),
         validation=total,
-        start_nll=-mean_of(candidates.table[-1], own_weights),
-        train_nll=-mean_of(at_observed(density, some.points), some.weights)
-        if notes
-        else mean_nll(density, some.points, some.weights),
+        start_nll=-uniform,
+        train_nll=mean_nll(density, some.points, some.weights),
         validation_nll=-held,
         stages=flow.stages if flow else (),
         steps=flow.steps if flow else 1,
         mass=mass,
-        integration_error=error,
+        integration_error=flow.integration_error if flow else 0.0,
         weights=density.weight_of_kind,
         components=parts,
         repeats=found,
         effective=None if folds.rows.weights is None else effective_rows(folds.rows.weights),
-        notes=(
-            *notes,
-            *weights_note(folds.rows),
-            *chosen,
-            *_untried_note(density.space, folds, settings),
-            *found.notes(settings.repeats),
-            *budget.notes(),
-            *steps_note(flow.steps if flow else 1, error),
-        ),
+        notes=tuple(chosen),
     )

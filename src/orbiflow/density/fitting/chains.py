@@ -1,16 +1,27 @@
-"""Fitting a mixture of von Mises chains by EM with a prior."""
+"""Fitting mixtures of von Mises chains by EM, and Bayesian networks of them."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
-from orbiflow.density.fitting.budget import Budget
 from orbiflow.density.fitting.rows import Rows
-from orbiflow.density.models import SCALES, VonMisesChains, chained, shares_of, waves
-from orbiflow.density.spaces import Space
+from orbiflow.density.fitting.weights import gain_of
+from orbiflow.density.models import (
+    SCALES,
+    Factor,
+    VonMisesChains,
+    VonMisesNetwork,
+    chained,
+    log_conditional,
+    shares_of,
+    waves,
+)
+from orbiflow.density.spaces import Space, Torus
 from orbiflow.typed_torch import linalg, special
 
 PRIOR, PRIOR_RESULTANT = 0.05, 0.9
@@ -25,8 +36,8 @@ RIDGE = 10.0
 STRAIGHT = 5
 """First iterations of EM, without regressions."""
 
-EVERY, PATIENCE = 5, 2
-"""Iterations between looks at the held-out points, and looks that may gain nothing."""
+EVERY, IDLE = 5, 1e-3
+"""Iterations between looks at the held-out points, and nats between two of them that are too few."""
 
 
 def _nll(mixture: VonMisesChains, rows: Rows) -> float:
@@ -35,55 +46,34 @@ def _nll(mixture: VonMisesChains, rows: Rows) -> float:
 
 @torch.no_grad()
 def fit_chain_mixture(
-    start: VonMisesChains,
-    train: Rows,
-    held: Rows,
-    iterations: int,
-    budget: Budget,
-    *,
-    patience: int = PATIENCE,
-    worthwhile: float = 0.0,
+    start: VonMisesChains, train: Rows, held: Rows, iterations: int
 ) -> VonMisesChains:
-    """Fit by EM from a start whose chains have one order; return the iterate best on `held`.
-
-    It ends after more than `patience` looks at `held` that gain no more than `worthwhile` nats.
-    """
+    """Fit by EM from a start whose chains have one order; return the iterate best on `held`."""
     step = _Maximization(train, start.order[0])
     mixture = best = start
-    least, idle = _nll(start, held), 0
+    least = _nll(start, held)
     for iteration in range(1, iterations + 1):
-        late = budget.is_spent
-        if not late:
-            mixture = step(mixture, bent=iteration > STRAIGHT)
-        if iteration % EVERY == 0 or iteration == iterations or late:
+        mixture = step(mixture, bent=iteration > STRAIGHT)
+        if iteration % EVERY == 0 or iteration == iterations:
             score = _nll(mixture, held)
-            idle = 0 if score < least - worthwhile else idle + 1
-            if score < least:
+            gain = least - score
+            if gain > 0:
                 best, least = mixture, score
-            if idle > patience:
+            if not gain > IDLE:
                 break
-        if late:
-            break
     return best
 
 
 def spread_chains(
     space: Space, rows: Rows, count: int, order: Tensor, generator: torch.Generator
 ) -> VonMisesChains:
-    """Return a uniform component and `count` round ones at rows far from each other (k-means++).
+    """Return a uniform component and `count` round ones at rows far apart, in an order (d,)."""
+    angle = 2 * math.pi * rows.points
 
-    Its chains take the angles in `order` (d,).
-    """
-    angle, own = 2 * math.pi * rows.points, rows.weights
-    if own is None:
-        chosen = [int(torch.randint(len(angle), (), generator=generator))]
-    else:
-        chosen = [int(torch.multinomial(own, 1, generator=generator))]
-    far = (1 - (angle - angle[chosen[0]]).cos()).sum(dim=1)
-    for _ in range(count - 1):
-        odds = far + 1e-12 if own is None else own * (far + 1e-12)
-        chosen.append(int(torch.multinomial(odds, 1, generator=generator)))
-        far = torch.minimum(far, (1 - (angle - angle[chosen[-1]]).cos()).sum(dim=1))
+    def away(row: int) -> Tensor:
+        return (1 - (angle - angle[row]).cos()).sum(dim=1)
+
+    chosen = far_apart(away, len(angle), count, generator, rows.weights)
     d = angle.shape[1]
     means = angle.new_zeros(count + 1, d, 1 + 2 * d)
     means[1:, :, 0] = angle[chosen]
@@ -91,6 +81,26 @@ def spread_chains(
     concentrations[0] = 0.0
     weights = angle.new_full((count + 1, len(SCALES)), 1.0 / (count + 1) / len(SCALES))
     return VonMisesChains(space, weights.log(), means, concentrations, order.repeat(count + 1, 1))
+
+
+def far_apart(
+    away: Callable[[int], Tensor],
+    rows: int,
+    count: int,
+    generator: torch.Generator,
+    weights: Tensor | None,
+) -> list[int]:
+    """Return `count` rows far from each other (k-means++); `away` tells the distances (N,) from one."""
+    if weights is None:
+        chosen = [int(torch.randint(rows, (), generator=generator))]
+    else:
+        chosen = [int(torch.multinomial(weights, 1, generator=generator))]
+    far = away(chosen[0])
+    for _ in range(count - 1):
+        odds = far + 1e-12 if weights is None else weights * (far + 1e-12)
+        chosen.append(int(torch.multinomial(odds, 1, generator=generator)))
+        far = torch.minimum(far, away(chosen[-1]))
+    return chosen
 
 
 class _Maximization:
@@ -189,3 +199,146 @@ def concentration(resultant: Tensor) -> Tensor:
         kappa = kappa - (ratio - r) / (1 - ratio / kappa - ratio**2)
         kappa = kappa.clamp(1e-6, 1e8)
     return kappa
+
+
+MOST_PARENTS = 3
+"""The most parents of an angle."""
+
+PROPOSED = 2
+"""Number of angles that are tried as a further parent."""
+
+SIZES = (4, 8, 16, 32, 64, 128)
+"""Numbers of components of a factor."""
+
+FIRST = 16
+"""Components with which parents are chosen, if there are rows for as many."""
+
+PER_COMPONENT = 20
+"""Rows that each component must have on average."""
+
+WORTHWHILE = 0.005
+"""Nats that a parent, or twice as many components, must gain."""
+
+SEARCHED = 4_000
+"""The most rows by which the arrows are chosen."""
+
+ITERATIONS = 40
+"""Maximum iterations of EM."""
+
+HARMONICS, NOISE = 4, 1e-3
+"""Waves of each angle by which dependence is screened, and what is added to their variances."""
+
+
+class Shape(NamedTuple):
+    """The shape of a factor: its angles, parents before their child, and its number of components."""
+
+    axes: tuple[int, ...]
+    components: int
+
+
+def network_shapes(rows: Rows, held: Rows, generator: torch.Generator) -> Iterator[Shape]:
+    """Yield factors one after the other, chosen by held-out rows; parents before their children.
+
+    The order is that of Prim's algorithm on the angles' dependence (as Chow and Liu, 1968), parents
+    are taken one by one as long as they gain.
+    """
+    rows = rows[:SEARCHED]
+    seen = Screen(rows.points)
+    order = seen.order()
+    for place, axis in enumerate(order):
+        yield _factor_shape(axis, order[:place], seen, rows, held, generator)
+
+
+def fit_network(
+    space: Torus, rows: Rows, held: Rows, shapes: Sequence[Shape], generator: torch.Generator
+) -> VonMisesNetwork:
+    """Fit factors of these shapes."""
+    return VonMisesNetwork(
+        space, [Factor(axes, _fitted(rows, held, axes, size, generator)) for axes, size in shapes]
+    )
+
+
+def _factor_shape(
+    axis: int, before: list[int], seen: Screen, rows: Rows, held: Rows, generator: torch.Generator
+) -> Shape:
+    most = max(SIZES[0], len(rows) // PER_COMPONENT)
+    first = max(size for size in SIZES if size <= min(FIRST, most))
+
+    def score(axes: tuple[int, ...], size: int) -> Tensor:
+        chains = _fitted(rows, held, axes, size, generator)
+        with torch.no_grad():
+            return log_conditional(chains, held.points[:, list(axes)])
+
+    parents: tuple[int, ...] = ()
+    best = score((axis,), first)
+    while len(parents) < min(MOST_PARENTS, len(before)):
+        proposed = seen.parents(axis, parents, before)[:PROPOSED]
+        scores = {parent: score((*parents, parent, axis), first) for parent in proposed}
+        parent = max(scores, key=lambda one: held.mean(scores[one]))
+        gain = gain_of(scores[parent], best, held.weights)
+        if gain.nats <= max(WORTHWHILE, gain.error):
+            break
+        parents, best = (*parents, parent), scores[parent]
+    size, axes = first, (*parents, axis)
+    while 2 * size <= min(SIZES[-1], most):
+        value = score(axes, 2 * size)
+        if gain_of(value, best, held.weights).nats < WORTHWHILE:
+            break
+        size, best = 2 * size, value
+    return Shape(axes, size)
+
+
+def _fitted(
+    rows: Rows, held: Rows, axes: tuple[int, ...], size: int, generator: torch.Generator
+) -> VonMisesChains:
+    own, beside = (Rows(part.points[:, list(axes)], part.weights) for part in (rows, held))
+    start = spread_chains(Torus(len(axes)), own, size, torch.arange(len(axes)), generator)
+    return fit_chain_mixture(start, own, beside, ITERATIONS)
+
+
+class Screen:
+    """How much angles (N, d), in turns, say about each other: Gaussian mutual information of waves.
+
+    It uses a few moments only; what it proposes is then tried.
+    """
+
+    def __init__(self, points: Tensor) -> None:
+        harmonics = torch.arange(1, HARMONICS + 1).to(points)
+        angle = 2 * math.pi * points[..., None] * harmonics
+        seen = torch.cat([angle.cos(), angle.sin()], dim=2).flatten(1)
+        self.dim = points.shape[1]
+        self.covariance = torch.cov(seen.mT)
+        self.covariance += NOISE * torch.eye(len(self.covariance)).to(points)
+
+    def order(self) -> list[int]:
+        """Return the angle that says most about all, then those about which the ones before do."""
+        pairs = torch.zeros(self.dim, self.dim, dtype=torch.float64)
+        for i in range(self.dim):
+            for j in range(i):
+                pairs[i, j] = pairs[j, i] = self.between(i, j)
+        order = [int(pairs.sum(dim=1).argmax())]
+        while len(order) < self.dim:
+            left = [i for i in range(self.dim) if i not in order]
+            order.append(max(left, key=lambda i: float(pairs[i, order].max())))
+        return order
+
+    def parents(self, axis: int, known: tuple[int, ...], before: list[int]) -> list[int]:
+        """Return the angles before an angle, by what they say about it beyond those that are known."""
+        left = [i for i in before if i not in known]
+        return sorted(left, key=lambda i: -self.between(axis, i, known))
+
+    def between(self, one: int, other: int, known: tuple[int, ...] = ()) -> float:
+        """Return the nats that two angles say about each other, beyond those that are known."""
+        return 0.5 * (
+            self._log_det(one, *known)
+            + self._log_det(other, *known)
+            - self._log_det(*known)
+            - self._log_det(one, other, *known)
+        )
+
+    def _log_det(self, *axes: int) -> float:
+        if not axes:
+            return 0.0
+        width = 2 * HARMONICS
+        at = torch.cat([torch.arange(width) + width * axis for axis in axes])
+        return float(torch.logdet(self.covariance[at][:, at]))

@@ -10,11 +10,14 @@ from typing import Generic, TypeVar
 import torch
 from torch import Tensor
 
-from orbiflow.density.fitting.budget import Budget
-from orbiflow.density.fitting.chains import fit_chain_mixture, spread_chains
-from orbiflow.density.fitting.kernels import NARROWEST, kernel_estimates
-from orbiflow.density.fitting.mixtures import fit_mixture
-from orbiflow.density.fitting.network import Shape, fit_network, network_shapes
+from orbiflow.density.fitting.chains import (
+    Shape,
+    fit_chain_mixture,
+    fit_network,
+    network_shapes,
+    spread_chains,
+)
+from orbiflow.density.fitting.kernels import NARROWEST, fit_mixture, kernel_estimates
 from orbiflow.density.fitting.rows import Rows, is_whole, log_prob_of_rows, with_incomplete
 from orbiflow.density.fitting.weights import gain_of
 from orbiflow.density.models import (
@@ -22,7 +25,6 @@ from orbiflow.density.models import (
     Density,
     VonMisesChains,
     VonMisesNetwork,
-    averaged,
     averaged_networks,
 )
 from orbiflow.density.spaces import Space, Torus
@@ -42,8 +44,8 @@ MOST_MIXED, MOST_CHAINED = 20_000, 12_000
 CLEARLY = 2.0
 """Standard errors by which a larger mixture must be worse to be the last that is tried."""
 
-ITERATIONS, IDLE = 60, 1e-3
-"""Of EM at most; it ends where five bring fewer nats than the latter."""
+ITERATIONS = 60
+"""Maximum iterations of EM."""
 
 Say = Callable[[str], None]
 """A function that is called with what is being tried."""
@@ -109,18 +111,31 @@ class KernelFamily(Family[AdaptiveKernels]):
         return {name: with_incomplete(part, rest, total) for name, part in found.items()}
 
 
-@dataclass
-class MixtureFamily(Family[AdaptiveKernels]):
-    """Mixtures of several sizes, in the end the mean of those of all folds.
+class SizedFamily(Family[D]):
+    """Densities of several sizes, in the end the mean of those of all folds.
 
     By concavity the mean of densities scores at least the mean of their scores, and EM ends in another
     optimum from every start (Breiman, Bagging predictors, 1996).
     """
 
+    sizes: tuple[int, ...] | None = None
+
+    def final(self, rows: Rows, folds: list[dict[str, D]], names: list[str]) -> list[D]:
+        del rows
+        parts = ([fold[name] for fold in folds if name in fold] for name in names)
+        return [_mean(own) for own in parts]
+
+    def keep(self, names: set[str]) -> None:
+        self.sizes = tuple(sorted(map(int, names)))
+
+
+@dataclass
+class MixtureFamily(SizedFamily[AdaptiveKernels]):
+    """Mixtures of kernels."""
+
     space: Space
     seed: int
     narrowest: float = NARROWEST
-    sizes: tuple[int, ...] | None = None
     name = "mixture"
 
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, AdaptiveKernels]:
@@ -143,33 +158,18 @@ class MixtureFamily(Family[AdaptiveKernels]):
             return _grown(fit, [k for k in SIZES if k == 1 or MIXTURE_ROWS * k <= whole], held)
         return {str(size): fit(size) for size in self.sizes}
 
-    def final(
-        self, rows: Rows, folds: list[dict[str, AdaptiveKernels]], names: list[str]
-    ) -> list[AdaptiveKernels]:
-        del rows
-        found: list[AdaptiveKernels] = []
-        for name in names:
-            parts = [fold[name] for fold in folds if name in fold]
-            found.append(AdaptiveKernels.joined(parts, torch.ones(len(parts), dtype=torch.float64)))
-        return found
-
-    def keep(self, names: set[str]) -> None:
-        self.sizes = tuple(sorted(map(int, names)))
-
 
 @dataclass
-class ChainFamily(Family[VonMisesChains]):
-    """Mixtures of von Mises chains on a torus, in the end the mean of those of all folds.
+class ChainFamily(SizedFamily[VonMisesChains]):
+    """Mixtures of von Mises chains on a torus.
 
-    Args:
-        starts: fitted to each fold but the first; those after the first have their angles in random
-            orders, so that they differ more.
+    `starts` are fitted to each fold but the first; those after the first have their angles in random
+    orders, so that they differ more.
     """
 
     space: Space
     seed: int
     starts: int = 1
-    sizes: tuple[int, ...] | None = None
     name = "chains"
 
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, VonMisesChains]:
@@ -177,35 +177,20 @@ class ChainFamily(Family[VonMisesChains]):
         generator = torch.Generator().manual_seed(self.seed + number)
         natural = torch.arange(self.space.dim)
 
-        def fit(size: int, turn: int) -> VonMisesChains:
+        def fit(size: int, turn: int = 0) -> VonMisesChains:
             say(f"chains of {size}" + (f", start {turn + 1}" if self.starts > 1 else ""))
             turned = number + turn > 0
             order = torch.randperm(self.space.dim, generator=generator) if turned else natural
             start = spread_chains(self.space, train, size, order, generator)
-            return fit_chain_mixture(
-                start, train, held, ITERATIONS, Budget(), patience=0, worthwhile=IDLE
-            )
+            return fit_chain_mixture(start, train, held, ITERATIONS)
 
         if self.sizes is None:
             sizes = [k for k in SIZES if k >= SMALLEST_CHAINS and CHAIN_ROWS * k <= len(train)]
-            return _grown(lambda size: fit(size, 0), sizes, held)
+            return _grown(fit, sizes, held)
         return {
-            str(size): averaged([fit(size, turn) for turn in range(self.starts)])
+            str(size): _mean([fit(size, turn) for turn in range(self.starts)])
             for size in self.sizes
         }
-
-    def final(
-        self, rows: Rows, folds: list[dict[str, VonMisesChains]], names: list[str]
-    ) -> list[VonMisesChains]:
-        del rows
-        found: list[VonMisesChains] = []
-        for name in names:
-            parts = [fold[name] for fold in folds if name in fold]
-            found.append(averaged(parts))
-        return found
-
-    def keep(self, names: set[str]) -> None:
-        self.sizes = tuple(sorted(map(int, names)))
 
 
 @dataclass
@@ -214,7 +199,6 @@ class NetworkFamily(Family[VonMisesNetwork]):
 
     space: Torus
     seed: int
-    starts: int = 1
     name = "network"
     _shapes: list[Shape] = field(default_factory=list[Shape])
 
@@ -226,17 +210,19 @@ class NetworkFamily(Family[VonMisesNetwork]):
                 self._shapes.append(shape)
                 say(f"network, angle {len(self._shapes)} of {self.space.dim}")
         say("network")
-        return {
-            "network": fit_network(self.space, train, held, self._shapes, generator, self.starts)
-        }
+        return {"network": fit_network(self.space, train, held, self._shapes, generator)}
 
     def final(
         self, rows: Rows, folds: list[dict[str, VonMisesNetwork]], names: list[str]
     ) -> list[VonMisesNetwork]:
         del rows
-        found = [part for fold in folds for part in fold.values()]
-        mean = averaged_networks(found)
-        return [mean for _ in names]
+        return [averaged_networks([fold[name] for fold in folds]) for name in names]
+
+
+def _mean(parts: list[D]) -> D:
+    mean = type(parts[0]).joined(parts, torch.ones(len(parts), dtype=torch.float64))
+    assert mean is not None
+    return mean
 
 
 def _grown(fit: Callable[[int], D], sizes: Iterable[int], held: Rows) -> dict[str, D]:

@@ -1,18 +1,19 @@
-"""Fitting a density to points of the chart: split, match, refine, check."""
+"""Fitting a flow to points of the chart: split, match in closed form, refine, check."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
 import torch
+from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
 from orbiflow.density.arguments import check_kind, silent
-from orbiflow.density.fitting.budget import Budget, training
-from orbiflow.density.fitting.flow_matching import coupled, match_flow
 from orbiflow.density.fitting.kernels import blend_kernels
-from orbiflow.density.fitting.likelihood import Refinement, merged, refine
+from orbiflow.density.fitting.likelihood import Budget, Refinement, merged, refine, training
 from orbiflow.density.fitting.report import (
     MASS_TOLERANCE,
     MOST_REPORTED,
@@ -20,7 +21,6 @@ from orbiflow.density.fitting.report import (
     Progress,
     mass_with,
     mean_nll,
-    nll_at,
     own_points,
     repeats_note,
     settle,
@@ -33,7 +33,7 @@ from orbiflow.density.fitting.settings import FlowSettings
 from orbiflow.density.models import MOST_DIM, Density, FlowDensity, UniformDensity, VonMisesDensity
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import SplineField
+from orbiflow.fields import InvariantField, SplineField
 from orbiflow.flows import Flow
 
 MOST_TRAINING_STEPS = 16
@@ -78,6 +78,7 @@ def refine_in_stages(
     # never merged: means of cells would call overfitting to means of cells good
     held = validation[:MOST_HELD]
     held = Rows(held.points.to(dtype), held.weights)
+    shares = None if held.weights is None else (held.weights / held.weights.sum()).to(dtype)
     count = len(settings.roughness)
     while len(stages) < count and not budget.is_spent:
         number = len(stages)
@@ -92,15 +93,17 @@ def refine_in_stages(
             points,
             held.points,
             weights=weights,
-            held_weights=_shares(held),
+            held_weights=shares,
             iterations=settings.iterations,
             kinetic=settings.kinetic,
             roughness=settings.roughness[number],
             budget=budget,
             watch=watch,
         )
-        if _exploits(density, held, stage):
-            _restore(density, before)
+        if stage.best and _exploits(density, held, stage):
+            with torch.no_grad():
+                for parameter, value in zip(density.flow.parameters(), before, strict=True):
+                    parameter.copy_(value)
             if density.flow.steps >= MOST_TRAINING_STEPS:
                 break
             density.flow = density.flow.with_steps(2 * density.flow.steps)
@@ -115,21 +118,9 @@ def refine_in_stages(
 
 
 def _exploits(density: FlowDensity, held: Rows, stage: Refinement) -> bool:
-    if stage.best == 0:
-        return False
-    honest = nll_at(density, held.points, 4 * density.flow.steps, held.weights)
+    finer = density.with_steps(4 * density.flow.steps)
+    honest = mean_nll(finer, held.points, held.weights)
     return not honest <= stage.validation[0] + MASS_TOLERANCE
-
-
-def _shares(rows: Rows) -> Tensor | None:
-    """Weights of sum 1, in the points' dtype."""
-    return None if rows.weights is None else (rows.weights / rows.weights.sum()).to(rows.points)
-
-
-@torch.no_grad()
-def _restore(density: FlowDensity, values: list[Tensor]) -> None:
-    for parameter, value in zip(density.flow.parameters(), values, strict=True):
-        parameter.copy_(value)
 
 
 MOST_STEPS = 256
@@ -208,14 +199,18 @@ def fit_density(
         mass = None if mass is None else mass_with(found["flow"], mass)
         shares = ", ".join(f"{name} {weight:.1%}" for name, weight in found.items())
         notes.append(f"the density is a mixture: {shares}")
+    train_nll, validation_nll = (
+        mean_nll(density, some.points, some.weights)
+        for some in (train[:MOST_REPORTED], validation[:MOST_REPORTED])
+    )
     report = FitReport(
         points=len(rows),
         duplicates=duplicates,
         train=len(train),
         validation=len(validation),
         start_nll=start_nll,
-        train_nll=_nll(density, train),
-        validation_nll=_nll(density, validation),
+        train_nll=train_nll,
+        validation_nll=validation_nll,
         stages=tuple(stages),
         steps=flow.flow.steps,
         mass=mass,
@@ -225,11 +220,6 @@ def fit_density(
         notes=(*notes, *_mass_note(space, mass)),
     )
     return density, report
-
-
-def _nll(density: Density, rows: Rows) -> float:
-    some = rows[:MOST_REPORTED]
-    return mean_nll(density, some.points, some.weights)
 
 
 def _start(
@@ -274,3 +264,100 @@ def _mass_note(space: Space, mass: float | None) -> list[str]:
     if mass is None or abs(mass - 1) <= MASS_TOLERANCE:
         return []
     return [f"the density integrates to {mass:.4f} over the {space.name}, not to 1"]
+
+
+ORDER = 3
+"""Of the derivatives that the ridge holds small: the displacements are smooth, their noise is not."""
+
+REPEATS = 2
+"""Times at each geodesic and segment."""
+
+GROUP = 400
+"""Points matched optimally at a time: the cost of an assignment grows with the cube."""
+
+
+def coupled(
+    space: Space, start: Tensor, end: Tensor, *, group: int = GROUP
+) -> tuple[Tensor, Tensor]:
+    """Pair base points with data points so that their geodesics are short.
+
+    Within groups of `group` points the sum of squared distances over group images is least
+    (minibatch optimal transport: Tong et al., 2024; Pooladian et al., 2023). Of canonical points
+    (N, d), return starts and shortest displacements, both (N, d), in the order of `end`.
+    """
+    order: list[Tensor] = []
+    for first in range(0, len(end), group):
+        cost = space.squared_distances(start[first : first + group], end[first : first + group])
+        rows, columns = linear_sum_assignment(cost.cpu().numpy())
+        order.append(first + torch.as_tensor(rows[np.argsort(columns)]))
+    paired = start[torch.cat(order)]
+    return paired, space.displacement(paired, end)
+
+
+@torch.no_grad()
+def match_flow(
+    fields: Sequence[InvariantField],
+    space: Space,
+    start: Tensor,
+    move: Tensor,
+    *,
+    ridge: float = 1e-3,
+    iterations: int = 15,
+    generator: torch.Generator | None = None,
+) -> None:
+    """Set the parameters of `fields`, the equal segments of a flow, by ridge regression.
+
+    Segment k of K regresses the displacements at points on the geodesics at times in [k / K, (k + 1) /
+    K] (Lipman et al., Flow Matching for Generative Modeling, 2023). A segment of duration 1 carries
+    what takes time 1 / K, hence the factor. At each geodesic and segment there are `REPEATS` times.
+    `ridge` is the weight of E|V|^2 + E|grad^3 V|^2, lengths in wavelengths, beside the data's 1,
+    `iterations` those of conjugate gradients at most.
+    """
+    count = len(fields)
+    for k, field in enumerate(fields):
+        shape = (REPEATS, len(start), 1)
+        time = torch.rand(shape, dtype=start.dtype, generator=generator)
+        points = (start + (k + time) / count * move).reshape(-1, space.dim)
+        values = (move / count).expand(REPEATS, -1, -1).reshape(-1, space.dim)
+        field.parameters_.copy_(_least_squares(field, points, values, ridge, iterations))
+
+
+def _least_squares(
+    field: InvariantField, points: Tensor, values: Tensor, ridge: float, iterations: int
+) -> Tensor:
+    size = len(points)
+    magnitude = torch.as_tensor(field.basis.magnitude).to(points)
+    weight = ridge * (1 + magnitude ** (2 * ORDER)) * field.scale**2
+
+    def normal(c: Tensor) -> Tensor:
+        field.parameters_.copy_(c)
+        return field.adjoint(points, field(points)) / size + weight * c
+
+    right = field.adjoint(points, values) / size
+    # the columns are orthonormal for even points, so this is nearly the diagonal
+    return conjugate_gradients(normal, right, field.scale**2 + weight, iterations)
+
+
+def conjugate_gradients(
+    apply: Callable[[Tensor], Tensor],
+    right: Tensor,
+    diagonal: Tensor,
+    iterations: int,
+    tolerance: float = 1e-4,
+) -> Tensor:
+    """Solve a positive definite system, preconditioned by its approximate diagonal."""
+    x, residual = torch.zeros_like(right), right.clone()
+    z = residual / diagonal
+    direction, old = z.clone(), residual @ z
+    stop = tolerance**2 * old
+    for _ in range(iterations):
+        if old <= stop:
+            break
+        image = apply(direction)
+        step = old / (direction @ image)
+        x = x + step * direction
+        residual = residual - step * image
+        z = residual / diagonal
+        new = residual @ z
+        direction, old = z + new / old * direction, new
+    return x

@@ -61,9 +61,6 @@ def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds
     do rows held out at random. Where equal rows are an accident of rounding, that would reward peaks
     at the values that happened to be recorded: then they are kept `together`, in one fold. So are rows
     of one group, whatever they are: each of fewer than ten groups is a fold.
-
-    Raises:
-        OrbiflowError: for groups without which too few rows are left.
     """
     rows = rows[torch.randperm(len(rows), generator=generator)]
     folds = FOLDS
@@ -83,23 +80,15 @@ def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds
         group = torch.arange(len(rows))
     used = next((count for most, count in USED if len(rows) <= most), 2)
     found = Folds(rows, group % folds, min(used, folds))
-    if rows.groups is not None:
-        _check_rest(found)
-    return found
-
-
-def _check_rest(folds: Folds) -> None:
-    """Check that enough rows are left to fit to.
-
-    Raises:
-        OrbiflowError: if too few are left where a fold is held out.
-    """
-    left = min(len(places(folds.train(number).points)[0]) for number in range(folds.used))
+    if rows.groups is None:
+        return found
+    left = min(len(places(train.points)[0]) for train, _ in found)
     if left < LEAST_PLACES:
         raise OrbiflowError(
             f"groups: where whole groups are held out, {left} different rows are left to fit to, and "
             f"{LEAST_PLACES} are needed: more or smaller groups"
         )
+    return found
 
 
 def lightest_folds(sizes: NDArray[np.int64], folds: int) -> NDArray[np.int64]:
@@ -203,14 +192,8 @@ def _explained(data: Array, step: float, counts: Tensor) -> float | None:
     cells, number = np.unique(np.round(data / step).astype(np.int64), axis=0, return_counts=True)
     of = {tuple(cell): int(n) for cell, n in zip(cells.tolist(), number, strict=True)}
     apart = 0.0
-    for axis in range(data.shape[1]):
-        shift = np.zeros(data.shape[1], dtype=np.int64)
-        shift[axis] = 1
-        apart += sum(of[c] * of.get(tuple(m), 0) for c, m in _pairs(cells, shift))
+    for shift in np.eye(data.shape[1], dtype=np.int64):
+        beside = (cells + shift).tolist()
+        apart += sum(n * of.get(tuple(m), 0) for n, m in zip(of.values(), beside, strict=True))
     # of n rows in a cell n (n - 1) / 2 pairs are equal, and n m with the m of a cell beside it
     return apart / data.shape[1] / 2 / equal if equal else None
-
-
-def _pairs(cells: Array, shift: Array) -> list[tuple[tuple[int, ...], list[int]]]:
-    moved = (cells + shift).tolist()
-    return [(tuple(cell), m) for cell, m in zip(cells.tolist(), moved, strict=True)]

@@ -1,9 +1,10 @@
-"""Kernel estimates, and kernels beside a flow, with widths and weights by held-out points."""
+"""Kernel densities: estimates about the data, kernels beside a flow, and mixtures of few by EM."""
 
 from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import torch
@@ -11,13 +12,21 @@ from scipy.spatial import KDTree
 from torch import Tensor
 
 from orbiflow.density.arguments import check_kind, points_tensor
-from orbiflow.density.fitting.budget import training
+from orbiflow.density.fitting.chains import PRIOR, PRIOR_RESULTANT, concentration, far_apart
 from orbiflow.density.fitting.folds import places
+from orbiflow.density.fitting.likelihood import training
 from orbiflow.density.fitting.rows import mean_of
-from orbiflow.density.models import AdaptiveKernels, Density, Mixture, UniformDensity
-from orbiflow.density.spaces import Space
+from orbiflow.density.models import (
+    FAINT,
+    AdaptiveKernels,
+    Density,
+    Mixture,
+    UniformDensity,
+    kernel_rows,
+)
+from orbiflow.density.spaces import RoundSpace, Space, rectangle
 from orbiflow.errors import OrbiflowError
-from orbiflow.typed_torch import unique
+from orbiflow.typed_torch import linalg, special, unique
 
 MOST_KERNELS, MOST_HELD = 20_000, 2_000
 """The most centers, and the most held-out points that choose the widths."""
@@ -75,16 +84,11 @@ def blend_kernels(
     weights = counts.double() / counts.sum()
     held = held[:MOST_HELD]
     held_weights = None if held_weights is None else held_weights[:MOST_HELD]
-    found_spreads = spreads(space, centers, [m for m in NEIGHBOURS if m < len(centers)])
     uniform = UniformDensity(space)
     with torch.no_grad():
         others = [density.log_prob(held), uniform.log_prob(held)]
     best, found = -math.inf, None
-    shrinkage = (1.0,) if space.is_round or space.dim == 1 else ISOTROPY
-    for spread, scale, share in itertools.product(found_spreads, SCALES, shrinkage):
-        mean = spread.mean(dim=1, keepdim=True)
-        kappa = 1 / (scale * ((1 - share) * spread + share * mean))
-        kernels = AdaptiveKernels(space, centers, kappa.clamp(WIDEST, NARROWEST), weights)
+    for _, kernels in _near_kernels(space, centers, weights, NARROWEST):
         parts = torch.stack([others[0], kernels.log_prob(held), others[1]])
         shares, score = proportions(parts, row_weights=held_weights)
         if score > best:
@@ -108,6 +112,20 @@ def proportions(
     shares[-1] = shares[-1].clamp_min(FLOOR)
     shares = shares.clamp_min(1e-12) / shares.clamp_min(1e-12).sum()
     return shares, mean_of((parts + shares.log()[:, None]).logsumexp(dim=0), row_weights)
+
+
+def _near_kernels(
+    space: Space, centers: Tensor, weights: Tensor, narrowest: float
+) -> Iterator[tuple[str, AdaptiveKernels]]:
+    """Yield kernels as wide as shares of the distances to neighbours, by name, of all shapes tried."""
+    neighbours = [m for m in NEIGHBOURS if m < len(centers)]
+    shrinkage = (1.0,) if space.is_round or space.dim == 1 else ISOTROPY
+    for number, spread in zip(neighbours, spreads(space, centers, neighbours), strict=True):
+        mean = spread.mean(dim=1, keepdim=True)
+        for scale, share in itertools.product(SCALES, shrinkage):
+            kappa = 1 / (scale * ((1 - share) * spread + share * mean))
+            kernels = AdaptiveKernels(space, centers, kappa.clamp(WIDEST, narrowest), weights)
+            yield f"near {number}, {scale:g}, {share:g}", kernels
 
 
 def spreads(space: Space, centers: Tensor, neighbours: list[int]) -> list[Tensor]:
@@ -145,21 +163,11 @@ def kernel_estimates(
 
     "width ..." have one concentration, in a ladder; "near ..." a share of the mean square distance to
     the nearest neighbours, on tori axis by axis (Breiman, Meisel, Purcell, 1977); "repeated" are the
-    narrowest kernels, about the places of several points alone.
-
-    Args:
-        space: The space.
-        train: The points.
-        narrowest: The largest concentration.
-        repeats: Whether places of several points count as such.
-        row_weights: Weights of the points (N,); default: equal.
+    narrowest kernels, about the places of several points alone, if `repeats` are real.
     """
     train = train[:MOST_CENTERS]
-    own = (
-        None
-        if row_weights is None
-        else row_weights[:MOST_CENTERS] / row_weights[:MOST_CENTERS].sum()
-    )
+    own = None if row_weights is None else row_weights[:MOST_CENTERS]
+    own = None if own is None else own / own.sum()
     found: dict[str, AdaptiveKernels] = {}
     for kappa in np.geomspace(WIDEST, narrowest, LADDER):
         found[f"width {kappa**-0.5:.2g}"] = even_kernels(space, train, float(kappa), own)
@@ -170,14 +178,7 @@ def kernel_estimates(
     centers, weights = train[first], counts.double() / len(train)
     if own is not None:
         weights = torch.zeros_like(weights).index_add_(0, place, own)
-    neighbours = [m for m in NEIGHBOURS if m < len(centers)]
-    shrinkage = (1.0,) if space.is_round or space.dim == 1 else ISOTROPY
-    for number, spread in zip(neighbours, spreads(space, centers, neighbours), strict=True):
-        mean = spread.mean(dim=1, keepdim=True)
-        for scale, share in itertools.product(SCALES, shrinkage):
-            kappa = 1 / (scale * ((1 - share) * spread + share * mean))
-            name = f"near {number}, {scale:g}, {share:g}"
-            found[name] = AdaptiveKernels(space, centers, kappa.clamp(WIDEST, narrowest), weights)
+    found |= dict(_near_kernels(space, centers, weights, narrowest))
     repeated = counts > 1
     if repeats and bool(repeated.any()):
         weights = weights[repeated] / weights[repeated].sum()
@@ -193,3 +194,138 @@ def even_kernels(
     if weights is None:
         weights = torch.full((len(centers),), 1 / len(centers), dtype=torch.float64)
     return AdaptiveKernels(space, centers, centers.new_full((len(centers), width), kappa), weights)
+
+
+CONVERGED = 1e-4
+"""Nats that an iteration of EM must gain."""
+
+BLOCK = 4_096
+"""Points worked on at a time."""
+
+
+@training()
+@torch.no_grad()
+def fit_mixture(
+    space: Space,
+    train: Tensor,
+    components: int,
+    *,
+    iterations: int = 60,
+    narrowest: float = NARROWEST,
+    generator: torch.Generator,
+    row_weights: Tensor | None = None,
+) -> AdaptiveKernels:
+    """Fit a mixture of few components with places, widths and weights of their own.
+
+    Products of von Mises distributions with a concentration an angle on torus and Klein bottle, von
+    Mises-Fisher on sphere and projective plane (Banerjee et al., Clustering on the unit hypersphere
+    using von Mises-Fisher distributions, 2005), summed over the group. A few prior points hold each
+    concentration finite.
+
+    Of the canonical points (N, d), as many rows as components are whole. On tori, others may lack
+    angles (NaN) and count by their marginal likelihood (Ghahramani and Jordan, Supervised learning
+    from incomplete data via an EM approach, 1994). `row_weights` (N,) have the mean 1.
+    """
+    absent = train.isnan()
+    whole = ~absent.any(dim=1)
+    images = space.features(train.nan_to_num(0.0))
+    if not bool(whole.all()):
+        images = images * ~torch.cat([absent, absent], dim=1)
+    blocks = torch.split(images, BLOCK, dim=1)
+    owns = [None] * len(blocks) if row_weights is None else torch.split(row_weights, BLOCK)
+    gaps = [None] * len(blocks) if bool(whole.all()) else torch.split(absent.to(images), BLOCK)
+    start = None if row_weights is None else row_weights[whole]
+    mean = _spread_out(images[:, whole], components, generator, start)
+    width = 1 if space.is_round else space.dim
+    kappa = mean.new_full((components, width), 10.0)
+    weights = mean.new_full((components,), 1 / components)
+    last = -math.inf
+    for _ in range(iterations):
+        found = _expectation(
+            space, list(zip(blocks, owns, gaps, strict=True)), mean, kappa, weights
+        )
+        count, known, total, score = found
+        weights = (count + 0.01) / (count + 0.01).sum()
+        mean, length = _directions(space, total)
+        resultant = (length + PRIOR * PRIOR_RESULTANT) / (known + PRIOR)
+        kappa = (_round_concentration if space.is_round else concentration)(resultant)
+        kappa = kappa.clamp(WIDEST / 100, narrowest)
+        if score - last < CONVERGED * len(train):
+            break
+        last = score
+    return AdaptiveKernels(space, _points(space, mean), kappa, weights)
+
+
+def _spread_out(
+    images: Tensor, count: int, generator: torch.Generator, row_weights: Tensor | None
+) -> Tensor:
+    """Return features (K, m) of points far from each other over their images (E, N, m): k-means++."""
+    own = images[0]
+
+    def away(row: int) -> Tensor:
+        return ((images - own[row]) ** 2).sum(dim=-1).amin(dim=0)
+
+    return own[far_apart(away, len(own), count, generator, row_weights)].clone()
+
+
+def _expectation(
+    space: Space,
+    blocks: Sequence[tuple[Tensor, Tensor | None, Tensor | None]],
+    mean: Tensor,
+    kappa: Tensor,
+    weights: Tensor,
+) -> tuple[Tensor, Tensor, Tensor, float]:
+    """Return what belongs to each component, and the log-likelihood.
+
+    Blocks are features of points, 0 where they are missing, their weights, and what is missing. What
+    belongs to a component are points (K,), those of them that know each angle (K, 1) or (K, d), and
+    sums (K, m) of their nearest images' features.
+    """
+    rows, offsets = kernel_rows(space, mean, kappa)
+    rows, offsets = rows.mT.contiguous(), offsets + weights.log()
+    count, total, score = torch.zeros_like(weights), torch.zeros_like(mean), 0.0
+    unknown: Tensor | float = 0.0
+    for images, own, absent in blocks:
+        joint = images @ rows + offsets
+        if absent is not None:  # a factor that is not there has no constant either
+            joint += absent @ (special.i0e(kappa).log() + kappa).mT
+        top = joint.amax(dim=(0, 2), keepdim=True)
+        share = (joint - top).clamp_min_(FAINT).exp_()
+        every = share.sum(dim=(0, 2), keepdim=True)
+        share /= every
+        likelihood = every.log() + top
+        if own is not None:
+            share *= own[:, None]
+            likelihood = likelihood[0, :, 0] * own
+        count += share.sum(dim=(0, 1))
+        if absent is not None:
+            unknown = unknown + share[0].mT @ absent
+        total += torch.einsum("enk,enm->km", share, images)
+        score += float(likelihood.sum())
+    return count, count[:, None] - unknown, total, score
+
+
+def _directions(space: Space, total: Tensor) -> tuple[Tensor, Tensor]:
+    """Return unit vectors of sums (K, m), and their lengths: of the whole, or of each angle."""
+    parts = total[:, None] if space.is_round else torch.stack(total.chunk(2, dim=1), dim=-1)
+    length = linalg.vector_norm(parts, dim=-1)
+    unit = parts / length.clamp_min(1e-300)[..., None]
+    return (unit[:, 0] if space.is_round else torch.cat(unit.unbind(dim=-1), dim=1)), length
+
+
+def _round_concentration(resultant: Tensor) -> Tensor:
+    """Return kappa of mean cosines coth(kappa) - 1 / kappa: Banerjee et al. (2005), then Newton."""
+    r = resultant.clamp(1e-4, 1 - 1e-8)
+    kappa = r * (3 - r**2) / (1 - r**2)
+    for _ in range(4):
+        ratio = 1 / torch.tanh(kappa) - 1 / kappa
+        kappa = (kappa - (ratio - r) / (1 - ratio**2 - 2 * ratio / kappa)).clamp(1e-3, 1e8)
+    return kappa
+
+
+def _points(space: Space, mean: Tensor) -> Tensor:
+    """Return chart points of features (K, m)."""
+    if isinstance(space, RoundSpace):
+        return space.vectors_to_chart(mean.numpy())
+    cos, sin = mean.chunk(2, dim=1)
+    return space.project(torch.atan2(sin, cos) / (2 * math.pi) * rectangle(space))

@@ -1,10 +1,14 @@
-"""Likelihood refinement: L-BFGS on the exact log density, with a kinetic penalty."""
+"""Likelihood refinement, L-BFGS on the exact log density with penalties, and what a fit may spend.
+
+Evaluations end alike on every machine; time is an outer limit.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +17,9 @@ import torch
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.fitting.budget import Budget, Spent
 from orbiflow.density.models import FlowDensity
 from orbiflow.fields import InvariantField
+from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import unique
 
 ORDER = 3
@@ -82,7 +86,10 @@ class Objective:
         self.weights = _even(points) if weights is None else weights
         self.parameters = [p for p in density.flow.parameters() if p.requires_grad]
         self.fields = [f for f in density.flow.segments if isinstance(f, InvariantField)]
-        self._weights = [self._penalty_weights(f, kinetic, roughness) for f in self.fields]
+        self._weights: list[Tensor] = []
+        for field in self.fields:  # of each coefficient's square, (P,)
+            magnitude = torch.as_tensor(field.basis.magnitude).to(field.parameters_)
+            self._weights.append(kinetic + roughness * magnitude ** (2 * ORDER))
         self.last = math.inf
 
     def get(self) -> Array:
@@ -105,12 +112,6 @@ class Objective:
         for field, weights in zip(self.fields, self._weights, strict=True):
             total = total + ((field.parameters_ * field.scale) ** 2 * weights).sum()
         return total * count  # a segment of duration 1 stands for a time 1 / count
-
-    @staticmethod
-    def _penalty_weights(field: InvariantField, kinetic: float, roughness: float) -> Tensor:
-        """Return the weights (P,) of each coefficient's square."""
-        magnitude = torch.as_tensor(field.basis.magnitude).to(field.parameters_)
-        return kinetic + roughness * magnitude ** (2 * ORDER)
 
     def __call__(self, values: Array) -> tuple[float, Array]:
         """Return loss and gradient, or a barrier where the density is not finite."""
@@ -145,22 +146,12 @@ def refine(
     budget: Budget | None = None,
     watch: Watch | None = None,
 ) -> Refinement:
-    """Descend on the negative log-likelihood, and leave the parameters best on `validation`.
+    """Descend on the negative log-likelihood, and leave the flow's parameters best on `validation`.
 
-    Args:
-        density: The density; the parameters of its flow are changed.
-        train: Canonical training points (N, d) in the parameters' dtype.
-        validation: Canonical validation points (M, d).
-        weights: Weights of the training points, of sum 1; default: equal.
-        held_weights: Weights of the validation points, of sum 1; default: equal.
-        iterations: Maximum number of iterations. It stops if validation has not improved for
-            `PATIENCE` of them.
-        kinetic: Weight of the kinetic energy, see `Objective`.
-        roughness: Weight of the roughness.
-        budget: The budget of evaluations and time; when it is spent, the best so far is left.
-        watch: A function called with every score.
+    Canonical points (N, d) are in the parameters' dtype; weights have the sum 1, by default equal ones.
+    It ends after `iterations`, or `PATIENCE` of them that do not improve the validation score, or when
+    the `budget` is spent. `watch` is told every score.
     """
-    weights = _even(train) if weights is None else weights
     budget = Budget() if budget is None else budget
     began = time.monotonic()
     objective = Objective(density, train, weights, kinetic=kinetic, roughness=roughness)
@@ -264,14 +255,8 @@ def merged(
     within a cell, which is below 1 / (6 cells^2). Where the density is sharp, points crowd: cells of
     more than `crowd` points are quartered, again and again.
 
-    Args:
-        points: (N, d) in [0, 1]^d.
-        cells: along a side, of the coarsest grid.
-        row_weights: of the points (N,); default equal.
-        crowd: points in a cell, at most; more only where cells have been halved `LEVELS` times.
-
-    Returns:
-        Points (M, d) and weights (M,) of sum 1, M <= N, in the points' dtype.
+    Points (N, d) in [0, 1]^d, with `row_weights` (N,) or equal ones, and so many `cells` along a side
+    of the coarsest grid, become points (M, d) and weights (M,) of sum 1, M <= N, in the points' dtype.
 
     >>> merged(torch.tensor([[0.1], [0.2], [0.9]]), 2, crowd=2)[1]
     tensor([0.6667, 0.3333])
@@ -280,9 +265,12 @@ def merged(
     left = torch.arange(len(points), device=points.device)
     groups = 0
     for level in range(LEVELS + 1):
-        _, where, counts = unique(
-            _labels(points[left], cells << level), return_inverse=True, return_counts=True
+        side = cells << level
+        cell = (points[left] * side).floor().clamp(0, side - 1).long()
+        label = (cell * side ** torch.arange(points.shape[1], device=left.device).flip(0)).sum(
+            dim=1
         )
+        _, where, counts = unique(label, return_inverse=True, return_counts=True)
         settled = (counts[where] <= crowd) | (level == LEVELS)
         group[left[settled]] = groups + where[settled]
         left, groups = left[~settled], groups + len(counts)
@@ -298,10 +286,76 @@ def merged(
     return sums / counts[:, None], counts.to(points) / len(points)
 
 
-def _labels(points: Tensor, cells: int) -> Tensor:
-    """Return the number (N,) of each point's cell."""
-    cell = (points * cells).floor().clamp(0, cells - 1).long()
-    label = cell[:, 0]
-    for axis in range(1, points.shape[1]):
-        label = label * cells + cell[:, axis]
-    return label
+clock = time.monotonic
+"""Seconds since some moment; tests put another in its place."""
+
+
+class Spent(Exception):
+    """Raised where the next evaluation would begin; `reason` is "evaluations" or "time"."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+class Budget:
+    """Counts evaluations of an objective, and looks at the clock between them.
+
+    A fit that ends by its evaluations is the same on a busy machine; one that ends by time is not, so
+    it has to say so: `notes`.
+
+    >>> budget = Budget(evaluations=1)
+    >>> budget.spend()
+    >>> budget.is_spent
+    True
+    """
+
+    def __init__(self, evaluations: float = math.inf, seconds: float | None = None) -> None:
+        self.evaluations = evaluations
+        self.seconds = math.inf if seconds is None else seconds
+        self.used = 0
+        self._began = clock()
+        self._reason: str | None = None
+
+    @property
+    def is_spent(self) -> bool:
+        """Whether the next evaluation may not begin: ask only before one. Once so, always so."""
+        if self._reason is None:
+            if self.used >= self.evaluations:
+                self._reason = "evaluations"
+            # no limit needs no clock
+            elif self.seconds < math.inf and clock() - self._began >= self.seconds:
+                self._reason = "time"
+        return self._reason is not None
+
+    @property
+    def seconds_left(self) -> float | None:
+        """What is left of the limit on time, at least 0; None if there is no limit."""
+        if self.seconds == math.inf:
+            return None
+        return max(0.0, self.seconds - (clock() - self._began))
+
+    def spend(self) -> None:
+        """Count an evaluation that is about to begin."""
+        if self.is_spent:
+            raise Spent(str(self._reason))
+        self.used += 1
+
+    def notes(self) -> list[str]:
+        """What the user should know, in words."""
+        if self._reason == "time":
+            return [f"stopped by the limit of {self.seconds:g} s: another run may differ"]
+        if self._reason == "evaluations":
+            return [f"stopped by the budget of {self.evaluations:g} evaluations"]
+        return []
+
+
+@contextlib.contextmanager
+def training() -> Generator[None]:
+    """Train in a block, or in a function that it decorates; the caller's settings are left alone.
+
+    Under `torch.no_grad()` or `torch.inference_mode()` there would be no gradients, and what is made
+    in the latter could never be differentiated.
+    """
+    with one_thread(), torch.inference_mode(False), torch.enable_grad():
+        yield

@@ -11,13 +11,12 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.arguments import check_kind, points_tensor
-from orbiflow.density.fitting.folds import Repeats
+from orbiflow.density.fitting.folds import LEAST_PLACES, Repeats, places
 from orbiflow.density.fitting.likelihood import Refinement
-from orbiflow.density.fitting.rows import mean_of
+from orbiflow.density.fitting.rows import log_prob_of_rows, mean_of
 from orbiflow.density.models import Density, FlowDensity
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
-from orbiflow.typed_torch import unique
 
 MASS_TOLERANCE = 1e-3
 """Of the integral over the square, and of the log-likelihood at doubled steps."""
@@ -32,15 +31,13 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class ComponentEvidence:
-    """What a component of a density is worth.
+    """What a component of a density is worth, by `rows` that were held out.
 
-    - `name`: "flow", "kernels", "mixture", "chains" or "network".
-    - `share`: of the density.
-    - `alone`: mean log density of the part alone at held-out rows, in nats above the uniform one.
-    - `gain`, `error`: nats that the density would lose without it, and their standard error.
-    - `rows`: held-out rows by which it was judged.
-    - `others`: as `alone`, of all other parts together, at the same rows; None where these are the rows
-      of all parts. A flow is tried on fewer: compare `alone` with this.
+    - `name`: "flow", "kernels", "mixture", "chains" or "network"; `share`: Its weight in the density.
+    - `alone`: Its mean log density at held-out rows, in nats above the uniform one.
+    - `gain`, `error`: Nats that the density would lose without it, and their standard error.
+    - `others`: As `alone`, of all other components together; None where the rows are those of all. A
+      flow is tried on fewer: compare `alone` with this.
     """
 
     name: str
@@ -143,67 +140,47 @@ def _figures(values: list[float | None]) -> tuple[float, ...]:
 
 
 def own_points(space: Space, points: Any) -> Tensor:
-    """Canonical points (N, d), float64: a copy, for those of `torch.inference_mode` cannot be used.
-
-    Raises:
-        OrbiflowError: for another shape or values that are not finite, or what is no `Space`.
-    """
+    """Canonical points (N, d), float64: a copy, for those of `torch.inference_mode` cannot be used."""
     check_kind(space, Space, "space", "see `make_space`")
     return space.project(points_tensor(points, space.dim, flat=True).detach().double().clone())
 
 
 def sides(points: Tensor, share: float, generator: torch.Generator) -> tuple[Tensor, Tensor, int]:
-    """An order of points (N, d), which of them (N,) are held out in it, how many repeat another.
-
-    Raises:
-        OrbiflowError: if there are fewer than ten different points.
-    """
-    # rounding keeps together what differs by the projection's last digit
-    places, where = unique((points * 1e9).round(), dim=0, return_inverse=True)
-    if len(places) < 10:
+    """An order of points (N, d), which of them (N,) are held out in it, how many repeat another."""
+    counts, where = places(points)
+    if len(counts) < LEAST_PLACES:
         raise OrbiflowError(
-            f"a density needs at least 10 different points, got {len(places)} among {len(points)}"
+            f"a density needs at least {LEAST_PLACES} different points, got {len(counts)} among "
+            f"{len(points)}"
         )
-    held = torch.zeros(len(places), dtype=torch.bool)
-    held[torch.randperm(len(places), generator=generator)[: max(1, round(share * len(places)))]] = (
-        True
-    )
+    chosen = torch.randperm(len(counts), generator=generator)
+    held = torch.zeros(len(counts), dtype=torch.bool)
+    held[chosen[: max(1, round(share * len(counts)))]] = True
     order = torch.randperm(len(points), generator=generator)
-    return order, held[where][order], len(points) - len(places)
+    return order, held[where][order], len(points) - len(counts)
 
 
 @torch.no_grad()
 def mean_nll(density: Density, points: Tensor, weights: Tensor | None = None) -> float:
     """Mean negative log density at `points` (N, d), weighted, per area of the square."""
-    return -mean_of(density.log_prob(points), weights)
-
-
-def nll_at(
-    density: FlowDensity, points: Tensor, steps: int, weights: Tensor | None = None
-) -> float:
-    """`mean_nll` with another number of Runge-Kutta steps a segment."""
-    return mean_nll(density.with_steps(steps), points, weights)
+    return -mean_of(log_prob_of_rows(density, points), weights)
 
 
 def step_error(density: FlowDensity, points: Tensor) -> float:
     """Change of the mean log density at `points` when the steps are doubled."""
-    return abs(nll_at(density, points, 2 * density.flow.steps) - mean_nll(density, points))
+    finer = density.with_steps(2 * density.flow.steps)
+    return abs(mean_nll(finer, points) - mean_nll(density, points))
 
 
 def settle(density: FlowDensity, points: Tensor, most: int) -> tuple[float, float | None]:
     """Double the steps until the mean log density has settled and, in two dimensions, the mass is 1.
 
-    Args:
-        density: its flow's steps are changed, up to `most`.
-        points: (N, d), at which it is looked at.
-        most: steps a segment.
-
-    Returns:
-        By how much the mean log density still changes, and the mass (None in other dimensions).
+    Return by how much the mean at `points` (N, d) still changes, and the mass, None in other
+    dimensions. The density's flow is given up to `most` steps a segment.
     """
     now = mean_nll(density, points)
     while True:
-        finer = nll_at(density, points, 2 * density.flow.steps)
+        finer = mean_nll(density.with_steps(2 * density.flow.steps), points)
         error = abs(finer - now)
         last = density.flow.steps >= most
         if last or error <= MASS_TOLERANCE / 2:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +12,7 @@ from torch import Tensor
 
 from orbiflow.arguments import described
 from orbiflow.density.arguments import check_kind, float_tensor
-from orbiflow.density.inference import at_observed, check_torus
+from orbiflow.density.inference import at_observed, check_torus, observed_rows
 from orbiflow.density.models import AdaptiveKernels, Density
 from orbiflow.density.spaces import Space, row_count
 from orbiflow.errors import OrbiflowError
@@ -66,11 +65,7 @@ def effective_rows(weights: Tensor) -> float:
 
 
 def weights_of(weights: Any, known: Tensor) -> Tensor:
-    """Return the weights of the rows that are `known` (N,).
-
-    Raises:
-        OrbiflowError: for another number of weights than rows.
-    """
+    """Return the weights of the rows that are `known` (N,)."""
     own = float_tensor(weights, "weights")
     if own.shape != known.shape:
         raise OrbiflowError(
@@ -81,9 +76,6 @@ def weights_of(weights: Any, known: Tensor) -> Tensor:
 
 def group_numbers(labels: ArrayLike, rows: int) -> NDArray[np.int64]:
     """Return the group (N,) of each row as a whole number from 0, from labels of any kind.
-
-    Raises:
-        OrbiflowError: for another number of labels.
 
     >>> group_numbers(["a", "b", "a"], 3).tolist()
     [0, 1, 0]
@@ -154,29 +146,17 @@ BLOCK_ENTRIES = 2_000_000
 
 
 def check_missing(missing: Any) -> str:
-    """Return what is done with rows that lack an angle.
-
-    Raises:
-        OrbiflowError: for what is not one of `MISSING`.
-    """
+    """Return what is done with rows that lack an angle."""
     if not isinstance(missing, str) or missing not in MISSING:
         raise OrbiflowError(f"missing must be one of {', '.join(MISSING)}, got {missing!r}")
     return missing
 
 
 def observed_points(space: Space, points: Any) -> tuple[Tensor, Tensor]:
-    """Return canonical points (N, d) of a torus, and which rows have an angle at all.
-
-    Raises:
-        OrbiflowError: for another space or shape, infinite angles, or what is no `Space`.
-    """
+    """Return canonical points (N, d) of a torus, and which rows have an angle at all."""
     check_kind(space, Space, "space", "see `make_space`")
     check_torus(space, "densities of rows that lack angles")
-    own = float_tensor(points, "points").detach().double().clone()
-    if own.dim() != 2 or own.shape[1] != space.dim:
-        raise OrbiflowError(f"expected points (N, {space.dim}), got {tuple(own.shape)}")
-    if bool(own.isinf().any()):
-        raise OrbiflowError("angles may be missing (NaN), but not infinite")
+    own = observed_rows(points, "points", space).detach().clone()
     known = ~own.isnan().all(dim=1)
     return space.project(own[known]), known
 
@@ -216,35 +196,22 @@ def with_incomplete(kernels: AdaptiveKernels, rows: Rows, total: float) -> Adapt
     """Return kernels about whole rows whose weights follow the rows that lack angles, too.
 
     Each such row shares its weight out among the kernels as they explain the angles that it has: one
-    step of EM, from kernels of the whole rows' weights.
-
-    Args:
-        kernels: Kernels about whole rows.
-        rows: The rows that lack angles.
-        total: The weight of the whole rows.
+    step of EM, from kernels of the whole rows' weights, of which there are `total`.
     """
     some = rows[:MOST_SPREAD]
     lacking = float(len(rows)) if rows.weights is None else float(rows.weights.sum())
     gained = torch.zeros_like(kernels.weights)
     logs = kernels.weights.log()
-    for observed, part in _patterns(some):
-        for block in _blocks(part, len(logs)):
+    size = max(1, BLOCK_ENTRIES // len(logs))
+    # one pattern of angles that are there after the other
+    kinds, number = unique(~some.points.isnan(), dim=0, return_inverse=True)
+    for k, kind in enumerate(kinds):
+        observed, part = listed(torch.nonzero(kind)[:, 0]), some[number == k]
+        for start in range(0, len(part), size):
+            block = part[start : start + size]
             share = torch.softmax(kernels.log_each(block.points[:, observed], observed) + logs, 1)
             gained += share.sum(dim=0) if block.weights is None else block.weights @ share
     weights = total * kernels.weights + lacking * gained / gained.sum()
     return AdaptiveKernels(
         kernels.space, kernels.centers, kernels.concentrations, weights / weights.sum()
     )
-
-
-def _patterns(rows: Rows) -> Iterator[tuple[list[int], Rows]]:
-    """Yield the angles that rows have, and the rows that have just these."""
-    kinds, number = unique(~rows.points.isnan(), dim=0, return_inverse=True)
-    for k, kind in enumerate(kinds):
-        yield listed(torch.nonzero(kind)[:, 0]), rows[number == k]
-
-
-def _blocks(rows: Rows, kernels: int) -> Iterator[Rows]:
-    size = max(1, BLOCK_ENTRIES // kernels)
-    for start in range(0, len(rows), size):
-        yield rows[start : start + size]

@@ -54,9 +54,7 @@ def stacked(table: Tensor, weights: Tensor) -> Tensor:
 
 
 def stacking_weights(table: Tensor, row_weights: Tensor | None = None) -> Tensor:
-    """Return proportions (P,) with the greatest mean log density of held-out rows.
-
-    It is found from a table (P, N) of log densities.
+    """Return proportions (P,) with the greatest mean log density of held-out rows, from a table (P, N).
 
     The problem is concave; EM finds its only optimum (Smyth and Wolpert, Linearly combining density
     estimators via stacking, 1999). The largest mean ratio of a density to the mixture, less 1, bounds

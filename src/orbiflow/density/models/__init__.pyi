@@ -1,10 +1,8 @@
 from .chain_integrals import SCALES as SCALES
 from .chain_integrals import waves as waves
 from .chains import VonMisesChains as VonMisesChains
-from .chains import averaged as averaged
 from .chains import chained as chained
 from .density import Density as Density
-from .density import Restriction as Restriction
 from .density import Split as Split
 from .evaluation import CHECKED as CHECKED
 from .evaluation import TabulatedDensity as TabulatedDensity
@@ -15,6 +13,8 @@ from .files import density_to_bytes as density_to_bytes
 from .files import read_density as read_density
 from .flow import MOST_DIM as MOST_DIM
 from .flow import FlowDensity as FlowDensity
+from .flow import UniformDensity as UniformDensity
+from .flow import VonMisesDensity as VonMisesDensity
 from .flow import identity_flow as identity_flow
 from .kernels import AdaptiveKernels as AdaptiveKernels
 from .kernels import kernel_rows as kernel_rows
@@ -24,9 +24,6 @@ from .network import Factor as Factor
 from .network import VonMisesNetwork as VonMisesNetwork
 from .network import averaged_networks as averaged_networks
 from .network import log_conditional as log_conditional
-from .network import log_of_parents as log_of_parents
 from .terms import FAINT as FAINT
 from .terms import log_sum_exp as log_sum_exp
 from .terms import shares_of as shares_of
-from .uniform import UniformDensity as UniformDensity
-from .uniform import VonMisesDensity as VonMisesDensity

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
 
 from orbiflow.density.models.terms import log_sum_exp
 from orbiflow.typed_torch import listed, special, unique
+
+if TYPE_CHECKING:
+    from orbiflow.density.models.chains import VonMisesChains
 
 SCALES = (1.0, 4.0, 16.0)
 """A component's concentrations are divided by these, each with its own weight: heavy tails."""
@@ -40,11 +43,6 @@ class Nodes:
     log_weights: Tensor
     offsets: dict[int, Tensor]
 
-    @property
-    def count(self) -> int:
-        """The number Q of nodes of a component."""
-        return self.log_weights.shape[1]
-
 
 def nodes_of(
     means: Tensor, kappa: Tensor, hidden: tuple[int, ...], observed: tuple[int, ...], seed: int = 0
@@ -52,20 +50,12 @@ def nodes_of(
     """Yield the numbers of components, and their nodes; those that need as many come together.
 
     The trapezoidal rule over each hidden angle, as fine as it and the angles after it are sharp: to
-    analytic functions it converges exponentially (Trefethen and Weideman, 2014).
-
-    Args:
-        means: Means (C, d, 1 + 2 d), see `VonMisesChains`.
-        kappa: Concentrations (C, d).
-        hidden: The axes that are integrated out.
-        observed: The axes that are not; those before a hidden one do not depend on it, with slopes
-            of 0.
-        seed: Seed of quasi-random nodes.
+    analytic functions it converges exponentially (Trefethen and Weideman, 2014). For means
+    (C, d, 1 + 2 d) and concentrations (C, d); observed axes before a hidden one have slopes of 0 there.
     """
     count, d = kappa.shape
     if not hidden:
-        nothing = Nodes(kappa.new_zeros(count, 1), {})
-        yield torch.arange(count), nothing
+        yield torch.arange(count), Nodes(kappa.new_zeros(count, 1), {})
         return
     sharp = _sharpness(means, kappa, hidden, observed, d)
     reach = (REACH / kappa[:, hidden].clamp_min(1e-12).sqrt()).clamp_max(math.pi)
@@ -154,21 +144,11 @@ class _Group:
     hidden: tuple[int, ...]
 
 
-class ChainTensors(NamedTuple):
-    """The parameters of a `VonMisesChains`, as they are named there."""
-
-    log_weights: Tensor
-    means: Tensor
-    concentrations: Tensor
-    order: Tensor
-
-
-def chains_at(chains: ChainTensors, points: Tensor, observed: list[int], seed: int = 0) -> Tensor:
+def chains_at(chains: VonMisesChains, points: Tensor, observed: list[int], seed: int = 0) -> Tensor:
     """Return log densities (N,) of the `observed` angles alone, at points (N, len(observed)).
 
-    Angles that come before others and are not observed are integrated out at `nodes_of` them, spread
-    about their means, which makes a mixture that is normalised however many nodes there are; `seed` is
-    of those that are quasi-random.
+    Angles before others that are not observed are integrated out at `nodes_of` them, spread about their
+    means, which makes a mixture that is normalised however many nodes there are.
     """
     angle = torch.zeros(len(points), chains.order.shape[1], dtype=torch.float64)
     angle[:, observed] = 2 * math.pi * points.double()
@@ -176,7 +156,7 @@ def chains_at(chains: ChainTensors, points: Tensor, observed: list[int], seed: i
     return log_sum_exp(torch.cat(logs, dim=1))
 
 
-def _groups(chains: ChainTensors, observed: list[int]) -> Iterator[_Group]:
+def _groups(chains: VonMisesChains, observed: list[int]) -> Iterator[_Group]:
     orders, number = unique(chains.order, dim=0, return_inverse=True)
     rows: list[list[int]] = listed(orders)
     for k, order in enumerate(rows):
@@ -190,7 +170,7 @@ def _groups(chains: ChainTensors, observed: list[int]) -> Iterator[_Group]:
         )
 
 
-def _group_at(chains: ChainTensors, group: _Group, angle: Tensor, seed: int) -> Tensor:
+def _group_at(chains: VonMisesChains, group: _Group, angle: Tensor, seed: int) -> Tensor:
     """Return log weight plus log density (N, C) of the group's components, each at every scale."""
     scale = torch.tensor(SCALES, dtype=torch.float64)
     means = chains.means[group.components].repeat_interleave(len(SCALES), dim=0)
@@ -199,7 +179,7 @@ def _group_at(chains: ChainTensors, group: _Group, angle: Tensor, seed: int) -> 
     constant = constant - special.i0e(kappa[:, group.observed]).log().sum(dim=1)
     found = angle.new_empty(len(angle), len(means))
     for chosen, nodes in nodes_of(means, kappa, group.hidden, group.observed, seed):
-        block = max(1, BLOCK_ENTRIES // (len(chosen) * nodes.count))
+        block = max(1, BLOCK_ENTRIES // nodes.log_weights.numel())
         parts = [
             _walked(part, means[chosen], kappa[chosen], group, nodes)
             for part in torch.split(angle, block)

@@ -11,8 +11,8 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.arguments import float_tensor
-from orbiflow.density.models.chain_integrals import SCALES, ChainTensors, chains_at, waves
-from orbiflow.density.models.density import Density, Restriction, Split
+from orbiflow.density.models.chain_integrals import SCALES, chains_at, waves
+from orbiflow.density.models.density import Density, Restriction, Split, in_blocks
 from orbiflow.density.models.headers import checked_integer, checked_tensors
 from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
@@ -60,23 +60,16 @@ class VonMisesChains(Density, kind="chains"):
             raise OrbiflowError(f"von Mises chains need a torus, got the {space.name}")
         d = space.dim
         log_weights, means, concentrations = (
-            float_tensor(value, name)
-            for value, name in (
-                (log_weights, "log_weights"),
-                (means, "means"),
-                (concentrations, "concentrations"),
-            )
+            float_tensor(log_weights, "log_weights"),
+            float_tensor(means, "means"),
+            float_tensor(concentrations, "concentrations"),
         )
         count = concentrations.shape[0] if concentrations.dim() == 2 else 0
         if order is None:
             order = torch.arange(d, device=concentrations.device).repeat(count, 1)
-        shapes = (
-            (log_weights, (count, len(SCALES)), "log_weights"),
-            (means, (count, d, 1 + 2 * d), "means"),
-            (concentrations, (count, d), "concentrations"),
-            (order, (count, d), "order"),
-        )
-        for tensor, shape, name in shapes:
+        shapes = _shapes(count, d)
+        given = (log_weights, means, concentrations, order)
+        for tensor, (name, shape) in zip(given, shapes.items(), strict=True):
             if count < 1 or tuple(tensor.shape) != shape:
                 raise OrbiflowError(f"{name} has shape {tuple(tensor.shape)}, expected {shape}")
         # a weight may be 0, its logarithm -inf
@@ -94,16 +87,17 @@ class VonMisesChains(Density, kind="chains"):
         self.order = order.detach().long().clone()
 
     def log_chart(self, points: Tensor) -> Tensor:
-        flat = points.reshape(-1, self.space.dim)
-        parts = [log_sum_exp(self.joint(block).flatten(1)) for block in torch.split(flat, BLOCK)]
-        return torch.cat(parts).reshape(points.shape[:-1])
+        return in_blocks(lambda p: log_sum_exp(self.joint(p).flatten(1)), points, BLOCK)
 
     def joint(self, points: Tensor) -> Tensor:
         """Return the log density (N, L, K) at points (N, d) of each scale and component, weighted."""
         residual = self.residuals(points)
         kappa = self.concentrations.to(points)
         fit = torch.einsum("nkd,kd->nk", residual.cos() - 1, kappa)
-        return fit[:, None] / fit.new_tensor(SCALES)[:, None] + self._constant().to(points)
+        # log weights less log normalising constants, per unit of the cube: (L, K)
+        scaled = self.concentrations / self.concentrations.new_tensor(SCALES)[:, None, None]
+        constant = self.log_weights.mT - special.i0e(scaled).log().sum(dim=-1)
+        return fit[:, None] / fit.new_tensor(SCALES)[:, None] + constant.to(points)
 
     def residuals(self, points: Tensor) -> Tensor:
         """Return angles less their regressions, in radians (N, K, d), for points (N, d)."""
@@ -139,7 +133,7 @@ class VonMisesChains(Density, kind="chains"):
         )
 
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
-        return chains_at(self._tensors(), points, axes, seed)
+        return chains_at(self, points, axes, seed)
 
     def restricted(self, split: Split, space: Torus) -> Restriction:
         """Keep the chains in which all that is given comes first and all that is hidden last."""
@@ -199,7 +193,12 @@ class VonMisesChains(Density, kind="chains"):
         return {"components": len(self.concentrations), "scales": list(SCALES)}
 
     def tensors(self) -> dict[str, Tensor]:
-        return {**self._tensors()._asdict(), "order": self.order.double()}
+        return {
+            "log_weights": self.log_weights,
+            "means": self.means,
+            "concentrations": self.concentrations,
+            "order": self.order.double(),
+        }
 
     @classmethod
     def from_header(
@@ -208,22 +207,19 @@ class VonMisesChains(Density, kind="chains"):
         count, d = checked_integer(header, "components", MOST_COMPONENTS), space.dim
         if header.get("scales") != list(SCALES):
             raise OrbiflowError(f"scales {header.get('scales')!r}, expected {list(SCALES)}")
-        shapes = {
-            "log_weights": (count, len(SCALES)),
-            "means": (count, d, 1 + 2 * d),
-            "concentrations": (count, d),
-            "order": (count, d),
-        }
         # a component of no weight has the logarithm -inf
-        return cls(space, *checked_tensors(tensors, shapes, least=-math.inf))
+        return cls(space, *checked_tensors(tensors, _shapes(count, d), least=-math.inf))
 
-    def _tensors(self) -> ChainTensors:
-        return ChainTensors(self.log_weights, self.means, self.concentrations, self.order)
 
-    def _constant(self) -> Tensor:
-        """Return log weights less log normalising constants, per unit of the cube: (L, K)."""
-        kappa = self.concentrations / self.concentrations.new_tensor(SCALES)[:, None, None]
-        return self.log_weights.mT - special.i0e(kappa).log().sum(dim=-1)
+def _shapes(count: int, d: int) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of the tensors of so many chains of d angles, by name."""
+    each = (count, d)
+    return {
+        "log_weights": (count, len(SCALES)),
+        "means": (*each, 1 + 2 * d),
+        "concentrations": each,
+        "order": each,
+    }
 
 
 def chained(order: Tensor) -> Tensor:
@@ -238,14 +234,3 @@ def chained(order: Tensor) -> Tensor:
     place = order.argsort(dim=-1)
     before = place[..., None, :] < place[..., :, None]
     return torch.cat([torch.ones_like(before[..., :1]), before, before], dim=-1)
-
-
-def averaged(mixtures: Sequence[VonMisesChains]) -> VonMisesChains:
-    """Return the mean of several densities, again a mixture of chains."""
-    return VonMisesChains(
-        mixtures[0].space,
-        torch.cat([m.log_weights for m in mixtures]) - math.log(len(mixtures)),
-        torch.cat([m.means for m in mixtures]),
-        torch.cat([m.concentrations for m in mixtures]),
-        torch.cat([m.order for m in mixtures]),
-    )

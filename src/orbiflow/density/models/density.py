@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+import numbers
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 from torch.distributions import Distribution, constraints
 
 from orbiflow.density.arguments import check_kind, points_tensor
-from orbiflow.density.models.devices import destination, moved, shape_of, source_of
 from orbiflow.density.spaces import CHART, Space, Torus, check_measure
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
@@ -85,9 +85,11 @@ class Density(Distribution):
     def log_chart(self, points: Tensor) -> Tensor:
         """Return log densities (...,) per area of the chart's square, at points (..., d).
 
-        Differentiable in the points, in their dtype.
+        Differentiable in the points, in their dtype. This follows from `log_density` or the other way
+        round: a subclass gives one of them.
         """
-        raise NotImplementedError
+        values = self.log_density(points)
+        return values + self.space.log_area(points) if self.space.is_round else values
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         """Return `count` random canonical points (count, d), the same on every device."""
@@ -214,9 +216,7 @@ class Density(Distribution):
         own = points.to(self.dtype)
         if torch.is_grad_enabled() or own[..., 0].numel() <= BLOCK:
             return self._log_prob(own, measure).to(points.dtype)
-        flat = own.reshape(-1, self.space.dim)
-        parts = [self._log_prob(block, measure) for block in torch.split(flat, BLOCK)]
-        return torch.cat(parts).reshape(points.shape[:-1]).to(points.dtype)
+        return in_blocks(lambda p: self._log_prob(p, measure), own, BLOCK).to(points.dtype)
 
     def _log_prob(self, points: Tensor, measure: str) -> Tensor:
         check_measure(measure)
@@ -315,13 +315,10 @@ class Density(Distribution):
 
 @dataclass(frozen=True)
 class Split:
-    """The angles of a torus in three: kept, given and integrated out.
+    """The angles of a torus, of which there are `dim`, in three: kept, given and integrated out.
 
-    Attributes:
-        dim: The number of angles of the torus.
-        kept: The numbers of the angles of the density that is asked for, in its order.
-        given: The numbers of the angles that are known.
-        values: Where these are, in turns.
+    `kept` are in the order of the density that is asked for; `values` say where those given are, in
+    turns.
     """
 
     dim: int
@@ -343,14 +340,20 @@ class Split:
 class Restriction(NamedTuple):
     """A density of some angles, given others, as far as there is a closed form.
 
-    Attributes:
-        closed: Densities of the angles kept, each with the logarithm of its weight; what is given
-            makes these weights, whose sum is the density of what is given.
-        left: Densities of all angles that have no closed form, with the logarithms of their weights.
+    - `closed`: Densities of the angles kept, each with the logarithm of its weight; what is given
+      makes these weights, whose sum is the density of what is given.
+    - `left`: Densities of all angles that have no closed form, with the logarithms of their weights.
     """
 
     closed: list[tuple[float, Density]]
     left: list[tuple[float, Density]]
+
+
+def in_blocks(function: Callable[[Tensor], Tensor], points: Tensor, size: int) -> Tensor:
+    """Return a function of points (N, d) at points (..., d), evaluated at some of them at a time."""
+    flat = points.reshape(-1, points.shape[-1])
+    parts = [function(block) for block in torch.split(flat, size)]
+    return torch.cat(parts).reshape(points.shape[:-1])
 
 
 def log_area_factor(space: Space, measure: str) -> float:
@@ -358,3 +361,59 @@ def log_area_factor(space: Space, measure: str) -> float:
     volume = math.log(space.volume)
     natural = 0.0 if space.is_round else -volume
     return natural + (volume if measure == "uniform" else 0.0)
+
+
+def destination(*wanted: Any) -> tuple[torch.device | None, torch.dtype | None]:
+    """Return a device and a dtype from what `torch.Tensor.to` takes: either, both, or a tensor.
+
+    >>> destination("cpu", torch.float32)
+    (device(type='cpu'), torch.float32)
+    """
+    device: torch.device | None = None
+    dtype: torch.dtype | None = None
+    for one in wanted:
+        if isinstance(one, torch.dtype):
+            dtype = one
+        elif isinstance(one, Tensor):
+            device, dtype = one.device, one.dtype
+        elif one is not None:
+            try:
+                device = torch.device(one)
+            except (RuntimeError, TypeError) as error:
+                raise OrbiflowError(
+                    f"expected a device or a dtype, such as 'cuda' or torch.float32, got {one!r}"
+                ) from error
+    if dtype is not None and not dtype.is_floating_point:
+        raise OrbiflowError(f"a density is evaluated in floating-point numbers, not in {dtype}")
+    return device, dtype
+
+
+def moved(value: Any, device: torch.device | None, dtype: torch.dtype | None = None) -> Any:
+    """Return a copy on the device of whatever can be moved; only modules change their dtype."""
+    if isinstance(value, nn.Module):  # which would move in place
+        return copy.deepcopy(value).to(device=device, dtype=dtype)
+    return value.to(device) if device is not None and hasattr(value, "to") else value
+
+
+def source_of(generator: torch.Generator | None) -> torch.Generator:
+    """Return the source of random numbers, by default torch's own."""
+    if generator is None:
+        return torch.default_generator
+    if generator.device.type != "cpu":
+        raise OrbiflowError(
+            f"samples are drawn on the CPU, the generator is on {generator.device}: give a "
+            "torch.Generator() without a device"
+        )
+    return generator
+
+
+def shape_of(sample_shape: Any) -> torch.Size:
+    """Return the shape of samples, which may be given as their number."""
+    sizes = (int(sample_shape),) if isinstance(sample_shape, numbers.Integral) else sample_shape
+    try:
+        shape = torch.Size(sizes)
+    except TypeError as error:
+        raise OrbiflowError(f"expected a number or shape of samples: {error}") from error
+    if any(size < 0 for size in shape):
+        raise OrbiflowError(f"expected a number or shape of samples, got {tuple(shape)}")
+    return shape

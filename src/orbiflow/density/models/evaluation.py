@@ -13,8 +13,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.arguments import check_kind, check_range, float_tensor, points_tensor
-from orbiflow.density.models.density import Density, log_area_factor
-from orbiflow.density.models.devices import destination, moved
+from orbiflow.density.models.density import Density, destination, log_area_factor, moved
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.spaces import CHART, Space, rectangle
 from orbiflow.errors import OrbiflowError
@@ -124,7 +123,6 @@ class TabulatedDensity:
     Args:
         density: A density in two dimensions, on a rectangular lattice.
         resolution: Grid points along a side of the square.
-        seed: Seed of the points at which the table is compared with the density.
 
     Attributes:
         error: The root mean square difference of log densities at samples of the density, in nats.
@@ -135,7 +133,7 @@ class TabulatedDensity:
     """
 
     @one_thread()
-    def __init__(self, density: Density, resolution: int = 512, seed: int = 0) -> None:
+    def __init__(self, density: Density, resolution: int = 512) -> None:
         space = check_kind(density, Density, "density").space
         if space.dim != 2:
             raise OrbiflowError(f"a table needs two dimensions, this {space.name} has {space.dim}")
@@ -144,7 +142,7 @@ class TabulatedDensity:
         self._narrow: AdaptiveKernels | None = None
         smooth = self._smooth_part(density)
         self._table = padded(self._coefficients(smooth)[None])
-        generator = torch.Generator().manual_seed(seed)
+        generator = torch.Generator().manual_seed(0)
         with torch.no_grad():
             drawn = density.sample((CHECKED,), generator)
             even = space.uniform(CHECKED, generator)

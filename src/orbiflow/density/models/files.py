@@ -11,7 +11,7 @@ from torch import Tensor
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.models.chains import VonMisesChains
 from orbiflow.density.models.density import Density
-from orbiflow.density.models.flow import FlowDensity
+from orbiflow.density.models.flow import FlowDensity, UniformDensity
 from orbiflow.density.models.headers import (
     check_group,
     density_from,
@@ -22,7 +22,6 @@ from orbiflow.density.models.headers import (
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.models.mixture import Mixture
 from orbiflow.density.models.network import VonMisesNetwork
-from orbiflow.density.models.uniform import UniformDensity
 from orbiflow.density.spaces import Space, make_space
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import read_tensors, tensor_bytes

@@ -1,4 +1,4 @@
-"""A density carried by a flow: the push-forward of a base, whose field has the space's symmetry."""
+"""Densities carried by a flow whose field has the space's symmetry, and the bases that it carries."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ import math
 from collections.abc import Mapping
 from typing import Any, Self
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.arguments import is_a
 from orbiflow.density.arguments import check_kind
-from orbiflow.density.models.density import Density, Split
+from orbiflow.density.models.density import Density, Restriction, Split, in_blocks
 from orbiflow.density.models.evaluation import midpoints
 from orbiflow.density.models.headers import (
-    check_same_space,
     density_from,
     density_parts,
     series_from_header,
     series_parts,
     within,
 )
-from orbiflow.density.models.uniform import UniformDensity
-from orbiflow.density.spaces import CHART, Space
+from orbiflow.density.spaces import CHART, Space, Torus, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 from orbiflow.runtime import one_thread
-from orbiflow.typed_torch import linalg
+from orbiflow.typed_torch import linalg, special
 
 MOST_DIM = 3
 """The most dimensions of a flow of splines, whose grid would be too large beyond."""
@@ -81,9 +81,7 @@ class FlowDensity(Density, kind="flow"):
         # flow, base and area are invariant: no need to project
         if torch.is_grad_enabled() or points[..., 0].numel() <= BLOCK:
             return self._carried_back(points)
-        flat = points.reshape(-1, self.space.dim)
-        parts = [self._carried_back(block) for block in torch.split(flat, BLOCK)]
-        return torch.cat(parts).reshape(points.shape[:-1])
+        return in_blocks(self._carried_back, points, BLOCK)
 
     def _carried_back(self, points: Tensor) -> Tensor:
         start, log_det = self.flow.inverse_and_log_det(points)
@@ -141,12 +139,6 @@ class FlowDensity(Density, kind="flow"):
             area = linalg.det(torch.stack(rows, dim=1))
             return self._log_prob(end.detach(), CHART).exp() * area
 
-    @torch.no_grad()
-    def integration_error(self, points: Tensor) -> float:
-        """Return the largest change of the log density at `points` when the steps are doubled."""
-        finer = self.with_steps(2 * self.flow.steps)
-        return float((finer.log_prob(points) - self.log_prob(points)).abs().max())
-
     def with_steps(self, steps: int) -> Self:
         """Return a view of the density with its flow integrated in other steps."""
         view = copy.copy(self)
@@ -200,10 +192,9 @@ class FlowDensity(Density, kind="flow"):
         return split.dim > len(split.observed)
 
     def header(self) -> dict[str, Any]:
-        check_same_space(self, self.base, "base")
         return {
             "flow": series_parts(self.flow, self.space)[0],
-            "base": density_parts(self.base, "base")[0],
+            "base": density_parts(self.base, "base", space=self.space)[0],
         }
 
     def tensors(self) -> dict[str, Tensor]:
@@ -241,3 +232,77 @@ def _nodes(count: int, axes: int, *, all_of_them: bool) -> Tensor:
     if not all_of_them:
         grid = grid[(grid % 2 == 1).any(dim=1)]
     return grid.double() / count
+
+
+class UniformDensity(Density, kind="uniform"):
+    """The uniform density in natural measure: on sphere and projective plane J / 4 pi and J / 2 pi.
+
+    An equivariant flow fixes the cone points, so a base that is flat in the chart could never be
+    corrected there (design point 13). As a component it keeps a lone observation from being
+    impossible.
+    """
+
+    @property
+    def log_floor(self) -> float:
+        return -math.log(self.space.volume) if self.space.is_round else 0.0
+
+    def log_density(self, points: Tensor, beside: float = -math.inf) -> Tensor:
+        del beside
+        return self.log_floor + 0 * points[..., 0]  # which has gradients
+
+    def draw(self, count: int, generator: torch.Generator) -> Tensor:
+        return self.space.uniform(count, generator)
+
+    def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
+        del axes, seed
+        return torch.zeros(len(points), dtype=torch.float64)
+
+    def restricted(self, split: Split, space: Torus) -> Restriction:
+        del split
+        return Restriction([(0.0, UniformDensity(space))], [])
+
+
+class VonMisesDensity(Density, kind="von-mises"):
+    """The paper's base: a product of von Mises densities about the square's centre.
+
+    It is made invariant by summing over the group: with periods those of the lattice, the sum over
+    coset representatives integrates to 1 over the square.
+
+    Args:
+        space: Any space.
+        concentration: The concentration kappa > 0 of each factor.
+    """
+
+    def __init__(self, space: Space, concentration: float = 1.0) -> None:
+        super().__init__(space)
+        real = is_a(concentration, int | float)
+        if not real or not concentration > 0 or not math.isfinite(concentration):
+            raise OrbiflowError(f"concentration must be positive, got {concentration!r}")
+        self.concentration = float(concentration)
+        self.periods = rectangle(space)
+
+    def log_chart(self, points: Tensor) -> Tensor:
+        images = self.space.group.images(points)
+        periods = self.periods.to(points)
+        angle = 2 * math.pi * (images - 0.5) / periods
+        kappa = self.concentration
+        log_normal = torch.log(special.i0e(torch.tensor(kappa, dtype=torch.float64))) + kappa
+        terms = kappa * angle.cos() - log_normal.to(points) - periods.log()
+        return terms.sum(dim=-1).logsumexp(dim=0)
+
+    def draw(self, count: int, generator: torch.Generator) -> Tensor:
+        seed = int(torch.randint(2**31, (), generator=generator))
+        angle = np.random.default_rng(seed).vonmises(
+            0.0, self.concentration, (count, self.space.dim)
+        )
+        return self.space.project(0.5 + torch.tensor(angle) / (2 * math.pi) * self.periods.cpu())
+
+    def header(self) -> dict[str, Any]:
+        return {"concentration": self.concentration}
+
+    @classmethod
+    def from_header(
+        cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
+    ) -> Self:
+        del tensors
+        return cls(space, float(header["concentration"]))

@@ -20,17 +20,11 @@ from orbiflow.symmetry import CrystallographicGroup, group_header
 
 
 def density_parts(
-    density: Density, name: str, prefix: str = ""
+    density: Density, name: str, prefix: str = "", space: Space | None = None
 ) -> tuple[dict[str, Any], dict[str, Tensor]]:
     """Return a density's header and its tensors, whose names begin with `prefix`.
 
-    Args:
-        density: The density.
-        name: What it is in messages, such as "base".
-        prefix: The beginning of the tensors' names.
-
-    Raises:
-        OrbiflowError: naming a class that has no kind of its own.
+    `name` is what it is in messages, such as "base"; a component must be on the whole's `space`.
     """
     kind = type(density).kind
     if KINDS.get(kind) is not type(density):
@@ -39,17 +33,17 @@ def density_parts(
             f"one of the kinds {', '.join(sorted(KINDS))}, or give the class a kind, "
             f'class {type(density).__name__}(Density, kind="...")'
         )
+    own = density.space
+    if space is not None and (space.name, space.settings()) != (own.name, own.settings()):
+        raise OrbiflowError(
+            f"the {name} is on {own!r}, the density on {space!r}: make both on one space"
+        )
     tensors = {prefix + key: tensor for key, tensor in density.tensors().items()}
     return {"kind": kind, **density.header()}, tensors
 
 
 def density_from(space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Density:
-    """Make the density of `density_parts` again, bit for bit.
-
-    Raises:
-        OrbiflowError: for an unknown kind.
-        OrbiflowError, ValueError, KeyError, TypeError: for what does not fit.
-    """
+    """Make the density of `density_parts` again, bit for bit."""
     kind = header["kind"]
     if kind not in KINDS:
         raise OrbiflowError(
@@ -67,28 +61,10 @@ def within(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
     }
 
 
-def check_same_space(density: Density, component: Density, name: str) -> None:
-    """Check that a component is on the space of the density.
-
-    Raises:
-        OrbiflowError: if it is not.
-    """
-    one, other = ((s.name, s.settings()) for s in (density.space, component.space))
-    if one != other:
-        raise OrbiflowError(
-            f"the {name} is on {component.space!r}, the density on {density.space!r}: make both on "
-            "one space"
-        )
-
-
 def checked_tensors(
     tensors: Mapping[str, Tensor], shapes: Mapping[str, tuple[int, ...]], *, least: float = -1e30
 ) -> list[Tensor]:
-    """Return the tensors of these names and shapes, in this order.
-
-    Raises:
-        OrbiflowError: if one is missing, has another shape, or values below `least` or not finite.
-    """
+    """Return the tensors of these names and shapes, in this order."""
     found: list[Tensor] = []
     for name, shape in shapes.items():
         if name not in tensors:
@@ -102,15 +78,11 @@ def checked_tensors(
     return found
 
 
-def checked_integer(header: Mapping[str, Any], name: str, most: int) -> int:
-    """Return an entry of a header that must be an integer from 1 to `most`.
-
-    Raises:
-        OrbiflowError: for another value.
-    """
+def checked_integer(header: Mapping[str, Any], name: str, most: int, least: int = 1) -> int:
+    """Return an entry of a header that must be an integer of a range."""
     value = header.get(name)
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-        raise OrbiflowError(f"{name} must be an integer from 1 to {most}, got {value!r}")
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        raise OrbiflowError(f"{name} must be an integer from {least} to {most}, got {value!r}")
     return value
 
 
@@ -133,21 +105,11 @@ def is_same_group(one: CrystallographicGroup, other: CrystallographicGroup) -> b
 
 
 def check_group(header: Any, group: CrystallographicGroup) -> None:
-    """Check that `header`, from `group_header`, describes this group.
-
-    Raises:
-        OrbiflowError: if it describes another one.
-    """
+    """Check that `header`, from `group_header`, describes this group."""
     try:
-        tables = [np.array(header[name], dtype=float) for name in group_header(group)]
-        lattice, linear, translations = tables
-        same = (
-            lattice.shape == group.lattice.shape
-            and linear.shape == group.linear_parts.shape
-            and translations.shape == group.translations.shape
-            and np.allclose(lattice, group.lattice, rtol=0, atol=TOLERANCE)
-            and np.allclose(linear, group.linear_parts, rtol=0, atol=TOLERANCE)
-            and np.allclose(translations, group.translations, rtol=0, atol=TOLERANCE)
+        tables = [(np.array(header[n], float), np.array(v)) for n, v in group_header(group).items()]
+        same = all(
+            a.shape == b.shape and np.allclose(a, b, rtol=0, atol=TOLERANCE) for a, b in tables
         )
     except (KeyError, TypeError, ValueError, OverflowError):
         same = False
@@ -164,11 +126,7 @@ FIELD_NAMES = {kind: name for name, kind in FIELDS.items()}
 
 
 def series_parts(flow: Flow, space: Space) -> tuple[dict[str, Any], dict[str, Tensor]]:
-    """Return a header ready for JSON and a float64 tensor "flow.k" for each segment of a flow.
-
-    Raises:
-        OrbiflowError: naming the part of the flow that cannot be saved.
-    """
+    """Return a header ready for JSON and a float64 tensor "flow.k" for each segment of a flow."""
     if type(flow) is not Flow:
         raise OrbiflowError(
             f"the flow is a {type(flow).__name__}: only flows of Fourier and spline fields are "
@@ -226,11 +184,7 @@ def _segment(number: int, field: Any, space: Space) -> dict[str, Any]:
 def series_from_header(
     header: Mapping[str, Any], tensors: Mapping[str, Tensor], space: Space
 ) -> Flow:
-    """Make the flow of `series_parts` again; headers of the first files of version 0.1 work as well.
-
-    Raises:
-        OrbiflowError, ValueError, KeyError, TypeError: for what does not fit.
-    """
+    """Make the flow of `series_parts` again; headers of the first files of version 0.1 work as well."""
     if space.dim > MAX_DIM:
         raise ValueError(f"a flow of Fourier or spline fields has {MAX_DIM} dimensions at most")
     if header["kind"] != "series":
@@ -240,7 +194,7 @@ def series_from_header(
         raise ValueError("no segments, or too many")
     return Flow(
         [_field(part, tensors[f"flow.{k}"], space) for k, part in enumerate(segments)],
-        steps=_bounded(header["steps"], MAX_STEPS, "steps"),
+        steps=checked_integer(header, "steps", MAX_STEPS, 0),
         method=str(header["method"]),
         duration=_finite(header["duration"], "duration"),
         warn=False,  # the fit has settled them and said if it could not
@@ -259,7 +213,7 @@ def _of_version_1(
 
 
 def _field(header: Mapping[str, Any], row: Tensor, space: Space) -> InvariantField:
-    frequency = _bounded(header["max_frequency"], MAX_FREQUENCY, "max_frequency")
+    frequency = checked_integer(header, "max_frequency", MAX_FREQUENCY, 0)
     smoothness = _finite(header["smoothness"], "smoothness")
     if not bool(torch.isfinite(row).all()):
         raise ValueError("parameters that are not finite")
@@ -275,9 +229,3 @@ def _finite(value: Any, name: str) -> float:
     if not math.isfinite(float(value)):
         raise ValueError(f"{name} {value!r}")
     return float(value)
-
-
-def _bounded(value: Any, most: int, name: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
-        raise ValueError(f"{name} {value!r}")
-    return value

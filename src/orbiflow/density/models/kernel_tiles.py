@@ -85,11 +85,7 @@ class Chart:
 
         Along an axis by 4 M rho^(1 - n) / (rho - 1), M the largest value on the ellipse of rho
         (Trefethen, Approximation Theory and Approximation Practice, 2013, theorem 8.2), times the
-        Lebesgue constant of the other axis.
-
-        Args:
-            terms: The terms.
-            largest: The largest logarithms (K,) of each term in the tile.
+        Lebesgue constant of the other axis. The terms in the tile are below exp(`largest`), (K,).
         """
         centers = self._turned(terms.centers)
         lebesgue = 1 + 2 / math.pi * math.log(NODES)
@@ -162,15 +158,9 @@ class Chart:
         local, found = _sphere(grid), 0.0
         block = max(1, BLOCK_ENTRIES // local.shape[1])
         (centers,) = self._turned(terms.centers)
-        for c, k, p in zip(
-            torch.split(centers, block, dim=1),
-            torch.split(terms.kappa[0], block),
-            torch.split(terms.peaks, block),
-            strict=True,
-        ):
-            found = (
-                _exponents(c, k, local).add_(p - top).clamp_min_(-WIDE).exp_().sum(dim=1) + found
-            )
+        for at in torch.split(torch.arange(terms.size), block):
+            table = _exponents(centers[:, at], terms.kappa[0][at], local)
+            found = table.add_(terms.peaks[at] - top).clamp_min_(-WIDE).exp_().sum(dim=1) + found
         assert isinstance(found, Tensor)
         return found.reshape(NODES, -1)
 

@@ -49,12 +49,9 @@ class AdaptiveKernels(Density, kind="kernels"):
     ) -> None:
         super().__init__(space)
         centers, concentrations, weights = (
-            float_tensor(value, name)
-            for name, value in (
-                ("centers", centers),
-                ("concentrations", concentrations),
-                ("weights", weights),
-            )
+            float_tensor(centers, "centers"),
+            float_tensor(concentrations, "concentrations"),
+            float_tensor(weights, "weights"),
         )
         width = 1 if space.is_round else space.dim
         shapes = [tuple(t.shape) for t in (centers, concentrations, weights)]
@@ -83,10 +80,6 @@ class AdaptiveKernels(Density, kind="kernels"):
 
     def log_density_without_kernels(self, points: Tensor) -> Tensor:
         return points.new_full(points.shape[:-1], -math.inf)
-
-    def log_chart(self, points: Tensor) -> Tensor:
-        values = self.log_density(points)
-        return values + self.space.log_area(points) if self.space.is_round else values
 
     def log_density(
         self, points: Tensor, beside: float = -math.inf, tolerance: float = TOLERANCE

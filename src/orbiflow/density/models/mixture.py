@@ -13,13 +13,7 @@ from torch import Tensor
 from orbiflow.density.arguments import check_kind, float_tensor
 from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.flow import FlowDensity
-from orbiflow.density.models.headers import (
-    check_same_space,
-    checked_tensors,
-    density_from,
-    density_parts,
-    within,
-)
+from orbiflow.density.models.headers import checked_tensors, density_from, density_parts, within
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
@@ -114,10 +108,6 @@ class Mixture(Density, kind="mixture"):
                 return weight * own[0], own[1]
         return None
 
-    def log_chart(self, points: Tensor) -> Tensor:
-        values = self.log_density(points)
-        return values + self.space.log_area(points) if self.space.is_round else values
-
     def log_density(self, points: Tensor, beside: float = -math.inf) -> Tensor:
         floor = float(torch.logaddexp(*torch.tensor([self.log_floor, beside], dtype=torch.float64)))
         return _log_sum(
@@ -165,11 +155,9 @@ class Mixture(Density, kind="mixture"):
         return new
 
     def header(self) -> dict[str, Any]:
-        headers: list[dict[str, Any]] = []
-        for own in self.components:
-            check_same_space(self, own, own.article or own.kind or type(own).__name__)
-            headers.append(density_parts(own, "component")[0])
-        return {"components": headers}
+        named = ((own, own.article or own.kind or type(own).__name__) for own in self.components)
+        parts = [density_parts(own, name, space=self.space) for own, name in named]
+        return {"components": [header for header, _ in parts]}
 
     def tensors(self) -> dict[str, Tensor]:
         found = {"weights": self.weights}

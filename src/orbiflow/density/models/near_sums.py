@@ -44,14 +44,8 @@ def near_log_sum(
 
     Points are divided into tiles. Terms whose largest values in a tile are negligible beside the least
     sum there are left out; those that are smooth across the tile are summed at few places and
-    interpolated; the rest is summed point by point, once tiles are small.
-
-    Args:
-        terms: The terms.
-        features: The features.
-        floor: Logarithm of what the caller adds to the sum, to which errors are relative as well. It is
-            not in the result.
-        tolerance: The relative error that is allowed.
+    interpolated; the rest is summed point by point, once tiles are small. `floor` is the logarithm of
+    what the caller adds to the sum, to which errors are relative as well; it is not in the result.
 
     Differentiable in the features: the gradient in closed form, as fast as the sum; higher
     derivatives by autograd through the terms that count.
@@ -111,7 +105,10 @@ class _Walk:
         self.features, self.terms, self.floor = features, terms, floor
         self.tolerance, self.each = math.log(tolerance), math.log(tolerance / terms.size)
         self.by_autograd = by_autograd
-        self.worth = math.inf if by_autograd else _worth(terms)
+        # the number of points of a tile from which on interpolation may pay
+        self.worth = WORTH_ROUND if len(terms.centers) == 3 else WORTH_FLAT
+        if by_autograd or terms.factors > 2:
+            self.worth = math.inf
         plain = features.detach()
         self.log_sum = torch.full_like(plain[0], -math.inf)
         self.slope = torch.zeros_like(plain) if slope else None
@@ -189,13 +186,6 @@ class _Walk:
             slope = slope / values
         self._add(torch.as_tensor(part.numbers), values.log() + top, slope)
         return terms.only(~smooth)
-
-
-def _worth(terms: Terms) -> float:
-    """Return the number of points of a tile from which on interpolation may pay."""
-    if terms.factors > 1:
-        return WORTH_FLAT if terms.factors == 2 else math.inf
-    return WORTH_ROUND if len(terms.centers) > 2 else WORTH_FLAT
 
 
 def _halves(features: Tensor, tile: Tile) -> tuple[np.ndarray, np.ndarray]:

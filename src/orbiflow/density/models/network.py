@@ -13,8 +13,8 @@ from torch import Tensor
 
 from orbiflow.density.arguments import check_kind
 from orbiflow.density.models.chain_integrals import SCALES, quantiles, waves
-from orbiflow.density.models.chains import BLOCK, VonMisesChains, averaged
-from orbiflow.density.models.density import Density, Split
+from orbiflow.density.models.chains import BLOCK, VonMisesChains
+from orbiflow.density.models.density import Density, Split, in_blocks
 from orbiflow.density.models.headers import within
 from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
@@ -87,17 +87,15 @@ class VonMisesNetwork(Density, kind="network"):
         self.factors = tuple(factors)
 
     def log_chart(self, points: Tensor) -> Tensor:
-        flat = points.reshape(-1, self.space.dim)
-        parts = [self._block(block) for block in torch.split(flat, BLOCK)]
-        return torch.cat(parts).reshape(points.shape[:-1])
+        return in_blocks(self._log_product, points, BLOCK)
 
-    def _block(self, points: Tensor) -> Tensor:
+    def _log_product(self, points: Tensor) -> Tensor:
         angles = points.unbind(dim=1)
-        found = [
+        logs = [
             log_conditional(chains, torch.stack([angles[axis] for axis in axes], dim=1))
             for axes, chains in self.factors
         ]
-        return torch.stack(found).sum(dim=0)
+        return torch.stack(logs).sum(dim=0)
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         rng = np.random.default_rng(int(torch.randint(2**31, (), generator=generator)))
@@ -105,8 +103,11 @@ class VonMisesNetwork(Density, kind="network"):
         for axes, chains in self.factors:
             own = chains.to("cpu")
             angle = 2 * math.pi * points[:, list(axes)]
-            chosen = [_drawn(own, block, generator) for block in torch.split(angle, BLOCK)]
-            part = torch.cat([angle.new_zeros(0).long(), *chosen])
+            chosen = [angle.new_zeros(0).long()]
+            for block in torch.split(points[:, list(axes)], BLOCK):
+                shares = shares_of(_log_parents(own, block))
+                chosen.append(torch.multinomial(shares, 1, generator=generator)[:, 0])
+            part = torch.cat(chosen)
             component, scale = part // len(SCALES), part % len(SCALES)
             mean = (waves(angle) * own.means[component, -1]).sum(dim=1)
             kappa = own.concentrations[component, -1] / torch.tensor(SCALES)[scale]
@@ -192,9 +193,8 @@ class VonMisesNetwork(Density, kind="network"):
         factors: list[Factor] = []
         for own in stored:
             axes: Any = own.get("axes")
-            if not is_list(axes) or not 0 < len(axes) <= space.dim:
-                raise OrbiflowError(f"a factor of the angles {axes!r}")
-            if not all(type(axis) is int and 0 <= axis < space.dim for axis in axes):
+            are_axes = is_list(axes) and all(type(a) is int and 0 <= a < space.dim for a in axes)
+            if not are_axes or not 0 < len(axes) <= space.dim:
                 raise OrbiflowError(f"a factor of the angles {axes!r}")
             below = within(tensors, f"{axes[-1]}.")
             chains = VonMisesChains.from_header(Torus(len(axes)), own, below)
@@ -214,11 +214,6 @@ def log_conditional(chains: VonMisesChains, points: Tensor) -> Tensor:
     return log_sum_exp((before + own).flatten(1)) - log_sum_exp(before.flatten(1))
 
 
-def log_of_parents(chains: VonMisesChains, points: Tensor) -> Tensor:
-    """Return log densities (N, L, K) of all but the last angle, for each scale and component."""
-    return _terms(chains, points)[0]
-
-
 def _terms(chains: VonMisesChains, points: Tensor) -> tuple[Tensor, Tensor]:
     """Return logs (N, L, K) of weight times parents' density, and of the last angle given them."""
     kappa = chains.concentrations.to(points)
@@ -230,25 +225,24 @@ def _terms(chains: VonMisesChains, points: Tensor) -> tuple[Tensor, Tensor]:
     return before, fit[..., -1][:, None] / scale - normal[..., -1]
 
 
-def _drawn(chains: VonMisesChains, angle: Tensor, generator: torch.Generator) -> Tensor:
-    """Draw a component and scale (N,) for each row, K * len(SCALES) + L, given the parents in it."""
-    shares = shares_of(log_of_parents(chains, angle / (2 * math.pi)).mT.flatten(1))
-    return torch.multinomial(shares, 1, generator=generator)[:, 0]
+def _log_parents(chains: VonMisesChains, points: Tensor) -> Tensor:
+    """Return logs (N, K * L) of weight times parents' density, of each component at all scales."""
+    return _terms(chains, points)[0].mT.flatten(1)
 
 
 def averaged_networks(networks: Sequence[VonMisesNetwork]) -> VonMisesNetwork:
-    """Return the network whose factors are the means of those of networks with the same arrows.
-
-    Raises:
-        OrbiflowError: if the arrows differ.
-    """
+    """Return the network whose factors are the means of those of networks with the same arrows."""
     first = networks[0]
     if len({tuple(axes for axes, _ in one.factors) for one in networks}) > 1:
         raise OrbiflowError("networks with other arrows have no common mean")
+    even = torch.ones(len(networks), dtype=torch.float64)
     columns = zip(*(one.factors for one in networks), strict=True)
     return VonMisesNetwork(
         first.space,
-        [Factor(column[0].axes, averaged([own.chains for own in column])) for column in columns],
+        [
+            Factor(column[0].axes, VonMisesChains.joined([own.chains for own in column], even))
+            for column in columns
+        ],
     )
 
 
@@ -263,7 +257,7 @@ class _Mixture:
     @classmethod
     def of(cls, chains: VonMisesChains, axes: tuple[int, ...], at: dict[int, Tensor]) -> _Mixture:
         around = {**at, axes[-1]: torch.zeros(1, 1, dtype=torch.float64)}
-        logs = _along(lambda p: log_of_parents(chains, p).mT.flatten(1), axes, around)[0]
+        logs = _along(lambda p: _log_parents(chains, p), axes, around)[0]
         scale = torch.tensor(SCALES, dtype=torch.float64)
         kappa = (chains.concentrations[:, -1, None] / scale).flatten()
         logs = logs - log_sum_exp(logs)[:, None] - special.i0e(kappa).log()
@@ -284,11 +278,10 @@ class _Mixture:
 
 @dataclass(frozen=True)
 class _Once:
-    """What does not depend on the points, and is worked on once.
+    """What does not depend on the points, and is worked on once, and the `factors` that do.
 
-    - `factors`: those that do.
-    - `at`: angles that are known (1, 1) or drawn (1, Q). `total`: log density of those that are known.
-    - `mixtures`: of angles whose parents are among them.
+    - `at`, `total`: Angles that are known (1, 1) or drawn (1, Q), and the log density of those known.
+    - `mixtures`: Those of angles whose parents are among them.
     """
 
     factors: list[Factor]
@@ -343,7 +336,7 @@ def _drawn_at(
 ) -> Tensor:
     """Draw the last angle, (N, Q) or (1, Q), given its parents, by probabilities (Q, 2)."""
     around = {**at, axes[-1]: even.new_zeros(1, 1)}
-    shares = _along(lambda p: shares_of(log_of_parents(chains, p).mT.flatten(1)), axes, around)
+    shares = _along(lambda p: shares_of(_log_parents(chains, p)), axes, around)
     rows = len(shares)
     below = shares.cumsum(dim=-1).expand(rows, len(even), -1).contiguous()
     chosen = torch.searchsorted(below, even[None, :, :1].expand(rows, -1, 1).contiguous())[..., 0]

@@ -7,6 +7,7 @@ run along the memory.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
@@ -20,13 +21,8 @@ def log_sum_exp(table: Tensor) -> Tensor:
     """Return `torch.logsumexp` over the last dimension, ten times as fast if most terms are faint.
 
     Exponentials that underflow take a slow path of the processor. Each is raised to `FAINT` instead,
-    which changes nothing: the largest term counts 1.
-
-    Args:
-        table: Logarithms (..., n), n > 0.
-
-    Returns:
-        Logarithms (...). Where all terms are 0, the lowest number of the dtype rather than -inf.
+    which changes nothing: the largest term counts 1. Of logarithms (..., n), n > 0, return (...); where
+    all terms are 0, the lowest number of the dtype rather than -inf.
 
     >>> log_sum_exp(torch.tensor([[0.0, 0.0], [-1e9, 3.0]]))
     tensor([0.6931, 3.0000])
@@ -90,18 +86,12 @@ class Terms(NamedTuple):
     def log_sum(self, features: Tensor, middle: Tensor, spread: float) -> Tensor:
         """Return the logarithm (N,) of the sum at features (m, N), differentiable.
 
-        Args:
-            features: The features.
-            middle: Features (m,) near them. About it little cancels: at a concentration of 1e7 the
-                cosine of the whole angle would lose half of all digits.
-            spread: Logarithm of the ratio of the largest peak to the least sum.
+        Exponents are taken about features `middle` (m,) near them, where little cancels: at a
+        concentration of 1e7 the cosine of the whole angle would lose half of all digits. `spread` is
+        the logarithm of the ratio of the largest peak to the least sum.
         """
-        rows, bias = self._about(middle[:, None])
+        rows, bias, _, parts = self._about(features, middle)
         top = float(self.peaks.max())
-        offset = features - middle[:, None]
-        seen = torch.cat([offset, lengths2(offset, self.factors)])
-        block = max(1, BLOCK_ENTRIES // self.size)
-        parts = torch.split(seen, block, dim=1)
         if spread > WIDE:
             return torch.cat([log_sum_exp(torch.addmm(bias, part.mT, rows)) for part in parts])
         bias = bias - top
@@ -115,13 +105,11 @@ class Terms(NamedTuple):
         self, features: Tensor, middle: Tensor, spread: float
     ) -> tuple[Tensor, Tensor]:
         """Return what `log_sum` does, and its gradient (m, N) in the features; not differentiable."""
-        rows, bias = self._about(middle[:, None])
+        rows, bias, offset, parts = self._about(features, middle)
         bias = bias - self.peaks.max()
-        offset = features - middle[:, None]
-        seen = torch.cat([offset, lengths2(offset, self.factors)])
         values: list[Tensor] = []
         slopes: list[Tensor] = []
-        for part in torch.split(seen, max(1, BLOCK_ENTRIES // self.size), dim=1):
+        for part in parts:
             table = torch.addmm(bias, part.mT, rows)
             top = table.amax(dim=1, keepdim=True) if spread > WIDE else table.new_zeros(1, 1)
             table.sub_(top).clamp_min_(-WIDE - 80).exp_()
@@ -146,12 +134,20 @@ class Terms(NamedTuple):
             table = table - self.kappa[k % self.factors] / 2 * (x[:, None] - center) ** 2
         return table.logsumexp(dim=1)
 
-    def _about(self, middle: Tensor) -> tuple[Tensor, Tensor]:
-        """Return rows (m + F, K) and bias (K,): exponents are linear in offsets and their squares."""
-        offset, half = self.centers - middle, self.kappa / 2
-        bias = self.peaks - (half * lengths2(offset, self.factors)).sum(dim=0)
+    def _about(
+        self, features: Tensor, middle: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor, Sequence[Tensor]]:
+        """Return rows (m + F, K), bias (K,), offsets (m, N), and blocks of them with their squares.
+
+        Exponents are linear in offsets and their squares.
+        """
+        own, half = self.centers - middle[:, None], self.kappa / 2
+        bias = self.peaks - (half * lengths2(own, self.factors)).sum(dim=0)
         repeated = self.kappa.repeat(len(middle) // self.factors, 1)
-        return torch.cat([repeated * offset, -half]), bias
+        offset = features - middle[:, None]
+        seen = torch.cat([offset, lengths2(offset, self.factors)])
+        parts = torch.split(seen, max(1, BLOCK_ENTRIES // self.size), dim=1)
+        return torch.cat([repeated * own, -half]), bias, offset, parts
 
 
 def lengths2(offset: Tensor, factors: int) -> Tensor:

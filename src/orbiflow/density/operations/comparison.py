@@ -2,32 +2,35 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
+from orbiflow import runtime
+from orbiflow.batch import csv_bytes
+from orbiflow.density import comparing, tables
 from orbiflow.density.comparing import ComparisonSettings
 from orbiflow.density.operations.drawing import require_ending
-from orbiflow.density.tables import TableSettings
+from orbiflow.density.run_folder import write_file
+from orbiflow.density.tables import SpaceName, TableSettings, Unit
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.runtime import Cancel, Note, Outcome, Progress, Sink, Written, ignore, operation
 from orbiflow.settings import DefaultText, Option, Repeated
 
 if TYPE_CHECKING:
     from orbiflow.arrays import Array
     from orbiflow.density.comparing import DataComparison, ModelComparison
     from orbiflow.density.models import Density
-    from orbiflow.density.tables import Table
+    from orbiflow.density.tables import TableRows
 
-SpaceName = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
-Unit = Literal["radians", "degrees", "turns"]
 Columns = tuple[str, ...] | None
 
 FITTED_SHARE, MIN_LOOKED_UP = 0.5, 5
 """Share of the rows that a model knows, and rows that must have been looked up, for a warning."""
 
 
-@operation("density compare")
+@runtime.operation("density compare")
 def compare(
     settings: ComparisonSettings = ComparisonSettings(),
     table: TableSettings = TableSettings(),
@@ -38,9 +41,9 @@ def compare(
     unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None,
     group: str | None = None,
     out: Annotated[Path | None, Option("-o"), DefaultText("nothing is written")] = None,
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Which model suits held-out rows better, or do two data sets differ? With its uncertainty.
 
     Models: -m A -m B -d held-out.csv. Data sets: -d a.csv -d b.csv --space sphere.
@@ -57,15 +60,10 @@ def compare(
     models = models or ()
     require_ending(out, (".json", ".csv"))
     _check_what_is_compared(data, models, space, unit)
-
-    import json
-
-    from orbiflow.runtime import check_output_file, one_thread, write_atomic
-
     if out is not None:
-        check_output_file(out, *models, *data)
+        runtime.check_output_file(out, *models, *data)
     read = _Reader(table, group, on_event, cancel)
-    with one_thread():
+    with runtime.one_thread():
         if models:
             found = _compare_models(data[0], models, read, settings)
         else:
@@ -74,25 +72,18 @@ def compare(
     document = found.to_json()
     cancel.check()
     for line in [*found.words(), *found.notes]:
-        on_event(Note(line))
+        on_event(runtime.Note(line))
     if out is not None:
         as_csv = out.suffix.lower() == ".csv"
-        write_atomic(
-            out, _csv(found) if as_csv else json.dumps(document, allow_nan=False, indent=1)
-        )
-        on_event(Written(out))
-        on_event(Note(f"written to {out}"))
-    return Outcome({"file": None if out is None else str(out), "comparison": document})
+        text = _csv(found) if as_csv else json.dumps(document, allow_nan=False, indent=1)
+        write_file(out, text, on_event, f"written to {out}")
+    return runtime.Outcome({"file": None if out is None else str(out), "comparison": document})
 
 
 def _check_what_is_compared(
     data: Sequence[Path], models: Sequence[Path], space: str | None, unit: str | None
 ) -> None:
-    """Check that there are models and a table, or two tables and a space.
-
-    Raises:
-        SettingError: If there is something else.
-    """
+    """Check that there are models and a table, or two tables and a space."""
     if not models and len(data) != 2:
         raise SettingError(
             "give two {models} or more and one {data} to compare models, or two {data} and their "
@@ -117,74 +108,55 @@ def _check_what_is_compared(
             raise SettingError(f"{{{name}}} is that of the models: leave it out")
 
 
+@dataclass(frozen=True)
 class _Reader:
-    """Tables as a comparison reads them, with its progress and notes.
+    """How tables are read, the column of groups, and who is told of the progress."""
 
-    Args:
-        settings: Which columns and rows are read.
-        group: The column of groups.
-        tell: The sink of events.
-        cancel: Ends the work early.
-    """
-
-    def __init__(
-        self, settings: TableSettings, group: str | None, tell: Sink, cancel: Cancel
-    ) -> None:
-        self.settings, self.columns, self.header = settings, settings.columns, settings.header
-        self.group, self.tell, self.cancel = group, tell, cancel
+    settings: TableSettings
+    group: str | None
+    tell: runtime.Sink
+    cancel: runtime.Cancel
 
     def progress(self, share: float, what: str) -> None:
         """Tell the progress, unless the work was cancelled."""
         self.cancel.check()
-        self.tell(Progress(min(1.0, share), what))
+        self.tell(runtime.Progress(min(1.0, share), what))
 
-    def table(self, data: Path, columns: Columns, tell: Sink) -> Table:
-        """Return numbers, without the column of groups if columns are not named."""
-        from orbiflow.density.tables import read_rows
-
-        settings = self.settings.replace(columns=columns)
-        return read_rows(data, settings, tell, group=self.group).table
-
-    def labels(self, data: Path, table: Table) -> Any:
-        """Return the group of each row, or None if there are no groups."""
-        from orbiflow.density.tables import read_labels
-
-        if self.group is None:
-            return None
-        return read_labels(data, self.group, table, has_header=self.header)
+    def rows(self, data: Path, columns: Columns, tell: runtime.Sink) -> TableRows:
+        """Return rows, without the column of groups if columns are not named."""
+        return tables.read_rows(
+            data, self.settings.replace(columns=columns), tell, group=self.group
+        )
 
 
 def _compare_models(
     data: Path, paths: Sequence[Path], read: _Reader, settings: ComparisonSettings
 ) -> ModelComparison:
-    from dataclasses import replace
-
-    from orbiflow.density.comparing import compare_scores, require_one_space, scores_of
     from orbiflow.density.operations.saved import check_fits, model_at
 
     names = _names(paths)
     models = dict(zip(names, map(model_at, paths), strict=True))
-    require_one_space({name: density.space for name, (density, _) in models.items()})
+    comparing.require_one_space({name: density.space for name, (density, _) in models.items()})
     columns = _columns_of_models(data, {name: extra for name, (_, extra) in models.items()}, read)
-    tables: dict[Columns, Table] = {}
+    found: dict[Columns, TableRows] = {}
     scores: dict[str, Array] = {}
     notes: list[str] = []
     for k, (name, (density, extra)) in enumerate(models.items()):
         own = columns[name]
-        if own not in tables:
-            tell_once = ignore if tables else read.tell
-            tables[own] = read.table(data, own, tell_once)
-            check_fits(data, tables[own], density.space, extra, tell_once)
-        values = tables[own].values
+        if own not in found:
+            tell_once = runtime.ignore if found else read.tell
+            found[own] = read.rows(data, own, tell_once)
+            check_fits(data, found[own].table, density.space, extra, tell_once)
+        values = found[own].table.values
 
         def told(share: float, k: int = k) -> None:
             read.progress((k + share) / len(models), "scoring")
 
-        scores[name] = scores_of(density, values, told)
+        scores[name] = comparing.scores_of(density, values, told)
         notes += _notes_on_known_rows(name, density, extra, values)
-    groups = read.labels(data, next(iter(tables.values())))
-    found = compare_scores(scores, settings, groups=groups)
-    return replace(found, notes=(*notes, *found.notes))
+    groups = next(iter(found.values())).labels()
+    made = comparing.compare_scores(scores, settings, groups=groups)
+    return replace(made, notes=(*notes, *made.notes))
 
 
 def _compare_data(
@@ -194,28 +166,24 @@ def _compare_data(
     read: _Reader,
     settings: ComparisonSettings,
 ) -> DataComparison:
-    from dataclasses import replace
-
     import numpy as np
 
-    from orbiflow.density.comparing import compare_samples
-    from orbiflow.density.tables import angle_unit
-
-    names = _names(data)
-    columns = read.columns or _common_columns(data, read)
-    tables = [read.table(path, columns, read.tell) for path in data]
+    columns = read.settings.columns or _common_columns(data, read)
+    found = dict(
+        zip(_names(data), [read.rows(path, columns, read.tell) for path in data], strict=True)
+    )
     groups = None
     if read.group is not None:
-        labels = [read.labels(path, table) for path, table in zip(data, tables, strict=True)]
-        groups = dict(zip(names, labels, strict=True))
-    both = tables[0]
-    if len({table.values.shape[1] for table in tables}) == 1:
-        both = replace(both, values=np.concatenate([table.values for table in tables]))
-    return compare_samples(
-        {name: table.values for name, table in zip(names, tables, strict=True)},
+        groups = {name: np.asarray(rows.labels()) for name, rows in found.items()}
+    values = {name: rows.table.values for name, rows in found.items()}
+    both = next(iter(found.values())).table
+    if len({own.shape[1] for own in values.values()}) == 1:
+        both = replace(both, values=np.concatenate(list(values.values())))
+    return comparing.compare_samples(
+        values,
         space,
         settings,
-        unit=angle_unit(space, unit, both, read.tell),
+        unit=tables.angle_unit(space, unit, both, read.tell),
         groups=groups,
         progress=read.progress,
     )
@@ -229,9 +197,9 @@ def _columns_of_models(
 
     own = {name: tuple(extra.get("columns") or ()) for name, extra in extras.items()}
     (first, wanted), *others = own.items()
-    if read.columns is not None:
+    asked = read.settings.columns
+    if asked is not None:
         places = {name: k for k, name in enumerate(wanted)}
-        asked = read.columns
         if len(places) != len(asked):
             return dict.fromkeys(own, asked)
         # by the order of the first; another model may have the same ones in another order
@@ -260,9 +228,8 @@ def _columns_of_models(
 
 def _common_columns(data: Sequence[Path], read: _Reader) -> Columns:
     """Return the first table's columns if the second has them in another order, else None."""
-    from orbiflow.density.tables import column_names
-
-    one, other = (column_names(path, has_header=read.header) for path in data)
+    header = read.settings.header
+    one, other = (tables.column_names(path, has_header=header) for path in data)
     if one is None or other is None or one == other:
         return None
     if sorted(n.casefold() for n in one) != sorted(n.casefold() for n in other):
@@ -278,14 +245,13 @@ def _notes_on_known_rows(
     name: str, density: Density, extra: Mapping[str, Any], values: Array
 ) -> list[str]:
     """Return a note if a model was, or may have been, fitted to the rows."""
-    from orbiflow.density.comparing import RowSketch
-
     if not extra.get("fitted_rows"):
         return [
             f"{name} has no record of the rows that it was fitted to: make sure that none of these "
             "is one"
         ]
-    known, looked_up = RowSketch.from_json(extra["fitted_rows"]).known(density.space, values)
+    sketch = comparing.RowSketch.from_json(extra["fitted_rows"])
+    known, looked_up = sketch.known(density.space, values)
     if not known:
         return []
     if looked_up >= MIN_LOOKED_UP and known >= FITTED_SHARE * looked_up:
@@ -318,27 +284,11 @@ def _names(paths: Sequence[Path]) -> list[str]:
     return [f"{k}: {path}" for k, path in enumerate(full, 1)]
 
 
-def _csv(found: ModelComparison | DataComparison) -> str:
+def _csv(found: ModelComparison | DataComparison) -> bytes:
     """Return the differences of models, or the figures of data sets, a row each."""
-    import csv
-    import io
-
     document = found.to_json()
-    rows: list[Mapping[str, Any]]
-    if document["kind"] == "models":
-        rows = document["differences"]
-    else:
-        p = {
-            "figure": "p",
-            "value": document["test"]["p"],
-            "error": None,
-            "low": None,
-            "high": None,
-        }
-        divergence: dict[str, Any] = document["divergence"] or {}
-        rows = [p, *({"figure": name, **estimate} for name, estimate in divergence.items())]
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
+    rows: list[dict[str, Any]] = document.get("differences") or [
+        {"figure": "p", "value": document["test"]["p"], "error": None, "low": None, "high": None},
+        *({"figure": name, **own} for name, own in (document["divergence"] or {}).items()),
+    ]
+    return csv_bytes(list(rows[0]), [list(row.values()) for row in rows])

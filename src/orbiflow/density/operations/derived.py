@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,30 +14,14 @@ import numpy as np
 import torch
 
 from orbiflow.arrays import Array
-from orbiflow.density.inference import axes_named, given_named, log_prob_observed
+from orbiflow.density import inference, pictures
 from orbiflow.density.models import Density, density_to_bytes
 from orbiflow.density.operations.saved import unit_warning
-from orbiflow.density.pictures import (
-    MODEL,
-    REPORT,
-    TABLE,
-    PlotSettings,
-    corner_picture,
-    density_picture,
-)
+from orbiflow.density.run_folder import write_files
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.density.tables import to_csv
 from orbiflow.errors import OrbiflowError, SettingError, literal
-from orbiflow.runtime import (
-    Cancel,
-    Note,
-    Outcome,
-    Progress,
-    ResultFolder,
-    Sink,
-    Written,
-    write_atomic,
-)
+from orbiflow.runtime import Cancel, Note, Outcome, Progress, ResultFolder, Sink
 
 PICTURE = "density.png"
 
@@ -52,14 +35,11 @@ DRAWN = 20_000
 def axes_of(wanted: Sequence[str], names: Sequence[str]) -> list[int]:
     """Return the numbers, from 0, of angles given by name, or else by number from 1, as in tables.
 
-    Raises:
-        OrbiflowError: If there is no such column, or several.
-
     >>> axes_of(["psi", "1"], ["phi", "psi"])
     [1, 0]
     """
     lower = {name.casefold() for name in names}
-    return axes_named(
+    return inference.axes_named(
         [
             int(one) - 1
             if one.casefold() not in lower and one.isdecimal() and 1 <= int(one) <= len(names)
@@ -70,57 +50,22 @@ def axes_of(wanted: Sequence[str], names: Sequence[str]) -> list[int]:
     )
 
 
-@dataclass(frozen=True)
-class Condition:
-    """Some angles of a torus that are known, and those of the others that are kept.
-
-    - `names`: The names of all angles.
-    - `values`: What is known by name, in the torus' unit.
-    - `given`: The same in turns, by the angles' numbers.
-    - `kept`: The numbers of the angles to keep.
-    - `notes`: What the user should know.
-    """
-
-    names: list[str]
-    values: dict[str, float]
-    given: dict[int, float]
-    kept: list[int]
-    notes: tuple[str, ...]
-
-    @property
-    def columns(self) -> list[str]:
-        """The names of the angles to keep."""
-        return [self.names[axis] for axis in self.kept]
-
-    @property
-    def words(self) -> str:
-        """What is known, such as "psi = -45"."""
-        return ", ".join(f"{name} = {value:g}" for name, value in self.values.items())
-
-    def evidence(self, density: Density) -> float:
-        """Return the log density of what is known, relative to the uniform one."""
-        at = torch.full((1, len(self.names)), torch.nan, dtype=torch.float64)
-        at[0, list(self.given)] = torch.tensor(list(self.given.values()), dtype=torch.float64)
-        return float(log_prob_observed(density, at, measure="uniform"))
-
-
 def condition_of(
     space: Space,
     names: list[str],
     pairs: Sequence[tuple[str, float]],
     columns: Sequence[str] | None,
-) -> Condition:
-    """Return which angles are known, and which of the others are kept: all, or those of `columns`.
+    tell: Sink,
+) -> tuple[dict[str, float], dict[int, float], list[int]]:
+    """Return the known angles by name in the torus' unit and by number in turns, and which to keep.
 
-    Raises:
-        OrbiflowError: If the space is no torus, or an angle is unknown, known twice, or both known and
-            kept.
+    All others are kept, or those of `columns`. A warning is told of angles that seem to be in another
+    unit.
     """
     axes = axes_of([name for name, _ in pairs], names)
     values = [(axis, value) for axis, (_, value) in zip(axes, pairs, strict=True)]
-    given = given_named(space, values, names)
+    given = inference.given_named(space, values, names)
     known = {names[axis]: value for axis, value in values}
-    warning = unit_warning(space, np.array([list(known.values())]), list(known))
     kept = [axis for axis in range(len(names)) if axis not in given]
     if columns is not None:
         kept = axes_of(columns, names)
@@ -130,7 +75,17 @@ def condition_of(
                 literal(repr(both[0]))
                 + " is both among {columns} and {given}; name it in one of them"
             )
-    return Condition(names, known, given, kept, (f"WARNING: {warning}",) if warning else ())
+    warning = unit_warning(space, np.array([list(known.values())]), list(known))
+    if warning:
+        tell(Note(f"WARNING: {warning}"))
+    return known, given, kept
+
+
+def evidence_of(density: Density, given: dict[int, float]) -> float:
+    """Return the log density of known angles, in turns, relative to the uniform one."""
+    at = torch.full((1, density.space.dim), torch.nan, dtype=torch.float64)
+    at[0, list(given)] = torch.tensor(list(given.values()), dtype=torch.float64)
+    return float(inference.log_prob_observed(density, at, measure="uniform"))
 
 
 def write_derived(
@@ -141,20 +96,7 @@ def write_derived(
     tell: Sink,
     cancel: Cancel,
 ) -> Outcome:
-    """Write the folder of a density of fewer angles.
-
-    Args:
-        density: The density.
-        names: The names of its columns.
-        origin: What the report says of where it comes from.
-        folder: Where to write.
-        tell: Gets the progress, the files and what they are.
-        cancel: Ends it before anything is written.
-
-    Raises:
-        OutputError: If the folder cannot be written.
-        Cancelled: If it is cancelled.
-    """
+    """Write the folder of a density of fewer angles; `origin` says in the report where it is from."""
     cancel.check()
     space = density.space
     document = {
@@ -164,19 +106,15 @@ def write_derived(
         **origin,
     }
     files: dict[str, str | bytes] = {
-        MODEL: density_to_bytes(density, columns=names),
-        REPORT: json.dumps(document, allow_nan=False, indent=1),
+        pictures.MODEL: density_to_bytes(density, columns=names),
+        pictures.REPORT: json.dumps(document, allow_nan=False, indent=1),
     }
     if space.dim in ROWS:
         tell(Progress(0.5, "drawing"))
-        files[TABLE] = to_csv((*names, "density"), _table(density))
+        files[pictures.TABLE] = to_csv((*names, "density"), _table(density))
         files[PICTURE] = _picture(density, names)
     cancel.check()
-    with folder.replaced() as staged:
-        for name, content in files.items():
-            write_atomic(staged / name, content)
-    for name in files:
-        tell(Written(folder.path / name))
+    write_files(folder, files, tell)
     tell(Note(_words(density, names, folder.path)))
     summary = {"folder": str(folder.path), "files": list(files), "columns": names}
     return Outcome({**summary, "error": density.error})
@@ -192,7 +130,7 @@ def _words(density: Density, names: list[str], out: Path) -> str:
 
 
 def _table(density: Density) -> Array:
-    """Angles from minus half a turn on, and the density (N, d + 1) in their unit."""
+    """Return angles from minus half a turn on, and the density in their unit: (N, d + 1)."""
     space = density.space
     if not isinstance(space, Torus):
         raise OrbiflowError(f"a table of angles needs a torus, not the {space.name}")
@@ -204,8 +142,8 @@ def _table(density: Density) -> Array:
 
 
 def _picture(density: Density, names: list[str]) -> bytes:
-    settings = PlotSettings(names=tuple(names))
+    settings = pictures.PlotSettings(names=tuple(names))
     if density.space.dim == 2:
-        return density_picture(density, settings=settings).file()
+        return pictures.density_picture(density, settings=settings).file()
     drawn = density.sample((DRAWN,), torch.Generator().manual_seed(0))
-    return corner_picture(density, None, drawn, settings).file()
+    return pictures.corner_picture(density, None, drawn, settings).file()

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
+from orbiflow import runtime
+from orbiflow.density import pictures, regions, spaces, tables
 from orbiflow.density.pictures import PlotSettings
 from orbiflow.density.regions import RegionSettings
-from orbiflow.density.tables import TableSettings, check_table_name
+from orbiflow.density.run_folder import write_file
+from orbiflow.density.tables import TableSettings, Unit, check_table_name
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.runtime import Cancel, Note, Outcome, Progress, Sink, Written, ignore, operation
 from orbiflow.settings import DefaultText, Option, Range
 
 if TYPE_CHECKING:
@@ -25,16 +28,12 @@ PATCH_WIDTHS = (8, 9)
 
 
 def require_ending(out: Path | None, endings: tuple[str, ...]) -> None:
-    """Check that a file's name ends in one of these.
-
-    Raises:
-        SettingError: If it does not.
-    """
+    """Check that a file's name ends in one of these."""
     if out is not None and out.suffix.lower() not in endings:
         raise SettingError(f"{{out}} must end in {', '.join(endings)}, got {out.name!r}")
 
 
-@operation("density plot")
+@runtime.operation("density plot")
 def plot(
     settings: PlotSettings = PlotSettings(),
     table: TableSettings = TableSettings(),
@@ -42,9 +41,9 @@ def plot(
     model: Model,
     out: Annotated[Path, Option("-o")] = Path("plots"),
     data: Path | None = None,
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Draw a density: density, flow, samples as PNG, PDF or SVG, and surface.html, to turn in 3-D.
 
     Directions and axes are drawn on maps (density, latlon) and on the square.
@@ -61,43 +60,40 @@ def plot(
         raise SettingError(f"{{{name}}} applies only to {{data}}; give both or neither")
 
     from orbiflow.density.operations.saved import check_fits, model_at, with_columns_of
-    from orbiflow.density.pictures import is_one_file, known_names, plot_density
-    from orbiflow.density.tables import read_rows
-    from orbiflow.runtime import check_output_file, check_outside_runs
 
-    single = is_one_file(out)
+    single = pictures.is_one_file(out)
     if single and settings.format not in (None, "pdf"):
         raise SettingError(f"{{out}} ends in .pdf but {{format}} is {settings.format}")
     reads = (model, data, settings.coastlines)
     if single:
-        check_output_file(out, *reads)
+        runtime.check_output_file(out, *reads)
     else:  # pictures may stand beside their model
-        check_outside_runs(out, *reads)
+        runtime.check_outside_runs(out, *reads)
     density, extra = model_at(model)
     space = density.space
-    names = known_names(space, extra.get("columns"))
+    names = pictures.known_names(space, extra.get("columns"))
     if settings.names is None and names is not None:
         settings = settings.replace(names=names)
     points = None
     if data is not None:
         reading = with_columns_of(table, data, extra, on_event)
-        found = read_rows(data, reading, on_event).table
+        found = tables.read_rows(data, reading, on_event).table
         check_fits(data, found, space, extra, on_event)
         points = found.values
 
     def told(share: float, what: str) -> None:
         cancel.check()
-        on_event(Progress(share, what))
+        on_event(runtime.Progress(share, what))
 
-    plotted = plot_density(density, out, settings, data=points, told=told)
+    plotted = pictures.plot_density(density, out, settings, data=points, told=told)
     captions = plotted.captions if single or settings.sheet.printed else ()
     for path in plotted.files:
-        on_event(Written(path))
+        on_event(runtime.Written(path))
     for note in (*(f"caption: {caption}" for caption in captions), *plotted.notes):
-        on_event(Note(note))
-    on_event(Note(_where_pictures_are(out, single, space)))
+        on_event(runtime.Note(note))
+    on_event(runtime.Note(_where_pictures_are(out, single, space)))
     folder = out.parent if single else out
-    return Outcome({"folder": str(folder), "files": [path.name for path in plotted.files]})
+    return runtime.Outcome({"folder": str(folder), "files": [path.name for path in plotted.files]})
 
 
 def _where_pictures_are(out: Path, single: bool, space: Space) -> str:
@@ -112,15 +108,15 @@ def _where_pictures_are(out: Path, single: bool, space: Space) -> str:
     return f"written to {out}; open {out / 'surface.html'} in a browser"
 
 
-@operation("density region")
+@runtime.operation("density region")
 def region(
     settings: RegionSettings = RegionSettings(),
     *,
     model: Model,
     out: Annotated[Path, Option("-o")] = Path("regions.json"),
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Find the smallest regions that hold a mass: threshold, size, and boundary as closed polygons.
 
     On a torus of more or fewer than two angles there are threshold and size alone.
@@ -131,64 +127,45 @@ def region(
     """
     require_ending(out, (".geojson", ".json", ".csv"))
 
-    import json
-
     from orbiflow.density.operations.saved import model_at
-    from orbiflow.density.regions import (
-        DensityLevels,
-        outlines,
-        outlines_csv,
-        regions_document,
-        samples_for,
-        to_geojson,
-    )
-    from orbiflow.runtime import check_output_file, one_thread, write_atomic
 
-    check_output_file(out, model)
+    runtime.check_output_file(out, model)
     density, _ = model_at(model)
     kind, space = out.suffix.lower(), density.space
     _require_format(out, kind, space)
-    samples = samples_for(settings.masses, settings.samples)
-    on_event(Progress(0.0, f"drawing {samples} samples"))
+    samples = regions.samples_for(settings.masses, settings.samples)
+    on_event(runtime.Progress(0.0, f"drawing {samples} samples"))
     cancel.check()
-    with one_thread():
-        levels = DensityLevels(density, samples=samples, seed=settings.seed)
-        regions = [levels.highest(mass) for mass in settings.masses]
-        regions += [levels.above(level) for level in settings.level or ()]
+    with runtime.one_thread():
+        levels = regions.DensityLevels(density, samples=samples, seed=settings.seed)
+        found = [levels.highest(mass) for mass in settings.masses]
+        found += [levels.above(level) for level in settings.level or ()]
         reached = 0.1
 
         def told(share: float, what: str) -> None:
             nonlocal reached
             cancel.check()
             reached = max(reached, 0.1 + 0.9 * share)
-            on_event(Progress(reached, what))
+            on_event(runtime.Progress(reached, what))
 
         drawn: list[Outline] = []
         if space.dim == 2:
             budget, seed = settings.budget, settings.seed
-            drawn = outlines(levels, regions, budget=budget, seed=seed, told=told)
+            drawn = regions.outlines(levels, found, budget=budget, seed=seed, told=told)
     if kind == ".geojson":
-        text = json.dumps(to_geojson(drawn), allow_nan=False)
+        text = json.dumps(regions.to_geojson(drawn), allow_nan=False)
     elif kind == ".csv":
-        text = outlines_csv(drawn)
+        text = regions.outlines_csv(drawn)
     else:
-        document = regions_document(regions, drawn, samples=samples, seed=settings.seed)
+        document = regions.regions_document(found, drawn, samples=samples, seed=settings.seed)
         text = json.dumps(document, allow_nan=False)
     cancel.check()
-    write_atomic(out, text)
-    on_event(Written(out))
-    for note in _region_notes(regions, drawn):
-        on_event(Note(note))
-    on_event(Note(f"written to {out}"))
-    return Outcome({"file": str(out), "regions": [one.to_json() for one in regions]})
+    write_file(out, text, on_event, *_region_notes(found, drawn), f"written to {out}")
+    return runtime.Outcome({"file": str(out), "regions": [one.to_json() for one in found]})
 
 
 def _require_format(out: Path, kind: str, space: Space) -> None:
-    """Check that regions of a space can be written in a format.
-
-    Raises:
-        OrbiflowError: If they cannot.
-    """
+    """Check that regions of a space can be written in a format."""
     if kind == ".geojson" and not space.is_round:
         raise OrbiflowError(
             f"{out}: GeoJSON is for places on a globe, not for the angles of a {space.name}: write "
@@ -201,9 +178,9 @@ def _require_format(out: Path, kind: str, space: Space) -> None:
         )
 
 
-def _region_notes(regions: list[DensityRegion], drawn: list[Outline]) -> list[str]:
+def _region_notes(found: list[DensityRegion], drawn: list[Outline]) -> list[str]:
     """Return what the user should know of regions, whose outlines may not have been drawn."""
-    space = regions[0].density.space
+    space = found[0].density.space
     notes: list[str] = []
     if not drawn:
         notes.append(
@@ -211,15 +188,13 @@ def _region_notes(regions: list[DensityRegion], drawn: list[Outline]) -> list[st
             "thresholds and sizes alone; `orbiflow density score --region` says of each row how far "
             "inside it is"
         )
-    for k, one in enumerate(regions):
+    for k, one in enumerate(found):
         notes.append(_described(one, drawn[k] if drawn else None))
         notes += drawn[k].notes if drawn else ()
     return notes
 
 
 def _described(found: DensityRegion, outline: Outline | None) -> str:
-    from orbiflow.density.regions import size_unit
-
     size, fraction, polygons = found.size, found.fraction, ""
     if outline is not None:
         size, fraction = outline.size, outline.fraction
@@ -230,7 +205,8 @@ def _described(found: DensityRegion, outline: Outline | None) -> str:
     return (
         f"mass {_with_error(found.held, found.error)}: log density of at least "
         f"{found.log_prob:.4f} ({found.log_prob_low:.4f} to {found.log_prob_high:.4f}), "
-        f"{size:.6g} {size_unit(found.density.space)}, {_percentage(fraction)} of the space{polygons}"
+        f"{size:.6g} {regions.size_unit(found.density.space)}, {_percentage(fraction)} of the space"
+        f"{polygons}"
     )
 
 
@@ -260,17 +236,17 @@ def _counted(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
-@operation("density patches")
+@runtime.operation("density patches")
 def patches(
     data: Path,
     table: TableSettings = TableSettings(),
     *,
     out: Annotated[Path, Option("-o")] = Path("angles.csv"),
-    unit: Literal["radians", "degrees", "turns"] = "radians",
+    unit: Unit = "radians",
     farthest: Annotated[float | None, Range(0), DefaultText("all are kept")] = None,
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Turn image patches into theta,phi on the Klein bottle, for `fit --space klein-bottle`.
 
     Distances are between patches of mean 0 and contrast 1.
@@ -283,22 +259,18 @@ def patches(
     """
     import numpy as np
 
-    from orbiflow.density.spaces import to_klein
-    from orbiflow.density.tables import listing, read_rows, to_csv
-    from orbiflow.runtime import check_output_file, one_thread, write_atomic
-
     check_table_name(out)
-    check_output_file(out, data)
-    found = read_rows(data, table, on_event).table
+    runtime.check_output_file(out, data)
+    found = tables.read_rows(data, table, on_event).table
     width = len(found.columns)
     if width not in PATCH_WIDTHS:
         raise OrbiflowError(
             f"{data}: a patch has 9 pixel values or 8 DCT coordinates, and there "
             f"{'is' if width == 1 else 'are'} {_counted(width, 'column')} "
-            f"({listing(found.columns)}): choose with --columns"
+            f"({tables.listing(found.columns)}): choose with --columns"
         )
-    with one_thread():
-        angles, distances = to_klein(found.values, unit=unit)
+    with runtime.one_thread():
+        angles, distances = spaces.to_klein(found.values, unit=unit)
     near = distances <= (np.inf if farthest is None else farthest)
     if not near.any():
         raise OrbiflowError(
@@ -309,14 +281,9 @@ def patches(
         )
     kept = np.column_stack([angles, distances])[near]
     cancel.check()
-    write_atomic(out, to_csv(("theta", "phi", "distance"), kept))
-    on_event(Written(out))
     left_out = int((~near).sum())
     left = f", {left_out} farther ones left out" if left_out else ""
-    on_event(
-        Note(
-            f"{len(kept)} patches, half of them within {np.median(kept[:, 2]):.3f} of the Klein "
-            f"bottle{left}; written to {out}"
-        )
-    )
-    return Outcome({"file": str(out), "rows": len(kept), "left_out": left_out})
+    half = f"half of them within {np.median(kept[:, 2]):.3f} of the Klein bottle{left}"
+    content = tables.to_csv(("theta", "phi", "distance"), kept)
+    write_file(out, content, on_event, f"{len(kept)} patches, {half}; written to {out}")
+    return runtime.Outcome({"file": str(out), "rows": len(kept), "left_out": left_out})

@@ -26,11 +26,7 @@ DIRECTIONS = (2, 3)
 
 
 def model_at(path: Path) -> tuple[Density, dict[str, Any]]:
-    """Return the density in a file or in the folder of a fit, and what was saved with it.
-
-    Raises:
-        InputFileError: If there is none, or it cannot be read.
-    """
+    """Return the density in a file or in the folder of a fit, and what was saved with it."""
     file = path / MODEL if path.is_dir() else path
     if not file.exists():
         missing = f"there is no {MODEL} in it" if path.is_dir() else "there is no such folder"
@@ -53,15 +49,6 @@ def with_columns_of(
 
     A file that names its columns must have those of the fit; of one without names all are taken, which
     is told.
-
-    Args:
-        settings: How the table is read.
-        data: The table.
-        extra: What was saved with the model.
-        tell: Gets the note.
-
-    Raises:
-        SettingError: If the file names other columns.
     """
     names: tuple[str, ...] = tuple(extra.get("columns") or ())
     unnamed = all(re.fullmatch(r"column\d+", name) for name in names)
@@ -86,18 +73,7 @@ def with_columns_of(
 
 
 def check_fits(data: Path, table: Table, space: Space, extra: dict[str, Any], tell: Sink) -> None:
-    """Check that a table can be of a model, and warn of angles that seem to be in another unit.
-
-    Args:
-        data: The file, for messages.
-        table: Its columns.
-        space: The model's.
-        extra: What was saved with the model.
-        tell: Gets the warning.
-
-    Raises:
-        SettingError: If there is another number of columns.
-    """
+    """Check that a table can be of a model, and warn of angles that seem to be in another unit."""
     wanted: list[str] = list(extra.get("columns") or space.columns)
     # directions are known by their number of columns
     widths = DIRECTIONS if space.is_round else (len(space.columns),)

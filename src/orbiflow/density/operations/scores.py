@@ -34,12 +34,10 @@ SCORED = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """What is known of the rows.
+    """Columns (N,) to add to a table, log densities first, and what is known of them.
 
-    - `columns`: Values (N,) by the name of the column to add; the first are log densities.
     - `mean`: The mean log density in nats, weighted, of the rows that lack nothing.
     - `over`: Which rows these are, in words.
-    - `notes`: What the user should know.
     """
 
     columns: dict[str, Array]
@@ -57,20 +55,7 @@ def score_rows(
     *,
     may_lack: bool = False,
 ) -> Scores:
-    """Return log densities of rows, and what else the settings ask for.
-
-    Args:
-        density: The density.
-        rows: Data in its own columns.
-        settings: What to find.
-        tell: Gets the progress.
-        cancel: Ends it between two blocks of rows.
-        may_lack: Whether rows may lack angles of a torus, and are scored by those that they have.
-
-    Raises:
-        OrbiflowError: If the data are not of the space.
-        Cancelled: If it is cancelled.
-    """
+    """Return log densities of rows, and what else the settings ask for."""
     space, values = density.space, rows.table.values
     points = chart_of_observed(space, values) if may_lack else space.to_chart(values)
     known = ~points.isnan()
@@ -90,7 +75,7 @@ def score_rows(
     if not whole.all():
         notes.append(_missing_note(known, name))
     over = f"{len(whole)} rows" if whole.all() else f"the {whole.sum()} whole rows"
-    return Scores(columns, _mean(columns[name], rows.weights, whole), over, tuple(notes))
+    return Scores(columns, mean_of_whole(columns[name], rows.weights, whole), over, tuple(notes))
 
 
 def _log_densities(
@@ -125,7 +110,7 @@ def _log_densities(
 
 
 def _gradients(density: Density, rows: TableRows, tell: Sink, cancel: Cancel) -> dict[str, Array]:
-    """The gradient of the log density in the data's own coordinates, a column (N,) for each."""
+    """Return the gradient of the log density, a column (N,) for each of the data's coordinates."""
     values = rows.table.values
     found: list[NDArray[np.float64]] = []
     for start in range(0, len(values), BLOCK_GRADIENT):
@@ -137,15 +122,15 @@ def _gradients(density: Density, rows: TableRows, tell: Sink, cancel: Cancel) ->
     return dict(zip(names, np.concatenate(found).T, strict=True))
 
 
-def _mean(scores: Array, weights: Array | None, whole: NDArray[np.bool_]) -> float:
-    """Of the whole rows: densities of fewer angles are in another unit."""
+def mean_of_whole(scores: Array, weights: Array | None, whole: NDArray[np.bool_]) -> float:
+    """Return the mean of the rows that lack nothing: densities of fewer angles are in another unit."""
     chosen = whole if whole.any() else np.ones_like(whole)
     rows = weighed(torch.tensor(scores[chosen, None]), None if weights is None else weights[chosen])
     return mean_of(rows.points[:, 0], rows.weights)
 
 
 def _region_note(samples: int) -> str:
-    """How far `hdr` can be trusted."""
+    """Return how far `hdr` can be trusted, in words."""
     low, high = resolvable_masses(samples)
     return (
         "hdr: the mass of the smallest highest-density region that holds the row, by "
@@ -155,7 +140,7 @@ def _region_note(samples: int) -> str:
 
 
 def _missing_note(known: Tensor, name: str) -> str:
-    """How many rows lack angles, and what their log density is."""
+    """Return in words how many rows lack angles, and what their log density is."""
     lacking, empty = int((~known.all(dim=1)).sum()), int((~known.any(dim=1)).sum())
     nothing = f"; {empty} of them have none, hence 0" if empty else ""
     return (

@@ -6,14 +6,15 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal
 
+from orbiflow import runtime
+from orbiflow.density import inference, tables
+from orbiflow.density.run_folder import write_file, written_files
 from orbiflow.density.tables import RowSettings, check_table_name
 from orbiflow.errors import literal
-from orbiflow.runtime import Cancel, Note, Outcome, Progress, Sink, Written, ignore, operation
 from orbiflow.settings import DefaultText, Needs, NotWith, Option, Range, SettingError, Settings
 
 Model = Annotated[Path, Option("--model", "-m")]
 Out = Annotated[Path, Option("--out", "-o")]
-RegionSamples = Annotated[int | None, Range(1000, 10_000_000)]
 
 
 class ScoreSettings(Settings, group="Scores"):
@@ -26,7 +27,9 @@ class ScoreSettings(Settings, group="Scores"):
     region: bool = False
     """Add a column hdr: the mass of the smallest region of highest density that holds the row."""
 
-    samples: Annotated[RegionSamples, Needs("region"), DefaultText("20000")] = None
+    samples: Annotated[
+        int | None, Range(1000, 10_000_000), Needs("region"), DefaultText("20000")
+    ] = None
     """Samples of the density from which hdr is known; 20000 tell masses up to 0.9995."""
 
     gradient: bool = False
@@ -48,7 +51,7 @@ class ScoreSettings(Settings, group="Scores"):
                 )
 
 
-@operation("density score")
+@runtime.operation("density score")
 def score(
     data: Path,
     settings: ScoreSettings = ScoreSettings(),
@@ -56,9 +59,9 @@ def score(
     *,
     model: Model,
     out: Out = Path("scores.csv"),
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Add a column log_prob, in nats, to a table.
 
     Args:
@@ -73,26 +76,18 @@ def score(
 
     from orbiflow.density.operations.saved import check_fits, model_at, with_columns_of
     from orbiflow.density.operations.scores import score_rows
-    from orbiflow.density.tables import append_columns, read_rows
-    from orbiflow.runtime import check_output_file, one_thread, write_atomic
 
-    check_output_file(out, data, model)
-    with one_thread():
+    runtime.check_output_file(out, data, model)
+    with runtime.one_thread():
         density, extra = model_at(model)
-        rows = read_rows(data, with_columns_of(reading, data, extra, on_event), on_event)
+        rows = tables.read_rows(data, with_columns_of(reading, data, extra, on_event), on_event)
         check_fits(data, rows.table, density.space, extra, on_event)
         found = score_rows(density, rows, settings, on_event, cancel, may_lack=may_lack)
-    write_atomic(out, append_columns(rows.table, data, found.columns))
-    on_event(Written(out))
-    for note in found.notes:
-        on_event(Note(note))
     weighted = "" if reading.weights is None else f", weighted by {reading.weights}"
-    on_event(
-        Note(
-            f"mean log density {found.mean:.4f} nats over {found.over}{weighted}; written to {out}"
-        )
-    )
-    return Outcome({"file": str(out), "rows": len(rows.table.values), "mean": found.mean})
+    words = f"mean log density {found.mean:.4f} nats over {found.over}{weighted}; written to {out}"
+    table = tables.append_columns(rows.table, data, found.columns)
+    write_file(out, table, on_event, *found.notes, words)
+    return runtime.Outcome({"file": str(out), "rows": len(rows.table.values), "mean": found.mean})
 
 
 class SampleSettings(Settings, group="Samples"):
@@ -105,15 +100,15 @@ class SampleSettings(Settings, group="Samples"):
     """Seed of the random numbers: the same seed on the same machine gives the same samples."""
 
 
-@operation("density sample")
+@runtime.operation("density sample")
 def sample(
     settings: SampleSettings = SampleSettings(),
     *,
     model: Model,
     out: Out = Path("samples.csv"),
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Draw samples in the units of the data.
 
     Args:
@@ -125,31 +120,28 @@ def sample(
     import torch
 
     from orbiflow.density.operations.saved import model_at, names_of
-    from orbiflow.density.tables import to_csv
-    from orbiflow.runtime import check_output_file, one_thread, write_atomic
 
-    check_output_file(out, model)
-    with one_thread():
+    runtime.check_output_file(out, model)
+    with runtime.one_thread():
         density, extra = model_at(model)
         generator = torch.Generator().manual_seed(settings.seed)
         data = density.space.from_chart(density.sample((settings.count,), generator))
     names = names_of(density, extra)
     cancel.check()
-    write_atomic(out, to_csv(names, data))
-    on_event(Written(out))
-    on_event(Note(f"{settings.count} samples written to {out}"))
-    return Outcome({"file": str(out), "rows": settings.count})
+    words = f"{settings.count} samples written to {out}"
+    write_file(out, tables.to_csv(names, data), on_event, words)
+    return runtime.Outcome({"file": str(out), "rows": settings.count})
 
 
-@operation("density marginal")
+@runtime.operation("density marginal")
 def marginal(
     *,
     model: Model,
     columns: tuple[str, ...],
     out: Out = Path("marginal"),
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Find the density of some of a torus' angles, whatever the others are.
 
     Writes a model that score, sample and plot read; of one or two angles density.csv and density.png,
@@ -163,35 +155,32 @@ def marginal(
     if not columns:
         raise SettingError("{columns} names no column; give names or numbers, as in phi,psi")
 
-    from orbiflow.density.inference import marginal as marginal_of
     from orbiflow.density.operations.derived import axes_of, write_derived
     from orbiflow.density.operations.saved import model_at, names_of
-    from orbiflow.density.run_folder import written_files
-    from orbiflow.runtime import ResultFolder, check_output_folder, one_thread
 
-    check_output_folder(out, model, what="model")
-    with one_thread():
+    runtime.check_output_folder(out, model, what="model")
+    with runtime.one_thread():
         density, extra = model_at(model)
         names = names_of(density, extra)
         axes = axes_of(columns, names)
-        folder = ResultFolder(out, written_files)
-        on_event(Progress(0.0, "integrating"))
-        found = marginal_of(density, axes)
+        folder = runtime.ResultFolder(out, written_files)
+        on_event(runtime.Progress(0.0, "integrating"))
+        found = inference.marginal(density, axes)
         kept = [names[axis] for axis in axes]
         origin = {"marginal": kept, "model": str(model)}
         return write_derived(found, kept, origin, folder, on_event, cancel)
 
 
-@operation("density conditional")
+@runtime.operation("density conditional")
 def conditional(
     *,
     model: Model,
     given: tuple[str, ...],
     columns: Annotated[tuple[str, ...] | None, DefaultText("all")] = None,
     out: Out = Path("conditional"),
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Find the density of a torus' other angles where some are known.
 
     Writes a model that score, sample and plot read; of one or two angles density.csv and density.png,
@@ -207,40 +196,32 @@ def conditional(
         raise SettingError("{given} says nothing; give what is known, as in psi=-45")
     pairs = [_angle(text) for text in given]
 
-    from orbiflow.density.inference import conditional as conditional_of
-    from orbiflow.density.operations.derived import condition_of, write_derived
+    from orbiflow.density.operations.derived import condition_of, evidence_of, write_derived
     from orbiflow.density.operations.saved import model_at, names_of
-    from orbiflow.density.run_folder import written_files
-    from orbiflow.runtime import ResultFolder, check_output_folder, one_thread
 
-    check_output_folder(out, model, what="model")
-    with one_thread():
+    runtime.check_output_folder(out, model, what="model")
+    with runtime.one_thread():
         density, extra = model_at(model)
         names = names_of(density, extra)
-        condition = condition_of(density.space, names, pairs, columns)
-        for note in condition.notes:
-            on_event(Note(note))
-        folder = ResultFolder(out, written_files)
-        on_event(Progress(0.0, "integrating"))
-        found = conditional_of(density, condition.given, condition.kept)
-        evidence = condition.evidence(density)
+        known, turns, kept = condition_of(density.space, names, pairs, columns, on_event)
+        folder = runtime.ResultFolder(out, written_files)
+        on_event(runtime.Progress(0.0, "integrating"))
+        found = inference.conditional(density, turns, kept)
+        evidence = evidence_of(density, turns)
         rare = "; few data lie there, or none" if evidence < -3 else ""
-        on_event(
-            Note(
-                f"the density at {condition.words} is {math.exp(evidence):.3g} times that of even "
-                f"angles{rare}"
-            )
-        )
+        words = ", ".join(f"{name} = {value:g}" for name, value in known.items())
+        ratio = f"{math.exp(evidence):.3g} times that of even angles{rare}"
+        on_event(runtime.Note(f"the density at {words} is {ratio}"))
         origin = {
-            "given": condition.values,
+            "given": known,
             "log_density_of_given_over_uniform": evidence,
             "model": str(model),
         }
-        return write_derived(found, condition.columns, origin, folder, on_event, cancel)
+        return write_derived(found, [names[k] for k in kept], origin, folder, on_event, cancel)
 
 
 def _angle(text: str) -> tuple[str, float]:
-    """The name and the value of an angle that is known."""
+    """Return the name and the value of an angle that is known."""
     name, sign, value = text.rpartition("=")
     try:
         if not sign or not name.strip():

@@ -1,5 +1,6 @@
 from .axes import space_title as space_title
 from .coastlines import read_coastlines as read_coastlines
+from .colours import density_on_grid as density_on_grid
 from .corner import corner_picture as corner_picture
 from .flow import draw_cells as draw_cells
 from .flow import flow_picture as flow_picture
@@ -24,4 +25,3 @@ from .surfaces import edge_pairs as edge_pairs
 from .surfaces import immersion as immersion
 from .surfaces import viewpoint as viewpoint
 from .thumbnail import density_thumbnail as density_thumbnail
-from .values import density_on_grid as density_on_grid

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -38,22 +38,14 @@ class View(NamedTuple):
         return points + tensor(self.low, dtype=points.dtype)
 
     def places(self, points: Tensor) -> Array:
-        """Return where chart points (N, d) lie in the window, in [0, 1]^d.
-
-        Raises:
-            OrbiflowError: If the points have another shape.
-        """
+        """Return where chart points (N, d) lie in the window, in [0, 1]^d."""
         moved = chart_points(self.space, points) - tensor(self.low)
         # a translation commutes with the torus' group, and is 0 elsewhere
         return self.space.project(moved).numpy()
 
 
 def chart_points(space: Space, points: Tensor) -> Tensor:
-    """Return chart points (N, d) as float64.
-
-    Raises:
-        OrbiflowError: If they have another shape.
-    """
+    """Return chart points (N, d) as float64."""
     if points.ndim != 2 or points.shape[1] != space.dim:
         raise OrbiflowError(f"expected chart points (N, {space.dim}), got {tuple(points.shape)}")
     return points.detach().double().cpu()
@@ -62,18 +54,7 @@ def chart_points(space: Space, points: Tensor) -> Tensor:
 def view_of(
     space: Space, names: Sequence[str] | None = None, center: Sequence[float] | None = None
 ) -> View:
-    """Return the window of a space's flat pictures.
-
-    Args:
-        space: The space.
-        names: Names of the data's columns. Default: `space.columns`.
-        center: Middle of the torus' window, an angle for each column in the space's unit. Default:
-            0, so that angles run from minus half a turn to half a turn.
-
-    Raises:
-        OrbiflowError: If there is another number of names or angles, an angle is not finite, or a
-            centre is given on another space, whose window is the canonical square.
-    """
+    """Return the window of a space's flat pictures."""
     names = tuple(space.columns if names is None else names)
     if len(names) != len(space.columns):
         raise OrbiflowError(f"expected {len(space.columns)} names of columns, got {list(names)}")
@@ -97,11 +78,7 @@ def view_of(
 
 
 def require_plane(space: Space) -> None:
-    """Check that a space has two dimensions.
-
-    Raises:
-        OrbiflowError: If it has not.
-    """
+    """Check that a space has two dimensions."""
     if space.dim != 2:
         raise OrbiflowError(f"a picture needs two dimensions, this {space.name} has {space.dim}")
 
@@ -151,33 +128,17 @@ def legible(at: list[float], texts: list[str], side: float, sheet: Sheet) -> lis
 
 
 def angle_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
-    """Return the label of an axis, and the places and texts of its ticks.
-
-    The view is of a space whose name is in `ANGLE_AXES`.
-    """
-    return ANGLE_AXES[view.space.name](view, axis)
-
-
-def _torus_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
-    low = float(view.low[axis])
-    quarters = range(math.ceil(4 * low - 1e-9), math.floor(4 * low + 4 + 1e-9) + 1)
-    places = [k / 4 - low for k in quarters]
-    texts = [angle_text(k / 4, view.space.unit) for k in quarters]
-    return axis_label(view, axis), places, texts
-
-
-def _klein_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
-    # the first column, theta, goes up: half a turn; phi starts a quarter before 0
-    turns = [k / 4 - 0.25 for k in range(5)] if axis == 0 else [k / 8 for k in range(5)]
-    texts = [angle_text(t, view.space.unit) for t in turns]
-    return axis_label(view, 1 - axis), [k / 4 for k in range(5)], texts
-
-
-ANGLE_AXES: dict[str, Callable[[View, int], tuple[str, list[float], list[str]]]] = {
-    "torus": _torus_axis,
-    "klein-bottle": _klein_axis,
-}
-"""The spaces whose chart is a plain rescaling of angles, by name."""
+    """Return the label of an axis of a torus or Klein bottle, and the places and texts of its ticks."""
+    if view.space.is_torus:
+        low = float(view.low[axis])
+        quarters = range(math.ceil(4 * low - 1e-9), math.floor(4 * low + 4 + 1e-9) + 1)
+        places, turns = [k / 4 - low for k in quarters], [k / 4 for k in quarters]
+        label = axis_label(view, axis)
+    else:  # the first column, theta, goes up: half a turn; phi starts a quarter before 0
+        places = [k / 4 for k in range(5)]
+        turns = [k / 4 - 0.25 for k in range(5)] if axis == 0 else [k / 8 for k in range(5)]
+        label = axis_label(view, 1 - axis)
+    return label, places, [angle_text(t, view.space.unit) for t in turns]
 
 
 def angle_text(turns: float, unit: str | None) -> str:

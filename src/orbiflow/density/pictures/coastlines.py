@@ -55,7 +55,12 @@ def read_coastlines(path: Path) -> list[Array]:
             start = file.read(4096)
     except OSError as error:
         raise InputFileError(f"cannot read {path}: {error.strerror or error}") from error
-    _refuse_binary(path, start)
+    known = {b"\x00\x00\x27\x0a": "a shapefile", b"PK\x03\x04": "a zip archive"}
+    for magic, what in known.items():
+        if start.startswith(magic):
+            raise InputFileError(
+                f"{path} is {what}: make GeoJSON of it, with ogr2ogr -f GeoJSON lines.geojson FILE.shp"
+            )
     text = start.removeprefix(b"\xef\xbb\xbf").lstrip()
     lines = _geojson(path) if text.startswith((b"{", b"[")) else _table(path)
     if not lines:
@@ -65,21 +70,10 @@ def read_coastlines(path: Path) -> list[Array]:
     return lines
 
 
-def _refuse_binary(path: Path, start: bytes) -> None:
-    known = {b"\x00\x00\x27\x0a": "a shapefile", b"PK\x03\x04": "a zip archive"}
-    for magic, what in known.items():
-        if start.startswith(magic):
-            raise InputFileError(
-                f"{path} is {what}: make GeoJSON of it, with ogr2ogr -f GeoJSON lines.geojson FILE.shp"
-            )
-
-
 def _table(path: Path) -> list[Array]:
     values = read_table(path, columns=None, width=2).values
     parts = np.split(values, np.flatnonzero(abs(values[:, 0]) > 90))
-    found = [part[abs(part[:, 0]) <= 90] for part in parts]
-    for part in found:
-        _check_degrees(path, part)
+    found = [_checked(path, part[abs(part[:, 0]) <= 90]) for part in parts]
     return [part for part in found if len(part) > 1]
 
 
@@ -147,12 +141,13 @@ def _positions(path: Path, kind: str, positions: list[Any]) -> Array:
         raise InputFileError(
             f"{path}: a {kind} has a position that is not longitude, latitude"
         ) from error
-    _check_degrees(path, line)
+    line = _checked(path, line)
     line[:, 0] = np.clip(line[:, 0], -90, 90)
     return line
 
 
-def _check_degrees(path: Path, line: Array) -> None:
+def _checked(path: Path, line: Array) -> Array:
+    """Return a line (M, 2) whose latitudes and longitudes are degrees."""
     wrong = ~((abs(line[:, 0]) <= 90 + _ROUNDING) & (abs(line[:, 1]) <= 360))  # NaN, too
     if wrong.any():
         lat, lon = line[wrong.argmax()]
@@ -160,6 +155,7 @@ def _check_degrees(path: Path, line: Array) -> None:
             f"{path}: latitude {lat:g}, longitude {lon:g} is beyond the globe: give degrees (WGS 84), "
             "in GeoJSON the longitude first"
         )
+    return line
 
 
 def _without_cuts(ring: Array) -> list[Array]:

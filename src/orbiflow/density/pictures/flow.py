@@ -15,8 +15,7 @@ from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, FlowDensity
 from orbiflow.density.pictures.axes import INK, require_plane, space_title, view_of
-from orbiflow.density.pictures.frame import Room, colour_bar, make_frame, printed_room
-from orbiflow.density.pictures.ground import COLOURS
+from orbiflow.density.pictures.ground import COLOURS, Room, colour_bar, make_frame, printed_room
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.drawing import Picture, Sheet, draw_flow, draw_magnitude
 from orbiflow.errors import OrbiflowError
@@ -59,10 +58,8 @@ def flow_picture(
     view = view_of(space, center=None if space.is_round else settings.center)
     low, high = 0.5 - cells / 2, 0.5 + cells / 2
     window = (low, low, high, high)
-    room = SCREEN
-    if sheet.printed:
-        room = printed_room(sheet, 0.4, 0.6, 0.6, SPEED, ("0.00",))
-    frame = make_frame(sheet, room)
+    printed = printed_room(sheet, 0.4, 0.6, 0.6, SPEED, ("0.00",))
+    frame = make_frame(sheet, printed if sheet.printed else SCREEN)
     axes = frame.axes
     axes.set_xlim(low, high)
     axes.set_ylim(low, high)  # `draw_magnitude` keeps these
@@ -75,26 +72,17 @@ def flow_picture(
     draw_cells(axes, space.group, window, pen=sheet.pen)
     colour_bar(axes.images[0], frame, sheet, SPEED)
     axes.set_axis_off()
-    title, signs = _title(density), "canonical square outlined, its images thin"
+    weight, flow = flow_of(density)
+    part = "" if flow is density else f", {100 * weight:.0f} % of the density"
+    title = f"Flow{part} on the {space_title(space)}"
+    signs = "canonical square outlined, its images thin"
     if not sheet.printed:
         frame.figure.text(0.03, 0.025, f"{title}: {signs}", fontsize=sheet.text, color=INK)
     return Picture(frame.figure, sheet, title, f"The {signs}.")
 
 
-def _title(density: Density) -> str:
-    name = f"the {space_title(density.space)}"
-    weight, flow = flow_of(density)
-    if flow is density:
-        return f"Flow on {name}"
-    return f"Flow, {100 * weight:.0f} % of the density on {name}"
-
-
 def flow_of(density: Density) -> tuple[float, FlowDensity]:
-    """Return the weight and the density of the flow to draw.
-
-    Raises:
-        OrbiflowError: If the density has none.
-    """
+    """Return the weight and the density of the flow to draw."""
     part = density.flow_part
     if part is None:
         raise OrbiflowError("the density has no flow: draw another picture of it")

@@ -29,16 +29,7 @@ def draw_map_lines(
     coastlines: Sequence[Array] = (),
     light: bool = False,
 ) -> None:
-    """Draw a map's outline, graticule, labels and coastlines on axes without a frame.
-
-    Args:
-        axes: The axes, which will show the whole map undistorted.
-        projection: The map.
-        sheet: The sheet of the figure.
-        side: Width of the axes in inches.
-        coastlines: Lines (M, 2) of latitude and longitude.
-        light: Whether the ground is light.
-    """
+    """Draw a map's outline, graticule, labels and coastlines (M, 2) on axes without a frame."""
     ring = projection.outline()
     axes.set_axis_off()
     axes.set_xticks([])
@@ -54,8 +45,21 @@ def draw_map_lines(
     for each in (*map(parallel, lats), *map(meridian, lons)):
         for piece in projection.pieces(each):
             axes.plot(*piece.T, **style)
-    _draw_coastlines(axes, projection, sheet, side, coastlines, light)
     labels = _Labels(axes, projection, sheet, side, light)
+    if len(coastlines):
+        from matplotlib.collections import LineCollection
+        from shapely import LineString
+
+        whole = [np.asarray(line, dtype=float) for line in coastlines]
+        pieces = [piece for line in whole for piece in projection.pieces(line)]
+        # below the resolution of any printer; islands of a point stay as dots
+        apart = _TOLERANCE / labels.size
+        fine = [np.array(LineString(piece).simplify(apart).coords) for piece in pieces]
+        drawn = LineCollection(
+            fine, colors="#85857f" if light else COAST, zorder=4, capstyle="round",
+            linewidths=sheet.pen(0.7 if light else 0.9, 0.25),
+        )  # fmt: skip
+        axes.add_collection(drawn, autolim=False)
     if isinstance(projection, WorldMap):
         labels.along_the_sides(lats, lons)
     else:
@@ -64,11 +68,9 @@ def draw_map_lines(
 
 def graticule(projection: Projection) -> tuple[list[float], list[float]]:
     """Return the latitudes and longitudes, in degrees, of the lines that are drawn."""
-    step = 30.0
+    step = along = 30.0
     if isinstance(projection, Azimuthal):
         step = next(s for s in (1.0, 2.0, 5.0, 10.0, 15.0, 30.0) if s >= projection.radius / 3.5)
-    along = step
-    if isinstance(projection, Azimuthal):
         # meridians draw together towards the poles
         nearest = min(abs(projection.center[0]), 89.0)
         along = min(30.0, step / max(np.cos(np.radians(nearest)), 0.05))
@@ -89,35 +91,6 @@ def meridian(lon: float) -> Array:
     return np.stack([lat, np.full_like(lat, lon)], axis=-1)
 
 
-def _draw_coastlines(
-    axes: Axes,
-    projection: Projection,
-    sheet: Sheet,
-    side: float,
-    coastlines: Sequence[Array],
-    light: bool,
-) -> None:
-    from matplotlib.collections import LineCollection
-    from shapely import LineString
-
-    if not len(coastlines):
-        return
-    unit = np.ptp(projection.outline()[:, 0]) / (72 * side)
-    pieces = [p for line in coastlines for p in projection.pieces(np.asarray(line, dtype=float))]
-    # below the resolution of any printer; islands of a point stay as dots
-    fine = [np.array(LineString(p).simplify(_TOLERANCE * unit).coords) for p in pieces]
-    axes.add_collection(
-        LineCollection(
-            fine,
-            colors="#85857f" if light else COAST,
-            linewidths=sheet.pen(0.7 if light else 0.9, 0.25),
-            zorder=4,
-            capstyle="round",
-        ),
-        autolim=False,
-    )
-
-
 class _Labels:
     """The degrees beside the lines of a graticule, none of which touch."""
 
@@ -131,11 +104,9 @@ class _Labels:
         self.boxes: list[Array] = []
 
     def latitude(self, lat: float) -> str:
-        """Return the text of a latitude."""
         return degrees_text(lat, self.north_south)
 
     def longitude(self, lon: float) -> str:
-        """Return the text of a longitude."""
         return degrees_text(lon % 360 if self.is_net else lon, self.east_west)
 
     def along_the_sides(self, lats: list[float], lons: list[float]) -> None:
@@ -146,28 +117,21 @@ class _Labels:
             end = projection.forward(np.array([[lat, west]]))[0]
             self._outside(self.latitude(lat), end, (-gap, 0.0), ha="right", va="center")
         inside = isinstance(projection, Mollweide)
-        middle = projection.center[1]
-        step = self._step(projection)
+        middle, at = projection.center[1], 0.0 if inside else -90.0
+        ends = projection.forward(np.array([[at, middle], [at, middle + 60.0]]))
+        room = self.size * float(np.ptp(ends[:, 0]))
+        letters = 7.5 * LETTER * self.sheet.small  # texts must not touch
+        step = next((s for s in (60.0, 90.0, 120.0) if room * s / 60 > letters), 180.0)
         turns = sorted(((lon - middle + 180) % 360 - 180) for lon in lons if lon % step == 0)
         turns = [*turns, 180.0] if turns[0] == -180 else turns
         for turn in turns:
-            if inside and abs(turn) == 180:
-                continue
-            lon = (middle + turn + 180) % 360 - 180
-            at = np.array([[0.0 if inside else -90.0, middle + turn - 1e-7 * np.sign(turn)]])
-            place, text = projection.forward(at)[0], self.longitude(lon)
-            if inside:
-                self._inside(text, place)
-            else:
+            lon = np.array([[at, middle + turn - 1e-7 * np.sign(turn)]])
+            place = projection.forward(lon)[0]
+            text = self.longitude((middle + turn + 180) % 360 - 180)
+            if not inside:
                 self._outside(text, place, (0.0, -gap), ha="center", va="top")
-
-    def _step(self, projection: Projection) -> float:
-        """Return degrees between longitudes whose texts do not touch along the lower side."""
-        lat = 0.0 if isinstance(projection, Mollweide) else -90.0
-        ends = np.array([[lat, projection.center[1]], [lat, projection.center[1] + 60.0]])
-        room = self.size * float(np.ptp(projection.forward(ends)[:, 0]))
-        letters = 7.5 * LETTER * self.sheet.small
-        return next((s for s in (60.0, 90.0, 120.0) if room * s / 60 > letters), 180.0)
+            elif abs(turn) != 180:
+                self._inside(text, place)
 
     def along_the_rim(self, lats: list[float], lons: list[float]) -> None:
         """Write texts where lines meet the rim, else on them."""
@@ -180,16 +144,12 @@ class _Labels:
         missed = [lon for lon in order if not self._at_rim(meridian(lon), self.longitude(lon))]
         if not polar:
             lats = [lat for lat in lats if not self._at_rim(parallel(lat), self.latitude(lat))]
-        for lat in lats:
-            self._on_map(self.latitude(lat), lat, lon0 + (15 if polar else 0))
-        for lon in [] if polar else missed:
-            self._on_map(self.longitude(lon), level, lon)
-
-    def _on_map(self, text: str, lat: float, lon: float) -> None:
-        """Write a text at a direction, if the map shows it."""
-        direction = np.array([[lat, lon]])
-        if self.projection.contains(direction)[0]:
-            self._inside(text, self.projection.forward(direction)[0])
+        inside = [(self.latitude(lat), lat, lon0 + (15 if polar else 0)) for lat in lats]
+        inside += [(self.longitude(lon), level, lon) for lon in ([] if polar else missed)]
+        for text, lat, lon in inside:
+            direction = np.array([[lat, lon]])
+            if projection.contains(direction)[0]:
+                self._inside(text, projection.forward(direction)[0])
 
     def _at_rim(self, line: Array, text: str) -> bool:
         """Write a text outside the rim, where a line meets it, and return whether there was room."""

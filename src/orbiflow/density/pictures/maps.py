@@ -1,4 +1,4 @@
-"""Pictures of densities of directions or axes on maps."""
+"""Pictures of densities of directions or axes on maps, and the map that suits them."""
 
 from __future__ import annotations
 
@@ -13,33 +13,15 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
-from orbiflow.density.pictures.axes import chart_points
-from orbiflow.density.pictures.frame import (
-    NARROW,
-    Frame,
-    Room,
-    room_for_bar_below,
-    room_for_bar_beside,
-    write_caption,
-)
-from orbiflow.density.pictures.ground import (
-    LIGHT,
-    Colouring,
-    Ground,
-    Panel,
-    Words,
-    draw_density,
-    draw_samples,
-)
-from orbiflow.density.pictures.map_axes import draw_map_lines
-from orbiflow.density.pictures.map_choice import caption, chosen_map, subtitle
-from orbiflow.density.pictures.projections import Azimuthal, Projection
-from orbiflow.density.pictures.regions import log_natural, region_lines
-from orbiflow.density.pictures.scale import shading
+from orbiflow.density.pictures import ground, projections
+from orbiflow.density.pictures.axes import chart_points, degrees_text
+from orbiflow.density.pictures.colours import chosen_scale, density_on_map, is_sharp, shading
+from orbiflow.density.pictures.map_axes import draw_map_lines, graticule
+from orbiflow.density.pictures.overlays import log_natural, region_lines
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.density.pictures.values import chosen_scale, density_on_map, is_sharp
 from orbiflow.density.spaces import RoundSpace, Space, checked_table, to_latlon, to_vectors
 from orbiflow.drawing import Picture, Sheet
+from orbiflow.errors import OrbiflowError, SettingError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,9 +65,9 @@ def map_picture(
     settings = settings or PlotSettings()
     if about is None:
         about = torch.empty(0, 2) if samples is None else samples
-    ground = Map(density.space, _projection(density.space, about, settings), coastlines)
+    drawn = _map_about(density.space, about, settings, coastlines)
     lines = region_lines(density, settings)
-    return draw_density(ground, density, settings, dots=samples, regions=lines, sheet=sheet)
+    return ground.draw_density(drawn, density, settings, dots=samples, regions=lines, sheet=sheet)
 
 
 def map_samples_picture(
@@ -97,40 +79,30 @@ def map_samples_picture(
     coastlines: Sequence[ArrayLike] = (),
     sheet: Sheet | None = None,
 ) -> Picture:
-    """Draw data and samples on two maps; without data, the density and samples.
+    """Draw data (N, 2) and samples (M, 2) on two maps; without data, the density and samples.
 
-    Args:
-        density: A density on the sphere or the projective plane.
-        data: Chart points (N, 2).
-        samples: Chart points (M, 2).
-        settings: How it is drawn.
-        coastlines: Lines (M, 2) of latitude and longitude.
-        sheet: The sheet. Default: that of the settings.
-
-    Raises:
-        OrbiflowError: As `map_picture`.
+    Points are of the chart; all else is as for `map_picture`.
     """
     settings = settings or PlotSettings()
-    projection = _projection(density.space, samples if data is None else data, settings)
-    ground = Map(density.space, projection, coastlines)
-    return draw_samples(ground, density, settings, data, samples, sheet=sheet)
+    about = samples if data is None else data
+    drawn = _map_about(density.space, about, settings, coastlines)
+    return ground.draw_samples(drawn, density, settings, data, samples, sheet=sheet)
 
 
-def _projection(space: Space, about: Tensor, settings: PlotSettings) -> Projection:
-    return chosen_map(space, chart_points(space, about), settings, settings.names)
+def _map_about(
+    space: Space, about: Tensor, settings: PlotSettings, coastlines: Sequence[ArrayLike]
+) -> Map:
+    chosen = chosen_map(space, chart_points(space, about), settings, settings.names)
+    return Map(space, chosen, coastlines)
 
 
-class Map(Ground):
-    """A map of the sphere or the projective plane.
-
-    Raises:
-        OrbiflowError: If coastlines are not lines (N, 2) of latitude and longitude.
-    """
+class Map(ground.Ground):
+    """A map of the sphere or the projective plane, with coastlines (N, 2) in degrees."""
 
     caption_below = True
 
     def __init__(
-        self, space: Space, projection: Projection, coastlines: Sequence[ArrayLike] = ()
+        self, space: Space, projection: projections.Projection, coastlines: Sequence[ArrayLike] = ()
     ) -> None:
         self.space, self.projection = space, projection
         self.coastlines = [checked_table(line, (2,), "a coastline") for line in coastlines]
@@ -139,13 +111,13 @@ class Map(Ground):
         self.outline = projection.outline()
         width, height = np.ptp(self.outline, axis=0)
         self.width, self.aspect = float(width), float(width / height)
-        self.is_disc = isinstance(projection, Azimuthal)
+        self.is_disc = isinstance(projection, projections.Azimuthal)
         self.title_gap = 2.2 if self.is_disc else 0.6
 
     def places(self, points: Tensor) -> Array:
         return places_on(self.space, self.projection, points)
 
-    def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
+    def colouring(self, density: Density, settings: PlotSettings) -> ground.Colouring:
         pixels = pixels_of(self.projection)
         points = cast(RoundSpace, self.space).vectors_to_chart(to_vectors(pixels.latlon))
         values = density_on_map(density, points, settings.measure, pixels.angle)
@@ -161,47 +133,58 @@ class Map(Ground):
             size = f"{math.degrees(pixels.angle):.2g}°"
             note = f"peaks narrower than {size} are averaged over it"
         places = pixels.table(shade.places(values), 0.0)
-        return Colouring(places, pixels.extent, shade, chosen.reason, note, logs, self.outline)
+        return ground.Colouring(
+            places, pixels.extent, shade, chosen.reason, note, logs, self.outline
+        )
 
-    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> Room:
+    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> ground.Room:
         above = 0.8 if sheet.printed else 3.2
-        if self.is_disc and (not sheet.printed or sheet.width >= NARROW):
-            beside = Room(3.6, 1.8, 0.0, above + 1.2, 4.4, 1.2)
-            return room_for_bar_beside(sheet, beside, label, ticks)
+        if self.is_disc and (not sheet.printed or sheet.width >= ground.NARROW):
+            beside = ground.Room(3.6, 1.8, 0.0, above + 1.2, 4.4, 1.2)
+            return ground.room_for_bar_beside(sheet, beside, label, ticks)
         left, right, top = (3.4, 3.4, 1.2) if self.is_disc else (3.6, 1.8, 0.0)
-        under = Room(left, 0.0, right, above + top, 2.2, 1.0)
-        return room_for_bar_below(sheet, under, label)
+        under = ground.Room(left, 0.0, right, above + top, 2.2, 1.0)
+        return ground.room_for_bar_below(sheet, under, label)
 
-    def panels_room(self, sheet: Sheet) -> tuple[Room, bool]:
+    def panels_room(self, sheet: Sheet) -> tuple[ground.Room, bool]:
         if not self.is_disc:
-            return Room(3.6, 2.4, 1.8, 2.2, 4.4, 0.0), True
+            return ground.Room(3.6, 2.4, 1.8, 2.2, 4.4, 0.0), True
         stacked = sheet.printed and sheet.width < _BESIDE
-        return Room(3.6, 1.8, 3.6, 3.8, 5.6 if stacked else 7.4, 0.0), stacked
+        return ground.Room(3.6, 1.8, 3.6, 3.8, 5.6 if stacked else 7.4, 0.0), stacked
 
     def fill(self, axes: Axes) -> None:
-        axes.fill(*self.outline.T, color=LIGHT, linewidth=0, zorder=0)
+        axes.fill(*self.outline.T, color=ground.LIGHT, linewidth=0, zorder=0)
 
-    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: Panel) -> None:
+    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: ground.Panel) -> None:
         """Draw the outline, the graticule with its degrees, and coastlines."""
         draw_map_lines(
             axes, self.projection, sheet, side, coastlines=self.coastlines, light=panel.light
         )
 
     def caption(self, notes: Sequence[str], dots: tuple[int, int] | None) -> str:
-        return caption(
+        return map_caption(
             self.space, self.projection, notes, dots=dots, coastlines=bool(self.coastlines)
         )
 
     def samples_caption(self, notes: Sequence[str]) -> str:
         return self.caption(notes or ["dots are points"], None)
 
-    def write_on_screen(self, frame: Frame, sheet: Sheet, title: str, words: Words) -> None:
+    def write_on_screen(
+        self,
+        frame: ground.Frame,
+        sheet: Sheet,
+        title: str,
+        caption: str,
+        notes: Sequence[str],
+        dots: bool,
+    ) -> None:
+        del notes, dots  # the caption has them
         top = 1 - 1.6 * sheet.em / frame.figure.get_size_inches()[1]
         frame.figure.text(
             0.5, top, f"{title}: {subtitle(self.projection)}", ha="center", va="center",
             fontsize=1.15 * sheet.text,
         )  # fmt: skip
-        write_caption(frame.figure, words.caption, sheet)
+        ground.write_caption(frame.figure, caption, sheet)
 
 
 class Pixels(NamedTuple):
@@ -229,9 +212,10 @@ class Pixels(NamedTuple):
         return table
 
 
-def pixels_of(projection: Projection, count: int | None = None) -> Pixels:
+def pixels_of(projection: projections.Projection, count: int | None = None) -> Pixels:
     """Return about `count` pixels of a map, by default `_PIXELS`."""
     from matplotlib.path import Path
+    from scipy.ndimage import binary_dilation
 
     ring = projection.outline()
     low, high = ring.min(axis=0), ring.max(axis=0)
@@ -242,8 +226,7 @@ def pixels_of(projection: Projection, count: int | None = None) -> Pixels:
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     within = Path(ring).contains_points(places)
     shown = within.reshape(counts[::-1])
-    for _ in range(_MARGIN):
-        shown = _grown(shown)
+    shown = binary_dilation(shown, iterations=_MARGIN)
     kept = shown.ravel()
     latlon = projection.inverse(places[kept])
     last = first + step * counts
@@ -251,35 +234,199 @@ def pixels_of(projection: Projection, count: int | None = None) -> Pixels:
     return Pixels(shown, latlon, within[kept], _areas(projection, latlon), step, extent)
 
 
-def _grown(shown: Array) -> Array:
-    wider = shown.copy()
-    wider[1:] |= shown[:-1]
-    wider[:-1] |= shown[1:]
-    wider[:, 1:] |= shown[:, :-1]
-    wider[:, :-1] |= shown[:, 1:]
-    return wider
-
-
-def _areas(projection: Projection, latlon: Array) -> Array:
+def _areas(projection: projections.Projection, latlon: Array) -> Array:
     """Return the areas on the sphere of equal pixels of the map."""
     if projection.is_equal_area:
         return np.ones(len(latlon))
-    if isinstance(projection, Azimuthal):
+    if isinstance(projection, projections.Azimuthal):
         cosines = to_vectors(latlon) @ projection.frame[2]
         return ((1 + cosines) / 2) ** 2  # conformal: scale 2 / (1 + cos), squared
     return np.cos(np.radians(latlon[:, 0]))
 
 
-def places_on(space: Space, projection: Projection, points: Tensor) -> Array:
-    """Return the places (M, 2) of those of chart points (N, 2) that are on a map.
-
-    Axes are placed at the end that the map shows.
-
-    Raises:
-        OrbiflowError: If the points have another shape.
-    """
+def places_on(space: Space, projection: projections.Projection, points: Tensor) -> Array:
+    """Return places (M, 2) of chart points (N, 2) on a map; of axes, those of the end that it shows."""
     vectors = cast(RoundSpace, space).vectors(chart_points(space, points))
-    if space.name == "projective-plane" and isinstance(projection, Azimuthal):
+    if space.name == "projective-plane" and isinstance(projection, projections.Azimuthal):
         vectors = np.where(vectors @ projection.frame[2] < 0, -1.0, 1.0)[:, None] * vectors
     latlon = to_latlon(vectors)
     return projection.forward(latlon[projection.contains(latlon)])
+
+
+WORLD: dict[str, type[projections.WorldMap]] = {
+    c.name: c for c in (projections.EqualEarth, projections.Mollweide, projections.PlateCarree)
+}
+CENTRED: dict[str, type[projections.Azimuthal]] = {
+    c.name: c for c in (projections.Lambert, projections.Stereographic)
+}
+NETS: dict[str, type[projections.Azimuthal]] = {
+    "schmidt": projections.Lambert,
+    "wulff": projections.Stereographic,
+}
+"""Nets of structural geology: latitude is plunge or inclination, longitude trend or declination."""
+
+_NET_WORDS = ("inc", "plunge", "dip")
+"""How names of the first column begin if rows are directions in a net, not places on a globe."""
+
+_RADII = (5, 10, 15, 20, 30, 40, 50, 60, 75)
+_SHARE = 0.995
+"""Share of the points that a map of less than the sphere has to show."""
+
+
+def chosen_map(
+    space: Space,
+    points: Tensor,
+    settings: PlotSettings | None = None,
+    names: Sequence[str] | None = None,
+) -> projections.Projection:
+    """Return the map of a sphere or projective plane that settings ask for, or that suits points.
+
+    `points` are chart points (N, 2); `names` of the data's columns may ask for a net.
+
+    >>> from orbiflow.density import Sphere
+    >>> here = Sphere().to_chart([[40.0, 140.0], [44.0, 142.0]])
+    >>> chosen_map(Sphere(), here)
+    Lambert(center=(42.0, 141.0), radius=5.0, flipped=False)
+    """
+    if not space.is_round:
+        raise OrbiflowError(f"maps are of the sphere and the projective plane, not of {space!r}")
+    settings = settings or PlotSettings()
+    projection, radius = settings.projection, settings.radius
+    middle = settings.center
+    if middle is not None and not (len(middle) in (1, 2) and all(map(math.isfinite, middle))):
+        raise SettingError(
+            "{center} must be a latitude and a longitude, or a longitude, in degrees, such as 40,140, "
+            f"got {list(middle)}"
+        )
+    axial = space.name == "projective-plane"
+    cap = None if axial else smallest_cap(cast(RoundSpace, space).vectors(points))
+    if projection == "auto":
+        if axial:
+            a_net = bool(names and names[0].strip().lower().startswith(_NET_WORDS))
+            projection = "schmidt" if a_net and middle is None else "lambert"
+        elif middle is not None:
+            projection = "lambert" if len(middle) == 2 and middle[0] else "equal-earth"
+        else:
+            projection = "equal-earth" if cap is None and radius is None else "lambert"
+    if projection in WORLD:
+        return _world(WORLD[projection], space, middle, radius)
+    if projection in NETS:
+        if middle is not None:
+            raise SettingError(
+                f"{{center}} does not apply to a {projection} net, which has the vertical in its "
+                "middle: give no centre"
+            )
+        return NETS[projection]((90.0, 0.0), float(radius or 90.0), flipped=True)
+    if middle is None:
+        middle, reach = cap or ((90.0, 0.0), 90.0)
+    else:
+        reach = 90.0
+        if len(middle) == 1:
+            middle = (90.0 if axial else 0.0, middle[0])
+    return CENTRED[projection]((middle[0], middle[1]), float(radius or reach))
+
+
+def smallest_cap(vectors: Array) -> tuple[tuple[float, float], float] | None:
+    """Return a centre in whole degrees, and a radius that shows nearly all unit vectors (N, 3).
+
+    It is None if they do not fit into 75 degrees around a centre.
+    """
+    mean = vectors.mean(axis=0) if len(vectors) else np.zeros(3)
+    if np.linalg.norm(mean) < 0.2:
+        return None
+    lat, lon = to_latlon(mean[None] / np.linalg.norm(mean))[0].round() + 0.0
+    middle = to_vectors([[lat, lon]])[0]
+    apart = np.degrees(np.arccos(np.clip(vectors @ middle, -1, 1)))
+    reach = 1.1 * float(np.quantile(apart, _SHARE, method="higher"))
+    fitting = [float(r) for r in _RADII if r >= reach]
+    return ((float(lat), float(lon)), fitting[0]) if fitting else None
+
+
+def _world(
+    kind: type[projections.WorldMap],
+    space: Space,
+    middle: tuple[float, ...] | None,
+    radius: float | None,
+) -> projections.Projection:
+    if space.name == "projective-plane":
+        raise SettingError(
+            "a direction and its opposite are one point of the projective plane, which needs a map "
+            f"of one hemisphere: {{projection}} must be {', '.join((*CENTRED, *NETS))}, got {kind.name}"
+        )
+    if radius is not None:
+        raise SettingError(
+            f"a map of the whole sphere ({kind.name}) has no radius: leave {{radius}} out"
+        )
+    lat, lon = middle if middle and len(middle) == 2 else (0.0, *(middle or (0.0,)))
+    return kind((lat, lon))
+
+
+def subtitle(projection: projections.Projection) -> str:
+    """Return the projection as a title has it."""
+    if _is_net(projection):
+        return "Schmidt net (equal-area)" if projection.is_equal_area else "Wulff net (equal-angle)"
+    return projection.title
+
+
+def map_caption(
+    space: Space,
+    projection: projections.Projection,
+    notes: Sequence[str] = (),
+    *,
+    dots: tuple[int, int] | None = None,
+    coastlines: bool = False,
+) -> str:
+    """Return a map's caption: projection, centre, which points are one, lines and dots, and notes.
+
+    >>> from orbiflow.density import Sphere
+    >>> from orbiflow.density.pictures.projections import Mollweide
+    >>> map_caption(Sphere(), Mollweide((0.0, 150.0)))
+    'The sphere in the Mollweide projection (equal-area), about 150° E. Lines every 30°.'
+    """
+    parts = [_description(space, projection)]
+    if space.name == "projective-plane":
+        parts.append(
+            "An axis is drawn at the end in this hemisphere; opposite points of the rim are one axis"
+        )
+    lats, lons = graticule(projection)
+    steps = {f"{line[1] - line[0]:g}°" for line in (lats, lons) if len(line) > 1}
+    steps = sorted(steps, key=lambda text: float(text[:-1]))
+    lines = f"Lines every {steps[0]}"
+    if len(steps) > 1:
+        lines = f"Parallels every {lats[1] - lats[0]:g}°, meridians every {lons[1] - lons[0]:g}°"
+    parts.append(lines + (", and coastlines" if coastlines else ""))
+    if dots is not None:
+        shown, known = dots
+        parts.append(f"Dots are {f'{shown} of ' if shown < known else ''}{known} points")
+    parts += [note[0].upper() + note[1:] for note in notes]
+    return " ".join(f"{part}." for part in parts)
+
+
+def _description(space: Space, projection: projections.Projection) -> str:
+    lat, lon = projection.center
+    frame = (
+        ""
+        if space.columns[0] == "lat"
+        else "; latitudes are from the x, y plane towards z, longitudes from x towards y"
+    )
+    if not isinstance(projection, projections.Azimuthal):
+        middle = degrees_text((lon + 180) % 360 - 180, "EW")
+        return f"The sphere in {projection.title}, about {middle}{frame}"
+    within = (
+        "the hemisphere" if projection.radius == 90 else f"what is within {projection.radius:g}°"
+    )
+    if _is_net(projection):
+        return (
+            f"Lower hemisphere, {subtitle(projection)}: the vertical (latitude, plunge or inclination "
+            "90°) is in the middle, longitude (trend, declination) runs clockwise from the top"
+        )
+    if abs(lat) == 90:
+        where = "the north pole" if lat > 0 else "the south pole"
+    else:
+        where = f"{degrees_text(lat, 'NS')}, {degrees_text((lon + 180) % 360 - 180, 'EW')}"
+    seen = f"about {where} in {projection.title}, seen from outside{frame}"
+    return f"{within[0].upper()}{within[1:]} {seen}"
+
+
+def _is_net(projection: projections.Projection) -> bool:
+    return isinstance(projection, projections.Azimuthal) and projection.flipped

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, cast
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import torch
@@ -14,33 +13,12 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
-from orbiflow.density.pictures.axes import (
-    View,
-    angle_text,
-    axis_label,
-    chart_points,
-    column_name,
-    space_title,
-    view_of,
-)
-from orbiflow.density.pictures.dots import thinned, uncrowded
+from orbiflow.density.pictures import axes, colours, surfaces
 from orbiflow.density.pictures.ground import COLOURS, SMALLER
-from orbiflow.density.pictures.scale import bar_label, bar_ticks, shading
+from orbiflow.density.pictures.overlays import thinned, uncrowded
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import average_note
-from orbiflow.density.pictures.surfaces import (
-    EYE,
-    KLEIN_RADIUS,
-    RING_RADIUS,
-    TUBE_RADIUS,
-    immersion,
-    mesh,
-    normals,
-    vector_immersion,
-    viewpoint,
-)
-from orbiflow.density.pictures.values import chosen_scale, density_on_grid, is_sharp
-from orbiflow.density.spaces import RoundSpace, Space, checked_table, to_vectors
+from orbiflow.density.spaces import Space, checked_table, to_vectors
 from orbiflow.drawing import rendered
 from orbiflow.errors import OrbiflowError
 
@@ -51,8 +29,6 @@ _CELLS, _FINE_CELLS = 160, 240
 
 _SOFT = 1.6
 """Cells that the narrowest peak is averaged over: with fewer, a triangle's corners would be seen."""
-
-_EVERY_45 = "Lines every 45°, heavier where an angle is 0."
 
 
 def density_page(
@@ -86,41 +62,42 @@ def density_page(
         OrbiflowError: If the space has another dimension, names do not fit, there are coastlines on a
             space without latitudes, or the page would be larger than `MAX_BYTES`.
     """
+    from matplotlib import colormaps
+
     settings, space = settings or PlotSettings(), density.space
     cells = resolution or (_FINE_CELLS if density.has_fine_detail else _CELLS)
-    grid, view = mesh(space, cells), view_of(space, settings.names)
-    drawing = DRAWINGS[space.name]
+    grid, view = surfaces.mesh(space, cells), axes.view_of(space, settings.names)
     t = torch.linspace(0.0, 1.0, cells + 1, dtype=torch.float64)
-    values = density_on_grid(density, t, t, settings.measure, pixel=_SOFT / cells).ravel()
+    values = colours.density_on_grid(density, t, t, settings.measure, pixel=_SOFT / cells).ravel()
     # by area on the surface: vertices crowd at the cone points
     areas = space.log_area(grid.points).exp().numpy()
-    chosen = chosen_scale(density, settings.measure, settings.scale)
-    shade = shading(values, areas, log=chosen.log)
-    lines = (*drawing.grid(space), (1.6, _coast(space, coastlines)))
+    chosen = colours.chosen_scale(density, settings.measure, settings.scale)
+    shade = colours.shading(values, areas, log=chosen.log)
+    lines = (*_coordinate_lines(space), (1.6, _coast(space, coastlines)))
     notes = []
     data = {
         **_surface(space, grid.points, int(values.argmax())),
-        "round": drawing.is_ball,
+        "round": space.name == "sphere",  # the near side hides the far one
         "triangles": _packed(grid.triangles, "<u2"),
         "values": _packed(65535 * np.clip(shade.places(values), 0, 1), "<u2"),
         "lines": [{"width": width, **_polylines(parts)} for width, parts in lines if parts],
         "samples": "",
         "widths": "",
         "dots": settings.dots,
-        "labels": drawing.labels(view),
-        "colours": _packed(_colours(), "u1"),
-        "ticks": [tick._asdict() for tick in bar_ticks(shade, ends=True)],
-        "measure": bar_label(shade, space, settings.measure),
+        "labels": _labels(view),
+        "colours": _packed(255 * colormaps[COLOURS](np.linspace(0, 1, 256)), "u1"),
+        "ticks": [tick._asdict() for tick in colours.bar_ticks(shade, ends=True)],
+        "measure": colours.bar_label(shade, space, settings.measure),
     }
     if samples is not None:
-        points = torch.tensor(thinned(chart_points(space, samples).numpy()))
-        places, widths = uncrowded(immersion(space)(space.project(points)))
+        points = torch.tensor(thinned(axes.chart_points(space, samples).numpy()))
+        places, widths = uncrowded(surfaces.immersion(space)(space.project(points)))
         data |= {"samples": _packed(places, "<f4"), "widths": _packed(widths, "<f4")}
         notes.append(SMALLER)
-    if is_sharp(density, pixel=_SOFT / cells):
+    if colours.is_sharp(density, pixel=_SOFT / cells):
         notes.append(average_note(round(cells / _SOFT)))
-    caption = " ".join([drawing.caption(view), *(f"{n[0].upper()}{n[1:]}." for n in notes)])
-    title = title or f"Density on the {space_title(space)}"
+    caption = " ".join([_caption(view), *(f"{n[0].upper()}{n[1:]}." for n in notes)])
+    title = title or f"Density on the {axes.space_title(space)}"
     page = rendered(
         "orbiflow.density.pictures", "surface.html", title=title, caption=caption, data=data
     )
@@ -135,15 +112,15 @@ def density_page(
 
 def _surface(space: Space, points: Tensor, peak: int) -> dict[str, Any]:
     """Return the mesh in space, its size, and from where it is seen first."""
-    places = immersion(space)(points)
+    places = surfaces.immersion(space)(points)
     center = (places.min(axis=0) + places.max(axis=0)) / 2
     return {
         "center": center.tolist(),
         "radius": float(np.linalg.norm(places - center, axis=1).max()),
-        "start": viewpoint(space, points[peak])._asdict(),
-        "eye": EYE,
+        "start": surfaces.viewpoint(space, points[peak])._asdict(),
+        "eye": surfaces.EYE,
         "points": _packed(places, "<f4"),
-        "normals": _packed(127 * normals(space, points), "i1"),
+        "normals": _packed(127 * surfaces.normals(space, points), "i1"),
     }
 
 
@@ -167,42 +144,26 @@ def _coast(space: Space, coastlines: Sequence[ArrayLike]) -> list[Array]:
     if not space.is_round:
         raise OrbiflowError(f"coastlines need latitudes and longitudes, the {space.name} has none")
     tables = [checked_table(line, (2,), "a coastline") for line in coastlines]
-    return [vector_immersion(space)(to_vectors(table)) for table in tables if len(table) > 1]
-
-
-def _colours() -> Array:
-    from matplotlib import colormaps
-
-    return 255 * colormaps[COLOURS](np.linspace(0, 1, 256))
+    return [
+        surfaces.vector_immersion(space)(to_vectors(table)) for table in tables if len(table) > 1
+    ]
 
 
 Lines = tuple[tuple[float, list[Array]], tuple[float, list[Array]]]
 """Lines (M, 3) of equal coordinates with their widths, then those of coordinate 0, which are wider."""
 
 
-@dataclass(frozen=True)
-class Drawing:
-    """What is drawn on the surface of a space beside the density.
-
-    - `grid`: A function that returns lines of equal coordinates.
-    - `labels`: A function that returns texts of directions, and where they stand.
-    - `caption`: A function that returns what is seen, and which way the coordinates run.
-    - `is_ball`: Whether the near side hides the far one.
-    """
-
-    grid: Callable[[Space], Lines]
-    labels: Callable[[View], list[dict[str, Any]]]
-    caption: Callable[[View], str]
-    is_ball: bool = False
-
-
-def _graticule(space: Space, step: int) -> Lines:
-    """Return parallels and meridians, every `step` degrees."""
+def _coordinate_lines(space: Space) -> Lines:
+    """Return parallels and meridians of a round space, lines every eighth of a turn of angles."""
+    if not space.is_round:
+        # the Klein bottle's square is half a turn high, and phi is 0 inside
+        return _eighths(space, 8, 0) if space.is_torus else _eighths(space, 4, 2)
+    step = 30 if space.name == "sphere" else 15
     t = np.linspace(-180.0, 180.0, 181)
     across = [np.stack([np.full(181, lat), t], axis=-1) for lat in range(0, 90, step)]
     across += [line * (-1, 1) for line in across[1:]]
     along = [np.stack([t / 2, np.full(181, lon)], axis=-1) for lon in range(0, 360, step)]
-    surface = vector_immersion(space)
+    surface = surfaces.vector_immersion(space)
     parallels, meridians = (
         [surface(to_vectors(line)) for line in lines] for lines in (across, along)
     )
@@ -211,71 +172,53 @@ def _graticule(space: Space, step: int) -> Lines:
 
 def _eighths(space: Space, steps: int, zero: int) -> Lines:
     """Return lines every eighth of a turn, `steps` of them up the square; x = zero / 8 is angle 0."""
-    surface, t = immersion(space), torch.linspace(0, 1, 161, dtype=torch.float64)
+    surface, t = surfaces.immersion(space), torch.linspace(0, 1, 161, dtype=torch.float64)
     across = [torch.stack([torch.full_like(t, k / 8), t], dim=-1) for k in range(8)]
     along = [torch.stack([t, torch.full_like(t, k / steps)], dim=-1) for k in range(steps)]
     zeros = [across[zero], along[0]]
     return (1.0, [surface(line) for line in across + along]), (2.0, [surface(z) for z in zeros])
 
 
-def _labels(texts: Sequence[str], places: Array) -> list[dict[str, Any]]:
+def _labels(view: axes.View) -> list[dict[str, Any]]:
+    """Return texts of directions, or of the first angle at four places of a ring, and their places."""
+    space = view.space
+    if space.name == "projective-plane":
+        return []
+    if space.is_round:
+        texts = ("+x", "+y", "+z", "−x", "−y", "−z")
+        if space.columns[0] == "lat":
+            texts = ("0°", "90° E", "N", "180°", "90° W", "S")
+        places = 1.07 * np.concatenate([np.eye(3), -np.eye(3)])
+    else:
+        turns = (0, 0.25, 0.5, -0.25) if space.is_torus else (0, 0.125, 0.25, 0.375)
+        texts = [f"{axes.column_name(view, 0)} {axes.angle_text(t, space.unit)}" for t in turns]
+        radius = (
+            surfaces.RING_RADIUS + surfaces.TUBE_RADIUS
+            if space.is_torus
+            else surfaces.KLEIN_RADIUS + 1
+        )
+        places = 1.1 * radius * np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
     return [{"text": t, "at": place.tolist()} for t, place in zip(texts, places, strict=True)]
 
 
-def _ring_labels(view: View, turns: Sequence[float], radius: float) -> list[dict[str, Any]]:
-    """Return the first angle at four places round a ring."""
-    name, unit = column_name(view, 0), view.space.unit
-    places = 1.1 * radius * np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
-    return _labels([f"{name} {angle_text(t, unit)}" for t in turns], places)
+def _caption(view: axes.View) -> str:
+    """Return what is seen, and which way the coordinates run."""
+    if view.space.is_round:
+        return CAPTIONS[view.space.name]
+    names = {"first": axes.axis_label(view, 0), "second": axes.axis_label(view, 1)}
+    return CAPTIONS[view.space.name].format(**names)
 
 
-def _globe_labels(view: View) -> list[dict[str, Any]]:
-    latlon = ("0°", "90° E", "N", "180°", "90° W", "S")
-    form = cast(RoundSpace, view.space).form
-    names = latlon if form == "latlon" else ("+x", "+y", "+z", "−x", "−y", "−z")
-    return _labels(names, 1.07 * np.concatenate([np.eye(3), -np.eye(3)]))
-
-
-def _ring_caption(view: View) -> str:
-    first, second = axis_label(view, 0), axis_label(view, 1)
-    return f"{first} runs round the ring, {second} round its tube. {_EVERY_45}"
-
-
-def _bottle_caption(view: View) -> str:
-    first, second = axis_label(view, 0), axis_label(view, 1)
-    return (
-        f"The Klein bottle as a figure eight that makes half a turn on its way round: {first} runs "
-        f"round the ring, {second} along the figure eight. {_EVERY_45} The surface passes through "
-        "itself along a circle; the sheets that cross there are far apart on the bottle."
-    )
-
-
-_GLOBE_CAPTION = (
-    "The sphere in the data's frame. Lines every 30°, heavier the equator and longitude 0."
-)
-_BOY_CAPTION = (
-    "Boy's surface, where a direction and its opposite are one point. Lines every 15° of latitude and "
-    "longitude, heavier the equator and longitude 0. The surface passes through itself; sheets that "
-    "cross are far apart on the projective plane."
-)
-
-DRAWINGS: dict[str, Drawing] = {
-    "torus": Drawing(
-        lambda space: _eighths(space, 8, 0),
-        lambda view: _ring_labels(view, (0, 0.25, 0.5, -0.25), RING_RADIUS + TUBE_RADIUS),
-        _ring_caption,
-    ),
-    # the square is half a turn high, and phi is 0 inside
-    "klein-bottle": Drawing(
-        lambda space: _eighths(space, 4, 2),
-        lambda view: _ring_labels(view, (0, 0.125, 0.25, 0.375), KLEIN_RADIUS + 1),
-        _bottle_caption,
-    ),
-    "sphere": Drawing(
-        lambda space: _graticule(space, 30), _globe_labels, lambda _: _GLOBE_CAPTION, is_ball=True
-    ),
-    "projective-plane": Drawing(
-        lambda space: _graticule(space, 15), lambda _: [], lambda _: _BOY_CAPTION
-    ),
+CAPTIONS = {
+    "torus": "{first} runs round the ring, {second} round its tube. Lines every 45°, heavier where an "
+    "angle is 0.",
+    "klein-bottle": "The Klein bottle as a figure eight that makes half a turn on its way round: "
+    "{first} runs round the ring, {second} along the figure eight. Lines every 45°, heavier where an "
+    "angle is 0. The surface passes through itself along a circle; the sheets that cross there are far "
+    "apart on the bottle.",
+    "sphere": "The sphere in the data's frame. Lines every 30°, heavier the equator and longitude 0.",
+    "projective-plane": "Boy's surface, where a direction and its opposite are one point. Lines every "
+    "15° of latitude and longitude, heavier the equator and longitude 0. The surface passes through "
+    "itself; sheets that cross are far apart on the projective plane.",
 }
-"""What is drawn on each surface, by the name of the space."""
+"""What is said of each surface, by the name of the space."""

@@ -2,33 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
-from torch import Tensor
 
 from orbiflow.arguments import as_path
+from orbiflow.density.comparing import density_of
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models import Density, read_density
-from orbiflow.density.pictures.axes import space_title, view_of
+from orbiflow.density.pictures.axes import view_of
 from orbiflow.density.pictures.coastlines import read_coastlines, simplified
 from orbiflow.density.pictures.corner import MAX_COLUMNS, corner_picture
 from orbiflow.density.pictures.flow import few_colours, flow_picture
 from orbiflow.density.pictures.ground import Ground, draw_density, draw_samples
-from orbiflow.density.pictures.map_choice import chosen_map
-from orbiflow.density.pictures.maps import Map
+from orbiflow.density.pictures.maps import Map, chosen_map
+from orbiflow.density.pictures.overlays import region_lines
 from orbiflow.density.pictures.page import density_page
-from orbiflow.density.pictures.projections import PlateCarree, Projection
-from orbiflow.density.pictures.regions import RegionLine, region_lines
+from orbiflow.density.pictures.projections import PlateCarree
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import Square
 from orbiflow.density.spaces import Space
-from orbiflow.drawing import FORMATS, Picture, Sheet, pdf_pages
+from orbiflow.drawing import FORMATS, Picture, pdf_pages
 from orbiflow.errors import OrbiflowError, OutputError, SettingError
 from orbiflow.runtime import LITTER, make_folder, one_thread, write_atomic, write_set
 
@@ -48,8 +47,6 @@ PICTURES = (*(f"{name}.{form}" for form in FORMATS for name in NAMES), PAGE)
 SAMPLES = 3000
 PAGE_POINTS = 40_000
 """Points of coastlines on the surface that turns, at most."""
-
-Maker = Callable[[], Picture]
 
 
 class Plotted(NamedTuple):
@@ -94,32 +91,32 @@ def plot_density(
     """
     settings, out = settings or PlotSettings(), as_path(out, "the folder to draw into")
     single = is_one_file(out)
-    if not single:
-        refuse_foreign_files(out)
-    plots = _Plots.of(density, settings, data, coastlines)
     if single:
-        sheet = Sheet.column(settings.width or "single", "pdf")
-        made = list(plots.pictures(sheet, told).values())
-        return Plotted((write_atomic(out, pdf_pages(made)),), _captions(made), plots.notes)
-    make_folder(out)
-    sheet = settings.sheet
-    pictures = plots.pictures(sheet, told)
+        settings = settings.replace(format="pdf")
+    else:
+        refuse_foreign_files(out)
+    shown = _Shown(density, settings, data, coastlines)
+    if not single:
+        make_folder(out)
+    form, makers, pictures = settings.sheet.format, shown.makers(), dict[str, Picture]()
+    for k, (name, make) in enumerate(makers.items()):
+        told(k / (len(makers) + 1), f"drawing {name}.{form}")
+        pictures[name] = make()
+    captions = tuple(f"{own.title}. {own.caption}".strip() for own in pictures.values())
+    if single:
+        path = write_atomic(out, pdf_pages(list(pictures.values())))
+        return Plotted((path,), captions, shown.notes)
     contents: dict[str, str | bytes] = {
-        f"{name}.{sheet.format}": _content(name, picture) for name, picture in pictures.items()
+        f"{name}.{form}": _content(name, picture) for name, picture in pictures.items()
     }
-    if plots.space.dim == 2:
+    if shown.space.dim == 2:
         told(0.75, f"drawing {PAGE}")
-        contents[PAGE] = plots.page()
-    paths = write_set(out, PICTURES, contents)
-    return Plotted(tuple(paths), _captions(pictures.values()), plots.notes)
+        contents[PAGE] = shown.page()
+    return Plotted(tuple(write_set(out, PICTURES, contents)), captions, shown.notes)
 
 
 def refuse_foreign_files(out: Path) -> None:
-    """Refuse a folder with pictures beside files of others: the pictures may be somebody's own.
-
-    Raises:
-        OutputError: If it is such a folder.
-    """
+    """Refuse a folder with pictures beside files of others: the pictures may be somebody's own."""
     if not out.is_dir():
         return
     inside = {path.name for path in out.iterdir()} - LITTER
@@ -163,136 +160,88 @@ def _content(name: str, picture: Picture) -> bytes:
     return few_colours(content) if few else content
 
 
-def _captions(pictures: Iterable[Picture]) -> tuple[str, ...]:
-    return tuple(f"{picture.title}. {picture.caption}".strip() for picture in pictures)
+class _Shown:
+    """A density and what is drawn with it: settings, chart points, lines around regions, a map.
 
+    All that can be wrong is checked before the work.
+    """
 
-@dataclass(frozen=True, eq=False)
-class _Plots:
-    """A density and what is drawn with it: chart points, lines around regions, coastlines."""
-
-    density: Density
-    settings: PlotSettings
-    samples: Tensor
-    data: Tensor | None
-    projection: Projection | None
-    regions: tuple[RegionLine, ...]
-    coastlines: Sequence[ArrayLike]
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         given: Density | DensityEstimator | str | Path,
         settings: PlotSettings,
         data: ArrayLike | None,
         coastlines: Sequence[ArrayLike],
-    ) -> _Plots:
-        """Check all that can be wrong, before the work.
-
-        Raises:
-            OrbiflowError: As `plot_density`.
-        """
-        density, columns = _density_of(given)
-        space = density.space
+    ) -> None:
+        self.density, columns = _density_of(given)
+        self.space = space = self.density.space
         if settings.names is None:
-            names = known_names(space, columns)
-            settings = settings if names is None else settings.replace(names=names)
-        coastlines = _all_coastlines(space, settings, coastlines)
+            settings = settings.replace(names=known_names(space, columns))
+        self.settings = settings
+        self.coastlines = _all_coastlines(space, settings, coastlines)
         _check_space(space, settings)
-        points = None if data is None else space.to_chart(data)
+        self.data = None if data is None else space.to_chart(data)
         generator = torch.Generator().manual_seed(settings.seed)
-        samples = density.sample((settings.samples or SAMPLES,), generator)
-        chosen = None
-        if space.is_round:
-            about = samples if points is None else points
-            chosen = chosen_map(space, about, settings, columns)
-        lines = region_lines(density, settings)
-        return cls(density, settings, samples, points, chosen, lines, coastlines)
-
-    @property
-    def space(self) -> Space:
-        """The density's space."""
-        return self.density.space
+        self.samples = self.density.sample((settings.samples or SAMPLES,), generator)
+        self.points = self.samples if self.data is None else self.data
+        self.map = chosen_map(space, self.points, settings, columns) if space.is_round else None
+        self.regions = region_lines(self.density, settings)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What is not drawn, and why."""
-        if self.space.dim != 2 or self._has_flow:
+        if self.space.dim != 2 or self.density.flow_part is not None:
             return ()
         return ("the flow has no part in this density, so that there is no picture of it",)
 
-    def pictures(
-        self, sheet: Sheet, told: Callable[[float, str], None] = lambda *_: None
-    ) -> dict[str, Picture]:
-        """Draw all figures, by the names of their files without the ending."""
-        makers = self._makers(sheet)
-        made: dict[str, Picture] = {}
-        for k, (name, make) in enumerate(makers.items()):
-            told(k / (len(makers) + 1), f"drawing {name}.{sheet.format}")
-            made[name] = make()
-        return made
-
     def page(self) -> str:
         """Return the page of the surface to turn in a browser."""
-        return density_page(
-            self.density,
-            self.settings,
-            samples=self._shown,
-            coastlines=simplified(list(map(np.asarray, self.coastlines)), PAGE_POINTS),
-            title=f"Density on the {space_title(self.space)}",
-        )
+        lines = simplified(list(map(np.asarray, self.coastlines)), PAGE_POINTS)
+        return density_page(self.density, self.settings, samples=self.points, coastlines=lines)
 
-    @property
-    def _shown(self) -> Tensor:
-        return self.samples if self.data is None else self.data
-
-    @property
-    def _has_flow(self) -> bool:
-        """Whether a flow has a part in the density."""
-        return self.density.flow_part is not None
-
-    def _makers(self, sheet: Sheet) -> dict[str, Maker]:
-        """Return functions that draw the figures, by name."""
-        density, settings, data = self.density, self.settings, self.data
+    def makers(self) -> dict[str, Callable[[], Picture]]:
+        """Return functions that draw the figures, by the names of their files without the ending."""
+        density, settings, data, samples = self.density, self.settings, self.data, self.samples
         if self.space.dim != 2:
-            draw = lambda: corner_picture(density, data, self.samples, settings, sheet=sheet)  # noqa: E731
-            return {"samples": draw}
+            return {"samples": partial(corner_picture, density, data, samples, settings)}
         grounds = self._grounds()
-        makers = {name: self._maker(ground, sheet) for name, ground in grounds.items()}
-        if self._has_flow:
-            makers["flow"] = lambda: flow_picture(density, settings, sheet=sheet)
+        dots = self.points if settings.dots else None
+        draw = partial(draw_density, dots=dots, regions=self.regions)
+        makers: dict[str, Callable[[], Picture]] = {
+            name: partial(draw, own, density, settings) for name, own in grounds.items()
+        }
+        if density.flow_part is not None:
+            makers["flow"] = partial(flow_picture, density, settings)
         if data is not None or settings.samples is not None:
             ground = grounds["density"]
-            makers["samples"] = lambda: draw_samples(
-                ground, density, settings, data, self.samples, sheet=sheet
-            )
+            makers["samples"] = partial(draw_samples, ground, density, settings, data, samples)
         return makers
-
-    def _maker(self, ground: Ground, sheet: Sheet) -> Maker:
-        dots = self._shown if self.settings.dots else None
-        return lambda: draw_density(
-            ground, self.density, self.settings, dots=dots, regions=self.regions, sheet=sheet
-        )
 
     def _grounds(self) -> dict[str, Ground]:
         """Return what the density is drawn on, by the names of the figures."""
-        space, chosen = self.space, self.projection
-        square = Square(space, self.settings)
-        if chosen is None:
+        space, square = self.space, Square(self.space, self.settings)
+        if self.map is None:
             return {"density": square}
-        grounds: dict[str, Ground] = {"density": Map(space, chosen, self.coastlines)}
-        if space.name == "sphere" and not isinstance(chosen, PlateCarree):
-            plain = PlateCarree((0.0, chosen.center[1]))
+        grounds: dict[str, Ground] = {"density": Map(space, self.map, self.coastlines)}
+        if space.name == "sphere" and not isinstance(self.map, PlateCarree):
+            plain = PlateCarree((0.0, self.map.center[1]))
             grounds["latlon"] = Map(space, plain, self.coastlines)
         return {**grounds, "square": square}
 
 
-def _check_space(space: Space, settings: PlotSettings) -> None:
-    """Check that a space can be drawn, and that settings fit it.
+def _density_of(
+    given: Density | DensityEstimator | str | Path,
+) -> tuple[Density, Sequence[str] | None]:
+    """Return the density, and the columns that it was fitted to, if they are known."""
+    if isinstance(given, Density | DensityEstimator):
+        return density_of(given, "this DensityEstimator"), None
+    path = as_path(given, "the density")
+    density, extra = read_density(path / MODEL if path.is_dir() else path)
+    return density, extra.get("columns")
 
-    Raises:
-        OrbiflowError: If it has too many angles, or a setting applies to another space.
-    """
+
+def _check_space(space: Space, settings: PlotSettings) -> None:
+    """Check that a space can be drawn, and that settings fit it."""
     if space.dim > MAX_COLUMNS:
         raise OrbiflowError(
             f"this {space.name} has {space.dim} angles, pictures have {MAX_COLUMNS} at most: draw "
@@ -317,19 +266,3 @@ def _all_coastlines(
     if settings.coastlines is None:
         return lines
     return [*lines, *read_coastlines(settings.coastlines)]
-
-
-def _density_of(
-    given: Density | DensityEstimator | str | Path,
-) -> tuple[Density, Sequence[str] | None]:
-    """Return the density, and the columns that it was fitted to, if they are known."""
-    if isinstance(given, Density):
-        return given, None
-    if isinstance(given, DensityEstimator):
-        density = getattr(given, "density_", None)
-        if density is None:
-            raise OrbiflowError("this DensityEstimator is not fitted; call fit(data) first")
-        return density, None
-    path = as_path(given, "the density")
-    density, extra = read_density(path / MODEL if path.is_dir() else path)
-    return density, extra.get("columns")

@@ -24,14 +24,10 @@ FINEST = 1.0
 
 @dataclass(frozen=True)
 class Projection(ABC):
-    """A map of directions.
+    """A map of directions about `center`, a latitude and a longitude.
 
     - `name`: Its name in settings. `title`: Its name in a sentence.
     - `is_equal_area`: Whether equal areas of the sphere are equal on the map.
-    - `center`: Latitude and longitude of the map's middle.
-
-    Raises:
-        OrbiflowError: If the centre is no direction.
     """
 
     name: ClassVar[str]
@@ -50,10 +46,7 @@ class Projection(ABC):
 
     @abstractmethod
     def inverse(self, places: Array) -> Array:
-        """Return the directions of places, continued a little beyond the outline.
-
-        Longitudes are in [-180, 180).
-        """
+        """Return directions of places, even a little off the map; longitudes are in [-180, 180)."""
 
     @abstractmethod
     def outline(self) -> Array:
@@ -63,9 +56,9 @@ class Projection(ABC):
     def pieces(self, latlon: Array) -> list[Array]:
         """Return a line (M, 2) of directions on the map, cut where the map is: places (K, 2), K > 1."""
 
-    @abstractmethod
     def contains(self, latlon: Array) -> Array:
-        """Return which directions the map shows, (N,) of bool."""
+        """Return which directions the map shows, (N,) of bool: all, unless it is of a part."""
+        return np.ones(len(latlon), dtype=bool)
 
 
 def refined(latlon: Array) -> Array:
@@ -88,7 +81,6 @@ def wrapped(lon: Array) -> Array:
 
 
 def _without_points(lines: list[Array]) -> list[Array]:
-    """Return the lines (M, 2) that are more than a point."""
     return [line for line in lines if len(line) > 1 and bool((line != line[0]).any())]
 
 
@@ -101,9 +93,6 @@ class Azimuthal(Projection):
 
     - `flipped`: Whether it is upside down, so that about the north pole longitudes run clockwise from
       the top: a net of structural geology and palaeomagnetism.
-
-    Raises:
-        OrbiflowError: If the centre is no direction, or the radius is not above 0 and at most 90.
     """
 
     radius: float = 90.0
@@ -153,8 +142,7 @@ class Azimuthal(Projection):
 
     def pieces(self, latlon: Array) -> list[Array]:
         vectors = to_vectors(refined(latlon))
-        limit = math.cos(math.radians(self.radius))
-        above = vectors @ self.frame[2] - limit
+        above = vectors @ self.frame[2] - math.cos(math.radians(self.radius))
         inside = above >= 0
         found: list[Array] = []
         ends = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]])))
@@ -210,11 +198,7 @@ _NEWTON = 12
 
 
 class WorldMap(Projection):
-    """A map of the whole sphere, cut along the meridian opposite the map's own.
-
-    Raises:
-        OrbiflowError: If the centre is no direction, or off the equator.
-    """
+    """A map of the whole sphere, cut along the meridian opposite the map's own."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -237,7 +221,7 @@ class WorldMap(Projection):
         """Return x per radian of longitude."""
 
     def forward(self, latlon: Array) -> Array:
-        return self._placed(latlon[:, 0], self._relative(latlon[:, 1]))
+        return self._placed(latlon[:, 0], wrapped(latlon[:, 1] - self.center[1]))
 
     def inverse(self, places: Array) -> Array:
         x, y = places.T
@@ -253,7 +237,7 @@ class WorldMap(Projection):
 
     def pieces(self, latlon: Array) -> list[Array]:
         latlon = refined(latlon)
-        lat, lon = latlon[:, 0], self._relative(latlon[:, 1])
+        lat, lon = latlon[:, 0], wrapped(latlon[:, 1] - self.center[1])
         found: list[Array] = []
         start, head = 0, np.empty((0, 2))
         for k in np.flatnonzero(abs(np.diff(lon)) > 180):
@@ -266,12 +250,6 @@ class WorldMap(Projection):
             start, head = k + 1, np.array([[cut, -sign * 180]])
         found.append(np.concatenate([head, np.stack([lat[start:], lon[start:]], axis=-1)]))
         return _without_points([self._placed(*line.T) for line in found])
-
-    def contains(self, latlon: Array) -> Array:
-        return np.ones(len(latlon), dtype=bool)
-
-    def _relative(self, lon: Array) -> Array:
-        return wrapped(lon - self.center[1])
 
     def _placed(self, lat: Array, lon: Array) -> Array:
         """Return places of longitudes from the map's own meridian, -180 and 180 at its two sides."""
@@ -333,30 +311,21 @@ class EqualEarth(WorldMap):
 
     name, title, is_equal_area = "equal-earth", "the Equal Earth projection (equal-area)", True
 
-    _A = (1.340264, -0.081106, 0.000893, 0.003796)
-
-    def _polynomial(self, theta: Array) -> Array:
-        a1, a2, a3, a4 = self._A
-        square = theta**2
-        return theta * (a1 + square * (a2 + square**2 * (a3 + square * a4)))
-
-    def _slope(self, theta: Array) -> Array:
-        a1, a2, a3, a4 = self._A
-        square = theta**2
-        return a1 + square * (3 * a2 + square**2 * (7 * a3 + square * 9 * a4))
+    _Y = np.polynomial.Polynomial((0, 1.340264, 0, -0.081106, 0, 0, 0, 0.000893, 0, 0.003796))
+    _SLOPE = _Y.deriv()
 
     def _theta(self, y: Array) -> Array:
-        theta = y / self._A[0]
+        theta = y / self._Y.coef[1]
         for _ in range(_NEWTON):
-            theta = theta - (self._polynomial(theta) - y) / self._slope(theta)
+            theta = theta - (self._Y(theta) - y) / self._SLOPE(theta)
         return np.clip(theta, -math.pi / 3, math.pi / 3)
 
     def height(self, lat: Array) -> Array:
-        return self._polynomial(np.arcsin(math.sqrt(3) / 2 * np.sin(lat)))
+        return self._Y(np.arcsin(math.sqrt(3) / 2 * np.sin(lat)))
 
     def latitude(self, y: Array) -> Array:
         return np.arcsin(np.clip(2 / math.sqrt(3) * np.sin(self._theta(y)), -1, 1))
 
     def stretch(self, y: Array) -> Array:
         theta = self._theta(y)
-        return 2 / math.sqrt(3) * np.cos(theta) / self._slope(theta)
+        return 2 / math.sqrt(3) * np.cos(theta) / self._SLOPE(theta)

@@ -11,8 +11,8 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, midpoints
+from orbiflow.density.pictures import ground
 from orbiflow.density.pictures.axes import (
-    ANGLE_AXES,
     INK,
     angle_axis,
     degrees_text,
@@ -21,28 +21,10 @@ from orbiflow.density.pictures.axes import (
     shortened,
     view_of,
 )
-from orbiflow.density.pictures.frame import (
-    NARROW,
-    Frame,
-    Room,
-    caption_lines,
-    printed_room,
-    write_caption,
-)
-from orbiflow.density.pictures.ground import (
-    LIGHT,
-    Colouring,
-    Ground,
-    Panel,
-    Words,
-    draw_density,
-    draw_samples,
-)
-from orbiflow.density.pictures.regions import log_natural, region_lines
-from orbiflow.density.pictures.scale import shading
+from orbiflow.density.pictures.colours import chosen_scale, density_on_grid, is_sharp, shading
+from orbiflow.density.pictures.overlays import log_natural, region_lines
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.surfaces import edge_pairs
-from orbiflow.density.pictures.values import chosen_scale, density_on_grid, is_sharp
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import CENTER_COLOURS, Picture, Sheet, center_sign
 from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
@@ -60,7 +42,7 @@ EDGE_COLOURS = ("#d95f02", "#1f78b4")
 HEAD = 0.035
 """Length of an arrow's head on a screen, in sides of the square."""
 
-SCREEN = Room(6.67, 10.4, 11.52, 5.26, 3.33, 1.52)
+SCREEN = ground.Room(6.67, 10.4, 11.52, 5.26, 3.33, 1.52)
 """Room on a screen, with a title above and a legend of five lines below."""
 
 TURNS, SIGNS = {2: "half", 4: "quarter"}, {2: "Lenses", 4: "Squares"}
@@ -94,8 +76,8 @@ def density_picture(
             centre do not fit.
     """
     settings = settings or PlotSettings()
-    ground, lines = Square(density.space, settings), region_lines(density, settings)
-    return draw_density(ground, density, settings, dots=samples, regions=lines, sheet=sheet)
+    square, lines = Square(density.space, settings), region_lines(density, settings)
+    return ground.draw_density(square, density, settings, dots=samples, regions=lines, sheet=sheet)
 
 
 def samples_picture(
@@ -106,30 +88,18 @@ def samples_picture(
     *,
     sheet: Sheet | None = None,
 ) -> Picture:
-    """Draw data and samples on two squares; without data, the density and samples.
+    """Draw data (N, 2) and samples (M, 2) on two squares; without data, the density and samples.
 
-    Args:
-        density: A density on a two-dimensional space.
-        data: Chart points (N, 2), such as `space.to_chart(table)`.
-        samples: Chart points (M, 2), such as `density.sample((M,))`.
-        settings: How it is drawn.
-        sheet: The sheet. Default: that of the settings.
-
-    Raises:
-        OrbiflowError: If the space has another dimension, points have another shape, or names or a
-            centre do not fit.
+    Points are of the chart, such as `space.to_chart(table)` and `density.sample((M,))`; all else is as
+    for `density_picture`.
     """
     settings = settings or PlotSettings()
-    ground = Square(density.space, settings)
-    return draw_samples(ground, density, settings, data, samples, sheet=sheet)
+    square = Square(density.space, settings)
+    return ground.draw_samples(square, density, settings, data, samples, sheet=sheet)
 
 
-class Square(Ground):
-    """The canonical square of a two-dimensional space.
-
-    Raises:
-        OrbiflowError: If the space has another dimension, or names or a centre do not fit.
-    """
+class Square(ground.Ground):
+    """The canonical square of a two-dimensional space."""
 
     width = aspect = 1.0
     title_gap = 0.7
@@ -144,7 +114,7 @@ class Square(Ground):
     def places(self, points: Tensor) -> Array:
         return self.view.places(points)
 
-    def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
+    def colouring(self, density: Density, settings: PlotSettings) -> ground.Colouring:
         count = _FINE_GRID if density.has_fine_detail else _GRID
         middles = (torch.arange(count, dtype=torch.float64) + 0.5) / count
         x, y = (middles + low for low in self.view.low)
@@ -160,23 +130,23 @@ class Square(Ground):
 
         note = average_note(count) if is_sharp(density, pixel=1 / count) else ""
         places = shade.places(values).T
-        return Colouring(places, (0, 1, 0, 1), shade, chosen.reason, note, logs)
+        return ground.Colouring(places, (0, 1, 0, 1), shade, chosen.reason, note, logs)
 
-    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> Room:
+    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> ground.Room:
         if not sheet.printed:
             return SCREEN
         edges = (5.4, 3.8, 0.8) if self._has_ticks else (1.0, 2.8, 2.8)
-        return printed_room(sheet, *edges, label, ticks)
+        return ground.printed_room(sheet, *edges, label, ticks)
 
-    def panels_room(self, sheet: Sheet) -> tuple[Room, bool]:
+    def panels_room(self, sheet: Sheet) -> tuple[ground.Room, bool]:
         edges = (5.4, 4.2, 1.6, 2.4, 4.2) if self._has_ticks else (1.0, 1.0, 1.0, 2.4, 1.6)
-        room, stacked = Room(*edges, 0.0), sheet.printed and sheet.width < NARROW
+        room, stacked = ground.Room(*edges, 0.0), sheet.printed and sheet.width < ground.NARROW
         return (room._replace(gap=room.below + 2.0) if stacked else room), stacked
 
     def fill(self, axes: Axes) -> None:
-        axes.set_facecolor(LIGHT)
+        axes.set_facecolor(ground.LIGHT)
 
-    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: Panel) -> None:
+    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: ground.Panel) -> None:
         """Draw ticks, edges with their arrows, and cone points with their places in the data."""
         axes.set_xlim(0, 1)
         axes.set_ylim(0, 1)
@@ -210,13 +180,22 @@ class Square(Ground):
     def samples_caption(self, notes: Sequence[str]) -> str:
         return self.caption(notes, (0, 0))
 
-    def write_on_screen(self, frame: Frame, sheet: Sheet, title: str, words: Words) -> None:
+    def write_on_screen(
+        self,
+        frame: ground.Frame,
+        sheet: Sheet,
+        title: str,
+        caption: str,
+        notes: Sequence[str],
+        dots: bool,
+    ) -> None:
+        del caption  # the legend says it
         frame.axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
-        self._draw_legend(frame.figure, sheet, words)
+        self._draw_legend(frame.figure, sheet, _sentences(self._notes(notes, dots)), dots)
 
     @property
     def _has_ticks(self) -> bool:
-        return self.space.name in ANGLE_AXES
+        return self.space.unit is not None
 
     @property
     def _orders(self) -> list[int]:
@@ -261,7 +240,7 @@ class Square(Ground):
             fontsize=sheet.small, color=INK,
         )  # fmt: skip
 
-    def _draw_legend(self, figure: Figure, sheet: Sheet, words: Words) -> None:
+    def _draw_legend(self, figure: Figure, sheet: Sheet, notes: str, dots: bool) -> None:
         """Draw a legend of edges, cone points and dots above the notes, in the lower left corner."""
         from matplotlib.lines import Line2D
 
@@ -277,12 +256,11 @@ class Square(Ground):
             style |= {"marker": np.concatenate([sign, sign[:1]]), "markersize": size}
             text = f"cone point of a {TURNS[order]} turn: no flow moves it"
             entries.append(Line2D([], [], color=CENTER_COLOURS[order], label=text, **style))
-        if words.dots:
+        if dots:
             style = {"markerfacecolor": "#ffffff", "markeredgecolor": INK, "linestyle": "none"}
             entries.append(Line2D([], [], marker="o", label="points", **style))
-        notes = _sentences(self._notes(words.notes, words.dots))
-        write_caption(figure, notes, sheet)
-        lines = len(caption_lines(notes, sheet))
+        ground.write_caption(figure, notes, sheet)
+        lines = len(ground.caption_lines(notes, sheet))
         up = (0.6 + 1.25 * lines) * sheet.em / figure.get_size_inches()[1]
         figure.legend(
             handles=entries, loc="lower left", bbox_to_anchor=(0.02, up), ncols=2, frameon=False,

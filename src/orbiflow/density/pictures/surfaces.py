@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -31,21 +31,14 @@ MAX_RESOLUTION = 250
 
 
 class Mesh(NamedTuple):
-    """Triangles of the canonical square.
-
-    - `points`: Chart points (N, 2), float64, the square's edges included.
-    - `triangles`: Indices (M, 3) into them, int64.
-    """
+    """Chart points (N, 2) of the square, edges included, and triangles (M, 3), numbers of points."""
 
     points: Tensor
     triangles: Array
 
 
 def torus_ring(points: Tensor) -> Array:
-    """Return points of a ring.
-
-    They are ((R + r cos 2 pi y) cos 2 pi x, (R + r cos 2 pi y) sin 2 pi x, r sin 2 pi y).
-    """
+    """Return ((R + r cos 2 pi y) cos 2 pi x, (R + r cos 2 pi y) sin 2 pi x, r sin 2 pi y)."""
     u, v = _turns(points)
     radius = RING_RADIUS + TUBE_RADIUS * np.cos(v)
     return np.stack([radius * np.cos(u), radius * np.sin(u), TUBE_RADIUS * np.sin(v)], axis=-1)
@@ -100,9 +93,12 @@ def immersion(space: Space) -> Callable[[Tensor], Array]:
     Raises:
         OrbiflowError: If the space has no surface.
     """
-    if space.name not in _IMMERSIONS or space.dim != 2:
+    if space.dim != 2:
         raise OrbiflowError(f"only spaces of two dimensions have a surface, not {space!r}")
-    return _IMMERSIONS[space.name](space)
+    if isinstance(space, RoundSpace):
+        surface = vector_immersion(space)
+        return lambda points: surface(space.vectors(points))
+    return torus_ring if space.is_torus else klein_figure_eight
 
 
 def vector_immersion(space: Space) -> Callable[[Array], Array]:
@@ -110,31 +106,8 @@ def vector_immersion(space: Space) -> Callable[[Array], Array]:
     return boy_surface if space.name == "projective-plane" else np.asarray
 
 
-def _round_immersion(space: Space) -> Callable[[Tensor], Array]:
-    vectors, surface = cast(RoundSpace, space).vectors, vector_immersion(space)
-    return lambda points: surface(vectors(points))
-
-
-_IMMERSIONS: dict[str, Callable[[Space], Callable[[Tensor], Array]]] = {
-    "torus": lambda _: torus_ring,
-    "klein-bottle": lambda _: klein_figure_eight,
-    "sphere": _round_immersion,
-    "projective-plane": _round_immersion,
-}
-
-
 def mesh(space: Space, resolution: int) -> Mesh:
-    """Return an even grid on the canonical square, cut into 2 resolution^2 triangles.
-
-    The groups take the grid's points on the edges to each other, so the surface closes.
-
-    Args:
-        space: The space.
-        resolution: Cells along an edge, 2 to `MAX_RESOLUTION`.
-
-    Raises:
-        OrbiflowError: If the resolution is not allowed, or the space is not two-dimensional.
-    """
+    """Return an even grid on the canonical square, whose edges a group identifies, in triangles."""
     immersion(space)
     if isinstance(resolution, bool) or not 2 <= resolution <= MAX_RESOLUTION:
         raise OrbiflowError(f"resolution must be 2 to {MAX_RESOLUTION}, got {resolution!r}")
@@ -173,20 +146,14 @@ def edge_pairs(group: CrystallographicGroup) -> list[EdgePair]:
 
 
 def off_cones(points: Tensor, margin: float = 1e-3) -> Tensor:
-    """Move chart points (N, 2) of the square that are within `margin` of a corner inwards by it.
-
-    At the cone points of sphere and projective plane the area factor is 0, and a density 0/0.
-    """
+    """Move chart points (N, 2) within `margin` of a corner inwards: cone points have densities 0/0."""
     inward = 0.5 - points
     near = inward.abs().amin(dim=-1, keepdim=True) > 0.5 - margin
     return torch.where(near, points + margin * inward.sign(), points)
 
 
 def normals(space: Space, points: Tensor) -> Array:
-    """Return unit normals (N, 3) of the immersed surface at points (N, 2) of the square.
-
-    They are continuous over the square, and up to the sign over its edges.
-    """
+    """Return unit normals (N, 3) at points (N, 2) of the square, over its edges up to the sign."""
     surface, step = immersion(space), 1e-4
     if space.is_round:
         points = off_cones(points, 4e-3)
@@ -244,7 +211,14 @@ def viewpoint(space: Space, place: Tensor) -> Viewpoint:
     radius = float(np.linalg.norm(cloud - center, axis=1).max())
     spot = (surface(place[None])[0] - center) / radius
     normal = normals(space, place[None])[0]
-    angles = _candidates(space, spot)
+    if space.name == "sphere":
+        pitch = np.clip([np.arctan2(spot[2], np.hypot(spot[0], spot[1]))], -0.9, 0.9)
+    elif space.is_round:
+        pitch = np.linspace(-1.2, 1.2, 17)
+    else:  # rings are recognised from above or below
+        pitch = np.concatenate([s * np.linspace(0.4, 1.2, 9) for s in (1, -1)])
+    yaw = np.arctan2(spot[1], spot[0]) + np.linspace(0, 2 * np.pi, 36, endpoint=False)
+    angles = np.stack(np.meshgrid(yaw, pitch, indexing="ij"), axis=-1).reshape(-1, 2)
     toward = _directions(angles)
     sight = EYE * toward - spot
     sight /= np.linalg.norm(sight, axis=1, keepdims=True)
@@ -261,30 +235,7 @@ def viewpoint(space: Space, place: Tensor) -> Viewpoint:
     return Viewpoint(*angles[best].tolist(), cut=50 * (1 - depth) if hidden[best] else 0.0)
 
 
-def _candidates(space: Space, spot: Array) -> Array:
-    """Return angles (M, 2) all round, at heights from which the surface is recognised."""
-    yaw = np.arctan2(spot[1], spot[0]) + np.linspace(0, 2 * np.pi, 36, endpoint=False)
-    pitch = _PITCHES[space.name](spot)
-    return np.stack(np.meshgrid(yaw, pitch, indexing="ij"), axis=-1).reshape(-1, 2)
-
-
-_FROM_ABOVE = np.concatenate([s * np.linspace(0.4, 1.2, 9) for s in (1, -1)])
-
-
-def _own_pitch(spot: Array) -> Array:
-    own = float(np.arctan2(spot[2], np.hypot(spot[0], spot[1])))
-    return np.clip([own], -0.9, 0.9)
-
-
-_PITCHES: dict[str, Callable[[Array], Array]] = {
-    "torus": lambda _: _FROM_ABOVE,
-    "klein-bottle": lambda _: _FROM_ABOVE,
-    "sphere": _own_pitch,
-    "projective-plane": lambda _: np.linspace(-1.2, 1.2, 17),
-}
-"""Pitches that are tried for a place on the surface, by the name of the space."""
-
-
 def _directions(angles: Array) -> Array:
+    """Return unit vectors (M, 3) of yaws and pitches (M, 2)."""
     yaw, pitch = angles.T
     return np.stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)], -1)

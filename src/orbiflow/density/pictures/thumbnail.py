@@ -19,10 +19,8 @@ from PIL import Image, ImageDraw
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, midpoints
 from orbiflow.density.pictures.axes import view_of
-from orbiflow.density.pictures.map_choice import chosen_map
-from orbiflow.density.pictures.maps import pixels_of
-from orbiflow.density.pictures.scale import DARK_SHARE, Shade, dark_share, shading
-from orbiflow.density.pictures.values import density_on_grid, density_on_map
+from orbiflow.density.pictures.colours import density_on_grid, density_on_map, shading
+from orbiflow.density.pictures.maps import chosen_map, pixels_of
 from orbiflow.density.spaces import RoundSpace, to_vectors
 
 SIZE = (360, 240)
@@ -79,16 +77,12 @@ def _coloured(places: Array) -> Image.Image:
     return Image.fromarray((255 * shades + 0.5).astype(np.uint8), "RGB")
 
 
-def _shade(values: Array, areas: Array) -> Shade:
-    return shading(values, areas, log=dark_share(values, areas) > DARK_SHARE)
-
-
 def _square(density: Density) -> Image.Image:
     space, view = density.space, view_of(density.space)
     middles = (torch.arange(COARSE, dtype=torch.float64) + 0.5) / COARSE
     values = density_on_grid(density, middles + view.low[0], middles + view.low[1], "natural")
     areas = space.log_area(midpoints(space, COARSE)).exp().numpy().reshape(COARSE, COARSE)
-    picture = _coloured(_shade(values, areas).places(values).T[::-1])
+    picture = _coloured(shading(values, areas, log=None).places(values).T[::-1])
     return picture.resize((SIZE[1], SIZE[1]), Image.Resampling.BICUBIC)
 
 
@@ -99,7 +93,7 @@ def _map(density: Density, data: Array) -> Image.Image:
     pixels = pixels_of(projection, MAP_PLACES)
     points = space.vectors_to_chart(to_vectors(pixels.latlon))
     values = density_on_map(density, points, "natural", pixels.angle)
-    shade = _shade(values[pixels.within], pixels.areas[pixels.within])
+    shade = shading(values[pixels.within], pixels.areas[pixels.within], log=None)
     places = pixels.table(shade.places(values), 0.0)
     left, right, below, above = pixels.extent
     scale = min((SIZE[0] - MARGIN) / (right - left), (SIZE[1] - MARGIN) / (above - below))

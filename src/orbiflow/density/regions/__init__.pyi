@@ -1,5 +1,9 @@
 from .boundaries import Outline as Outline
 from .boundaries import outlines as outlines
+from .boundaries import outlines_csv as outlines_csv
+from .boundaries import regions_document as regions_document
+from .boundaries import size_unit as size_unit
+from .boundaries import to_geojson as to_geojson
 from .levels import DensityLevels as DensityLevels
 from .levels import DensityRegion as DensityRegion
 from .levels import highest_density_region as highest_density_region
@@ -8,7 +12,3 @@ from .settings import RegionSettings as RegionSettings
 from .settings import SampleCount as SampleCount
 from .settings import resolvable_masses as resolvable_masses
 from .settings import samples_for as samples_for
-from .writing import outlines_csv as outlines_csv
-from .writing import regions_document as regions_document
-from .writing import size_unit as size_unit
-from .writing import to_geojson as to_geojson

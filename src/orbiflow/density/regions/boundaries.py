@@ -1,8 +1,8 @@
-"""The boundaries of regions in two dimensions, as closed polygons."""
+"""The boundaries of regions in two dimensions: polygons in a window, as GeoJSON, CSV and JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,13 +13,12 @@ from shapely.geometry.polygon import orient
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.arguments import silent
+from orbiflow.batch import csv_bytes
 from orbiflow.density.models import Density
-from orbiflow.density.regions.contours import filled
-from orbiflow.density.regions.grid import LevelGrid, Seeds
-from orbiflow.density.regions.islands import with_islands
+from orbiflow.density.regions.grid import LevelGrid, Seeds, filled, with_islands
 from orbiflow.density.regions.levels import DensityLevels, DensityRegion
-from orbiflow.density.regions.windows import Window, window_of
+from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors, whole_turn
+from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import unique
 
@@ -100,7 +99,7 @@ def outlines(
     *,
     budget: int = BUDGET,
     seed: int = 0,
-    told: Callable[[float, str], None] = silent,
+    told: Callable[[float, str], None] = lambda _share, _what: None,
 ) -> list[Outline]:
     """Return the boundaries of regions of one density of two dimensions.
 
@@ -135,7 +134,7 @@ def outlines(
         np.concatenate([window.from_chart(levels.points), peaks]),
         np.concatenate([levels.log_probs, function(peaks)]),
     )
-    grid = LevelGrid.refined(
+    grid = LevelGrid(
         function, window.low, window.high, window.cells, thresholds, seeds, DOUBLINGS, budget
     )
     spent = grid.evaluations + len(peaks)
@@ -146,23 +145,14 @@ def outlines(
         told(min(0.9, spent / budget), "drawing outlines")
         shape, off = filled(grid.values, grid.low, grid.step, region.log_prob, function)
         left = (budget - spent) // (len(regions) - number)
-        shape, more, missed = with_islands(shape, grid, region.log_prob, seeds, function, left)
+        shape, more, missed = with_islands(shape, grid, region.log_prob, left)
         spent += more
         shape = _polygons(shape, float(grid.step.min()), MAX_SIDE if window.on_globe else np.inf)
-        inside = _share_inside(shape, fresh)
+        shapely.prepare(shape)
+        inside = float(np.mean(shapely.intersects_xy(shape, fresh[:, 0], fresh[:, 1])))
         error = float(np.sqrt(max(inside * (1 - inside), 1 / CHECKED) / CHECKED))
-        found.append(
-            Outline(
-                region,
-                window,
-                shape,
-                window.area(shape),
-                inside,
-                error,
-                off,
-                _notes(region, inside, error, missed),
-            )
-        )
+        size, notes = window.area(shape), _notes(region, inside, error, missed)
+        found.append(Outline(region, window, shape, size, inside, error, off, notes))
     return found
 
 
@@ -185,15 +175,6 @@ def _polygons(shape: shapely.Geometry, step: float, longest: float) -> shapely.M
     return shapely.MultiPolygon(kept)
 
 
-def _share_inside(shape: shapely.MultiPolygon, points: Array) -> float:
-    """Return the share of points (N, 2) in the polygons."""
-    if shape.is_empty:
-        return 0.0
-    tree = shapely.STRtree(list(shape.geoms))
-    rows, _ = tree.query(shapely.points(points), predicate="intersects")
-    return len(np.unique(rows)) / len(points)
-
-
 def _notes(region: DensityRegion, inside: float, error: float, missed: int) -> tuple[str, ...]:
     notes: list[str] = []
     beyond = abs(inside - region.held) - 3 * float(np.hypot(error, region.error))
@@ -205,3 +186,176 @@ def _notes(region: DensityRegion, inside: float, error: float, missed: int) -> t
     if missed:
         notes.append(f"{missed} islands or holes were not outlined: a larger budget would")
     return tuple(notes)
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """A rectangle that holds each point of a space once, except on its edges.
+
+    - `names`: Names of x and y. `low`, `high`: Corners (2,) in data units.
+    - `cells`: Numbers of cells of the coarsest grid.
+    - `edges`: Which edges are one, and so where regions are cut, in words.
+    - `on_globe`: Whether x and y are longitude and latitude.
+    - `to_chart`, `from_chart`: Functions from points (N, 2) of the rectangle to chart points and back.
+    """
+
+    names: tuple[str, str]
+    low: Array
+    high: Array
+    cells: tuple[int, int]
+    edges: str
+    on_globe: bool
+    to_chart: Callable[[Array], Tensor]
+    from_chart: Callable[[Tensor], Array]
+
+    def area(self, shape: shapely.MultiPolygon) -> float:
+        """Return the natural area; on the globe, of sides straight in longitude and latitude."""
+        if not self.on_globe:
+            return shape.area
+        return sum(map(_steradians, shape.geoms))
+
+
+def window_of(space: Space) -> Window:
+    """Return the window in which regions of a space are drawn."""
+    if space.dim != 2:
+        raise OrbiflowError(
+            f"outlines are drawn in two dimensions, this {space.name} has {space.dim}; thresholds, "
+            "sizes and which rows are inside can be found all the same"
+        )
+    if isinstance(space, RoundSpace):
+        return _round(space)
+    return _flat(space)
+
+
+def _round(space: RoundSpace) -> Window:
+    def to_chart(points: Array) -> Tensor:
+        return space.vectors_to_chart(to_vectors(points[:, ::-1]))
+
+    def from_chart(points: Tensor) -> Array:
+        data = space.from_chart(points)
+        return (to_latlon(data) if data.shape[1] == 3 else data)[:, ::-1]
+
+    half = len(space.features(to_chart(np.zeros((1, 2))))) > 1
+    edges = "longitude -180 is longitude 180"
+    if half:
+        edges += "; on the equator, a point is that opposite; polygons are of northern ends"
+    low, high = np.array([-180.0, 0.0 if half else -90.0]), np.array([180.0, 90.0])
+    cells = (180, 45 if half else 90)
+    return Window(("lon", "lat"), low, high, cells, edges, True, to_chart, from_chart)
+
+
+def _flat(space: Space) -> Window:
+    period = whole_turn(str(space.unit))
+    if space.is_torus:
+        low = np.full(2, -period / 2)
+        high, edges = -low, "opposite edges are one"
+    else:
+        low, high = np.array([0.0, -period / 4]), np.array([period / 2, 3 * period / 4])
+        theta, phi = space.columns
+        edges = f"{theta} 0 is {theta} {period / 2:g} with {phi} turned over; the others are one"
+    names, cells = (space.columns[0], space.columns[1]), (128, 128)
+    return Window(names, low, high, cells, edges, False, space.to_chart, space.from_chart)
+
+
+def _steradians(polygon: shapely.Polygon) -> float:
+    """Return the area of a polygon: integrals of sin(lat) dlon, exact for straight sides."""
+    areas: list[float] = []
+    for ring in (polygon.exterior, *polygon.interiors):
+        lon, lat = np.radians(np.asarray(ring.coords).T)
+        half = np.diff(lat) / 2
+        mean = np.sin(lat[:-1] + half) * np.sinc(half / np.pi)
+        areas.append(abs(float((mean * np.diff(lon)).sum())))
+    return areas[0] - sum(areas[1:])
+
+
+DIGITS = 7
+"""Digits after the point of degrees in GeoJSON: a centimetre on the ground."""
+
+
+def to_geojson(outlines: Sequence[Outline]) -> dict[str, Any]:
+    """Return a FeatureCollection with a MultiPolygon for each region, for `json.dumps`.
+
+    Coordinates are longitude and latitude in degrees, outer rings counter-clockwise (RFC 7946, 3.1.6);
+    polygons are cut at the antimeridian (3.1.9), and one that holds a pole runs along the edge of the
+    map there. Sides are straight in longitude and latitude (3.1.1). Axes are drawn at their northern
+    ends.
+
+    The properties of each are `mass` (asked for, or null), `held` and `held_error` (from samples of
+    the density), `log_prob` (the threshold, nats per steradian) and its interval of 95 %, `area` in
+    steradians, `fraction` of the space, `polygons_mass` and `polygons_mass_error` (from new samples
+    inside the polygons).
+
+    Raises:
+        OrbiflowError: If the space is not round.
+    """
+    features: list[dict[str, Any]] = []
+    for outline in outlines:
+        region = outline.region
+        if not outline.window.on_globe:
+            raise OrbiflowError(
+                "GeoJSON is for places on a globe, not for the angles of a "
+                f"{region.density.space.name}: write .json or .csv"
+            )
+        found = region.to_json()
+        names = ("mass", "held", "log_prob", "log_prob_low", "log_prob_high")
+        properties = {
+            **{name: found[name] for name in names},
+            "held_error": region.error,
+            "area": outline.size,
+            "fraction": outline.fraction,
+            "polygons_mass": outline.mass,
+            "polygons_mass_error": outline.error,
+        }
+        rings = [[np.round(ring, DIGITS).tolist() for ring in rings] for rings in outline.rings()]
+        geometry = {"type": "MultiPolygon", "coordinates": rings}
+        features.append({"type": "Feature", "properties": properties, "geometry": geometry})
+    return {"type": "FeatureCollection", "features": features}
+
+
+def outlines_csv(outlines: Sequence[Outline]) -> bytes:
+    """Return CSV text with a row for each vertex of the outlines of one density's regions."""
+    heads = ["region", "mass", "log_prob", "polygon", "ring", *outlines[0].window.names]
+    return csv_bytes(heads, _vertices(outlines))
+
+
+def _vertices(outlines: Sequence[Outline]) -> Iterator[list[Any]]:
+    for number, outline in enumerate(outlines, 1):
+        mass = "" if outline.region.mass is None else f"{outline.region.mass:g}"
+        level = f"{outline.region.log_prob:.10g}"
+        for polygon, rings in enumerate(outline.rings(), 1):
+            for ring, points in enumerate(rings):
+                for x, y in points:
+                    yield [number, mass, level, polygon, ring, f"{x:.10g}", f"{y:.10g}"]
+
+
+def regions_document(
+    regions: Sequence[DensityRegion], outlines: Sequence[Outline], *, samples: int, seed: int
+) -> dict[str, Any]:
+    """Return one density's regions, with their outlines if there are any, for `json.dumps`."""
+    space = regions[0].density.space
+    document: dict[str, Any] = {
+        "kind": "regions",
+        "space": {"name": space.name, **space.settings()},
+        "size_unit": size_unit(space),
+        "samples": samples,
+        "seed": seed,
+    }
+    if outlines:
+        window = outlines[0].window
+        document["axes"] = list(window.names)
+        document["window"] = [window.low.tolist(), window.high.tolist()]
+        document["edges"] = window.edges
+    document["regions"] = [one.to_json() for one in outlines or regions]
+    return document
+
+
+def size_unit(space: Space) -> str:
+    """Return the unit of sizes in a space's natural measure.
+
+    >>> from orbiflow.density import Torus
+    >>> size_unit(Torus(2, unit="degrees"))
+    'degrees^2'
+    """
+    if space.is_round:
+        return "steradians"
+    return str(space.unit) if space.dim == 1 else f"{space.unit}^{space.dim}"

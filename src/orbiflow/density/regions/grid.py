@@ -1,4 +1,4 @@
-"""A grid of a function's values that is fine only where the function crosses certain levels."""
+"""Where a function is at least a level: a grid that is fine there, and polygons with their islands."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
+from skimage.measure import find_contours
 
 from orbiflow.arrays import Array
 
@@ -27,59 +29,16 @@ class Seeds:
     values: Array
 
 
-@dataclass(frozen=True, eq=False)
 class LevelGrid:
     """Values (n + 1, m + 1) at the nodes of n x m even cells between `low` and `high`.
 
-    Values are exact at both ends of every side of a cell whose ends are on different sides of a level;
-    elsewhere they are interpolated from coarser cells.
+    They are evaluated everywhere on `cells`, which are then halved, `doublings` times or until `budget`
+    evaluations, where a level is crossed. Values are exact at both ends of every side of a cell whose
+    ends are on different sides of one of the levels (T,); elsewhere they are interpolated from coarser
+    cells.
 
-    - `low`, `step`: The lower corner, and the sides of a cell.
-    - `missed`: For each cell and level (n, m, T) how many seeds are on the other side of the level than
-      all nodes of the cell.
     - `evaluations`: Number of evaluations of the function.
     """
-
-    low: Array
-    step: Array
-    values: Array
-    missed: NDArray[np.int64]
-    evaluations: int
-
-    @classmethod
-    def refined(
-        cls,
-        function: Function,
-        low: Array,
-        high: Array,
-        cells: tuple[int, int],
-        levels: Array,
-        seeds: Seeds,
-        doublings: int,
-        budget: int,
-    ) -> LevelGrid:
-        """Evaluate everywhere on `cells`, then halve them where a level is crossed.
-
-        Args:
-            function: The function.
-            low: Lower corner of the grid.
-            high: Upper corner of the grid.
-            cells: Numbers of cells along both sides, at first.
-            levels: The levels (T,).
-            seeds: Points at which the function is known.
-            doublings: How often cells are halved at most.
-            budget: Number of evaluations after which they are not halved again.
-        """
-        maker = _Maker(function, low, high, cells, levels, seeds)
-        for _ in range(doublings):
-            if maker.evaluations >= budget:
-                break
-            maker.double()
-        return cls(low, maker.step, maker.values, maker.missed(), maker.evaluations)
-
-
-class _Maker:
-    """A grid that is being refined."""
 
     def __init__(
         self,
@@ -89,6 +48,8 @@ class _Maker:
         cells: tuple[int, int],
         levels: Array,
         seeds: Seeds,
+        doublings: int,
+        budget: int,
     ) -> None:
         self.function, self.low, self.high = function, low, high
         self.levels, self.seeds = levels, seeds
@@ -96,33 +57,40 @@ class _Maker:
         self.known = np.zeros(self.values.shape, dtype=bool)
         self.evaluations = 0
         self._evaluate(~self.known)
+        for _ in range(doublings):
+            if self.evaluations >= budget:
+                break
+            self._double()
 
     @property
     def step(self) -> Array:
+        """The sides of a cell."""
         return (self.high - self.low) / (np.array(self.values.shape) - 1)
 
-    def double(self) -> None:
+    def _double(self) -> None:
         """Halve the cells, and evaluate around crossings and where seeds were missed."""
-        wanted = (self.missed() > 0).any(axis=2)
-        self.values, self.known = _doubled(self.values), _spread(self.known)
+        wanted = self._missed()
+        known = np.zeros(2 * np.array(self.known.shape) - 1, dtype=bool)
+        known[::2, ::2] = self.known
+        self.values, self.known = _doubled(self.values), known
         self._evaluate(_corners(np.repeat(np.repeat(wanted, 2, axis=0), 2, axis=1)))
         for _ in range(MAX_ROUNDS):
             if not self._evaluate(_corners(self._mixed())):
                 return
 
-    def missed(self) -> NDArray[np.int64]:
-        """Return for each cell and level (n, m, T) how many seeds are on the other side."""
-        shape = np.array(self.values.shape) - 1
-        cell = np.clip(
-            np.floor((self.seeds.points - self.low) / self.step).astype(int), 0, shape - 1
-        )
-        found = np.zeros((*shape, len(self.levels)), dtype=np.int64)
-        for k, level in enumerate(self.levels):
+    def cells_of(self, points: Array) -> NDArray[np.int64]:
+        """Return the cells (N, 2) that hold points (N, 2)."""
+        most = np.array(self.values.shape) - 2
+        return np.clip(np.floor((points - self.low) / self.step).astype(np.int64), 0, most)
+
+    def _missed(self) -> Flags:
+        """Return the cells (n, m) with a seed on the other side of a level than all their nodes."""
+        i, j = self.cells_of(self.seeds.points).T
+        found = np.zeros(np.array(self.values.shape) - 1, dtype=bool)
+        for level in self.levels:
             least, most = _extremes(self.values >= level)
-            above = self.seeds.values >= level
-            i, j = cell.T
-            lost = np.where(above, ~most[i, j], least[i, j])
-            np.add.at(found[:, :, k], (i[lost], j[lost]), 1)
+            lost = np.where(self.seeds.values >= level, ~most[i, j], least[i, j])
+            found[i[lost], j[lost]] = True
         return found
 
     def _mixed(self) -> Flags:
@@ -168,7 +136,161 @@ def _doubled(values: Array) -> Array:
     return found
 
 
-def _spread(known: Flags) -> Flags:
-    found = np.zeros(2 * np.array(known.shape) - 1, dtype=bool)
-    found[::2, ::2] = known
-    return found
+PARTS = 12
+"""Parts into which each side of a cell is cut."""
+
+ISLAND_ROUNDS = 4
+"""Rounds of following an island into neighbouring cells."""
+
+MIN_WRONG_PARTS = 2
+"""Parts of a cell's side on which the grid must be wrong for the neighbour to be drawn, too."""
+
+BLOCK = 500
+"""Cells evaluated at a time."""
+
+
+def with_islands(
+    shape: shapely.Geometry, grid: LevelGrid, level: float, budget: int
+) -> tuple[shapely.Geometry, int, int]:
+    """Draw a shape again in those of a grid's cells that have seeds on its wrong side.
+
+    Cells with the most seeds are first; those beyond the budget of evaluations are left as they are.
+
+    Returns:
+        The shape, the number of evaluations, and the number of cells left.
+    """
+    most = max(1, budget // (PARTS + 1) ** 2)
+    cells = _wrong(shape, grid, level)
+    left = max(0, len(cells) - most)
+    done = np.zeros(np.array(grid.values.shape) - 1, dtype=bool)
+    drawn: list[shapely.Geometry] = []
+    for _ in range(ISLAND_ROUNDS):
+        cells = cells[: most - len(drawn)]
+        if not len(cells):
+            break
+        done[tuple(cells.T)] = True
+        blocks, fine = _evaluated(grid, cells), grid.step / PARTS
+        drawn += [
+            filled(block, grid.low + cell * grid.step, fine, level, grid.function)[0]
+            for cell, block in zip(cells, blocks, strict=True)
+        ]
+        cells = _beside(cells, blocks, level, done)
+    if not drawn:
+        return shape, 0, left
+    lows = grid.low + np.argwhere(done) * grid.step
+    corners = np.concatenate([lows, lows + grid.step], axis=1).tolist()
+    boxes: list[shapely.Geometry] = [shapely.box(*corner) for corner in corners]
+    merged = shapely.union_all([shapely.difference(shape, shapely.union_all(boxes)), *drawn])
+    return merged, len(drawn) * (PARTS + 1) ** 2, left
+
+
+def _wrong(shape: shapely.Geometry, grid: LevelGrid, level: float) -> NDArray[np.int64]:
+    """Return cells (C, 2) with seeds on the wrong side, those with most first."""
+    shapely.prepare(shape)
+    points, values = grid.seeds.points, grid.seeds.values
+    inside = np.asarray(shapely.intersects_xy(shape, points[:, 0], points[:, 1]))
+    wrong = inside != (values >= level)
+    cells, counts = np.unique(grid.cells_of(points[wrong]), axis=0, return_counts=True)
+    return cells[np.argsort(-counts, kind="stable")]
+
+
+def _evaluated(grid: LevelGrid, cells: NDArray[np.int64]) -> Array:
+    """Return values (C, P + 1, P + 1) in cells (C, 2)."""
+    t = np.arange(PARTS + 1) / PARTS
+    inside = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1)
+    found: list[Array] = []
+    for start in range(0, len(cells), BLOCK):
+        at = cells[start : start + BLOCK, None, None] + inside
+        values = grid.function((grid.low + at * grid.step).reshape(-1, 2))
+        found.append(values.reshape(at.shape[:-1]))
+    return np.concatenate(found)
+
+
+def _beside(
+    cells: NDArray[np.int64], blocks: Array, level: float, done: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Return neighbours of cells on whose common side the grid is wrong."""
+    t = np.arange(PARTS + 1) / PARTS
+    sides = (
+        ((-1, 0), blocks[:, 0]),
+        ((1, 0), blocks[:, -1]),
+        ((0, -1), blocks[:, :, 0]),
+        ((0, 1), blocks[:, :, -1]),
+    )
+    found: list[Array] = []
+    for move, side in sides:
+        drawn = side[:, :1] + t * (side[:, -1:] - side[:, :1])
+        off = ((side >= level) != (drawn >= level)).sum(axis=1) >= MIN_WRONG_PARTS
+        to = cells + move
+        fits = (to >= 0).all(axis=1) & (to < done.shape).all(axis=1) & off
+        found.append(to[fits][~done[tuple(to[fits].T)]])
+    return np.unique(np.concatenate(found), axis=0)
+
+
+TOLERANCE = 1e-3
+"""Difference between the function at a vertex and the level that is good enough."""
+
+MAX_STEPS = 8
+"""Steps in which a vertex is found, at most."""
+
+FAR_BELOW = 1e12
+
+
+def filled(
+    values: Array, low: Array, step: Array, level: float, function: Function
+) -> tuple[shapely.Geometry, float]:
+    """Return the area in which values (n + 1, m + 1) at the nodes of a grid are at least `level`.
+
+    It is cut at the grid's border. Vertices lie on sides of cells, moved along them to where `function`
+    is at the level; second comes the root mean square of the difference that is left inside.
+    """
+    padded = np.pad(values, 1, constant_values=level - FAR_BELOW)
+    rings = [ring - 1 for ring in find_contours(padded, level)]
+    if not rings:
+        return shapely.MultiPolygon(), 0.0
+    sizes = np.cumsum([len(ring) for ring in rings])[:-1]
+    at, off = _on_level(np.concatenate(rings), values, low, step, level, function)
+    lines = [np.concatenate([ring[:-1], ring[:1]]) for ring in np.split(low + at * step, sizes)]
+    closed = [shapely.LinearRing(line) for line in lines if len(np.unique(line, axis=0)) > 2]
+    if not closed:
+        return shapely.MultiPolygon(), off
+    return shapely.make_valid(shapely.build_area(shapely.GeometryCollection(closed))), off
+
+
+def _on_level(
+    at: Array, values: Array, low: Array, step: Array, level: float, function: Function
+) -> tuple[Array, float]:
+    """Return vertices (V, 2), in cells, by false position between nodes (the Illinois algorithm)."""
+    most = np.array(values.shape) - 1
+    inside = ((at >= 0) & (at <= most)).all(axis=1)
+    at = np.clip(at, 0, most)
+    start, end = np.floor(at), np.ceil(at)
+    inside &= (start != end).any(axis=1)  # else it lies on a node
+    rows = np.flatnonzero(inside)
+    if not len(rows):
+        return at, 0.0
+    a, b = start[rows], end[rows]
+    fa, fb = (values[tuple(p.astype(int).T)] - level for p in (a, b))
+    off = np.full(len(rows), np.inf)
+    found = at[rows]
+    todo, last = np.arange(len(rows)), np.zeros(len(rows))
+    for _ in range(MAX_STEPS):
+        width = fb[todo] - fa[todo]
+        share = np.clip(-fa[todo] / np.where(width == 0, 1.0, width), 0.0, 1.0)
+        here = a[todo] + share[:, None] * (b[todo] - a[todo])
+        f = function(low + here * step) - level
+        better = abs(f) < abs(off[todo])
+        found[todo[better]], off[todo[better]] = here[better], f[better]
+        same = (f >= 0) == (fa[todo] >= 0)
+        # an end that stays twice counts half
+        side = np.where(same, 1, -1)
+        again = np.where(last[todo] == side, 0.5, 1.0)
+        last[todo] = side
+        left, right = todo[same], todo[~same]
+        a[left], fa[left], fb[left] = here[same], f[same], fb[left] * again[same]
+        b[right], fb[right], fa[right] = here[~same], f[~same], fa[right] * again[~same]
+        todo = todo[abs(off[todo]) > TOLERANCE]
+        if not len(todo):
+            break
+    at[rows] = found
+    return at, float(np.sqrt(np.mean(off**2)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -64,11 +64,8 @@ class DensityRegion:
 
     def to_json(self) -> dict[str, Any]:
         """Return an object for `json.dumps`."""
-        names = (
-            "mass", "held", "error", "log_prob", "log_prob_low", "log_prob_high", "size",
-            "size_error", "fraction",
-        )  # fmt: skip
-        return {name: getattr(self, name) for name in names}
+        names = [field.name for field in fields(self) if field.name != "density"]
+        return {name: getattr(self, name) for name in (*names, "fraction")}
 
 
 class DensityLevels:
@@ -134,13 +131,10 @@ class DensityLevels:
         # if it is none or all, one more sample might have said otherwise
         error = math.sqrt(max(held * (1 - held), 1 / count) / count)
         spread = 0.0 if mass is None else SIGMAS_95 * math.sqrt(mass * (1 - mass) / count)
-        ends = (level, level)
+        low = high = level
         if mass is not None:
-            ends = tuple(self._threshold(min(1.0, max(0.0, mass + s))) for s in (spread, -spread))
-        size, size_error = self._size(level)
-        return DensityRegion(
-            self.density, mass, held, error, level, ends[0], ends[1], size, size_error
-        )
+            low, high = (self._threshold(min(1.0, max(0.0, mass + s))) for s in (spread, -spread))
+        return DensityRegion(self.density, mass, held, error, level, low, high, *self._size(level))
 
     def _size(self, level: float) -> tuple[float, float]:
         """Return the natural measure above a level, and its standard error.

@@ -122,8 +122,5 @@ def resolvable_masses(samples: int) -> tuple[float, float]:
 
 
 def _count(expected: int, share: float) -> int:
-    """Return the number of samples of which so many are expected in a share.
-
-    1 - 0.9995 is not 0.0005 to the last digit.
-    """
-    return math.ceil(expected / share * (1 - 1e-9))
+    """Return the number of samples of which so many are expected in a share."""
+    return math.ceil(expected / share * (1 - 1e-9))  # 1 - 0.9995 is not 0.0005 to the last digit

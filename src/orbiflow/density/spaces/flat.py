@@ -23,24 +23,15 @@ MAX_DIM = 64
 
 
 def whole_turn(unit: str) -> float:
-    """Return a whole turn in a unit.
-
-    Raises:
-        OrbiflowError: If the unit is unknown.
-    """
+    """Return a whole turn in a unit."""
     return TURN[as_choice(unit, tuple(TURN), "unit")]
 
 
 @lru_cache(maxsize=16)
-def _integer_lattice(dim: int) -> CrystallographicGroup:
+def _group(name: str, dim: int = 2) -> CrystallographicGroup:
     if dim == 2:
-        return identification_group("torus")
+        return identification_group(name)
     return CrystallographicGroup.generate(np.eye(dim), name="p1")
-
-
-@lru_cache(maxsize=1)
-def _klein_group() -> CrystallographicGroup:
-    return identification_group("klein-bottle")
 
 
 class Torus(Space):
@@ -61,7 +52,7 @@ class Torus(Space):
         dim = as_whole(dim, "dim", 1, MAX_DIM)
         self.period = whole_turn(unit)
         self.unit = unit
-        self.group = _integer_lattice(dim)
+        self.group = _group("torus", dim)
         self.columns = tuple(f"angle{k + 1}" for k in range(dim))
 
     @classmethod
@@ -128,7 +119,7 @@ class KleinBottle(Space):
     def __init__(self, *, unit: str = "radians") -> None:
         self.period = whole_turn(unit)
         self.unit = unit
-        self.group = _klein_group()
+        self.group = _group("klein-bottle")
 
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:

@@ -108,10 +108,6 @@ def from_klein(angles: ArrayLike, *, unit: str = "radians") -> Array:
 def klein_patch(theta: ArrayLike, phi: ArrayLike) -> Array:
     """Return K(theta, phi) (..., 9), pixels row by row, of mean 0 and contrast norm 1.
 
-    Args:
-        theta: First angle in radians.
-        phi: Second angle in radians, of a shape that broadcasts.
-
     >>> klein_patch(0.0, -np.pi / 2).reshape(3, 3).round(3).tolist()[0]
     [-0.136, 0.272, -0.136]
     """
@@ -121,20 +117,12 @@ def klein_patch(theta: ArrayLike, phi: ArrayLike) -> Array:
 
 
 def dct_to_pixels(coordinates: ArrayLike) -> Array:
-    """Return patches (N, 9) of mean 0, row by row from the top left, from DCT coordinates (N, 8).
-
-    Raises:
-        OrbiflowError: If the shape is another one, or a value is not finite.
-    """
+    """Return patches (N, 9) of mean 0, row by row from the top left, from DCT coordinates (N, 8)."""
     return checked_table(coordinates, (8,), "DCT coordinates of patches") @ DCT_BASIS.T
 
 
 def pixels_to_dct(patches: ArrayLike) -> Array:
-    """Return DCT coordinates (N, 8) of patches (N, 9), whose length is the contrast norm.
-
-    Raises:
-        OrbiflowError: If the shape is another one, or a value is not finite.
-    """
+    """Return DCT coordinates (N, 8) of patches (N, 9), whose length is the contrast norm."""
     # the basis is orthogonal in the plain product, too
     dual = DCT_BASIS / (DCT_BASIS**2).sum(axis=0)
     return checked_table(patches, (9,), "patches of 3 x 3 pixels") @ dual

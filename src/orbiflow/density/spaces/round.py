@@ -101,6 +101,10 @@ class RoundSpace(Space):
         self.rotation = turn
         self.group = _group(self.name)
 
+    @property
+    def volume(self) -> float:
+        return self.power * math.pi
+
     def log_area(self, points: Tensor) -> Tensor:
         return uniformization.log_area(points, self.power)
 
@@ -129,28 +133,24 @@ class RoundSpace(Space):
 
     def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
         """Return gradients as any space does; at cone points, where there is none, NaN."""
-        own = to_vectors(data)
+        vectors = to_vectors(data)
         with torch.enable_grad():
             at = points.detach().clone().requires_grad_()
             found = self.unit_vectors(at)
-            rows = [
-                torch.autograd.grad(found[:, k].sum(), at, retain_graph=k < 2)[0] for k in range(3)
-            ]
+            rows = [torch.autograd.grad(own.sum(), at, retain_graph=True)[0] for own in found.mT]
         # conformal: the transpose over the squared scale is the inverse
         jacobian = torch.stack(rows, dim=1)
         scale = (jacobian**2).sum(dim=(1, 2)) / 2
         slope = (torch.einsum("nkd,nd->nk", jacobian, gradient) / scale[:, None]).numpy()
         # the chart may have the other end of an axis
-        slope *= np.sign((own * found.detach().numpy()).sum(axis=1, keepdims=True))
+        slope *= np.sign((vectors * found.detach().numpy()).sum(axis=1, keepdims=True))
         if np.shape(data)[1] == 3:
             return slope
         lat, lon = np.radians(np.asarray(data, dtype=np.float64).T)
-        north = np.stack(
-            [-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)], axis=-1
-        )
-        east = np.stack([-np.sin(lon), np.cos(lon), np.zeros_like(lon)], axis=-1)
-        east *= np.cos(lat)[:, None]
-        per_degree = [(slope * direction).sum(axis=1) for direction in (north, east)]
+        sin, cos = np.sin(lat), np.cos(lat)
+        north = [-sin * np.cos(lon), -sin * np.sin(lon), cos]
+        east = [-cos * np.sin(lon), cos * np.cos(lon), 0 * lon]
+        per_degree = [(slope * np.stack(way, axis=-1)).sum(axis=1) for way in (north, east)]
         return np.radians(np.stack(per_degree, axis=-1))
 
     def from_chart(self, points: Tensor) -> Array:
@@ -159,9 +159,8 @@ class RoundSpace(Space):
 
     def uniform(self, count: int, generator: torch.Generator) -> Tensor:
         vectors = torch.randn(count, 3, dtype=torch.float64, generator=generator)
-        return self.vectors_to_chart(
-            (vectors / linalg.vector_norm(vectors, dim=1, keepdim=True)).numpy()
-        )
+        vectors = vectors / linalg.vector_norm(vectors, dim=1, keepdim=True)
+        return self.vectors_to_chart(vectors.numpy())
 
     def cone_vectors(self) -> Array:
         """Return unit vectors of the chart's cone points, in the data's frame."""
@@ -198,10 +197,6 @@ class Sphere(RoundSpace):
     name = "sphere"
     power = 4
 
-    @property
-    def volume(self) -> float:
-        return 4 * math.pi
-
 
 class ProjectivePlane(RoundSpace):
     """The projective plane of axes, which are directions without a sense; densities are per steradian.
@@ -215,10 +210,6 @@ class ProjectivePlane(RoundSpace):
 
     name = "projective-plane"
     power = 2
-
-    @property
-    def volume(self) -> float:
-        return 2 * math.pi
 
     def features(self, points: Tensor) -> Tensor:
         vectors = self.unit_vectors(points)

@@ -212,20 +212,12 @@ class Space(ABC):
 
 
 def check_measure(measure: str) -> None:
-    """Check that a measure is one of `MEASURES`.
-
-    Raises:
-        OrbiflowError: If it is not.
-    """
+    """Check that a measure is one of `MEASURES`."""
     as_choice(measure, MEASURES, "measure")
 
 
 def rectangle(space: Space) -> Tensor:
-    """Return the lengths (d,) of the sides of the lattice's rectangle, in sides of the square.
-
-    Raises:
-        OrbiflowError: If the lattice is not rectangular.
-    """
+    """Return the lengths (d,) of the sides of the lattice's rectangle, in sides of the square."""
     lattice = space.group.lattice
     sides = np.diag(lattice)
     if not np.allclose(lattice, np.diag(sides)):
@@ -243,16 +235,7 @@ def row_count(count: int) -> str:
 
 
 def checked_table(data: ArrayLike, widths: tuple[int, ...], what: str) -> Array:
-    """Return data as a finite float64 array (N, k).
-
-    Args:
-        data: The data.
-        widths: The numbers k of columns that are allowed.
-        what: What the data are, for messages.
-
-    Raises:
-        OrbiflowError: If the shape is another one, or a value is not finite; it names the first row.
-    """
+    """Return data as a finite float64 array (N, k)."""
     try:
         table = np.asarray(data, dtype=np.float64)
     except (TypeError, ValueError) as error:

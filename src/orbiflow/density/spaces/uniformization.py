@@ -31,9 +31,6 @@ TERMS = 4
 def thetas(z: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Return theta_1, ..., theta_4 at v = pi z / 2.
 
-    Args:
-        z: Complex numbers with |Im z| <= 1, for which so many terms give rounding accuracy.
-
     Reference: DLMF 20.2(i), https://dlmf.nist.gov/20.2.
     """
     v = z * (math.pi / 2)
@@ -59,13 +56,7 @@ TINY = 1e-30
 
 
 def to_sphere(points: Tensor, power: int) -> Tensor:
-    """Return the unit vectors (..., 3) of points (..., 2) of the square [0, 1]^2.
-
-    Args:
-        points: Points in the canonical square, or near it.
-        power: 4 for the sphere (p4), or 2 for the projective plane (pgg), where one of two opposite
-            vectors is returned.
-    """
+    """Return the unit vectors (..., 3) of points (..., 2) of the square [0, 1]^2."""
     one, _, three, _ = thetas(_complex(points))
     a, b = three**power, one**power
     size = a.abs() ** 2 + b.abs() ** 2

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import importlib
 import io
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.density.tables.binary import (
-    npy_names,
-    parquet_labels,
-    parquet_names,
-    read_npy,
-    read_parquet,
+from orbiflow.density.tables.table import (
+    BLOCK,
+    MAX_COLUMNS,
+    Reading,
+    Table,
+    check_count,
+    choose,
+    find,
+    finished,
+    quote,
 )
-from orbiflow.density.tables.table import Reading, Table, find
 from orbiflow.density.tables.text import layout_of, read_text, split_line, text_lines
-from orbiflow.errors import InputFileError
+from orbiflow.errors import InputFileError, OrbiflowError
 
 MAX_BYTES = 2 * 2**30
 _MAGIC = {"npy": b"\x93NUMPY", "parquet": b"PAR1"}
@@ -104,7 +111,7 @@ def append_columns(
             cells = [_name_cell(name, end) for name in _free_names(columns, header)]
             header = None
         elif number in table.dropped:
-            cells = [_missing_cell(end)] * len(values)
+            cells = ["nan" if end == " " else ""] * len(values)
         elif lines[done] == number:
             cells = [_number_cell(column[done], table) for column in values]
             done += 1
@@ -136,24 +143,16 @@ def _number_cell(value: float, table: Table) -> str:
     return f'"{cell}"' if table.decimal == table.delimiter else cell
 
 
-def _missing_cell(delimiter: str) -> str:
-    return "nan" if delimiter == " " else ""
-
-
 def _free_names(wanted: Iterable[str], taken: Sequence[str]) -> list[str]:
-    found: list[str] = []
+    found, used = list[str](), {name.casefold() for name in taken}
     for name in wanted:
-        found.append(_free_name(name, (*taken, *found)))
+        free, i = name, 1
+        while free.casefold() in used:
+            i += 1
+            free = f"{name}_{i}"
+        found.append(free)
+        used.add(free.casefold())
     return found
-
-
-def _free_name(name: str, taken: Sequence[str]) -> str:
-    used = {other.casefold() for other in taken}
-    free, i = name, 1
-    while free.casefold() in used:
-        i += 1
-        free = f"{name}_{i}"
-    return free
 
 
 def _name_cell(name: str, delimiter: str) -> str:
@@ -232,30 +231,20 @@ def read_labels(
     """
     path = Path(path)
     kind = kind_of_file(path)
+    found: dict[int, str] = {}
     if kind == "npy":
         numbers = read_table(path, columns=[column], width=1, drop_missing=True)
         cells = numbers.values[:, 0].astype(str).tolist()
         found = dict(zip(numbers.lines.tolist(), cells, strict=True))
-        return _picked(path, column, found, table)
-    if kind == "parquet":
-        cells = parquet_labels(path, column)
-        return _picked(path, column, {k: c for k, c in enumerate(cells, start=1) if c}, table)
-    layout = layout_of(path, [column], has_header)
-    index = find(path, layout.names, column)
-    found: dict[int, str] = {}
-    for number, line, is_comment in text_lines(path):
-        if is_comment:
-            continue
-        cells = split_line(path, number, line, layout.delimiter)
-        cell = cells[index].strip() if index < len(cells) else ""
-        if cell:
-            found[number] = cell
-    return _picked(path, column, found, table)
-
-
-def _picked(path: Path, column: str, found: dict[int, str], table: Table) -> NDArray[np.str_]:
-    """Return cells, given by the numbers of their lines, for the rows of the table."""
-    missing = [line for line in table.lines.tolist() if line not in found]
+    elif kind == "parquet":
+        found = dict(enumerate(parquet_labels(path, column), start=1))
+    else:
+        layout = layout_of(path, [column], has_header)
+        index = find(path, layout.names, column)
+        for number, line, is_comment in text_lines(path):
+            cells = [] if is_comment else split_line(path, number, line, layout.delimiter)
+            found[number] = cells[index].strip() if index < len(cells) else ""
+    missing = [line for line in table.lines.tolist() if not found.get(line)]
     if missing:
         raise InputFileError(
             f"{path}: {len(missing)} rows have no {column!r}, the first in line {missing[0]}; fill "
@@ -283,3 +272,117 @@ def is_identifier(name: str, values: NDArray[np.float64]) -> bool:
     word = name.strip().casefold()
     named = word in IDENTIFIER_NAMES or word.endswith(("_id", " id"))
     return named and len(np.unique(values)) == len(values)
+
+
+MAX_NPY_HEADER = 10_000
+"""Characters of a header, which numpy parses with `ast.literal_eval`."""
+
+
+def read_npy(path: Path, reading: Reading) -> Table:
+    """Read a table from an `.npy` file."""
+    shape, dtype = _npy_header(path)
+    check_count(path, shape[0], reading.max_rows, "rows")
+    fields = dtype.names
+    n_columns = len(fields) if fields is not None else shape[1]
+    check_count(path, n_columns, MAX_COLUMNS, "columns")
+    names = fields or tuple(f"column{i}" for i in range(1, n_columns + 1))
+    types = [dtype[name] for name in fields] if fields is not None else [dtype] * n_columns
+    numeric = [kind.kind in "fiu" for kind in types]
+    picked, notes = choose(path, names, numeric, reading, types)
+    try:
+        data = np.load(path, mmap_mode="r", allow_pickle=False, max_header_size=MAX_NPY_HEADER)
+        with np.errstate(over="ignore"):
+            parts = [data[names[i]] if fields is not None else data[:, i] for i in picked]
+            values = np.stack([part.astype(np.float64) for part in parts], axis=1)
+    except (OSError, ValueError, TypeError, IndexError, OverflowError) as exc:
+        raise _damaged(path, exc) from exc
+    return finished(path, values, None, tuple(names[i] for i in picked), reading, notes)
+
+
+def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
+    """Return shape and dtype, once they are known to be a table's and to fit into the file."""
+    form = np.lib.format
+    try:
+        with path.open("rb") as file:
+            version = form.read_magic(file)
+            read = {(1, 0): form.read_array_header_1_0, (2, 0): form.read_array_header_2_0}[version]
+            shape, _, dtype = read(file, max_header_size=MAX_NPY_HEADER)
+            left = path.stat().st_size - file.tell()
+    except Exception as exc:  # numpy's parser of headers raises many types
+        raise _damaged(path, exc) from exc
+    if dtype.hasobject:
+        raise InputFileError(
+            f"{path}: holds Python objects, which are never read; save the array as float64"
+        )
+    if len(shape) != (1 if dtype.names is not None else 2) or min(shape) < 0:
+        raise InputFileError(
+            f"{path}: an array of shape {quote(str(shape))} and type {quote(str(dtype))}; save "
+            "one of shape (N, k), or (N,) with named fields"
+        )
+    if math.prod(shape) * dtype.itemsize > left:
+        raise InputFileError(
+            f"{path}: its header promises {math.prod(shape) * dtype.itemsize} bytes of numbers and "
+            f"{left} follow; the file is cut short or damaged: save it again"
+        )
+    return shape, dtype
+
+
+def npy_names(path: Path) -> tuple[str, ...] | None:
+    """Return the names of a structured array's fields, or None for a plain one."""
+    return _npy_header(path)[1].names
+
+
+@contextmanager
+def _parquet(path: Path) -> Generator[Any]:
+    """Open a Parquet file; whatever goes wrong inside is its damage."""
+    try:
+        arrow, parquet = map(importlib.import_module, ("pyarrow", "pyarrow.parquet"))
+    except ImportError as exc:
+        raise OrbiflowError(f"{path}: reading Parquet needs pyarrow: pip install pyarrow") from exc
+    try:
+        with parquet.ParquetFile(path) as file:
+            yield file
+    except InputFileError:
+        raise
+    except (arrow.ArrowException, OSError, ValueError, KeyError, MemoryError) as exc:
+        raise _damaged(path, exc) from exc
+
+
+def parquet_names(path: Path) -> tuple[str, ...]:
+    """Return the names of all columns."""
+    with _parquet(path) as file:
+        return tuple(file.schema_arrow.names)
+
+
+def parquet_labels(path: Path, column: str) -> list[str]:
+    """Return a column's cells as text, "" for empty ones."""
+    names = parquet_names(path)
+    name = names[find(path, names, column)]
+    with _parquet(path) as file:
+        batches = file.iter_batches(BLOCK, columns=[name])
+        cells = [cell for batch in batches for cell in batch.column(0).to_pylist()]
+    return ["" if cell is None else str(cell).strip() for cell in cells]
+
+
+def read_parquet(path: Path, reading: Reading) -> Table:
+    """Read a table from a Parquet file."""
+    with _parquet(path) as file:
+        check_count(path, file.metadata.num_rows, reading.max_rows, "rows")
+        schema = file.schema_arrow
+        check_count(path, len(schema.names), MAX_COLUMNS, "columns")
+        kinds = importlib.import_module("pyarrow").types
+        tests = kinds.is_integer, kinds.is_floating, kinds.is_decimal
+        numeric = [any(test(kind) for test in tests) for kind in schema.types]
+        picked, notes = choose(path, schema.names, numeric, reading, schema.types)
+        names = tuple(schema.names[i] for i in picked)
+        for name in names:  # Parquet columns are read by name alone
+            find(path, schema.names, name)
+        blocks = [np.empty((0, len(names)))]
+        for batch in file.iter_batches(BLOCK, columns=list(names)):
+            cast = [batch.column(name).cast("float64", safe=False) for name in names]
+            blocks.append(np.stack([c.to_numpy(zero_copy_only=False) for c in cast], axis=1))
+    return finished(path, np.concatenate(blocks), None, names, reading, notes)
+
+
+def _damaged(path: Path, exc: Exception) -> InputFileError:
+    return InputFileError(f"{path}: damaged or of an unknown kind ({quote(str(exc))}); save again")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,13 +26,10 @@ EAST = frozenset({"lon", "long", "lng", "longitude", "trend", "azimuth"})
 
 @dataclass(frozen=True, eq=False)
 class TableRows:
-    """The rows of a table, what each weighs and what it belongs to.
+    """The rows of a table, what each weighs, and the column that names what rows belong to.
 
-    - `path`: The file.
-    - `table`: The columns of data, N rows.
     - `weights`: How much each row counts, (N,). None: all the same.
-    - `group`: The column that names what rows belong to, or None.
-    - `header`: Whether the first line names the columns, None to look.
+    - `header`: Whether the first line of the file names the columns, None to look.
     """
 
     path: Path
@@ -41,12 +38,13 @@ class TableRows:
     group: str | None = None
     header: bool | None = None
 
-    def labels(self) -> NDArray[np.str_] | None:
-        """Return what each row belongs to, (N,), or None if no column says so.
+    @property
+    def whole(self) -> NDArray[np.bool_]:
+        """Which rows (N,) lack no value."""
+        return np.logical_and.reduce(np.isfinite(self.table.values), axis=1)
 
-        Raises:
-            InputFileError: If the column is unknown, or a row has no label.
-        """
+    def labels(self) -> NDArray[np.str_] | None:
+        """Return what each row belongs to, (N,), or None if no column says so."""
         if self.group is None:
             return None
         return read_labels(self.path, self.group, self.table, has_header=self.header)
@@ -60,21 +58,10 @@ def read_rows(
     width: int | None = None,
     group: str | None = None,
 ) -> TableRows:
-    """Return the rows of a table, and tell what was decided for the user.
+    """Return the rows of a table of `width` columns, and tell what was decided for the user.
 
-    Without `columns`, all columns of numbers are taken but those that count the rows, and those of
-    weights and groups.
-
-    Args:
-        path: The file.
-        settings: Which columns and rows.
-        tell: Gets a note of each decision.
-        width: How many columns there must be. Default: any number.
-        group: The column that names what rows belong to.
-
-    Raises:
-        InputFileError: If the table cannot be read, lacks values that it must have, or its columns
-            are not those that are needed.
+    Without `columns` in the settings, all columns of numbers are taken but those that count the rows,
+    and those of weights and groups.
     """
     rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
     how: dict[str, Any] = {
@@ -148,25 +135,19 @@ def _without_identifiers(table: Table, tell: Sink) -> Table:
 
 
 def _weighed(path: Path, table: Table, weighing: Table) -> tuple[Table, Array]:
-    """The rows that have a weight, and their weights."""
+    """Return the rows that have a weight, and their weights."""
     name = weighing.columns[0]
     if name in table.columns:
         raise TableError(
             literal(f"{path}: {name!r} holds the rows' weights and cannot be a column of the data")
             + " as well; leave it out of {columns}"
         )
-    kept = np.isin(table.lines, weighing.lines)
-    table = replace(
-        table,
-        values=table.values[kept],
-        lines=table.lines[kept],
-        dropped=table.dropped | weighing.dropped,
-    )
+    table = table.only(np.isin(table.lines, weighing.lines))
     return table, weighing.values[np.isin(weighing.lines, table.lines), 0]
 
 
 def _name(path: Path, column: str, header: bool | None) -> str:
-    """What a table calls a column that is given by its name or number."""
+    """Return what a table calls a column that is given by its name or number."""
     names = column_names(path, wanted=[column], has_header=header)
     if names is None:
         number = column.strip()
@@ -175,19 +156,7 @@ def _name(path: Path, column: str, header: bool | None) -> str:
 
 
 def angle_unit(space: str, unit: Unit | None, table: Table, tell: Sink) -> Unit:
-    """Return the unit of angles: the given one, or else radians if all values are within 2 pi.
-
-    Args:
-        space: The name of the space.
-        unit: The unit that was asked for, if any.
-        table: The data.
-        tell: Gets a note if radians were assumed.
-
-    Raises:
-        SettingError: If no unit was given and the values cannot be radians; and on the sphere or the
-            projective plane, if another unit than degrees was given, or the columns are a longitude
-            before its latitude.
-    """
+    """Return the unit of angles: the given one, or else radians if all values are within 2 pi."""
     if space not in ("torus", "klein-bottle"):
         check_order(table.columns, space)
         check_unit(space, unit)

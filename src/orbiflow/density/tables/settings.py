@@ -8,8 +8,6 @@ from typing import Annotated, Literal
 from orbiflow.errors import literal
 from orbiflow.settings import DefaultText, SettingError, Settings
 
-Missing = Literal["refuse", "drop", "marginalise"]
-
 TABLES = (".csv", ".tsv", ".txt", ".dat")
 """What names of tables end in. Others may end in anything that is not among these:"""
 
@@ -21,14 +19,14 @@ OTHER_FORMATS = frozenset((
 ))
 # fmt: on
 
-Space = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
+SpaceName = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
 Unit = Literal["radians", "degrees", "turns"]
 
 
 class SpaceSettings(Settings, group="Density"):
     """Where the data live."""
 
-    space: Space
+    space: SpaceName
     """Where the data live."""
 
     unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None
@@ -38,13 +36,14 @@ class SpaceSettings(Settings, group="Density"):
         """Check that only angles have a unit."""
         check_unit(self.space, self.unit)
 
+    @property
+    def width(self) -> int | None:
+        """The number of columns that the space takes, None if there may be several."""
+        return 2 if self.space == "klein-bottle" else None
+
 
 def check_unit(space: str, unit: Unit | None) -> None:
-    """Refuse a unit of data that are not angles.
-
-    Raises:
-        SettingError: If it is another than degrees, by the name of the setting `unit`.
-    """
+    """Refuse a unit of data that are not angles."""
     if space in ("sphere", "projective-plane") and unit in ("radians", "turns"):
         raise SettingError(
             f"{{unit}} {unit} applies only to angles on the torus and the Klein bottle: latitude and "
@@ -68,7 +67,7 @@ class TableSettings(Settings, group="Reading the table"):
 class RowSettings(TableSettings, group="Reading the table"):
     """Which columns and rows of a table are read, and how much each row counts."""
 
-    missing: Missing = "refuse"
+    missing: Literal["refuse", "drop", "marginalise"] = "refuse"
     """What is done with rows that lack a value. With marginalise, on tori, they count by the angles
     that they have."""
 
@@ -84,11 +83,7 @@ class RowSettings(TableSettings, group="Reading the table"):
 
 
 def check_table_name(out: Path) -> None:
-    """Refuse a name for a table whose ending is that of another format.
-
-    Raises:
-        SettingError: If it is, by the name of the setting `out`.
-    """
+    """Refuse a name for a table whose ending is that of another format."""
     if out.suffix.lower() in OTHER_FORMATS:
         raise SettingError(
             f"{{out}} must end in {', '.join(TABLES)}, got {literal(repr(out.name))}"

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,11 @@ class Table:
     decimal: str = "."
     dropped: frozenset[int] = frozenset()
 
+    def only(self, kept: NDArray[np.bool_]) -> Table:
+        """Return the rows that are kept, (N,) of bool; the others are dropped."""
+        dropped = self.dropped | frozenset(self.lines[~kept].tolist())
+        return replace(self, values=self.values[kept], lines=self.lines[kept], dropped=dropped)
+
     def without(self, column: int) -> Table:
         """Return the table without a column, by its number from 0."""
         names = self.columns[:column] + self.columns[column + 1 :]
@@ -66,9 +72,16 @@ class MissingCellsError(TableError):
 
 
 def choose(
-    path: Path, names: Sequence[str], numeric: Sequence[bool], reading: Reading
+    path: Path,
+    names: Sequence[str],
+    numeric: Sequence[bool],
+    reading: Reading,
+    kinds: Sequence[object] | None = None,
 ) -> tuple[list[int], list[str]]:
-    """Return the numbers, from 0, of the columns that are read, and notes."""
+    """Return the numbers, from 0, of the columns that are read, and notes.
+
+    Where the file says of what kind each column is, others than numbers are refused.
+    """
     columns, width = reading.columns, reading.width
     if columns is not None:
         picked = [find(path, names, wanted) for wanted in columns]
@@ -88,6 +101,12 @@ def choose(
             + literal(f"{listing(names)})")
             + "; choose with {columns}"
         )
+    for i in picked:
+        if kinds is not None and not numeric[i]:
+            raise TableError(
+                literal(f"{path}: column {quote(names[i])} holds {quote(str(kinds[i]))}")
+                + ", not numbers; choose another with {columns}"
+            )
     if columns is not None:
         return picked, []
     taken = [names[i] for i in picked]
@@ -134,28 +153,22 @@ def check_count(path: Path, n: int, most: int, what: str) -> None:
         )
 
 
-def checked_rows(
+def finished(
     path: Path,
     values: NDArray[np.float64],
-    lines: NDArray[np.int64],
-    columns: Sequence[str],
-    unit: str,
+    lines: NDArray[np.int64] | None,
+    columns: tuple[str, ...],
     reading: Reading,
-) -> tuple[NDArray[np.float64], NDArray[np.int64], frozenset[int], list[str]]:
-    """Return rows and lines without those to leave out, the lines of these, and a note of them.
+    notes: Sequence[str],
+    layout: Mapping[str, Any] | None = None,
+) -> Table:
+    """Return the table of values (N, k), NaN for missing ones, without the rows to leave out.
 
-    Args:
-        path: The file.
-        values: Numbers (N, k), NaN for missing ones.
-        lines: Number (N,) of each row's line.
-        columns: Names of the columns.
-        unit: What a row is in: "line" or "row".
-        reading: Which rows may lack values.
-
-    Raises:
-        InputFileError: If there are no rows, or a cell is infinite or, unless it may be, missing.
+    Lines (N,) number its rows in text; in other files these are numbered from 1.
     """
-    dropped, notes = frozenset[int](), list[str]()
+    unit = "row" if lines is None else "line"
+    lines = np.arange(1, len(values) + 1, dtype=np.int64) if lines is None else lines
+    dropped, notes = frozenset[int](), list(notes)
     if reading.drop_missing and len(values):
         whole = ~np.isnan(values).any(axis=1)
         if not whole.any():
@@ -165,7 +178,7 @@ def checked_rows(
         left = lines[~whole].tolist()
         if left:
             rows = f"{len(left)} row{'s' * (len(left) > 1)}"
-            notes = [f"left out {rows} with missing values, the first in {unit} {left[0]}"]
+            notes.append(f"left out {rows} with missing values, the first in {unit} {left[0]}")
         values, lines, dropped = values[whole], lines[whole], frozenset(left)
     if not len(values):
         raise InputFileError(f"{path}: holds no rows of numbers; export it again")
@@ -179,7 +192,8 @@ def checked_rows(
             )
             + "; fill them in or leave their rows out with {drop_missing}"
         )
-    return values, lines, dropped, notes
+    named: dict[str, Any] = {"header": None, "delimiter": None, **(layout or {})}
+    return Table(values, columns, lines, tuple(notes), dropped=dropped, **named)
 
 
 def listing(names: Sequence[str]) -> str:

@@ -12,7 +12,7 @@ import math
 import re
 from array import array
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -26,9 +26,9 @@ from orbiflow.density.tables.table import (
     Table,
     TableError,
     check_count,
-    checked_rows,
     choose,
     column_number,
+    finished,
     listing,
     quote,
 )
@@ -87,17 +87,16 @@ def read_text(path: Path, reading: Reading) -> Table:
     values.extend(_numbers(path, cells, lines, names, layout.decimal))
     check_count(path, len(lines), reading.max_rows, "rows")
     rows, at = np.frombuffer(values).reshape(-1, len(picked)), np.frombuffer(lines, dtype=np.int64)
-    rows, at, dropped, more = checked_rows(path, rows, at, names, "line", reading)
-    notes += more
+    named = {name: getattr(layout, name) for name in ("header", "delimiter", "decimal")}
+    table = finished(path, rows, at, names, reading, notes, named)
+    notes = list(table.notes)
     if layout.decimal == ",":
         notes.append("read decimal commas")
     if layout.header is not None:
         notes.append(f"took line {layout.first} as the header: {listing(layout.header)}")
     if comments:
         notes.append(f"skipped {comments} comment line{'s' * (comments > 1)}")
-    return Table(
-        rows, names, at, tuple(notes), layout.header, layout.delimiter, layout.decimal, dropped
-    )
+    return replace(table, notes=tuple(notes))
 
 
 def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
@@ -145,8 +144,10 @@ def layout_of(path: Path, columns: Sequence[str] | None, has_header: bool | None
         if len(row) != len(rows[0]):
             raise _ragged(path, number, len(row), first, len(rows[0]), delimiter)
     decimal = _decimal(rows)
-    pointed = [[_pointed(cell, decimal) for cell in row] for row in rows]
-    classes = list(zip(*([_class(cell) for cell in row] for row in pointed), strict=True))
+    classes = [
+        tuple(_class(cell.replace(decimal, ".")) for cell in column)
+        for column in zip(*rows, strict=True)
+    ]
     header = None
     if has_header is None:
         has_header = _has_header(path, first, rows[0], classes, columns)
@@ -166,10 +167,6 @@ def _decimal(rows: list[list[str]]) -> str:
     commas = any(DECIMAL_COMMA.fullmatch(cell) for cell in cells)
     points = any("." in cell and _class(cell) == "number" for cell in cells)
     return "," if commas and not points else "."
-
-
-def _pointed(cell: str, decimal: str) -> str:
-    return cell if decimal == "." else cell.replace(decimal, ".")
 
 
 def _delimiter(lines: list[str]) -> str:
@@ -265,7 +262,7 @@ def _numbers(
 ) -> list[float]:
     """Return the cells of the last of `lines`, row after row, as floats; NaN for missing ones."""
     if decimal != ".":
-        cells = [_pointed(cell, decimal) for cell in cells]
+        cells = [cell.replace(decimal, ".") for cell in cells]
     try:
         if "_" not in "".join(cells):  # float takes 1_000
             return list(map(float, cells))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -34,40 +34,19 @@ from orbiflow.tiles.silhouette import (
 )
 from orbiflow.tiles.tile import EscherTile
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
+# Greatest distance of flattened curves from the drawing's, in sizes of the silhouette
 FLATNESS = 1 / 4000
-"""Greatest distance of flattened curves from the drawing's, in sizes of the silhouette."""
-
+# Longest straight piece that is carried, in sizes of the silhouette: lines bend with the tile
 LONGEST = 1 / 150
-"""Longest straight piece that is carried, in sizes of the silhouette: lines bend with the tile."""
-
-MOST_CARRIED = 400_000
-"""Greatest number of points that are carried in all."""
-
-FARTHEST = 1e6
-"""Greatest reach of a drawing, in sizes of the silhouette."""
-
-
-class TooFar(Exception):
-    """An error for a path that reaches beyond `FARTHEST`."""
+MOST_CARRIED = 400_000  # greatest number of points that are carried in all
+FARTHEST = 1e6  # greatest reach of a drawing, in sizes of the silhouette
 
 
 def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
     """Read an SVG file and carry its drawing onto a tile, in the tile's units; return it with notes.
 
-    Fills and strokes are kept and gradients become one colour; texts, pictures and clips are left out.
-    `currentColor` without a `color` is the ink that shows on each tile.
-
-    Args:
-        path: The file.
-        tile: A tile with a map.
-
-    Raises:
-        InputFileError: If the file is over 16 MB, is no SVG or cannot be understood, has another
-            aspect than the silhouette, or draws nothing.
+    Fills and strokes are kept and gradients become one colour; texts, pictures and clips are left
+    out. `currentColor` without a `color` is the ink that shows on each tile.
     """
     check_file(path)
     drawing = Drawing(path, parse_xml(path, read_bytes(path, MAX_BYTES)))
@@ -79,10 +58,6 @@ def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
     for shape in drawing.shapes:
         try:
             parts += _parts(shape, drawing, carry)
-        except TooFar as error:
-            raise InputFileError(
-                f"{path}: a path reaches much too far beyond the page; delete or shorten it"
-            ) from error
         except (TooManyPoints, TooTangled, GEOSException) as error:
             raise InputFileError(
                 f"{path}: the drawing is too intricate to be carried, or much too long; simplify it"
@@ -122,11 +97,6 @@ class _Carry:
         self.tolerance = FLATNESS * size / self.scale
         self.count = 0
 
-    def check(self, points: Array) -> None:
-        """Raise `TooFar` if points of the drawing lie too far out to be seen."""
-        if not (np.abs(points) < FARTHEST * self.size / self.scale).all():  # NaN, too
-            raise TooFar
-
     def __call__(self, points: Array, *, closed: bool) -> Array:
         here = points @ self.linear.T + self.offset
         line = shapely.LinearRing(here) if closed else shapely.LineString(here)
@@ -145,7 +115,10 @@ def _parts(shape: DrawnShape, drawing: Drawing, carry: _Carry) -> list[Part]:
     if paint.get("visibility") in ("hidden", "collapse"):
         return []
     reach = np.concatenate([path.reach() for path in shape.paths] or [np.zeros((1, 2))])
-    carry.check(reach)
+    if not (np.abs(reach) < FARTHEST * carry.size / carry.scale).all():  # NaN, too
+        raise InputFileError(
+            f"{drawing.path}: a path reaches much too far beyond the page; delete or shorten it"
+        )
     lines = [(path.flatten(carry.tolerance), path) for path in shape.paths]
     if sum(len(points) for points, _ in lines) > MAX_POINTS:
         raise TooManyPoints
@@ -153,11 +126,13 @@ def _parts(shape: DrawnShape, drawing: Drawing, carry: _Carry) -> list[Part]:
     filled, share = _colour(paint.get("fill", "#000000"), paint, drawing)
     if filled is not None:
         region = fill([points for points, _ in lines if len(points) > 2], shape.fill_rule)
-        curves = [
-            _ring(carry, ring, outer=k == 0)
-            for polygon in polygons_in(region)
-            for k, ring in enumerate([polygon.exterior, *polygon.interiors])
-        ]
+        curves: list[Curve] = []
+        for polygon in polygons_in(region):
+            for k, ring in enumerate([polygon.exterior, *polygon.interiors]):
+                points = carry(shapely.get_coordinates(ring)[:-1], closed=True)
+                # holes run the other way, so that they are holes under every fill rule
+                points = orient(points, counter_clockwise=k == 0)
+                curves.append(Curve.polyline(points, closed=True))
         opacity = shape.opacity * share * _number(paint.get("fill-opacity"), 1.0)
         if curves and opacity > 0:
             found.append(Part(tuple(curves), Style(filled), opacity))
@@ -168,12 +143,6 @@ def _parts(shape: DrawnShape, drawing: Drawing, carry: _Carry) -> list[Part]:
         curves = [_line(carry, points, path) for points, path in lines if len(points) > 1]
         found.append(Part(tuple(curves), Style(None, stroked, width), opacity))
     return found
-
-
-def _ring(carry: _Carry, ring: shapely.LinearRing, *, outer: bool) -> Curve:
-    points = carry(shapely.get_coordinates(ring)[:-1], closed=True)
-    # holes run the other way, so that they are holes under every fill rule
-    return Curve.polyline(orient(points, counter_clockwise=outer), closed=True)
 
 
 def _line(carry: _Carry, points: Array, path: SubPath) -> Curve:
@@ -243,12 +212,7 @@ class Over(NamedTuple):
 
 
 def read_over(path: str | Path, tile: EscherTile) -> Over:
-    """Read the picture or drawing in a file, whichever its content is.
-
-    Raises:
-        InputFileError: As `read_picture` and `read_drawing`.
-        OrbiflowError: If the tile has no map.
-    """
+    """Read the picture or drawing in a file, whichever its content is, over a tile with a map."""
     tile.require_map()
     path = as_path(path, "the picture's file")
     check_file(path)
@@ -280,8 +244,14 @@ def _canvas(parts: list[Part], grid: Grid) -> Array:
     """Return parts drawn as RGBA (height, width, 4), straight, 0 to 1."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import PathCollection
+    from matplotlib.figure import Figure
 
-    figure, axes = _axes(grid)
+    figure = Figure(figsize=(grid.width / DOTS, grid.height / DOTS), dpi=DOTS)
+    figure.patch.set_alpha(0)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    axes.set_xlim(0, grid.width)
+    axes.set_ylim(grid.height, 0)
     for part in parts:
         fill, stroke = (
             "#000000" if colour == INK else colour
@@ -300,15 +270,3 @@ def _canvas(parts: list[Part], grid: Grid) -> Array:
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba(), dtype=np.float32) / 255
-
-
-def _axes(grid: Grid) -> tuple[Figure, Axes]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(grid.width / DOTS, grid.height / DOTS), dpi=DOTS)
-    figure.patch.set_alpha(0)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set_axis_off()
-    axes.set_xlim(0, grid.width)
-    axes.set_ylim(grid.height, 0)
-    return figure, axes

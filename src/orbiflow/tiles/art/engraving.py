@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -26,34 +27,16 @@ from orbiflow.tiles.geometry import (
 )
 from orbiflow.tiles.tile import EscherTile
 
-GRID_DENSITY = 420.0
-"""Cells of the raster along the square root of the area."""
-
+GRID_DENSITY = 420.0  # cells of the raster along the square root of the area
+# The direction from which light comes, with y down: from above, on the left
 LIGHT = np.array([-0.6, -0.8])
-"""The direction from which light comes, with y down: from above, on the left."""
-
-
-class Along:
-    """Evenly spaced places along the outline: `points`, inward `normals`, half-thickness `half`."""
-
-    def __init__(self, body: Body, count: int) -> None:
-        ring = body.ring
-        self.points = resampled(ring, count)
-        step = np.roll(self.points, -1, axis=0) - np.roll(self.points, 1, axis=0)
-        inward = np.stack([-step[:, 1], step[:, 0]], axis=1) * np.sign(signed_area(ring))
-        inward = gaussian_filter(inward, (2, 0), mode="wrap")
-        self.normals = inward / np.maximum(np.linalg.norm(inward, axis=1), 1e-12)[:, None]
-        self.half = body.half_thickness(self.points, self.normals)
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A tile at area 1 with y down, and how deep places in it lie.
+    """A tile at area 1 with y down, and how deep places in it lie."""
 
-    - `ring`: The outline (N, 2).
-    """
-
-    ring: Array
+    ring: Array  # the outline (N, 2)
 
     @cached_property
     def _grid(self) -> Grid:
@@ -121,14 +104,10 @@ def stroke(points: Array, widths: Array) -> Array:
     return np.concatenate([points + side, (points - side)[::-1]])
 
 
-USUAL_EYE = 0.032
-"""Radius of an eye in square roots of the tile's area."""
-
-EYE_CLEARANCE = 1.7
-"""Distance, in radii of an eye, that lines keep from its middle."""
-
+USUAL_EYE = 0.032  # radius of an eye in square roots of the tile's area
+EYE_CLEARANCE = 1.7  # distance, in radii of an eye, that lines keep from its middle
+# Step of an echo in square roots of the tile's area, and the least number of steps of a piece
 ECHO_STEP, ECHO_LEAST_STEPS = 0.008, 12
-"""Step of an echo in square roots of the tile's area, and the least number of steps of a piece."""
 
 
 class Eye(NamedTuple):
@@ -139,23 +118,8 @@ class Eye(NamedTuple):
     parts: tuple[Part, ...]
 
 
-def eyes(
-    tile: EscherTile, given: tuple[tuple[float, ...], ...], palette: Palette
-) -> tuple[Eye, ...]:
-    """Carry eyes from the silhouette onto the tile; they stay round.
-
-    Args:
-        tile: The tile, with a map if any eyes are given.
-        given: Each eye as (x, y) or (x, y, radius) in the silhouette's coordinates.
-        palette: The palette whose paper and outline they are drawn in.
-
-    Raises:
-        OrbiflowError: If an eye lies outside the silhouette.
-    """
-    return tuple(_eye(tile, eye, palette) for eye in given)
-
-
-def _eye(tile: EscherTile, given: tuple[float, ...], palette: Palette) -> Eye:
+def eye(tile: EscherTile, given: tuple[float, ...], palette: Palette) -> Eye:
+    """Carry an eye (x, y) or (x, y, radius) from the silhouette onto the tile; it stays round."""
     x, y = given[:2]
     outline = shapely.Polygon(silhouette_outline(tile))
     if not outline.contains(shapely.Point(x, y)):
@@ -180,14 +144,12 @@ def _eye(tile: EscherTile, given: tuple[float, ...], palette: Palette) -> Eye:
     glint = np.array([-0.3, 0.35 * up])
     turn = factor / abs(factor)
     spot = complex(*glint) * turn
-    disc = _circle(middle, radius)
-    pupil = _circle(middle, 0.58 * radius)
-    light = _circle(middle + radius * np.array([spot.real, spot.imag]) * 0.9, 0.2 * radius)
+    light = middle + radius * np.array([spot.real, spot.imag]) * 0.9
     edge = Style(palette.paper, palette.outline, 0.2 * radius)
     parts = (
-        Part((disc,), edge),
-        Part((pupil,), Style(palette.outline)),
-        Part((light,), Style(palette.paper)),
+        Part((_circle(middle, radius),), edge),
+        Part((_circle(middle, 0.58 * radius),), Style(palette.outline)),
+        Part((_circle(light, 0.2 * radius),), Style(palette.paper)),
     )
     return Eye(middle, radius, parts)
 
@@ -198,7 +160,7 @@ def _circle(middle: Array, radius: float) -> Curve:
     return Curve.polyline(ring, closed=True)
 
 
-def engraved(tile: EscherTile, strokes: Strokes, around: tuple[Eye, ...] = ()) -> tuple[Part, ...]:
+def engraved(tile: EscherTile, strokes: Strokes, around: Sequence[Eye] = ()) -> tuple[Part, ...]:
     """Return lines of one kind in ink, thin in the light and deep inside, that keep clear of eyes."""
     polygon = tile.tile.polygon
     size = float(np.sqrt(abs(tile.tile.signed_area)))
@@ -213,22 +175,23 @@ def engraved(tile: EscherTile, strokes: Strokes, around: tuple[Eye, ...] = ()) -
 
 
 def _hatch(body: Body, reach: float = 0.32, spacing: float = 0.017) -> list[Array]:
-    """Return ticks inwards from the outline as on a woodcut: long in the shade, short in the light.
-
-    None is longer than `reach`.
-    """
+    """Return ticks inwards from the outline as on a woodcut: long in the shade, up to `reach`."""
     count = int(arc_lengths(body.ring)[-1] / spacing)
-    along = Along(body, count)
-    dark = shade(along.normals)
-    half = median_filter(along.half, 9, mode="wrap")  # no single spikes out of notches
-    length = np.minimum(half, 1.15 * along.half) * (0.22 + 0.62 * dark)
+    points = resampled(body.ring, count)
+    step = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    inward = np.stack([-step[:, 1], step[:, 0]], axis=1) * np.sign(signed_area(body.ring))
+    inward = gaussian_filter(inward, (2, 0), mode="wrap")
+    n = inward / np.maximum(np.linalg.norm(inward, axis=1), 1e-12)[:, None]
+    own = body.half_thickness(points, n)
+    dark = shade(n)
+    half = median_filter(own, 9, mode="wrap")  # no single spikes out of notches
+    length = np.minimum(half, 1.15 * own) * (0.22 + 0.62 * dark)
     # around a point of a neighbour they fan out: short, or they make a star
-    bend = np.roll(along.normals, -1, axis=0) - np.roll(along.normals, 1, axis=0)
+    bend = np.roll(n, -1, axis=0) - np.roll(n, 1, axis=0)
     length /= 1 + 0.05 * np.hypot(*bend.T) / (2 * spacing)
     length = np.minimum(length, reach) * (0.82 + 0.18 * _wobble(count, 1))
     lean = np.deg2rad(24 + 6 * _wobble(count, 2))
     cos, sin = np.cos(lean), np.sin(lean)
-    n = along.normals
     way = np.stack([cos * n[:, 0] - sin * n[:, 1], sin * n[:, 0] + cos * n[:, 1]], axis=1)
     share = np.linspace(0, 1, 9)
     found = []
@@ -236,7 +199,7 @@ def _hatch(body: Body, reach: float = 0.32, spacing: float = 0.017) -> list[Arra
         if length[k] < 0.016:
             continue
         # bends towards the normal on its way in
-        path = along.points[k] + length[k] * (
+        path = points[k] + length[k] * (
             share[:, None] * way[k] + 0.35 * (share**2)[:, None] * (n[k] - way[k])
         )
         if body.depth(path[2:]).min() <= 0.002:

@@ -1,28 +1,44 @@
-"""Artwork before it is a file: what is on the tile and the page, and the pixels that show it."""
+"""Artwork: what is on the tile and the page, the pixels that show it, and its file."""
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
-from orbiflow.arrays import Array
+from orbiflow import __version__
+from orbiflow.arguments import path as as_path
 from orbiflow.drawing import palette
-from orbiflow.runtime import Cancel
-from orbiflow.tiles.art.drawings import paint_motif
-from orbiflow.tiles.art.engraving import engraved, eyes
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
+from orbiflow.tiles.art.drawings import Over, paint_motif, read_over
+from orbiflow.tiles.art.engraving import engraved, eye
 from orbiflow.tiles.art.page import ArtPage, art_page
 from orbiflow.tiles.art.raster import Grid, Paint, render_page
 from orbiflow.tiles.art.settings import ArtSettings
 from orbiflow.tiles.art.source import Picture, carried_picture, with_map
-from orbiflow.tiles.exporting import Curve, Motif, Part, Style
+from orbiflow.tiles.exporting import (
+    INCH,
+    Box,
+    Curve,
+    Layer,
+    Motif,
+    Part,
+    Raster,
+    Scene,
+    Style,
+    Uses,
+    rectangle,
+    write_svg,
+)
+from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile, TileSource
 
-TEXELS_PER_PIXEL = 1.5
-"""Texels of the tile's raster along a pixel of the page."""
-
-TILE_PER_OUTLINE = 120
-"""The tile's size over the outline's usual width."""
+TEXELS_PER_PIXEL = 1.5  # texels of the tile's raster along a pixel of the page
+TILE_PER_OUTLINE = 120  # the tile's size over the outline's usual width
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +68,7 @@ class Artwork:
 
     def _repr_png_(self) -> bytes:
         """Return what a notebook shows."""
-        from orbiflow.tiles.art.scene import png_of
+        from orbiflow.tiles.art.making import png_of
 
         return png_of(render_artwork(self), self.settings.dpi)
 
@@ -70,8 +86,7 @@ def artwork(
     Args:
         tile: A tile in memory, or a run's folder; see `with_map`.
         settings: How it is drawn.
-        picture: A picture over the silhouette, as `read_over` returns it.
-        drawing: A drawing that is already carried onto the tile, as `read_over` returns it.
+        picture, drawing: What lies over the silhouette, as `read_over` returns it.
         notes: What the user should know of picture or drawing.
 
     Raises:
@@ -83,30 +98,21 @@ def artwork(
         tile.require_map()
     page = art_page(tile, settings)
     parts: tuple[Part, ...] = () if drawing is None else drawing.parts
-    around = eyes(tile, settings.eyes, palette(settings.palette))
+    around = [eye(tile, given, palette(settings.palette)) for given in settings.eyes]
     if settings.strokes is not None:
         parts += engraved(tile, settings.strokes, around)
-    parts += tuple(part for eye in around for part in eye.parts)
+    parts += tuple(part for one in around for part in one.parts)
     short = palette(settings.palette).shortage(page.count)
     said = (*tile.notes, *notes, *page.notes, *short)
     return Artwork(tile, settings, page, picture, Motif(parts), said)
 
 
 def render_artwork(art: Artwork, *, cancel: Cancel | None = None) -> np.ndarray:
-    """Render the picture (height, width, 3) in 8 bits, antialiased.
-
-    Raises:
-        Cancelled: If it was cancelled.
-    """
-    return render_on(art, art.page, cancel=cancel)
-
-
-def render_on(art: Artwork, page: ArtPage, *, cancel: Cancel | None = None) -> np.ndarray:
-    """Render another part of the same plane, as `render_artwork` does."""
-    settings, chosen = art.settings, palette(art.settings.palette)
+    """Render the picture (height, width, 3) in 8 bits, antialiased."""
+    page, chosen, samples = art.page, palette(art.settings.palette), art.settings.samples
     grid = raster_grid(art)
-    coloured = painted(art, grid).coloured(chosen, art.page.count)
-    return render_page(page, grid, coloured, chosen.paper, samples=settings.samples, cancel=cancel)
+    coloured = painted(art, grid).coloured(chosen, page.count)
+    return render_page(page, grid, coloured, chosen.paper, samples=samples, cancel=cancel)
 
 
 def raster_grid(art: Artwork) -> Grid:
@@ -132,11 +138,143 @@ def painted(art: Artwork, grid: Grid) -> Paint:
         paint_motif(paint, art.motif)
         paint.bleed(grid.inside(polygon))
     if art.outline > 0:
-        paint_motif(paint, outlined(polygon, art.outline / art.page.scale, art))
+        # half of its width inside
+        colour, width = palette(art.settings.palette).outline, art.outline / art.page.scale
+        line = Part((Curve.polyline(polygon, closed=True),), Style(None, colour, width))
+        paint_motif(paint, Motif((line,)))
     return paint
 
 
-def outlined(polygon: Array, width: float, art: Artwork) -> Motif:
-    """Return the line around a tile, half of its width inside."""
-    style = Style(None, palette(art.settings.palette).outline, width)
-    return Motif((Part((Curve.polyline(polygon, closed=True),), style),))
+TILE, MOTIF = "tile", "motif"
+
+
+def art_scene(art: Artwork) -> Scene:
+    """Return the page in millimetres, as `render_artwork` draws it.
+
+    A picture of pixels becomes part of the drawing, already carried onto the tile.
+    """
+    page, chosen = art.page, palette(art.settings.palette)
+    unit = INCH / art.settings.dpi  # a pixel in mm
+    linear, offset = unit * page.linear, unit * page.offset
+    tile = page.tile
+    # relative to the tile's own middle, so that rounding transforms moves points least
+    middle = tile.center
+    symbol = Curve.polyline(tile.polygon - middle, closed=True)
+    motif = Motif(art.motif.parts, _rasters(art), TILE).moved(np.eye(2), -middle)
+    copies = page.copies
+    turned = linear @ tile.group.linear_parts
+    places = copies.translations @ linear.T + offset + (turned @ middle)[copies.cosets]
+    # symbols in mm, for which the writer's decimals are meant
+    scale = unit * page.scale
+    turned = turned / scale
+    symbols = {TILE: symbol.moved(scale * np.eye(2), np.zeros(2))}
+    motifs = {MOTIF: motif.moved(scale * np.eye(2), np.zeros(2))}
+    box = Box(0.0, 0.0, unit * page.width, unit * page.height)
+    width = unit * art.outline
+    layers = [Layer("paper", "paper", Style(fill=chosen.paper), (rectangle(box),))]
+    drawn = bool(motif.parts or motif.rasters)
+    for colour in sorted(set(page.colours.tolist())):
+        own = page.colours == colour
+        fill, name = chosen.fill(colour), f"colour {colour + 1}"
+        # a hairline in the tile's own colour closes the seams that viewers leave between neighbours
+        style = Style(fill, fill, 0.3 * unit)
+        uses = Uses(TILE, turned, copies.cosets[own], places[own])
+        layers.append(Layer(name, "tiles", style, (uses,), clipped=True))
+        if drawn:
+            uses = Uses(MOTIF, turned, copies.cosets[own], places[own])
+            name, ink = f"drawing on {name}", chosen.ink(colour)
+            layers.append(Layer(name, "tiles", Style(), (uses,), clipped=True, ink=ink))
+    if art.outline > 0:
+        style = Style(None, chosen.outline, width)
+        uses = Uses(TILE, turned, copies.cosets, places)
+        layers.append(Layer("outlines", "tiles", style, (uses,), clipped=True))
+    notes = (f"Artwork of {tile.isohedral_class or 'a tile'}, made with orbiflow {__version__}.",)
+    return Scene(
+        box.width,
+        box.height,
+        tuple(layers),
+        symbols,
+        window=box,
+        title=art.tile.name,
+        notes=notes,
+        motifs=motifs if drawn else {},
+    )
+
+
+def _rasters(art: Artwork) -> tuple[Raster, ...]:
+    if art.picture is None:
+        return ()
+    grid = raster_grid(art)
+    values = picture_paint(art, grid).values
+    alpha = 1 - values[..., 3:4]
+    straight = values[..., :3] / np.maximum(alpha, 1e-6)
+    both = np.concatenate([straight, alpha], axis=2)
+    image = Image.fromarray((both * 255 + 0.5).clip(0, 255).astype(np.uint8), "RGBA")
+    buffer = io.BytesIO()
+    image.save(buffer, "PNG")
+    linear = np.eye(2) / grid.density
+    return (Raster(buffer.getvalue(), image.size, linear, grid.corner),)
+
+
+def write_artwork(art: Artwork, ending: str, *, cancel: Cancel | None = None) -> bytes | str:
+    """Return the content of a file with this ending, .svg, or .png for pixels."""
+    if ending.lower() == ".svg":
+        return write_svg(art_scene(art))
+    return png_of(render_artwork(art, cancel=cancel), art.settings.dpi)
+
+
+def draw_art(
+    tile: TileSource,
+    out: str | Path,
+    settings: ArtSettings | None = None,
+    *,
+    picture: str | Path | None = None,
+    target: Target | None = None,
+    force: bool = False,
+    on_event: Sink = ignore,
+    cancel: Cancel | None = None,
+) -> Artwork:
+    """Write a picture of a tiling with something on its tiles, and return what was drawn.
+
+    Args:
+        tile: A tile in memory, or a run's folder; see `with_map`.
+        out: The file, .png or .svg.
+        settings: How it is drawn.
+        picture: The file of a picture or drawing over the silhouette.
+        target: The target of a search in memory that left no map, such as one for overlap.
+        force: Take a tile that is not certified.
+        on_event: Called with the `Progress`.
+        cancel: Stops the work; nothing is then written.
+
+    Raises:
+        CertificationError: If the tile is not certified.
+        InputFileError: If the picture cannot be read.
+        OrbiflowError: For another ending, and as `artwork`.
+        OutputError: If the file cannot be written.
+        Cancelled: If it was cancelled.
+    """
+    out, cancel = as_path(out, "the file to draw to"), cancel or Cancel()
+    if out.suffix.lower() not in (".png", ".svg"):
+        raise OrbiflowError(f"artwork is written to a .png or .svg, got {out.name!r}")
+    source = with_map(tile, target)
+    source.require_certified(
+        force=force, otherwise="so it is not exported; --force exports it, marked so"
+    )
+    on_event(Progress(0.0, "laying out"))
+    if picture is not None:
+        source.require_map()
+    over = Over() if picture is None else read_over(picture, source)
+    made = artwork(source, settings, picture=over.picture, drawing=over.drawing, notes=over.notes)
+    cancel.check()
+    on_event(Progress(0.2, "drawing"))
+    content = write_artwork(made, out.suffix, cancel=cancel)
+    cancel.check()
+    write_atomic(out, content)
+    return made
+
+
+def png_of(pixels: np.ndarray, dpi: float) -> bytes:
+    """Return pixels (height, width, 3) as a PNG that gives their resolution."""
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, "PNG", dpi=(dpi, dpi), compress_level=5)
+    return buffer.getvalue()

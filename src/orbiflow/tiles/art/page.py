@@ -16,34 +16,23 @@ from orbiflow.tiles.exporting import longer_side
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Copies, Tile, colouring, copies_meeting
 
-USUAL_TILES = 25
-"""Number of tiles on a page if no size of a tile is given."""
+USUAL_TILES = 25  # number of tiles on a page if no size of a tile is given
 
 
 @dataclass(frozen=True, eq=False)
 class ArtPage:
-    """The tiles of a picture.
+    """The tiles of a picture."""
 
-    - `width`, `height`: The picture's size in pixels.
-    - `tile`: The tile in its own units.
-    - `copies`: All copies that the picture shows, and some beyond.
-    - `linear`, `offset`: The map from the tile's units to pixels, y down.
-    - `colours`: The number (M,) of each copy's colour.
-    - `count`: The number of colours.
-    - `tile_size`: The size of a tile in pixels.
-    - `notes`: What the user should know.
-    """
-
-    width: int
+    width: int  # with `height`: the picture's size in pixels
     height: int
-    tile: Tile
-    copies: Copies
-    linear: Array
+    tile: Tile  # the tile in its own units
+    copies: Copies  # all copies that the picture shows, and some beyond
+    linear: Array  # with `offset`: the map from the tile's units to pixels, y down
     offset: Array
-    colours: NDArray[np.int64]
-    count: int
-    tile_size: float
-    notes: tuple[str, ...] = ()
+    colours: NDArray[np.int64]  # the number (M,) of each copy's colour
+    count: int  # the number of colours
+    tile_size: float  # the size of a tile in pixels
+    notes: tuple[str, ...] = ()  # what the user should know
 
     @property
     def scale(self) -> float:
@@ -64,13 +53,9 @@ class _Colours:
     """A way to colour the copies of a tile, and the translations that keep the colours."""
 
     def __init__(self, tile: Tile, how: str) -> None:
-        self.how = how
-        order = tile.group.order
-        self.count = {"one": 1, "aspect": order}.get(how, 0)
-        self.lattice = tile.group.lattice
+        self.how, self.own, self.lattice = how, colouring(tile), tile.group.lattice
+        self.count = {"one": 1, "aspect": tile.group.order}.get(how, self.own.count)
         if how == "neighbour":
-            self.own = colouring(tile)
-            self.count = self.own.count
             a, b, c = self.own.sublattice
             self.lattice = tile.group.lattice @ np.array([[a, b], [0.0, c]])
 
@@ -81,18 +66,17 @@ class _Colours:
 
 
 def art_page(given: EscherTile, settings: ArtSettings) -> ArtPage:
-    """Put the tile on a page of the settings' size, the same way up; or make the repeating cell.
-
-    Raises:
-        OrbiflowError: If there are more tiles than can be drawn, or no rectangle repeats.
-    """
+    """Put the tile on a page of the settings' size, the same way up; or make the repeating cell."""
     tile = given.tile
     colours = _Colours(tile, settings.colour)
     flip = np.diag([1.0, 1.0 if given.y_down else -1.0])
     size = longer_side(tile.polygon)
-    scale = _scale(tile, settings) if settings.tile_size is None else settings.tile_size / size
+    width, height = settings.size
+    scale = float(np.sqrt(width * height / USUAL_TILES / abs(tile.signed_area)))
+    if settings.tile_size is not None:
+        scale = settings.tile_size / size
     if not settings.repeat:
-        linear, (width, height) = scale * flip, settings.size
+        linear = scale * flip
         offset = np.array([width, height]) / 2 - linear @ tile.center
         return _page(tile, colours, linear, offset, (width, height), ())
     found = rectangle(colours.lattice, scale, settings.tolerance, flipped=not given.y_down)
@@ -105,31 +89,14 @@ def art_page(given: EscherTile, settings: ArtSettings) -> ArtPage:
     note = f"the cell that repeats is {found.width} x {found.height} pixels and holds {tiles:.0f} tiles"
     if abs(found.turn) > 0.05:
         note += f"; the tiling is turned by {found.turn:.1f} degrees"
-    note += "; " + _strain_in_words(found.strain, exact=found.exact)
+    share = f"{100 * found.strain:.2g} %" if found.strain >= 5e-5 else "less than 0.01 %"
+    if found.strain < 1e-9:
+        note += "; nothing is stretched"
+    elif found.exact:
+        note += f"; whole pixels stretch it by {share}"
+    else:
+        note += f"; it is stretched by {share} to be a rectangle"
     return _page(tile, colours, found.linear, offset, (found.width, found.height), (note,))
-
-
-def spread_page(
-    page: ArtPage, given: EscherTile, settings: ArtSettings, across: int, down: int
-) -> ArtPage:
-    """Return a page with the plane of a repeating cell over `across` x `down` cells, computed anew."""
-    colours = _Colours(given.tile, settings.colour)
-    size = page.width * across, page.height * down
-    return _page(given.tile, colours, page.linear, page.offset, size, ())
-
-
-def _strain_in_words(strain: float, *, exact: bool) -> str:
-    if strain < 1e-9:
-        return "nothing is stretched"
-    share = f"{100 * strain:.2g} %" if strain >= 5e-5 else "less than 0.01 %"
-    if exact:
-        return f"whole pixels stretch it by {share}"
-    return f"it is stretched by {share} to be a rectangle"
-
-
-def _scale(tile: Tile, settings: ArtSettings) -> float:
-    width, height = settings.size
-    return float(np.sqrt(width * height / USUAL_TILES / abs(tile.signed_area)))
 
 
 def _page(
@@ -161,58 +128,36 @@ def _page(
     )
 
 
-REACH = 14
-"""Greatest multiple of a basis vector that is tried."""
-
-LARGEST = 60
-"""Greatest number of lattice cells in a rectangle."""
-
-EXACT = 1e-6
-"""Strain up to which a rectangle counts as exact: that of rounding."""
-
+REACH = 14  # greatest multiple of a basis vector that is tried
+LARGEST = 60  # greatest number of lattice cells in a rectangle
+EXACT = 1e-6  # strain up to which a rectangle counts as exact: that of rounding
+# Number of lattice cells up to which an exact rectangle is preferred to a smaller inexact one
 LARGEST_EXACT = 8
-"""Number of lattice cells up to which an exact rectangle is preferred to a smaller inexact one."""
-
-SLENDER = 4.0
-"""Ratio of its sides beyond which a rectangle counts as larger than it is."""
-
-SIZE_TOLERANCE = 0.02
-"""Greatest relative change of the size so that the cell is whole pixels."""
+SLENDER = 4.0  # ratio of its sides beyond which a rectangle counts as larger than it is
+SIZE_TOLERANCE = 0.02  # greatest relative change of the size so that the cell is whole pixels
 
 
 class Rectangle(NamedTuple):
     """A rectangular cell of whole pixels that repeats.
 
     - `linear`: The map (2, 2) from the lattice's units to pixels: a similarity, but for `strain`.
-    - `width`, `height`: The size in pixels.
-    - `cells`: The number of lattice cells in it.
-    - `strain`: How much longer one direction became than another; 0 for a similarity.
-    - `turn`: The angle in degrees, -45 to 45, by which the lattice is turned.
-    - `exact`: Whether it is a rectangle of the lattice: then only whole pixels strain it.
     """
 
     linear: Array
-    width: int
+    width: int  # with `height`: the size in pixels
     height: int
-    cells: int
-    strain: float
-    turn: float
-    exact: bool
+    cells: int  # the number of lattice cells in it
+    strain: float  # how much longer one direction became than another; 0 for a similarity
+    turn: float  # the angle in degrees, -45 to 45, by which the lattice is turned
+    exact: bool  # whether it is a rectangle of the lattice: then only whole pixels strain it
 
 
 def rectangle(lattice: Array, scale: float, tolerance: float, *, flipped: bool) -> Rectangle:
-    """Find the smallest rectangle of lattice vectors that repeats, in pixels.
+    """Find the smallest rectangle of lattice vectors, as columns (2, 2), that repeats, in pixels.
 
-    An exact rectangle is preferred if it is not much larger.
-
-    Args:
-        lattice: The basis vectors as columns (2, 2).
-        scale: The approximate number of pixels per unit.
-        tolerance: The greatest strain by which a parallelogram may be made a rectangle.
-        flipped: Whether y points up in the lattice's units, so that the picture is flipped.
-
-    Raises:
-        OrbiflowError: If there is none.
+    There are about `scale` pixels per unit. An exact rectangle is preferred if it is not much
+    larger; others are strained by at most `tolerance`. The picture is `flipped` if y points up in
+    the lattice.
 
     >>> found = rectangle(np.array([[1.0, 0.5], [0.0, 0.75**0.5]]), 100, 0.02, flipped=False)
     >>> found.width, found.height, found.cells, abs(found.turn) < 1e-9, found.strain < 4e-4

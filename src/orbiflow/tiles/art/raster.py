@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from orbiflow.arrays import Array, Integers
-from orbiflow.drawing import Palette
+from orbiflow.drawing import Palette, rgb
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.art.page import ArtPage
 
-NOWHERE = -1
-"""The label of samples that lie in no region."""
+NOWHERE = -1  # the label of samples that lie in no region
 
 NUDGE = 3.1415926e-7
 """Distance, in samples, by which rows of samples are moved down: rounding would otherwise decide about
@@ -24,18 +23,12 @@ vertices that a symmetric placement puts exactly on a row."""
 
 
 class Runs(NamedTuple):
-    """R runs of samples, each in one region, row by row and from left to right.
+    """R runs of samples, each in one region, row by row and from left to right."""
 
-    - `label`: The region (R,), or `NOWHERE`.
-    - `row`: The row (R,), counted from 0.
-    - `start`: The first column (R,).
-    - `length`: The number (R,) of samples; those of a row add up to its width.
-    """
-
-    label: Integers
-    row: Integers
-    start: Integers
-    length: Integers
+    label: Integers  # the region (R,), or `NOWHERE`
+    row: Integers  # the row (R,), counted from 0
+    start: Integers  # the first column (R,)
+    length: Integers  # the number (R,) of samples; those of a row add up to its width
 
     def spread(self, values: NDArray) -> NDArray:
         """Return one value for each sample (rows x width,) from one for each run."""
@@ -43,30 +36,29 @@ class Runs(NamedTuple):
 
 
 class Sides(NamedTuple):
-    """Sides of regions, each with the region to its right, at larger x.
+    """Sides of regions, each with the region to its right, at larger x."""
 
-    - `start`, `end`: The ends (S, 2) in samples, y down: sample (i, j) lies at (j + 1/2, i + 1/2).
-    - `label`: The region (S,).
-    """
-
-    start: Array
+    start: Array  # with `end`: (S, 2) in samples, y down: sample (i, j) lies at (j + 1/2, i + 1/2)
     end: Array
-    label: Integers
+    label: Integers  # the region (S,)
 
 
 def ring_sides(rings: Array) -> Sides:
     """Return the sides of rings (M, N, 2) that have the inside to their right; ring m has label m."""
-    ahead = np.roll(rings, -1, axis=1)
-    area = (rings[..., 0] * ahead[..., 1] - rings[..., 1] * ahead[..., 0]).sum(axis=1)
-    entering = (ahead[..., 1] - rings[..., 1]) * np.sign(area)[:, None] < 0
+    ahead, entering = _entering(rings)
     return Sides(rings[entering], ahead[entering], np.nonzero(entering)[0])
+
+
+def _entering(rings: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the ends of the sides of rings (..., N, 2), and which have the inside to their right."""
+    ahead = np.roll(rings, -1, axis=-2)
+    area = (rings[..., 0] * ahead[..., 1] - rings[..., 1] * ahead[..., 0]).sum(axis=-1)
+    return ahead, (ahead[..., 1] - rings[..., 1]) * np.sign(area)[..., None] < 0
 
 
 def polygon_sides(ring: Array) -> Sides:
     """Return the sides of one ring (N, 2): 0 where they enter it, `NOWHERE` where they leave it."""
-    ahead = np.roll(ring, -1, axis=0)
-    area = (ring[:, 0] * ahead[:, 1] - ring[:, 1] * ahead[:, 0]).sum()
-    entering = (ahead[:, 1] - ring[:, 1]) * np.sign(area) < 0
+    ahead, entering = _entering(ring)
     return Sides(ring, ahead, np.where(entering, 0, NOWHERE))
 
 
@@ -98,8 +90,7 @@ def runs(sides: Sides, top: int, rows: int, width: int) -> Runs:
     two regions share enters one of them, so every sample of a partition is in exactly one region.
 
     >>> square = np.array([[[1.0, 0.0], [3.0, 0.0], [3.0, 2.0], [1.0, 2.0]]])
-    >>> left = square - (2.0, 0.0)
-    >>> found = runs(ring_sides(np.concatenate([left, square])), 0, 2, 3)
+    >>> found = runs(ring_sides(np.concatenate([square - (2.0, 0.0), square])), 0, 2, 3)
     >>> found.label[found.length > 0].tolist(), found.length[found.length > 0].tolist()
     ([0, 1, 0, 1], [1, 2, 1, 2])
     """
@@ -127,28 +118,19 @@ def runs(sides: Sides, top: int, rows: int, width: int) -> Runs:
     return Runs(label, row, begin, stop - begin)
 
 
-MARGIN = 3
-"""Width in texels of the margin around the tile."""
-
-MOST_TEXELS = 20_000_000
-"""Greatest number of texels in the rasters of all colours together."""
-
+MARGIN = 3  # width in texels of the margin around the tile
+MOST_TEXELS = 20_000_000  # greatest number of texels in the rasters of all colours together
+# The neighbours of a texel, those that share a side last, for the last one counts
 _AROUND = ((-1, -1), (-1, 1), (1, -1), (1, 1), (-1, 0), (1, 0), (0, -1), (0, 1))
-"""The neighbours of a texel, those that share a side last, for the last one counts."""
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """A grid of texels over a tile: texel (i, j) lies at corner + (j + 1/2, i + 1/2) / density.
+    """A grid of texels over a tile: texel (i, j) lies at corner + (j + 1/2, i + 1/2) / density."""
 
-    - `corner`: The corner (2,) in the tile's units.
-    - `density`: Texels per unit.
-    - `width`, `height`: The size in texels.
-    """
-
-    corner: Array
-    density: float
-    width: int
+    corner: Array  # the corner (2,) in the tile's units
+    density: float  # texels per unit
+    width: int  # with `height`: the size in texels
     height: int
 
     @classmethod
@@ -173,8 +155,8 @@ class Grid:
 class Paint:
     """The painting of a tile in five channels (height, width, 5), from which colours are mixed.
 
-    They are red, green and blue, 0 to 1, already times their share; then the shares of the tile's own
-    colour and of its ink.
+    They are red, green and blue, 0 to 1, already times their share; then the shares of the tile's
+    own colour and of its ink.
     """
 
     def __init__(self, grid: Grid) -> None:
@@ -191,10 +173,6 @@ class Paint:
         """Lay ink over all, with this opacity (height, width)."""
         self.values *= (1 - alpha)[..., None]
         self.values[..., 4] += alpha
-
-    def line(self, colour: str, alpha: Array) -> None:
-        """Lay one colour over all, with this opacity (height, width)."""
-        self.lay(alpha[..., None] * rgb_of(colour).astype(np.float32), alpha)
 
     def bleed(self, inside: NDArray[np.bool_]) -> None:
         """Copy colours from just inside to the texels around, which lookups blend in."""
@@ -224,11 +202,10 @@ class Paint:
 
 def rgb_of(colour: str) -> Array:
     """Return the colour #rrggbb as three numbers (3,) from 0 to 1."""
-    return np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    return np.array(rgb(colour)) / 255
 
 
-BAND = 2_000_000
-"""Number of samples that are computed at a time."""
+BAND = 2_000_000  # number of samples that are computed at a time
 
 
 def render_page(
@@ -242,15 +219,8 @@ def render_page(
 ) -> np.ndarray:
     """Return the picture of a page (height, width, 3) in 8 bits.
 
-    Every sample belongs to exactly one copy of the tile; a pixel is the mean of its samples.
-
-    Args:
-        page: The copies of the tile.
-        grid: The grid of the tile's raster.
-        coloured: The raster (colours, height, width, 3), as `Paint.coloured` returns it.
-        paper: The colour where there is no tile.
-        samples: The number of samples along each side of a pixel.
-        cancel: Stops the work.
+    Every sample belongs to exactly one copy of the tile, and has its colour in the raster (colours,
+    height, width, 3) that `Paint.coloured` returns; a pixel is the mean of `samples` x `samples`.
     """
     cancel = cancel or Cancel()
     look = _Lookup(page, grid, coloured, paper, samples)

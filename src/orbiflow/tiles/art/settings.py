@@ -24,14 +24,9 @@ from orbiflow.units import pixel_size, pixels
 
 Strokes: TypeAlias = Literal["hatch", "echoes", "feathers"]
 
-MOST_PIXELS = 100_000_000
-"""The largest number of pixels of a picture."""
-
-LONGEST = 30_000
-"""The longest side of a picture in pixels."""
-
-SMALLEST_TILE = 8.0
-"""The size of a tile in pixels below which it shows nothing."""
+MOST_PIXELS = 100_000_000  # the largest number of pixels of a picture
+LONGEST = 30_000  # the longest side of a picture in pixels
+SMALLEST_TILE = 8.0  # the size of a tile in pixels below which it shows nothing
 
 
 def eye_numbers(text: str) -> tuple[float, ...]:
@@ -130,11 +125,7 @@ class ArtSettings(Settings, group="Picture"):
 
 
 def check_size(width: int, height: int) -> None:
-    """Check that a picture is not too large.
-
-    Raises:
-        SettingError: If it has too many pixels.
-    """
+    """Check that a picture is not too large."""
     if max(width, height) > LONGEST or width * height > MOST_PIXELS:
         raise SettingError(
             f"a picture of {width} x {height} pixels is too large ({{size}}); at most "

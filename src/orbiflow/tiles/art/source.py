@@ -23,13 +23,9 @@ from orbiflow.tiles.tile_map import TileMap
 def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
     """Return a tile with a map from its silhouette, or with the reason why there is none.
 
-    The map is the one that the search saved. Where there is none, as after a search for overlap, the
-    outlines of the silhouette and of the tile over it are matched.
-
-    Args:
-        source: A tile in memory, or a run's folder, or its result.json, whose best tile is meant.
-        target: The search's target, for a tile in memory without a map. The silhouette of a tile out
-            of a file is read again.
+    The map is the one that the search saved. Where there is none, as after a search for overlap,
+    the outlines of the silhouette and of the tile over it are matched: that of the search's
+    `target`, for a tile in memory, or the silhouette that a tile out of a file names, read again.
 
     Raises:
         OrbiflowError: If `source` holds no tile.
@@ -103,11 +99,7 @@ def covered_area(tile: EscherTile) -> Covered:
 
 
 def _silhouette(own: dict[str, Any]) -> Target:
-    """Return the silhouette of a run, read again.
-
-    Raises:
-        OrbiflowError: If it is missing or has changed.
-    """
+    """Return the silhouette of a run, read again, unless it is missing or has changed."""
     source = Path(str(own["source"]))
     if not source.is_file():
         raise InputFileError(
@@ -136,28 +128,20 @@ def _border(points: Array, triangles: np.ndarray) -> Array:
     return points[ring]
 
 
-SAME_ASPECT = 0.01
-"""Relative difference up to which two aspect ratios count as the same."""
-
+SAME_ASPECT = 0.01  # relative difference up to which two aspect ratios count as the same
+# Width in pixels of the strip inside the outline that its background may have mixed with
 FRINGE = 1.5
-"""Width in pixels of the strip inside the outline that its background may have mixed with."""
-
+# Distance in pixels from what the fringe leaves beyond which pixels are kept: thin limbs
 THIN = 4.0
-"""Distance in pixels from what the fringe leaves beyond which pixels are kept: thin limbs."""
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A picture of the silhouette.
+    """A picture of the silhouette."""
 
-    - `image`: The image: RGBA, straight, 8 bits.
-    - `covered`: The rectangle that it covers in the silhouette's coordinates.
-    - `notes`: What was decided for the user.
-    """
-
-    image: Image.Image
-    covered: Covered
-    notes: tuple[str, ...] = ()
+    image: Image.Image  # the image: RGBA, straight, 8 bits
+    covered: Covered  # the rectangle that it covers in the silhouette's coordinates
+    notes: tuple[str, ...] = ()  # what was decided for the user
 
     @property
     def pixel(self) -> float:
@@ -178,12 +162,7 @@ class Picture:
 
 
 def read_picture(path: Path, tile: EscherTile) -> Picture:
-    """Read a picture of a tile's silhouette from a file.
-
-    Raises:
-        InputFileError: If the file is over 64 MB or 40 megapixels, damaged or no image, or the
-            picture's aspect is not the silhouette's.
-    """
+    """Read a picture of a tile's silhouette from a file; it must have the silhouette's aspect."""
     image, notes = open_image(path, _decode)
     covered = covered_area(tile)
     wide, high = covered.high - covered.low
@@ -214,8 +193,7 @@ def _decode(path: Path, image: Image.Image) -> tuple[Image.Image, tuple[str, ...
 def carried_picture(picture: Picture, tile: EscherTile, grid: Grid) -> tuple[Array, Array]:
     """Carry a picture onto a tile's raster; its colours extend a little beyond the outline.
 
-    Returns:
-        Colours (height, width, 3) times their opacity, and the opacity (height, width).
+    Returns colours (height, width, 3) times their opacity, and the opacity (height, width).
     """
     small = picture.reduced(1 / grid.density)
     places = _places(tile, grid)
@@ -234,7 +212,8 @@ def carried_picture(picture: Picture, tile: EscherTile, grid: Grid) -> tuple[Arr
 def _spread(colours: Array, outline: Array) -> Array:
     """Extend the colours (height, width, 4) just inside an outline, in pixels, to all outside it.
 
-    So neither the background of a cut-out shows nor the pixels along the outline that it mixed with.
+    So neither the background of a cut-out shows nor the pixels along the outline that it mixed
+    with.
     """
     height, width = colours.shape[:2]
     found = runs(polygon_sides(outline), 0, height, width)

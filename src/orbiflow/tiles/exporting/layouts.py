@@ -1,8 +1,9 @@
-"""A tile in millimetres in its place on the page, and the copies of it, each in its colour."""
+"""A tile in its place on the page, and the scenes of whole tilings and of pieces to cut."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -11,53 +12,47 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import rotation_matrix
-from orbiflow.tiles.exporting.outlines import Outline, outline
-from orbiflow.tiles.exporting.scene import Box, Layer, PlacedTile, Scene, Style, Uses, rectangle
+from orbiflow.tiles.exporting.nesting import Placed, dense_arrangements, on_sheet
+from orbiflow.tiles.exporting.outlines import Outline, fitted, outline, turning
+from orbiflow.tiles.exporting.scene import (
+    Box,
+    Curve,
+    Layer,
+    PlacedTile,
+    Scene,
+    Style,
+    Uses,
+    rectangle,
+)
 from orbiflow.tiles.exporting.settings import ExportSettings
+from orbiflow.tiles.geometry import polygons_in
+from orbiflow.tiles.likeness import Thinnest, narrowest_neck, narrowest_slit
 from orbiflow.tiles.tilings import Copies, Tile, colouring, copies_inside, copies_meeting
 
-STRIP = 8.0
-"""Height in mm of the strip at the page's foot that the calibration mark has for itself."""
+STRIP = 8.0  # height in mm of the strip at the page's foot that the calibration mark has for itself
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A tile's place on the page, from which every kind of export starts.
-
-    - `settings`: The settings as they were given.
-    - `tile`: The tile in mm on the page, y down.
-    - `outline`: The tile's curves.
-    - `box`: The part of the page that tiles may use.
-    - `notes`: What the user should know.
-    """
+    """A tile's place on the page, from which every kind of export starts."""
 
     settings: ExportSettings
-    tile: Tile
-    outline: Outline
-    box: Box
-    notes: tuple[str, ...]
+    tile: Tile  # the tile in mm on the page, y down
+    outline: Outline  # the tile's curves
+    box: Box  # the part of the page that tiles may use
 
 
+# Places along each side of a lattice cell that are tried for a page with most whole tiles
 SHIFTS = 10
-"""Places along each side of a lattice cell that are tried for a page with most whole tiles."""
-
+# Number of tiles on a page beyond which a few more are not worth looking for
 MOST_TILES_TO_SHIFT = 1000
-"""Number of tiles on a page beyond which a few more are not worth looking for."""
 
 
 def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
     """Scale the tile and put it on the page, the way up it has, turned as the settings say.
 
-    It lies in the middle; where tiles are not cut at the page's edge, it lies nearby, so that as many
-    as possible are whole.
-
-    Args:
-        tile: The tile, in any units.
-        settings: How it is exported.
-        y_down: Whether its y axis points down.
-
-    Raises:
-        OrbiflowError: If the page is smaller than the tile.
+    It lies in the middle; where tiles are not cut at the page's edge, it lies nearby, so that as
+    many as possible are whole.
     """
     width, height = settings.page
     box = Box(0.0, 0.0, width, height - (STRIP if settings.calibrate else 0.0))
@@ -67,11 +62,18 @@ def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
     middle = np.array([(box.left + box.right) / 2, (box.top + box.bottom) / 2])
     placed = tile.transformed(linear, middle - linear @ tile.center)
     if settings.cut != "pieces":
-        _check_room(placed, settings, box)
+        need = np.ptp(placed.polygon, axis=0) + 2 * bleed(settings)
+        if need[0] > box.width or need[1] > box.height:
+            extra = height - box.height
+            strip = f", {extra:g} mm of it for the calibration mark" if extra else ""
+            raise OrbiflowError(
+                f"a tile of {settings.tile_size:g} mm does not fit on the page of {width:g} x "
+                f"{height:g} mm: it needs {need[0]:.1f} x {need[1] + extra:.1f} mm{strip}; choose "
+                "a larger area or a smaller tile size"
+            )
         if not settings.clip:
             placed = _with_most_whole(placed, inner_box(box, settings))
-    curves = outline(placed, settings.deviation)
-    return Layout(settings, placed, curves, box, (curves.note,) if curves.note else ())
+    return Layout(settings, placed, outline(placed, settings.deviation), box)
 
 
 def longer_side(ring: Array) -> float:
@@ -126,19 +128,6 @@ def _with_most_whole(tile: Tile, box: Box) -> Tile:
     return tile.transformed(np.eye(2), shift)
 
 
-def _check_room(tile: Tile, settings: ExportSettings, box: Box) -> None:
-    need = np.ptp(tile.polygon, axis=0) + 2 * bleed(settings)
-    if need[0] <= box.width and need[1] <= box.height:
-        return
-    extra = settings.page[1] - box.height
-    strip = f", {extra:g} mm of it for the calibration mark" if extra else ""
-    raise OrbiflowError(
-        f"a tile of {settings.tile_size:g} mm does not fit on the page of {settings.page[0]:g} x "
-        f"{settings.page[1]:g} mm: it needs {need[0]:.1f} x {need[1] + extra:.1f} mm{strip}; choose "
-        "a larger area or a smaller tile size"
-    )
-
-
 def placed_tiles(copies: Copies, layout: Layout) -> tuple[PlacedTile, ...]:
     """Return what the JSON file says about each copy."""
     own = layout.outline.edges
@@ -173,11 +162,7 @@ def chosen_copies(layout: Layout) -> Copies:
 
 
 def tiling_scene(layout: Layout) -> Scene:
-    """Return a scene with the tile as a symbol, a use of it for each copy, a layer for each colour.
-
-    Raises:
-        OrbiflowError: If the page holds too many tiles.
-    """
+    """Return a scene with the tile as a symbol, a use of it for each copy, a layer for each colour."""
     settings = layout.settings
     copies = chosen_copies(layout)
     # relative to the symbol's own middle, so that rounding a transform moves no point by much
@@ -221,3 +206,148 @@ def line_style(layout: Layout) -> Style:
     """Return the style of lines to cut."""
     settings = layout.settings
     return Style(None, settings.stroke or RED, settings.stroke_width or 0.1)
+
+
+MITRE = 4.0  # the greatest reach of a sharp corner of a cut, in offsets
+
+
+def cut_ring(ring: Array, kerf: float, clearance: float) -> Array:
+    """Return the line (M, 2) that the middle of the beam follows to cut a piece with this outline.
+
+    The piece that is left is `ring` (N, 2), less half the clearance all around. A neck no wider
+    than kerf or clearance is an error, and so is a slit that the beam would close.
+
+    >>> bar = np.array([[0.0, 0.0], [20, 0], [20, 4], [0, 4]])
+    >>> shapely.Polygon(cut_ring(bar, 0.2, 0.0)).bounds
+    (-0.1, -0.1, 20.1, 4.1)
+    """
+    neck = narrowest_neck(ring)
+    if neck.width <= max(kerf, clearance):
+        what = "kerf" if kerf >= clearance else "clearance"
+        raise OrbiflowError(
+            f"the {what} of {max(kerf, clearance):g} mm is wider than the piece's neck: it is "
+            f"{neck.width:.2f} mm wide {place_on(ring, neck)}; choose a larger tile size"
+        )
+    slit = narrowest_slit(ring)
+    if slit is not None and slit.width + clearance <= kerf:
+        raise OrbiflowError(
+            f"the kerf of {kerf:g} mm is wider than a slit of the piece: it is {slit.width:.2f} mm "
+            f"wide {place_on(ring, slit)}, and would be burned away; choose a larger tile size"
+        )
+    return _offset_ring(ring, (kerf - clearance) / 2)
+
+
+def _offset_ring(ring: Array, distance: float) -> Array:
+    if abs(distance) < 1e-9:
+        return ring
+    moved = shapely.Polygon(ring).buffer(distance, join_style="mitre", mitre_limit=MITRE)
+    parts = polygons_in(moved)
+    if len(parts) != 1 or parts[0].interiors:
+        raise OrbiflowError(
+            "kerf and clearance are wider than a part of the piece: its cut would fall into "
+            f"{len(parts) + sum(len(part.interiors) for part in parts)} lines; choose a larger "
+            "tile size"
+        )
+    points = np.asarray(parts[0].exterior.coords)[:-1]
+    steps = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1)
+    return points[steps > 1e-9]
+
+
+def place_on(ring: Array, found: Thinnest) -> str:
+    """Return in words where on a piece a neck or slit is.
+
+    >>> ring = np.array([[10.0, 10.0], [30.0, 10.0], [30.0, 14.0], [10.0, 14.0]])
+    >>> place_on(ring, narrowest_neck(ring)).split(" from ")[1]
+    'its left and 2.0 mm'
+    """
+    x, y = found.place - ring.min(axis=0)
+    return f"{x:.1f} mm from its left and {y:.1f} mm from its top"
+
+
+LEAST_GAP = 0.01  # the least distance in mm between cuts: pieces never touch
+LEAST_EDGE = 0.1  # twice the least distance in mm of cuts from the sheet's edge
+
+
+def pieces_scenes(layout: Layout, *, fine: bool = True) -> list[Scene]:
+    """Return a scene for each sheet; there is one unless a bed is given and does not hold all copies.
+
+    The cuts are smooth curves if `fine`, else polygons.
+    """
+    settings, box = layout.settings, layout.box
+    flat = settings.deviation / 4
+    # flattening and fitting again share what the outline's fit left of the tolerance
+    ring = cut_ring(layout.outline.closed.flattened(flat / 2), settings.kerf, settings.clearance)
+    curve = _closed_fit(ring, flat) if fine else Curve.polyline(ring, closed=True)
+    line = curve.flattened(flat / 4)
+    gap = max(settings.spacing, LEAST_GAP)
+    arrangements = dense_arrangements(layout.tile, line, gap)
+    edge = max(gap, LEAST_EDGE) / 2
+    placed = on_sheet(arrangements, line, box.width - 2 * edge, box.height - 2 * edge)
+    placed = replace(placed, offsets=placed.offsets + edge)
+    if not len(placed):
+        short, long = rectangle_sides(line)
+        raise OrbiflowError(
+            f"the page of {box.width:g} x {box.height:g} mm does not hold a single piece, which takes "
+            f"{long:.1f} x {short:.1f} mm; choose a larger area or bed, or a smaller tile size"
+        )
+    return [
+        _scene(layout, part, curve, line, box, gap) for part in _shared_out(placed, layout, box)
+    ]
+
+
+def _shared_out(placed: Placed, layout: Layout, box: Box) -> list[Placed]:
+    settings, fit = layout.settings, len(placed)
+    wanted = settings.copies or fit
+    sheets = math.ceil(wanted / fit)
+    if sheets > 1 and settings.bed is None:
+        plural = "s" if fit > 1 else ""
+        raise OrbiflowError(
+            f"{wanted} pieces do not fit on the page of {box.width:g} x {box.height:g} mm: it holds "
+            f"{fit} piece{plural}, so that {sheets} sheets are needed; choose a larger area, or give "
+            f"the bed to have {sheets} files"
+        )
+    return [placed.first(min(fit, wanted - k * fit)) for k in range(sheets)]
+
+
+def _scene(
+    layout: Layout, placed: Placed, curve: Curve, line: Array, box: Box, gap: float
+) -> Scene:
+    _require_clear(placed.rings(line), box, gap)
+    cuts = tuple(
+        curve.moved(linear, offset)
+        for linear, offset in zip(placed.linear, placed.offsets, strict=True)
+    )
+    return Scene(
+        *layout.settings.page,
+        (Layer("cut", "cut", line_style(layout), cuts),),
+        window=box,
+        prototile=layout.tile.polygon,
+        tiles=tuple(
+            PlacedTile(int(aspect), linear, offset)
+            for aspect, linear, offset in zip(
+                placed.aspects, placed.linear, placed.offsets, strict=True
+            )
+        ),
+    )
+
+
+def _closed_fit(ring: Array, tolerance: float) -> Curve:
+    """Fit a smooth curve to a closed polygon; take the polygon where the curve would cross itself."""
+    closed = np.concatenate([ring[-1:], ring, ring[:1]])
+    first = int(np.argmax(np.abs(turning(closed))))  # a corner, where there is one
+    turned = np.roll(ring, -first, axis=0)
+    curve = fitted(np.concatenate([turned, turned[:1]]), tolerance)
+    curve = Curve(curve.pieces, curve.straight, closed=True)
+    if shapely.Polygon(curve.flattened(tolerance / 4)).is_valid:
+        return curve
+    return Curve.polyline(ring, closed=True)
+
+
+def _require_clear(rings: Array, box: Box, gap: float) -> None:
+    """Check that pieces keep their distance and lie on the sheet, as the arrangement promises."""
+    polygons = np.asarray(shapely.polygons(rings))
+    tree = shapely.STRtree(polygons)
+    first, second = tree.query(polygons, predicate="dwithin", distance=0.999 * gap)
+    low, high = rings.min(axis=(0, 1)), rings.max(axis=(0, 1))
+    if (first != second).any() or (low < 0).any() or (high > (box.width, box.height)).any():
+        raise RuntimeError("the nesting broke its promise: pieces too close or off the sheet")

@@ -1,8 +1,8 @@
 """Dense lattice arrangements of a piece, and the sheets that are filled with them.
 
 There are three kinds of start: the tile's own tiling spread apart, which is dense where the gap is
-small; a lattice of pieces all one way up; and a lattice of pairs, one of each turned by 180 degrees.
-Each is made as tight as the gap allows, then improved by small random changes.
+small; a lattice of pieces all one way up; and a lattice of pairs, one of each turned by 180
+degrees. Each is made as tight as the gap allows, then improved by small random changes.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import attrgetter
 
 import numpy as np
 import shapely
@@ -22,16 +23,11 @@ from orbiflow.tiles.tilings import Tile
 
 @dataclass(frozen=True, eq=False)
 class Arrangement:
-    """An arrangement of pieces, A of them in each cell of a lattice.
+    """An arrangement of pieces, A of them in each cell of a lattice."""
 
-    - `lattice`: The basis vectors in mm, as columns (2, 2).
-    - `linear`: How each piece of a cell is turned or mirrored (A, 2, 2).
-    - `offsets`: Where each piece is (A, 2): a point p of the piece goes to linear p + offset.
-    """
-
-    lattice: Array
-    linear: Array
-    offsets: Array
+    lattice: Array  # the basis vectors in mm, as columns (2, 2)
+    linear: Array  # how each piece of a cell is turned or mirrored (A, 2, 2)
+    offsets: Array  # where each piece is (A, 2): a point p of the piece goes to linear p + offset
 
     def scaled(self, stretch: Array, middle: Array) -> Arrangement:
         """Return the arrangement with the pieces' middles moved by the linear map `stretch` (2, 2)."""
@@ -52,7 +48,10 @@ class Arrangement:
 
     def clear(self, ring: Array, gap: float) -> bool:
         """Return whether no two pieces with the outline `ring` come closer than `gap`."""
-        pieces = self._own(ring)
+        pieces = [
+            shapely.Polygon(ring @ linear.T + offset)
+            for linear, offset in zip(self.linear, self.offsets, strict=True)
+        ]
         reach = float(np.linalg.norm(ring - _middle(ring), axis=1).max())
         centers = self.linear @ _middle(ring) + self.offsets
         steps = self._steps(2 * reach + gap, centers)
@@ -64,15 +63,12 @@ class Arrangement:
                 near = np.hypot(*moved.T) <= 2 * reach + gap
                 if second == first:  # one of each pair of opposite shifts, and not the piece itself
                     near &= (steps[:, 0] > 0) | ((steps[:, 0] == 0) & (steps[:, 1] > 0))
-                if near.any() and self._touched(piece, pieces[second], shifts[near], gap):
-                    return False
+                if near.any():
+                    points = np.asarray(pieces[second].exterior.coords)
+                    others = shapely.polygons(points + shifts[near][:, None, :])
+                    if shapely.dwithin(piece, others, gap).any():
+                        return False
         return True
-
-    def _own(self, ring: Array) -> list[shapely.Polygon]:
-        return [
-            shapely.Polygon(ring @ linear.T + offset)
-            for linear, offset in zip(self.linear, self.offsets, strict=True)
-        ]
 
     def _steps(self, reach: float, centers: Array) -> Array:
         """Return the integer coordinates of all lattice vectors that can bring two pieces together."""
@@ -81,12 +77,6 @@ class Arrangement:
         bound = np.minimum(bound, 40)
         ranges = [np.arange(-b, b + 1) for b in bound]
         return np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 2)
-
-    @staticmethod
-    def _touched(piece: shapely.Polygon, other: shapely.Polygon, shifts: Array, gap: float) -> bool:
-        points = np.asarray(other.exterior.coords)
-        moved = shapely.polygons(points + shifts[:, None, :])
-        return bool(shapely.dwithin(piece, moved, gap).any())
 
 
 def tightened(start: Arrangement, ring: Array, gap: float, *, most: float = 4.0) -> Arrangement:
@@ -116,17 +106,10 @@ def _middle(ring: Array) -> Array:
 
 Mask = NDArray[np.bool_]
 
-CELLS = 48
-"""Raster cells along a piece."""
-
-DIRECTIONS = 30
-"""Directions of a lattice's first vector that are tried."""
-
-PAIRS = 24
-"""Places of the turned piece of a pair that are tried."""
-
-KEPT_LATTICES = 3
-"""Number of best lattices that are then tightened exactly."""
+CELLS = 48  # raster cells along a piece
+DIRECTIONS = 30  # directions of a lattice's first vector that are tried
+PAIRS = 24  # places of the turned piece of a pair that are tried
+KEPT_LATTICES = 3  # number of best lattices that are then tightened exactly
 
 
 def lattice_starts(ring: Array, gap: float) -> list[Arrangement]:
@@ -141,7 +124,8 @@ def pair_starts(ring: Array, gap: float) -> list[Arrangement]:
     """Return dense lattices of pairs, the piece and the piece turned by 180 degrees."""
     raster = _Raster(ring, gap)
     found = []
-    for place in raster.edge_of(raster.turned):
+    for angle in np.arange(PAIRS) * 2 * np.pi / PAIRS:
+        place = raster.first_outside(raster.turned, angle)
         # the pair's no-fit region: like with like, and unlike either way round
         there = _shifted(raster.turned, -place)
         pair = raster.same | there | there[::-1, ::-1]
@@ -175,31 +159,27 @@ class _Raster:
         self.turned = np.pad(fftconvolve(piece, piece) > 0.5, pad)
         self.half = (len(self.same) - 1) // 2
 
-    def edge_of(self, region: Mask) -> list[NDArray[np.int64]]:
-        """Return translations (2,) in cells just outside a region, in all directions."""
-        found = []
-        for angle in np.arange(PAIRS) * 2 * np.pi / PAIRS:
-            found.append(self._first_outside(region, angle))
-        return found
-
-    def _first_outside(self, region: Mask, angle: float) -> NDArray[np.int64]:
+    def first_outside(self, region: Mask, angle: float) -> NDArray[np.int64]:
+        """Return the translation (2,) in cells just outside a region in a direction."""
         way = np.array([np.cos(angle), np.sin(angle)])
         steps = np.round(np.arange(1, self.half + 2)[:, None] * way).astype(int)
-        free = np.logical_not(_values_at(region, steps))
-        return steps[int(np.argmax(free))]
+        index = steps + (np.array(region.shape) - 1) // 2
+        known = np.asarray(((index >= 0) & (index < region.shape)).all(axis=1))
+        index = np.where(known[:, None], index, 0)
+        return steps[int(np.argmin(known & region[index[:, 0], index[:, 1]]))]
 
     def lattices(self, region: Mask, pieces: int) -> list[tuple[float, Array]]:
         """Return the area and lattice, in mm, of lattices outside a region, the densest first.
 
-        Their basis vectors lie outside it; longer vectors may still lie in it. A cell smaller than so
-        many `pieces` is left out.
+        Their basis vectors lie outside it; longer vectors may still lie in it. A cell smaller than
+        so many `pieces` is left out.
         """
         half = (len(region) - 1) // 2
         axis = np.arange(-half, half + 1)
         grid = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1)
         found = []
         for angle in np.arange(DIRECTIONS) * np.pi / DIRECTIONS:
-            first = self._first_outside(region, angle)
+            first = self.first_outside(region, angle)
             blocked = np.zeros_like(region)
             most = 1 + int(2 * half / max(1.0, float(np.hypot(*first))))
             for k in range(-most, most + 1):
@@ -215,14 +195,6 @@ class _Raster:
         return found
 
 
-def _values_at(region: Mask, steps: NDArray[np.int64]) -> Mask:
-    half = (np.array(region.shape) - 1) // 2
-    index = steps + half
-    known = np.asarray(((index >= 0) & (index < region.shape)).all(axis=1))
-    index = np.where(known[:, None], index, 0)
-    return known & region[index[:, 0], index[:, 1]]
-
-
 def _shifted(region: Mask, step: NDArray[np.int64]) -> Mask:
     """Return the region moved by whole cells; what comes from beyond the raster is free."""
     moved = np.zeros_like(region)
@@ -235,14 +207,9 @@ def _shifted(region: Mask, step: NDArray[np.int64]) -> Mask:
     return moved
 
 
-TRIALS = 400
-"""Random changes of each kind of start."""
-
-KEPT = 4
-"""Number of densest arrangements that are tried on a sheet."""
-
-ANGLES = 36
-"""Angles of an arrangement that are tried on a sheet."""
+TRIALS = 400  # random changes of each kind of start
+KEPT = 4  # number of densest arrangements that are tried on a sheet
+ANGLES = 36  # angles of an arrangement that are tried on a sheet
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,30 +236,22 @@ class Placed:
 
 
 def dense_arrangements(tile: Tile, ring: Array, gap: float, *, seed: int = 0) -> list[Arrangement]:
-    """Return arrangements of pieces with the outline `ring`, the densest first.
+    """Return arrangements of pieces cut along `ring` (M, 2), at least `gap` apart, the densest first.
 
-    Args:
-        tile: The tile, in the same coordinates.
-        ring: The line (M, 2) that is cut, in mm.
-        gap: The least distance in mm between pieces, above 0.
-        seed: The seed of the small changes; the same seed gives the same arrangements.
+    The same seed, of the small changes, gives the same arrangements.
     """
     rng = np.random.default_rng(seed)
     coarse = _simplified(ring, gap)
     group = tile.group
     own = Arrangement(group.lattice, group.linear_parts, group.translations)
     starts = [own, *lattice_starts(coarse, gap), *pair_starts(coarse, gap)]
-    tight = sorted((tightened(start, coarse, gap) for start in starts), key=_area)
+    tight = sorted((tightened(start, coarse, gap) for start in starts), key=attrgetter("cell_area"))
     clear = [found for found in tight if found.clear(ring, gap)]
     improved = [_improved(found, coarse, gap, rng) for found in clear[:3]]
-    best = sorted((*improved, *clear), key=_area)[:KEPT]
+    best = sorted((*improved, *clear), key=attrgetter("cell_area"))[:KEPT]
     # the coarse ring holds the fine one, so there is a little room left
     exact = (tightened(found, ring, gap) for found in best)
-    return sorted((found for found in exact if found.clear(ring, gap)), key=_area)
-
-
-def _area(arrangement: Arrangement) -> float:
-    return arrangement.cell_area
+    return sorted((found for found in exact if found.clear(ring, gap)), key=attrgetter("cell_area"))
 
 
 def _simplified(ring: Array, gap: float) -> Array:
@@ -328,8 +287,8 @@ def on_sheet(
 ) -> Placed:
     """Fill a rectangle from the origin with as many pieces as fit, in rows from the top.
 
-    Each arrangement is tried, turned and shifted in several ways; among equally good ones the first is
-    taken. A single piece goes in whichever way it fits.
+    Each arrangement is tried, turned and shifted in several ways; among equally good ones the first
+    is taken. A single piece goes in whichever way it fits.
     """
     best = Placed(np.zeros((0, 2, 2)), np.zeros((0, 2)), np.zeros(0, dtype=np.int64))
     turns = [(found, angle) for found in arrangements for angle in _angles(found, ring)]
@@ -337,7 +296,8 @@ def on_sheet(
         turned = arrangement.turned(angle)
         rings = np.einsum("aij,mj->ami", turned.linear, ring) + turned.offsets[:, None]
         low, high = rings.min(axis=1), rings.max(axis=1)
-        for shift in _shifts(low):
+        # one piece at the left edge and one at the top, a hair inside
+        for shift in (np.array([1e-6 - x, 1e-6 - y]) for x in low[:, 0] for y in low[:, 1]):
             placed = _within(turned, low + shift, high + shift, shift, width, height)
             if len(placed) > len(best):
                 best = placed
@@ -350,11 +310,6 @@ def _angles(arrangement: Arrangement, ring: Array) -> list[float]:
     along = [-np.arctan2(y, x) + turn for x, y in sides for turn in (0, np.pi / 2)]
     even = np.arange(ANGLES) * np.pi / ANGLES
     return sorted({round(float(a % np.pi), 9) for a in (*along, *even)})
-
-
-def _shifts(low: Array) -> list[Array]:
-    """Return shifts that bring one piece to the left edge and one to the top, a hair inside."""
-    return [np.array([1e-6 - x, 1e-6 - y]) for x in low[:, 0] for y in low[:, 1]]
 
 
 def _within(

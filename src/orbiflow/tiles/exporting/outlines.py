@@ -10,25 +10,20 @@ import shapely
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.scene import Curve
+from orbiflow.tiles.exporting.scene import Curve, bezier
 from orbiflow.tiles.tilings import EdgeImage, Edges, Tile, edge_classes, edges
 
+# The angle in radians by which a polyline turns at a vertex that stays a corner
 CORNER = np.radians(30.0)
-"""The angle in radians by which a polyline turns at a vertex that stays a corner."""
 
 _SAMPLES, _ROUNDS = 48, 4
 
 
 def fitted(points: Array, tolerance: float) -> Curve:
-    """Fit a curve of smooth pieces to a polyline.
+    """Fit a curve of smooth pieces within `tolerance` to a polyline (n, 2), from end to end.
 
-    Args:
-        points: The polyline's vertices (n, 2), two or more.
-        tolerance: The greatest distance between curve and polyline, in the points' units. Where no
-            smooth piece is that close, the polyline's sides are taken.
-
-    Returns:
-        A curve from the first point to the last; the polyline's corners are ends of its pieces.
+    The polyline's corners are ends of its pieces. Where no smooth piece is that close, sides are
+    taken.
 
     >>> turns = np.linspace(0, np.pi, 40)
     >>> arc = fitted(np.stack([np.cos(turns), np.sin(turns)], axis=1), 3e-2)
@@ -93,28 +88,26 @@ def _tangents(run: Array) -> Array:
 def _cubic(part: Array, start: Array, end: Array, tolerance: float) -> tuple[Array | None, int]:
     """Return the cubic along a polyline, or None and the vertex at which to divide it."""
     samples = _samples(part)
-    share = _arc_shares(samples)
+    knots = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(samples, axis=0), axis=1))])
+    share = knots / max(knots[-1], 1e-300)
     piece = _least_squares(samples, share, start, end)
     for _ in range(_ROUNDS):
         share = _closer(piece, samples, share)
         piece = _least_squares(samples, share, start, end)
-    error = np.linalg.norm(_points(piece, share) - samples, axis=1)
-    if error.max() <= tolerance and _deviation(piece, part) <= tolerance:
-        return piece, 0
+    error = np.linalg.norm(bezier(piece[None], share) - samples, axis=1)
+    if error.max() <= tolerance:
+        along = bezier(piece[None], np.linspace(0, 1, 4 * min(len(part), 24) + 9))
+        if shapely.distance(shapely.points(along), shapely.LineString(part)).max() <= tolerance:
+            return piece, 0
     inner = part[1:-1]
     if not len(inner):
         return None, 0
     off = shapely.distance(
-        shapely.points(inner), shapely.LineString(_points(piece, np.linspace(0, 1, 40)))
+        shapely.points(inner), shapely.LineString(bezier(piece[None], np.linspace(0, 1, 40)))
     )
     balance = np.minimum(np.arange(1, len(part) - 1), np.arange(len(part) - 2, 0, -1))
     # the farthest vertex, unless a sliver would be left
     return None, int(np.argmax(off * np.minimum(balance / len(part), 0.2))) + 1
-
-
-def _deviation(piece: Array, part: Array) -> float:
-    samples = shapely.points(_points(piece, np.linspace(0, 1, 4 * min(len(part), 24) + 9)))
-    return float(shapely.distance(samples, shapely.LineString(part)).max())
 
 
 def _samples(part: Array) -> Array:
@@ -125,11 +118,6 @@ def _samples(part: Array) -> Array:
     share = (np.arange(count.sum()) - (np.cumsum(count) - count)[own]) / count[own]
     points = part[own] + share[:, None] * (part[own + 1] - part[own])
     return np.concatenate([points, part[-1:]])
-
-
-def _arc_shares(samples: Array) -> Array:
-    knots = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(samples, axis=0), axis=1))])
-    return knots / max(knots[-1], 1e-300)
 
 
 def _least_squares(samples: Array, share: Array, start: Array, end: Array) -> Array:
@@ -153,12 +141,6 @@ def _least_squares(samples: Array, share: Array, start: Array, end: Array) -> Ar
     return np.stack([first, first + lengths[0] * start, last - lengths[1] * end, last])
 
 
-def _points(piece: Array, share: Array) -> Array:
-    t = share[:, None]
-    u = 1 - t
-    return u**3 * piece[0] + 3 * u**2 * t * piece[1] + 3 * u * t**2 * piece[2] + t**3 * piece[3]
-
-
 def _closer(piece: Array, samples: Array, share: Array) -> Array:
     """Return parameters nearer to the samples, by one step of Newton's method."""
     t = share[:, None]
@@ -167,7 +149,7 @@ def _closer(piece: Array, samples: Array, share: Array) -> Array:
     second = np.diff(piece, n=2, axis=0)
     slope = 3 * (u**2 * first[0] + 2 * u * t * first[1] + t**2 * first[2])
     bend = 6 * (u * second[0] + t * second[1])
-    off = _points(piece, share) - samples
+    off = bezier(piece[None], share) - samples
     top = (off * slope).sum(axis=1)
     bottom = (slope**2).sum(axis=1) + (off * bend).sum(axis=1)
     step = np.where(np.abs(bottom) > 1e-300, top / np.where(bottom == 0, 1, bottom), 0.0)
@@ -183,16 +165,13 @@ _SHARES = (0.6, 0.15, 0.04)  # of the tolerance; finer where curves would otherw
 class Outline:
     """The outline of a tile in curves.
 
-    - `tile`: The tile.
     - `edges`: How its outline falls into edges; None if that is not known (`note` says why).
-    - `curves`: One curve for each edge, end to end; or a single closed curve.
-    - `note`: What the user should know, or "".
     """
 
     tile: Tile
     edges: Edges | None
-    curves: tuple[Curve, ...]
-    note: str = ""
+    curves: tuple[Curve, ...]  # one curve for each edge, end to end; or a single closed curve
+    note: str = ""  # what the user should know, or ""
 
     @property
     def closed(self) -> Curve:
@@ -201,16 +180,12 @@ class Outline:
 
 
 def outline(tile: Tile, tolerance: float) -> Outline:
-    """Fit smooth curves to a tile's polygon that tile the plane as exactly as it does.
+    """Fit smooth curves near a tile's polygon that tile the plane as exactly as it does.
 
-    One edge of each class of identified edges is fitted and the others are its images; an edge that is
-    its own image, by a half-turn or a mirror across it, is fitted up to its middle. Where curves would
-    touch each other within the tolerance, they are fitted more closely, at worst along the polygon
-    itself.
-
-    Args:
-        tile: The tile.
-        tolerance: The greatest distance from the polygon, in the tile's units.
+    One edge of each class of identified edges is fitted and the others are its images; an edge that
+    is its own image, by a half-turn or a mirror across it, is fitted up to its middle. Where curves
+    would touch each other within the tolerance, they are fitted more closely, at worst along the
+    polygon itself.
     """
     try:
         own = edges(tile)

@@ -12,7 +12,6 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
-from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
@@ -92,7 +91,7 @@ class Curve:
         own = np.repeat(np.arange(len(count)), count)
         first = np.cumsum(count) - count
         share = (np.arange(count.sum()) - first[own]) / count[own]
-        points = _at(self.pieces[own], share)
+        points = bezier(self.pieces[own], share)
         return points if self.closed else np.concatenate([points, self.end[None]])
 
     def bounds(self) -> Array:
@@ -101,7 +100,7 @@ class Curve:
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
 
-def _at(pieces: Array, share: Array) -> Array:
+def bezier(pieces: Array, share: Array) -> Array:
     """Return the point of each piece (n, 4, 2) at its parameter `share` (n,)."""
     t = share[:, None]
     u = 1 - t
@@ -142,16 +141,11 @@ class Style(NamedTuple):
 
 
 class Part(NamedTuple):
-    """Curves drawn as one.
+    """Curves drawn as one."""
 
-    - `curves`: The curves; closed ones are filled, holes run the other way.
-    - `style`: Fill and stroke, which may be `INK`.
-    - `opacity`: A number from 0 to 1.
-    """
-
-    curves: tuple[Curve, ...]
-    style: Style
-    opacity: float = 1.0
+    curves: tuple[Curve, ...]  # the curves; closed ones are filled, holes run the other way
+    style: Style  # fill and stroke, which may be `INK`
+    opacity: float = 1.0  # a number from 0 to 1
 
     @property
     def inked(self) -> bool:
@@ -183,16 +177,11 @@ class Raster(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Motif:
-    """A drawing of many parts that every copy of a tile carries.
+    """A drawing of many parts that every copy of a tile carries."""
 
-    - `parts`: What is drawn, from the bottom up.
-    - `rasters`: Pictures of pixels under the parts.
-    - `within`: The name of the symbol that cuts the drawing off, if any.
-    """
-
-    parts: tuple[Part, ...] = ()
-    rasters: tuple[Raster, ...] = ()
-    within: str | None = None
+    parts: tuple[Part, ...] = ()  # what is drawn, from the bottom up
+    rasters: tuple[Raster, ...] = ()  # pictures of pixels under the parts
+    within: str | None = None  # the name of the symbol that cuts the drawing off, if any
 
     def moved(self, linear: Array, offset: Array) -> Motif:
         """Return the image under a map p -> linear p + offset."""
@@ -255,19 +244,13 @@ class Layer:
 
 @dataclass(frozen=True, eq=False)
 class PlacedTile:
-    """A tile on the page, for programs that read the JSON file.
+    """A tile on the page, for programs that read the JSON file."""
 
-    - `aspect`: The index of its coset representative.
-    - `linear`, `offset`: The map from the prototile's place in the scene to this tile's.
-    - `neighbours`: The numbers of the scene's tiles that share an edge with it.
-    - `whole`: Whether all of it is on the page.
-    """
-
-    aspect: int
-    linear: Array
+    aspect: int  # the index of its coset representative
+    linear: Array  # with `offset`: the map from the prototile's place in the scene to this tile's
     offset: Array
-    neighbours: tuple[int, ...] = ()
-    whole: bool = True
+    neighbours: tuple[int, ...] = ()  # the numbers of the scene's tiles that share an edge with it
+    whole: bool = True  # whether all of it is on the page
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,22 +286,14 @@ class Scene:
         return self.window or Box(0.0, 0.0, self.width, self.height)
 
     def require_plain(self) -> None:
-        """Check that all symbols are single curves.
-
-        Raises:
-            OrbiflowError: If there are motifs, which only SVG can hold.
-        """
+        """Check that there are no motifs, which only SVG can hold."""
         if self.motifs:
             raise OrbiflowError(
                 "this format cannot hold artwork: write it as SVG, or render it as PNG"
             )
 
     def curves(self, layer: Layer) -> Iterator[Curve]:
-        """Yield every curve of a layer, including copies of symbols.
-
-        Raises:
-            OrbiflowError: If the scene is artwork, as `require_plain`.
-        """
+        """Yield every curve of a layer, including copies of symbols."""
         self.require_plain()
         for item in layer.items:
             if isinstance(item, Uses):
@@ -335,12 +310,9 @@ def rectangle(box: Box) -> Curve:
 
 def inside(curve: Curve, box: Box, *, slack: float = 1e-9) -> bool:
     """Return whether a box holds a curve with all its control points."""
-    (left, top), (right, bottom) = curve.bounds()
+    low, high = curve.bounds()
     return bool(
-        left >= box.left - slack
-        and top >= box.top - slack
-        and right <= box.right + slack
-        and bottom <= box.bottom + slack
+        (low >= np.array(box[:2]) - slack).all() and (high <= np.array(box[2:]) + slack).all()
     )
 
 
@@ -352,8 +324,7 @@ def clipped_region(curve: Curve, box: Box, tolerance: float) -> list[Curve]:
     if inside(curve, box):
         return [curve]
     polygon = shapely.Polygon(curve.flattened(tolerance))
-    if not polygon.is_valid:
-        polygon = shapely.make_valid(polygon)
+    polygon = polygon if polygon.is_valid else shapely.make_valid(polygon)
     common = shapely.intersection(polygon, shapely.box(*box))
     return [
         Curve.polyline(np.asarray(part.exterior.coords)[:-1], closed=True)
@@ -367,11 +338,6 @@ def clipped_line(curve: Curve, box: Box, tolerance: float) -> list[Curve]:
         return [curve]
     points = curve.flattened(tolerance)
     line = shapely.LineString(np.concatenate([points, points[:1]]) if curve.closed else points)
-    common = shapely.intersection(line, shapely.box(*box))
-    return [Curve.polyline(part) for part in _lines(common)]
-
-
-def _lines(geometry: BaseGeometry) -> list[np.ndarray]:
-    if geometry.geom_type == "LineString":
-        return [] if geometry.is_empty else [shapely.get_coordinates(geometry)]
-    return [line for part in getattr(geometry, "geoms", ()) for line in _lines(part)]
+    parts = shapely.get_parts(shapely.intersection(line, shapely.box(*box)))
+    lines = [part for part in parts if part.geom_type == "LineString" and not part.is_empty]
+    return [Curve.polyline(shapely.get_coordinates(part)) for part in lines]

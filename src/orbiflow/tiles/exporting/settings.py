@@ -20,8 +20,7 @@ from orbiflow.settings import (
 from orbiflow.units import COLUMNS, Colour, Length, LengthOrZero, PageSize, Size
 
 PIECES = Group("Pieces")
-PAGE = (300.0, 200.0)
-"""Width and height of the page in mm where none is asked for."""
+PAGE = (300.0, 200.0)  # width and height of the page in mm where none is asked for
 
 
 class ExportSettings(FileSettings, group="Page and file"):

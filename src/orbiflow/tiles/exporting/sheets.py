@@ -22,11 +22,8 @@ from orbiflow.tiles.exporting.scene import (
     clipped_region,
 )
 
-OVERLAP = 12.0
-"""Width in mm of the strip that two neighbouring sheets share; the crosses lie in it."""
-
-ARM = 4.0
-"""Half the width of a cross, in mm."""
+OVERLAP = 12.0  # width in mm of the strip that two neighbouring sheets share; the crosses lie in it
+ARM = 4.0  # half the width of a cross, in mm
 
 MOST_SHEETS = 400
 
@@ -36,17 +33,9 @@ BLUE = Style(None, "#0000ff", 0.1)
 def split(scene: Scene, bed: tuple[float, float], tolerance: float) -> list[Scene]:
     """Split a scene into sheets no larger than the bed, row by row, unless the bed holds it.
 
-    Neighbouring sheets overlap by `OVERLAP`. Lines go from one sheet to the next in the middle of the
-    strip, where both sheets have the same crosses; no line is on two sheets.
-
-    Args:
-        scene: The page.
-        bed: The bed's width and height in mm.
-        tolerance: The greatest distance in mm between a curve and the polygon that replaces it where
-            sheets meet.
-
-    Raises:
-        OrbiflowError: If the bed is too small for sheets that overlap, or there are too many sheets.
+    Neighbouring sheets overlap by `OVERLAP`. Lines go from one sheet to the next in the middle of
+    the strip, where both sheets have the same crosses; no line is on two sheets. Curves become
+    polygons within `tolerance` where sheets meet.
     """
     if scene.width <= bed[0] and scene.height <= bed[1]:
         return [scene]
@@ -85,27 +74,18 @@ def _parts(length: float, bed: float) -> list[tuple[float, float]]:
     return [(k * (part - OVERLAP), k * (part - OVERLAP) + part) for k in range(count)]
 
 
-def _seams(parts: list[tuple[float, float]]) -> list[float]:
-    return [(end + start) / 2 for (_, end), (start, _) in pairwise(parts)]
-
-
 def _crosses(
     columns: list[tuple[float, float]], rows: list[tuple[float, float]]
 ) -> list[tuple[float, float]]:
     """Return two crosses for each stretch of seam between two sheets."""
-    found = [
-        (x, top + share * (bottom - top))
-        for x in _seams(columns)
-        for top, bottom in rows
-        for share in (0.2, 0.8)
-    ]
-    found += [
-        (left + share * (right - left), y)
-        for y in _seams(rows)
-        for left, right in columns
-        for share in (0.2, 0.8)
-    ]
-    return found
+    x_seams, y_seams = (
+        [(end + start) / 2 for (_, end), (start, _) in pairwise(parts)] for parts in (columns, rows)
+    )
+    across, down = (
+        [start + share * (end - start) for start, end in parts for share in (0.2, 0.8)]
+        for parts in (columns, rows)
+    )
+    return [(x, y) for x in x_seams for y in down] + [(x, y) for y in y_seams for x in across]
 
 
 def _sheet(
@@ -124,16 +104,12 @@ def _sheet(
         page.right - (half if page.right < scene.width - 1e-9 else 0.0),
         page.bottom - (half if page.bottom < scene.height - 1e-9 else 0.0),
     )
-    window = Box(
-        max(seams.left, scene.clip.left),
-        max(seams.top, scene.clip.top),
-        min(seams.right, scene.clip.right),
-        min(seams.bottom, scene.clip.bottom),
-    )
+    low, high = np.maximum(seams[:2], scene.clip[:2]), np.minimum(seams[2:], scene.clip[2:])
+    window = Box(*low.tolist(), *high.tolist())
     back = -np.array([page.left, page.top])
     layers = [_part(layer, scene, seams, window, back, tolerance) for layer in scene.layers]
     marks = [
-        _line([[x - dx, y - dy], [x + dx, y + dy]], back)
+        Curve.polyline(np.array([[x - dx, y - dy], [x + dx, y + dy]]) + back)
         for x, y in crosses
         if page.left < x - ARM
         and x + ARM < page.right
@@ -147,12 +123,7 @@ def _sheet(
         width=page.width,
         height=page.height,
         layers=tuple(layers),
-        window=Box(
-            window.left - page.left,
-            window.top - page.top,
-            window.right - page.left,
-            window.bottom - page.top,
-        ),
+        window=Box(*(np.array(window) + np.tile(back, 2)).tolist()),
         tiles=_tiles(scene, seams, back),
         notes=(*scene.notes, f"Sheet {number}; crosses are common to neighbouring sheets."),
     )
@@ -197,25 +168,16 @@ def _tiles(scene: Scene, seams: Box, back: np.ndarray) -> tuple[PlacedTile, ...]
     )
 
 
-def _line(points: list[list[float]], back: np.ndarray) -> Curve:
-    return Curve.polyline(np.array(points) + back)
-
-
 def calibrated(scene: Scene) -> Scene:
-    """Add a mark exactly 100 mm long at the foot of the scene, on a layer of its own.
-
-    Raises:
-        OrbiflowError: If the page is narrower than 110 mm.
-    """
+    """Add a mark exactly 100 mm long at the foot of the scene, on a layer of its own."""
     if scene.width < 110:
         raise OrbiflowError(
             f"the calibration mark is 100 mm long and needs a page at least 110 mm wide, got "
             f"{scene.width:g} mm"
         )
     y, left = scene.height - STRIP / 2, (scene.width - 100) / 2
-    still = np.zeros(2)
     lines = [[[left, y], [left + 100, y]]]
     lines += [[[x, y - 2.5], [x, y + 2.5]] for x in (left, left + 50, left + 100)]
-    marks = tuple(_line(line, still) for line in lines)
+    marks = tuple(Curve.polyline(line) for line in lines)
     layer = Layer("calibration 100 mm", "mark", BLUE, marks)
     return replace(scene, layers=(*scene.layers, layer))

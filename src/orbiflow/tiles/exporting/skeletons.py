@@ -6,6 +6,8 @@ from collections import defaultdict
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from orbiflow.arrays import Array
@@ -16,11 +18,7 @@ from orbiflow.tiles.tilings import skeleton
 
 
 def skeleton_scene(layout: Layout) -> Scene:
-    """Return a scene with each edge that tiles share once, in few long lines.
-
-    Raises:
-        OrbiflowError: If the page holds too many tiles, or the tile's edges do not match.
-    """
+    """Return a scene with each edge that tiles share once, in few long lines."""
     settings, box, own = layout.settings, layout.box, layout.outline.edges
     if own is None:
         raise OrbiflowError(
@@ -43,8 +41,10 @@ def skeleton_scene(layout: Layout) -> Scene:
             continue
         for part in clipped_line(curve, box, settings.deviation / 4):
             # a cut end is a vertex of its own
-            start = vertices[0] if _same(part.start, curve.start) else (free := free - 1)
-            end = vertices[1] if _same(part.end, curve.end) else (free := free - 1)
+            start = (
+                vertices[0] if np.allclose(part.start, curve.start, 0, 1e-9) else (free := free - 1)
+            )
+            end = vertices[1] if np.allclose(part.end, curve.end, 0, 1e-9) else (free := free - 1)
             arcs.append(part)
             ends.append((start, end))
     style = line_style(layout)
@@ -61,10 +61,8 @@ def skeleton_scene(layout: Layout) -> Scene:
 
 def joined(arcs: list[Curve], ends: list[tuple[int, int]]) -> list[Curve]:
     """Join arcs that lead from vertex to vertex into few long curves, in a short order."""
-    if not arcs:
-        return []
     long = []
-    for trail in trails(np.array(ends)):
+    for trail in trails(np.array(ends)) if arcs else ():
         parts = [arcs[number] if forward else arcs[number].reversed() for number, forward in trail]
         (first, along), (last, forward) = trail[0], trail[-1]
         start, end = ends[first][0 if along else 1], ends[last][1 if forward else 0]
@@ -72,22 +70,15 @@ def joined(arcs: list[Curve], ends: list[tuple[int, int]]) -> list[Curve]:
     return in_short_order(long)
 
 
-def _same(point: Array, other: Array) -> bool:
-    return bool(np.abs(point - other).max() < 1e-9)
-
-
 Trail = list[tuple[int, bool]]
 """Arcs end to end: the number of each, and whether it runs from its start to its end."""
 
 
 def trails(ends: NDArray[np.int64]) -> list[Trail]:
-    """Return the fewest trails that run every arc once, by Hierholzer's method.
+    """Return the fewest trails that run every arc, with the ends (S, 2), once, by Hierholzer's method.
 
-    A connected part with 2k odd vertices, where an odd number of arcs meet, falls into k trails; one
-    without odd vertices is a single closed trail (Euler).
-
-    Args:
-        ends: The numbers (S, 2) of the vertices that each arc leads from and to.
+    A connected part with 2k odd vertices, where an odd number of arcs meet, falls into k trails;
+    one without odd vertices is a single closed trail (Euler).
 
     >>> trails(np.array([[0, 1], [1, 2], [2, 0]]))
     [[(0, True), (1, True), (2, True)]]
@@ -110,20 +101,12 @@ def trails(ends: NDArray[np.int64]) -> list[Trail]:
 
 def _joints(ends: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return pairs (J, 2) of the odd vertices of each connected part."""
-    parent: dict[int, int] = {}
-
-    def root(vertex: int) -> int:
-        while parent.setdefault(vertex, vertex) != vertex:
-            parent[vertex] = parent[parent[vertex]]
-            vertex = parent[vertex]
-        return vertex
-
-    for start, end in ends.tolist():
-        parent[root(start)] = root(end)
+    vertices, index, counts = np.unique(ends, return_inverse=True, return_counts=True)
+    arcs = (np.ones(len(ends)), tuple(index.reshape(-1, 2).T))
+    _, part_of = connected_components(coo_array(arcs, shape=(len(vertices), len(vertices))), False)
     odd: dict[int, list[int]] = defaultdict(list)
-    vertices, counts = np.unique(ends, return_counts=True)
-    for vertex in vertices[counts % 2 == 1].tolist():
-        odd[root(vertex)].append(vertex)
+    for k in np.flatnonzero(counts % 2):
+        odd[int(part_of[k])].append(int(vertices[k]))
     pairs = [part[k : k + 2] for part in odd.values() for k in range(0, len(part), 2)]
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
@@ -168,8 +151,8 @@ def _without_joints(circuit: Trail, count: int) -> list[Trail]:
 def in_short_order(curves: list[Curve]) -> list[Curve]:
     """Return the curves in an order and in directions that make a tool's way between them short.
 
-    The way leads from the upper left corner to the nearest end, and from each curve's other end to the
-    nearest end of a curve that is left.
+    The way leads from the upper left corner to the nearest end, and from each curve's other end to
+    the nearest end of a curve that is left.
     """
     if not curves:
         return []

@@ -1,8 +1,8 @@
 """Scenes as SVG, for Inkscape, Illustrator, browsers and cutters; and the SVG of a tile or a tiling.
 
-One user unit is one millimetre, and layers are those of Inkscape. A scene's copies are one short line
-each; `tile_svg` and `tiling_svg` write plain paths without symbols, transforms or style sheets, which
-some programs drop.
+One user unit is one millimetre, and layers are those of Inkscape. A scene's copies are one short
+line each; `tile_svg` and `tiling_svg` write plain paths without symbols, transforms or style
+sheets, which some programs drop.
 """
 
 from __future__ import annotations
@@ -29,14 +29,11 @@ width="{width}mm" height="{height}mm" viewBox="0 0 {width} {height}">
 
 
 def write_svg(scene: Scene, *, decimals: int = 3) -> str:
-    """Return the scene as an SVG document.
+    """Return the scene as an SVG document, with so many decimals of coordinates in mm.
 
-    Args:
-        scene: The page.
-        decimals: The decimals of coordinates in mm. Edges that two tiles share have the same numbers up
-            to the last of them.
+    Edges that two tiles share have the same numbers up to the last of them.
     """
-    number = _Numbers(decimals)
+    number = Numbers(decimals)
     parts = [_HEADER.format(width=number(scene.width), height=number(scene.height))]
     parts.append(f"  <title>{escape(scene.title)}</title>\n")
     if scene.notes:
@@ -54,7 +51,7 @@ def write_svg(scene: Scene, *, decimals: int = 3) -> str:
     return "".join(parts)
 
 
-class _Numbers:
+class Numbers:
     """A format for numbers: a fixed number of decimals, without zeros at the end."""
 
     def __init__(self, decimals: int) -> None:
@@ -66,13 +63,13 @@ class _Numbers:
         return "0" if text in ("-0", "") else text
 
 
-def path_data(curve: Curve, number: _Numbers | None = None) -> str:
+def path_data(curve: Curve, number: Numbers | None = None) -> str:
     """Return the d attribute of a path, in absolute coordinates.
 
     >>> path_data(Curve.polyline([[0, 0], [2, 0], [2, 1.5]], closed=True))
     'M0,0L2,0 2,1.5Z'
     """
-    number = number or _Numbers(3)
+    number = number or Numbers(3)
     (x, y), last = curve.start.tolist(), len(curve.pieces) - 1
     parts, before = [f"M{number(x)},{number(y)}"], ""
     for k, (piece, straight) in enumerate(
@@ -88,18 +85,21 @@ def path_data(curve: Curve, number: _Numbers | None = None) -> str:
     return "".join(parts) + ("Z" if curve.closed else "")
 
 
-def _definitions(scene: Scene, number: _Numbers) -> str:
+def _definitions(scene: Scene, number: Numbers) -> str:
     parts = []
     for name, curve in scene.symbols.items():
         parts.append(f'    <path id="{name}" d="{path_data(curve, number)}"/>\n')
     for name, motif in scene.motifs.items():
         parts.append(_motif(name, motif, number))
     if any(layer.clipped for layer in scene.layers):
-        parts.append(f'    <clipPath id="window">{_rectangle(scene.clip, number)}</clipPath>\n')
+        box = scene.clip
+        x, y, width, height = map(number, (box.left, box.top, box.width, box.height))
+        window = f'<rect x="{x}" y="{y}" width="{width}" height="{height}"/>'
+        parts.append(f'    <clipPath id="window">{window}</clipPath>\n')
     return "  <defs>\n" + "".join(parts) + "  </defs>\n" if parts else ""
 
 
-def _motif(name: str, motif: Motif, number: _Numbers) -> str:
+def _motif(name: str, motif: Motif, number: Numbers) -> str:
     """Return a group that is drawn once and used by every copy."""
     parts, clip = [], ""
     if motif.within is not None:
@@ -136,11 +136,6 @@ def _reach(scene: Scene, name: str) -> float:
     return max((float(np.abs(curve.bounds()).max()) for curve in curves), default=1.0)
 
 
-def _rectangle(box: Box, number: _Numbers) -> str:
-    x, y, width, height = map(number, (box.left, box.top, box.width, box.height))
-    return f'<rect x="{x}" y="{y}" width="{width}" height="{height}"/>'
-
-
 def _layer_start(layer: Layer) -> str:
     name = quoteattr(layer.name)
     key = quoteattr(layer.name.replace(" ", "-"))
@@ -157,13 +152,13 @@ def _style_attributes(style: Style) -> str:
     text = f' fill="{style.fill or "none"}"'
     if style.stroke is None:
         return text + ' stroke="none"'
-    width = _Numbers(4)(style.width)
+    width = Numbers(4)(style.width)
     return text + f' stroke="{style.stroke}" stroke-width="{width}" stroke-linejoin="round"'
 
 
-def _uses(uses: Uses, reach: float, number: _Numbers) -> Iterator[str]:
+def _uses(uses: Uses, reach: float, number: Numbers) -> Iterator[str]:
     """Yield a line for each copy, its matrix as exact as keeps the symbol's far end in its place."""
-    fine = _Numbers(number.decimals + max(1, math.ceil(math.log10(max(reach, 1.0)))))
+    fine = Numbers(number.decimals + max(1, math.ceil(math.log10(max(reach, 1.0)))))
     # columns first, as SVG has them
     matrices = [",".join(fine(value) for value in linear.T.ravel()) for linear in uses.linear]
     still = [bool(np.abs(linear - np.eye(2)).max() < 1e-12) for linear in uses.linear]
@@ -224,13 +219,9 @@ def tiling_svg(
     so that no paper shines through between neighbours.
 
     Args:
-        tile: A tile or a tiling.
-        window: The window (xmin, ymin, xmax, ymax) in the tile's units. Default: `default_window`.
+        tile, window, palette_name, colours, y_down: As for `tiling_png`.
         width_mm: The page's width in mm.
-        palette_name: The palette of paper, fills and outlines.
-        colours: Which tile has which colour. Default: `colouring(tile)`.
         outline_mm: The outline's width in mm; 0 means a hairline in the tile's own colour.
-        y_down: Whether the tile's y axis points down, as in images.
         title: The file's title. Default: the class.
 
     Raises:

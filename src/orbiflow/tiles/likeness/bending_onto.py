@@ -1,10 +1,10 @@
 """The least bending of a silhouette onto a given outline.
 
-This is for shapes that were not found by bending. Points of the silhouette's outline slide along the
-other one and the energy is minimised: linear equations in how far each slides, and in the size of the
-other outline, alternate with the choice of rotations. The descent starts from the correspondence of
-`corresponding`, so the outlines must lie over each other. It ends in a local minimum, whose energy is
-an upper bound of the least one.
+This is for shapes that were not found by bending. Points of the silhouette's outline slide along
+the other one and the energy is minimised: linear equations in how far each slides, and in the size
+of the other outline, alternate with the choice of rotations. The descent starts from the
+correspondence of `corresponding`, so the outlines must lie over each other. It ends in a local
+minimum, whose energy is an upper bound of the least one.
 """
 
 from typing import NamedTuple

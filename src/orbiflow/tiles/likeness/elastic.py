@@ -1,12 +1,12 @@
 """A silhouette as an elastic body, and the energy of its deformations.
 
 As rigid as possible (Sorkine and Alexa, As-Rigid-As-Possible Surface Modeling, SGP 2007; a distance
-for Escher tiles since Nagata and Imahori, 2021): with points x at rest, moved to z, and a rotation r_i
-of each, the energy is the sum over all pairs of w_ij |(z_i - z_j) - r_i (x_i - x_j)|^2. Cotangent
-weights measure the strain of areas; weights along the outline measure strain by length, so that
-small parts count: an ear has little area and much outline. The outline also bends as a rod, at the
-square of the change of its curvature, so that straight parts stay straight and corners stay corners.
-Points are complex numbers x + iy; a batch of C shapes is (N, C).
+for Escher tiles since Nagata and Imahori, 2021): with points x at rest, moved to z, and a rotation
+r_i of each, the energy is the sum over all pairs of w_ij |(z_i - z_j) - r_i (x_i - x_j)|^2.
+Cotangent weights measure the strain of areas; weights along the outline measure strain by length,
+so that small parts count: an ear has little area and much outline. The outline also bends as a rod,
+at the square of the change of its curvature, so that straight parts stay straight and corners stay
+corners. Points are complex numbers x + iy; a batch of C shapes is (N, C).
 """
 
 from __future__ import annotations

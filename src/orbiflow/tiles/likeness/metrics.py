@@ -154,8 +154,8 @@ def hausdorff(a: Shape, b: Shape) -> float:
     """Return the Hausdorff distance between the boundaries of two shapes, in the shapes' own units.
 
     This is the greatest distance from any point of one boundary, not only a vertex, to the nearest
-    point of the other. It is too small by at most 1e-6 of the diagonal of the box around both shapes,
-    never too large.
+    point of the other. It is too small by at most 1e-6 of the diagonal of the box around both
+    shapes, never too large.
 
     Raises `OrbiflowError` naming the argument that is not a valid polygon.
 

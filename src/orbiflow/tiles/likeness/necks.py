@@ -2,9 +2,9 @@
 
 Two points of the outline face each other across a neck if the segment between them is inside and at
 most `MAX_NECK_WIDTH` long, and both ways along the outline between them are long: at least
-`OUTLINE_PER_WIDTH` times the segment and at least `MIN_OUTLINE`. So the tip of a corner is a neck only
-if it is sharper than 23 degrees; its width is then taken where the outline beyond is `MIN_OUTLINE`
-long. A slit is the same with the segment outside.
+`OUTLINE_PER_WIDTH` times the segment and at least `MIN_OUTLINE`. So the tip of a corner is a neck
+only if it is sharper than 23 degrees; its width is then taken where the outline beyond is
+`MIN_OUTLINE` long. A slit is the same with the segment outside.
 """
 
 # pyright: reportUnknownMemberType=false
@@ -69,8 +69,8 @@ def neck_factor(share: float, min_neck: float) -> float:
 def least_neck(silhouette: ArrayLike, min_neck: float) -> float:
     """Return how wide the necks of a silhouette's tiles should be, in square roots of the area.
 
-    It is the larger of `min_neck` and `PINCHED_SHARE` times the silhouette's own narrowest neck, the
-    latter at most `SOUND_NECK_WIDTH`; 0 if `min_neck` is 0.
+    It is the larger of `min_neck` and `PINCHED_SHARE` times the silhouette's own narrowest neck,
+    the latter at most `SOUND_NECK_WIDTH`; 0 if `min_neck` is 0.
 
     >>> bar = [[0.0, 0.0], [20.0, 0.0], [20.0, 0.2], [0.0, 0.2]]
     >>> least_neck(bar, 0.01), least_neck(bar, 0.1), least_neck(bar, 0.0)
@@ -88,8 +88,9 @@ def least_neck(silhouette: ArrayLike, min_neck: float) -> float:
 def narrowest_neck(ring: ArrayLike) -> Thinnest:
     """Return the narrowest neck of a polygon; without a neck, the diameter of its largest disc.
 
-    The result is exact if the sides of the neck are parallel or a vertex is at its narrowest place; if
-    it tapers, the place is found to two `POINT_SPACING`s along the outline, and never too narrow.
+    The result is exact if the sides of the neck are parallel or a vertex is at its narrowest place;
+    if it tapers, the place is found to two `POINT_SPACING`s along the outline, and never too
+    narrow.
 
     Args:
         ring: The vertices (n, 2) of a simple polygon, in either orientation.
@@ -128,8 +129,8 @@ def hair_share(ring: ArrayLike, width: float) -> float:
     """Return the share, 0 to 1, of a polygon's outline that bounds parts thinner than `width`.
 
     A part is thin if no disc of that diameter inside the polygon covers it (the residue of a
-    morphological opening). It counts if it has more than `OUTLINE_PER_WIDTH` widths of the outline, so
-    corners count only if they are sharper than 23 degrees.
+    morphological opening). It counts if it has more than `OUTLINE_PER_WIDTH` widths of the outline,
+    so corners count only if they are sharper than 23 degrees.
 
     Args:
         ring: The vertices (n, 2) of a simple polygon, in either orientation.

@@ -32,8 +32,8 @@ MAX_REGION_VERTICES, REGION_TOLERANCE = 1500, 2e-3
 def prepared_region(ring: Array) -> shapely.Polygon:
     """Return the prepared region of a ring (N, 2) of area about 1, simplified if it is complex.
 
-    Use it to choose among candidates, as intersections with thousands of vertices take seconds; final
-    results are measured with the ring itself.
+    Use it to choose among candidates, as intersections with thousands of vertices take seconds;
+    final results are measured with the ring itself.
     """
     ring = numbers(ring, "the region's ring", ("N", 2))
     if len(ring) < 3:
@@ -60,8 +60,8 @@ def boundary_iou(goal: shapely.Polygon, boundaries: Array) -> Array:
 class Overlap:
     """The overlap of rings with one region.
 
-    The common area of P and T changes at the rate of the normal speed integrated over the part of P's
-    boundary inside T; along a side the speed is linear between its ends.
+    The common area of P and T changes at the rate of the normal speed integrated over the part of
+    P's boundary inside T; along a side the speed is linear between its ends.
 
     Args:
         target: The simple ring (M, 2) of the region, in either orientation; see `prepared_region`.

@@ -1,14 +1,16 @@
 """An elastic body with pinned parts, which keep their shape.
 
 A part costs, for each of its points, the squared distance from the nearest similar copy a x + b of
-the part x at rest, with complex a and b (shape matching: Mueller et al., Meshless Deformations Based
-on Shape Matching, 2005). Stiffer springs would do the same, but with them a part turns, in each step
-of choosing rotations and solving, only by the ratio of the stiffnesses; a and b are solved for
-together with the points, so that a part moves freely at once. A cost is added if a differs from a
-rotation at the whole body's size or, if parts keep their angle, from the whole body's own rotation.
+the part x at rest, with complex a and b (shape matching: Mueller et al., Meshless Deformations
+Based on Shape Matching, 2005). Stiffer springs would do the same, but with them a part turns, in
+each step of choosing rotations and solving, only by the ratio of the stiffnesses; a and b are
+solved for together with the points, so that a part moves freely at once. A cost is added if a
+differs from a rotation at the whole body's size or, if parts keep their angle, from the whole
+body's own rotation.
 
-With a and b eliminated, the stiffness matrix is a real one less W W^H, where W has two complex columns
-per part. All equations are solved with the real matrix and corrected (Sherman, Morrison, Woodbury).
+With a and b eliminated, the stiffness matrix is a real one less W W^H, where W has two complex
+columns per part. All equations are solved with the real matrix and corrected (Sherman, Morrison,
+Woodbury).
 """
 
 from __future__ import annotations

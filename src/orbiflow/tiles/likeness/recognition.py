@@ -115,8 +115,9 @@ class Recogniser:
 def recognisability(tile: Shape, target: Shape) -> Recognisability:
     """Return how much of `target` is recognised in `tile`, both in one frame.
 
-    The result is invariant under a similarity of both shapes. To compare many tiles with one target,
-    use a `Recogniser`. Raises `OrbiflowError` naming the argument that is not a valid polygon.
+    The result is invariant under a similarity of both shapes. To compare many tiles with one
+    target, use a `Recogniser`. Raises `OrbiflowError` naming the argument that is not a valid
+    polygon.
 
     >>> square = [[0, 0], [2, 0], [2, 2], [0, 2]]
     >>> recognisability(square, square).score

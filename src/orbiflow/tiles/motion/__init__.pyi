@@ -1,3 +1,3 @@
-from .animations import animate as animate
-from .animations import animation as animation
 from .settings import AnimationSettings as AnimationSettings
+from .writers import animate as animate
+from .writers import animation as animation

@@ -8,12 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array, csc_array
+from scipy.sparse.linalg import splu
 
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.motion.morph import Morph
-from orbiflow.tiles.pictures import ASPECT, BendingWay, default_window
-from orbiflow.tiles.search import OwnFrame
+from orbiflow.tiles.motion.morph import Morph, OwnFrame
+from orbiflow.tiles.pictures import ASPECT, default_window
+from orbiflow.tiles.silhouette import Bending
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Copies, Tile, colouring, copies_meeting
 
@@ -31,25 +33,21 @@ class Motion:
 
     All lengths are in pixels, with y down; the progress of the animation runs from 0 to 1.
 
-    - `width`, `height`: The size of the picture.
     - `outline`: The outline (N, 2) at a progress, relative to a point of its own; N does not change.
     - `places`: The places of the copies at a progress; the first is the tile itself.
-    - `colours`: The numbers (M,) of the palette's fills.
     - `births`: The progress (M, 2) from which to which each copy grows; below 0 if always there.
-    - `steady`: Whether the places do not change.
     - `keys`: Values of the progress between which the outline moves in nearly straight lines.
-    - `what`: The motion in words, for titles.
     """
 
-    width: int
+    width: int  # with `height`: the size of the picture
     height: int
     outline: Callable[[float], Array]
     places: Callable[[float], Places]
-    colours: NDArray[np.int64]
+    colours: NDArray[np.int64]  # the numbers (M,) of the palette's fills
     births: Array
-    steady: bool
+    steady: bool  # whether the places do not change
     keys: tuple[float, ...]
-    what: str
+    what: str  # the motion in words, for titles
 
     def grown(self, progress: float) -> Array:
         """Return the size (M,) of each copy, 0 to 1."""
@@ -65,23 +63,19 @@ class Motion:
             yield size[k] * outline @ linear[k].T + offset[k], int(self.colours[k]), size[k] == 1
 
 
-ALWAYS = (-1.0, -0.5)
-"""The birth of copies that are there from the start."""
+ALWAYS = (-1.0, -0.5)  # the birth of copies that are there from the start
 
 
+# Share of the progress of a bending in which the silhouette bends; then the tiling grows
 BEND = 0.45
-"""Share of the progress of a bending in which the silhouette bends; then the tiling grows."""
-
+# Values of the progress at which the copies that come into the picture are collected
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Values of the progress at which the copies that come into the picture are collected."""
 
 
 class Page:
     """The tile's default window on a picture `width` pixels wide.
 
-    - `linear`: The map from the tile's coordinates to pixels.
-    - `center`: The tile's centre in its coordinates.
-    - `middle`: The tile's centre in pixels.
+    `linear` maps the tile's coordinates to pixels; `center` and `middle` are its centre in either.
     """
 
     def __init__(self, tile: Tile, width: int, y_down: bool) -> None:
@@ -109,17 +103,8 @@ class Page:
 def morph(tile: Tile, width: int, *, y_down: bool = False, steady: bool = False) -> Motion:
     """Return the tiling by the class's template, with straight edges, becoming the tile's.
 
-    It is a tiling throughout.
-
-    Args:
-        tile: A tile whose class and corners are known.
-        width: The picture's width in pixels.
-        y_down: Whether the tile's y axis points down.
-        steady: Whether the tile's lattice is there from the start: then the template is stretched as
-            the lattice is, and only edges move.
-
-    Raises:
-        OrbiflowError: If the tile has no known class.
+    It is a tiling throughout. If `steady`, the tile's lattice is there from the start: then the
+    template is stretched as the lattice is, and only edges move.
     """
     way, page = Morph(OwnFrame.of(tile)), Page(tile, width, y_down)
     end = way.end
@@ -173,15 +158,7 @@ def grow(tile: Tile, width: int, *, y_down: bool = False) -> Motion:
 
 
 def bend(given: EscherTile, width: int) -> Motion:
-    """Return the silhouette bending into the tile, and then the tiling growing around it.
-
-    Args:
-        given: A tile of a search for likeness, with its map.
-        width: The picture's width in pixels.
-
-    Raises:
-        OrbiflowError: If there is no map: the silhouette did not bend into this tile.
-    """
+    """Return the silhouette bending into the tile, and then the tiling growing around it."""
     tile, bending, frame = given.tile, given.bending, given.frame
     if bending is None or frame is None:
         raise OrbiflowError(
@@ -218,13 +195,9 @@ def _still_places(tile: Tile, page: Page) -> tuple[Places, Array]:
     offset = (moved - page.center) @ page.linear.T + page.middle
     order = np.argsort(np.linalg.norm(offset - page.middle, axis=1), kind="stable")
     places = Places(linear[copies.cosets[order]], offset[order])
-    return places, _first_dark(colouring(tile).colours(copies)[order])
-
-
-def _first_dark(colours: Array) -> Array:
-    """Exchange two colours, so that the tile that is alone at first has the palette's second."""
-    own = colours[0]
-    return np.where(colours == own, 1, np.where(colours == 1, own, colours))
+    colours = colouring(tile).colours(copies)[order]
+    # the tile that is alone at first has the palette's second colour
+    return places, np.where(colours == colours[0], 1, np.where(colours == 1, colours[0], colours))
 
 
 def _births(places: Places, begin: float) -> Array:
@@ -261,8 +234,72 @@ def _seen(
     return copies.select(np.argsort(far, kind="stable"))
 
 
+class BendingWay:
+    """The silhouettes on the way from the one at rest to the tile."""
+
+    def __init__(self, bending: Bending) -> None:
+        self.rest, self.images = bending.rest, bending.images
+        triangles = bending.triangles
+        self.ring = _outline(triangles)
+        corners, images = self.rest[triangles], self.images[triangles]
+        sides, moved = (
+            np.stack([c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]], axis=2) for c in (corners, images)
+        )
+        inverse = np.linalg.inv(sides)
+        linear = moved @ inverse
+        # polar decomposition of 2 x 2 matrices that turn nothing over
+        self._angle = np.arctan2(
+            linear[:, 1, 0] - linear[:, 0, 1], linear[:, 0, 0] + linear[:, 1, 1]
+        )
+        # within half a turn of their mean: beyond it a limb has turned the other way
+        mean = float(np.angle(np.exp(1j * self._angle).sum()))
+        self._angle = mean + np.angle(np.exp(1j * (self._angle - mean)))
+        self._stretch = _rotations(-self._angle) @ linear
+        # rows of a triangle's gradient: J = P @ gradient, P the three corners as columns
+        gradient = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
+        area = np.abs(np.linalg.det(sides))[:, None, None]
+        self._gradient, self._triangles = area * gradient, triangles
+        blocks = area * gradient @ np.swapaxes(gradient, 1, 2)
+        rows = np.repeat(triangles[:, :, None], 3, axis=2)
+        columns = np.swapaxes(rows, 1, 2)
+        count = len(self.rest)
+        matrix = coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(count, count))
+        # the solution is free up to a shift: hold one point, and shift all afterwards
+        anchor = coo_array(([area.mean()], ([0], [0])), shape=(count, count))
+        self._solver = splu(csc_array(matrix + anchor))
+
+    def at(self, share: float) -> Array:
+        """Return the outline (n, 2) at 0 (as it is) to 1 (the tile), in the target's normal form."""
+        turned = _rotations(share * self._angle)
+        linear = turned @ ((1 - share) * np.eye(2) + share * self._stretch)
+        pull = self._gradient @ np.swapaxes(linear, 1, 2)
+        right = np.zeros_like(self.rest)
+        np.add.at(right, self._triangles, pull)
+        points = self._solver.solve(right)
+        middle = (1 - share) * self.rest.mean(axis=0) + share * self.images.mean(axis=0)
+        return (points - points.mean(axis=0) + middle)[self.ring]
+
+
+def _rotations(angles: Array) -> Array:
+    c, s = np.cos(angles), np.sin(angles)
+    return np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)
+
+
+def _outline(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the points of the sides that belong to one triangle alone, in order."""
+    ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    known = {(int(a), int(b)) for a, b in ends}
+    after = {a: b for a, b in known if (b, a) not in known}
+    ring = [min(after)]
+    while len(ring) <= len(after) and (follower := after[ring[-1]]) != ring[0]:
+        ring.append(follower)
+    if len(ring) != len(after):
+        raise OrbiflowError("the bending's triangles do not fill one outline")
+    return np.array(ring)
+
+
+# Shares of the loop: the rest at the start, each way, and the rest at the end, at the tile
 REST, MOVE, SHOW = 0.07, 0.37, 0.19
-"""Shares of the loop: the rest at the start, each way, and the rest at the end, at the tile."""
 
 
 class Frame(NamedTuple):
@@ -279,21 +316,6 @@ def eased(share: float) -> float:
     [0.0, 0.156, 0.5, 1.0]
     """
     return share * share * (3 - 2 * share)
-
-
-def progress(time: float) -> float:
-    """Return the progress of a loop at a time, 0 to 1 of the loop.
-
-    >>> [round(progress(time), 3) for time in (0.0, 0.255, 0.5, 0.815)]
-    [0.0, 0.5, 1.0, 0.5]
-    """
-    if time < REST:
-        return 0.0
-    if time < REST + MOVE:
-        return eased((time - REST) / MOVE)
-    if time < REST + MOVE + SHOW:
-        return 1.0
-    return eased(max(0.0, 1 - (time - REST - MOVE - SHOW) / MOVE))
 
 
 def frames(seconds: float, fps: float) -> list[Frame]:

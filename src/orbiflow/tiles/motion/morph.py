@@ -1,18 +1,20 @@
 """The way from a class's template to a tile through tiles: no frame overlaps, however limbs are bent.
 
 Both tiles are divided into triangles that correspond. Every vertex of the tiling is a mean of its
-neighbours with positive weights (mean value coordinates; Floater, 2003), and on a torus any positive
-weights give a plane drawing (Tutte, 1963; Gortler, Gotsman and Thurston, 2006). So the weights are
-interpolated instead of the places (Floater and Gotsman, How to morph tilings injectively, 1999), and
-the places are solved for. Weights that are invariant under the group give places that are, so there are
-two unknowns for each orbit of vertices.
+neighbours with positive weights (mean value coordinates; Floater, 2003), and on a torus any
+positive weights give a plane drawing (Tutte, 1963; Gortler, Gotsman and Thurston, 2006). So the
+weights are interpolated instead of the places (Floater and Gotsman, How to morph tilings
+injectively, 1999), and the places are solved for. Weights that are invariant under the group give
+places that are, so there are two unknowns for each orbit of vertices.
 
-If the group has no rotation, walks by such weights may drift, and the torus would have to change. The
-weights along the drift are then tilted by an exponential, which keeps them positive, until it stops.
+If the group has no rotation, walks by such weights may drift, and the torus would have to change.
+The weights along the drift are then tilted by an exponential, which keeps them positive, until it
+stops.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -20,29 +22,151 @@ from typing import Any
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.linalg import polar
 from scipy.sparse import bmat, coo_array, csc_array
 from scipy.sparse.linalg import spsolve
 
+from orbiflow.arguments import instance
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import Isometry, identity
-from orbiflow.tiles.search import OwnFrame
 from orbiflow.tiles.silhouette import triangulate
+from orbiflow.tiles.tilings import IsohedralClass, Tile, isohedral_class
+
+# How far corresponding vertices of identified edges may lie apart, in square roots of the area
+TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class OwnFrame:
+    """A tile as an affine image of one whose group is its class's own.
+
+    - `linear`, `offset`: (2, 2) and (2,): a point p of the own frame lies at linear p + offset.
+    """
+
+    kind: IsohedralClass
+    points: Array  # (N, 2) the polygon in the own frame, from corner 0 on
+    starts: tuple[int, ...]  # indices of the corners in it, increasing from 0
+    linear: Array
+    offset: Array
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Sides of the polygon along each edge of the class."""
+        return tuple(np.diff([*self.starts, len(self.points)]).tolist())
+
+    @classmethod
+    def of(cls, tile: Tile) -> OwnFrame:
+        """Of a tile whose class and corners are known, as those of every search are."""
+        instance(tile, Tile, "the tile", "read_result(folder) gives one")
+        if not tile.isohedral_class:
+            raise OrbiflowError("this tile's class is not known, so neither is what it comes from")
+        kind = isohedral_class(tile.isohedral_class)
+        if len(tile.corners) != len(kind.template()) or tile.group.order != kind.group().order:
+            raise OrbiflowError(f"this tile's corners or group are not those of class {kind.name}")
+        first = tile.corners[0]
+        placed = np.roll(tile.polygon, -first, axis=0)
+        starts = tuple((k - first) % len(placed) for k in tile.corners)
+        if list(starts) != sorted(set(starts)):
+            raise OrbiflowError("this tile's corners are not in the order of its polygon")
+        linear = tile.group.lattice @ kind.group().inverse_lattice
+        offset = _offset(kind, placed, starts, linear)
+        points = (placed - offset) @ np.linalg.inv(linear).T
+        own = cls(kind, points, starts, linear, offset)
+        own.check()
+        return own
+
+    def check(self) -> None:
+        """Check that identified edges are images of each other, vertex by vertex."""
+        size = np.sqrt(self.kind.group().cell_volume / self.kind.group().order)
+        for pair in self.kind.identified_edges:
+            first, second = self.edge(pair.first), self.edge(pair.second)
+            image = pair.isometry(first)
+            image = image[::-1] if pair.reversed else image
+            if len(image) != len(second) or np.abs(image - second).max() > TOLERANCE * size:
+                raise OrbiflowError(
+                    f"this tile's edges {pair.first} and {pair.second} are not images of each other "
+                    f"as class {self.kind.name} has them"
+                )
+
+    def edge(self, number: int) -> Array:
+        """(M, 2) vertices of an edge, both ends included."""
+        ends = [*self.starts, len(self.points)]
+        return self.points[np.arange(ends[number], ends[number + 1] + 1) % len(self.points)]
+
+    def straight(self) -> OwnFrame:
+        """The class's template with as many vertices: each where, along its edge, this one's are.
+
+        Its frame has the turn and the scale of this one, and no stretch.
+        """
+        corners = self.kind.template()
+        parts: list[Array] = []
+        for k in range(len(corners)):
+            edge = self.edge(k)
+            steps = np.linalg.norm(np.diff(edge, axis=0), axis=1)
+            share = np.concatenate([[0], np.cumsum(steps)[:-1]]) / steps.sum()
+            start, end = corners[k], corners[(k + 1) % len(corners)]
+            parts.append(start + share[:, None] * (end - start))
+        turn, stretch = polar(self.linear)
+        scale = np.sqrt(abs(np.linalg.det(stretch)))
+        return replace(self, points=np.concatenate(parts), linear=scale * turn)
+
+    def refined(self, sides: Iterable[int]) -> OwnFrame:
+        """With a vertex in the middle of each of these sides, and of the sides identified with them."""
+        bounds = [*self.starts, len(self.points)]
+        marks = np.zeros(len(self.points), dtype=bool)
+        marks[list(sides)] = True
+        edges = [marks[bounds[k] : bounds[k + 1]] for k in range(len(self.starts))]
+        for pair in self.kind.identified_edges:
+            step = -1 if pair.reversed else 1
+            both = edges[pair.first] | edges[pair.second][::step]
+            edges[pair.first], edges[pair.second] = both, both[::step]
+        chosen = np.concatenate(edges)
+        index = np.flatnonzero(chosen)
+        middles = (self.points[index] + self.points[(index + 1) % len(self.points)]) / 2
+        points = np.insert(self.points, index + 1, middles, axis=0)
+        before = np.cumsum(chosen) - chosen
+        starts = tuple(int(k + before[k]) for k in self.starts)
+        return replace(self, points=points, starts=starts)
+
+    def tile(self) -> Tile:
+        """The tile again."""
+        group = self.kind.group().conjugate(self.linear, self.offset)
+        placed = self.points @ self.linear.T + self.offset
+        return Tile(placed, group, self.kind.name, self.starts)
+
+
+def _offset(kind: IsohedralClass, placed: Array, starts: tuple[int, ...], linear: Array) -> Array:
+    """Where the own frame's origin lies, from the edges that the group identifies.
+
+    Where the group leaves a direction open, the corners come as near to the template's as can be.
+    """
+    rows: list[Array] = []
+    values: list[Array] = []
+    inverse = np.linalg.inv(linear)
+    for pair in kind.identified_edges:
+        element = pair.isometry
+        turned = linear @ element.linear @ inverse
+        begin = placed[starts[pair.first]]
+        end = starts[(pair.second + pair.reversed) % len(starts)]
+        rows.append(np.eye(2) - turned)
+        values.append(placed[end] - turned @ begin - linear @ element.translation)
+    matrix = np.concatenate(rows)
+    offset, *_ = np.linalg.lstsq(matrix, np.concatenate(values), rcond=1e-6)
+    _, sizes, ways = np.linalg.svd(matrix)
+    open_ways = ways[np.concatenate([sizes, np.zeros(2 - len(sizes))]) < 1e-6]
+    away = placed[list(starts)].mean(axis=0) - kind.template().mean(axis=0) @ linear.T - offset
+    return offset + open_ways.T @ (open_ways @ away)
 
 
 @dataclass(frozen=True, eq=False)
 class Orbits:
-    """The orbits of N vertices: vertex i lies at linear[i] p + shift[i], with p vertex `source[i]`.
+    """The orbits of N vertices: vertex i lies at linear[i] p + shift[i], with p vertex `source[i]`."""
 
-    - `source`: The number (N,) of a vertex that is its own source.
-    - `linear`, `shift`: The isometries (N, 2, 2) and (N, 2) of the own frame's group.
-    - `fixed`: Whether (N,) the vertex lies on a centre of rotation and cannot move.
-    """
-
-    source: NDArray[np.int64]
-    linear: Array
+    source: NDArray[np.int64]  # the number (N,) of a vertex that is its own source
+    linear: Array  # with `shift`: the isometries (N, 2, 2) and (N, 2) of the own frame's group
     shift: Array
-    fixed: NDArray[np.bool_]
+    fixed: NDArray[np.bool_]  # whether (N,) the vertex lies on a centre of rotation and cannot move
 
     @classmethod
     def of(cls, own: OwnFrame) -> Orbits:
@@ -67,7 +191,8 @@ class Orbits:
                         fixed[root] = True  # two ways there: an element leaves it where it is
             fixed[orbit] = fixed[root]
         found = [element or identity(2) for element in elements]
-        linear, shift = (np.stack(part) for part in zip(*map(_parts, found), strict=True))
+        linear = np.stack([element.linear for element in found])
+        shift = np.stack([element.translation for element in found])
         return cls(source, linear, shift, fixed)
 
     def with_inner(self, count: int) -> Orbits:
@@ -84,10 +209,6 @@ class Orbits:
         """Return the vertices (N, 2), with sources and fixed ones taken from `points` (N, 2)."""
         images = np.einsum("nij,nj->ni", self.linear, points[self.source]) + self.shift
         return np.where(self.fixed[:, None], points, images)
-
-
-def _parts(element: Isometry) -> tuple[Array, Array]:
-    return element.linear, element.translation
 
 
 def _links(own: OwnFrame) -> list[list[tuple[int, Isometry]]]:
@@ -108,42 +229,36 @@ def _links(own: OwnFrame) -> list[list[tuple[int, Isometry]]]:
     return links
 
 
-ROUNDS = 12
-"""Number of times that sides of the outline may be halved for the triangulation."""
-
-STIFF = 1e4
-"""How much more strongly edges pull than the inside where they are to be straight."""
+ROUNDS = 12  # number of times that sides of the outline may be halved for the triangulation
+STIFF = 1e4  # how much more strongly edges pull than the inside where they are to be straight
 
 TILTS, BALANCED, TINY = 12, 1e-9, 1e-4
 """Greatest number of steps in which weights are tilted, the force that counts as none, and the step
 of the finite differences."""
 
+# Number of places at which the way of the weights is measured, so that the outline moves evenly
 EVEN = 24
-"""Number of places at which the way of the weights is measured, so that the outline moves evenly."""
 
 CHECKED = 96
 """Number of places at which the straight way is checked."""
 
 
 class Morph:
-    """The way from a tile's template to the tile: straight if it stays simple, else by weights.
-
-    Args:
-        own: The tile.
-
-    Raises:
-        OrbiflowError: If the tile cannot be triangulated.
-    """
+    """The way from a tile's template to the tile: straight if it stays simple, else by weights."""
 
     def __init__(self, own: OwnFrame) -> None:
         self.end, self.start = own, own.straight()
         self._weights: _Weights | None = None
         shares = np.linspace(0, 1, CHECKED + 1)
-        if not all(_is_simple(self._straight_way(float(s))) for s in shares):
+        if not all(shapely.Polygon(self._straight_way(float(s))).is_valid for s in shares):
             self._weights = _Weights.of(own)
             self.end = self._weights.own
             self.start = replace(self.end.straight(), points=self._weights.points(0.0))
-            self._even = _evenly(self._weights)
+            # how far the outline has moved, 0 to 1, at even shares of the weights' way
+            found = [self._weights.points(float(s)) for s in np.linspace(0, 1, EVEN + 1)]
+            steps = [np.sqrt(((b - a) ** 2).sum(axis=1).mean()) for a, b in pairwise(found)]
+            far = np.concatenate([[0], np.cumsum(steps)])
+            self._even = far / far[-1]
 
     @property
     def is_straight(self) -> bool:
@@ -173,18 +288,15 @@ class _Weights:
     """The weights of template and tile, from which places between them are solved for.
 
     - `own`: The tile with as many vertices as the triangles need; they are the first n points.
-    - `orbits`: The orbits of all points.
-    - `sides`: Each side (E, 2) of a triangle, from either end.
     - `first`, `last`: The weights (E,) of template and tile, which add up to one for each orbit.
-    - `guess`: The points (N, 2) of the tile.
     """
 
     own: OwnFrame
-    orbits: Orbits
-    sides: NDArray[np.int64]
+    orbits: Orbits  # the orbits of all points
+    sides: NDArray[np.int64]  # each side (E, 2) of a triangle, from either end
     first: Array
     last: Array
-    guess: Array
+    guess: Array  # the points (N, 2) of the tile
 
     @classmethod
     def of(cls, own: OwnFrame) -> _Weights:
@@ -196,7 +308,8 @@ class _Weights:
         else:
             raise OrbiflowError("the tile is too thin somewhere to be animated")
         orbits = Orbits.of(own).with_inner(len(mesh.points) - mesh.size)
-        sides = _sides(mesh.triangles)
+        pairs = [(a, b) for a in range(3) for b in range(3) if a != b]
+        sides = np.unique(np.concatenate([mesh.triangles[:, pair] for pair in pairs]), axis=0)
         first, last = (
             weights / _sums(weights, sides, orbits)
             for weights in (
@@ -289,11 +402,6 @@ def _open_ways(own: OwnFrame) -> Array:
     return ways[sizes < 1e-6]
 
 
-def _sides(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-    ends = np.concatenate([triangles[:, [a, b]] for a in range(3) for b in range(3) if a != b])
-    return np.unique(ends, axis=0)
-
-
 def _sums(weights: Array, sides: NDArray[np.int64], orbits: Orbits) -> Array:
     """Return for each side (E,) the sum of the weights over all sides at the same orbit."""
     own = orbits.source[sides[:, 0]]
@@ -327,15 +435,3 @@ def _mean_values(points: Array, triangles: NDArray[np.int64], sides: NDArray[np.
         for end, length in zip((one, other), lengths, strict=True):
             np.add.at(total, np.searchsorted(codes, at * len(points) + end), half / length)
     return total
-
-
-def _evenly(weights: _Weights) -> Array:
-    """Return how far the outline has moved, 0 to 1, at even shares of the weights' way."""
-    found = [weights.points(float(s)) for s in np.linspace(0, 1, EVEN + 1)]
-    steps = [np.sqrt(((b - a) ** 2).sum(axis=1).mean()) for a, b in pairwise(found)]
-    far = np.concatenate([[0], np.cumsum(steps)])
-    return far / far[-1]
-
-
-def _is_simple(ring: Array) -> bool:
-    return bool(shapely.is_valid(shapely.Polygon(ring)))

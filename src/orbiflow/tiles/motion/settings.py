@@ -7,8 +7,7 @@ from typing import Annotated, Literal
 from orbiflow.drawing import DEFAULT_PALETTE, PaletteName
 from orbiflow.settings import FileSettings, Hidden, OnlyWith, Range, SettingError, Unit
 
-MOST_FRAMES = 2400
-"""The largest number of pictures of a GIF or video."""
+MOST_FRAMES = 2400  # the largest number of pictures of a GIF or video
 
 
 class AnimationSettings(FileSettings, group="Animation"):

@@ -1,4 +1,4 @@
-"""Animations as files: a GIF by Pillow, an MP4 by ffmpeg if it is installed, an SVG in curves."""
+"""Animations of a tile as files: a GIF by Pillow, an MP4 by ffmpeg, an SVG in curves."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import accumulate
 from pathlib import Path
 from xml.sax.saxutils import escape
@@ -15,13 +16,116 @@ from xml.sax.saxutils import escape
 import numpy as np
 from PIL import Image
 
+from orbiflow.arguments import path as as_path
 from orbiflow.arrays import Array
-from orbiflow.drawing import Palette, Raster, limited
+from orbiflow.drawing import Palette, Raster, limited, palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.motion.kinds import MOVE, REST, SHOW, Frame, Motion, Places, eased
+from orbiflow.runtime import Cancel, Note, Progress, Sink, ignore, write_atomic
+from orbiflow.tiles.exporting import Numbers
+from orbiflow.tiles.motion.kinds import (
+    MOVE,
+    REST,
+    SHOW,
+    Frame,
+    Motion,
+    Places,
+    bend,
+    eased,
+    frames,
+    grow,
+    morph,
+)
+from orbiflow.tiles.motion.settings import AnimationSettings
+from orbiflow.tiles.tile import EscherTile, TileSource
+from orbiflow.tiles.tilings import colouring
 
-OUTLINE = 0.0016
-"""Width of outlines, as a share of the picture's."""
+
+def animate(
+    tile: TileSource,
+    out: str | Path,
+    settings: AnimationSettings | None = None,
+    *,
+    force: bool = False,
+    on_event: Sink = ignore,
+    cancel: Cancel | None = None,
+) -> Path:
+    """Write an animation of a tile.
+
+    Args:
+        tile: A tile in memory, or a run's folder; see `read_result`.
+        out: The file. Its ending, .gif, .mp4 or .svg, decides the format, unless the settings give one.
+        settings: How it is animated.
+        force: Animate a tile that is not certified.
+        on_event: Called with each `Note` and `Progress`.
+        cancel: Stops the work; nothing is then written.
+
+    Raises:
+        CertificationError: If the tile is not certified.
+        OrbiflowError: If the settings cannot be met, or nothing says the format.
+        OutputError: If the file cannot be written.
+        Cancelled: If it was cancelled.
+    """
+    out, cancel = as_path(out, "the file to animate to"), cancel or Cancel()
+    settings, given = (settings or AnimationSettings()).for_file(out), EscherTile.of(tile)
+
+    def told(share: float) -> None:
+        cancel.check()
+        on_event(Progress(share, "drawing"))
+
+    for note in palette(settings.palette).shortage(colouring(given.tile).count):
+        on_event(Note(note))
+    content = animation(given, settings, force=force, told=told)
+    cancel.check()
+    return write_atomic(out, content)
+
+
+def animation(
+    tile: TileSource,
+    settings: AnimationSettings | None = None,
+    *,
+    force: bool = False,
+    told: Callable[[float], None] = lambda _: None,
+) -> bytes | str:
+    """The content of the file.
+
+    Args:
+        told: told the share of the work done; what it raises ends it.
+
+    Raises:
+        As `animate`.
+    """
+    settings = (settings or AnimationSettings()).for_file(None)
+    if settings.format == "mp4":
+        require_ffmpeg()  # before the work
+    given, colours = EscherTile.of(tile), palette(settings.palette)
+    given.require_certified(force=force, otherwise="so it is not animated; --force animates it")
+    made = motion(given, settings)
+    told(0.0)
+    loop = frames(settings.seconds, settings.fps)
+    match settings.file_format:
+        case "svg":
+            title = f"{given.name}: {made.what}"
+            name = f"{given.name}-{settings.kind}"
+            return write_motion_svg(made, colours, seconds=settings.seconds, name=name, title=title)
+        case "mp4":
+            return write_mp4(made, colours, loop, settings.fps, told)
+        case _:
+            return write_gif(made, colours, loop, told)
+
+
+def motion(tile: EscherTile, settings: AnimationSettings) -> Motion:
+    """Return what moves, before it is a file."""
+    match settings.kind:
+        case "morph":
+            steady = settings.format == "svg"
+            return morph(tile.tile, settings.size, y_down=tile.y_down, steady=steady)
+        case "grow":
+            return grow(tile.tile, settings.size, y_down=tile.y_down)
+        case "bend":
+            return bend(tile, settings.size)
+
+
+OUTLINE = 0.0016  # width of outlines, as a share of the picture's
 
 ProgressCall = Callable[[float], None]
 """Called with the share of the work that is done."""
@@ -47,14 +151,7 @@ def picture(motion: Motion, palette: Palette, progress: float) -> Raster:
 
 
 def write_gif(motion: Motion, palette: Palette, frames: list[Frame], told: ProgressCall) -> bytes:
-    """Return a GIF that repeats for ever, with one palette for all frames.
-
-    Args:
-        motion: What moves.
-        palette: The palette of paper, fills and outlines.
-        frames: The frames of the loop.
-        told: Called with the share of the work that is done.
-    """
+    """Return a GIF that repeats for ever, with one palette for all frames."""
     fills = [palette.fill(k) for k in range(int(motion.colours.max(initial=0)) + 1)]
     colours = (palette.paper, *fills, palette.outline)
     # few mixed colours, each of which costs bytes in every frame
@@ -77,11 +174,7 @@ def write_gif(motion: Motion, palette: Palette, frames: list[Frame], told: Progr
 
 
 def require_ffmpeg() -> str:
-    """Return the path of ffmpeg.
-
-    Raises:
-        OrbiflowError: If it is not installed.
-    """
+    """Return the path of ffmpeg, which must be installed."""
     found = shutil.which("ffmpeg")
     if found is None:
         raise OrbiflowError(
@@ -94,11 +187,7 @@ def require_ffmpeg() -> str:
 def write_mp4(
     motion: Motion, palette: Palette, frames: list[Frame], fps: float, told: ProgressCall
 ) -> bytes:
-    """Return an MP4 (H.264) of one loop, which every player and browser shows.
-
-    Raises:
-        OrbiflowError: If ffmpeg is not installed or fails.
-    """
+    """Return an MP4 (H.264) of one loop, which every player and browser shows."""
     ffmpeg = require_ffmpeg()
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "loop.mp4"
@@ -144,22 +233,16 @@ def write_motion_svg(
 ) -> str:
     """Return an animated SVG; readers who prefer less motion see the tiling at rest.
 
-    Args:
-        motion: What moves; it must be steady.
-        palette: The palette of paper, fills and outlines.
-        seconds: The time that the loop takes.
-        name: The beginning of all ids and classes, so that a page can hold several animations.
-        title: The title in words.
+    All ids and classes begin with `name`, so that a page can hold several animations.
     """
     key = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "tile"
     width, height = motion.width, motion.height
     still = motion.places(1.0)
     # growing tiles lie below whole ones
-    order = reversed(range(len(motion.colours)))
+    order = range(len(motion.colours))[::-1]
     moving = [_copy(motion, still, k, f"{key}-moving", palette, seconds) for k in order]
-    fixed = [
-        _still_copy(still, k, f"{key}-still", palette, motion) for k in range(len(motion.colours))
-    ]
+    grown = replace(motion, births=np.full_like(motion.births, -1.0))
+    fixed = [_copy(grown, still, k, f"{key}-still", palette, seconds) for k in reversed(order)]
     stroke = f'stroke="{palette.outline}" stroke-width="{OUTLINE * width:.2f}"'
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" \
@@ -188,17 +271,15 @@ width="{width}" height="{height}" role="img" class="{key}">
 """
 
 
+_number = Numbers(1)
+
+
 def _path(ring: Array) -> str:
     return "M" + " ".join(f"{_number(x)},{_number(y)}" for x, y in ring.tolist()) + "Z"
 
 
-def _number(value: float, decimals: int = 1) -> str:
-    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
-    return "0" if text in ("-0", "") else text
-
-
 def _matrix(linear: Array) -> str:
-    return ",".join(_number(value, 5) for value in linear.T.ravel())
+    return ",".join(Numbers(5)(value) for value in linear.T.ravel())
 
 
 def _changing(motion: Motion, seconds: float) -> str:
@@ -219,21 +300,13 @@ def _copy(
     if end <= 0:
         return f'{use} transform="matrix({_matrix(linear)},{_number(x)},{_number(y)})"/>\n'
     keys = [0.0, start, *np.linspace(start, end, 5)[1:-1].tolist(), end, 1.0]
-    sizes = [_number(eased(float(np.clip((t - start) / (end - start), 0, 1))), 3) for t in keys]
+    sizes = [Numbers(3)(eased(float(np.clip((t - start) / (end - start), 0, 1)))) for t in keys]
     grows = _animate(
         "animateTransform", 'attributeName="transform" type="scale"', keys, sizes, seconds
     )
     return (
         f'<g transform="translate({_number(x)},{_number(y)})"><g>{grows}'
         f'{use} transform="matrix({_matrix(linear)},0,0)"/></g></g>\n'
-    )
-
-
-def _still_copy(places: Places, k: int, symbol: str, palette: Palette, motion: Motion) -> str:
-    x, y = places.offset[k].tolist()
-    return (
-        f'<use href="#{symbol}" fill="{palette.fill(int(motion.colours[k]))}" '
-        f'transform="matrix({_matrix(places.linear[k])},{_number(x)},{_number(y)})"/>\n'
     )
 
 
@@ -252,7 +325,7 @@ def _animate(
     mode = f'calcMode="spline" keySplines="{";".join(splines)}"' if direct else 'calcMode="linear"'
     return (
         f'<{element} {what} dur="{seconds:g}s" repeatCount="indefinite" {mode} '
-        f'keyTimes="{";".join(_number(t, 4) for t in times)}" values="{";".join(shown)}"/>'
+        f'keyTimes="{";".join(Numbers(4)(t) for t in times)}" values="{";".join(shown)}"/>'
     )
 
 

@@ -1,8 +1,12 @@
-"""`overview.png`: all tiles of a search on one sheet; and what counts of a tile, in words."""
+"""What a search found, with measures in words: a sheet (`overview.png`) and a page (`index.html`).
+
+The page has no scripts; it works in light and dark, on a phone and on paper.
+"""
 
 from __future__ import annotations
 
 import io
+from bisect import bisect_right
 from collections.abc import Sequence
 from pathlib import PurePath
 from typing import NamedTuple
@@ -10,7 +14,7 @@ from typing import NamedTuple
 from PIL import Image, ImageDraw
 
 from orbiflow.arrays import Window
-from orbiflow.drawing import Raster, font, window_of
+from orbiflow.drawing import Raster, font, rendered, window_of
 from orbiflow.tiles.pictures import bending_raster, overlay_raster, tiling_raster
 from orbiflow.tiles.search import ClassFailure
 from orbiflow.tiles.silhouette import Target
@@ -29,60 +33,32 @@ class Measure(NamedTuple):
 
 def measures(result: EscherTile) -> list[Measure]:
     """Return a tile's measures, the most important first, without those that were not taken."""
-    found = [_score(result)]
-    if result.deformation is not None:
-        found.append(
-            Measure(
-                "Deformation",
-                f"{result.deformation:.3f}",
-                _word(
-                    result.deformation,
-                    (0.1, "bent a little"),
-                    (0.2, "bent somewhat"),
-                    (0.35, "bent much"),
-                    "bent very much",
-                ),
-                "What bending the silhouette into the tile costs; 0 is the silhouette itself.",
-            )
-        )
-    found += [
-        Measure(
-            "Overlap (IoU)",
-            f"{result.metrics.iou:.3f}",
-            f"{100 * result.metrics.dice:.0f} % of their areas in common",
-            "Area common to tile and silhouette, as it is, over the area of both together.",
-        ),
-        Measure(
-            "Recognised",
-            f"{result.recognisability.score:.2f}",
-            f"limbs {result.recognisability.limbs:.2f}",
-            "Share of the outlines that is found again, point by point; 1 is all.",
-        ),
-    ]
-    if result.thinnest is not None:
-        thin = result.thinnest.share < max(result.min_neck, 0.02)
-        found.append(
-            Measure(
-                "Thinnest neck",
-                f"{100 * result.thinnest.share:.1f} %",
-                "thin: take care when you cut" if thin else "sound",
-                "Its width, in hundredths of the square root of the tile's area.",
-            )
-        )
+    found, bent, thinnest = [_score(result)], result.deformation, result.thinnest
+    if bent is not None:
+        words = ("bent a little", "bent somewhat", "bent much", "bent very much")
+        word = words[bisect_right((0.1, 0.2, 0.35), bent)]
+        meaning = "What bending the silhouette into the tile costs; 0 is the silhouette itself."
+        found.append(Measure("Deformation", f"{bent:.3f}", word, meaning))
+    common = f"{100 * result.metrics.dice:.0f} % of their areas in common"
+    meaning = "Area common to tile and silhouette, as it is, over the area of both together."
+    found.append(Measure("Overlap (IoU)", f"{result.metrics.iou:.3f}", common, meaning))
+    same = result.recognisability
+    meaning = "Share of the outlines that is found again, point by point; 1 is all."
+    found.append(Measure("Recognised", f"{same.score:.2f}", f"limbs {same.limbs:.2f}", meaning))
+    if thinnest is not None:
+        thin = thinnest.share < max(result.min_neck, 0.02)
+        word = "thin: take care when you cut" if thin else "sound"
+        meaning = "Its width, in hundredths of the square root of the tile's area."
+        found.append(Measure("Thinnest neck", f"{100 * thinnest.share:.1f} %", word, meaning))
     if result.pinned is not None:
-        found.append(
-            Measure(
-                "Pinned parts",
-                f"{result.pinned:.4f}",
-                "as they were" if result.pinned < 0.01 else "changed",
-                "How far the worst of them is from similar to what it was; 0 is the same shape.",
-            )
-        )
+        word = "as they were" if result.pinned < 0.01 else "changed"
+        meaning = "How far the worst of them is from similar to what it was; 0 is the same shape."
+        found.append(Measure("Pinned parts", f"{result.pinned:.4f}", word, meaning))
     return found
 
 
+# Scores up to which a tile is called poor, after a search for overlap and for likeness
 POOR_MATCH, POOR_LIKENESS = 0.4, 0.2
-"""Scores up to which a tile is called poor, after a search for overlap and for likeness."""
 
 
 def is_poor(result: EscherTile) -> bool:
@@ -92,34 +68,15 @@ def is_poor(result: EscherTile) -> bool:
 
 def _score(result: EscherTile) -> Measure:
     if result.fidelity is None:
-        words = _word(
-            -result.score,
-            (-0.8, "a close match"),
-            (-0.6, "a fair match"),
-            (-POOR_MATCH, "a loose match"),
-            "a poor match",
-        )
+        bounds = (-0.8, -0.6, -POOR_MATCH)
+        words = ("a close match", "a fair match", "a loose match", "a poor match")
         meaning = "Overlap and recognisability together, 0 to 1; tiles are ranked by it."
     else:
-        words = _word(
-            -result.score,
-            (-0.6, "a good likeness"),
-            (-0.4, "a middling likeness"),
-            (-POOR_LIKENESS, "a loose likeness"),
-            "a poor likeness",
-        )
+        bounds = (-0.6, -0.4, -POOR_LIKENESS)
+        words = ("a good likeness", "a middling likeness", "a loose likeness", "a poor likeness")
         meaning = "How much of the outline's shape bending left, 0 to 1; tiles are ranked by it."
-    return Measure("Score", f"{result.score:.2f}", words, meaning)
-
-
-def _word(value: float, *scale: tuple[float, str] | str) -> str:
-    """Return the word of the first bound that the value is below; the last word has none."""
-    for step in scale:
-        if isinstance(step, str):
-            return step
-        if value < step[0]:
-            return step[1]
-    return ""
+    word = words[bisect_right(bounds, -result.score)]
+    return Measure("Score", f"{result.score:.2f}", word, meaning)
 
 
 INK, FAINT, WARNING = "#1a1a1a", "#5b6570", "#b0413e"
@@ -132,9 +89,11 @@ _THUMB = 156
 
 
 class _Place(NamedTuple):
+    """Where a tile is on the sheet: its tiling, and what is `below` it."""
+
     left: int
     top: int
-    width: int
+    below: int
 
 
 def overview_png(
@@ -164,30 +123,20 @@ def overview_png(
     _header(sheet, pen, target, len(results), [failure.name for failure in failures])
     for k, result in enumerate(results):
         row, column = divmod(k, columns)
-        place = _Place(_MARGIN + column * (cell + _GAP), _HEADER + row * (height + _GAP), cell)
+        top = _HEADER + row * (height + _GAP)
+        place = _Place(_MARGIN + column * (cell + _GAP), top, top + round(cell / 1.5) + 14)
         _write_words(pen, result, place, k + 1)
         own = colours[k] if colours else None
         tiling = tiling_raster(
             result.tile, width_px=cell, colours=own, outline_px=1.4, y_down=target.y_down
         )
         sheet.paste(tiling.image(), (place.left, place.top))
-        thumb = _thumbnail(_small(result, target))
-        sheet.paste(thumb, (place.left + (_THUMB - thumb.width) // 2, _below(place)))
+        thumb = _small(result, target).image()
+        thumb.thumbnail((_THUMB, _THUMB))
+        sheet.paste(thumb, (place.left + (_THUMB - thumb.width) // 2, place.below))
     buffer = io.BytesIO()
     sheet.save(buffer, "PNG", compress_level=4)
     return buffer.getvalue()
-
-
-def verdict(result: EscherTile) -> str:
-    """Return how far a tile is from its silhouette, in a few words.
-
-    After a search for likeness this is what bending cost, else how well the silhouette is recognised.
-    """
-    if result.deformation is None:
-        how = f"recognised {result.recognisability.score:.2f}"
-    else:
-        how = f"bent {result.deformation:.2f}"
-    return f"{how}    IoU {result.metrics.iou:.2f}    score {result.score:.2f}"
 
 
 def _header(
@@ -196,7 +145,8 @@ def _header(
     window = window_of([target.outline])
     small = Raster(window, _fitting(window), y_down=target.y_down)
     small.fill([target.outline], INK)
-    picture = _thumbnail(small)
+    picture = small.image()
+    picture.thumbnail((_THUMB, _THUMB))
     sheet.paste(picture, (_MARGIN, (_HEADER - picture.height) // 2))
     left, middle = _MARGIN + picture.width + 28, _HEADER // 2
     name = PurePath(target.source).name
@@ -209,20 +159,17 @@ def _header(
         pen.text((left, middle + 76), text, WARNING, font(_WORDS), anchor="ls")
 
 
-def _below(place: _Place) -> int:
-    """Return where the part below the tiling begins."""
-    return place.top + round(place.width / 1.5) + 14
-
-
 def _write_words(pen: ImageDraw.ImageDraw, result: EscherTile, place: _Place, rank: int) -> None:
-    below = _below(place)
-    left = place.left + _THUMB + 22
+    left, below = place.left + _THUMB + 22, place.below
+    cost = result.deformation
+    same = f"recognised {result.recognisability.score:.2f}"
+    how = same if cost is None else f"bent {cost:.2f}"
+    verdict = f"{how}    IoU {result.metrics.iou:.2f}    score {result.score:.2f}"
     name = f"{rank}.  {result.isohedral_class}  ({result.group_name})"
     pen.text((left, below + 34), name, INK, font(_NAME), anchor="ls")
-    pen.text((left, below + 76), verdict(result), INK, font(_WORDS), anchor="ls")
+    pen.text((left, below + 76), verdict, INK, font(_WORDS), anchor="ls")
     valid = result.certificate.valid
-    likeness = next(m.words for m in measures(result) if m.name == "Score")
-    words = f"{likeness}, certified" if valid else "NOT CERTIFIED"
+    words = f"{_score(result).words}, certified" if valid else "NOT CERTIFIED"
     if result.front is not None:
         words = f"for {result.objective}, {words.split(', ')[-1]}"
     colour = FAINT if valid else WARNING
@@ -245,7 +192,66 @@ def _fitting(window: Window) -> int:
     return max(16, round(_THUMB * min(1.0, aspect)), round(17 * aspect))
 
 
-def _thumbnail(raster: Raster) -> Image.Image:
-    picture = raster.image()
-    picture.thumbnail((_THUMB, _THUMB))
-    return picture
+# The files in every tile's folder
+TILE_FILES = ("tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors")
+
+CHOICES = {
+    "tile.svg": "the tile (SVG)",
+    "tiling.svg": "the tiling (SVG)",
+    "tiling.png": "the tiling (PNG)",
+    "overlay.png": "the comparison (PNG)",
+    "tiling.pdf": "the tiling, for print (PDF)",
+    "overlay.pdf": "the comparison, for print (PDF)",
+    "field.png": "the flow (PNG)",
+    "field.pdf": "the flow, for print (PDF)",
+    "model.safetensors": "the map (safetensors)",
+}
+"""Files of a class, in words."""
+
+
+def index_page(
+    results: Sequence[EscherTile],
+    target: Target,
+    folders: Sequence[str],
+    *,
+    failures: Sequence[ClassFailure] = (),
+    figures: Sequence[Sequence[str]] = (),
+) -> str:
+    """Return the page of one search's tiles, best first, to be written beside their `folders`.
+
+    `figures` are the names of the files in each folder besides the `TILE_FILES`.
+    """
+    name = PurePath(target.source).name
+    extra = figures or [()] * len(results)
+    tiles = [
+        {
+            "found": result,
+            "folder": folder,
+            "files": (*TILE_FILES, *more),
+            "measures": measures(result),
+        }
+        for result, folder, more in zip(results, folders, extra, strict=True)
+    ]
+    return rendered(
+        "orbiflow.tiles.pages",
+        "index_page.html",
+        title=f"Tiles that look like {name}",
+        name=name,
+        silhouette=_silhouette(target),
+        compared=any(result.front is not None for result in results),
+        notes=target.notes,
+        tiles=tiles,
+        failures=failures,
+        choices=CHOICES,
+    )
+
+
+def _silhouette(target: Target) -> dict[str, str]:
+    """Return the silhouette as the path of an SVG, 100 units along its longer side."""
+    left, low, right, high = window_of([target.outline])
+    scale = 100 / max(right - left, high - low)
+    ring = (target.outline - (left, low if target.y_down else high)) * scale
+    ring = ring * (1, 1 if target.y_down else -1)
+    path = "L".join(f"{x:.1f},{y:.1f}" for x, y in ring)
+    size = {"width": f"{(right - left) * scale:.1f}", "height": f"{(high - low) * scale:.1f}"}
+    return {**size, "path": f"M{path}Z"}

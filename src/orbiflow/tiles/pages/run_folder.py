@@ -1,31 +1,106 @@
-"""The folder of a search: a folder for each class, overviews, and `result.json`."""
+"""The folder of a search: a folder for each tile, overviews, and `result.json`."""
 
 from __future__ import annotations
 
 import contextlib
 import functools
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from orbiflow.arguments import instance
 from orbiflow.arguments import path as as_path
-from orbiflow.runtime import Note, ResultFolder, Sink, Written, ignore, work, write_atomic
-from orbiflow.tiles.pages.index import index_page
-from orbiflow.tiles.pages.overview import overview_png
-from orbiflow.tiles.pages.tile_folder import (
-    FIELD_FILES,
-    FIGURE_FILES,
-    TILE_FILES,
-    figure_files,
-    write_tile_folder,
+from orbiflow.drawing import Picture, Sheet, field_picture
+from orbiflow.runtime import (
+    Note,
+    ResultFolder,
+    Sink,
+    Written,
+    ignore,
+    make_folder,
+    work,
+    write_atomic,
 )
-from orbiflow.tiles.pictures import FrontPoint, front_png
+from orbiflow.tiles.exporting import tile_svg, tiling_svg
+from orbiflow.tiles.pages.overview import TILE_FILES, index_page, overview_png
+from orbiflow.tiles.pictures import (
+    FrontPoint,
+    bending_picture,
+    bending_png,
+    front_png,
+    overlay_picture,
+    overlay_png,
+    tiling_picture,
+    tiling_png,
+)
 from orbiflow.tiles.result_file import RESULT, folder_names
-from orbiflow.tiles.search import ClassFailure, SearchResult, report
+from orbiflow.tiles.search import ClassFailure, SearchResult, placed_field, report
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tile_map import TileMap
 from orbiflow.tiles.tilings import Colouring, colouring
+
+FIELD_FILES = ("field.png", "field.pdf")
+FIGURE_FILES = ("tiling.pdf", "overlay.pdf", *FIELD_FILES)
+"""The further files if figures were asked for: for print, as wide as a journal's column; and the field
+of the flow if there is one."""
+
+
+def figure_files(result: EscherTile) -> tuple[str, ...]:
+    """Return the `FIGURE_FILES` of a tile: there is no flow where the silhouette bent into the tile."""
+    likeness = result.objective == "likeness"
+    return tuple(file for file in FIGURE_FILES if not (likeness and file in FIELD_FILES))
+
+
+def write_tile_folder(
+    result: EscherTile,
+    target: Target,
+    folder: Path,
+    *,
+    colours: Colouring | None = None,
+    figures: bool = False,
+) -> list[Path]:
+    """Write the `TILE_FILES` of a tile into its folder, and the `FIGURE_FILES`, which take much longer.
+
+    Raises:
+        OutputError: If a file cannot be written.
+    """
+    make_folder(folder)
+    tile, colours, y_down = result.tile, colours or colouring(result.tile), target.y_down
+    label = f"{result.isohedral_class} ({result.group_name})"
+    title = f"{target.source.rsplit('/', 1)[-1]}, {label}"
+    if not result.certificate.valid:
+        title += ", NOT CERTIFIED"
+
+    def overlay() -> bytes:
+        if result.bent is None or result.rest is None:
+            return overlay_png(tile, target.outline, y_down=y_down, label=label)
+        text = f"{label}  IoU {result.metrics.iou:.3f}"
+        return bending_png(tile, result.rest, result.bent, y_down=y_down, label=text)
+
+    def overlay_for_print() -> Picture:
+        if result.bent is None or result.rest is None:
+            return overlay_picture(tile, target.outline, y_down=y_down)
+        return bending_picture(tile, result.rest, result.bent, y_down=y_down)
+
+    def field(sheet: Sheet) -> bytes:
+        normal = result.normal_tile
+        return field_picture(placed_field(result.model()), normal.group, normal, sheet=sheet).file()
+
+    contents: dict[str, Callable[[], str | bytes]] = {
+        "tile.svg": lambda: tile_svg(tile, y_down=y_down, title=title),
+        "tiling.svg": lambda: tiling_svg(tile, y_down=y_down, title=title, colours=colours),
+        "tiling.png": lambda: tiling_png(tile, y_down=y_down, colours=colours),
+        "overlay.png": overlay,
+        "tiling.pdf": lambda: tiling_picture(tile, y_down=y_down, colours=colours).file(),
+        "overlay.pdf": lambda: overlay_for_print().file(),
+        "field.png": lambda: field(Sheet.screen(1200)),
+        "field.pdf": lambda: field(Sheet.column()),
+        "model.safetensors": (result.map or TileMap()).to_bytes,
+    }
+    names = (*TILE_FILES, *(figure_files(result) if figures else ()))
+    return [write_atomic(folder / name, contents[name]()) for name in names]
+
 
 OVERVIEW, INDEX, FRONT = "overview.png", "index.html", "front.png"
 
@@ -39,29 +114,22 @@ def write_gallery(
     figures: bool = False,
     workers: int = 1,
 ) -> None:
-    """Write each class's folder, `overview.png` and `index.html`.
+    """Write each class's folder, `overview.png` and `index.html` for tiles, best first, one or more.
 
-    Args:
-        results: The tiles, best first, one or more.
-        target: The silhouette that was searched for.
-        out: The folder.
-        failures: The classes without a tile, which the page names.
-        figures: Write the figures, too.
-        workers: The number of processes that draw figures; without figures, starting one would take
-            longer than drawing.
+    So many `workers` draw `figures`; without figures, starting one would take longer than drawing.
 
     Raises:
         OutputError: If a file cannot be written.
     """
     names = folder_names([result.isohedral_class for result in results])
-    folders = [out / name for name in names]
     colours = [colouring(result.tile) for result in results]
-    draw = functools.partial(_draw, results, target, folders, colours, figures)
+    draw = functools.partial(_draw, target, figures)
+    items = list(zip(results, colours, (out / name for name in names), strict=True))
     if workers == 1 or len(results) == 1 or not figures:
-        for k in range(len(results)):
-            draw(k)
+        for item in items:
+            draw(item)
     else:
-        with contextlib.closing(work(draw, range(len(results)), workers)) as news:
+        with contextlib.closing(work(draw, items, workers)) as news:
             for _ in news:
                 pass
     write_atomic(out / OVERVIEW, overview_png(results, target, colours, failures=failures))
@@ -70,14 +138,18 @@ def write_gallery(
     write_atomic(out / INDEX, page)
 
 
+def _draw(
+    target: Target, figures: bool, item: tuple[EscherTile, Colouring, Path], *_: object
+) -> None:
+    """Write the folder of one tile; this may run in a worker process."""
+    tile, colours, folder = item
+    write_tile_folder(tile, target, folder, colours=colours, figures=figures)
+
+
 def write_front(
     results: Sequence[EscherTile], found: Iterable[EscherTile], target: Target, out: Path
 ) -> None:
-    """Write `front.png`: the listed tiles among all that were found, by deformation and overlap.
-
-    Raises:
-        OutputError: If the file cannot be written.
-    """
+    """Write `front.png`: the listed tiles among all that were found, by deformation and overlap."""
     listed = {id(result.tile) for result in results}
     others = [result for result in found if id(result.tile) not in listed]
     points = [
@@ -95,21 +167,6 @@ def write_front(
     ]
     if points:
         write_atomic(out / FRONT, front_png(points, y_down=target.y_down))
-
-
-def _draw(
-    results: Sequence[EscherTile],
-    target: Target,
-    folders: Sequence[Path],
-    colours: Sequence[Colouring],
-    figures: bool,
-    index: int,
-    *_: object,
-) -> None:
-    """Write the folder of one tile; this may run in a worker process."""
-    write_tile_folder(
-        results[index], target, folders[index], colours=colours[index], figures=figures
-    )
 
 
 def written_files(folder: Path) -> set[str]:
@@ -132,11 +189,7 @@ def written_files(folder: Path) -> set[str]:
 
 
 def result_folder(out: str | Path) -> ResultFolder:
-    """Return the folder that a run is written to.
-
-    Raises:
-        OutputError: If it holds what orbiflow did not write.
-    """
+    """Return the folder that a run is written to, which holds nothing else."""
     return ResultFolder(as_path(out, "the folder to write into"), written_files)
 
 
@@ -145,8 +198,8 @@ def write_run(
 ) -> list[Path]:
     """Write what a search found as a result folder: a folder a class, overviews, `result.json`.
 
-    An earlier run there is replaced whole, unless the search was interrupted before any class had its
-    tile: a first look is less than an earlier run's tiles.
+    An earlier run there is replaced whole, unless the search was interrupted before any class had
+    its tile: a first look is less than an earlier run's tiles.
 
     Args:
         result: What the search found.
@@ -170,22 +223,20 @@ def write_run(
     if tiles and figures and not any(FIELD_FILES[0] in figure_files(tile) for tile in tiles):
         on_event(Note("no flow made these tiles, so there is none to draw: the silhouette bent"))
     with folder.replaced() as staged:
-        _fill(staged, result, figures=figures)
+        if tiles:
+            write_gallery(
+                tiles,
+                result.target,
+                staged,
+                failures=result.failures,
+                figures=figures,
+                workers=result.workers if figures else 1,
+            )
+            if result.method.objective == "both":
+                write_front(tiles, result.found or tiles, result.target, staged)
+        write_atomic(staged / RESULT, json.dumps(report(result), allow_nan=False))
         files = [path.relative_to(staged) for path in staged.rglob("*") if path.is_file()]
     written = [folder.path / path for path in sorted(files)]
     for path in written:
         on_event(Written(path))
     return written
-
-
-def _fill(folder: Path, result: SearchResult, *, figures: bool) -> None:
-    """Write all files of a run into an empty folder."""
-    tiles, target = result.tiles, result.target
-    document = report(result)
-    if tiles:
-        workers = result.workers if figures else 1
-        failures = result.failures
-        write_gallery(tiles, target, folder, failures=failures, figures=figures, workers=workers)
-        if document["objective"] == "both":
-            write_front(tiles, result.found or tiles, target, folder)
-    write_atomic(folder / RESULT, json.dumps(document, allow_nan=False))

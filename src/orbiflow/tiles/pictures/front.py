@@ -18,44 +18,29 @@ INK, PALE, GRID = "#1a1a1a", "#c4ccd4", "#eceff2"
 COLOURS = {"likeness": "#1d4e79", "overlap": "#c8702a"}
 NAMES = {"likeness": "found for likeness", "overlap": "found for overlap"}
 
+# Height of a listed tile's silhouette, and of another tile's, as a share of the width
 SIZE, SMALL = 0.075, 0.03
-"""Height of a listed tile's silhouette, and of another tile's, as a share of the width."""
-
-PUSHES = 400
-"""Number of steps in which the silhouettes make room for each other."""
+PUSHES = 400  # number of steps in which the silhouettes make room for each other
 
 
 class FrontPoint(NamedTuple):
-    """A tile in the picture.
+    """A tile in the picture."""
 
-    - `deformation`, `iou`: Its place in the picture.
-    - `polygon`: The polygon (N, 2) in the input's coordinates.
-    - `label`: The words beside it, such as its class.
-    - `objective`: What it was found for: "likeness" or "overlap".
-    - `listed`: Whether it is in the list; others are pale.
-    - `front`: Whether no other tile beats it in both.
-    """
-
-    deformation: float
+    deformation: float  # with `iou`: its place in the picture
     iou: float
-    polygon: Array
-    label: str
-    objective: str
-    listed: bool
-    front: bool
+    polygon: Array  # the polygon (N, 2) in the input's coordinates
+    label: str  # the words beside it, such as its class
+    objective: str  # what it was found for: "likeness" or "overlap"
+    listed: bool  # whether it is in the list; others are pale
+    front: bool  # whether no other tile beats it in both
 
 
 def front_png(points: Sequence[FrontPoint], *, width_px: int = 1600, y_down: bool = False) -> bytes:
     """Return a PNG of tiles by deformation (to the right) and overlap (upwards), as silhouettes.
 
-    Listed tiles are large and coloured by what they were found for, with a line to their place if they
-    had to make room; full colour means that no other beats them. Others are pale, and the dashed
-    steps are the border of what is beaten.
-
-    Args:
-        points: All tiles that were found.
-        width_px: The width in pixels; the height is seven tenths of it.
-        y_down: Whether the y axis of the polygons points down, as in images.
+    Listed tiles are large and coloured by what they were found for, with a line to their place if
+    they had to make room; full colour means that no other beats them. Others are pale, and the
+    dashed steps are the border of what is beaten. The height is seven tenths of the width.
 
     Raises:
         OrbiflowError: If there are no points or the size is impossible.
@@ -108,23 +93,14 @@ def _axes(figure: object, points: Sequence[FrontPoint]) -> Axes:
         spine.set_color("#8a949e")
         spine.set_linewidth(0.7)
     kinds = [kind for kind in COLOURS if any(p.objective == kind for p in points)]
+    names = {COLOURS[kind]: NAMES[kind] for kind in kinds}
+    names[PALE] = "left out: beaten, or much like one that is shown"
     marks = [
-        Line2D([], [], marker="o", ls="", ms=5, color=COLOURS[k], label=NAMES[k]) for k in kinds
+        Line2D([], [], marker="o", ls="", ms=5, color=colour, label=name)
+        for colour, name in names.items()
     ]
-    marks.append(
-        Line2D(
-            [],
-            [],
-            marker="o",
-            ls="",
-            ms=5,
-            color=PALE,
-            label="left out: beaten, or much like one that is shown",
-        )
-    )
-    axes.legend(
-        handles=marks, fontsize=7.5, frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1)
-    )
+    corner = {"loc": "lower left", "bbox_to_anchor": (0, 1)}
+    axes.legend(handles=marks, fontsize=7.5, frameon=False, ncols=3, **corner)
     return axes
 
 

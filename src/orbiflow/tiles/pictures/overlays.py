@@ -1,6 +1,9 @@
-"""Pictures of a tile laid over its silhouette: what is missing and what is added."""
+"""Pictures of a tile over its silhouette: what is missing and added, or how the silhouette bent."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -8,20 +11,24 @@ from numpy.typing import ArrayLike
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import numbers
+from orbiflow.arrays import Array
 from orbiflow.drawing import (
     Picture,
     Raster,
     Sheet,
+    arrow,
     caption,
     captioned,
+    dashes,
+    rgb,
     strip_middle,
     vector_picture,
 )
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.tilings import Tile
 
+# Fills of the overlay: in both, in the target only, in the tile only
 COMMON, MISSING, ADDED = "#c9d3dc", "#d95f02", "#2b6cb0"
-"""Fills of the overlay: in both, in the target only, in the tile only."""
 
 
 def overlay_png(
@@ -60,15 +67,7 @@ def overlay_picture(
     y_down: bool = False,
     sheet: Sheet | None = None,
 ) -> Picture:
-    """Return the picture of `overlay_png` for print, in curves; the caption has its legend.
-
-    Args:
-        tile, target, y_down: As for `overlay_png`.
-        sheet: The sheet it is drawn on. Default: a journal's single column, as PDF.
-
-    Raises:
-        OrbiflowError: As `overlay_png`.
-    """
+    """Return the picture of `overlay_png` for print, in curves; the caption has its legend."""
     raster = overlay_raster(tile, target, width_px=1600, y_down=y_down)
     title = f"Tile {tile.isohedral_class} over the silhouette".replace("  ", " ")
     caption = "Grey: in both. Orange: missing, in the silhouette alone. Blue: added."
@@ -96,12 +95,16 @@ def overlay_raster(
 
 def _legend(raster: Raster) -> None:
     entries = [("in both", COMMON, 0.40), ("missing", MISSING, 0.58), ("added", ADDED, 0.76)]
-    y, high = strip_middle(raster), 0.014 * raster.width
     for name, colour, x in entries:
-        left, right = x * raster.width, (x + 0.03) * raster.width
-        ring = [[left, y - high], [right, y - high], [right, y + high], [left, y + high]]
-        raster.fill_pixels(np.array(ring), colour)
+        _swatch(raster, x, x + 0.03, 0.014, colour)
         caption(raster, x + 0.04, name)
+
+
+def _swatch(raster: Raster, left: float, right: float, high: float, colour: str) -> None:
+    """Fill a rectangle in the strip, in shares of the picture's width."""
+    y, ends = strip_middle(raster), np.array([left, right, right, left]) * raster.width
+    sides = y + np.array([-high, -high, high, high]) * raster.width
+    raster.fill_pixels(np.stack([ends, sides], axis=1), colour)
 
 
 def _target(target: ArrayLike | BaseGeometry) -> BaseGeometry:
@@ -118,3 +121,132 @@ def _target(target: ArrayLike | BaseGeometry) -> BaseGeometry:
 
 def _clean(geometry: BaseGeometry) -> BaseGeometry:
     return geometry if shapely.is_valid(geometry) else shapely.make_valid(geometry)
+
+
+TILE, GHOST, ARROW = "#d7dee6", "#9a8c7a", "#b0413e"
+STILL = 0.06  # distance, in square roots of the area, up to which no arrow is drawn
+FAR = 0.3  # distance, in square roots of the area, at which the outline has the ramp's last colour
+
+_STEPS = 11
+_LINE, _GHOST = 0.0042, 0.0022  # widths of lines, as shares of the picture's
+
+
+def bending_png(
+    tile: Tile,
+    rest: Array,
+    bent: Array,
+    *,
+    width_px: int = 1200,
+    y_down: bool = False,
+    label: str = "",
+) -> bytes:
+    """Return a PNG of a tile with the bent silhouette's outline, coloured by how far points moved.
+
+    The silhouette as it was is a faint dashed line; arrows lead from it to the tile where it bent.
+
+    Args:
+        tile: The tile in the input's coordinates, which is filled.
+        rest, bent: The outlines (n, 2) of the silhouette as it was and bent, point by point.
+        width_px, y_down, label: As for `overlay_png`.
+    """
+    text = label or tile.isohedral_class or " "
+    raster = bending_raster(tile, rest, bent, width_px=width_px, y_down=y_down, text=text)
+    _bending_legend(raster)
+    return raster.png()
+
+
+def bending_picture(
+    tile: Tile, rest: Array, bent: Array, *, y_down: bool = False, sheet: Sheet | None = None
+) -> Picture:
+    """Return the picture of `bending_png` for print, in curves; the caption has its legend."""
+    raster = bending_raster(tile, rest, bent, width_px=1600, y_down=y_down)
+    title = f"Silhouette bent into a tile {tile.isohedral_class}".strip()
+    caption = (
+        "Dashed: the silhouette as it was, with arrows to where it went. The tile's outline is "
+        "coloured by how far each point moved, from blue, little, to red, far."
+    )
+    return vector_picture(raster, sheet or Sheet.column(), title=title, caption=caption)
+
+
+def bending_raster(
+    tile: Tile,
+    rest: Array,
+    bent: Array,
+    *,
+    width_px: int,
+    y_down: bool = False,
+    text: str = "",
+    thick: float = 1.0,
+) -> Raster:
+    """Return the picture of `bending_png` without its legend, and without a strip if `text` is empty.
+
+    Lines are `thick` times as wide, for small pictures.
+    """
+    raster = captioned([rest, bent, tile.polygon], width_px, y_down=y_down, text=text)
+    raster.fill([tile.polygon], TILE)
+    size = float(np.sqrt(abs(tile.signed_area)))
+    moved = np.linalg.norm(bent - rest, axis=1) / size
+    unit = thick * width_px
+    closed = raster.to_pixels(np.concatenate([rest, rest[:1]]))
+    for piece in dashes(closed, 0.009 * unit, 0.006 * unit):
+        raster.line(piece, GHOST, _GHOST * unit, pixels=True)
+    _arrows(raster, rest, bent, moved, size, _GHOST * unit)
+    values = np.clip((moved + np.roll(moved, -1)) / 2 / FAR, 0, 1)
+    steps = np.rint(values * (_STEPS - 1)).astype(int)
+    for step, run in sorted(_runs(bent, steps), key=lambda item: item[0]):
+        raster.line(run, RAMP[step], _LINE * unit)
+    return raster
+
+
+def _ramp(stops: tuple[str, ...], count: int) -> tuple[str, ...]:
+    """Return so many colours, evenly spaced from the first stop to the last."""
+    values = np.array([rgb(stop) for stop in stops], dtype=float)
+    places = np.linspace(0, len(stops) - 1, count)
+    mixed = [np.interp(places, np.arange(len(stops)), values[:, k]) for k in range(3)]
+    return tuple(
+        f"#{red:02x}{green:02x}{blue:02x}"
+        for red, green, blue in np.rint(mixed).astype(int).T.tolist()
+    )
+
+
+# Colours of the outline, from where it stayed to where it moved far
+RAMP = _ramp(("#1d4e79", "#d98a2b", ARROW), _STEPS)
+
+
+def _runs(ring: Array, steps: Array) -> Iterator[tuple[int, Array]]:
+    """Yield the runs of a ring's sides (n, 2) that have the same step (n,) of the ramp."""
+    starts = np.flatnonzero(steps != np.roll(steps, 1))
+    if not len(starts):
+        yield int(steps[0]), np.concatenate([ring, ring[:1]])
+        return
+    for first, last in zip(starts, np.roll(starts, -1), strict=True):
+        count = (last - first - 1) % len(ring) + 2
+        yield int(steps[first]), ring[(first + np.arange(count)) % len(ring)]
+
+
+def _arrows(
+    raster: Raster, rest: Array, bent: Array, moved: Array, size: float, width: float
+) -> None:
+    """Draw arrows to where the outline went, at points some way apart that moved far."""
+    taken: list[int] = []
+    for k in np.argsort(-moved):
+        if moved[k] < STILL or len(taken) == 24:
+            break
+        near = [np.linalg.norm(rest[k] - rest[other]) < 0.16 * size for other in taken]
+        if not any(near):
+            taken.append(int(k))
+    for k in taken:
+        arrow(raster, rest[k], bent[k], GHOST, width)
+
+
+def _bending_legend(raster: Raster) -> None:
+    y, wide = strip_middle(raster), raster.width
+    sample = np.array([[0.47 * wide, y], [0.52 * wide, y]])
+    for piece in dashes(sample, 0.009 * wide, 0.006 * wide):
+        raster.line(piece, GHOST, _GHOST * wide, pixels=True)
+    caption(raster, 0.53, "as it was")
+    for (left, right), colour in zip(
+        pairwise(np.linspace(0.68, 0.78, _STEPS + 1)), RAMP, strict=True
+    ):
+        _swatch(raster, left, right, 0.009, colour)
+    caption(raster, 0.79, "moved, little to far")

@@ -1,8 +1,9 @@
-"""The search for likeness in one class: placements, co-deformation, the best worked out in detail."""
+"""The search for likeness in one class: placements, co-deformation, finalists, start tiles."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -10,74 +11,62 @@ import shapely
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array, Complex
-from orbiflow.runtime import Cancel
+from orbiflow.errors import CertificationError
+from orbiflow.runtime import Cancel, one_blas_thread
 from orbiflow.tiles.geometry import best_similarity, plane_points, signed_area
 from orbiflow.tiles.likeness import (
     Elastic,
     Fidelity,
+    Overlap,
     Stiffness,
+    best_overlay,
     fidelity,
+    least_neck,
     narrowest_neck,
     neck_factor,
 )
+from orbiflow.tiles.search.candidates import Fit, Progress, Prototiles, StillTiles, silent
 from orbiflow.tiles.search.co_deformation import (
     FIRM,
     SOFT,
     Bodies,
+    Drawn,
     Hand,
+    Stage,
     drawn_to_tiles,
     held_on_tiles,
+    shifted,
 )
-from orbiflow.tiles.search.corner_shifts import Drawn, Stage, shifted
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.placements import Placements, best_placements
 from orbiflow.tiles.search.starts import mirror_closed
-from orbiflow.tiles.search.tile_space import TileSpace
+from orbiflow.tiles.search.tile_space import NearestTiles, TileSpace
+from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass
 
-TWIN = 2e-4
-"""Mean squared distance of two bent outlines below which they are twins."""
-
-FIRST_ROUNDS = 6
-"""Steps of the minimisation for all that are held."""
-
-FOLLOWING = 60.0
-"""Strength of the springs by which a finer body follows a coarser one."""
-
-RELAXED = 1500.0
-"""Strength of the springs that keep a relaxed outline near its tile."""
+TWIN = 2e-4  # mean squared distance of two bent outlines below which they are twins
+FIRST_ROUNDS = 6  # steps of the minimisation for all that are held
+FOLLOWING = 60.0  # strength of the springs by which a finer body follows a coarser one
+RELAXED = 1500.0  # strength of the springs that keep a relaxed outline near its tile
 
 Item = TypeVar("Item")
 
 
 class Bent(NamedTuple):
-    """A bent silhouette that is a tile.
+    """A bent silhouette that is a tile."""
 
-    - `hand`: what was bent.
-    - `points`: (N,) of the fine body; its outline is the tile, up to a similarity.
-    - `linear`, `offset`: the map from the group's own frame, of `points`.
-    - `placement`: one, of the fine outline.
-    - `relaxed`: (n,) the outline let go a little: bent as it would like to be near this tile.
-    - `fidelity`: what is left of the outline, and what bending costs.
-    - `neck`: width of the narrowest neck, in square roots of the area.
-    """
-
-    hand: Hand
-    points: Complex
-    linear: Array
+    hand: Hand  # what was bent
+    points: Complex  # (N,) of the fine body; its outline is the tile, up to a similarity
+    linear: Array  # with `offset`: the map from the group's own frame, of `points`
     offset: Array
-    placement: Placements
-    relaxed: Complex
-    fidelity: Fidelity
-    neck: float
+    placement: Placements  # one, of the fine outline
+    relaxed: Complex  # (n,) the outline let go a little: bent as it would like to be near this tile
+    fidelity: Fidelity  # what is left of the outline, and what bending costs
+    neck: float  # width of the narrowest neck, in square roots of the area
 
     def score(self, min_neck: float) -> float:
         """What finalists are ordered by: their fidelity's, less where a neck is too thin."""
         return self.fidelity.score * neck_factor(self.neck, min_neck)
-
-
-def _told_nobody(_share: float) -> None:
-    """No progress wanted."""
 
 
 def bent_tiles(
@@ -89,23 +78,12 @@ def bent_tiles(
     *,
     wanted: int = 1,
 ) -> tuple[list[Bent], int]:
-    """The finalists of one class, best score first, no two of them twins.
+    """Return the finalists of one class, best score first and without twins, and how many crossed.
 
-    Args:
-        both: of the target.
-        kind: the class.
-        settings: of the search.
-        progress: told the share of the work done.
-        cancel: looked at before each step.
-        wanted: finalists of each hand at least, if there are as many.
-
-    Returns:
-        The finalists, and how many were dropped because they cross themselves.
-
-    Raises:
-        Cancelled: if it was told to stop.
+    There are at least `wanted` of each hand, if so many are found.
     """
-    told, cancel = progress or _told_nobody, cancel or Cancel()
+    told: Callable[[float], None] = progress or (lambda _share: None)
+    cancel = cancel or Cancel()
     found: list[Bent] = []
     dropped = done = 0
     sides = both[:1] if mirror_closed(kind) else both
@@ -253,3 +231,91 @@ def _apart(a: Complex, b: Complex) -> float:
     """Mean squared distance of two outlines after the best similarity."""
     factor = complex(best_similarity(a, b))
     return float((abs(factor * (a - a.mean()) - (b - b.mean())) ** 2).mean())
+
+
+class PlacedBent(NamedTuple):
+    """A bent silhouette that is a tile, laid over the target by a similarity.
+
+    - `factor`, `shift`: z -> factor z + shift, after which a mirrored one is reflected in the x axis.
+    """
+
+    bent: Bent  # the silhouette, in a frame of its own, mirrored if its hand is
+    factor: complex
+    shift: complex
+
+    def place(self, z: Complex) -> Array:
+        """Points (...) x + iy of the bent silhouette as points (..., 2) of the normal form."""
+        placed = self.factor * z + self.shift
+        return plane_points(np.conj(placed) if self.bent.hand.mirrored else placed)
+
+    @property
+    def outlines(self) -> tuple[Array, Array]:
+        """The outline at rest and bent near its tile, (n, 2) each, counter-clockwise, point by point.
+
+        In the normal form, where the silhouette lies as it is.
+        """
+        hand = self.bent.hand
+        rest = hand.samples.fine * ((1.0, -1.0) if hand.mirrored else (1.0, 1.0))
+        bent = self.place(self.bent.relaxed)
+        return (rest[::-1], bent[::-1]) if hand.mirrored else (rest, bent)
+
+
+def fit_bending(
+    target: Target,
+    kind: IsohedralClass,
+    settings: LikenessSearch,
+    both: Sequence[Hand],
+    *,
+    per_class: int = 1,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Fit:
+    """Fit tiles of one class to a target by letting the silhouette bend (design point 15)."""
+    told = progress or silent
+    enough = 1 if per_class == 1 else 3 * per_class
+    settings = replace(settings, min_neck=least_neck(target.normal, settings.min_neck))
+
+    def report(share: float) -> None:
+        told(0.9 * share, float("nan"))
+
+    with one_blas_thread():  # many small systems
+        found, dropped = bent_tiles(both, kind, settings, report, cancel, wanted=enough)
+    if not found:
+        raise CertificationError("all tiles near the silhouette cross themselves")
+    found = found[: enough + 1]  # one to spare, if one is not certified
+    overlaps = [Overlap(target.normal * (1.0, -1.0 if hand.mirrored else 1.0)) for hand in both]
+    with one_blas_thread():
+        placed = [placed_best(bent, overlaps[bent.hand.mirrored]) for bent in found]
+    starts = Prototiles.joined([prototile(kind, one) for one in placed])
+    candidates = StillTiles(kind, starts)
+    return Fit(candidates, settings.placements, dropped, enough, tuple(placed))
+
+
+def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:
+    """Lay a bent tile over the silhouette that was bent by the similarity of largest IoU.
+
+    From the one that lays the bent points nearest to where they were, by L-BFGS on exact gradients.
+    """
+    rest, points = bent.hand.fine.rest, bent.points
+    center = points.mean()
+    ring = bent.points[: bent.hand.fine.size] - center
+    factor, middle, _ = best_overlay(
+        ring, overlap, complex(best_similarity(points, rest)), rest.mean()
+    )
+    return PlacedBent(bent, factor, complex(middle - factor * center))
+
+
+def prototile(kind: IsohedralClass, placed: PlacedBent) -> Prototiles:
+    """A placed bent tile as a start tile of a flow."""
+    bent, factor, shift = placed
+    n = bent.hand.fine.size
+    order = (np.arange(n) + bent.placement.starts[0]) % n
+    turn = np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])
+    tiles = NearestTiles(
+        (factor * bent.points[:n] + shift)[order][None],
+        (turn @ bent.linear)[None],
+        (turn @ bent.offset + [shift.real, shift.imag])[None],
+        np.cumsum(bent.placement.lengths, axis=1) - bent.placement.lengths,
+        np.zeros(1),
+    )
+    return Prototiles.of(kind, tiles, n, mirrored=bent.hand.mirrored)

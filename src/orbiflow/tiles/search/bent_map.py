@@ -1,4 +1,4 @@
-"""The map from a silhouette to a tile that it was bent to: its mesh, laid onto the tile's polygon."""
+"""Maps from a silhouette to a tile: its mesh laid onto the tile it was bent to, or outlines matched."""
 
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
@@ -8,31 +8,26 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+import scipy.sparse as sparse
 import shapely
 from numpy.typing import NDArray
+from scipy.sparse.linalg import spsolve
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import arc_lengths
+from orbiflow.tiles.geometry import arc_lengths, orient, plane_points, points_along, resampled
 from orbiflow.tiles.search.bending import Bent
-from orbiflow.tiles.silhouette import Bending, Mesh, unfolded
+from orbiflow.tiles.silhouette import Bending, Mesh, triangulate, unfolded
 from orbiflow.tiles.tilings import Tile
 
-SAME = 1e-9
-"""Distance along the outline, in outlines, below which points are one."""
+SAME = 1e-9  # distance along the outline, in outlines, below which points are one
 
 
 def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bending:
     """Return the map that a bent silhouette and its similarity z -> factor z + shift make.
 
-    Args:
-        bent: a silhouette that is a tile.
-        factor, shift: of the similarity, in the frame of the hand that was bent.
-        tile: extracted from it, in the target's normal form: a mirrored hand's is reflected back.
-            It may have fewer vertices than the bent outline: the outline is laid onto it.
-
-    Raises:
-        OrbiflowError: if the silhouette's inside cannot follow without folds.
+    The tile, in the target's normal form, may have fewer vertices than the bent outline, which is
+    laid onto it. It is an `OrbiflowError` if the silhouette's inside cannot follow without folds.
     """
     hand = bent.hand
     flip = np.array([1.0, -1.0]) if hand.mirrored else np.ones(2)
@@ -41,7 +36,7 @@ def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bend
     first = np.cumsum(placement.lengths[0]) - placement.lengths[0]
     mesh, images = onto_polygon(
         hand.fine.mesh,
-        np.stack([z.real, z.imag], axis=-1),
+        plane_points(z),
         tile.polygon * flip,
         (first + placement.starts[0]) % n,
         np.array(tile.corners),
@@ -54,24 +49,12 @@ def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bend
 def onto_polygon(
     mesh: Mesh, images: Array, polygon: Array, corners: Integers, vertices: Integers
 ) -> tuple[Mesh, Array]:
-    """Move the outline's images so that together they are the polygon.
+    """Move the outline's images (of `images` (N, 2)) onto a polygon (Q, 2); return the mesh and images.
 
     Where a vertex of the polygon belongs to none of the outline's points, a point is put on the
-    outline and its triangle divided; points between two vertices are laid onto the side between them,
-    in proportion to where they were.
-
-    Args:
-        mesh: of the silhouette.
-        images: (N, 2) of its points; the outline's lie near the polygon.
-        polygon: (Q, 2), run through as the outline is.
-        corners: (K,) of the outline's points, in order.
-        vertices: (K,) of the polygon's vertices: where the corners go.
-
-    Returns:
-        The mesh, with more points where need be, and their images.
-
-    Raises:
-        OrbiflowError: if the corners do not run round the outline and the polygon once.
+    outline and its triangle divided; points between two vertices are laid onto the side between
+    them, in proportion to where they were. The outline's points `corners` (K,) go to the polygon's
+    `vertices` (K,), both in order round.
     """
     n, outline = mesh.size, mesh.size + len(mesh.sides)
     knots = arc_lengths(np.roll(images[:n], -corners[0], axis=0))
@@ -105,21 +88,16 @@ def _places(ring: Array, polygon: Array, knots: Array, own: Integers, goal: Inte
         edge = shapely.LineString(closed[a : b + 1])
         at = knots[a] + shapely.line_locate_point(edge, shapely.points(loop[p : q + 1]))
         at[0], at[-1] = knots[a], knots[b]
-        at = _on_vertices(at, loop[p : q + 1], closed[a : b + 1], knots[a : b + 1])
+        # vertices that are points of the edge lie exactly there
+        apart = abs(loop[p : q + 1, None] - closed[None, a : b + 1]).max(axis=2)
+        same = apart.min(axis=1) < SAME
+        same[[0, -1]] = False
+        at = np.where(same, knots[a : b + 1][apart.argmin(axis=1)], at)
         if (np.diff(at) <= SAME * knots[-1]).any():
             # where the edge comes back to itself the nearest point may be out of order
             at = np.interp(lengths[p : q + 1], lengths[[p, q]], knots[[a, b]])
         found[p:q] = at[:-1]
     return found
-
-
-def _on_vertices(at: Array, vertices: Array, points: Array, knots: Array) -> Array:
-    """Put those vertices that are points of the edge exactly there."""
-    apart = abs(vertices[:, None] - points[None]).max(axis=2)
-    nearest = apart.argmin(axis=1)
-    same = apart.min(axis=1) < SAME
-    same[[0, -1]] = False
-    return np.where(same, knots[nearest], at)
 
 
 def _snapped(places: Array, known: Array, total: float) -> tuple[Array, NDArray[np.bool_]]:
@@ -162,3 +140,88 @@ def _with_points(mesh: Mesh, at: Array, order: Integers, slots: Integers) -> Mes
         np.concatenate([mesh.shares, at - side]),
         n,
     )
+
+
+TILE, SILHOUETTE = 240, 480  # points along the two outlines that are matched
+STEPS = 12  # most points of the silhouette that one step along the tile passes
+EVENNESS = 2e-3  # cost of a step that is not the usual two points, in areas a point squared
+# Share of the matching that goes evenly round: no part of the silhouette is squeezed to nothing
+PROPORTION = 0.15
+
+
+def matched(silhouette: Array, polygon: Array) -> Bending:
+    """Return a map without folds from a silhouette (N, 2) to a tile (M, 2) over it, in normal form.
+
+    Points of the outlines are matched in order, near ones with near ones (dynamic programming over
+    both outlines, from the two points that are nearest); the inside follows harmonically and
+    is untangled.
+
+    Raises:
+        OrbiflowError: if the inside cannot follow without folds.
+    """
+    rest = orient(silhouette, counter_clockwise=True)
+    ring = orient(polygon, counter_clockwise=True)
+    mesh = triangulate(ring)
+    tile, goal = resampled(ring, TILE), resampled(rest, SILHOUETTE)
+    first, start = np.unravel_index(_apart(tile, goal).argmin(), (TILE, SILHOUETTE))
+    steps = _matching(np.roll(tile, -first, axis=0), np.roll(goal, -start, axis=0))
+    even = np.linspace(0, SILHOUETTE, TILE + 1)
+    places = (1 - PROPORTION) * steps + PROPORTION * even
+    # how far round the polygon each point of the mesh on its outline lies
+    knots = arc_lengths(ring)
+    vertex = np.concatenate([np.arange(mesh.size), mesh.sides + mesh.shares])
+    share: Array = np.interp(vertex, np.arange(len(knots)), knots) / knots[-1]
+    turn = (share * TILE - first) % TILE
+    place = (np.interp(turn, np.arange(TILE + 1), places) + start) % SILHOUETTE
+    lengths = arc_lengths(rest)
+    outline = points_along(rest, place / SILHOUETTE * lengths[-1])
+    points = _harmonic(mesh, outline)
+    try:
+        return Bending(unfolded(mesh, points), mesh.points, mesh.triangles)
+    except OrbiflowError as error:
+        raise OrbiflowError(
+            "the silhouette cannot be carried to this tile without folds: they differ too much"
+        ) from error
+
+
+def _apart(first: Array, second: Array) -> Array:
+    """(N, M) squared distances."""
+    return ((first[:, None] - second[None]) ** 2).sum(axis=2)
+
+
+def _matching(tile: Array, goal: Array) -> Array:
+    """(TILE + 1,) for each point of the tile, from 0 to SILHOUETTE, its point of the silhouette."""
+    cost = _apart(tile, np.concatenate([goal, goal[:1]]))
+    cost = np.concatenate([cost, cost[:1]])
+    pay = EVENNESS * (np.arange(STEPS + 1) - SILHOUETTE / TILE) ** 2
+    best = np.full(SILHOUETTE + 1, np.inf)
+    best[0] = 0.0
+    taken = np.zeros((TILE + 1, SILHOUETTE + 1), dtype=np.int64)
+    for i in range(1, TILE + 1):
+        options = np.full((STEPS + 1, SILHOUETTE + 1), np.inf)
+        for k in range(STEPS + 1):
+            options[k, k:] = best[: SILHOUETTE + 1 - k] + pay[k]
+        taken[i] = options.argmin(axis=0)
+        best = options.min(axis=0) + cost[i]
+    found = np.empty(TILE + 1)
+    place = SILHOUETTE
+    for i in range(TILE, -1, -1):
+        found[i] = place
+        place -= taken[i, place]
+    return found
+
+
+def _harmonic(mesh: Mesh, outline: Array) -> Array:
+    """(N, 2) the mesh's points moved: those inside by the mean of how their neighbours are."""
+    count, fixed = len(mesh.points), len(outline)
+    ends = np.concatenate([mesh.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
+    links = sparse.coo_array((np.ones(len(ends)), ends.T), shape=(count, count)).tocsr()
+    links = links + links.T
+    own, degrees = np.arange(count), np.asarray(links.sum(axis=1)).ravel()
+    degree = sparse.coo_array((degrees, (own, own)), shape=(count, count)).tocsr()
+    laplacian = sparse.csr_array(degree - links)
+    moved = outline - mesh.points[:fixed]
+    inner = spsolve(
+        sparse.csc_array(laplacian[fixed:, fixed:]), -(laplacian[fixed:, :fixed] @ moved)
+    )
+    return mesh.points + np.concatenate([moved, np.asarray(inner).reshape(-1, 2)])

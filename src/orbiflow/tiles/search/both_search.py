@@ -1,7 +1,7 @@
 """The search for both: a short list of tiles that no other beats in deformation and overlap together.
 
-The front of Pareto: a tile is on it if no other has at most its deformation and at least its IoU, and
-one of them better.
+The front of Pareto: a tile is on it if no other has at most its deformation and at least its IoU,
+and one of them better.
 """
 
 from __future__ import annotations
@@ -18,28 +18,20 @@ from orbiflow.runtime import Cancel
 from orbiflow.tiles.geometry import orient
 from orbiflow.tiles.likeness import bent_onto, mutual_iou
 from orbiflow.tiles.search.candidates import Fit
-from orbiflow.tiles.search.co_deformation import Hand, shared_hands
+from orbiflow.tiles.search.co_deformation import Hand, hands
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.method import Goal, SearchMethod
 from orbiflow.tiles.search.overlap_search import OverlapSearch
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass
 
-MOST = 12
-"""Tiles in the list."""
-
-ALIKE = 0.9
-"""Mutual IoU from which two tiles are one to the eye."""
-
-NEAR = 0.15
-"""How far behind the front a tile may be that fills up the list."""
-
-WORTH = 0.2
-"""IoU that is worth as much as all of the deformation, behind the front."""
+MOST = 12  # tiles in the list
+ALIKE = 0.9  # mutual IoU from which two tiles are one to the eye
+NEAR = 0.15  # how far behind the front a tile may be that fills up the list
+WORTH = 0.2  # IoU that is worth as much as all of the deformation, behind the front
 
 
-CANDIDATES = 3
-"""Tiles of each class, of either search, that the list is chosen from at least."""
+CANDIDATES = 3  # tiles of each class, of either search, that the list is chosen from at least
 
 
 @dataclass(frozen=True)
@@ -83,7 +75,7 @@ class BothSearch(SearchMethod):
 
     def finish(self, tiles: Sequence[EscherTile], goal: Goal) -> Sequence[EscherTile]:
         """Return the tiles with their deformation measured."""
-        hand, _ = shared_hands(goal, self.likeness)
+        hand, _ = hands(goal.target, self.likeness, emphasis=goal.emphasis, pins=goal.pins)
         return [measured(tile, hand) for tile in tiles]
 
     def short_list(self, tiles: Sequence[EscherTile]) -> list[EscherTile]:
@@ -92,19 +84,14 @@ class BothSearch(SearchMethod):
 
 
 def front_list(results: Sequence[EscherTile]) -> list[EscherTile]:
-    """At most twelve tiles: those on the front, no two of them alike, then some behind it.
+    """Return at most twelve tiles: those on the front, no two of them alike, then some behind it.
 
     The tile of least deformation and that of largest IoU are chosen first, then the others on the
-    front, from each search in turn in the order of `results`; what has a mutual IoU of 0.9 with an
-    earlier one is left out. While there is room, the first of each search follows, which it would
-    show alone, and tiles that one on the front beats by at most 15% of their deformation and .03 of
-    IoU, nearest first. Tiles without a deformation (forced ones that cross themselves) come last.
-
-    Args:
-        results: with their deformation measured, best first.
-
-    Returns:
-        The list in the order of `results`, with `front` set.
+    front, from each search in turn in the order of `results`, best first; what has a mutual IoU of
+    0.9 with an earlier one is left out. While there is room, the first of each search follows,
+    which it would show alone, and tiles that one on the front beats by at most 15% of their
+    deformation and .03 of IoU, nearest first. Tiles without a deformation (forced ones that cross
+    themselves) come last.
     """
     measured = [k for k, result in enumerate(results) if result.deformation is not None]
     odd = [k for k, result in enumerate(results) if result.deformation is None]
@@ -132,8 +119,7 @@ def front_list(results: Sequence[EscherTile]) -> list[EscherTile]:
 def behind(cost: Array, overlap: Array) -> Array:
     """(n,) how far each point is behind the nearest on the front that beats it; 0 on the front.
 
-    The larger of two shares: that of its cost which the other saves, and that of `WORTH` by which the
-    other's overlap is larger.
+    The larger of the share of its cost which the other saves, and that of `WORTH` in overlap.
 
     >>> behind(np.array([1.0, 1.25, 2.0, 1.3]), np.array([0.7, 0.68, 0.9, 0.68])).round(3)
     array([0.   , 0.2  , 0.   , 0.231])
@@ -149,16 +135,10 @@ def behind(cost: Array, overlap: Array) -> Array:
 
 
 def deformation(hand: Hand, ring: Array) -> float:
-    """What it costs to bend a silhouette until its outline is a ring: as `Elastic.cost`.
+    """Return what it costs to bend a silhouette until its outline is a simple ring (M, 2) over it.
 
     The forgiving energy in areas of the bent silhouette, and its displacement, at the best result
-    of `bent_onto`: outline points correspond by dynamic programming, four times with other weights,
-    and slide along the ring, which may change its size, while the energy falls.
-    So it is an upper bound of the least cost, as the search's own cost of a tile that it found is.
-
-    Args:
-        hand: the silhouette as it is, not mirrored.
-        ring: (M, 2) simple, in the normal form, laid over the silhouette.
+    of `bent_onto`: an upper bound of the least cost, as the search's own cost of a tile is.
     """
     body = hand.fine
     z = bent_onto(body, orient(ring, counter_clockwise=True))

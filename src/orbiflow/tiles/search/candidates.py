@@ -1,28 +1,209 @@
-"""What a search method gives: candidates of one class, not certified yet."""
+"""Candidates of one class: start tiles, what a fit gives, and polygons along a boundary."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
+import shapely
+from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
-from orbiflow.tiles.search.polygons import simplest_tile
-from orbiflow.tiles.search.prototiles import Prototiles
+from orbiflow.errors import CertificationError
+from orbiflow.tiles.geometry import plane_points, subdivided
+from orbiflow.tiles.search.tile_space import NearestTiles
 from orbiflow.tiles.tile_map import TileMap
-from orbiflow.tiles.tilings import IsohedralClass, Tile
+from orbiflow.tiles.tilings import CLASSES, EdgeIdentification, IsohedralClass, Tile
 
 if TYPE_CHECKING:
-    from orbiflow.tiles.search.bending_fit import PlacedBent
+    from orbiflow.tiles.search.bending import PlacedBent
     from orbiflow.tiles.search.model import TileModel
+
+
+@dataclass(frozen=True, eq=False)
+class Prototiles:
+    """S tiles of one class with as many vertices, any of which a flow can start from.
+
+    - `corners`: (S, K) index of the vertex at each of the template's corners, increasing from 0.
+    - `angle`, `log_scale`, `offset`, `stretch`, `mirrored`: the pose, as in `TileModel`; (S,), (S,),
+      (S, 2), (S, stretch_dim) and (S,).
+    """
+
+    vertices: Array  # (S, N, 2), in the group's own frame; those of identified edges correspond
+    corners: NDArray[np.int64]
+    angle: Array
+    log_scale: Array
+    offset: Array
+    stretch: Array
+    mirrored: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.vertices)
+
+    def take(self, indices: Sequence[int]) -> Prototiles:
+        """Those at `indices`."""
+        return Prototiles(*(getattr(self, f.name)[list(indices)] for f in fields(self)))
+
+    @staticmethod
+    def joined(parts: Sequence[Prototiles]) -> Prototiles:
+        """All of `parts` in one; they have as many vertices."""
+        return Prototiles(
+            *(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Prototiles))
+        )
+
+    @classmethod
+    def of(
+        cls, kind: IsohedralClass, tiles: NearestTiles, count: int, *, mirrored: bool
+    ) -> Prototiles:
+        """Turn placed polygons, whose `linear` keeps orientation, into start tiles of `count` vertices.
+
+        `count` is a multiple of the polygons' own number: their sides are divided evenly. Polygons
+        that belong to the target's mirror image in the x axis are placed on the target itself.
+        """
+        placed = plane_points(tiles.vertices)
+        inverse = np.linalg.inv(tiles.linear)
+        own = (placed - tiles.offset[:, None]) @ np.swapaxes(inverse, 1, 2)
+        pieces = count // placed.shape[1]
+        angle, log_scale, stretch = _pose(kind, tiles.linear)
+        return cls(
+            subdivided(own, pieces),
+            tiles.corners * pieces,
+            -angle if mirrored else angle,
+            log_scale,
+            tiles.offset * (1.0, -1.0) if mirrored else tiles.offset,
+            stretch,
+            np.full(len(own), mirrored),
+        )
+
+
+def _pose(kind: IsohedralClass, linear: Array) -> tuple[Array, Array, Array]:
+    """Angle, log of the scale and stretch parameters: linear = scale rotation(angle) stretch."""
+    log_scale = np.log(np.linalg.det(linear)) / 2
+    unit = linear * np.exp(-log_scale)[:, None, None]
+    u, _, v = np.linalg.svd(unit)  # the polar decomposition
+    rotation = u @ v
+    angle = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    symmetric = np.swapaxes(rotation, 1, 2) @ unit
+    values, vectors = np.linalg.eigh(symmetric)
+    logarithm = np.einsum("cij,cj,ckj->cik", vectors, np.log(values), vectors)
+    entries = logarithm[:, 0, :] if kind.stretch_dim == 2 else logarithm[:, 0, : kind.stretch_dim]
+    return angle, log_scale, entries
+
+
+# Least number of samples around the tile from which vertices are chosen; the second if need be
+DENSE = (960, 4320)
+# Largest deviation of the polygon from the sampled curve, in square roots of the tile's area
+TOLERANCES = (5e-4, 1e-4, 2e-5, 0.0)
+
+
+def simplest_tile(
+    kind: IsohedralClass,
+    vertices: Array,
+    corners: Sequence[int],
+    linear: Array,
+    offset: Array,
+    *,
+    moved: Callable[[Array], Array],
+    force: bool = False,
+) -> Tile:
+    """Return the coarsest polygon along a boundary that is simple, with its group.
+
+    It is 5e-4 of the tile's size from the sampled curve, finer where parts of the boundary come
+    close to each other. The prototile's `vertices` (N, 2) and points that `moved` carries lie in
+    the group's own frame, from which `linear` (2, 2) and `offset` (2,) lead. If no sampling gives a
+    simple polygon, the candidate has folded: a `CertificationError`, unless `force` takes the
+    finest.
+    """
+    tile = None
+    for count in DENSE:
+        pieces = 2 * -(-count // (2 * len(vertices)))  # even: centres are sampled
+        edges = _moved_edges(kind, vertices, corners, pieces, moved)
+        placed = [edge @ linear.T + offset for edge in edges]
+        for tolerance in TOLERANCES:
+            chosen = _chosen_samples(kind, placed, tolerance)
+            kept = [edge[:-1][mask[:-1]] for edge, mask in zip(placed, chosen, strict=True)]
+            starts = np.cumsum([0] + [len(edge) for edge in kept[:-1]])
+            polygon = np.concatenate(kept)
+            # not before: a fit that ran away has no group, and says so above
+            group = kind.group().conjugate(linear, offset)
+            tile = Tile(polygon, group, kind.name, tuple(int(start) for start in starts))
+            if shapely.Polygon(polygon).is_valid:
+                return tile
+    if force and tile is not None:
+        return tile
+    raise CertificationError(
+        f"{kind.name}: the boundary crosses itself even with {DENSE[-1]} samples"
+    )
+
+
+def _moved_edges(
+    kind: IsohedralClass,
+    vertices: Array,
+    corners: Sequence[int],
+    pieces: int,
+    moved: Callable[[Array], Array],
+) -> list[Array]:
+    """Return samples along each edge of the tile, both ends included.
+
+    Half of them are moved, the others are their images: what moves them commutes with the group.
+    """
+    before = subdivided(vertices, pieces)
+    closed = np.concatenate([before, before[:1]])
+    first = [*(int(corner) * pieces for corner in corners), len(before)]
+    spans: dict[EdgeIdentification, slice[int, int, None]] = {}
+    for pair in kind.identified_edges:
+        start, end = first[pair.first], first[pair.first + 1]
+        spans[pair] = slice(start, (start + end) // 2 + 1 if pair.folded else end + 1)
+    carried = moved(np.concatenate([closed[span] for span in spans.values()]))
+    ends = np.cumsum([span.stop - span.start for span in spans.values()])
+    edges: dict[int, Array] = {}
+    for pair, own in zip(spans, np.split(carried, ends[:-1]), strict=True):
+        image = pair.isometry(own)
+        if pair.folded:
+            edges[pair.first] = np.concatenate([own, image[-2::-1]])
+        else:
+            edges[pair.first] = own
+            edges[pair.second] = image[::-1] if pair.reversed else image
+    return [edges[i] for i in range(len(edges))]
+
+
+def _chosen_samples(kind: IsohedralClass, closed: list[Array], tolerance: float) -> list[Array]:
+    """For each edge, which of its samples to keep, both ends included: matching on identified edges."""
+    masks: dict[int, Array] = {}
+    for pair in kind.identified_edges:
+        curve = closed[pair.first]
+        if pair.folded:
+            half = _simplified(curve[: len(curve) // 2 + 1], tolerance)
+            masks[pair.first] = np.concatenate([half, half[-2::-1]])
+            continue
+        mask = _simplified(curve, tolerance)
+        masks[pair.first] = mask
+        masks[pair.second] = mask[::-1] if pair.reversed else mask
+    return [masks[i] for i in range(len(closed))]
+
+
+def _simplified(curve: Array, tolerance: float) -> Array:
+    """Douglas-Peucker: which points of the curve (M, 2) to keep, the ends always."""
+    if tolerance == 0.0:
+        return np.ones(len(curve), dtype=bool)
+    kept = shapely.get_coordinates(
+        shapely.simplify(shapely.LineString(curve), tolerance, preserve_topology=False)
+    )
+    mask = np.zeros(len(curve), dtype=bool)
+    position = 0
+    for point in kept:  # vertices are kept bit for bit and in order
+        position += int(np.flatnonzero((curve[position:] == point).all(axis=1))[0])
+        mask[position] = True
+    return mask
+
 
 Progress = Callable[[float, float], None]
 """Called with the share of the work done and the best loss so far."""
 
+# Names under which the arrays of a map hold the start tile, if it is not the template
 VERTICES, CORNERS = "prototile.outline", "prototile.corners"
-"""Names under which the arrays of a map hold the start tile, if it is not the template."""
 
 
 def silent(_share: float, _loss: float) -> None:
@@ -38,11 +219,7 @@ class Candidates(Protocol):
         ...
 
     def finished(self, index: int, *, force: bool = False) -> tuple[Tile, TileMap]:
-        """Return the polygon of a candidate with its group, and the flow that made it.
-
-        Raises:
-            CertificationError: if it has no simple polygon and `force` is not set.
-        """
+        """Return a candidate's polygon with its group, and its flow; it is simple unless forced."""
         ...
 
     def as_model(self) -> TileModel:
@@ -72,21 +249,9 @@ class Fit(NamedTuple):
         return self.candidates.as_model()
 
 
-WAVES = {
-    "IH1": 18,
-    "IH2": 9,
-    "IH3": 9,
-    "IH4": 8,
-    "IH5": 4,
-    "IH6": 4,
-    "IH7": 8,
-    "IH21": 4,
-    "IH28": 4,
-}
-"""By class, the number of parameters of a symmetric field of frequency 1."""
-
-STEPS = 8
-"""Integration steps with which a flow's polygon is first computed."""
+# By class, the number of parameters of a symmetric field of frequency 1
+WAVES = dict(zip(CLASSES, (18, 9, 9, 8, 4, 4, 8, 4, 4), strict=True))
+STEPS = 8  # integration steps with which a flow's polygon is first computed
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +276,11 @@ class StillTiles:
             steps *= 2
             return points
 
-        linear = self._linear(own)
+        c, s = np.cos(own.angle[0]), np.sin(own.angle[0])
+        sign = -1.0 if own.mirrored[0] else 1.0
+        turn = np.exp(own.log_scale[0]) * np.array([[c, -s * sign], [s, c * sign]])
+        # einsum rounds each product, as torch does for a flow's tile; matmul does not
+        linear = np.einsum("ij,jk->ik", turn, self.kind.stretch(own.stretch[0]))
         tile = simplest_tile(
             self.kind, vertices, corners.tolist(), linear, offset, moved=moved, force=force
         )
@@ -136,24 +305,9 @@ class StillTiles:
         }
         return tile, TileMap(settings, {name: np.array(a) for name, a in arrays.items()})
 
-    def _linear(self, own: Prototiles) -> Array:
-        """Return the linear part (2, 2) of the placement of a single candidate."""
-        c, s = np.cos(own.angle[0]), np.sin(own.angle[0])
-        sign = -1.0 if own.mirrored[0] else 1.0
-        turn = np.array([[c, -s * sign], [s, c * sign]])
-        stretch = self.kind.stretch(own.stretch[0])
-        # einsum rounds each product, as torch does for a flow's tile; matmul does not
-        return np.einsum("ij,jk->ik", np.exp(own.log_scale[0]) * turn, stretch)
-
     def as_model(self) -> TileModel:
         """Return the candidates as a torch module, with a field of frequency 1 that is zero."""
         from orbiflow.tiles.search.model import TileModel
 
-        return TileModel(
-            self.kind,
-            max_frequency=1,
-            segments=1,
-            smoothness=0.0,
-            steps=1,
-            prototiles=self.prototiles,
-        )
+        own = self.prototiles
+        return TileModel(self.kind, max_frequency=1, smoothness=0.0, steps=1, prototiles=own)

@@ -9,18 +9,18 @@ from functools import lru_cache
 import shapely
 
 from orbiflow.arguments import instance
+from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import one_thread
 from orbiflow.tiles.likeness import Pinned, Recogniser, compare, iou, least_neck, narrowest_neck
-from orbiflow.tiles.search.bending_fit import PlacedBent
+from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
 from orbiflow.tiles.search.candidates import Candidates, Fit
-from orbiflow.tiles.silhouette import Bending, Target
+from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tilings import Tile
 
+# How a target is made, for messages
 HOW = "Target.read, Target.from_mask and Target.from_polygon make one"
-"""How a target is made, for messages."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +36,7 @@ def best_tiles(
 ) -> list[EscherTile]:
     """Turn finalists into polygons and certify them, best first, until there are enough.
 
-    Returns:
-        Certified tiles, best score first.
-
-    Raises:
-        CertificationError: if no finalist is certified and `force` is not set.
+    Returns certified tiles, best score first; none, unless forced, is a `CertificationError`.
     """
     found: list[EscherTile] = []
     reasons: list[str] = []
@@ -66,9 +62,7 @@ def best_tiles(
 def _result(target: Target, fit: Fit, index: int, seconds: float, *, force: bool) -> EscherTile:
     tile, flow = fit.candidates.finished(index, force=force)
     placed = tile.transformed(target.frame.linear, target.frame.offset)
-    # a forced tile may cross itself: measure the region that it covers
-    shape = shapely.Polygon(placed.polygon)
-    region = shape if shape.is_valid else shapely.make_valid(shape).buffer(0)
+    region, simple = _region(placed.polygon)
     return EscherTile(
         placed,
         y_down=target.y_down,
@@ -79,32 +73,30 @@ def _result(target: Target, fit: Fit, index: int, seconds: float, *, force: bool
         recognisability=recogniser(target)(region),
         starts=fit.starts,
         seconds=seconds,
-        thinnest=narrowest_neck(placed.polygon) if shape.is_valid else None,
+        thinnest=narrowest_neck(placed.polygon) if simple else None,
     )
 
 
-def _bending(placed: PlacedBent, tile: Tile) -> Bending | None:
-    with contextlib.suppress(OrbiflowError):  # hairs that no triangulation follows
-        return map_of_bent(*placed, tile)
-    return None
+def _region(ring: Array) -> tuple[shapely.Polygon, bool]:
+    """Return the region that a ring covers, and whether it is simple: a forced one may not be."""
+    shape = shapely.Polygon(ring)
+    return (shape, True) if shape.is_valid else (shapely.make_valid(shape).buffer(0), False)
 
 
 def _with_bent(target: Target, result: EscherTile, placed: PlacedBent) -> EscherTile:
     rest, outline = (target.frame.to_input(ring) for ring in placed.outlines)
-    region = shapely.Polygon(outline)
-    whole = region if region.is_valid else shapely.make_valid(region).buffer(0)
-    tile = shapely.Polygon(result.tile.polygon)
-    body = placed.bent.hand.fine
-    outline_points = placed.bent.points[: body.size]
-    maps, bending = result.map, _bending(placed, result.normal_tile)
+    tile, simple = _region(result.tile.polygon)
+    body, maps, bending = placed.bent.hand.fine, result.map, None
+    with contextlib.suppress(OrbiflowError):  # hairs that no triangulation follows
+        bending = map_of_bent(*placed, result.normal_tile)
     return result.changed(
         objective="likeness",
         rest=rest,
         bent=outline,
-        bent_iou=iou(whole, tile) if tile.is_valid else None,
+        bent_iou=iou(_region(outline)[0], tile) if simple else None,
         deformation=placed.bent.fidelity.cost,
         fidelity=placed.bent.fidelity,
-        pinned=body.misfit(outline_points) if isinstance(body, Pinned) else None,
+        pinned=body.misfit(placed.bent.points[: body.size]) if isinstance(body, Pinned) else None,
         map_source=None if maps is None else replace(maps, bending=bending),
     )
 
@@ -118,14 +110,13 @@ def recogniser(target: Target) -> Recogniser:
 def certified_tiles(
     target: Target, found: Fit | Candidates, *, force: bool = False, min_neck: float = 0.0
 ) -> list[EscherTile]:
-    """Polygons of what was fitted, each proved to tile the plane, best first.
+    """Return polygons of what was fitted to a target, each proved to tile the plane, best first.
 
     Args:
-        target: that it was fitted to.
-        found: of `fit_tile`, `fit_descent` or `fit_bending`; the candidates of `fit_occupancy`, or any
-            others, trained further or loaded.
-        force: give tiles that are not certified, too; their certificates say why.
-        min_neck: narrowest neck that a tile's score forgives, a share of its size.
+        target: The silhouette.
+        found: What `fit_tile` gave, or candidates, such as a `TileModel` trained further or loaded.
+        force: Give tiles that are not certified, too; their certificates say why.
+        min_neck: The narrowest neck that a tile's score forgives, a share of its size.
 
     Raises:
         OrbiflowError: for what holds no candidates.

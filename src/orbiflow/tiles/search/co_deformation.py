@@ -1,49 +1,50 @@
 """Co-deformation: a silhouette bends, as rigidly as it can, until it is a tile (design point 15).
 
-Hundreds of placements side by side. First springs draw each outline to the nearest tile of its class,
-which is taken anew after every step, and tighten; one factorization serves all placements and all
-classes. Then each outline is held in the linear space of its placement's tiles and the energy is
-minimised there: rotations in turn with one small linear system.
+Hundreds of placements side by side. First springs draw each outline to the nearest tile of its
+class, which is taken anew after every step, and tighten; one factorization serves all placements
+and all classes. Then each outline is held in the linear space of its placement's tiles and the
+energy is minimised there: rotations in turn with one small linear system.
+
+A search with few points knows a tile's corners to within a sixtieth of the outline. So each
+placement then moves to the best of its neighbours until none is better: the lengths of two pairs of
+edges change by a step, or all corners move along. Of the neighbours, those whose nearest tile is
+near the present outline are worked out, by springs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
+import shapely
+from numpy.typing import NDArray
 
-from orbiflow.arrays import Array, Complex
+from orbiflow.arrays import Array, Complex, Integers
+from orbiflow.runtime import Cancel
+from orbiflow.tiles.geometry import plane_points, signed_area
 from orbiflow.tiles.likeness import Elastic, Pinned, Stiffness
 from orbiflow.tiles.search.likeness_search import LikenessSearch
-from orbiflow.tiles.search.method import Goal
 from orbiflow.tiles.search.placements import Placements
 from orbiflow.tiles.search.tile_space import TileSpace
 from orbiflow.tiles.silhouette import Emphasis, Pins, Samples, Target, sampled, triangulate
 from orbiflow.tiles.tilings import IsohedralClass
 
-TIGHTER = tuple(np.geomspace(1.2, 3000.0, 9))
-"""Strengths of the springs, stage by stage."""
-
-ROUNDS = 3
-"""Steps of each stage."""
+TIGHTER = tuple(np.geomspace(1.2, 3000.0, 9))  # strengths of the springs, stage by stage
+ROUNDS = 3  # steps of choosing rotations and solving: in each stage, and of each neighbour
 
 
 class BentTiles(NamedTuple):
-    """C bent silhouettes that are tiles.
+    """C bent silhouettes that are tiles."""
 
-    - `points`: (N, C) of the body; the first n rows are the tile's vertices.
-    - `linear`, `offset`: (C, 2, 2) and (C, 2), the map from the group's own frame.
-    - `placements`: C of them, with the glide axes' final turns.
-    """
-
-    points: Complex
-    linear: Array
+    points: Complex  # (N, C) of the body; the first n rows are the tile's vertices
+    linear: Array  # with `offset`: (C, 2, 2) and (C, 2), the map from the group's own frame
     offset: Array
-    placements: Placements
+    placements: Placements  # C of them, with the glide axes' final turns
 
 
 def drawn_to_tiles(
@@ -54,17 +55,9 @@ def drawn_to_tiles(
     strengths: tuple[float, ...] = TIGHTER,
     rounds: int = ROUNDS,
 ) -> tuple[Complex, TileSpace]:
-    """Bend a body towards tiles of a class by springs that tighten.
+    """Bend a body towards tiles of C placements of a class by springs that tighten.
 
-    Args:
-        body: whose outline has as many points as the placements have steps.
-        kind: the class.
-        placements: C of them.
-        strengths: of the springs, stage by stage.
-        rounds: steps of each stage.
-
-    Returns:
-        Shapes (N, C), nearly tiles, and the space of tiles with the glide axes turned to suit them.
+    Returns shapes (N, C), nearly tiles, and the space of tiles, its glide axes turned to suit them.
     """
     space = TileSpace(kind, placements)
     z = np.repeat(body.rest[:, None], space.count, axis=1)
@@ -77,14 +70,7 @@ def drawn_to_tiles(
 
 
 def held_on_tiles(body: Elastic, space: TileSpace, z: Complex, rounds: int) -> BentTiles:
-    """Minimise the energy among tiles: the outline moves in the space of its placement's tiles.
-
-    Args:
-        body: the silhouette.
-        space: of tiles, C placements.
-        z: shapes (N, C) to start from.
-        rounds: of choosing rotations and solving.
-    """
+    """Minimise the energy among tiles from shapes (N, C): outlines move in their placements' spaces."""
     condensed = body.condensed
     low = condensed.low
     parts = [_Reduced(condensed.outline, low, *space.matrices(k)) for k in range(space.count)]
@@ -131,8 +117,8 @@ Tiles bent so cost more by the usual stiffness than the least, and are seen to b
 silhouette: docs/likeness.md has the comparison.
 """
 
+# Of the search where too few tiles of a firm body are simple: many long limbs, which cross
 SOFT = Stiffness(salience=0.0)
-"""Of the search where too few tiles of a firm body are simple: many long limbs, which cross."""
 
 
 class Bodies(NamedTuple):
@@ -147,13 +133,11 @@ class Bodies(NamedTuple):
 class Hand:
     """A silhouette or its mirror image.
 
-    - `mirrored`: whether the latter.
-    - `samples`: points of its outline, coarse to fine.
     - `made`: the elastic body of a level of points, "coarse", "middle" or "fine", and a stiffness.
     """
 
-    mirrored: bool
-    samples: Samples
+    mirrored: bool  # whether the latter
+    samples: Samples  # points of its outline, coarse to fine
     made: Callable[[str, Stiffness], Elastic]
     _bodies: dict[Stiffness, Bodies] = field(default_factory=dict[Stiffness, Bodies])
 
@@ -173,6 +157,7 @@ class Hand:
         return found
 
 
+@lru_cache(maxsize=2)  # one serves all classes
 def hands(
     target: Target,
     settings: LikenessSearch,
@@ -180,17 +165,7 @@ def hands(
     emphasis: Emphasis | None = None,
     pins: Pins | None = None,
 ) -> tuple[Hand, Hand]:
-    """The silhouette and its mirror image in the x axis, ready to be bent.
-
-    Args:
-        target: the silhouette.
-        settings: of the search.
-        emphasis: what is to bend less, by as much as it matters more.
-        pins: what is not to bend.
-
-    Raises:
-        OrbiflowError: for a silhouette that cannot be sampled or triangulated.
-    """
+    """The silhouette and its mirror image in the x axis, ready to be bent."""
     phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
     samples = sampled(np.asarray(target.normal), phase, settings.multiples)
     # read backwards from the same first point: every k-th fine point stays beside a coarse one
@@ -214,18 +189,151 @@ def hands(
     return hand(samples, False), hand(mirror, True)
 
 
-def shared_hands(goal: Goal, search: LikenessSearch) -> tuple[Hand, Hand]:
-    """Return the target's hands, made once for all classes."""
-    return _hands(goal.target, search.seed, search.multiples, goal.emphasis, goal.pins)
+# Strength of the springs by which neighbours are compared: nearly tiles, yet one matrix for all
+SPRINGS = 1500.0
+CROSSED = 100.0  # added to the cost of what crosses itself: more than anything sound costs
+BETTER = 0.998  # a neighbour is taken if it costs less than this much of what there is
+MOST_MOVES = 8  # of each placement with each step
 
 
-@lru_cache(maxsize=2)
-def _hands(
-    target: Target,
-    seed: int,
-    multiples: tuple[int, ...],
-    emphasis: Emphasis | None,
-    pins: Pins | None,
-) -> tuple[Hand, Hand]:
-    settings = LikenessSearch(seed=seed, multiples=multiples)
-    return hands(target, settings, emphasis=emphasis, pins=pins)
+class Drawn(NamedTuple):
+    """C shapes drawn to tiles of their placements by springs.
+
+    - `costs`: (C,) energy, springs and displacement together; `CROSSED` more of what crosses itself.
+    """
+
+    placements: Placements  # C of them
+    points: Complex  # (N, C)
+    costs: Array
+
+    def take(self, index: Integers) -> Drawn:
+        """Those at `index`."""
+        return Drawn(self.placements.take(index), self.points[:, index], self.costs[index])
+
+
+class Stage(NamedTuple):
+    """One stage of moving corners."""
+
+    step: int  # points of the outline by which corners move
+    keep: int  # placements that go on, the best and no two the same
+
+
+def shifted(
+    body: Elastic,
+    kind: IsohedralClass,
+    placements: Placements,
+    points: Complex,
+    stages: Sequence[Stage],
+    *,
+    share: float,
+    cancel: Cancel | None = None,
+) -> Drawn:
+    """Move the corners of each placement of shapes (N, C) until no neighbour is better.
+
+    Of all neighbours the `share` with the nearest tiles is worked out. Returns the placements that
+    are left, best first, no two the same.
+    """
+    cancel = cancel or Cancel()
+    drawn = _drawn(body, kind, placements, points)
+    for stage in stages:
+        drawn = _distinct(drawn, stage.keep)
+        live = np.arange(len(drawn.costs))
+        for _ in range(MOST_MOVES):
+            cancel.check()
+            owners, options = _neighbours(body, kind, drawn, live, stage.step, share)
+            if not len(owners):
+                break
+            tried = _drawn(body, kind, options, drawn.points[:, owners])
+            live = _take_better(drawn, owners, tried)
+    return _distinct(drawn, len(drawn.costs))
+
+
+def _drawn(body: Elastic, kind: IsohedralClass, placements: Placements, points: Complex) -> Drawn:
+    space, n = TileSpace(kind, placements), body.size
+    if space.glides:
+        space.turn(space.best_turns(points[:n].T))
+
+    def tiles() -> Complex:
+        return space.in_order(space.nearest(points[:n].T).vertices).T
+
+    for _ in range(ROUNDS):
+        points = body.pulled(points, tiles(), SPRINGS, 1)
+    apart = (abs(points[:n] - tiles()) ** 2).mean(axis=0)
+    rings = plane_points(points[:n].T)
+    area = np.maximum(signed_area(rings), 0.1)
+    costs = (body.lenient_energy(points) + SPRINGS * apart) / area
+    costs += body.stiffness.pose * body.displacement(points)
+    costs[~shapely.is_valid(shapely.polygons(rings))] += CROSSED
+    return Drawn(placements._replace(turns=space.turns), points, costs)
+
+
+def _distinct(drawn: Drawn, count: int) -> Drawn:
+    """The best `count` at most, best first, no placement twice."""
+    seen: set[tuple[int, ...]] = set()
+    kept: list[int] = []
+    for k in np.argsort(drawn.costs, kind="stable"):
+        corners = (int(drawn.placements.starts[k]), *drawn.placements.lengths[k].tolist())
+        if corners not in seen:
+            seen.add(corners)
+            kept.append(int(k))
+    return drawn.take(np.array(kept[:count], dtype=np.int64))
+
+
+def _neighbours(
+    body: Elastic, kind: IsohedralClass, drawn: Drawn, live: Integers, step: int, share: float
+) -> tuple[Integers, Placements]:
+    """Whose neighbours (M,), and these, of those at `live`: the share whose tiles are nearest."""
+    longer, later = _moves(kind, step)
+    own = drawn.placements
+    owners = np.repeat(live, len(later))
+    lengths = (own.lengths[live][:, None] + longer).reshape(len(owners), longer.shape[1])
+    starts = (own.starts[live][:, None] + later).ravel() % body.size
+    fits = (lengths >= 2).all(axis=1)
+    owners, lengths, starts = owners[fits], lengths[fits], starts[fits]
+    options = Placements(lengths, starts, own.turns[owners], own.gains[owners])
+    if share >= 1 or not len(owners):
+        return owners, options
+    apart = TileSpace(kind, options).nearest(drawn.points[: body.size, owners].T).distance
+    order = np.lexsort((apart, owners))
+    rank = np.arange(len(order)) - np.searchsorted(owners[order], owners[order])
+    count = np.bincount(owners, minlength=len(drawn.costs))[owners[order]]
+    near = np.sort(order[rank < np.maximum(4, share * count)])
+    return owners[near], options.take(near)
+
+
+def _take_better(drawn: Drawn, owners: Integers, tried: Drawn) -> Integers:
+    """Let each take the best that it has tried, in place; who has moved."""
+    moved: list[int] = []
+    for k in np.unique(owners):
+        mine = np.flatnonzero(owners == k)
+        best = mine[np.argmin(tried.costs[mine])]
+        if tried.costs[best] < BETTER * drawn.costs[k]:
+            for old, new in zip(drawn.placements, tried.placements, strict=True):
+                old[k] = new[best]
+            drawn.points[:, k], drawn.costs[k] = tried.points[:, best], tried.costs[best]
+            moved.append(int(k))
+    return np.array(moved, dtype=np.int64)
+
+
+@lru_cache(maxsize=64)
+def _moves(kind: IsohedralClass, step: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Neighbours of a placement: what is added to lengths (M, K) and starts (M,).
+
+    One pair of edges becomes longer and another shorter, with the first corner where it is, or
+    moved so that one of the other corners stays; or all corners move.
+    """
+    pairs = kind.identified_edges
+    still = np.zeros(len(kind.template()), dtype=np.int64)
+    lengths, starts = [still, still], [step, -step]
+    for one, other in permutations(pairs, 2):
+        change = still.copy()
+        same = one.folded == other.folded
+        for pair, sign, mate in ((one, 1, other), (other, -1, one)):
+            amount = sign * step * (1 if same or mate.folded else 2)
+            change[list({pair.first, pair.second})] += amount
+        corners = np.cumsum(change) - change
+        low, high = int(corners.min()), int(corners.max())
+        for start in sorted({0, -low, -high, -(low + high) // 2}):
+            lengths.append(change)
+            starts.append(start)
+    return np.array(lengths), np.array(starts)

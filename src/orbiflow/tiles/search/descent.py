@@ -1,31 +1,40 @@
-"""Sobolev descent on the group of symmetric diffeomorphisms (design point 10).
+"""The search for overlap in one class: Sobolev descent on the group of symmetric diffeomorphisms.
 
 A tile's area is fixed by its group, so its overlap with the target is a boundary integral: its
 derivative in the boundary is (occupancy - 1/2) n ds. Each step projects that force on the invariant
 Fourier fields, damps it by (1 + |kappa|^2)^-s, adds momentum, and follows the field for a time in
-which no boundary point moves far and the map stays injective. The fields are kept: one segment each of
-the flow that is the result. No backpropagation through an equation, all starts side by side.
+which no boundary point moves far and the map stays injective. The fields are kept: one segment each
+of the flow that is the result. No backpropagation through an equation, all starts side by side. The
+last percent is L-BFGS on the exact IoU of the polygon, through one more segment (design point 10).
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
+from functools import lru_cache
 
+import numpy as np
+import scipy.optimize
+import shapely
 import torch
 from torch import Tensor
 
+from orbiflow.arguments import instance
 from orbiflow.arrays import Array
 from orbiflow.fields import FourierField, group_factor, steepness
-from orbiflow.flows import METHODS
+from orbiflow.flows import METHODS, Flow
+from orbiflow.runtime import Cancel, one_thread
+from orbiflow.tiles.likeness import Overlap, Recogniser, boundary_iou, prepared_region, rank_score
+from orbiflow.tiles.search.candidates import Fit, Progress, Prototiles, silent
 from orbiflow.tiles.search.model import TileModel
 from orbiflow.tiles.search.overlap_search import OverlapSearch
-from orbiflow.tiles.search.prototiles import Prototiles
-from orbiflow.tiles.silhouette import SoftTarget
-from orbiflow.tiles.tilings import IsohedralClass
+from orbiflow.tiles.search.starts import Starts, outline_starts, template_starts
+from orbiflow.tiles.silhouette import Emphasis, SoftTarget, Target
+from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 from orbiflow.typed_torch import linalg
 
-CALM = 0.4
-"""Step length times the field's steepness, at most; less where `calm` finds it too bold."""
+CALM = 0.4  # step length times the field's steepness, at most; less where `calm` finds it too bold
 
 
 def calm(field: FourierField) -> float:
@@ -36,13 +45,7 @@ def calm(field: FourierField) -> float:
 
 
 class Descent:
-    """Candidates on their way: boundary points in the group's frame, poses, momentum, the record.
-
-    Args:
-        kind: the class.
-        prototiles: the starts, of `settings.boundary` vertices each.
-        settings: of the descent.
-    """
+    """Candidates on their way: boundary points in the group's frame, poses, momentum, the record."""
 
     def __init__(
         self, kind: IsohedralClass, prototiles: Prototiles, settings: OverlapSearch
@@ -64,7 +67,7 @@ class Descent:
         self.points = self.model.prototile()[0]
         self.momentum = torch.zeros_like(self.field.parameters_)
         self.pose_momentum = {name: torch.zeros_like(p) for name, p in self._pose().items()}
-        self.threshold = torch.full((self.size,), 0.45)
+        self.threshold = torch.full((self.model.size,), 0.45)
 
     def _set_up(self, model: TileModel) -> None:
         self.model = model
@@ -77,15 +80,10 @@ class Descent:
         every = dict(self.model.named_parameters())
         return {name: every[name] for name in names if every[name].numel()}
 
-    @property
-    def size(self) -> int:
-        """Number of candidates."""
-        return self.model.size
-
     def step(self, soft: SoftTarget) -> None:
         """One step of all candidates: another segment of their flows."""
         share = self.done / max(1, self.settings.iterations - 1)
-        reach, blur = (_between(ends, share) for ends in (self.settings.reach, self.settings.blur))
+        reach, blur = (between(ends, share) for ends in (self.settings.reach, self.settings.blur))
         first, last = self.settings.smoothness
         damping = (1 + self.magnitude**2) ** -(first + share * (last - first))
         pose = self._pose()
@@ -141,12 +139,7 @@ class Descent:
 
     @torch.no_grad()
     def keep(self, chosen: Sequence[int], iou: Array) -> None:
-        """Go on with the candidates `chosen` alone.
-
-        Args:
-            chosen: their indices.
-            iou: (S,) of all candidates as they are; below 0 if unknown.
-        """
+        """Go on with the candidates `chosen` alone; `iou` (S,) is that of all, below 0 if unknown."""
         index = list(chosen)
         known = torch.tensor(iou, dtype=torch.float32).clamp(0.5, 1.0)
         self.threshold = (known / (1 + known))[index]
@@ -160,5 +153,267 @@ class Descent:
         return self.model.with_fields(self.record)
 
 
-def _between(ends: tuple[float, float], share: float) -> float:
+def between(ends: tuple[float, float], share: float) -> float:
+    """Return the geometric interpolation between two ends."""
     return ends[0] * (ends[1] / ends[0]) ** share
+
+
+SMOOTHNESS = 1.25  # exponent s of the preconditioning (1 + |kappa|^2)^-s
+STEPS = 2  # midpoint steps through the new segment; each stays injective
+STALL = 2e-5  # polishing stops when ten iterations together gain less IoU than this
+
+
+def polish(
+    model: TileModel, target: Target, iterations: int, *, cancel: Cancel | None = None
+) -> TileModel:
+    """Improve a single candidate: a last stationary segment and its pose, by exact gradients.
+
+    Returns a float64 model with one segment more, or as many if nothing was gained. Its sampled
+    boundary is simple and its IoU no smaller.
+    """
+    cancel = cancel or Cancel()
+    work = _Polish(model, target)
+    if work.best_iou == 0.0:  # crosses itself already
+        return model
+
+    def loss(x: Array) -> tuple[float, Array]:
+        cancel.check()
+        return work.loss(x)
+
+    with contextlib.suppress(StopIteration):  # older SciPy lets it through
+        scipy.optimize.minimize(
+            loss,
+            np.zeros(work.size),
+            jac=True,
+            method="L-BFGS-B",
+            callback=work.stalled,
+            options={"maxiter": iterations, "maxls": 12, "ftol": 0.0, "gtol": 1e-9},
+        )
+    return work.result()
+
+
+class _Polish:
+    """The objective, and the best iterate that is simple and not too steep."""
+
+    def __init__(self, model: TileModel, target: Target) -> None:
+        self.model = model.take([0]).double()
+        self.field = FourierField(
+            model.group, model.max_frequency, batch=1, smoothness=0.0, dtype=torch.float64
+        )
+        self.flow = Flow([self.field], steps=STEPS, method="midpoint", warn=False)
+        magnitude = torch.tensor(self.field.basis.magnitude, dtype=torch.float64)
+        self.scale = (1 + magnitude**2) ** (-SMOOTHNESS / 2)
+        self.magnitude, self.limit = magnitude, calm(self.field) * STEPS
+        pose = (self.model.angle, self.model.log_scale, self.model.offset, self.model.stretch)
+        self.pose = [parameter for parameter in pose if parameter.numel()]
+        self.start = [p.detach().clone() for p in self.pose]
+        with torch.no_grad():
+            self.points = self.model.flow(self.model.prototile()[0])
+        self.overlap = Overlap(target.normal)
+        self.size = self.field.size + sum(p.numel() for p in self.pose)
+        self.best = np.zeros(self.size)
+        self.best_iou = 0.0
+        self.gradient = np.zeros(self.size)
+        self.loss(self.best)
+        self.first_iou = self.best_iou
+        self.history: list[float] = []
+
+    def loss(self, x: Array) -> tuple[float, Array]:
+        """1 - IoU and its gradient in all parameters."""
+        values = torch.tensor(x, dtype=torch.float64)
+        parameters = self._set(values)
+        placed = self.model.place(self.flow(self.points))
+        ring = placed.detach()[0].numpy()
+        calm = steepness(self.field.parameters_.detach(), self.magnitude) <= self.limit
+        if not (calm and shapely.Polygon(ring).is_valid):
+            return 1.0, self.gradient  # a barrier: the line search turns back
+        value, gradient = self.overlap.iou(ring)
+        if value > self.best_iou:
+            self.best, self.best_iou = np.array(x), value
+        work = (placed * torch.tensor(gradient)[None]).sum()
+        parts = torch.autograd.grad(work, parameters)
+        flat = torch.cat([(parts[0] * self.scale).flatten(), *(p.flatten() for p in parts[1:])])
+        self.gradient = -flat.numpy()
+        return 1 - value, self.gradient
+
+    def stalled(self, xk: Array) -> None:  # noqa: ARG002 - SciPy's name
+        """Stops the iteration when the last ten brought nothing."""
+        self.history.append(self.best_iou)
+        if len(self.history) > 10 and self.history[-1] - self.history[-11] < STALL:
+            raise StopIteration
+
+    def result(self) -> TileModel:
+        """The model at the best iterate."""
+        if self.best_iou <= self.first_iou:
+            self._set(torch.zeros(self.size, dtype=torch.float64))
+            return self.model
+        self._set(torch.tensor(self.best))
+        old = [field.parameters_.detach() for field in self.model.fourier_fields()]
+        # the model's own fields may scale their parameters
+        scale = self.model.fourier_fields()[0].scale
+        return self.model.with_fields([*old, self.field.parameters_.detach() / scale])
+
+    def _set(self, values: Tensor) -> list[Tensor]:
+        with torch.no_grad():
+            self.field.parameters_.copy_(values[: self.field.size] * self.scale)
+            at = self.field.size
+            for parameter, start in zip(self.pose, self.start, strict=True):
+                step = values[at : at + parameter.numel()].reshape(parameter.shape)
+                parameter.copy_(start + step)
+                at += parameter.numel()
+        return [self.field.parameters_, *self.pose]
+
+
+# Starts from the outline, and IoU of the best of them, below which the template's join them
+FEW, POOR = 8, 0.4
+NEAR = 0.01  # IoU that a more recognisable candidate of a class may be behind the best
+
+
+def fit_descent(
+    target: Target,
+    kind: IsohedralClass | str,
+    settings: OverlapSearch | None = None,
+    *,
+    soft: SoftTarget | None = None,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Fit:
+    """Fit tiles of one class to a target by Sobolev descent, all starts side by side.
+
+    `soft` is the target's soft edge, if it is at hand already; `progress` is told 1 - IoU as the
+    loss.
+    """
+    kind = isohedral_class(kind)
+    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    settings = instance(settings or OverlapSearch(), OverlapSearch, "settings")
+    outline = shapely.Polygon(target.normal).exterior
+    settings = settings.for_outline(outline.length)
+    soft = soft or SoftTarget(target)
+    report = progress or silent
+    cancel = cancel or Cancel()
+    starts = _starts(target, kind, settings, cancel)
+    prototiles = starts.prototiles
+    report(0.1, float("nan"))
+    descent = Descent(kind, prototiles, settings)
+    goal = prepared_region(target.normal)
+    crossed = 0
+    best = 0.0
+    for steps, survivors in settings.stages:
+        for k in range(steps):
+            cancel.check()
+            descent.step(soft)
+            if k % 8 == 7:
+                report(0.1 + 0.8 * descent.done / settings.iterations, 1 - best)
+        iou = _overlaps(goal, soft, descent)
+        crossed += int((iou < 0).sum())
+        ranking = np.argsort(-iou, kind="stable")
+        simple = ranking[: max(1, int((iou >= 0).sum()))]
+        descent.keep(simple[:survivors].tolist(), iou)
+        best = float(iou.max())
+    first = _best_first(target, goal, soft, descent)
+    model = descent.flow_model()
+    if soft.weights is None and starts.iou.max() > first:
+        model = _with_start(model, prototiles.take([int(starts.iou.argmax())]))
+    if settings.polish and soft.weights is None:  # the exact overlap knows no emphasis
+        report(0.92, 1 - best)
+        model = _polished(target, model, settings, cancel)
+    return Fit(model, len(prototiles), crossed, 1)
+
+
+@lru_cache(maxsize=2)  # targets hash by identity; one serves all classes
+def shared_soft_target(target: Target, emphasis: Emphasis | None) -> SoftTarget:
+    """Return the target with a soft edge, made once for all classes."""
+    with one_thread():
+        return SoftTarget(target, emphasis=emphasis)
+
+
+def _with_start(model: TileModel, prototile: Prototiles) -> TileModel:
+    """The candidates after a start that none of them beats, with a flow that stays where it is."""
+    still = TileModel(
+        model.isohedral_class,
+        max_frequency=model.max_frequency,
+        smoothness=model.smoothness,
+        steps=model.flow.steps,
+        method=model.flow.method,
+        dtype=model.angle.dtype,
+        prototiles=prototile,
+    )
+    zero = torch.zeros_like(still.fourier_fields()[0].parameters_)
+    return TileModel.joined([still.with_fields([zero] * model.segments), model])
+
+
+def _polished(
+    target: Target, model: TileModel, settings: OverlapSearch, cancel: Cancel
+) -> TileModel:
+    """The same candidates, each with one segment more."""
+    polished: list[TileModel] = []
+    for index in range(model.size):
+        single = model.take([index])
+        if index < settings.finalists:
+            single = polish(single, target, settings.polish, cancel=cancel)
+        if single.segments == model.segments:  # nothing gained
+            fields = [field.parameters_.detach() for field in single.fourier_fields()]
+            single = single.with_fields([*fields, torch.zeros_like(fields[0])])
+        polished.append(single.double())
+    return TileModel.joined(polished)
+
+
+def _overlaps(goal: shapely.Polygon, soft: SoftTarget, descent: Descent) -> Array:
+    """IoU (S,) of the candidates, weighted if there is emphasis; -1 for those that cross themselves."""
+    boundaries = descent.placed()
+    plain = boundary_iou(goal, boundaries)
+    if soft.weights is None:
+        return plain
+    rings = torch.tensor(boundaries, dtype=soft.image.dtype)
+    rings = torch.where(descent.model.mirror[:, None, None], rings.flip(1), rings)
+    return np.where(plain < 0, plain, soft.weighted_iou(rings).numpy())
+
+
+def _best_first(target: Target, goal: shapely.Polygon, soft: SoftTarget, descent: Descent) -> float:
+    """Order survivors by IoU and recognisability, those that gave up IoU last; the IoU of the first."""
+    boundaries = descent.placed()
+    iou = _overlaps(goal, soft, descent)
+    recognise = Recogniser(target.normal)
+    scores = [
+        rank_score(overlap, recognise(ring).score) - float(overlap < iou.max() - NEAR)
+        if overlap >= 0
+        else -2.0
+        for overlap, ring in zip(iou, boundaries, strict=True)
+    ]
+    order = np.argsort(-np.array(scores), kind="stable").tolist()
+    descent.keep(order, iou)
+    return float(iou[order[0]])
+
+
+def _starts(
+    target: Target, kind: IsohedralClass, settings: OverlapSearch, cancel: Cancel
+) -> Starts:
+    phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
+    found: Starts | None = None
+    if settings.starts == "outline":
+        found = outline_starts(
+            target,
+            kind,
+            count=settings.candidates,
+            resolutions=settings.resolutions,
+            projected=settings.projected,
+            measured=settings.measured,
+            vertices=settings.boundary,
+            phase=phase,
+            cancel=cancel,
+        )
+        if len(found.prototiles) >= FEW and found.iou.max() >= POOR:
+            return found
+    templates = template_starts(
+        kind,
+        turns=settings.turns,
+        stretch=settings.stretch if settings.lattice else 0.0,
+        vertices=settings.boundary,
+        phase=phase,
+    )
+    # their overlap is not known: 0 says that any result is better
+    plain = Starts(templates, np.zeros(len(templates)))
+    if found is None or not len(found.prototiles):
+        return plain
+    joined = Prototiles.joined([found.prototiles, templates])
+    return Starts(joined, np.concatenate([found.iou, plain.iou]))

@@ -93,8 +93,7 @@ class SearchSettings(Settings, group="Search"):
         """The method that is asked for: with what is set here, and otherwise its own defaults."""
         from orbiflow.tiles.search.both_search import BothSearch
         from orbiflow.tiles.search.likeness_search import LikenessSearch
-        from orbiflow.tiles.search.occupancy_search import OccupancySearch
-        from orbiflow.tiles.search.overlap_search import OverlapSearch
+        from orbiflow.tiles.search.overlap_search import OccupancySearch, OverlapSearch
 
         if self.method == "occupancy":
             return OccupancySearch(**self._shared(OccupancySearch))

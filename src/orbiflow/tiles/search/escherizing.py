@@ -1,21 +1,30 @@
-"""The search for tiles: from a silhouette and settings to a list of certified tiles."""
+"""The search for tiles: from a silhouette and settings to certified tiles, and their `result.json`."""
 
 from __future__ import annotations
 
+import math
+import platform
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import version
+from typing import Any, cast
 
+import numpy as np
+import shapely
+
+from orbiflow import __version__
 from orbiflow.arguments import instance
 from orbiflow.runtime import Cancel, ClassFailed, Note, Preview, Progress, Sink, TileFound, ignore
+from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
 from orbiflow.tiles.search.certifying import ClassFailure
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.method import SearchMethod
-from orbiflow.tiles.search.searching import INTERRUPTED, Event, search_classes
+from orbiflow.tiles.search.searching import INTERRUPTED, Event, class_list, search_classes
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tilings import CLASSES, isohedral_class
+from orbiflow.tiles.tilings import CLASSES
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,15 +91,15 @@ def escherize(
     instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
     settings = instance(settings or EscherizeSettings(), EscherizeSettings, "settings")
     if emphasis is None and settings.emphasis is not None:
-        emphasis = _emphasis(settings, target)
+        strength = {} if settings.strength is None else {"strength": settings.strength}
+        emphasis = Emphasis.read(settings.emphasis, target, **strength)
     if pins is None and settings.pin is not None:
         pins = Pins.read(settings.pin, target, keep_angle=settings.pin_angle)
     for source in (emphasis, pins):
         for note in source.notes if source else ():
             on_event(Note(note))
     method = method or settings.search_method
-    chosen = CLASSES if settings.classes is None else settings.classes
-    names = list(dict.fromkeys(isohedral_class(name).name for name in chosen))
+    names = class_list(CLASSES if settings.classes is None else settings.classes)
     workers = min(settings.workers or 1, len(names))
     relay = _Relay(names, on_event)
     tiles, failures = search_classes(
@@ -111,12 +120,6 @@ def escherize(
     )
 
 
-def _emphasis(settings: EscherizeSettings, target: Target) -> Emphasis:
-    assert settings.emphasis is not None
-    strength = {} if settings.strength is None else {"strength": settings.strength}
-    return Emphasis.read(settings.emphasis, target, **strength)
-
-
 class _Relay:
     """The events of a search for those who watch; all tiles of all classes go into `found`."""
 
@@ -135,7 +138,7 @@ class _Relay:
             return
         self.shares[name] = event.share
         share = sum(self.shares.values()) / len(self.shares)
-        loss = event.loss if abs(event.loss) < float("inf") else None  # no NaN in JSON
+        loss = event.loss if math.isfinite(event.loss) else None  # no NaN in JSON
         self.on_event(Progress(share, "fitting", name, event.share, loss))
         if isinstance(outcome, ClassFailure):
             self.on_event(ClassFailed(name, outcome.reason))
@@ -143,3 +146,33 @@ class _Relay:
             self.found += outcome.family()
             iou, certified = outcome.metrics.iou, outcome.certificate.valid
             self.on_event(TileFound(name, iou, outcome.score, certified))
+
+
+def report(result: SearchResult) -> dict[str, Any]:
+    """Return the whole document, ready for JSON, tiles best first."""
+    tiles, method = result.tiles, result.method
+    core_seconds = sum({tile.isohedral_class: tile.seconds for tile in tiles}.values())
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "method": method.method_name,
+        "objective": method.objective,
+        "seed": method.seed,
+        "settings": asdict(cast(Any, method)),
+        "versions": {
+            "orbiflow": __version__,
+            "python": platform.python_version(),
+            "torch": version("torch"),
+            "numpy": np.__version__,
+            "shapely": shapely.__version__,
+        },
+        "timings": {
+            "wall_seconds": round(result.seconds, 3),
+            "core_seconds": round(core_seconds, 3),
+            "workers": result.workers,
+        },
+        "input": result.target.report(),
+        "emphasis": None if result.emphasis is None else result.emphasis.report(),
+        "pins": None if result.pins is None else result.pins.report(),
+        "tiles": [tile_json(tile) for tile in tiles],
+        "failed": [{"class": f.name, "reason": f.reason} for f in result.failures],
+    }

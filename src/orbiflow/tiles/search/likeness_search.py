@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
+from orbiflow.arguments import number, whole
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.likeness import least_neck
 from orbiflow.tiles.search.candidates import Fit, Progress
-from orbiflow.tiles.search.method import Goal, SearchMethod, preferred_class, settings_for
+from orbiflow.tiles.search.method import Goal, SearchMethod, preferred_class
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass
 
-SKETCH = {
-    "placements": 60,
-    "held": 6,
-    "starts": 1,
-    "share": 0.1,
-    "finalists": 1,
-    "rounds": 10,
-    "below": 0,
-}
-"""Settings of the preview."""
+# Settings of the preview
+SKETCH = {"placements": 60, "held": 6, "starts": 1, "share": 0.1, "finalists": 1, "rounds": 10}
+
+FAST = {"placements": 80, "held": 20, "starts": 8, "share": 0.15, "finalists": 2, "rounds": 12}
+BEST = {"placements": 1500, "held": 300, "starts": 128, "share": 1.0, "finalists": 12, "rounds": 40}
 
 
 @dataclass(frozen=True)
@@ -46,7 +42,12 @@ class LikenessSearch(SearchMethod):
 
     objective: ClassVar[str] = "likeness"
     takes_pins: ClassVar[bool] = True
-    modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.bending_fit",)
+    modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.bending",)
+    efforts: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "fast": FAST,
+        "normal": {"below": 1},
+        "best": {**BEST, "below": 2},
+    }
 
     placements: int = 300
     held: int = 80
@@ -61,18 +62,13 @@ class LikenessSearch(SearchMethod):
 
     def __post_init__(self) -> None:
         for name in ("placements", "held", "starts", "finalists", "rounds"):
-            if getattr(self, name) < 1:
-                raise OrbiflowError(f"{name} must be at least 1, got {getattr(self, name)}")
-        if not 0 < self.share <= 1:
-            raise OrbiflowError(f"share must be above 0, at most 1, got {self.share}")
-        if not 0 <= self.below <= 2:
-            raise OrbiflowError(f"below must be 0, 1 or 2, got {self.below}")
+            whole(getattr(self, name), name, 1)
+        number(self.share, "share", 0, 1, above=True)
+        whole(self.below, "below", 0, 2)
         if not self.multiples or min(self.multiples) < 1:
             raise OrbiflowError(f"multiples must be at least 1, got {self.multiples}")
-        if not 0 <= self.min_neck <= 0.2:
-            raise OrbiflowError(f"min_neck must be from 0 to 0.2, got {self.min_neck}")
-        if not 0 <= self.seed < 2**32:
-            raise OrbiflowError(f"seed must be from 0 to 2^32 - 1, got {self.seed}")
+        number(self.min_neck, "min_neck", 0, 0.2)
+        whole(self.seed, "seed", 0, 2**32 - 1)
 
     def fit(
         self,
@@ -84,10 +80,10 @@ class LikenessSearch(SearchMethod):
         cancel: Cancel | None = None,
     ) -> Fit:
         """Let the silhouette bend into tiles of the class."""
-        from orbiflow.tiles.search.bending_fit import fit_bending
-        from orbiflow.tiles.search.co_deformation import shared_hands
+        from orbiflow.tiles.search.bending import fit_bending
+        from orbiflow.tiles.search.co_deformation import hands
 
-        both = shared_hands(goal, self)
+        both = hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins)
         return fit_bending(
             goal.target, kind, self, both, per_class=per_class, progress=progress, cancel=cancel
         )
@@ -96,11 +92,14 @@ class LikenessSearch(SearchMethod):
         self, goal: Goal, names: Sequence[str], cancel: Cancel | None = None
     ) -> EscherTile | None:
         """Return a tile that the silhouette bends to in haste; None if none is simple."""
-        from orbiflow.tiles.search.bending_fit import fit_bending
+        from orbiflow.tiles.search.bending import fit_bending
         from orbiflow.tiles.search.certifying import best_tiles
-        from orbiflow.tiles.search.co_deformation import shared_hands
+        from orbiflow.tiles.search.co_deformation import hands
 
-        both, quick = shared_hands(goal, self), replace(self, **SKETCH)
+        both, quick = (
+            hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins),
+            replace(self, below=0, **SKETCH),
+        )
         try:
             found = fit_bending(goal.target, preferred_class(names), quick, both, cancel=cancel)
             return best_tiles(goal.target, found._replace(enough=1))[0]
@@ -109,47 +108,27 @@ class LikenessSearch(SearchMethod):
 
     def prepare(self, goal: Goal) -> None:
         """Triangulate the silhouette and its mirror image."""
-        from orbiflow.tiles.search.co_deformation import shared_hands
+        from orbiflow.tiles.search.co_deformation import hands
 
-        shared_hands(goal, self)
+        hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins)
 
     def least_neck(self, goal: Goal) -> float:
         """Return `min_neck`, or a part of the silhouette's own narrowest neck."""
         return least_neck(goal.target.normal, self.min_neck)
 
-    @classmethod
-    def for_effort(cls, effort: str, **changes: Any) -> LikenessSearch:
-        """The settings of a level of effort: "fast", "normal" or "best".
-
-        >>> LikenessSearch.for_effort("fast", seed=3).seed
-        3
-        """
-        return settings_for(cls, BENDING_EFFORTS, effort, changes)
-
     def searches(self, wanted: int = 1) -> tuple[LikenessSearch, ...]:
-        """Those of the levels below, least first, and these: none with levels below.
+        """Those of the levels below, least first, and these, with so many finalists `wanted`.
 
-        Args:
-            wanted: finalists at least, for which each gets twice as many starts at least.
+        Each has twice as many starts as finalists at least, where more are wanted.
 
         >>> [own.starts for own in LikenessSearch.for_effort("best").searches()]
         [8, 32, 128]
         """
-        below = (FAST, NORMAL)[: self.below]
-        each = [replace(self, below=0, **changes) for changes in (*below, {})]
-        return tuple(own if own.finalists >= wanted else own._with(wanted) for own in each)
-
-    def _with(self, finalists: int) -> LikenessSearch:
-        return replace(self, finalists=finalists, starts=max(self.starts, 2 * finalists))
-
-
-FAST = {"placements": 80, "held": 20, "starts": 8, "share": 0.15, "finalists": 2, "rounds": 12}
-NORMAL = {name: getattr(LikenessSearch(), name) for name in FAST}
-BEST = {"placements": 1500, "held": 300, "starts": 128, "share": 1.0, "finalists": 12, "rounds": 40}
-
-BENDING_EFFORTS: dict[str, dict[str, Any]] = {
-    "fast": FAST,
-    "normal": {**NORMAL, "below": 1},
-    "best": {**BEST, "below": 2},
-}
-"""What each level changes."""
+        normal = {name: getattr(LikenessSearch, name) for name in FAST}
+        found: list[LikenessSearch] = []
+        for changes in (*(FAST, normal)[: self.below], {}):
+            own = replace(self, below=0, **changes)
+            if own.finalists < wanted:
+                own = replace(own, finalists=wanted, starts=max(own.starts, 2 * wanted))
+            found.append(own)
+        return tuple(found)

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from importlib import import_module
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Self
 
 from orbiflow.arguments import whole
 from orbiflow.errors import OrbiflowError
@@ -16,21 +16,14 @@ from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 
-Settings = TypeVar("Settings")
-
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """What tiles are to look like.
-
-    - `target`: The silhouette.
-    - `emphasis`: What must survive.
-    - `pins`: What must not bend.
-    """
+    """What tiles are to look like."""
 
     target: Target
-    emphasis: Emphasis | None = None
-    pins: Pins | None = None
+    emphasis: Emphasis | None = None  # what must survive
+    pins: Pins | None = None  # what must not bend
 
 
 class SearchMethod(ABC):
@@ -43,6 +36,7 @@ class SearchMethod(ABC):
     - `method_name`: The name of the method, for result.json.
     - `takes_pins`: Whether it minds parts of the silhouette that must not bend.
     - `modules`: What `fit` needs and nothing has imported yet.
+    - `efforts`: What each level of effort changes, for `for_effort`.
     - `seed`: What a user changes for other tiles.
     """
 
@@ -50,7 +44,23 @@ class SearchMethod(ABC):
     method_name: ClassVar[str] = "descent"
     takes_pins: ClassVar[bool] = False
     modules: ClassVar[tuple[str, ...]] = ()
+    efforts: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
     seed: int = 0
+
+    @classmethod
+    def for_effort(cls, effort: str, **changes: Any) -> Self:
+        """Return the settings of a level of effort, "fast", "normal" or "best", with changes by name.
+
+        Raises:
+            OrbiflowError: for an unknown level or setting.
+        """
+        if effort not in cls.efforts:
+            raise OrbiflowError(f"effort must be one of {', '.join(cls.efforts)}, got {effort!r}")
+        known = {field.name for field in fields(cls)}  # pyright: ignore[reportArgumentType]
+        unknown = [name for name in changes if name not in known]
+        if unknown:
+            raise OrbiflowError(f"unknown settings {', '.join(unknown)}")
+        return cls(**{**cls.efforts[effort], **changes})
 
     @abstractmethod
     def fit(
@@ -119,8 +129,8 @@ class SearchMethod(ABC):
         return list(tiles)
 
 
+# The classes by how often they come near a silhouette at once, for the time that they take
 PREFERRED = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")
-"""The classes by how often they come near a silhouette at once, for the time that they take."""
 
 
 def preferred_class(names: Sequence[str]) -> IsohedralClass:
@@ -128,42 +138,11 @@ def preferred_class(names: Sequence[str]) -> IsohedralClass:
     return isohedral_class(next(name for name in PREFERRED if name in names))
 
 
-def settings_for(
-    kind: type[Settings],
-    efforts: Mapping[str, Mapping[str, Any]],
-    effort: str,
-    changes: Mapping[str, Any],
-) -> Settings:
-    """Settings of a level of effort, with changes.
-
-    Args:
-        kind: a dataclass of settings.
-        efforts: what each level changes, by name.
-        effort: the level.
-        changes: settings that differ from it, by name.
-
-    Raises:
-        OrbiflowError: for an unknown level or setting.
-    """
-    if effort not in efforts:
-        raise OrbiflowError(f"effort must be one of {', '.join(efforts)}, got {effort!r}")
-    known = {field.name for field in fields(kind)}  # pyright: ignore[reportArgumentType]
-    unknown = [name for name in changes if name not in known]
-    if unknown:
-        raise OrbiflowError(f"unknown settings {', '.join(unknown)}")
-    return kind(**{**efforts[effort], **changes})
-
-
-MAX_FREQUENCY = 60
-"""Largest Omega that a fit takes on; time and memory grow with its square."""
+MAX_FREQUENCY = 60  # largest Omega that a fit takes on; time and memory grow with its square
 
 
 def check_max_frequency(value: int) -> None:
-    """Do nothing for an Omega from 0, constant fields (paper, figure of Omega), to `MAX_FREQUENCY`.
-
-    Raises:
-        OrbiflowError: for any other.
-    """
+    """Check an Omega: 0 is a constant field (paper, figure of Omega)."""
     if not 0 <= whole(value, "max_frequency", 0) <= MAX_FREQUENCY:
         raise OrbiflowError(
             f"max_frequency must be from 0 to {MAX_FREQUENCY}, got {value}: "
@@ -171,5 +150,4 @@ def check_max_frequency(value: int) -> None:
         )
 
 
-MAX_SEGMENTS = 2000
-"""Of a flow; the descent adds one a step."""
+MAX_SEGMENTS = 2000  # of a flow; the descent adds one a step

@@ -18,7 +18,7 @@ from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles.geometry import subdivided
-from orbiflow.tiles.search.prototiles import Prototiles
+from orbiflow.tiles.search.candidates import Prototiles
 from orbiflow.tiles.tile_map import TileMap
 from orbiflow.tiles.tilings import IsohedralClass, Tile
 from orbiflow.tiles.tilings import isohedral_class as class_of
@@ -33,26 +33,23 @@ class TileModel(nn.Module):
     reflections as soon as A rotates (design point 6). A template of area 1 is the start.
 
     Certificates outlive a change of precision: `.float()`, `.half()`, `.to(...)` round the parameters,
-    which only makes another tile, but `vertices`, whose identified edges must correspond, stay float64
-    whatever is asked, and the group's pose and the polygon (`extract_tile`) are computed in float64.
+    which only makes another tile, but `vertices`, whose identified edges must correspond, stay float64,
+    and the group's pose and the polygon (`extract_tile`) are computed in float64.
+
+    Points are (S, N, 2) throughout; arrays and lists are taken as tensors of the model's dtype.
 
     Args:
-        isohedral_class: of all S tiles, or its name.
-        angles: (S,) turn of each start, in radians; a number is one.
-        mirrored: (S,) whether A reverses orientation; default no.
-        max_frequency: Omega of the fields.
-        segments: stationary pieces of the flow.
-        smoothness: Sobolev exponent of the fields' parameters.
-        steps, method: of the integrator.
-        dtype: of all parameters.
-        prototiles: S start tiles with their poses, in place of the template; `angles` and `mirrored`
-            are then taken from them.
-
-    Shapes:
-        points (S, N, 2) throughout; arrays and lists are taken as tensors of the model's dtype.
+        isohedral_class: The class of all S tiles, or its name.
+        angles: The turn (S,) of each start, in radians; a number is one.
+        mirrored: Whether (S,) A reverses orientation. Default: no.
+        max_frequency, segments, smoothness: Omega of the fields, the number of stationary pieces of the
+            flow, and the Sobolev exponent of the fields' parameters.
+        steps, method: Steps and method of the integrator.
+        dtype: The type of all parameters.
+        prototiles: S start tiles with their poses, in place of the template, `angles` and `mirrored`.
 
     Raises:
-        OrbiflowError: for arguments that cannot be used, by name.
+        OrbiflowError: For arguments that cannot be used, by name.
     """
 
     mirror: Tensor
@@ -114,23 +111,24 @@ class TileModel(nn.Module):
 
     @torch.no_grad()
     def _start_from(self, prototiles: Prototiles | None) -> None:
-        if prototiles is None:
-            self.register_buffer("vertices", None)
-            self.register_buffer("corners", None)
-            self.recentre()
+        self.register_buffer("vertices", None)
+        self.register_buffer("corners", None)
+        if prototiles is None:  # each template's centre at the target's centroid
+            center = self.template().mean(dim=-2, keepdim=True) @ self.linear().mT
+            self.offset.copy_(-center[:, 0])
             return
         kind = self.isohedral_class
         own = prototiles.corners.shape[-1], prototiles.stretch.shape[-1]
         if own != (len(kind.template()), kind.stretch_dim):
             raise OrbiflowError(f"the prototiles are not of class {kind.name}")
-        self.register_buffer("vertices", torch.tensor(prototiles.vertices, dtype=torch.float64))
-        self.register_buffer("corners", torch.tensor(prototiles.corners))
+        self.vertices = torch.tensor(prototiles.vertices, dtype=torch.float64)
+        self.corners = torch.tensor(prototiles.corners)
         for name in ("log_scale", "offset", "stretch"):
             getattr(self, name).copy_(torch.as_tensor(getattr(prototiles, name)))
 
     @property
     def size(self) -> int:
-        """Number S of candidates."""
+        """The number S of candidates."""
         return len(self.angle)
 
     def template(self) -> Tensor:
@@ -149,12 +147,6 @@ class TileModel(nn.Module):
         sign = torch.where(self.mirror, -1.0, 1.0).to(dtype)
         turn = torch.stack([torch.stack([c, -s * sign], -1), torch.stack([s, c * sign], -1)], -2)
         return log_scale.exp()[:, None, None] * turn @ self.isohedral_class.stretch(stretch)
-
-    @torch.no_grad()
-    def recentre(self) -> None:
-        """Put each template's centre at the target's centroid, by the offset."""
-        center = self.template().mean(dim=-2, keepdim=True) @ self.linear().mT
-        self.offset.copy_(-center[:, 0])
 
     def place(self, points: Tensor) -> Tensor:
         """A o L at points (S, N, 2) of the group's frame."""
@@ -198,39 +190,24 @@ class TileModel(nn.Module):
         return self.vertices.to(self.angle.dtype), self.corners
 
     def boundary(self, pieces: int) -> Tensor:
-        """Points (S, N pieces, 2) along the prototile, `pieces` evenly spaced on each side.
-
-        Identified edges have as many sides each, so their samples correspond.
-        """
+        """Points (S, N pieces, 2) along the prototile, `pieces` evenly spaced on each side."""
         whole(pieces, "pieces", 1)
         vertices, _ = self.prototile()
         return subdivided(vertices, pieces)
 
     def take(self, indices: Sequence[int] | int) -> TileModel:
-        """A new model with the candidates at `indices` only, at the same parameters.
-
-        Raises:
-            OrbiflowError: for indices that are not candidates, and for none.
-        """
-        chosen = self._chosen(indices)
-        fields = [field.parameters_.detach()[chosen] for field in self.fourier_fields()]
-        return self.with_fields(fields, chosen)
-
-    def _chosen(self, indices: Sequence[int] | int) -> list[int]:
+        """A new model with the candidates at `indices` only, at the same parameters."""
         several = indices if isinstance(indices, Sequence | np.ndarray) else [indices]
         chosen = [whole(i, "a candidate's index", 0, self.size - 1) for i in several]
         if not chosen:
             raise OrbiflowError(f"choose at least one of the {self.size} candidates")
-        return chosen
+        fields = [field.parameters_.detach()[chosen] for field in self.fourier_fields()]
+        return self.with_fields(fields, chosen)
 
     @staticmethod
     @torch.no_grad()
     def joined(models: Sequence[TileModel]) -> TileModel:
-        """The candidates of models that differ in their parameters alone, as one stack.
-
-        Raises:
-            OrbiflowError: for no models, and for models of several classes.
-        """
+        """The candidates of models of one class that differ in their parameters alone, as one stack."""
         names = {model.isohedral_class.name for model in models}
         if len(names) != 1:
             raise OrbiflowError(f"models of one class can be joined, got {sorted(names) or 'none'}")
@@ -253,9 +230,7 @@ class TileModel(nn.Module):
     def with_fields(self, fields: list[Tensor], indices: list[int] | None = None) -> TileModel:
         """The candidates at `indices` (default all) with another flow: one segment for each field.
 
-        Args:
-            fields: parameters (len(indices), P) of each segment, under this model's smoothness.
-            indices: of the candidates.
+        Fields are parameters (len(indices), P), under this model's smoothness.
         """
         chosen = list(range(self.size)) if indices is None else indices
         model = TileModel(
@@ -280,8 +255,7 @@ class TileModel(nn.Module):
 
     def finished(self, index: int, *, force: bool = False) -> tuple[Tile, TileMap]:
         """Return the polygon of a candidate with its group, and the flow that made it."""
-        from orbiflow.tiles.search.boundary import extract_tile
-        from orbiflow.tiles.search.storage import as_map
+        from orbiflow.tiles.search.stored_models import as_map, extract_tile
 
         tile, fine = extract_tile(self.take([index]), force=force)
         return tile, as_map(fine)
@@ -291,20 +265,12 @@ class TileModel(nn.Module):
         return self
 
     def require_single(self) -> None:
-        """Do nothing if the model holds one candidate.
-
-        Raises:
-            OrbiflowError: if it holds more.
-        """
+        """Check that the model holds one candidate."""
         if self.size != 1:
             raise OrbiflowError(f"take one candidate first: this model holds {self.size}")
 
     def placed_group(self) -> CrystallographicGroup:
-        """The group of a single candidate's tile, in the target's normal form.
-
-        Raises:
-            OrbiflowError: if the model holds more than one candidate.
-        """
+        """The group of a single candidate's tile, in the target's normal form."""
         self.require_single()
         linear: Array = self._linear(torch.float64).detach().cpu().numpy()[0]
         offset: Array = self.offset.detach().double().cpu().numpy()[0]
@@ -317,3 +283,21 @@ class TileModel(nn.Module):
         for name, buffer in exact.items():
             setattr(self, name, buffer.to(getattr(self, name).device))
         return self
+
+
+def placed_field(model: TileModel) -> Callable[[Tensor], Tensor]:
+    """Return a single candidate's vector field, pushed forward by A o L to the target's normal form.
+
+    It is the mean over time if the flow has several segments.
+    """
+    linear = model.linear().detach()[0]
+    # fields are linear in their parameters: one evaluation for any number of segments
+    parameters = torch.stack([segment.parameters_.detach() for segment in model.fourier_fields()])
+    mean = model.with_fields([parameters.mean(dim=0)])
+
+    @torch.no_grad()
+    def field(points: Tensor) -> Tensor:
+        flat = points.to(linear).reshape(1, -1, 2)
+        return (mean.flow.segments[0](model.unplace(flat)) @ linear.mT).reshape(points.shape)
+
+    return field

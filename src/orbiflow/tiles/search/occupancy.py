@@ -17,15 +17,16 @@ from torch import Tensor
 from orbiflow.arguments import instance, whole
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.search.candidates import Progress, silent
+from orbiflow.tiles.search.descent import between
 from orbiflow.tiles.search.model import TileModel
-from orbiflow.tiles.search.occupancy_search import OccupancySearch
+from orbiflow.tiles.search.overlap_search import OccupancySearch
 from orbiflow.tiles.search.starts import initial_poses, template_symmetries
 from orbiflow.tiles.silhouette import Target, signed_distance
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 from orbiflow.typed_torch import adam, linalg, listed
 
+# Factor of the squared displacement of a pentagon's free vertex: keeps the template simple
 SHAPE_PENALTY = 0.02
-"""Factor of the squared displacement of a pentagon's free vertex: keeps the template simple."""
 
 
 class OccupancySamples:
@@ -65,15 +66,9 @@ def occupancy_loss(
 ) -> Tensor:
     """Mean binary cross-entropy of sigmoid(tau phi(D^-1 q)) against o(q), one value a candidate.
 
-    phi is the signed distance to the template, rescaled to the target's units. (Paper, equation of
-    L.)
-
-    Args:
-        model: S candidates.
-        points: (N, 2), in the target's normal form.
-        inside: (N,) occupancies, 0 or 1.
-        hardness: tau.
-        affine: leave the flow out.
+    phi is the signed distance to the template, rescaled to the target's units, tau the `hardness`
+    (paper, equation of L). The points (N, 2) are in the target's normal form, `inside` (N,) is 0 or
+    1, and `affine` leaves the flow out.
     """
     pulled = model.unplace(points) if affine else model.inverse(points)
     phi = signed_distance(pulled, model.template()) * model.log_scale.exp()[:, None]
@@ -91,11 +86,7 @@ def fit_occupancy(
 ) -> TileModel:
     """Fit tiles of one class to a target by the paper's method, all starts side by side.
 
-    Returns:
-        The surviving candidates, best loss first. They are not certified yet.
-
-    Raises:
-        Cancelled: if `cancel`, which is looked at before each step, says so.
+    Returns the surviving candidates, best loss first. They are not certified yet.
     """
     kind = isohedral_class(kind)
     instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
@@ -103,7 +94,19 @@ def fit_occupancy(
     # the mean over the candidates is all that couples them: separate fits, one tensor
     samples = OccupancySamples(target, 16384, seed=settings.seed)
     cancel = cancel or Cancel()
-    model = _affine_phase(_start(kind, settings), samples, settings, cancel)
+    angles, mirrored = initial_poses(kind, settings.turns)
+    model = TileModel(
+        kind,
+        angles,
+        mirrored=mirrored,
+        max_frequency=settings.max_frequency,
+        segments=settings.segments,
+        smoothness=settings.smoothness,
+        steps=settings.steps,
+        method=settings.method,
+        dtype=torch.float32,
+    )
+    model = _affine_phase(model, samples, settings, cancel)
     first = replace(settings, iterations=max(1, settings.iterations // 3))
     told = progress or silent
 
@@ -116,21 +119,6 @@ def fit_occupancy(
         model = _ranked(model, samples, settings.hardness[1], keep=(model.size + 1) // 2)
     model = _flow_phase(model, samples, settings, first.iterations, settings.iterations, report)
     return _ranked(model, samples, settings.hardness[1], keep=model.size)
-
-
-def _start(isohedral_class: IsohedralClass, settings: OccupancySearch) -> TileModel:
-    angles, mirrored = initial_poses(isohedral_class, settings.turns)
-    return TileModel(
-        isohedral_class,
-        angles,
-        mirrored=mirrored,
-        max_frequency=settings.max_frequency,
-        segments=settings.segments,
-        smoothness=settings.smoothness,
-        steps=settings.steps,
-        method=settings.method,
-        dtype=torch.float32,
-    )
 
 
 def _pose(model: TileModel) -> list[torch.nn.Parameter]:
@@ -146,7 +134,8 @@ def _affine_phase(
         points, inside = samples.draw(512)
         optimizer.zero_grad()
         loss = occupancy_loss(model, points, inside, 15.0, affine=True)
-        torch.autograd.backward((loss + _shape_penalty(model)).sum())
+        bent = SHAPE_PENALTY * model.shape.square().sum(dim=-1)
+        torch.autograd.backward((loss + bent).sum())
         optimizer.step()
     ranked = _ranked(model, samples, 15.0, keep=model.size, affine=True)
     return ranked.take(_distinct(ranked, settings.finalists))
@@ -193,25 +182,14 @@ def _flow_phase(
             group["lr"] = group["peak"] * warm * (0.51 + 0.49 * math.cos(math.pi * done))
         optimizer.zero_grad()
         points, inside = samples.draw(settings.points)
-        loss = occupancy_loss(model, points, inside, _between(settings.hardness, done))
-        energy = _between(settings.penalty, done) * _energy(model)
-        torch.autograd.backward((loss + energy + _shape_penalty(model)).sum())
+        loss = occupancy_loss(model, points, inside, between(settings.hardness, done))
+        squares = [p.square().sum(dim=-1) for p in model.flow.parameters()]
+        energy = between(settings.penalty, done) * torch.stack(squares).sum(dim=0)
+        bent = SHAPE_PENALTY * model.shape.square().sum(dim=-1)
+        torch.autograd.backward((loss + energy + bent).sum())
         optimizer.step()
         report((i + 1) / settings.iterations, float(loss.detach().min()))
     return model
-
-
-def _energy(model: TileModel) -> Tensor:
-    squares = [p.square().sum(dim=-1) for p in model.flow.parameters()]
-    return torch.stack(squares).sum(dim=0)
-
-
-def _shape_penalty(model: TileModel) -> Tensor:
-    return SHAPE_PENALTY * model.shape.square().sum(dim=-1)
-
-
-def _between(ends: tuple[float, float], share: float) -> float:
-    return ends[0] * (ends[1] / ends[0]) ** share
 
 
 @torch.no_grad()

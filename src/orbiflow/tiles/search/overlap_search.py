@@ -1,12 +1,12 @@
-"""The search for overlap by descent: its settings, its levels of effort, and how it searches."""
+"""Searches for overlap: by descent, and by the paper's occupancy method."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from orbiflow.arguments import number, numbers, whole
+from orbiflow.arguments import instance, number, numbers, whole
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import Cancel, one_thread
 from orbiflow.tiles.search.candidates import Fit, Progress
@@ -16,23 +16,44 @@ from orbiflow.tiles.search.method import (
     SearchMethod,
     check_max_frequency,
     preferred_class,
-    settings_for,
 )
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tilings import IsohedralClass
+from orbiflow.tiles.tilings import CLASSES, IsohedralClass
 
-POINTS = 60
-"""Points of the outline that the preview looks at."""
-
+POINTS = 60  # points of the outline that the preview looks at
+# Length of an outline, in square roots of its area, up to which the settings are as they are
 PLAIN = 8.0
-"""Length of an outline, in square roots of its area, up to which the settings are as they are."""
 
 
-RAGGED = 3.5
-"""Power of the length beyond, by which the number of starts grows."""
+RAGGED = 3.5  # power of the length beyond, by which the number of starts grows
+MOST_TIMES = 6.0  # what a ragged outline may multiply the starts by
 
-MOST_TIMES = 6.0
-"""What a ragged outline may multiply the starts by."""
+
+EFFORTS: Mapping[str, Mapping[str, Any]] = {
+    "fast": {
+        "candidates": 8,
+        "resolutions": (60,),
+        "projected": 800,
+        "measured": 150,
+        "stages": ((12, 2), (16, 1)),
+        "boundary": 120,
+        "polish": 0,
+        "finalists": 1,
+    },
+    "normal": {},
+    "best": {
+        "max_frequency": 15,
+        "candidates": 400,
+        "resolutions": (30, 48, 96, 120),
+        "boundary": 480,
+        "projected": 4000,
+        "measured": 1000,
+        "stages": ((20, 60), (35, 16), (45, 5), (40, 4)),
+        "polish": 100,
+        "finalists": 4,
+    },
+}
+"""What each level changes."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +81,8 @@ class OverlapSearch(SearchMethod):
     - `seed`: moves the starts.
     """
 
-    modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.descent_fit",)
+    modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.descent",)
+    efforts: ClassVar[Mapping[str, Mapping[str, Any]]] = EFFORTS
 
     max_frequency: int = 10
     starts: str = "outline"
@@ -96,7 +118,12 @@ class OverlapSearch(SearchMethod):
                     f"resolutions must be at least 24 and divide boundary = {self.boundary}, "
                     f"got {points:g}"
                 )
-        self._check_stages()
+        stages = numbers(self.stages, "stages", (...,))
+        pairs = stages.ndim == 2 and stages.shape[1] == 2
+        if not pairs or (stages < 1).any() or (stages % 1).any():
+            raise OrbiflowError(f"stages need steps and survivors of at least 1: {self.stages}")
+        if self.iterations >= MAX_SEGMENTS:
+            raise OrbiflowError(f"stages must have less than {MAX_SEGMENTS} steps in all")
         for name in ("smoothness", "reach", "blur"):
             for value in numbers(getattr(self, name), name, (2,)):
                 number(value, f"{name}, first and last,", 0, above=name != "smoothness")
@@ -104,14 +131,6 @@ class OverlapSearch(SearchMethod):
         number(self.stretch, "stretch", 0)
         whole(self.polish, "polish", 0, 1000)
         whole(self.seed, "seed", 0, 2**32 - 1)
-
-    def _check_stages(self) -> None:
-        stages = numbers(self.stages, "stages", (...,))
-        pairs = stages.ndim == 2 and stages.shape[1] == 2
-        if not pairs or (stages < 1).any() or (stages % 1).any():
-            raise OrbiflowError(f"stages need steps and survivors of at least 1: {self.stages}")
-        if self.iterations >= MAX_SEGMENTS:
-            raise OrbiflowError(f"stages must have less than {MAX_SEGMENTS} steps in all")
 
     @property
     def iterations(self) -> int:
@@ -128,13 +147,14 @@ class OverlapSearch(SearchMethod):
         cancel: Cancel | None = None,
     ) -> Fit:
         """Let flows carry near tiles closer to the silhouette."""
-        from orbiflow.tiles.search.descent_fit import fit_descent, shared_soft_target
+        from orbiflow.tiles.search.descent import fit_descent, shared_soft_target
 
+        stages = tuple((steps, max(kept, 2 * per_class)) for steps, kept in self.stages)
         with one_thread():
             found = fit_descent(
                 goal.target,
                 kind,
-                self.with_survivors(2 * per_class),
+                replace(self, stages=stages),
                 soft=shared_soft_target(goal.target, goal.emphasis),
                 progress=progress,
                 cancel=cancel,
@@ -171,7 +191,7 @@ class OverlapSearch(SearchMethod):
 
     def prepare(self, goal: Goal) -> None:
         """Draw the silhouette's soft edge."""
-        from orbiflow.tiles.search.descent_fit import shared_soft_target
+        from orbiflow.tiles.search.descent import shared_soft_target
 
         shared_soft_target(goal.target, goal.emphasis)
 
@@ -182,8 +202,7 @@ class OverlapSearch(SearchMethod):
     def for_outline(self, length: float) -> OverlapSearch:
         """More starts for a ragged silhouette: there are more ways to lay it out, and more fail.
 
-        Args:
-            length: of the outline, in square roots of the silhouette's area; a disc has 3.5.
+        `length` is the outline's, in square roots of the silhouette's area; a disc has 3.5.
         """
         share = min(max((length / PLAIN) ** RAGGED, 1.0), MOST_TIMES)
         (steps, kept), *later = self.stages
@@ -195,47 +214,76 @@ class OverlapSearch(SearchMethod):
             stages=((steps, round(share * kept)), *later),
         )
 
-    def with_survivors(self, least: int) -> OverlapSearch:
-        """The same, with at least that many candidates after each stage."""
-        stages = tuple((steps, max(kept, least)) for steps, kept in self.stages)
-        return replace(self, stages=stages)
 
-    @classmethod
-    def for_effort(cls, effort: str, **changes: object) -> OverlapSearch:
-        """The settings of a level of effort: "fast", "normal" or "best".
+@dataclass(frozen=True)
+class OccupancySearch(SearchMethod):
+    """The paper's method, by occupancy; the defaults were measured on the paper's goals.
 
-        Args:
-            effort: the level.
-            changes: settings that differ from it, by name.
+    - `max_frequency`: Omega; 0 leaves the flow the translations that commute with the group.
+    - `turns`: starting rotations of the template.
+    - `finalists`: starts that survive the affine phase; a third of the flow phase later the better
+      half of them goes on.
+    - `affine_iterations`, `iterations`: steps of each phase.
+    - `points`: sample points an iteration.
+    - `hardness`: tau at the start and end of the flow phase, per unit of length (the target has
+      area 1); it grows geometrically.
+    - `penalty`: factor of the fields' Sobolev energy, start and end. Without it the flow folds
+      parts of the tile to nothing, which no integrator follows.
+    - `smoothness`: Sobolev exponent s of the fields.
+    - `segments`: stationary pieces of the flow.
+    - `steps`, `method`: integrator during the optimisation; results are judged at finer steps.
+    - `learning_rate`: of Adam on the fields.
+    - `seed`: of the sample points.
+    """
 
-        >>> OverlapSearch.for_effort("fast", seed=3).seed
-        3
-        """
-        return settings_for(cls, DESCENT_EFFORTS, effort, changes)
+    method_name: ClassVar[str] = "occupancy"
+    modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.occupancy",)
 
+    max_frequency: int = 10
+    turns: int = 12
+    finalists: int = 4
+    affine_iterations: int = 80
+    iterations: int = 200
+    points: int = 800
+    hardness: tuple[float, float] = (8.0, 70.0)
+    penalty: tuple[float, float] = (1e-2, 1e-3)
+    smoothness: float = 2.0
+    segments: int = 1
+    steps: int = 4
+    method: str = "midpoint"
+    learning_rate: float = 0.04
+    seed: int = 0
 
-DESCENT_EFFORTS: dict[str, dict[str, object]] = {
-    "fast": {
-        "candidates": 8,
-        "resolutions": (60,),
-        "projected": 800,
-        "measured": 150,
-        "stages": ((12, 2), (16, 1)),
-        "boundary": 120,
-        "polish": 0,
-        "finalists": 1,
-    },
-    "normal": {},
-    "best": {
-        "max_frequency": 15,
-        "candidates": 400,
-        "resolutions": (30, 48, 96, 120),
-        "boundary": 480,
-        "projected": 4000,
-        "measured": 1000,
-        "stages": ((20, 60), (35, 16), (45, 5), (40, 4)),
-        "polish": 100,
-        "finalists": 4,
-    },
-}
-"""What each level changes."""
+    def __post_init__(self) -> None:
+        from orbiflow.flows import method as integrator
+
+        for name in ("turns", "finalists", "iterations", "points", "segments", "steps"):
+            whole(getattr(self, name), name, 1)
+        check_max_frequency(self.max_frequency)
+        integrator(instance(self.method, str, "method"))
+        whole(self.affine_iterations, "affine_iterations", 0)
+        number(self.smoothness, "smoothness", 0)
+        number(self.learning_rate, "learning_rate", 0, above=True)
+        for name in ("hardness", "penalty"):
+            for value in numbers(getattr(self, name), name, (2,)):
+                number(value, f"{name}, first and last,", 0, above=True)
+        whole(self.seed, "seed", 0, 2**32 - 1)
+
+    def fit(
+        self,
+        goal: Goal,
+        kind: IsohedralClass,
+        *,
+        per_class: int = 1,  # noqa: ARG002 - all survivors are given
+        progress: Progress | None = None,
+        cancel: Cancel | None = None,
+    ) -> Fit:
+        """Let flows carry templates onto the silhouette; each class has a seed of its own."""
+        from orbiflow.tiles.search.occupancy import fit_occupancy
+        from orbiflow.tiles.search.starts import initial_poses
+
+        number = list(CLASSES).index(kind.name)
+        own = replace(self, seed=(self.seed * 1009 + number) % 2**32)
+        with one_thread():
+            model = fit_occupancy(goal.target, kind, own, progress, cancel=cancel)
+        return Fit(model, len(initial_poses(kind, self.turns)[0]), 0, model.size)

@@ -4,8 +4,8 @@ An outline of n points is laid out along the template's edges: edge e gets `leng
 first corner sits at point `start`. The differences of a tile's boundary agree, up to the isometry,
 on identified edges; a placement's gain is how far those of the outline already do. This is the
 adjacent-difference distance of Nagata and Imahori (An Efficient Exhaustive Search Algorithm for the
-Escherization Problem, Algorithmica 2020) without its closing condition: all placements at once, from
-tables of sums along the outline. It ranks; `nearest_tile` is exact.
+Escherization Problem, Algorithmica 2020) without its closing condition: all placements at once,
+from tables of sums along the outline. It ranks; `nearest_tile` is exact.
 """
 
 from __future__ import annotations
@@ -19,42 +19,37 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Complex, Integers
 from orbiflow.tiles.tilings import IsohedralClass
 
+# Beyond this many, lengths and starts run in steps of more than one point
 MOST_PLACEMENTS = 4_000_000
-"""Beyond this many, lengths and starts run in steps of more than one point."""
 
 
 class Placements(NamedTuple):
     """Ways to lay an outline of n points along the edges of a template, best first.
 
-    - `lengths`: (C, K) steps of each edge, sum n.
-    - `starts`: (C,) point of the outline at the template's first corner.
     - `turns`: (C,) radians; turn of the glide axes, 0 in classes without glide reflections.
-    - `gains`: (C,) at most 1, which is an outline that is a tile already.
     """
 
-    lengths: Integers
-    starts: Integers
+    lengths: Integers  # (C, K) steps of each edge, sum n
+    starts: Integers  # (C,) point of the outline at the template's first corner
     turns: NDArray[np.float64]
-    gains: NDArray[np.float64]
+    gains: NDArray[np.float64]  # (C,) at most 1, which is an outline that is a tile already
 
     def take(self, index: Integers) -> Placements:
         """Those at `index`."""
-        return Placements(
-            self.lengths[index], self.starts[index], self.turns[index], self.gains[index]
-        )
+        return self._make(part[index] for part in self)
 
 
 def best_placements(kind: IsohedralClass, outline: Complex, keep: int) -> Placements:
-    """The `keep` placements of largest gain; of placements that differ by a relabelling, one.
+    """Return the `keep` placements of largest gain; of those that differ by a relabelling, one.
 
-    Args:
-        kind: the isohedral class.
-        outline: (n,) points x + iy, counter-clockwise, evenly spaced; n at least 4 times the
-            number of the template's edges.
-        keep: how many at most.
+    The outline has n points x + iy, counter-clockwise, evenly spaced; n is at least 4 times the
+    number of the template's edges.
     """
     n = len(outline)
-    unit = _unit(kind, n)
+    parts = _multiplicities(kind)
+    units = (u for u in range(1, n + 1) if n % u == 0)
+    most = MOST_PLACEMENTS
+    unit = next(u for u in units if u == n or _count(parts, n // u) * (n // u) <= most)
     lengths = edge_lengths(kind, n // unit) * unit
     starts = np.arange(0, n, unit)
     gains, turns = _gains(kind, np.roll(outline, -1) - outline, lengths, starts)
@@ -67,14 +62,6 @@ def best_placements(kind: IsohedralClass, outline: Complex, keep: int) -> Placem
     best = best[fresh][:keep]
     rows, columns = np.unravel_index(best, gains.shape)
     return Placements(lengths[rows], starts[columns], turns.ravel()[best], flat[best])
-
-
-def _unit(kind: IsohedralClass, n: int) -> int:
-    multiplicities = _multiplicities(kind)
-    for unit in (u for u in range(1, n + 1) if n % u == 0):
-        if _count(multiplicities, n // unit) * (n // unit) <= MOST_PLACEMENTS:
-            return unit
-    return n
 
 
 def _multiplicities(kind: IsohedralClass) -> list[int]:

@@ -24,8 +24,7 @@ from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass, isohedral_class
 
-INTERRUPTED = "interrupted"
-"""The reason given for a class that was left undone."""
+INTERRUPTED = "interrupted"  # the reason given for a class that was left undone
 
 ClassName = str | int | IsohedralClass
 """What `isohedral_class` takes."""
@@ -36,19 +35,17 @@ Outcome = EscherTile | ClassFailure
 
 @dataclass(frozen=True)
 class Event:
-    """News from a search, told in the thread that called `search_classes`, in this order:
+    """News from a search, told in the thread that called `search_classes`.
 
-    1. at most one event with a `preview`;
-    2. of each class, any number of events whose `share` never falls, then exactly one with its
-       `outcome`; those of several classes come as they happen, in any mixture.
-
+    First comes at most one event with a `preview`; then, of each class, any number of events whose
+    `share` never falls and exactly one with its `outcome`, those of several classes in any mixture.
     Classes that a `Cancel` left undone have their outcome last, in the order asked for.
 
-    - `name`: of the class.
-    - `share`: of the class's work that is done; 1 at its end, unless it was interrupted.
-    - `loss`: best so far in the method's own measure; for the descent 1 - IoU.
-    - `outcome`: what the class gave.
-    - `preview`: a first certified tile, which the search is going to improve on.
+    - `name`: The class.
+    - `share`: The share of the class's work that is done; 1 at its end, unless it was interrupted.
+    - `loss`: The best so far in the method's own measure; for the descent 1 - IoU.
+    - `outcome`: What the class gave.
+    - `preview`: A first certified tile, which the search is going to improve on.
     """
 
     name: str
@@ -67,24 +64,6 @@ class Task:
     per_class: int = 1
     force: bool = False
 
-    @classmethod
-    def checked(
-        cls,
-        target: Target,
-        method: SearchMethod | None,
-        emphasis: Emphasis | None,
-        pins: Pins | None,
-        per_class: int,
-        force: bool,
-    ) -> Task:
-        """Return the task, with what its method needs imported."""
-        instance(target, Target, "the target", HOW)
-        if pins is not None:
-            instance(pins, Pins, "pins", "Pins.read and Pins.at make one")
-        method = _checked(method, pins)
-        method.load()
-        return cls(Goal(target, emphasis, pins), method, per_class, force)
-
 
 def fit_tile(
     target: Target,
@@ -99,18 +78,10 @@ def fit_tile(
 ) -> Fit:
     """Fit tiles of one class to a target, in this process; `certified_tiles` makes polygons of them.
 
-    `escherize` does both, for several classes. This is for those who look at, or go on with, what was
-    fitted: `Fit.model` is a `TileModel`, a torch module whose candidates may be trained on.
-
-    Args:
-        target: the silhouette.
-        kind: the class, or its name.
-        method: how to search; default `LikenessSearch`.
-        emphasis: what must survive; the occupancy method takes no notice.
-        pins: what must not bend, in the search for likeness.
-        per_class: certified tiles that are wanted.
-        progress: told the share of the work done, and the loss.
-        cancel: looked at before each step.
+    `escherize` does both, for several classes. This is for those who look at, or go on with, what
+    was fitted: `Fit.model` is a `TileModel`, a torch module whose candidates may be trained on.
+    Arguments are as in `search_classes`; `progress` is called with the share of the work done, and
+    the loss.
 
     Raises:
         OrbiflowError: for an argument that cannot be used.
@@ -124,31 +95,36 @@ def fit_tile(
     >>> best.name, best.certificate.valid
     ('IH4', True)
     """
-    instance(target, Target, "the target", HOW)
-    method = _checked(method, pins)
-    method.load()
+    task = _task(target, method, emphasis, pins, per_class)
     with one_thread():
-        return method.fit(
-            Goal(target, emphasis, pins),
-            isohedral_class(kind),
-            per_class=per_class,
-            progress=progress,
-            cancel=cancel,
+        return task.method.fit(
+            task.goal, isohedral_class(kind), per_class=per_class, progress=progress, cancel=cancel
         )
 
 
-def _checked(method: SearchMethod | None, pins: Pins | None) -> SearchMethod:
-    """Return the method, by default a search for likeness of normal effort."""
+def _task(
+    target: Target,
+    method: SearchMethod | None,
+    emphasis: Emphasis | None,
+    pins: Pins | None,
+    per_class: int = 1,
+    force: bool = False,
+) -> Task:
+    """Return the task, checked, by default for likeness, with what its method needs imported."""
+    instance(target, Target, "the target", HOW)
     if method is None:
-        return LikenessSearch.for_effort("normal")
+        method = LikenessSearch.for_effort("normal")
     if not is_a(method, SearchMethod):
         raise OrbiflowError(
             f"the method must be a search such as LikenessSearch(), got {described(method)}; for a "
             'level of effort: LikenessSearch.for_effort("fast")'
         )
-    if pins is not None and not method.takes_pins:
-        raise OrbiflowError("pins belong to the search for likeness, where silhouettes bend")
-    return method
+    if pins is not None:
+        instance(pins, Pins, "pins", "Pins.read and Pins.at make one")
+        if not method.takes_pins:
+            raise OrbiflowError("pins belong to the search for likeness, where silhouettes bend")
+    method.load()
+    return Task(Goal(target, emphasis, pins), method, per_class, force)
 
 
 def search_classes(
@@ -164,51 +140,53 @@ def search_classes(
     watch: Watcher | None = None,
     cancel: Cancel | None = None,
 ) -> tuple[list[EscherTile], list[ClassFailure]]:
-    """Fit a tile of each class to the target, with knobs of one's own; see `escherize`.
+    """Fit a tile of each class to the target, with a method and events of one's own; see `escherize`.
 
     Args:
-        target: the silhouette.
-        classes: name of one, such as "IH4", or several; each is done once, in its own process.
-        method: how to search: for likeness (`LikenessSearch`, the default), for overlap
-            (`OverlapSearch`), for both (`BothSearch`), or by the paper's method (`OccupancySearch`).
-        emphasis: what must survive.
-        pins: what must not bend, in the search for likeness.
-        per_class: tiles of each class at most, no two of them with a mutual IoU of .9; in a search
+        target: The silhouette.
+        classes: The name of one, such as "IH4", or several; each is done once, in its own process.
+        method: How to search. Default: `LikenessSearch` of normal effort.
+        emphasis: What must survive; the occupancy method takes no notice.
+        pins: What must not bend, in the search for likeness.
+        per_class: Tiles of each class at most, no two of them with a mutual IoU of .9; in a search
             for both, those of either kind that it chooses from, at least three.
-        workers: processes; 1 stays in this process. A script that asks for more must do its work
+        workers: Processes; 1 stays in this process. A script that asks for more must do its work
             under `if __name__ == "__main__":`, as always with multiprocessing.
-        force: return tiles that are not certified, too; their certificates say why.
-        watch: called in this thread with every `Event`, in the order that `Event` states. What it
-            raises ends the search and comes out of this function; so does `KeyboardInterrupt`.
-        cancel: ends the search early, from another thread, a signal handler or `watch`; looked at
-            before each step of every fit.
+        force: Return tiles that are not certified, too; their certificates say why.
+        watch: Called in this thread with every `Event`. What it raises ends the search and comes out
+            of this function; so does `KeyboardInterrupt`.
+        cancel: Ends the search early; looked at before each step of every fit.
 
     Returns:
-        Certified tiles, best first (`EscherTile.score`), and the classes that gave none. Of
-        `BothSearch` at most twelve tiles in all, those for likeness first: see `front_list`. The
-        same seed gives the same tiles, whatever the number of workers. If it was cancelled: what was
-        found by then, and the other classes as failures with the reason `INTERRUPTED`.
+        Certified tiles, best first, and the classes that gave none, with the reason `INTERRUPTED` for
+        those that were not finished. Of `BothSearch` at most twelve tiles in all, those for likeness
+        first. The same seed gives the same tiles, whatever the number of workers.
 
     Raises:
         OrbiflowError: for an unknown class, a setting out of range, or workers that die.
     """
-    names = _names(classes)
+    names = class_list(classes)
     if not names:
         raise OrbiflowError(f"no isohedral class was given; the nine are {', '.join(CLASSES)}")
     for what, number in (("workers", workers), ("per_class", per_class)):
         if number < 1:
             raise OrbiflowError(f"{what} must be at least 1, got {number}")
-    task = Task.checked(target, method, emphasis, pins, per_class, force)
+    task = _task(target, method, emphasis, pins, per_class, force)
     cancel = cancel or Cancel()
-    teller = _Teller(watch)
+    teller = _Teller(watch or (lambda _event: None))
     count = min(workers, len(names))
     # asked before torch is limited here: a limit makes no fork safe
     preload = ("orbiflow.tiles.search.searching", *task.method.modules)
     context = process_context(preload) if count > 1 else None
     with contextlib.suppress(Cancelled):
-        _preview(task, names, teller.tell, cancel)
+        with one_thread():
+            first = task.method.preview(task.goal, names, cancel)
+        if first is not None:
+            teller.tell(Event(first.name, 0.0, 1 - first.metrics.iou, preview=first))
         if context is None:
-            _run_here(task, names, teller.tell, cancel)
+            for name in names:
+                cancel.check()
+                teller.tell(_finished(_work_on(task, name, teller.tell, cancel)))
         else:
             with contextlib.closing(_run_pool(task, names, count, context, cancel)) as found:
                 for event in found:
@@ -218,7 +196,8 @@ def search_classes(
     return task.method.short_list(results), failures
 
 
-def _names(classes: ClassName | Iterable[ClassName]) -> list[str]:
+def class_list(classes: ClassName | Iterable[ClassName]) -> list[str]:
+    """Return the names of classes, each once."""
     if isinstance(classes, str | int | IsohedralClass):
         classes = [classes]
     if not is_a(classes, Iterable):
@@ -245,15 +224,15 @@ def escherize_class(
     Raises:
         Cancelled: if it was told to stop.
     """
-    task = Task.checked(target, method, emphasis, pins, per_class, force)
-    return _work_on(task, name, watch or _ignore, cancel or Cancel())
+    task = _task(target, method, emphasis, pins, per_class, force)
+    return _work_on(task, name, watch or (lambda _event: None), cancel or Cancel())
 
 
 class _Teller:
     """Keeps what was found, and the order of events."""
 
-    def __init__(self, watch: Watcher | None) -> None:
-        self.watch = watch or _ignore
+    def __init__(self, watch: Watcher) -> None:
+        self.watch = watch
         self.shares: dict[str, float] = {}
         self.outcomes: dict[str, Outcome] = {}
         self.preview: EscherTile | None = None
@@ -341,26 +320,8 @@ def _without_twins(tiles: Sequence[EscherTile], count: int) -> list[int]:
     return [sound[k] for k in chosen] or [0]
 
 
-def _preview(task: Task, names: Sequence[str], watch: Watcher, cancel: Cancel) -> None:
-    """A first tile to look at, while the others are on their way."""
-    with one_thread():
-        tile = task.method.preview(task.goal, names, cancel)
-    if tile is not None:
-        watch(Event(tile.name, 0.0, 1 - tile.metrics.iou, preview=tile))
-
-
-def _ignore(_event: Event) -> None:
-    """Nobody watches."""
-
-
 def _finished(outcome: Outcome) -> Event:
     return Event(outcome.name, 1.0, float("nan"), outcome)
-
-
-def _run_here(task: Task, names: Sequence[str], watch: Watcher, cancel: Cancel) -> None:
-    for name in names:
-        cancel.check()
-        watch(_finished(_work_on(task, name, watch, cancel)))
 
 
 def _run_pool(

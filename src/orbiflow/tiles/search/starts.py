@@ -24,23 +24,20 @@ from orbiflow.symmetry import (
     rotation,
     rotation_matrix,
 )
-from orbiflow.tiles.geometry import resampled, reverse, subdivided
+from orbiflow.tiles.geometry import plane_points, resampled, reverse, subdivided
 from orbiflow.tiles.likeness import boundary_iou, prepared_region
+from orbiflow.tiles.search.candidates import Prototiles
 from orbiflow.tiles.search.placements import Placements, best_placements
-from orbiflow.tiles.search.prototiles import Prototiles
 from orbiflow.tiles.search.tile_space import NearestTiles, nearest_tiles
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import EdgeIdentification, IsohedralClass, isohedral_class
 
 
 def template_symmetries(isohedral_class: IsohedralClass) -> tuple[int, bool]:
-    """Rotations and reflections of the template that also leave its group alone.
+    """Return how many rotations of the template keep its group, and whether a mirror does.
 
-    Two starts that differ by such a map give the same tiles.
-
-    Returns:
-        The order of the rotations, and whether there is a reflection (then mirrored targets need
-        no starts of their own).
+    Two starts that differ by such a map give the same tiles: with a mirror, mirrored targets need
+    none.
     """
     vertices = isohedral_class.template()
     group = isohedral_class.group()
@@ -76,23 +73,18 @@ def _keeps(isometry: Isometry, vertices: Array, group: CrystallographicGroup) ->
     )
 
 
+# Starts differ by this share of the outline in where some corner sits, or they are twins
 APART = 0.025
-"""Starts differ by this share of the outline in where some corner sits, or they are twins."""
-
+# Standard deviations, in points, of the smoothing of outlines whose nearest tile crosses itself
 SMOOTHING = (0.0, 1.0, 2.0)
-"""Standard deviations, in points, of the smoothing of outlines whose nearest tile crosses itself."""
 
 
 @dataclass(frozen=True)
 class Starts:
-    """The best starts of a search.
+    """The best starts of a search."""
 
-    - `prototiles`: best overlap first.
-    - `iou`: (S,) of each before the descent.
-    """
-
-    prototiles: Prototiles
-    iou: Array
+    prototiles: Prototiles  # best overlap first
+    iou: Array  # (S,) of each before the descent
 
 
 def outline_starts(
@@ -107,22 +99,11 @@ def outline_starts(
     phase: float = 0.0,
     cancel: Cancel | None = None,
 ) -> Starts:
-    """The best start tiles of one class for a target, no two of them twins.
+    """Return the best start tiles of one class for a target, no two of them twins.
 
-    Args:
-        target: the silhouette.
-        kind: the class.
-        count: how many at most; fewer if the rest cross themselves.
-        resolutions: points of the outline, several for the sake of thin limbs: the fewer, the
-            smoother the start. Each divides `vertices`.
-        projected: placements projected at each resolution.
-        measured: of these, the nearest tiles whose overlap is measured.
-        vertices: of every start tile.
-        phase: of the points along the outline, in spacings; what a seed changes.
-        cancel: looked at before each resolution.
-
-    Raises:
-        Cancelled: if it was told to stop.
+    At each of the `resolutions`, points of the outline that divide `vertices`, so many placements
+    are `projected` onto tiles and the nearest `measured`: several for the sake of thin limbs, for
+    the fewer, the smoother the start. A seed changes `phase`, the place of the points in spacings.
     """
     kind = isohedral_class(kind)
     instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
@@ -157,15 +138,11 @@ def template_starts(
     vertices: int = 240,
     phase: float = 0.0,
 ) -> Prototiles:
-    """The template itself, turned and stretched: starts that know nothing of the target.
+    """Return the template itself, turned and stretched: starts that know nothing of the target.
 
-    Args:
-        kind: the class.
-        turns: angles, over the range in which the template does not look the same; twice as many
-            for classes without lattice freedom.
-        stretch: size of the starting stretches along each axis of the lattice freedom, besides none.
-        vertices: of every start tile, a multiple of the template's.
-        phase: of the angles, in steps.
+    There are so many `turns`, over the range in which the template does not look the same, twice as
+    many for classes without lattice freedom; and stretches of size `stretch` along each axis of
+    that freedom, besides none. `phase` moves the angles, in steps.
     """
     kind = isohedral_class(kind)
     order, symmetric = template_symmetries(kind)
@@ -234,8 +211,13 @@ def _simple_tiles(
     for spread in SMOOTHING:
         if not len(placements.starts) or wanted < 1:
             return
-        tiles = nearest_tiles(kind, _smoothed(outline, spread), placements)
-        rings = np.stack([tiles.vertices.real, tiles.vertices.imag], axis=-1)
+        smooth = outline
+        if spread:
+            parts = (outline.real, outline.imag)
+            x, y = (np.asarray(gaussian_filter1d(z, spread, mode="wrap")) for z in parts)
+            smooth = (x + 1j * y).astype(np.complex128)
+        tiles = nearest_tiles(kind, smooth, placements)
+        rings = plane_points(tiles.vertices)
         valid = np.asarray(shapely.is_valid(shapely.polygons(rings)))
         simple = valid & (np.linalg.det(tiles.linear) > 1e-6)
         nearest = np.argsort(tiles.distance, kind="stable")
@@ -243,16 +225,6 @@ def _simple_tiles(
         yield tiles.take(chosen), placements.take(chosen), boundary_iou(goal, rings[chosen])
         wanted -= len(chosen)
         placements = placements.take(np.flatnonzero(~simple))
-
-
-def _smoothed(outline: Complex, spread: float) -> Complex:
-    if spread == 0.0:
-        return outline
-    x, y = (
-        np.asarray(gaussian_filter1d(part, spread, mode="wrap"))
-        for part in (outline.real, outline.imag)
-    )
-    return (x + 1j * y).astype(np.complex128)
 
 
 def _apart(scores: Array, places: Array, mirrored: NDArray[np.bool_], count: int) -> list[int]:

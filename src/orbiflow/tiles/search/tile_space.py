@@ -1,10 +1,10 @@
 """The polygons of a class that tile, as a linear space: for every placement of the corners, at once.
 
-With the corners placed and the glide axes' turn given, a vertex of a tile is free, or the image of a
-free one, or fixed by the group; images and fixed points depend linearly on the group's position and
-lattice. So the tiles of a class with n vertices form a real linear space (the idea of EST: Koizumi
-and Sugihara, Maximum Eigenvalue Problem for Escherization, 2011; Nagata and Imahori, 2020). Points
-are complex numbers x + iy throughout.
+With the corners placed and the glide axes' turn given, a vertex of a tile is free, or the image of
+a free one, or fixed by the group; images and fixed points depend linearly on the group's position
+and lattice. So the tiles of a class with n vertices form a real linear space (the idea of EST:
+Koizumi and Sugihara, Maximum Eigenvalue Problem for Escherization, 2011; Nagata and Imahori, 2020).
+Points are complex numbers x + iy throughout.
 """
 
 from __future__ import annotations
@@ -24,29 +24,18 @@ from orbiflow.tiles.tilings import IsohedralClass
 class NearestTiles(NamedTuple):
     """C tiles, each the nearest to an outline under its placement.
 
-    - `vertices`: (C, n) x + iy, vertex i near point `start + i` of the outline.
-    - `linear`, `offset`: (C, 2, 2) and (C, 2), the map from the group's own frame.
-    - `corners`: (C, K) vertices at the template's corners.
-    - `distance`: (C,) sum of squared distances.
-
     A tile may cross itself, and `linear` may reverse orientation: then it is of no use.
     """
 
-    vertices: Complex
-    linear: Array
+    vertices: Complex  # (C, n) x + iy, vertex i near point `start + i` of the outline
+    linear: Array  # with `offset`: (C, 2, 2) and (C, 2), the map from the group's own frame
     offset: Array
-    corners: Integers
-    distance: Array
+    corners: Integers  # (C, K) vertices at the template's corners
+    distance: Array  # (C,) sum of squared distances
 
     def take(self, index: Integers) -> NearestTiles:
         """Those at `index`."""
-        return NearestTiles(
-            self.vertices[index],
-            self.linear[index],
-            self.offset[index],
-            self.corners[index],
-            self.distance[index],
-        )
+        return self._make(part[index] for part in self)
 
 
 class TileSpace:
@@ -55,30 +44,20 @@ class TileSpace:
     Args:
         kind: the class.
         placements: C of them, all of n steps; `turns` is the direction of the glide axes.
-        weights: (n,) positive weights of the outline's points; default 1.
     """
 
-    def __init__(
-        self, kind: IsohedralClass, placements: Placements, weights: Array | None = None
-    ) -> None:
+    def __init__(self, kind: IsohedralClass, placements: Placements) -> None:
         self.kind, self.placements = kind, placements
         self.count, self.size = len(placements.starts), int(placements.lengths[0].sum())
         self._orbits = _Orbits(kind, placements.lengths)
+        self.corners = self._orbits.corners  # (C, K) vertices at the template's corners
         self.order = (np.arange(self.size) + placements.starts[:, None]) % self.size
         """(C, n): the outline's point at each vertex."""
         self._place = np.argsort(self.order, axis=1)
-        self._weight = None if weights is None else np.asarray(weights, float)[self.order]
         flat = self._orbits.source + np.arange(self.count)[:, None] * self.size
         self._flat = flat.ravel()
-        ones = None if self._weight is None else self._weight.ravel()
-        self._total = np.bincount(self._flat, ones, minlength=flat.size)
-        self._total[self._total == 0] = 1.0
+        self._total = np.maximum(np.bincount(self._flat, minlength=flat.size), 1).astype(float)
         self.turn(placements.turns)
-
-    @property
-    def corners(self) -> Integers:
-        """(C, K) vertices at the template's corners."""
-        return self._orbits.corners
 
     @property
     def glides(self) -> bool:
@@ -95,14 +74,12 @@ class TileSpace:
         pulled = _unturn(self._factor, orbits.flips, self._columns)
         self._means = self._orbit_means(pulled)
         self._basis = self._residual(pulled, self._means)
-        weighted = np.conj(self._basis)
-        if self._weight is not None:
-            weighted = self._weight[..., None] * weighted
-        matrix = np.real(np.swapaxes(weighted, 1, 2) @ self._basis)
+        adjoint = np.swapaxes(np.conj(self._basis), 1, 2)
+        matrix = np.real(adjoint @ self._basis)
         # IH1 does not care about the offset: the least solution
         size = matrix.shape[-1]
         ridge = 1e-10 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(size)
-        self._solve: Complex = np.linalg.inv(matrix + ridge) @ np.swapaxes(weighted, 1, 2)
+        self._solve: Complex = np.linalg.inv(matrix + ridge) @ adjoint
 
     def best_turns(self, outlines: Complex) -> Array:
         """(C,) directions of the glide axes that suit the outlines (C, n) best; 0 without glides."""
@@ -135,13 +112,12 @@ class TileSpace:
         image = _turn(self._factor, orbits.flips, np.take_along_axis(free, orbits.source, axis=1))
         moved = (self._columns @ solution[..., None])[..., 0]
         vertices = np.where(orbits.fixed, 0, image) + moved
-        weight = 1.0 if self._weight is None else self._weight
         return NearestTiles(
             vertices,
             _linear(self.kind, solution[:, 2:], self.turns),
             solution[:, :2],
             self.corners,
-            (weight * abs(left) ** 2).sum(axis=1),
+            (abs(left) ** 2).sum(axis=1),
         )
 
     def in_order(self, vertices: Complex) -> Complex:
@@ -181,13 +157,12 @@ class TileSpace:
         return np.where(self._orbits.fixed[..., None], pulled, pulled - at_source)
 
     def _orbit_means(self, values: Complex) -> Complex:
-        """Weighted means of values (C, n, m) over each orbit, at its free vertex."""
+        """Means of values (C, n, m) over each orbit, at its free vertex."""
         count, n, m = values.shape
         means: Complex = np.empty((count * n, m), dtype=complex)
         for column in range(m):
-            part = values[..., column]
-            weighted = (part if self._weight is None else part * self._weight).ravel()
-            for own, sums in ((weighted.real, means.real), (weighted.imag, means.imag)):
+            part = values[..., column].ravel()
+            for own, sums in ((part.real, means.real), (part.imag, means.imag)):
                 sums[:, column] = np.bincount(self._flat, own, minlength=count * n) / self._total
         return means.reshape(count, n, m)
 
@@ -209,15 +184,9 @@ class _Element(NamedTuple):
         )
 
 
-class _Layout(NamedTuple):
-    """What a class identifies, in complex numbers: of each edge pair and of each corner."""
-
-    edges: tuple[_Element, ...]
-    corners: tuple[tuple[int, _Element], ...]  # first corner of the orbit; -1: a fixed point
-
-
 @lru_cache(maxsize=16)
-def _layout(kind: IsohedralClass) -> _Layout:
+def _layout(kind: IsohedralClass) -> tuple[tuple[_Element, ...], tuple[tuple[int, _Element], ...]]:
+    """The elements of edge pairs; of each corner its orbit's first corner (-1: fixed), and how."""
     group, vertices = kind.group(), kind.template()
     corners: list[tuple[int, _Element]] = []
     for k, vertex in enumerate(vertices):
@@ -230,7 +199,7 @@ def _layout(kind: IsohedralClass) -> _Layout:
                 corners.append((first, _Element.of(images[0])))
                 break
     edges = tuple(_Element.of(pair.isometry) for pair in kind.identified_edges)
-    return _Layout(edges, tuple(corners))
+    return edges, tuple(corners)
 
 
 class _Orbits:
@@ -238,7 +207,7 @@ class _Orbits:
 
     def __init__(self, kind: IsohedralClass, lengths: Integers) -> None:
         count, n = len(lengths), int(lengths[0].sum())
-        layout = _layout(kind)
+        edges, corners = _layout(kind)
         self.corners = np.cumsum(lengths, axis=1) - lengths
         self.source = np.tile(np.arange(n), (count, 1))
         self.factor = np.ones((count, n), dtype=complex)
@@ -246,7 +215,7 @@ class _Orbits:
         self.shift = np.zeros((count, n), dtype=complex)
         self.fixed = np.zeros((count, n), dtype=bool)
         vertices = kind.template() @ [1, 1j]
-        for pair, element in zip(kind.identified_edges, layout.edges, strict=True):
+        for pair, element in zip(kind.identified_edges, edges, strict=True):
             middle = (vertices[pair.first] + vertices[(pair.first + 1) % len(vertices)]) / 2
             own = self.corners[:, [pair.first]]
             other = self.corners[:, [pair.second]]
@@ -260,7 +229,7 @@ class _Orbits:
                 mate = other + (length - j if pair.reversed else j)
                 self._map(j < length, mate, own + j, element)
         rows = np.arange(count)
-        for k, (first, element) in enumerate(layout.corners):
+        for k, (first, element) in enumerate(corners):
             if first < 0:
                 self._fix(rows, self.corners[:, k], element.shift)
             else:
@@ -322,24 +291,14 @@ def _unturn(factor: Complex, flips: NDArray[np.bool_], z: Complex) -> Complex:
     )
 
 
-CHUNK = 4000
-"""Placements worked on at a time: bounds the memory at some hundred MB."""
+CHUNK = 4000  # placements worked on at a time: bounds the memory at some hundred MB
 
 
-def nearest_tiles(
-    kind: IsohedralClass, outline: Complex, placements: Placements, weights: Array | None = None
-) -> NearestTiles:
-    """Project an outline onto the tiles of a class, for every placement (see `tile_space`).
-
-    Args:
-        kind: the isohedral class.
-        outline: (n,) points x + iy, counter-clockwise.
-        placements: C of them, of this class and n.
-        weights: (n,) positive weights of the points; default 1.
-    """
+def nearest_tiles(kind: IsohedralClass, outline: Complex, placements: Placements) -> NearestTiles:
+    """Project an outline (n,), counter-clockwise, onto the tiles of a class for every placement."""
     found: list[NearestTiles] = []
     pieces = max(1, -(-len(placements.starts) // CHUNK))
     for index in np.array_split(np.arange(len(placements.starts)), pieces):
-        space = TileSpace(kind, placements.take(index), weights)
+        space = TileSpace(kind, placements.take(index))
         found.append(space.nearest(np.broadcast_to(outline, (space.count, len(outline)))))
     return NearestTiles(*(np.concatenate(parts) for parts in zip(*found, strict=True)))

@@ -31,11 +31,11 @@ MAX_SHARPENINGS = 30  # the largest number of times that the penalty on folds is
 class Bending:
     """A map of the plane that takes a triangulated silhouette to its tile, affine on each triangle.
 
-    Both sides are in the target's normal form. The image's outline is the tile's polygon, vertex for
-    vertex, and no triangle is turned over, so that inside the silhouette the map is a homeomorphism
-    onto the tile. A point outside goes with the nearest point of the silhouette, and the rest of its
-    way under the similarity nearest to the whole map: continuous across the outline, meant for what
-    lies close to it.
+    Both sides are in the target's normal form. The image's outline is the tile's polygon, vertex
+    for vertex, and no triangle is turned over, so that inside the silhouette the map is a
+    homeomorphism onto the tile. A point outside goes with the nearest point of the silhouette, and
+    the rest of its way under the similarity nearest to the whole map: continuous across the
+    outline, meant for what lies close to it.
 
     Args:
         rest: (N, 2) points of the silhouette.

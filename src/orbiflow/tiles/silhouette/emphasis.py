@@ -74,13 +74,14 @@ class Emphasis:
     def read(cls, path: str | Path, target: Target, *, strength: float = 4.0) -> Self:
         """Read a mask (PNG, JPEG, WebP) painted over the picture that `target` was read from.
 
-        White is fully emphasised and black not at all. If some of the mask is more transparent than the
-        rest, opaque is emphasised, in any colour. The mask covers the picture of an image, the page
-        (viewBox) of an SVG drawing, or else the outline's bounding box, and must have its aspect
-        within 1%. Its edges are smoothed by 1/50 of the square root of the silhouette's area.
+        White is fully emphasised and black not at all. If some of the mask is more transparent than
+        the rest, opaque is emphasised, in any colour. The mask covers the picture of an image, the
+        page (viewBox) of an SVG drawing, or else the outline's bounding box, and must have its
+        aspect within 1%. Its edges are smoothed by 1/50 of the square root of the silhouette's
+        area.
 
-        Raises `InputFileError` for a file over 64 MB or 40 megapixels, one that is damaged or not an
-        image, a mask of another aspect, a uniform mask, and one that emphasises no part of the
+        Raises `InputFileError` for a file over 64 MB or 40 megapixels, one that is damaged or not
+        an image, a mask of another aspect, a uniform mask, and one that emphasises no part of the
         silhouette; `OrbiflowError` for a strength that is not above 1 and at most 100.
         """
         instance(target, Target, "the target", "Target.read and Target.from_polygon make one")

@@ -37,8 +37,8 @@ def clean_ring(
 ) -> tuple[Array, list[str]]:
     """Check that `points` (N, 2) bound a region, and drop repeated vertices.
 
-    Returns the ring and a note, in plain words, of what was dropped. Each message begins with `where`,
-    such as a file name.
+    Returns the ring and a note, in plain words, of what was dropped. Each message begins with
+    `where`, such as a file name.
 
     Raises `error` when a coordinate is not a finite number, when fewer than 3 or more than 100,000
     vertices are given, when no area is enclosed, or when the polygon crosses or touches itself.

@@ -56,8 +56,9 @@ class Pins:
     def at(cls, target: Target, spots: Iterable[ArrayLike], *, keep_angle: bool = False) -> Self:
         """Return pins at spots (x, y) or (x, y, radius), all in the input's units.
 
-        The default radius of a spot is 8% of the longer side of the silhouette's bounding box, or 1.5
-        times its distance from the outline if that is more, so that it holds some of the outline.
+        The default radius of a spot is 8% of the longer side of the silhouette's bounding box, or
+        1.5 times its distance from the outline if that is more, so that it holds some of the
+        outline.
 
         Raises `OrbiflowError` for an invalid spot, a radius that is not positive, a spot that does
         not reach the silhouette, no spot, and spots that hold nine tenths of the outline.
@@ -68,8 +69,8 @@ class Pins:
     def read(cls, given: Iterable[str | Path], target: Target, *, keep_angle: bool = False) -> Self:
         """Return pins from text: spots "x,y" or "x,y,radius", or paths of masks, white where pinned.
 
-        A mask covers the same as in `Emphasis.read`: the picture, the drawing's page, or the outline's
-        bounding box.
+        A mask covers the same as in `Emphasis.read`: the picture, the drawing's page, or the
+        outline's bounding box.
 
         Raises:
             InputFileError: for masks that cannot be read or do not touch the silhouette.

@@ -74,8 +74,8 @@ class SoftTarget:
     def weighted_iou(self, rings: Tensor) -> Tensor:
         """Return the IoU (S,) of counter-clockwise rings (S, N, 2) with the target, weighted.
 
-        The areas are weighted by the emphasis. By Green's theorem they are integrals over the rings of
-        the weights' integral along x, accurate to a pixel of the image.
+        The areas are weighted by the emphasis. By Green's theorem they are integrals over the rings
+        of the weights' integral along x, accurate to a pixel of the image.
         """
         if self._integrals is None:
             self._integrals = self._integrate()

@@ -157,7 +157,8 @@ def _pair(values: Any, name: str) -> tuple[float, float]:
 class Target:
     """A silhouette: one simple closed curve.
 
-    Create one with `Target.read`, `from_bytes`, `from_mask` or `from_polygon`, which check the outline.
+    Create one with `Target.read`, `from_bytes`, `from_mask` or `from_polygon`, which check the
+    outline.
 
     - `outline`: The vertices (N, 2), without a repeated last one, in the input's own units. In an image
       the unit is the pixel and (0, 0) the image's top left corner, so that pixel (row 0, column 0)
@@ -199,9 +200,9 @@ class Target:
     ) -> Self:
         """Read a silhouette from an image (PNG, JPEG, WebP), an SVG, a `.json` or a `.dat` file.
 
-        A binary stream, such as an open file or `io.BytesIO`, is read from its present position. For
-        images, `threshold` (0 to 1) is the level that separates the shape from its background, and
-        `invert` says that the shape is the light (or the transparent) part. By default both are
+        A binary stream, such as an open file or `io.BytesIO`, is read from its present position.
+        For images, `threshold` (0 to 1) is the level that separates the shape from its background,
+        and `invert` says that the shape is the light (or the transparent) part. By default both are
         detected, and `notes` report the result.
 
         Raises `InputFileError` for a file without a usable silhouette, with what to do about it.
@@ -241,9 +242,9 @@ class Target:
     ) -> Self:
         """Return the largest shape in an array (H, W), a row of pixels at a time, the first on top.
 
-        Booleans, and integers that are only 0 and 1, are true in the shape (with `invert`, outside).
-        Other integers and floats are gray levels, from 0 to 255, 65535 or 1, and are read like those of
-        images: by default `threshold` and `invert` are detected.
+        Booleans, and integers that are only 0 and 1, are true in the shape (with `invert`,
+        outside). Other integers and floats are gray levels, from 0 to 255, 65535 or 1, and are read
+        like those of images: by default `threshold` and `invert` are detected.
 
         Raises `OrbiflowError` for another array, and `InputFileError` for one without a shape.
 

@@ -39,9 +39,9 @@ _MARGIN = 0.05  # width of the ring around the tile that must be covered; any po
 class Certificate:
     """The result of `certify`.
 
-    Lengths are in square roots of the expected area, areas relative to it. Figures that could not be
-    computed are NaN. With several prototiles each figure is the worst one, and areas are means over the
-    tiles.
+    Lengths are in square roots of the expected area, areas relative to it. Figures that could not
+    be computed are NaN. With several prototiles each figure is the worst one, and areas are means
+    over the tiles.
 
     Args:
         simple: Whether the polygon does not cross or touch itself.
@@ -106,19 +106,19 @@ def certify(tile: Tiles, *, tolerance: float = 1e-9) -> Certificate:
     """Check that the tiles of a tiling cover the plane once (design points 9 and 16).
 
     Proof. The tiles are the images g(T_k), one for each coset of the stabiliser S_k. Orient all of
-    them alike and let n(x) be the number of tiles that contain x; n is invariant under the group and
-    constant off the boundaries. Suppose that each boundary segment is the reverse of an image of its
-    partner, and that partners are evenly distributed (`boundaries_cancel`). As an invariant chain, the
-    sum of all boundaries then equals minus itself, so it vanishes: n does not jump across any segment
-    and is constant. Its mean over a lattice cell is sum_k area(T_k) |G| / |S_k| over |det B|. If that
-    is one, n = 1: with the T_k simple, the tiles cover the plane once. This uses no class table, only
-    polygons and group.
+    them alike and let n(x) be the number of tiles that contain x; n is invariant under the group
+    and constant off the boundaries. Suppose that each boundary segment is the reverse of an image
+    of its partner, and that partners are evenly distributed (`boundaries_cancel`). As an invariant
+    chain, the sum of all boundaries then equals minus itself, so it vanishes: n does not jump
+    across any segment and is constant. Its mean over a lattice cell is sum_k area(T_k) |G| / |S_k|
+    over |det B|. If that is one, n = 1: with the T_k simple, the tiles cover the plane once. This
+    uses no class table, only polygons and group.
 
     When partner edges are the same curves with different vertices (bricks laid in half bond, say),
     no such pairing exists. Then boundaries must lie within tolerance of the other tiles' boundaries
-    as curves, and the proof rests on the areas alone: no tile overlaps a prototile, and a ring around
-    each prototile is covered, so the covered set is open and closed. Both areas are also computed, as
-    an independent check, when the segments match.
+    as curves, and the proof rests on the areas alone: no tile overlaps a prototile, and a ring
+    around each prototile is covered, so the covered set is open and closed. Both areas are also
+    computed, as an independent check, when the segments match.
 
     Args:
         tile: A tile or a tiling, of any scale and position; double precision cannot hold the default

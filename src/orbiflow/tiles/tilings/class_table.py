@@ -43,8 +43,8 @@ OperatorRow: TypeAlias = RotationRow | TransflectionRow
 class ClassRow(NamedTuple):
     """A row of the table.
 
-    Operators are in the order in which the paper nests them, outermost first. Edges are identified in
-    pairs, equal where an edge is its own partner; the group has the isometry.
+    Operators are in the order in which the paper nests them, outermost first. Edges are identified
+    in pairs, equal where an edge is its own partner; the group has the isometry.
     """
 
     group: str

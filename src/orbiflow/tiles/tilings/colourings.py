@@ -19,8 +19,8 @@ def colour_graph(graph: Graph, count: int, *, max_steps: int = 4000) -> list[int
     """Return a proper colouring with colours 0 ... count - 1, or None.
 
     Backtracking in the order of saturation (Brélaz, "New methods to color the vertices of a graph",
-    CACM 22, 1979). None means that there is none, or that none was found in `max_steps` assignments;
-    with more colours than the largest degree it is always found, without backtracking.
+    CACM 22, 1979). None means that there is none, or that none was found in `max_steps`
+    assignments; with more colours than the largest degree it is always found, without backtracking.
 
     >>> colour_graph([{1, 2}, {0, 2}, {0, 1}], 3)
     [0, 1, 2]

@@ -116,9 +116,9 @@ _ROUNDING_ERROR = 1e-9
 def commutant(linear_parts: Array) -> Array:
     """Return an orthonormal basis (m, 2) of the (a, b) whose [[a, b], [b, -a]] commutes with a group.
 
-    The mean over the group projects on them: R X R^T turns (a, b) as R turns directions, twice as far.
-    The basis is made by Gram-Schmidt in the order a, b, so that it depends only on the group; saved
-    parameters are coordinates in it.
+    The mean over the group projects on them: R X R^T turns (a, b) as R turns directions, twice as
+    far. The basis is made by Gram-Schmidt in the order a, b, so that it depends only on the group;
+    saved parameters are coordinates in it.
 
     >>> commutant(np.array([np.eye(2), np.diag([1.0, -1.0])])).tolist()
     [[1.0, 0.0]]

@@ -165,9 +165,9 @@ def boundaries_cancel(
 
     The boundary of all tiles together is, per orbit of the group, the sum of [e] / |S_k| over the
     segments e of each T_k. If e is the reverse of an image of its partner, it is also minus the sum
-    of [partner of e] / |S_k|. The two agree if every segment, modulo the stabiliser of its prototile,
-    is a partner as often as it occurs, counted so; then the sum is its own negative. With one
-    prototile and no stabiliser: if the partners are a permutation.
+    of [partner of e] / |S_k|. The two agree if every segment, modulo the stabiliser of its
+    prototile, is a partner as often as it occurs, counted so; then the sum is its own negative.
+    With one prototile and no stabiliser: if the partners are a permutation.
     """
     sizes = np.array([len(a.ring) for a in around])
     first: Integers = np.cumsum(sizes) - sizes
@@ -203,7 +203,8 @@ def curve_distance(around: Surroundings) -> float:
     """Return the largest distance of a prototile's vertex to the boundaries of the tiles around.
 
     With the tiles' vertices seen from the prototile being its vertices seen from them, over all
-    prototiles this is the Hausdorff distance between a boundary and the union of the others near it.
+    prototiles this is the Hausdorff distance between a boundary and the union of the others near
+    it.
     """
     if not len(around):
         return float("inf")

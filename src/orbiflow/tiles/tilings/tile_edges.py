@@ -35,8 +35,8 @@ EdgeKind: TypeAlias = Literal["translation", "rotation", "glide", "mirror"]
 class EdgeIdentification(NamedTuple):
     """`isometry` takes edge `first` onto edge `second`, and its tile to the other side of it.
 
-    So across its edge `second` a tile T meets the copy isometry(T'), along that copy's `first`. An edge
-    may be its own partner: turned about its middle, or on a mirror that leaves it in place.
+    So across its edge `second` a tile T meets the copy isometry(T'), along that copy's `first`. An
+    edge may be its own partner: turned about its middle, or on a mirror that leaves it in place.
     """
 
     first: int
@@ -336,8 +336,8 @@ def _links(own: Edges) -> list[list[EdgeImage]]:
 def edge_to_edge(tile: Tiles) -> Tiling:
     """Return the same tiling, with a vertex wherever a neighbour, or the tile's own image, has one.
 
-    Then neighbours have the same vertices on their common boundary. A tiling that is edge to edge keeps
-    its vertices.
+    Then neighbours have the same vertices on their common boundary. A tiling that is edge to edge
+    keeps its vertices.
 
     Args:
         tile: A tile or a tiling.

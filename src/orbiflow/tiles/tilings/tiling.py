@@ -27,8 +27,8 @@ Cell: TypeAlias = tuple[int, int]
 class Aspects:
     """The A tiles of a tiling up to translations: pairs of a prototile and a coset of the lattice.
 
-    Elements that differ by an element of a prototile's stabiliser make the same tile of it; the coset
-    of an aspect is the first of them. With one prototile of no symmetry, aspects are cosets.
+    Elements that differ by an element of a prototile's stabiliser make the same tile of it; the
+    coset of an aspect is the first of them. With one prototile of no symmetry, aspects are cosets.
 
     - `prototiles`, `cosets`: The pairs, (A,) each.
     - `table`: The aspect (K, |G|) of coset i's image of prototile k.
@@ -109,9 +109,9 @@ def coset_and_cell(group: CrystallographicGroup, element: Isometry) -> tuple[int
 class Tiling:
     """Prototiles T_k and a group G in the same coordinates; the tiles are all g(T_k) (design point 16).
 
-    The stabiliser S_k, the elements that take T_k onto itself, is found from the polygon. A `Tiling`
-    need not tile the plane: `certify` checks that. Its tiles cover the plane once if
-    sum_k area(T_k) |G| / |S_k| = |det B| and their boundaries pair off.
+    The stabiliser S_k, the elements that take T_k onto itself, is found from the polygon. A
+    `Tiling` need not tile the plane: `certify` checks that. Its tiles cover the plane once if sum_k
+    area(T_k) |G| / |S_k| = |det B| and their boundaries pair off.
 
     Args:
         group: A group of the plane.
@@ -205,8 +205,8 @@ class Tiling:
 class Tile:
     """A closed polygon with a crystallographic group acting in the same coordinates.
 
-    This is a `Tiling` by one prototile, `tiling`, with its isohedral class. A `Tile` need not tile the
-    plane: `certify` checks that.
+    This is a `Tiling` by one prototile, `tiling`, with its isohedral class. A `Tile` need not tile
+    the plane: `certify` checks that.
 
     Args:
         polygon: The vertices (N, 2) in order, in either orientation, without repeating the first.

@@ -270,9 +270,9 @@ def read_mask_array(
 ) -> Reading:
     """Return the outline of the shape in an array (H, W), in pixels with y down.
 
-    Booleans, and integers that are 0 and 1 alone, say where the shape is; with `invert`, where it is
-    not. Other integers of 8 or 16 bits are gray levels of that full scale, floats of full scale 1:
-    `threshold` and `invert` mean what they do for images (see `read_image`).
+    Booleans, and integers that are 0 and 1 alone, say where the shape is; with `invert`, where it
+    is not. Other integers of 8 or 16 bits are gray levels of that full scale, floats of full scale
+    1: `threshold` and `invert` mean what they do for images (see `read_image`).
 
     Raises:
         OrbiflowError: for another shape or type, levels out of range, or a setting that does not fit.

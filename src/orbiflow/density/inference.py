@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+import numbers
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import torch
+from numpy.typing import ArrayLike
 from torch import Tensor
 
+from orbiflow.arguments import is_a
 from orbiflow.density.arguments import check_kind, float_tensor
-from orbiflow.density.inference.axes import check_torus, given_axes, kept_axes
 from orbiflow.density.models import AdaptiveKernels, Density, Mixture, Split, mixture_of
-from orbiflow.density.spaces import CHART, Torus
+from orbiflow.density.spaces import CHART, Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import fft, listed, special, unique
@@ -151,12 +154,17 @@ def log_prob_observed(density: Density, points: Tensor, *, measure: str = CHART)
     space = check_torus(
         check_kind(density, Density, "density").space, "densities at missing angles"
     )
-    points = float_tensor(points, "points").double()
-    if points.dim() != 2 or points.shape[1] != space.dim:
-        raise OrbiflowError(f"expected points (N, {space.dim}), got {tuple(points.shape)}")
-    if bool(points.isinf().any()):
+    return at_observed(density, observed_rows(points, "points", space), measure=measure)
+
+
+def observed_rows(values: Any, name: str, space: Space) -> Tensor:
+    """Return a float64 table of angles (N, d), some of which may be missing."""
+    rows = float_tensor(values, name).double()
+    if rows.dim() != 2 or rows.shape[1] != space.dim:
+        raise OrbiflowError(f"expected {name} (N, {space.dim}), got {tuple(rows.shape)}")
+    if bool(rows.isinf().any()):
         raise OrbiflowError("angles may be missing (NaN), but not infinite")
-    return at_observed(density, points, measure=measure)
+    return rows
 
 
 def at_observed(density: Density, points: Tensor, *, measure: str = CHART) -> Tensor:
@@ -205,12 +213,8 @@ def tabulated(
 
     Von Mises kernels whose deviation is one step interpolate what is smooth over a few steps nearly to
     rounding: their weights are one deconvolution by Fourier transform. The grid is refined until
-    random points agree as well.
-
-    Args:
-        log_function: The logarithm of a positive function of points (N, r), of any integral.
-        space: The torus of r = 1 or 2 angles.
-        most: The most points along an angle; default: `FINEST_GRID`.
+    random points agree as well. The function is positive, given by its logarithm at points (N, r) of
+    r = 1 or 2 angles, and of any integral; the grid has at most `most` points along an angle.
     """
     count, most = FIRST_GRID[space.dim], most or FINEST_GRID[space.dim]
     while True:
@@ -228,7 +232,8 @@ def _on_grid(log_function: Callable[[Tensor], Tensor], space: Torus, count: int)
     values = (logs - top).exp()
     log_total = top + float(values.mean().log())
     kappa = (count / (2 * math.pi)) ** 2
-    kernel = _kernel(line, kappa)
+    scaled = special.i0e(torch.tensor(kappa, dtype=torch.float64))
+    kernel = (kappa * ((2 * math.pi * line).cos() - 1)).exp() / scaled
     shape = [count] * space.dim
     spectrum = fft.fftn(values.reshape(shape))
     smoothing = fft.fft(kernel).real
@@ -236,7 +241,10 @@ def _on_grid(log_function: Callable[[Tensor], Tensor], space: Torus, count: int)
         spectrum = spectrum / smoothing.reshape([-1 if i == axis else 1 for i in range(space.dim)])
     weights = fft.ifftn(spectrum).real.flatten().clamp_min(0)
     weights = weights / weights.sum()
-    kept = _heaviest(weights)
+    # all but the lightest
+    ordered, order = weights.sort()
+    kept = torch.ones_like(weights, dtype=torch.bool)
+    kept[order[ordered.cumsum(0) < DROPPED]] = False
     kernels = AdaptiveKernels(
         space,
         grid[kept],
@@ -249,15 +257,108 @@ def _on_grid(log_function: Callable[[Tensor], Tensor], space: Torus, count: int)
     return Table(kernels, log_total, float(off.square().mean().sqrt()))
 
 
-def _kernel(line: Tensor, kappa: float) -> Tensor:
-    scaled = special.i0e(torch.tensor(kappa, dtype=torch.float64))
-    return (kappa * ((2 * math.pi * line).cos() - 1)).exp() / scaled
+def check_torus(space: Space, what: str) -> Torus:
+    """Return the space if it is a torus."""
+    if isinstance(space, Torus):
+        return space
+    if space.is_round:
+        why = "its coordinates are no angles that could be parted from each other"
+    else:
+        why = (
+            "(theta + pi, pi - phi) is the same place as (theta, phi), so that neither angle has a "
+            "meaning without the other"
+        )
+    raise OrbiflowError(f"{what} are of angles on a torus; on the {space.name} {why}")
 
 
-def _heaviest(weights: Tensor) -> Tensor:
-    """Return which (K,) are left when the lightest go."""
-    ordered, order = weights.sort()
-    light = ordered.cumsum(0) < DROPPED
-    kept = torch.ones_like(weights, dtype=torch.bool)
-    kept[order[light]] = False
-    return kept
+def kept_axes(axes: Iterable[int] | int, dim: int) -> tuple[int, ...]:
+    """Return the numbers of the angles to keep, 0 to dim - 1, each once."""
+    listed: Any = [axes] if isinstance(axes, numbers.Integral) else axes
+    try:
+        found = tuple(_axis(axis, dim) for axis in listed)
+    except TypeError:
+        raise OrbiflowError(f"axes must be numbers of angles, got {axes!r}") from None
+    if not found or len(set(found)) < len(found):
+        raise OrbiflowError(f"axes must name one angle or more, each once, got {axes!r}")
+    return found
+
+
+def given_axes(given: Mapping[int, float], dim: int) -> tuple[tuple[int, ...], tuple[float, ...]]:
+    """Return the numbers of the angles that are known, and their values."""
+    if not is_a(given, Mapping) or not given:
+        raise OrbiflowError(f"given must hold known angles, such as {{1: 0.25}}, got {given!r}")
+    axes = tuple(_axis(axis, dim) for axis in given)
+    if len(axes) == dim:
+        raise OrbiflowError(f"all {dim} angles are given: nothing is left to have a density")
+    pairs = zip(axes, given.values(), strict=True)
+    return axes, tuple(_known(value, f"angle {axis}") for axis, value in pairs)
+
+
+def _known(value: Any, name: str) -> float:
+    real = not isinstance(value, bool) and isinstance(value, numbers.Real)
+    if not real or not math.isfinite(float(value)):
+        raise OrbiflowError(f"{name} must be given as a finite number, got {value!r}")
+    return float(value)
+
+
+def _axis(axis: Any, dim: int) -> int:
+    whole = not isinstance(axis, bool) and isinstance(axis, numbers.Integral)
+    if not whole or not 0 <= int(axis) < dim:
+        raise OrbiflowError(f"axes are numbers of angles from 0 to {dim - 1}, got {axis!r}")
+    return int(axis)
+
+
+def axes_named(wanted: Sequence[str | int], names: Sequence[str]) -> list[int]:
+    """Return the numbers, from 0, of angles that are given by column names or by those numbers.
+
+    Raises:
+        OrbiflowError: for a name that no column has, or several.
+
+    >>> axes_named(["psi", 0], ["phi", "psi"])
+    [1, 0]
+    """
+    return [_named_axis(one, list(names)) for one in wanted]
+
+
+def _named_axis(wanted: Any, names: list[str]) -> int:
+    if not isinstance(wanted, bool) and isinstance(wanted, numbers.Integral):
+        return int(wanted)
+    hits = [i for i, name in enumerate(names) if name == wanted]
+    if not hits and isinstance(wanted, str):
+        hits = [i for i, name in enumerate(names) if name.casefold() == wanted.casefold()]
+    if len(hits) == 1:
+        return hits[0]
+    listed = ", ".join(names)
+    if hits:
+        raise OrbiflowError(f"several columns are called {wanted!r} ({listed}): say their number")
+    raise OrbiflowError(f"no column {wanted!r}; there are {listed}")
+
+
+def given_named(
+    space: Space, given: Iterable[tuple[str | int, float]], names: Sequence[str]
+) -> dict[int, float]:
+    """Return values in turns by numbers of angles, from values in the space's unit by columns.
+
+    Raises:
+        OrbiflowError: for another space, unknown columns, one that is given twice, or values that are
+            no finite numbers.
+    """
+    torus = check_torus(space, "conditional densities")
+    found: dict[int, float] = {}
+    for key, value in given:
+        axis = _named_axis(key, list(names))
+        if axis in found:
+            raise OrbiflowError(f"{names[axis]!r} is given twice")
+        found[axis] = _known(value, repr(names[axis])) / torus.period
+    return found
+
+
+def chart_of_observed(space: Space, data: ArrayLike) -> Tensor:
+    """Return angles (N, k) in the space's unit, missing ones NaN, as points (N, k) of the torus.
+
+    Raises:
+        OrbiflowError: for another space or shape, or infinite angles.
+    """
+    torus = check_torus(space, "densities of rows that lack angles")
+    values = observed_rows(data, "data", torus)
+    return torus.project(torch.as_tensor(values / torus.period))

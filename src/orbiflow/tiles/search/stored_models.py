@@ -1,32 +1,88 @@
-"""Candidates as plain arrays, and again as models."""
+"""Finished models: the polygon of a candidate, plain arrays for files, and models of these."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 
-from orbiflow.arguments import instance
+from orbiflow.arguments import instance, number, whole
 from orbiflow.arrays import Array
-from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.search.candidates import CORNERS, VERTICES
+from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.tiles.search.candidates import CORNERS, VERTICES, simplest_tile
 from orbiflow.tiles.search.method import MAX_FREQUENCY, MAX_SEGMENTS
 from orbiflow.tiles.search.model import TileModel
 from orbiflow.tiles.silhouette import Bending, Frame
 from orbiflow.tiles.tile_map import TileMap, naming_file
-from orbiflow.tiles.tilings import isohedral_class
+from orbiflow.tiles.tilings import Tile, isohedral_class
+from orbiflow.typed_torch import listed
+
+MAX_STEPS = 1024  # integration steps of a segment beyond which a field counts as too steep
+
+
+@torch.no_grad()
+def converge(
+    model: TileModel, points: torch.Tensor, *, tolerance: float = 1e-7, force: bool = False
+) -> tuple[torch.Tensor, float]:
+    """Double the integration steps of a single candidate until the flow is accurate.
+
+    Quality is judged at the steps set here, never at those of the optimisation (design point 5).
+    Returns the points (1, N, 2) carried at the doubled steps, and the error estimate. With `force`
+    the flow is taken after `MAX_STEPS`, accurate or not; else a field that is too steep is a
+    `CertificationError`.
+    """
+    coarse = model.flow(points)
+    while True:
+        finer = model.flow.with_steps(2 * model.flow.steps)
+        fine = finer(points)
+        error = float((fine - coarse).abs().max())
+        if not math.isfinite(error):
+            raise CertificationError("the flow has no finite values: lower the learning rate")
+        model.flow = finer
+        if error <= tolerance or (force and model.flow.steps >= MAX_STEPS):
+            return fine, error
+        if model.flow.steps >= MAX_STEPS:
+            raise CertificationError(
+                f"the flow is not accurate after {model.flow.steps} steps (error {error:.1e}): "
+                "the field is too steep; lower max-frequency or raise the penalty"
+            )
+        coarse = fine
+
+
+@torch.no_grad()
+def extract_tile(model: TileModel, *, force: bool = False) -> tuple[Tile, TileModel]:
+    """Return the tile of a single candidate in normal form, and the float64 model that made it.
+
+    The polygon is the coarsest that is simple, see `simplest_tile`; with `force`, the finest.
+    """
+    instance(model, TileModel, "the model", "load_model and the fits give one")
+    model.require_single()
+    model = model.take([0]).double()
+    model.flow = model.flow.with_steps(max(1, 8 // model.segments), method="rk4")
+    vertices, corners = model.prototile()
+
+    def moved(points: Array) -> Array:
+        return converge(model, torch.as_tensor(points)[None], force=force)[0][0].numpy()
+
+    tile = simplest_tile(
+        model.isohedral_class,
+        vertices[0].numpy(),
+        listed(corners[0]),
+        model.linear()[0].numpy(),
+        model.offset.detach()[0].numpy(),
+        moved=moved,
+        force=force,
+    )
+    return tile, model
+
 
 MAX_SIDES = 100_000
 
 
 def as_map(model: TileModel, frame: Frame | None = None, bending: Bending | None = None) -> TileMap:
-    """Return a single candidate as plain arrays; `frame` and `bending` go with it.
-
-    Raises:
-        OrbiflowError: for a model that holds more than one candidate.
-    """
+    """Return a single candidate as plain arrays; `frame` and `bending` go with it."""
     instance(model, TileModel, "the model", "load_model and the fits give one").require_single()
     settings = {
         "class": model.isohedral_class.name,
@@ -48,22 +104,24 @@ def as_map(model: TileModel, frame: Frame | None = None, bending: Bending | None
 
 
 def as_model(stored: TileMap) -> TileModel:
-    """Return the model again, float64, one candidate, in the target's normal form.
-
-    Raises:
-        OrbiflowError: if settings or arrays do not fit together.
-    """
+    """Return the model again, float64, one candidate, in the target's normal form."""
     settings, arrays = stored.settings, stored.arrays
-    _check_segments(settings, arrays)
+    # before anything is built: each segment takes time and memory
+    segments = sum(name.startswith("flow.") for name in arrays)
+    if settings.get("segments") != segments:
+        raise OrbiflowError(
+            f"the model's settings say {settings.get('segments')!r} segments, "
+            f"its arrays hold {segments}"
+        )
     try:
         model = TileModel(
             isohedral_class(settings["class"]),
             torch.zeros(1, dtype=torch.float64),
             mirrored=torch.tensor([bool(settings["mirrored"])]),
-            max_frequency=_whole(settings["max_frequency"], MAX_FREQUENCY, least=0),
-            segments=_whole(settings["segments"], MAX_SEGMENTS),
-            smoothness=_exponent(settings["smoothness"]),
-            steps=_whole(settings["steps"], 1_000_000),
+            max_frequency=whole(settings["max_frequency"], "max_frequency", 0, MAX_FREQUENCY),
+            segments=whole(settings["segments"], "segments", 1, MAX_SEGMENTS),
+            smoothness=number(settings["smoothness"], "smoothness", 0, 100),
+            steps=whole(settings["steps"], "steps", 1, 1_000_000),
             method=str(settings["method"]),
         )
     except (KeyError, TypeError) as error:
@@ -119,26 +177,3 @@ def _prototile(arrays: dict[str, Array], count: int) -> tuple[Array, Array]:
             f"less than {len(vertices)}"
         )
     return vertices, corners.astype(np.int64)
-
-
-def _check_segments(settings: dict[str, Any], arrays: dict[str, Array]) -> None:
-    # before anything is built: each segment takes time and memory
-    stored = sum(name.startswith("flow.") for name in arrays)
-    if settings.get("segments") != stored:
-        raise OrbiflowError(
-            f"the model's settings say {settings.get('segments')!r} segments, "
-            f"its arrays hold {stored}"
-        )
-
-
-def _exponent(value: Any) -> float:
-    number = float(value)
-    if not 0.0 <= number <= 100.0:
-        raise OrbiflowError(f"expected a smoothness from 0 to 100, got {value!r}")
-    return number
-
-
-def _whole(value: Any, most: int, least: int = 1) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        raise OrbiflowError(f"expected a whole number from {least} to {most}, got {value!r}")
-    return value

@@ -1,0 +1,212 @@
+"""What is drawn over a density that stays readable: dots for points, lines around regions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from torch import Tensor
+
+from orbiflow.arrays import Array
+from orbiflow.density.models import Density
+from orbiflow.density.pictures.axes import INK
+from orbiflow.density.pictures.settings import PlotSettings
+from orbiflow.density.regions import DensityLevels, samples_for
+from orbiflow.drawing import Sheet
+from orbiflow.errors import SettingError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.patches import Patch
+
+MAX_DOTS = 3000
+
+MAX_COVER = 0.3
+"""Share of a density's area that dots may hide."""
+
+NEIGHBOURS = 8
+"""Number of other dots whose distance says how crowded a place is."""
+
+MIN_WIDTH = 0.5
+"""Points (1/72 inch) across the smallest dot on a screen. Those that should be smaller are fainter."""
+
+STEP = 1.1
+"""Ratio of one size of dots to the next."""
+
+MIN_INK = 0.03
+"""Opacity of the faintest dots."""
+
+
+class Dots(NamedTuple):
+    """Places of dots (N, k), each once, and the widths (N,) that they may have."""
+
+    places: Array
+    widths: Array
+
+
+def uncrowded(points: Array) -> Dots:
+    """Return dots at points (N, k) of a plane or surface that hide `MAX_COVER` of it.
+
+    Widths are in the unit of the points. Points at one place are one dot; as many dots they would be
+    smaller and fainter.
+
+    >>> even = np.stack(np.meshgrid(np.arange(20.0), np.arange(20.0)), axis=-1).reshape(-1, 2)
+    >>> round(float(np.median(uncrowded(even).widths)), 1)
+    0.5
+    """
+    from scipy.spatial import cKDTree
+
+    _, first = np.unique(points.round(9), axis=0, return_index=True)
+    places = points[np.sort(first)]
+    nearest = min(NEIGHBOURS, len(places) - 1)
+    if nearest < 1:
+        return Dots(places, np.full(len(places), np.inf))
+    far = np.asarray(cKDTree(places).query(places, [nearest + 1])[0]).ravel()
+    # a disc of this radius holds so many others and the dot itself
+    return Dots(places, 2 * far * np.sqrt(MAX_COVER / (nearest + 1)))
+
+
+def draw_dots_over(
+    axes: Axes, points: Array, inches: float, *, limit: int = MAX_DOTS, scale: float = 1.0
+) -> None:
+    """Draw points (N, 2) as dots over a density, smaller where they crowd, as there its peaks are."""
+    chosen = thinned(points, limit)
+    most, scale = _largest(len(chosen), scale)
+    dots = uncrowded(chosen)
+    steps = np.ceil(np.log(most / (72 * inches * dots.widths).clip(1e-9, most)) / math.log(STEP))
+    # one collection a size: a PDF or SVG holds its circle once
+    for step in np.unique(steps):
+        wanted = most * STEP**-step
+        width = max(wanted, min(MIN_WIDTH * scale**0.5, most))
+        ink = max((wanted / width) ** 2, MIN_INK)
+        axes.scatter(
+            *dots.places[steps == step].T, s=width**2, c="#ffffff", edgecolors=INK,
+            linewidths=0.12 * width, alpha=0.8 * ink, zorder=5, rasterized=len(chosen) > MAX_DOTS,
+        )  # fmt: skip
+
+
+def draw_dots(
+    axes: Axes,
+    points: Array,
+    alpha: float,
+    *,
+    fill: str,
+    limit: int = MAX_DOTS,
+    scale: float = 1.0,
+    rasterized: bool = False,
+) -> None:
+    """Draw points (N, 2) as dots of one size on a ground of one colour."""
+    points = thinned(points, limit)
+    width, _ = _largest(len(points), scale)
+    axes.scatter(
+        *points.T, s=width**2, c=fill, edgecolors="none", alpha=alpha, zorder=5,
+        rasterized=rasterized or len(points) > MAX_DOTS,
+    )  # fmt: skip
+
+
+def _largest(count: int, scale: float) -> tuple[float, float]:
+    """Return the width of the largest of `count` dots in points (1/72 inch), and the area's factor."""
+    scale = max(scale / max(1.0, count / MAX_DOTS) ** 0.7, 0.04)
+    return (scale * max(2.0, 9.0 - count / 500)) ** 0.5, scale
+
+
+def thinned(points: Array, limit: int = MAX_DOTS) -> Array:
+    """Return a random choice of at most `limit` of points (N, d), always the same."""
+    if len(points) <= limit:
+        return points
+    return points[np.random.default_rng(0).choice(len(points), limit, replace=False)]
+
+
+def dot_scale(sheet: Sheet, side: float) -> float:
+    """Return the factor of the area of dots in a square of `side` inches, 1 on a screen."""
+    return max(0.2, (side / 5.6) ** 2) if sheet.printed else 1.0
+
+
+STYLES = ("solid", "dashed", "dotted", "dashdot")
+"""Styles of the lines, beginning with the smallest mass."""
+
+HALO, LINE = "#16202a", "#ffffff"
+
+
+class RegionLine(NamedTuple):
+    """A region of highest density: its mass, and the log density at its edge in natural measure."""
+
+    mass: float
+    log_prob: float
+
+
+def region_lines(density: Density, settings: PlotSettings) -> tuple[RegionLine, ...]:
+    """Return the lines for the settings' `regions`, the smallest mass first."""
+    if not settings.regions:
+        return ()
+    space = density.space
+    if space.dim != 2:
+        raise SettingError(
+            f"{{regions}} are drawn in two dimensions, this {space.name} has {space.dim}: `orbiflow "
+            "density region` finds their thresholds"
+        )
+    count = samples_for(settings.regions, settings.region_samples)
+    levels = DensityLevels(density, samples=count, seed=settings.seed % 2**63)
+    return tuple(
+        RegionLine(mass, levels.highest(mass).log_prob) for mass in sorted(settings.regions)
+    )
+
+
+def region_note(lines: Sequence[RegionLine]) -> str:
+    """Return what the lines mean, in words for a caption.
+
+    >>> region_note([RegionLine(0.5, -1.0), RegionLine(0.9, -2.0)])
+    'lines are about the smallest regions that hold 50 % (solid) and 90 % (dashed)'
+    """
+    if len(lines) == 1:
+        percent = f"{100 * lines[0].mass:.10g} %"
+        return f"the line is about the smallest region that holds {percent}"
+    parts = [
+        f"{100 * line.mass:.10g} % ({style})" for line, style in zip(lines, STYLES, strict=False)
+    ]
+    return f"lines are about the smallest regions that hold {', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def draw_regions(
+    axes: Axes,
+    lines: Sequence[RegionLine],
+    log_natural: Array,
+    extent: tuple[float, float, float, float],
+    sheet: Sheet,
+    clip: Patch | None = None,
+) -> None:
+    """Draw lines where the density is that of each region's edge, cut along the patch `clip`.
+
+    `log_natural` has its logarithms (R, C) in natural measure, the lowest row first, NaN where there
+    is none; `extent` is left, right, bottom and top of these pixels on the axes.
+    """
+    from matplotlib.patheffects import Stroke
+
+    rows, columns = log_natural.shape
+    left, right, below, above = extent
+    x = left + (right - left) * (np.arange(columns) + 0.5) / columns
+    y = below + (above - below) * (np.arange(rows) + 0.5) / rows
+    for line, style in zip(lines, STYLES, strict=False):
+        if not np.nanmin(log_natural) < line.log_prob < np.nanmax(log_natural):
+            continue
+        width = 0.11 * sheet.text
+        drawn = axes.contour(
+            x, y, log_natural, levels=[line.log_prob], colors=LINE, linestyles=style,
+            linewidths=width, zorder=4,
+        )  # fmt: skip
+        halo = Stroke(linewidth=1.9 * width, foreground=HALO, alpha=0.55)
+        if clip is not None:
+            drawn.set_clip_path(clip)
+        drawn.set_path_effects([halo, Stroke(linewidth=width, foreground=LINE)])
+
+
+def log_natural(density: Density, values: Array, points: Tensor, measure: str) -> Array:
+    """Return logarithms (N,) in natural measure of values (N,) in another one at points (N, d)."""
+    own = np.log(np.maximum(values, 1e-300))
+    if measure == "natural":
+        return own
+    factor = density.space.log_density_factor
+    shift = factor(points, "natural") - factor(points, measure)
+    return own + shift.double().cpu().numpy()
