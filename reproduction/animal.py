@@ -92,7 +92,7 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
         )
     good = {name: one for name, one in outcomes.items() if isinstance(one, EscherTile)}
     symmetry = {
-        name: equivariance_error(placed_field(one.model()), one.normal_tile.group)
+        name: equivariance_error(placed_field(one.model()), one.normal_tile.group.cosets)
         for name, one in good.items()
     }
     rows = [_row(name, one, symmetry.get(name)) for name, one in outcomes.items()]

@@ -19,6 +19,7 @@ from orbiflow.density import (
     draw_cells,
     make_space,
     mean_field,
+    midpoints,
 )
 from orbiflow.drawing import draw_flow, draw_magnitude
 from reproduction.density_fits import TARGETS, Fitted, fit_work, kl_of_uniform, target
@@ -122,7 +123,8 @@ def _needs_flat(name: str, extent: Extent) -> list[Work]:
 
 def _draw_flat(name: str, canvas: Canvas, _extent: Extent, values: list[Fitted]) -> Findings:
     figure = canvas.figure(0.445)
-    top = float(target(name, _grid(120)).max())
+    torus = make_space("torus")
+    top = float(target(name, midpoints(torus, 120)).max())
     errors = []
     for column, one in enumerate(values):
         density = one.density()
@@ -137,9 +139,9 @@ def _draw_flat(name: str, canvas: Canvas, _extent: Extent, values: list[Fitted])
         draw_magnitude(axes, field, _HALF_WINDOW, samples=SAMPLES)
         draw_flow(axes, field, density.space.group, _HALF_WINDOW)
         draw_cells(axes, density.space.group, _HALF_WINDOW)
-        errors.append(equivariance_error(field, density.space.group))
+        errors.append(equivariance_error(field, density.space.group.cosets))
     axes = figure.add_axes(_box(0, 4))
-    _image(axes, target(name, _grid(240)).reshape(240, 240).numpy(), top)
+    _image(axes, target(name, midpoints(torus, 240)).reshape(240, 240).numpy(), top)
     caption(figure, _box(0, 4), "target", weight="bold")
     for row, text in enumerate(("density", "flow")):
         box = _box(row, 0)
@@ -172,11 +174,6 @@ def _image(axes: Axes, values: Array, top: float) -> None:
     square = {"origin": "lower", "extent": (0, 1, 0, 1), "interpolation": "bilinear"}
     axes.imshow(values.T, cmap=COLOURS, vmin=0, vmax=top, **square)
     axes.set_axis_off()
-
-
-def _grid(count: int) -> torch.Tensor:
-    t = (torch.arange(count, dtype=torch.float64) + 0.5) / count
-    return torch.stack(torch.meshgrid(t, t, indexing="ij"), dim=-1).reshape(-1, 2)
 
 
 TABLE = Exhibit(

@@ -6,7 +6,6 @@ import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import torch
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import CENTER_COLOURS, LINE_COLOUR, center_sign, evaluate, plane_axes
@@ -14,7 +13,7 @@ from orbiflow.fields import VectorField, periodic_operator
 from orbiflow.symmetry import Isometry, Line, identity, rotation, transflection, translation
 from reproduction.drawing import INK, Canvas, around, caption, grid_box, label, text_size, tiny
 from reproduction.exhibit import Exhibit, Extent, Findings, Table
-from reproduction.symmetrization import Operator, nested, unit_field
+from reproduction.symmetrization import Operator, equivariance_error, nested, unit_field
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -75,16 +74,6 @@ def _kinds() -> tuple[Kind, ...]:
 KINDS = _kinds()
 
 
-@torch.no_grad()
-def residue(field: VectorField, images: tuple[Isometry, ...]) -> float:
-    """Return the largest |V(g p) - R_g V(p)| over `images` g and points, over V's root mean square."""
-    generator = torch.Generator().manual_seed(2)
-    points = 4 * torch.rand(300, 2, generator=generator, dtype=torch.float64) - 2
-    values = field(points)
-    worst = max(float((field(g(points)) - g.push(values)).norm(dim=-1).max()) for g in images)
-    return worst / float(values.square().sum(dim=-1).mean().sqrt())
-
-
 def _draw(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:
     figure = canvas.figure(0.43)
     rows, after = [], []
@@ -96,7 +85,8 @@ def _draw(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:
         caption(figure, box, kind.title, size=1.1)
         equation = re.sub(r"([A-Z])_(\w)", r"$\\mathrm{\1}_\\mathrm{\2}$", kind.equation)
         label(figure, box[0] + box[2] / 2, 0.055, equation, va="baseline")
-        found = residue(kind.before(), kind.images), residue(kind.after(), kind.images)
+        fields = kind.before(), kind.after()
+        found = [equivariance_error(field, kind.images, 300, seed=2) for field in fields]
         after.append(found[1])
         rows.append((kind.title, kind.equation, f"{found[0]:.1f}", tiny(found[1])))
     canvas.add(

@@ -77,17 +77,19 @@ def nested_error(group: CrystallographicGroup, operators: Sequence[Operator]) ->
 
 
 @torch.no_grad()
-def equivariance_error(field: VectorField, group: CrystallographicGroup) -> float:
-    """Return the largest |V(g p) - R_g V(p)| over cosets and points, over V's root mean square."""
-    points = _points()
+def equivariance_error(
+    field: VectorField, elements: Sequence[Isometry], count: int = 200, seed: int = 1
+) -> float:
+    """Return the largest |V(g p) - R_g V(p)| over elements and points, over V's root mean square."""
+    points = _points(count, seed)
     values = field(points)
-    worst = max(float((field(g(points)) - g.push(values)).norm(dim=-1).max()) for g in group.cosets)
+    worst = max(float((field(g(points)) - g.push(values)).norm(dim=-1).max()) for g in elements)
     return worst / float(values.square().sum(dim=-1).mean().sqrt())
 
 
-def _points() -> Tensor:
-    generator = torch.Generator().manual_seed(1)
-    return 4 * torch.rand(200, 2, generator=generator, dtype=torch.float64) - 2
+def _points(count: int = 200, seed: int = 1) -> Tensor:
+    generator = torch.Generator().manual_seed(seed)
+    return 4 * torch.rand(count, 2, generator=generator, dtype=torch.float64) - 2
 
 
 def as_printed(kind: IsohedralClass, linear: Array) -> VectorField:
@@ -112,8 +114,8 @@ def _draw(_canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:
         group, operators = kind.group(), kind.paper_operators()
         placed = group.conjugate(linear, np.zeros(2))
         nestings.append(nested_error(group, operators))
-        printed[name] = equivariance_error(as_printed(kind, linear), placed)
-        mended.append(equivariance_error(pushed(kind, linear), placed))
+        printed[name] = equivariance_error(as_printed(kind, linear), placed.cosets)
+        mended.append(equivariance_error(pushed(kind, linear), placed.cosets))
         area = abs(float(signed_area(kind.template())))
         closure = f"{group.order} × {area:.3f} = {group.cell_volume:.3f}"
         sizes = str(2 * 4 * (OMEGA + 1) ** 2), str(FourierField(group, OMEGA).size)

@@ -103,30 +103,25 @@ class _Workspace:
         return self.tables
 
 
-def _blocks(weights: Tensor, points: int) -> list[slice]:
-    """Return ranges of points whose tables and partial sums fit into a processor's cache."""
-    if weights.device.type != "cpu" or points == 0:
-        return [slice(0, points)]
-    rows = math.prod(weights.shape[:-1]) + weights.shape[0] * sum(weights.shape[2:])
-    size = max(1024, BLOCK_BYTES // (rows * weights.element_size()))
-    count = max(1, -(-points // size))
-    size = -(-points // count)
-    return [slice(start, start + size) for start in range(0, points, size)]
-
-
-def _blocks_with_workspace(weights: Tensor, points: int) -> Iterator[tuple[slice, _Workspace]]:
+def _blocks(weights: Tensor, points: int) -> Iterator[tuple[slice, _Workspace]]:
+    """Yield ranges of points whose tables and partial sums fit into a processor's cache."""
+    size = points
+    if weights.device.type == "cpu":
+        rows = math.prod(weights.shape[:-1]) + weights.shape[0] * sum(weights.shape[2:])
+        fitting = max(1024, BLOCK_BYTES // (rows * weights.element_size()))
+        size = -(-points // max(1, -(-points // fitting)))
     workspace = None
-    for block in _blocks(weights, points):
-        size = min(block.stop, points) - block.start
-        if workspace is None or workspace.size != size:
-            workspace = _Workspace(weights, size)
-        yield block, workspace
+    for start in range(0, points, max(size, 1)):
+        length = min(size, points - start)
+        if workspace is None or workspace.size != length:
+            workspace = _Workspace(weights, length)
+        yield slice(start, start + length), workspace
 
 
 def _forward(weights: Tensor, u: Tensor) -> Tensor:
     dim, points = u.shape[1], u.shape[2]
     values = u.new_empty(weights.shape[0], weights.shape[1], points)
-    for block, workspace in _blocks_with_workspace(weights, points):
+    for block, workspace in _blocks(weights, points):
         tables = workspace.fill(u[..., block])
         sums = _partial_sums(weights, tables[-1], workspace.sums)
         for level in range(dim - 2, -1, -1):
@@ -178,7 +173,7 @@ class _Series(torch.autograd.Function):
         want_weights, want_points = ctx.needs_input_grad
         grad_weights = torch.zeros_like(weights)
         grad_points = torch.empty_like(u) if want_points else None
-        for block, workspace in _blocks_with_workspace(weights, u.shape[2]):
+        for block, workspace in _blocks(weights, u.shape[2]):
             part, moved = _backward_block(
                 weights, u[..., block], grad[..., block], want_points, workspace
             )
@@ -231,7 +226,7 @@ def weight_cotangent(shape: tuple[int, ...], u: Tensor, grad: Tensor) -> Tensor:
     if transformed():
         return torch.func.vjp(partial(evaluate_plainly, u=u), weights)[1](grad)[0]
     total = torch.zeros_like(weights)
-    for block, workspace in _blocks_with_workspace(weights, u.shape[2]):
+    for block, workspace in _blocks(weights, u.shape[2]):
         part, _ = _backward_block(weights, u[..., block], grad[..., block], False, workspace)
         total += part.reshape(shape)
     return total

@@ -100,9 +100,8 @@ class Reader:
             inner = self.field(header["field"], f"{place}.field", nesting + 1)
             return Symmetrized(inner, self._group(header), periodic=bool(header["periodic"]))
         if kind == "torus-network":
-            raise OrbiflowError(
-                f"{place} is a NeuralTorusField, which orbiflow no longer has: use orbiflow 0.1"
-            )
+            what = f"{place} is a NeuralTorusField"
+            raise OrbiflowError(f"{what}, which orbiflow no longer has: use orbiflow 0.1")
         if kind == "perceptron":
             return self._perceptron(header, place)
         if kind == "own":
@@ -228,10 +227,8 @@ def save_flow(flow: Flow, path: str | Path) -> Path:
     segments: list[dict[str, Any]] = []
     for index, field in enumerate(fields):
         first = next(i for i, other in enumerate(fields) if other is field)
-        place = f"segments.{index}"
-        segments.append(
-            {"kind": "same", "segment": first} if first < index else writer.header(field, place)
-        )
+        same = {"kind": "same", "segment": first}
+        segments.append(same if first < index else writer.header(field, f"segments.{index}"))
     settings = {name: getattr(flow, name) for name in ("steps", "method", "duration")}
     header = {"format": FORMAT, "groups": writer.groups, "segments": segments, **settings}
     header["warn"] = flow.warns
@@ -300,11 +297,9 @@ def _fill(flow: Flow, tensors: Mapping[str, Tensor]) -> None:
         if name not in tensors or name not in expected:
             where = "its fields" if name in expected else "the file"
             raise OrbiflowError(f"{name} is only in {where}")
-        if expected[name].shape != tensors[name].shape:
-            raise OrbiflowError(
-                f"{name} has shape {tuple(tensors[name].shape)}, expected "
-                f"{tuple(expected[name].shape)}"
-            )
+        given, wanted = tuple(tensors[name].shape), tuple(expected[name].shape)
+        if given != wanted:
+            raise OrbiflowError(f"{name} has shape {given}, expected {wanted}")
     flow.load_state_dict(dict(tensors))
 
 

@@ -75,14 +75,10 @@ class Bending:
     @overload
     def forward(self, points: ArrayLike) -> Array: ...
     def forward(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
-        """Where points (..., 2) of the silhouette go.
+        """Return where points (..., 2) of the silhouette go, in the target's normal form.
 
-        Args:
-            points: an array, lists or a tensor, in the target's normal form; those that are not
-                finite give NaN.
-
-        Returns:
-            (..., 2): for a tensor, one of its dtype and device, without a gradient.
+        Arrays and lists give an array, tensors a tensor of their dtype and device, without a gradient;
+        points that are not finite give NaN.
         """
         return _mapped(points, self._forward)
 
@@ -91,7 +87,7 @@ class Bending:
     @overload
     def inverse(self, points: ArrayLike) -> Array: ...
     def inverse(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
-        """Where points (..., 2) of the tile come from; as `forward`."""
+        """Return where points (..., 2) of the tile come from; as `forward`."""
         return _mapped(points, self._backward)
 
     @cached_property
@@ -136,9 +132,9 @@ class _PiecewiseAffine:
 def _indices(values: ArrayLike, count: int) -> NDArray[np.int64]:
     triangles = np.array(values)
     if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
+        what = f"{triangles.dtype} of shape {triangles.shape}"
         raise OrbiflowError(
-            "the bending's triangles must be whole numbers of shape (M, 3), got "
-            f"{triangles.dtype} of shape {triangles.shape}"
+            f"the bending's triangles must be whole numbers of shape (M, 3), got {what}"
         )
     if not 3 <= count <= MAX_POINTS or not 1 <= len(triangles) <= MAX_TRIANGLES:
         raise OrbiflowError(

@@ -136,13 +136,10 @@ def signed_distance(points: Tensor, vertices: Tensor) -> Tensor:
     squared = (offset - along.unsqueeze(-1) * edge).square().sum(dim=-1).amin(dim=-1)
     # keeps the gradient finite for a point on the boundary
     distance = squared.clamp_min(torch.finfo(points.dtype).eps ** 2).sqrt()
-    return torch.where(_inside(offset, edge), distance, -distance)
-
-
-def _inside(offset: Tensor, edge: Tensor) -> Tensor:
-    """Return whether points are inside, by the crossings of a ray to the right (even-odd rule)."""
+    # inside by the crossings of a ray to the right (even-odd rule)
     y, height = offset[..., 1].detach(), edge[..., 1].detach()
     straddles = (y >= 0) != (y >= height)
     cross = edge[..., 0].detach() * y - height * offset[..., 0].detach()
     right = (cross > 0) == (height > 0)
-    return ((straddles & right).sum(dim=-1) % 2) == 1
+    inside = (straddles & right).sum(dim=-1) % 2 == 1
+    return torch.where(inside, distance, -distance)

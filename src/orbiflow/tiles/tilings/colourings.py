@@ -118,8 +118,7 @@ def colouring(tile: Tiles) -> Colouring:
 
     Raises `OrbiflowError` if polygon and group are of very different size.
 
-    >>> from orbiflow.tiles import Tile
-    >>> from orbiflow.tiles import isohedral_class
+    >>> from orbiflow.tiles import Tile, isohedral_class
     >>> hexagons = isohedral_class("IH1")
     >>> colouring(Tile(hexagons.template(), hexagons.group())).count
     3

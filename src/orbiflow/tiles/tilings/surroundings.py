@@ -247,8 +247,7 @@ def neighbours(tile: Tiles, prototile: int = 0, *, tolerance: float = 1e-7) -> N
 
     Raises `OrbiflowError` if polygon and group are of very different size.
 
-    >>> from orbiflow.tiles import Tile
-    >>> from orbiflow.tiles import isohedral_class
+    >>> from orbiflow.tiles import Tile, isohedral_class
     >>> floret = isohedral_class("IH21")
     >>> found = neighbours(Tile(floret.template(), floret.group()))
     >>> len(found.edge), len(found.point)
@@ -290,8 +289,7 @@ def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:
 
     Raises `OrbiflowError` for an empty window, or one of more than `MAX_TILES` tiles.
 
-    >>> from orbiflow.tiles import Tile
-    >>> from orbiflow.tiles import isohedral_class
+    >>> from orbiflow.tiles import Tile, isohedral_class
     >>> ih1 = isohedral_class("IH1")
     >>> len(patch(Tile(ih1.template(), ih1.group()), (-0.1, -0.1, 0.1, 0.1)))
     1

@@ -141,12 +141,8 @@ class Copies:
     def neighbours(self, elements: Sequence[Isometry], of: Sequence[int] | None = None) -> Integers:
         """Return the index (M, E) of the copy across each element, -1 if it is not among them.
 
-        The copy across an element of the copy g is g @ element.
-
-        Args:
-            elements: The elements; a plain isometry moves prototile 0.
-            of: The prototile (E,) from whose copies each element leads. Default: 0 for all. Other
-                copies have no neighbour.
+        The copy across an element of the copy g is g @ element; a plain isometry moves prototile 0.
+        Each element leads from copies of the prototile `of` (E,), by default 0; others have none.
         """
         return self.beyond(elements, of).copy
 

@@ -144,8 +144,7 @@ def edges(tile: Tiles) -> Edges:
 
     Raises `OrbiflowError` if the images do not match vertex by vertex.
 
-    >>> from orbiflow.tiles import Tile
-    >>> from orbiflow.tiles import isohedral_class
+    >>> from orbiflow.tiles import Tile, isohedral_class
     >>> ih4 = isohedral_class("IH4")
     >>> [found.brief for found in edges(Tile(ih4.template(), ih4.group())).identifications]
     ['0o', '2o', '3o', '1=4', '5o']

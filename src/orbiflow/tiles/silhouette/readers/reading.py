@@ -78,10 +78,8 @@ def read_bytes(path: Source, limit: int) -> bytes:
     """Return content of the file at `path`; refused when it is larger than `limit` bytes."""
     data = read_head(path, limit + 1)
     if len(data) > limit:
-        raise InputFileError(
-            f"{path}: larger than {limit / 2**20:.0f} MB, the limit for this kind of file; "
-            "simplify or downscale it"
-        )
+        what = f"larger than {limit / 2**20:.0f} MB, the limit for this kind of file"
+        raise InputFileError(f"{path}: {what}; simplify or downscale it")
     return data
 
 
@@ -93,6 +91,5 @@ def read_head(path: Source, n: int) -> bytes:
         with path.open("rb") as file:
             return file.read(n)
     except OSError as exc:
-        raise InputFileError(
-            f"{path}: cannot be read ({exc.strerror}); check its permissions"
-        ) from exc
+        reason = f"cannot be read ({exc.strerror})"
+        raise InputFileError(f"{path}: {reason}; check its permissions") from exc
