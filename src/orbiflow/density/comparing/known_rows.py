@@ -64,11 +64,7 @@ class RowSketch:
 
     @classmethod
     def from_json(cls, document: object) -> RowSketch:
-        """Return the sketch that `to_json` wrote.
-
-        Raises:
-            OrbiflowError: If it is no sketch.
-        """
+        """Return the sketch that `to_json` wrote."""
         try:
             assert is_a(document, Mapping)
             given = cast(Mapping[str, Any], document)

@@ -274,11 +274,7 @@ def compare_models(
 
 
 def density_of(model: Density | DensityEstimator, name: str = "the model") -> Density:
-    """Return the density of a fitted estimator, or a density as it is.
-
-    Raises:
-        OrbiflowError: If it is neither, or the estimator is not fitted.
-    """
+    """Return the density of a fitted estimator, or a density as it is."""
     if isinstance(model, DensityEstimator):
         density = getattr(model, "density_", None)
         if density is None:
@@ -288,11 +284,7 @@ def density_of(model: Density | DensityEstimator, name: str = "the model") -> De
 
 
 def require_one_space(spaces: Mapping[str, Space]) -> None:
-    """Check that log densities on all spaces are with respect to one measure.
-
-    Raises:
-        OrbiflowError: If they are not.
-    """
+    """Check that log densities on all spaces are with respect to one measure."""
     (first, one), *others = spaces.items()
     for name, other in others:
         if (one.name, one.dim) != (other.name, other.dim):

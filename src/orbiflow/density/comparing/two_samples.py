@@ -64,14 +64,7 @@ def mmd_test(
     out. Whole groups are permuted: groups of one data set among each other, while the two halves of
     a group with rows in both change places. All permutations, with the observed one among them, are
     standardised alike, so that p is exact.
-
-    Args:
-        space: The space.
-        points: Chart points (N, d) of both data sets.
-        first: Whether each row (N,) is of the first one.
-        groups: The groups of the rows.
-        permutations: Number of permutations.
-        seed: Seed of the permutations.
+    `points` are chart points (N, d) of both data sets; `first` says which (N,) are of the first one.
     """
     rng = np.random.default_rng(seed)
     labels = _permuted(first, groups, permutations, rng)

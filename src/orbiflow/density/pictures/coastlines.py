@@ -39,9 +39,6 @@ def read_coastlines(path: Path) -> list[Array]:
 
     Polygons become rings, without edges along longitude 180 or at a pole, where files cut what is
     whole on the globe. In a table, a row whose latitude is beyond 90 ends a line.
-
-    Raises:
-        InputFileError: If the file cannot be read, is too large, or holds no lines in degrees.
     """
     try:
         if path.exists() and not path.is_file():

@@ -47,16 +47,7 @@ def density_on_grid(
     A kernel narrower than a pixel would be seen or missed depending on where the grid falls. So half
     a pixel is added to the deviation of each kernel, in squares: then its values on the grid sum to
     its mass within 2 %, wherever it lies, and broad kernels stay as they are.
-
-    Args:
-        density: The density.
-        x: First coordinates.
-        y: Second coordinates.
-        measure: What the density is per.
-        pixel: Side of a pixel. Default: the step of `x`.
-
-    Raises:
-        OrbiflowError: If the measure is unknown.
+    A `pixel` is as wide as the step of `x`, if nothing is said.
     """
     shape = (len(x), len(y))
     points = torch.stack(torch.meshgrid(x, y, indexing="ij"), dim=-1).reshape(-1, 2)

@@ -130,11 +130,7 @@ def refuse_foreign_files(out: Path) -> None:
 
 
 def is_one_file(out: Path) -> bool:
-    """Return whether the pictures will be the pages of one PDF.
-
-    Raises:
-        OutputError: If the name is like that of one picture.
-    """
+    """Return whether the pictures will be the pages of one PDF; refuse a name of one picture."""
     ending = out.suffix.lower()
     if out.is_dir() or ending not in (".png", ".svg", ".pdf", ".html"):
         return False

@@ -89,9 +89,6 @@ def immersion(space: Space) -> Callable[[Tensor], Array]:
 
     The torus is a ring, the sphere the unit sphere in the user's frame (`Sphere.vectors`), the Klein
     bottle a figure-8 immersion, the projective plane Boy's surface.
-
-    Raises:
-        OrbiflowError: If the space has no surface.
     """
     if space.dim != 2:
         raise OrbiflowError(f"only spaces of two dimensions have a surface, not {space!r}")
@@ -193,17 +190,10 @@ class Viewpoint(NamedTuple):
 
 
 def viewpoint(space: Space, place: Tensor) -> Viewpoint:
-    """Return an eye that sees a place of the space's surface, as much from the front as it can.
+    """Return an eye that sees a place, a chart point (2,), of the space's surface, as much from the front as it can.
 
     Rings are never seen from their edge, nor globes from their poles. Boy's surface encloses some
     places: for these the front is cut away.
-
-    Args:
-        space: A space of two dimensions.
-        place: Chart point (2,).
-
-    Raises:
-        OrbiflowError: If the space has no surface.
     """
     surface = immersion(space)
     cloud = surface(mesh(space, _RESOLUTION).points)

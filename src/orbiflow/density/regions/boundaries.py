@@ -107,16 +107,7 @@ def outlines(
     threshold than all of their cell show islands between its nodes, and get a grid of their own. Each
     vertex is moved along its cell's side to where the density itself is at the threshold. The mass
     inside the polygons is measured with new samples.
-
-    Args:
-        levels: Samples of the density.
-        regions: Regions of `levels`.
-        budget: Number of evaluations of the density after which no grid gets finer.
-        seed: Seed of the new samples.
-        told: A function that is called with the share of the work done, and what is being done.
-
-    Raises:
-        OrbiflowError: If the density is not of two dimensions.
+    `told` is called with the share of the work done, and what is being done.
     """
     density = levels.density
     window = window_of(density.space)
@@ -284,9 +275,6 @@ def to_geojson(outlines: Sequence[Outline]) -> dict[str, Any]:
     the density), `log_prob` (the threshold, nats per steradian) and its interval of 95 %, `area` in
     steradians, `fraction` of the space, `polygons_mass` and `polygons_mass_error` (from new samples
     inside the polygons).
-
-    Raises:
-        OrbiflowError: If the space is not round.
     """
     features: list[dict[str, Any]] = []
     for outline in outlines:

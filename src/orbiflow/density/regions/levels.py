@@ -55,11 +55,7 @@ class DensityRegion:
         return self.size / self.density.space.volume
 
     def contains(self, data: ArrayLike) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        """Return whether data (N, k), in the space's own units, lie inside: (N,).
-
-        Raises:
-            OrbiflowError: If the data are not on the space.
-        """
+        """Return whether data (N, k), in the space's own units, lie inside: (N,)."""
         return scores_of(self.density, data) >= self.log_prob
 
     def to_json(self) -> dict[str, Any]:
@@ -75,9 +71,6 @@ class DensityLevels:
         density: A density or a fitted estimator.
         samples: Number of samples, 1000 to 10 million; `samples_for` says how many masses need.
         seed: Seed of the samples.
-
-    Raises:
-        OrbiflowError: If it is no density, or a number is out of range.
     """
 
     @one_thread()
@@ -97,11 +90,7 @@ class DensityLevels:
         self._even = self.density.log_prob(even, measure="natural").numpy()
 
     def highest(self, mass: float) -> DensityRegion:
-        """Return the smallest region that holds a mass between 0 and 1.
-
-        Raises:
-            OrbiflowError: If the mass is out of range, or these samples cannot tell it.
-        """
+        """Return the smallest region that holds a mass between 0 and 1, which these samples can tell."""
         samples_for([mass], len(self._sorted))
         return self._region(self._threshold(float(mass)), float(mass))
 

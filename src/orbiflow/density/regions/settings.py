@@ -78,14 +78,8 @@ def samples_for(
 ) -> int:
     """Return the number of samples for regions of these masses.
 
-    Args:
-        masses: Masses between 0 and 1.
-        samples: The number that was asked for, 1000 to 10 million. Default: 20,000, or as many as the
-            masses need up to a million.
-        name: What messages call `samples`.
-
-    Raises:
-        SettingError: If a mass is out of range, or so few samples cannot tell it.
+    It is the one that was asked for, or else 20,000 or as many as the masses need up to a million.
+    Messages call it `name`.
 
     >>> samples_for([0.5, 0.9]), samples_for([0.5, 0.9995])
     (20000, 200000)

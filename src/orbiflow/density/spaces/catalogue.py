@@ -19,11 +19,7 @@ SPACES = tuple(CLASSES)
 
 
 def space_class(name: str) -> type[Space]:
-    """Return the class of a space, by its name.
-
-    Raises:
-        OrbiflowError: If the name is unknown.
-    """
+    """Return the class of a space, by its name."""
     if not is_a(name, str) or name not in CLASSES:
         raise OrbiflowError(f"unknown space {name!r}; the four are {', '.join(SPACES)}")
     return CLASSES[name]
@@ -31,9 +27,6 @@ def space_class(name: str) -> type[Space]:
 
 def make_space(name: str, **options: Any) -> Space:
     """Return a space by its name, with the options of its class.
-
-    Raises:
-        OrbiflowError: If the name is unknown, or the space has no such option.
 
     >>> make_space("torus", dim=2, unit="degrees")
     Torus(dim=2, unit='degrees')

@@ -95,11 +95,7 @@ def to_klein(patches: ArrayLike, *, unit: str = "radians") -> KleinCoordinates:
 
 
 def from_klein(angles: ArrayLike, *, unit: str = "radians") -> Array:
-    """Return the patches (N, 9) on the Klein bottle at angles (N, 2), theta and phi.
-
-    Raises:
-        OrbiflowError: If the shape is another one, a value is not finite, or the unit is unknown.
-    """
+    """Return the patches (N, 9) on the Klein bottle at angles (N, 2), theta and phi."""
     turn = whole_turn(unit)
     theta, phi = checked_table(angles, (2,), "theta and phi").T * (2 * math.pi / turn)
     return klein_patch(theta, phi)

@@ -55,11 +55,7 @@ class Space(ABC):
     @classmethod
     @abstractmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
-        """Return the space that suits data (N, k) in its dimension, unit and rotation.
-
-        Raises:
-            OrbiflowError: If the space has no such data or unit.
-        """
+        """Return the space that suits data (N, k) in its dimension, unit and rotation."""
 
     @property
     def dim(self) -> int:
@@ -80,9 +76,6 @@ class Space(ABC):
         """Return canonical representatives in [0, 1]^d of points (..., d).
 
         The function is differentiable almost everywhere.
-
-        Raises:
-            OrbiflowError: If the points have another dimension.
         """
         return self.domain.project(self._checked(points))
 
@@ -103,11 +96,7 @@ class Space(ABC):
 
     @abstractmethod
     def to_chart(self, data: ArrayLike) -> Tensor:
-        """Return the canonical points (N, d), float64, of data (N, k).
-
-        Raises:
-            OrbiflowError: If the shape is wrong, or a value is not finite or out of range.
-        """
+        """Return the canonical points (N, d), float64, of data (N, k)."""
 
     @abstractmethod
     def from_chart(self, points: Tensor) -> Array:
@@ -124,10 +113,7 @@ class Space(ABC):
         They are per unit of each angle; on round spaces per degree of latitude and longitude or, for
         unit vectors, the vector of R^3 that is tangent to the sphere, per radian.
 
-        Args:
-            data: The data (N, k).
-            points: `cover` of the data.
-            gradient: The gradients (N, d) in the chart at these points.
+        `points` are `cover` of the data (N, k), and `gradient` (N, d) those in the chart there.
         """
 
     @abstractmethod
@@ -135,11 +121,7 @@ class Space(ABC):
         """Return the options that, with `name`, make the same space again, for JSON."""
 
     def log_density_factor(self, points: Tensor, measure: str) -> Tensor:
-        """Return what to add to a log density of the square at points (..., d) for another measure.
-
-        Raises:
-            OrbiflowError: If the measure is not one of `MEASURES`.
-        """
+        """Return what to add to a log density of the square at points (..., d) for another measure."""
         check_measure(measure)
         if measure == "square":
             return torch.zeros_like(points[..., 0])

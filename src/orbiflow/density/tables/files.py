@@ -50,19 +50,9 @@ def read_table(
     cannot be taken for anything else. `.npy` files hold a 2-dimensional array of numbers or a
     1-dimensional structured one.
 
-    Args:
-        path: The file.
-        columns: The columns that are wanted, in this order: each by its name (exactly, or else without
-            regard to case), or by its number from 1 as text ("3"). None takes all columns of numbers.
-        width: How many columns there must be, None for any number.
-        max_rows: How many rows there may be.
-        has_header: Whether a text file's first line names the columns, None to look.
-        drop_missing: Whether rows that lack a value in a chosen column are left out.
-        keep_missing: Whether they stay, with NaN.
-
-    Raises:
-        InputFileError: If the file cannot be read; it names the line and the column at fault.
-        OrbiflowError: If pyarrow is missing for a Parquet file.
+    Columns are wanted in their order: each by its name (exactly, or else without regard to case), or by
+    its number from 1 as text ("3"). None takes all columns of numbers; `width` says how many there must
+    be. Rows that lack a value are refused, left out or kept with NaN.
     """
     path = Path(path)
     read = {"text": read_text, "npy": read_npy, "parquet": read_parquet}[kind_of_file(path)]
@@ -78,15 +68,6 @@ def append_columns(
     and its comments, and loses its blank lines; it gets the new names only if it has a header. Rows
     that were left out get an empty cell. From npy and Parquet files the table's columns are written,
     as CSV. A name that is taken gets a number: "density_2".
-
-    Args:
-        table: The table that was read.
-        path_of_source: The file that it was read from.
-        columns: Values (N,) for the rows of the table, by the names of the new columns.
-
-    Raises:
-        InputFileError: If the source has changed since it was read.
-        ValueError: If values have another shape.
     """
     values = [np.asarray(column, dtype=np.float64) for column in columns.values()]
     for column in values:
@@ -193,16 +174,7 @@ def kind_of_file(path: Path) -> str:
 def column_names(
     path: str | Path, *, wanted: Sequence[str] | None = None, has_header: bool | None = None
 ) -> tuple[str, ...] | None:
-    """Return the names of all columns of a file, or None if it names none.
-
-    Args:
-        path: The file.
-        wanted: Columns that are wanted, which help to tell a header from a row.
-        has_header: Whether a text file's first line names the columns, None to look.
-
-    Raises:
-        InputFileError: If the file is no table.
-    """
+    """Return the names of all columns of a file, or None; `wanted` help to tell a header from a row."""
     path = Path(path)
     kind = kind_of_file(path)
     if kind == "text":
@@ -213,17 +185,7 @@ def column_names(
 def read_labels(
     path: str | Path, column: str, table: Table, *, has_header: bool | None = None
 ) -> NDArray[np.str_]:
-    """Return the cells (N,) of a column, numbers or not, for the rows of a table.
-
-    Args:
-        path: The file that the table was read from.
-        column: Name or number of the column.
-        table: The table.
-        has_header: Whether a text file's first line names the columns, None to look.
-
-    Raises:
-        InputFileError: If the column is unknown, a cell is empty, or the file has changed.
-    """
+    """Return the cells (N,) of a file's column, numbers or not, for the rows of its table."""
     path = Path(path)
     kind = kind_of_file(path)
     found: dict[int, str] = {}
