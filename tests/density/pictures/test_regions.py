@@ -15,6 +15,7 @@ from orbiflow.density import (
     AdaptiveKernels,
     Density,
     DensityLevels,
+    DensityRegion,
     FlowDensity,
     Mixture,
     PlotSettings,
@@ -27,7 +28,6 @@ from orbiflow.density import (
 )
 from orbiflow.density.models import identity_flow
 from orbiflow.density.pictures.axes import view_of
-from orbiflow.density.pictures.overlays import RegionLine
 from orbiflow.density.pictures.projections import EqualEarth
 from orbiflow.errors import OrbiflowError
 
@@ -48,9 +48,9 @@ def broad(name: str) -> Mixture:
     return blended(space, identity_flow(space), UniformDensity(space), kernels, shares)
 
 
-def lines_of(density: Mixture, *masses: float) -> list[RegionLine]:
+def lines_of(density: Mixture, *masses: float) -> list[DensityRegion]:
     levels = DensityLevels(density, samples=4000)
-    return [RegionLine(mass, levels.highest(mass).log_prob) for mass in masses]
+    return [levels.highest(mass) for mass in masses]
 
 
 def with_regions(*masses: float, **options: Any) -> PlotSettings:

@@ -19,6 +19,7 @@ from orbiflow.density.pictures import overlays
 from orbiflow.density.pictures.axes import INK, LETTER, space_title
 from orbiflow.density.pictures.colours import Shade, bar_label, bar_ticks, minor_places
 from orbiflow.density.pictures.settings import PlotSettings
+from orbiflow.density.regions import DensityRegion
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import Picture, Sheet
 
@@ -66,7 +67,7 @@ class Colouring:
             image.set_clip_path(self._clip(axes))
         return image
 
-    def draw_regions(self, axes: Axes, lines: Sequence[overlays.RegionLine], sheet: Sheet) -> None:
+    def draw_regions(self, axes: Axes, lines: Sequence[DensityRegion], sheet: Sheet) -> None:
         """Draw lines around regions, cut along the outline."""
         if lines:
             overlays.draw_regions(
@@ -152,18 +153,20 @@ def draw_density(
     settings: PlotSettings,
     *,
     dots: Tensor | None = None,
-    regions: Sequence[overlays.RegionLine] = (),
+    regions: Sequence[DensityRegion] | None = None,
     sheet: Sheet | None = None,
 ) -> Picture:
     """Draw a density on a ground, chart points (N, 2) as dots over it, and a colour bar."""
     sheet = sheet or settings.sheet
+    regions = overlays.region_lines(density, settings) if regions is None else regions
     colouring = ground.colouring(density, settings)
     shade = colouring.shade
     label = bar_label(shade, ground.space, settings.measure)
     places = None if dots is None else ground.places(dots)
     most = settings.samples or overlays.MAX_DOTS
+    masses = sorted(settings.regions or ())
     notes = [*([] if places is None else [SMALLER]), colouring.reason]
-    notes += [overlays.region_note(regions)] if regions else []
+    notes += [overlays.region_note(masses)] if masses else []
     notes += [colouring.averaging] if colouring.averaging else []
     count = None if places is None else (min(most, len(places)), len(places))
     caption = ground.caption(notes, count)

@@ -17,7 +17,7 @@ from orbiflow.density.pictures import ground, projections
 from orbiflow.density.pictures.axes import chart_points, degrees_text
 from orbiflow.density.pictures.colours import chosen_scale, density_on_map, is_sharp, shading
 from orbiflow.density.pictures.map_axes import draw_map_lines, graticule
-from orbiflow.density.pictures.overlays import log_natural, region_lines
+from orbiflow.density.pictures.overlays import log_natural
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import RoundSpace, Space, checked_table, to_latlon, to_vectors
 from orbiflow.drawing import Picture, Sheet
@@ -45,29 +45,19 @@ def map_picture(
     coastlines: Sequence[ArrayLike] = (),
     sheet: Sheet | None = None,
 ) -> Picture:
-    """Draw a density on a map with its graticule.
+    """Draw a density on the sphere or the projective plane on a map with its graticule.
 
     The density is evaluated at each pixel of the map, so that nothing is stretched or sewn; the
     pixels end at a curve. On the projective plane each axis is drawn at the end that the map shows.
 
     Args:
-        density: A density on the sphere or the projective plane.
-        samples: Data or samples to draw as dots, chart points (N, 2). Of too many a random choice is
-            drawn, always the same; dots are smaller where they crowd.
-        settings: How it is drawn.
+        density, samples, settings, sheet: As for `density_picture`.
         about: Chart points (N, 2) that the map should show. Default: `samples`.
         coastlines: Lines (M, 2) of latitude and longitude.
-        sheet: The sheet. Default: that of the settings.
-
-    Raises:
-        OrbiflowError: If the density is on another space, or settings do not fit it.
     """
     settings = settings or PlotSettings()
-    if about is None:
-        about = torch.empty(0, 2) if samples is None else samples
-    drawn = _map_about(density.space, about, settings, coastlines)
-    lines = region_lines(density, settings)
-    return ground.draw_density(drawn, density, settings, dots=samples, regions=lines, sheet=sheet)
+    drawn = _map_about(density.space, samples if about is None else about, settings, coastlines)
+    return ground.draw_density(drawn, density, settings, dots=samples, sheet=sheet)
 
 
 def map_samples_picture(
@@ -79,10 +69,7 @@ def map_samples_picture(
     coastlines: Sequence[ArrayLike] = (),
     sheet: Sheet | None = None,
 ) -> Picture:
-    """Draw data (N, 2) and samples (M, 2) on two maps; without data, the density and samples.
-
-    Points are of the chart; all else is as for `map_picture`.
-    """
+    """Draw data (N, 2) and samples (M, 2) on two maps, as `samples_picture` does on two squares."""
     settings = settings or PlotSettings()
     about = samples if data is None else data
     drawn = _map_about(density.space, about, settings, coastlines)
@@ -90,8 +77,9 @@ def map_samples_picture(
 
 
 def _map_about(
-    space: Space, about: Tensor, settings: PlotSettings, coastlines: Sequence[ArrayLike]
+    space: Space, about: Tensor | None, settings: PlotSettings, coastlines: Sequence[ArrayLike]
 ) -> Map:
+    about = torch.empty(0, 2) if about is None else about
     chosen = chosen_map(space, chart_points(space, about), settings, settings.names)
     return Map(space, chosen, coastlines)
 

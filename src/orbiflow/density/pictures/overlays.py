@@ -13,7 +13,7 @@ from orbiflow.arrays import Array
 from orbiflow.density.models import Density
 from orbiflow.density.pictures.axes import INK
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.density.regions import DensityLevels, samples_for
+from orbiflow.density.regions import DensityLevels, DensityRegion, samples_for
 from orbiflow.drawing import Sheet
 from orbiflow.errors import SettingError
 
@@ -130,15 +130,8 @@ STYLES = ("solid", "dashed", "dotted", "dashdot")
 HALO, LINE = "#16202a", "#ffffff"
 
 
-class RegionLine(NamedTuple):
-    """A region of highest density: its mass, and the log density at its edge in natural measure."""
-
-    mass: float
-    log_prob: float
-
-
-def region_lines(density: Density, settings: PlotSettings) -> tuple[RegionLine, ...]:
-    """Return the lines for the settings' `regions`, the smallest mass first."""
+def region_lines(density: Density, settings: PlotSettings) -> tuple[DensityRegion, ...]:
+    """Return the settings' `regions`, around which lines are drawn, the smallest mass first."""
     if not settings.regions:
         return ()
     space = density.space
@@ -149,29 +142,24 @@ def region_lines(density: Density, settings: PlotSettings) -> tuple[RegionLine, 
         )
     count = samples_for(settings.regions, settings.region_samples)
     levels = DensityLevels(density, samples=count, seed=settings.seed % 2**63)
-    return tuple(
-        RegionLine(mass, levels.highest(mass).log_prob) for mass in sorted(settings.regions)
-    )
+    return tuple(map(levels.highest, sorted(settings.regions)))
 
 
-def region_note(lines: Sequence[RegionLine]) -> str:
+def region_note(masses: Sequence[float]) -> str:
     """Return what the lines mean, in words for a caption.
 
-    >>> region_note([RegionLine(0.5, -1.0), RegionLine(0.9, -2.0)])
+    >>> region_note([0.5, 0.9])
     'lines are about the smallest regions that hold 50 % (solid) and 90 % (dashed)'
     """
-    if len(lines) == 1:
-        percent = f"{100 * lines[0].mass:.10g} %"
-        return f"the line is about the smallest region that holds {percent}"
-    parts = [
-        f"{100 * line.mass:.10g} % ({style})" for line, style in zip(lines, STYLES, strict=False)
-    ]
+    if len(masses) == 1:
+        return f"the line is about the smallest region that holds {100 * masses[0]:.10g} %"
+    parts = [f"{100 * mass:.10g} % ({style})" for mass, style in zip(masses, STYLES, strict=False)]
     return f"lines are about the smallest regions that hold {', '.join(parts[:-1])} and {parts[-1]}"
 
 
 def draw_regions(
     axes: Axes,
-    lines: Sequence[RegionLine],
+    lines: Sequence[DensityRegion],
     log_natural: Array,
     extent: tuple[float, float, float, float],
     sheet: Sheet,

@@ -22,7 +22,7 @@ from orbiflow.density.pictures.axes import (
     view_of,
 )
 from orbiflow.density.pictures.colours import chosen_scale, density_on_grid, is_sharp, shading
-from orbiflow.density.pictures.overlays import log_natural, region_lines
+from orbiflow.density.pictures.overlays import log_natural
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.surfaces import edge_pairs
 from orbiflow.density.spaces import Space
@@ -70,14 +70,10 @@ def density_picture(
             drawn, always the same; dots are smaller where they crowd, so that peaks stay in sight.
         settings: How it is drawn.
         sheet: The sheet. Default: that of the settings.
-
-    Raises:
-        OrbiflowError: If the space has another dimension, samples have another shape, or names or a
-            centre do not fit.
     """
     settings = settings or PlotSettings()
-    square, lines = Square(density.space, settings), region_lines(density, settings)
-    return ground.draw_density(square, density, settings, dots=samples, regions=lines, sheet=sheet)
+    square = Square(density.space, settings)
+    return ground.draw_density(square, density, settings, dots=samples, sheet=sheet)
 
 
 def samples_picture(
@@ -90,8 +86,7 @@ def samples_picture(
 ) -> Picture:
     """Draw data (N, 2) and samples (M, 2) on two squares; without data, the density and samples.
 
-    Points are of the chart, such as `space.to_chart(table)` and `density.sample((M,))`; all else is as
-    for `density_picture`.
+    Points are of the chart, such as `space.to_chart(table)` and `density.sample((M,))`.
     """
     settings = settings or PlotSettings()
     square = Square(density.space, settings)

@@ -190,7 +190,7 @@ class Viewpoint(NamedTuple):
 
 
 def viewpoint(space: Space, place: Tensor) -> Viewpoint:
-    """Return an eye that sees a place, a chart point (2,), of the space's surface, as much from the front as it can.
+    """Return an eye that sees a chart point (2,) on the surface, as much from the front as it can.
 
     Rings are never seen from their edge, nor globes from their poles. Boy's surface encloses some
     places: for these the front is cut away.

@@ -90,7 +90,7 @@ class DensityLevels:
         self._even = self.density.log_prob(even, measure="natural").numpy()
 
     def highest(self, mass: float) -> DensityRegion:
-        """Return the smallest region that holds a mass between 0 and 1, which these samples can tell."""
+        """Return the smallest region that holds a mass between 0 and 1, as these samples tell."""
         samples_for([mass], len(self._sorted))
         return self._region(self._threshold(float(mass)), float(mass))
 
