@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -32,20 +31,6 @@ SCORED = 0.3
 """Share of the work that is done when gradients are still to be found."""
 
 
-@dataclass(frozen=True, eq=False)
-class Scores:
-    """Columns (N,) to add to a table, log densities first, and what is known of them.
-
-    - `mean`: The mean log density in nats, weighted, of the rows that lack nothing.
-    - `over`: Which rows these are, in words.
-    """
-
-    columns: dict[str, Array]
-    mean: float
-    over: str
-    notes: tuple[str, ...]
-
-
 def score_rows(
     density: Density,
     rows: TableRows,
@@ -54,8 +39,12 @@ def score_rows(
     cancel: Cancel,
     *,
     may_lack: bool = False,
-) -> Scores:
-    """Return log densities of rows, and what else the settings ask for."""
+) -> tuple[dict[str, Array], float, str, list[str]]:
+    """Return columns (N,) to add to the table, log densities first, and what is known of them.
+
+    These are the mean log density in nats, weighted, of the rows that lack nothing, which rows these are
+    in words, and notes.
+    """
     space, values = density.space, rows.table.values
     points = chart_of_observed(space, values) if may_lack else space.to_chart(values)
     known = ~points.isnan()
@@ -75,7 +64,7 @@ def score_rows(
     if not whole.all():
         notes.append(_missing_note(known, name))
     over = f"{len(whole)} rows" if whole.all() else f"the {whole.sum()} whole rows"
-    return Scores(columns, mean_of_whole(columns[name], rows.weights, whole), over, tuple(notes))
+    return columns, mean_of_whole(columns[name], rows.weights, whole), over, notes
 
 
 def _log_densities(

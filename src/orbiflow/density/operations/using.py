@@ -82,12 +82,14 @@ def score(
         density, extra = model_at(model)
         rows = tables.read_rows(data, with_columns_of(reading, data, extra, on_event), on_event)
         check_fits(data, rows.table, density.space, extra, on_event)
-        found = score_rows(density, rows, settings, on_event, cancel, may_lack=may_lack)
+        columns, mean, over, notes = score_rows(
+            density, rows, settings, on_event, cancel, may_lack=may_lack
+        )
     weighted = "" if reading.weights is None else f", weighted by {reading.weights}"
-    words = f"mean log density {found.mean:.4f} nats over {found.over}{weighted}; written to {out}"
-    table = tables.append_columns(rows.table, data, found.columns)
-    write_file(out, table, on_event, *found.notes, words)
-    return runtime.Outcome({"file": str(out), "rows": len(rows.table.values), "mean": found.mean})
+    words = f"mean log density {mean:.4f} nats over {over}{weighted}; written to {out}"
+    table = tables.append_columns(rows.table, data, columns)
+    write_file(out, table, on_event, *notes, words)
+    return runtime.Outcome({"file": str(out), "rows": len(rows.table.values), "mean": mean})
 
 
 class SampleSettings(Settings, group="Samples"):
@@ -155,8 +157,8 @@ def marginal(
     if not columns:
         raise SettingError("{columns} names no column; give names or numbers, as in phi,psi")
 
-    from orbiflow.density.operations.derived import axes_of, write_derived
-    from orbiflow.density.operations.saved import model_at, names_of
+    from orbiflow.density import inference
+    from orbiflow.density.operations.saved import axes_of, model_at, names_of, write_derived
 
     runtime.check_output_folder(out, model, what="model")
     with runtime.one_thread():
@@ -165,8 +167,6 @@ def marginal(
         axes = axes_of(columns, names)
         folder = runtime.ResultFolder(out, written_files)
         on_event(runtime.Progress(0.0, "integrating"))
-        from orbiflow.density import inference
-
         found = inference.marginal(density, axes)
         kept = [names[axis] for axis in axes]
         origin = {"marginal": kept, "model": str(model)}
@@ -198,30 +198,26 @@ def conditional(
         raise SettingError("{given} says nothing; give what is known, as in psi=-45")
     pairs = [_angle(text) for text in given]
 
-    from orbiflow.density.operations.derived import condition_of, evidence_of, write_derived
-    from orbiflow.density.operations.saved import model_at, names_of
+    from orbiflow.density import inference
+    from orbiflow.density.operations import saved
 
     runtime.check_output_folder(out, model, what="model")
     with runtime.one_thread():
-        density, extra = model_at(model)
-        names = names_of(density, extra)
-        known, turns, kept = condition_of(density.space, names, pairs, columns, on_event)
+        density, extra = saved.model_at(model)
+        names = saved.names_of(density, extra)
+        known, turns, kept = saved.condition_of(density.space, names, pairs, columns, on_event)
         folder = runtime.ResultFolder(out, written_files)
         on_event(runtime.Progress(0.0, "integrating"))
-        from orbiflow.density import inference
-
         found = inference.conditional(density, turns, kept)
-        evidence = evidence_of(density, turns)
+        evidence = saved.evidence_of(density, turns)
         rare = "; few data lie there, or none" if evidence < -3 else ""
         words = ", ".join(f"{name} = {value:g}" for name, value in known.items())
         ratio = f"{math.exp(evidence):.3g} times that of even angles{rare}"
         on_event(runtime.Note(f"the density at {words} is {ratio}"))
-        origin = {
-            "given": known,
-            "log_density_of_given_over_uniform": evidence,
-            "model": str(model),
-        }
-        return write_derived(found, [names[k] for k in kept], origin, folder, on_event, cancel)
+        over_uniform = {"log_density_of_given_over_uniform": evidence}
+        origin = {"given": known, **over_uniform, "model": str(model)}
+        kept_names = [names[k] for k in kept]
+        return saved.write_derived(found, kept_names, origin, folder, on_event, cancel)
 
 
 def _angle(text: str) -> tuple[str, float]:
