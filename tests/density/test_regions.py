@@ -23,11 +23,11 @@ from orbiflow.density import (
     outlines,
     to_geojson,
 )
-from orbiflow.density.regions.grid import LevelGrid, Seeds, filled
+from orbiflow.density.regions.grid import LevelGrid, filled
 from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
-NO_SEEDS = Seeds(np.zeros((0, 2)), np.zeros(0))
+NO_SEEDS = (np.zeros((0, 2)), np.zeros(0))
 
 
 @given(st.floats(0.2, 0.8), st.floats(0.2, 0.8), st.floats(0.05, 0.19), st.floats(-1.0, 1.0))

@@ -35,7 +35,9 @@ def model_at(path: Path) -> tuple[Density, dict[str, Any]]:
     """Return the density in a file or in the folder of a fit, and what was saved with it."""
     file = path / pictures.MODEL if path.is_dir() else path
     if not file.exists():
-        missing = f"there is no {pictures.MODEL} in it" if path.is_dir() else "there is no such folder"
+        missing = (
+            f"there is no {pictures.MODEL} in it" if path.is_dir() else "there is no such folder"
+        )
         raise InputFileError(
             f"cannot read {path}: {missing}; give the folder that `orbiflow density fit` wrote"
         )

@@ -42,7 +42,7 @@ def score_rows(
 ) -> tuple[dict[str, Array], float, str, list[str]]:
     """Return columns (N,) to add to the table, log densities first, and what is known of them.
 
-    These are the mean log density in nats, weighted, of the rows that lack nothing, which rows these are
+    These are the weighted mean log density, in nats, of the rows that lack nothing, which rows they are
     in words, and notes.
     """
     space, values = density.space, rows.table.values

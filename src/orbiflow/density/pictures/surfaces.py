@@ -116,29 +116,22 @@ def mesh(space: Space, resolution: int) -> Mesh:
     return Mesh(points, corners.reshape(-1, 3))
 
 
-class EdgePair(NamedTuple):
-    """Two edges of the square that are one, (2, 2) each, from start to end in the same sense."""
-
-    first: Array
-    second: Array
-
-
-def edge_pairs(group: CrystallographicGroup) -> list[EdgePair]:
-    """Return the edges of the unit square that `group` identifies.
+def edge_pairs(group: CrystallographicGroup) -> list[tuple[Array, Array]]:
+    """Return pairs of edges (2, 2) of the unit square that `group` identifies, start with start.
 
     Neighbouring edges both start at the corner where they meet.
     """
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     edges = [corners[[0, 3]], corners[[1, 2]], corners[[0, 1]], corners[[3, 2]]]
     middle = np.full(2, 0.5)
-    pairs: list[EdgePair] = []
+    pairs: list[tuple[Array, Array]] = []
     for g in group.elements_near(middle, 1.5, source=middle)[1:]:
         for k, edge in enumerate(edges):
             for other in edges[k + 1 :]:
                 image = g(edge)
                 if np.allclose(image.mean(axis=0), other.mean(axis=0)):
                     turn = -1 if np.allclose(image[1], edge[1]) else 1
-                    pairs.append(EdgePair(edge[::turn].copy(), image[::turn].copy()))
+                    pairs.append((edge[::turn].copy(), image[::turn].copy()))
     return pairs
 
 

@@ -15,7 +15,7 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.batch import csv_bytes
 from orbiflow.density.models import Density
-from orbiflow.density.regions.grid import LevelGrid, Seeds, filled, with_islands
+from orbiflow.density.regions.grid import LevelGrid, filled, with_islands
 from orbiflow.density.regions.levels import DensityLevels, DensityRegion
 from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors, whole_turn
 from orbiflow.errors import OrbiflowError
@@ -121,10 +121,8 @@ def outlines(
     spent = 0
     peaks = window.from_chart(_peaks(density))
     thresholds = np.array([region.log_prob for region in regions])
-    seeds = Seeds(
-        np.concatenate([window.from_chart(levels.points), peaks]),
-        np.concatenate([levels.log_probs, function(peaks)]),
-    )
+    points = np.concatenate([window.from_chart(levels.points), peaks])
+    seeds = points, np.concatenate([levels.log_probs, function(peaks)])
     grid = LevelGrid(
         function, window.low, window.high, window.cells, thresholds, seeds, DOUBLINGS, budget
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -21,14 +20,6 @@ MAX_ROUNDS = 200
 """Rounds of evaluating what lies beside a crossing, at most, for each size of cells."""
 
 
-@dataclass(frozen=True, eq=False)
-class Seeds:
-    """Points (S, 2) at which the function is known, so that islands between the nodes are found."""
-
-    points: Array
-    values: Array
-
-
 class LevelGrid:
     """Values (n + 1, m + 1) at the nodes of n x m even cells between `low` and `high`.
 
@@ -37,6 +28,8 @@ class LevelGrid:
     ends are on different sides of one of the levels (T,); elsewhere they are interpolated from coarser
     cells.
 
+    - `seeds`: Points (S, 2) at which the function is known, and its values (S,) there, so that islands
+      between the nodes are found.
     - `evaluations`: Number of evaluations of the function.
     """
 
@@ -47,7 +40,7 @@ class LevelGrid:
         high: Array,
         cells: tuple[int, int],
         levels: Array,
-        seeds: Seeds,
+        seeds: tuple[Array, Array],
         doublings: int,
         budget: int,
     ) -> None:
@@ -85,11 +78,12 @@ class LevelGrid:
 
     def _missed(self) -> Flags:
         """Return the cells (n, m) with a seed on the other side of a level than all their nodes."""
-        i, j = self.cells_of(self.seeds.points).T
+        points, values = self.seeds
+        i, j = self.cells_of(points).T
         found = np.zeros(np.array(self.values.shape) - 1, dtype=bool)
         for level in self.levels:
             least, most = _extremes(self.values >= level)
-            lost = np.where(self.seeds.values >= level, ~most[i, j], least[i, j])
+            lost = np.where(values >= level, ~most[i, j], least[i, j])
             found[i[lost], j[lost]] = True
         return found
 
@@ -187,7 +181,7 @@ def with_islands(
 def _wrong(shape: shapely.Geometry, grid: LevelGrid, level: float) -> NDArray[np.int64]:
     """Return cells (C, 2) with seeds on the wrong side, those with most first."""
     shapely.prepare(shape)
-    points, values = grid.seeds.points, grid.seeds.values
+    points, values = grid.seeds
     inside = np.asarray(shapely.intersects_xy(shape, points[:, 0], points[:, 1]))
     wrong = inside != (values >= level)
     cells, counts = np.unique(grid.cells_of(points[wrong]), axis=0, return_counts=True)

@@ -13,8 +13,8 @@ from torch import Tensor
 
 from orbiflow.arguments import as_choice, as_whole
 from orbiflow.arrays import Array
-from orbiflow.density.spaces.space import Space, checked_table
-from orbiflow.symmetry import CrystallographicGroup, identification_group
+from orbiflow.density.spaces.space import Space, checked_table, named_group
+from orbiflow.symmetry import CrystallographicGroup
 
 TURN: dict[str, float] = {"radians": 2 * math.pi, "degrees": 360.0, "turns": 1.0}
 """A whole turn in each unit."""
@@ -28,13 +28,25 @@ def whole_turn(unit: str) -> float:
 
 
 @lru_cache(maxsize=16)
-def _group(name: str, dim: int = 2) -> CrystallographicGroup:
-    if dim == 2:
-        return identification_group(name)
+def _lattice_group(dim: int) -> CrystallographicGroup:
     return CrystallographicGroup.generate(np.eye(dim), name="p1")
 
 
-class Torus(Space):
+class _AngleSpace(Space):
+    """A space whose data are angles, all in one unit."""
+
+    def __init__(self, *, unit: str = "radians") -> None:
+        self.period = whole_turn(unit)
+        self.unit = unit
+
+    def to_chart(self, data: ArrayLike) -> Tensor:
+        return self.project(self.cover(data))
+
+    def settings(self) -> dict[str, Any]:
+        return {"unit": self.unit}
+
+
+class Torus(_AngleSpace):
     """The torus of several angles, whose natural measure is their product in the user's unit.
 
     Args:
@@ -50,9 +62,8 @@ class Torus(Space):
 
     def __init__(self, dim: int = 2, *, unit: str = "radians") -> None:
         dim = as_whole(dim, "dim", 1, MAX_DIM)
-        self.period = whole_turn(unit)
-        self.unit = unit
-        self.group = _group("torus", dim)
+        super().__init__(unit=unit)
+        self.group = named_group("torus") if dim == 2 else _lattice_group(dim)
         self.columns = tuple(f"angle{k + 1}" for k in range(dim))
 
     @classmethod
@@ -63,9 +74,6 @@ class Torus(Space):
     @property
     def volume(self) -> float:
         return self.period**self.dim
-
-    def to_chart(self, data: ArrayLike) -> Tensor:
-        return self.project(self.cover(data))
 
     def cover(self, data: ArrayLike) -> Tensor:
         table = checked_table(data, (self.dim,), f"{self.dim} angles")
@@ -94,10 +102,10 @@ class Torus(Space):
         return (table**2).sum(dim=-1)
 
     def settings(self) -> dict[str, Any]:
-        return {"dim": self.dim, "unit": self.unit}
+        return {"dim": self.dim, **super().settings()}
 
 
-class KleinBottle(Space):
+class KleinBottle(_AngleSpace):
     """The Klein bottle of angles with (theta + pi, pi - phi) ~ (theta, phi), both of period 2 pi.
 
     These are the coordinates of 3 x 3 image patches cos(phi) l(theta) + sin(phi) q(theta), with l a
@@ -117,9 +125,8 @@ class KleinBottle(Space):
     columns = ("theta", "phi")
 
     def __init__(self, *, unit: str = "radians") -> None:
-        self.period = whole_turn(unit)
-        self.unit = unit
-        self.group = _group("klein-bottle")
+        super().__init__(unit=unit)
+        self.group = named_group("klein-bottle")
 
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
@@ -129,9 +136,6 @@ class KleinBottle(Space):
     @property
     def volume(self) -> float:
         return self.period**2 / 2
-
-    def to_chart(self, data: ArrayLike) -> Tensor:
-        return self.project(self.cover(data))
 
     def cover(self, data: ArrayLike) -> Tensor:
         theta, phi = checked_table(data, (2,), "theta and phi").T / self.period
@@ -146,6 +150,3 @@ class KleinBottle(Space):
         """Return angles (N, 2): theta in [0, 1/2) turns, phi in [-1/4, 3/4) turns."""
         x, y = self.project(points).detach().double().cpu().numpy().T
         return np.stack([y / 2, x - 0.25], axis=-1) * self.period
-
-    def settings(self) -> dict[str, Any]:
-        return {"unit": self.unit}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -15,9 +14,8 @@ from torch import Tensor
 from orbiflow.arguments import as_choice, as_instance
 from orbiflow.arrays import Array
 from orbiflow.density.spaces import uniformization
-from orbiflow.density.spaces.space import Space, checked_table, row_count
+from orbiflow.density.spaces.space import Space, checked_table, named_group, row_count
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry import CrystallographicGroup, identification_group
 from orbiflow.typed_torch import linalg
 
 UNIT_TOLERANCE = 1e-3
@@ -99,7 +97,7 @@ class RoundSpace(Space):
         self.form = as_choice(form, tuple(FORMS), "form")
         self.columns = FORMS[self.form]
         self.rotation = turn
-        self.group = _group(self.name)
+        self.group = named_group(self.name)
 
     @property
     def volume(self) -> float:
@@ -229,8 +227,3 @@ def clear_rotation(
         cosines = abs(cosines)
     load = np.exp(30 * (cosines - 1)).sum(axis=(1, 2))
     return turns[int(load.argmin())]
-
-
-@lru_cache(maxsize=2)
-def _group(name: str) -> CrystallographicGroup:
-    return identification_group(name)

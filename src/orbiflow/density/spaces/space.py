@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -15,7 +15,7 @@ from torch import Tensor
 from orbiflow.arguments import as_choice, as_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry import CrystallographicGroup, DirichletDomain
+from orbiflow.symmetry import CrystallographicGroup, DirichletDomain, identification_group
 from orbiflow.typed_torch import linalg
 
 MEASURES = ("natural", "square", "uniform")
@@ -29,6 +29,9 @@ pictures use the natural measure."""
 
 CHART = "square"
 """The default measure of functions of chart points."""
+
+named_group = lru_cache(maxsize=4)(identification_group)
+"""The group of a space by its name, made once."""
 
 
 class Space(ABC):
