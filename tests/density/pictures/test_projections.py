@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from orbiflow.density import PlotSettings, ProjectivePlane, Sphere, Torus, to_vectors
 from orbiflow.density.pictures.map_axes import meridian, parallel
-from orbiflow.density.pictures.maps import chosen_map, pixels_of, places_on
+from orbiflow.density.pictures.maps import Map, chosen_map, pixels_of
 from orbiflow.density.pictures.projections import (
     Azimuthal,
     EqualEarth,
@@ -162,7 +162,7 @@ def test_both_ends_of_an_axis_are_drawn_at_one_place(seed: int, center: Any) -> 
     space, points = ProjectivePlane(), directions(50, seed)
     opposite = np.stack([-points[:, 0], (points[:, 1] + 360) % 360 - 180], axis=-1)
     projection = Lambert(center)
-    one, other = (places_on(space, projection, space.to_chart(p)) for p in (points, opposite))
+    one, other = (Map(space, projection).places(space.to_chart(p)) for p in (points, opposite))
     assert len(one) == len(points)
     np.testing.assert_allclose(one, other, atol=1e-6)
 

@@ -102,6 +102,9 @@ def cross_validation_folds(
         seed: Seed of the folds.
         split: Number of the repetition; each is a split of its own, whatever others there are.
 
+    Raises:
+        OrbiflowError: If there is another number of labels than rows, or fewer groups than folds.
+
     >>> cross_validation_folds(6, 3, together=["a", "a", "b", "b", "c", "c"]).tolist()
     [1, 1, 2, 2, 0, 0]
     """

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow import runtime
-from orbiflow.arrays import Array
+from orbiflow.batch import csv_bytes
 from orbiflow.density import tables
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
@@ -91,22 +91,11 @@ def fold(
         "seconds": time.perf_counter() - begin,
     }
     report = json.dumps(document, allow_nan=False, indent=1)
-    write_files(
-        folder, {SCORES: scores_csv(table.lines[out_of_fit], scores), REPORT: report}, on_event
-    )
+    pairs = zip(table.lines[out_of_fit].tolist(), scores.tolist(), strict=True)
+    write_files(folder, {SCORES: csv_bytes(["row", "log_prob"], pairs), REPORT: report}, on_event)
     on_event(runtime.Note(f"mean log density {mean:.4f} nats at {out_of_fit.sum()} rows held out"))
     names = ("rows", "fitted", "log_likelihood", "seconds")
     return runtime.Outcome({"folder": str(out), **{name: document[name] for name in names}})
-
-
-def scores_csv(rows: NDArray[np.int64], scores: Array) -> str:
-    """Return a table of row numbers (in text: line numbers) and log densities, to be read back exactly.
-
-    >>> scores_csv(np.array([2, 7]), np.array([-1.5, 0.1]))
-    'row,log_prob\\n2,-1.5\\n7,0.1\\n'
-    """
-    pairs = zip(rows.tolist(), scores.tolist(), strict=True)
-    return "row,log_prob\n" + "".join(f"{row},{score!r}\n" for row, score in pairs)
 
 
 def written_files(folder: Path) -> set[str]:

@@ -148,7 +148,7 @@ def _table(done: Sequence[tuple[Fit, batch.Entry]]) -> bytes:
     heads = ["split", "fold", "setting", "state", *FIGURES, "seconds", "error", "folder"]
     rows: list[list[Any]] = []
     for fit, entry in done:
-        figures = ["" if (v := entry.best.get(name)) is None else repr(v) for name in FIGURES]
+        figures = [entry.best.get(name) for name in FIGURES]
         seconds = "" if entry.seconds is None else f"{entry.seconds:.3f}"
         folder = "" if entry.state == "failed" else entry.name
         rows.append([fit.split, fit.fold, fit.setting, entry.state, *figures, seconds])
@@ -165,10 +165,6 @@ def _stamp(path: Path) -> tuple[int, int] | None:
     return found.st_size, found.st_mtime_ns
 
 
-def _figures(summary: batch.Summary) -> dict[str, Any]:
-    return {name: summary[name] for name in ("rows", "fitted", "log_likelihood")}
-
-
 FITS = batch.Kind(
     things="fits",
     items="fits",
@@ -176,7 +172,7 @@ FITS = batch.Kind(
     writes="out",
     modules=("orbiflow.density.cross_validation.fold",),
     columns=(batch.Column("log_likelihood", "held out", ".4f"), batch.Column("rows", "rows", "d")),
-    best=_figures,
+    best=lambda summary: {name: summary[name] for name in FIGURES},
     picture=lambda _summary: None,
     written=written_files,
 )
@@ -189,7 +185,8 @@ def run(
     begin = time.perf_counter()
     out = asked.out
     runtime.check_outside_runs(out, asked.data)
-    for name in (TABLE, ROWS, REPORT, PAGE):
+    files = {"table": TABLE, "rows": ROWS, "report": REPORT, "page": PAGE}
+    for name in files.values():
         runtime.check_inputs_kept(out / name, asked.data)
     with runtime.one_thread():
         rows = cv_rows(asked, tell)
@@ -208,10 +205,7 @@ def run(
         tell(runtime.Note(text))
     summary = {
         "folder": str(out),
-        "table": str(out / TABLE),
-        "rows": str(out / ROWS),
-        "report": str(out / REPORT),
-        "page": str(out / PAGE),
+        **{key: str(out / name) for key, name in files.items()},
         "fits": len(fits),
         "comparison": None if isinstance(found, str) else found.to_json(),
         "seconds": time.perf_counter() - begin,

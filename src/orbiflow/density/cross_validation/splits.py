@@ -170,9 +170,6 @@ def fits_of(asked: CrossValidation) -> Iterator[Fit]:
                 yield Fit(split, fold, setting, components)
 
 
-COLUMNS = ("row", "log_prob")
-
-
 @dataclass(frozen=True, eq=False)
 class HeldOut:
     """Log densities in nats and natural measure, each by a fit that had not seen the row.
@@ -237,7 +234,7 @@ def held_out(
 
 def _read(path: Path, held: NDArray[np.int64]) -> Array:
     """Return the log densities of the rows of these numbers, from 0."""
-    table = read_table(path, columns=COLUMNS, width=2)
+    table = read_table(path, columns=("row", "log_prob"), width=2)
     if not np.array_equal(table.values[:, 0], held + 1):
         raise OrbiflowError(
             f"{path} is not of the rows that were held out: delete its folder, and the same command "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -62,7 +62,7 @@ def compare(
     _check_what_is_compared(data, models, space, unit)
     if out is not None:
         runtime.check_output_file(out, *models, *data)
-    read = _Reader(table, group, on_event, cancel)
+    read = _Reader(table, group, on_event, runtime.progress_events(on_event, cancel))
     with runtime.one_thread():
         if models:
             found = _compare_models(data[0], models, read, settings)
@@ -110,17 +110,12 @@ def _check_what_is_compared(
 
 @dataclass(frozen=True)
 class _Reader:
-    """How tables are read, the column of groups, and who is told of the progress."""
+    """How tables are read, the column of groups, who is told, and who hears of the progress."""
 
     settings: TableSettings
     group: str | None
     tell: runtime.Sink
-    cancel: runtime.Cancel
-
-    def progress(self, share: float, what: str) -> None:
-        """Tell the progress, unless the work was cancelled."""
-        self.cancel.check()
-        self.tell(runtime.Progress(min(1.0, share), what))
+    progress: Callable[[float, str], None]
 
     def rows(self, data: Path, columns: Columns, tell: runtime.Sink) -> TableRows:
         """Return rows, without the column of groups if columns are not named."""

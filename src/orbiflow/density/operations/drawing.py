@@ -81,10 +81,7 @@ def plot(
         check_fits(data, found, space, extra, on_event)
         points = found.values
 
-    def told(share: float, what: str) -> None:
-        cancel.check()
-        on_event(runtime.Progress(share, what))
-
+    told = runtime.progress_events(on_event, cancel)
     plotted = pictures.plot_density(density, out, settings, data=points, told=told)
     captions = plotted.captions if single or settings.sheet.printed else ()
     for path in plotted.files:
@@ -134,24 +131,18 @@ def region(
     kind, space = out.suffix.lower(), density.space
     _require_format(out, kind, space)
     samples = regions.samples_for(settings.masses, settings.samples)
-    on_event(runtime.Progress(0.0, f"drawing {samples} samples"))
-    cancel.check()
+    progress = runtime.progress_events(on_event, cancel)
+    progress(0.0, f"drawing {samples} samples")
     with runtime.one_thread():
         levels = regions.DensityLevels(density, samples=samples, seed=settings.seed)
         found = [levels.highest(mass) for mass in settings.masses]
         found += [levels.above(level) for level in settings.level or ()]
-        reached = 0.1
-
-        def told(share: float, what: str) -> None:
-            nonlocal reached
-            cancel.check()
-            reached = max(reached, 0.1 + 0.9 * share)
-            on_event(runtime.Progress(reached, what))
-
         drawn: list[Outline] = []
         if space.dim == 2:
-            budget, seed = settings.budget, settings.seed
-            drawn = regions.outlines(levels, found, budget=budget, seed=seed, told=told)
+            drawn = regions.outlines(
+                levels, found, budget=settings.budget, seed=settings.seed,
+                told=lambda share, what: progress(0.1 + 0.9 * share, what),
+            )  # fmt: skip
     if kind == ".geojson":
         text = json.dumps(regions.to_geojson(drawn), allow_nan=False)
     elif kind == ".csv":

@@ -14,12 +14,11 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.comparing import scores_of
-from orbiflow.density.fitting import mean_of, weighed
+from orbiflow.density.fitting import Progress, mean_of, weighed
 from orbiflow.density.inference import chart_of_observed, log_prob_observed
 from orbiflow.density.models import CHECKED, Density, TabulatedDensity, log_density_gradient
 from orbiflow.density.regions import DensityLevels, resolvable_masses, samples_for
 from orbiflow.density.tables import TableRows
-from orbiflow.runtime import Cancel, Progress, Sink
 
 if TYPE_CHECKING:
     from orbiflow.density.operations.using import ScoreSettings
@@ -35,8 +34,7 @@ def score_rows(
     density: Density,
     rows: TableRows,
     settings: ScoreSettings,
-    tell: Sink,
-    cancel: Cancel,
+    progress: Progress,
     *,
     may_lack: bool = False,
 ) -> tuple[dict[str, Array], float, str, list[str]]:
@@ -51,12 +49,12 @@ def score_rows(
     whole = known.all(dim=1).numpy()
     name = "log_prob" if whole.all() else "log_prob_marginal"
     notes: list[str] = []
-    columns = {name: _log_densities(density, points, settings, tell, cancel, notes)}
+    columns = {name: _log_densities(density, points, settings, progress, notes)}
     if settings.gradient:
-        columns |= _gradients(density, rows, tell, cancel)
+        columns |= _gradients(density, rows, progress)
     if settings.region:
         count = samples_for((), settings.samples)
-        tell(Progress(1.0, f"drawing {count} samples"))
+        progress(1.0, f"drawing {count} samples")
         natural = settings.measure == "natural"
         scores = columns[name] if natural else scores_of(density, values)
         columns["hdr"] = DensityLevels(density, samples=count).hdr_of(scores)
@@ -68,15 +66,10 @@ def score_rows(
 
 
 def _log_densities(
-    density: Density,
-    points: Tensor,
-    settings: ScoreSettings,
-    tell: Sink,
-    cancel: Cancel,
-    notes: list[str],
+    density: Density, points: Tensor, settings: ScoreSettings, progress: Progress, notes: list[str]
 ) -> NDArray[np.float64]:
     if settings.table:
-        tell(Progress(0.0, "making a table"))
+        progress(0.0, "making a table")
         source = TabulatedDensity(density)
         notes.append(
             f"read off a table: the error is {source.error:.1e} nats at the density's own points, "
@@ -90,23 +83,21 @@ def _log_densities(
     found: list[NDArray[np.float64]] = []
     end = SCORED if settings.gradient else 1.0
     for start in range(0, len(points), BLOCK):
-        cancel.check()
         with torch.no_grad():
             scores = log_prob(points[start : start + BLOCK], measure=settings.measure)
         found.append(scores.double().numpy())
-        tell(Progress(end * min(1.0, (start + BLOCK) / len(points)), "scoring"))
+        progress(end * min(1.0, (start + BLOCK) / len(points)), "scoring")
     return np.concatenate(found)
 
 
-def _gradients(density: Density, rows: TableRows, tell: Sink, cancel: Cancel) -> dict[str, Array]:
+def _gradients(density: Density, rows: TableRows, progress: Progress) -> dict[str, Array]:
     """Return the gradient of the log density, a column (N,) for each of the data's coordinates."""
     values = rows.table.values
     found: list[NDArray[np.float64]] = []
     for start in range(0, len(values), BLOCK_GRADIENT):
-        cancel.check()
         found.append(log_density_gradient(density, values[start : start + BLOCK_GRADIENT])[1])
         share = min(1.0, (start + BLOCK_GRADIENT) / len(values))
-        tell(Progress(SCORED + (1 - SCORED) * share, "finding gradients"))
+        progress(SCORED + (1 - SCORED) * share, "finding gradients")
     names = [f"log_prob_by_{name}" for name in rows.table.columns]
     return dict(zip(names, np.concatenate(found).T, strict=True))
 

@@ -82,8 +82,9 @@ def score(
         density, extra = model_at(model)
         rows = tables.read_rows(data, with_columns_of(reading, data, extra, on_event), on_event)
         check_fits(data, rows.table, density.space, extra, on_event)
+        progress = runtime.progress_events(on_event, cancel)
         columns, mean, over, notes = score_rows(
-            density, rows, settings, on_event, cancel, may_lack=may_lack
+            density, rows, settings, progress, may_lack=may_lack
         )
     weighted = "" if reading.weights is None else f", weighted by {reading.weights}"
     words = f"mean log density {mean:.4f} nats over {over}{weighted}; written to {out}"

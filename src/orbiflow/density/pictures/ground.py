@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
 from torch import Tensor
 
 from orbiflow.arrays import Array
@@ -33,6 +34,9 @@ COLOURS = "viridis"
 DOT, LIGHT = "#3b528b", "#f4f4f1"
 """Colours of dots without a density, and of the ground beneath them."""
 
+HALO, LINE = "#16202a", "#ffffff"
+"""Colours of lines around regions: their rim, and the line."""
+
 SMALLER = "dots are smaller where they crowd"
 
 
@@ -44,8 +48,8 @@ class Colouring:
     - `extent`: Left, right, bottom and top of the pixels on the axes.
     - `shade`: The scale of the colours. `reason`: Why it is linear or logarithmic.
     - `averaging`: A note on peaks narrower than a pixel, "" if there are none.
-    - `log_natural`: Called, the logarithms of the density in natural measure, shaped as `places`;
-      only lines around regions need them.
+    - `log_natural`: Called, the logarithms of the density in natural measure, shaped as `places`, NaN
+      where there is none; only lines around regions need them.
     - `outline`: Ring (N, 2) beyond which nothing is drawn, None for the whole rectangle.
     """
 
@@ -68,11 +72,27 @@ class Colouring:
         return image
 
     def draw_regions(self, axes: Axes, lines: Sequence[DensityRegion], sheet: Sheet) -> None:
-        """Draw lines around regions, cut along the outline."""
-        if lines:
-            overlays.draw_regions(
-                axes, lines, self.log_natural(), self.extent, sheet, self._clip(axes)
-            )
+        """Draw lines where the density is that of each region's edge, cut along the outline."""
+        if not lines:
+            return
+        from matplotlib.patheffects import Stroke
+
+        logs, (left, right, below, above) = self.log_natural(), self.extent
+        rows, columns = logs.shape
+        x = left + (right - left) * (np.arange(columns) + 0.5) / columns
+        y = below + (above - below) * (np.arange(rows) + 0.5) / rows
+        width, clip = 0.11 * sheet.text, self._clip(axes)
+        for line, style in zip(lines, overlays.STYLES, strict=False):
+            if not np.nanmin(logs) < line.log_prob < np.nanmax(logs):
+                continue
+            drawn = axes.contour(
+                x, y, logs, levels=[line.log_prob], colors=LINE, linestyles=style,
+                linewidths=width, zorder=4,
+            )  # fmt: skip
+            halo = Stroke(linewidth=1.9 * width, foreground=HALO, alpha=0.55)
+            if clip is not None:
+                drawn.set_clip_path(clip)
+            drawn.set_path_effects([halo, Stroke(linewidth=width, foreground=LINE)])
 
     def _clip(self, axes: Axes) -> Polygon | None:
         from matplotlib.patches import Polygon
@@ -143,8 +163,8 @@ class Ground(ABC):
         """Write the title, and the caption or a legend with notes, on a picture for a screen."""
 
     def dot_scale(self, sheet: Sheet, side: float) -> float:
-        """Return what to multiply the area of dots by, on axes `side` inches wide."""
-        return overlays.dot_scale(sheet, max(1.0, side / self.aspect))
+        """Return what to multiply the area of dots by, on axes `side` inches wide: 1 on a screen."""
+        return max(0.2, (max(1.0, side / self.aspect) / 5.6) ** 2) if sheet.printed else 1.0
 
 
 def draw_density(

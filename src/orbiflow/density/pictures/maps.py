@@ -103,7 +103,13 @@ class Map(ground.Ground):
         self.title_gap = 2.2 if self.is_disc else 0.6
 
     def places(self, points: Tensor) -> Array:
-        return places_on(self.space, self.projection, points)
+        """Return places (M, 2) of chart points (N, 2); of axes, those of the end that the map shows."""
+        space, projection = self.space, self.projection
+        vectors = cast(RoundSpace, space).vectors(chart_points(space, points))
+        if space.name == "projective-plane" and isinstance(projection, projections.Azimuthal):
+            vectors = np.where(vectors @ projection.frame[2] < 0, -1.0, 1.0)[:, None] * vectors
+        latlon = to_latlon(vectors)
+        return projection.forward(latlon[projection.contains(latlon)])
 
     def colouring(self, density: Density, settings: PlotSettings) -> ground.Colouring:
         pixels = pixels_of(self.projection)
@@ -150,9 +156,59 @@ class Map(ground.Ground):
         )
 
     def caption(self, notes: Sequence[str], dots: tuple[int, int] | None) -> str:
-        return map_caption(
-            self.space, self.projection, notes, dots=dots, coastlines=bool(self.coastlines)
-        )
+        """Return projection, centre, which points are one, lines and dots, and notes.
+
+        >>> from orbiflow.density import Sphere
+        >>> from orbiflow.density.pictures.projections import Mollweide
+        >>> Map(Sphere(), Mollweide((0.0, 150.0))).caption([], None)
+        'The sphere in the Mollweide projection (equal-area), about 150° E. Lines every 30°.'
+        """
+        parts = [self._description()]
+        if self.space.name == "projective-plane":
+            parts.append("An axis is drawn at the end in this hemisphere")
+            parts[-1] += "; opposite points of the rim are one axis"
+        lats, lons = graticule(self.projection)
+        steps = {line[1] - line[0] for line in (lats, lons) if len(line) > 1}
+        lines = f"Lines every {min(steps):g}°"
+        if len(steps) > 1:
+            lines = (
+                f"Parallels every {lats[1] - lats[0]:g}°, meridians every {lons[1] - lons[0]:g}°"
+            )
+        parts.append(lines + (", and coastlines" if self.coastlines else ""))
+        if dots is not None:
+            shown, known = dots
+            parts.append(f"Dots are {f'{shown} of ' if shown < known else ''}{known} points")
+        parts += [note[0].upper() + note[1:] for note in notes]
+        return " ".join(f"{part}." for part in parts)
+
+    def _description(self) -> str:
+        projection, frame = self.projection, ""
+        lat, lon = projection.center
+        if self.space.columns[0] != "lat":
+            frame = "; latitudes are from the x, y plane towards z, longitudes from x towards y"
+        middle = degrees_text((lon + 180) % 360 - 180, "EW")
+        if not isinstance(projection, projections.Azimuthal):
+            return f"The sphere in {projection.title}, about {middle}{frame}"
+        if projection.flipped:
+            return (
+                f"Lower hemisphere, {self._subtitle}: the vertical (latitude, plunge or inclination "
+                "90°) is in the middle, longitude (trend, declination) runs clockwise from the top"
+            )
+        within = f"What is within {projection.radius:g}°"
+        if projection.radius == 90:
+            within = "The hemisphere"
+        where = f"{degrees_text(lat, 'NS')}, {middle}"
+        if abs(lat) == 90:
+            where = f"the {'north' if lat > 0 else 'south'} pole"
+        return f"{within} about {where} in {projection.title}, seen from outside{frame}"
+
+    @property
+    def _subtitle(self) -> str:
+        """The projection as a title has it."""
+        projection = self.projection
+        if not (isinstance(projection, projections.Azimuthal) and projection.flipped):
+            return projection.title
+        return "Schmidt net (equal-area)" if projection.is_equal_area else "Wulff net (equal-angle)"
 
     def samples_caption(self, notes: Sequence[str]) -> str:
         return self.caption(notes or ["dots are points"], None)
@@ -169,7 +225,7 @@ class Map(ground.Ground):
         del notes, dots  # the caption has them
         top = 1 - 1.6 * sheet.em / frame.figure.get_size_inches()[1]
         frame.figure.text(
-            0.5, top, f"{title}: {subtitle(self.projection)}", ha="center", va="center",
+            0.5, top, f"{title}: {self._subtitle}", ha="center", va="center",
             fontsize=1.15 * sheet.text,
         )  # fmt: skip
         ground.write_caption(frame.figure, caption, sheet)
@@ -230,15 +286,6 @@ def _areas(projection: projections.Projection, latlon: Array) -> Array:
         cosines = to_vectors(latlon) @ projection.frame[2]
         return ((1 + cosines) / 2) ** 2  # conformal: scale 2 / (1 + cos), squared
     return np.cos(np.radians(latlon[:, 0]))
-
-
-def places_on(space: Space, projection: projections.Projection, points: Tensor) -> Array:
-    """Return places (M, 2) of chart points (N, 2) on a map; of axes, those of the end that it shows."""
-    vectors = cast(RoundSpace, space).vectors(chart_points(space, points))
-    if space.name == "projective-plane" and isinstance(projection, projections.Azimuthal):
-        vectors = np.where(vectors @ projection.frame[2] < 0, -1.0, 1.0)[:, None] * vectors
-    latlon = to_latlon(vectors)
-    return projection.forward(latlon[projection.contains(latlon)])
 
 
 WORLD: dict[str, type[projections.WorldMap]] = {
@@ -347,74 +394,3 @@ def _world(
         )
     lat, lon = middle if middle and len(middle) == 2 else (0.0, *(middle or (0.0,)))
     return kind((lat, lon))
-
-
-def subtitle(projection: projections.Projection) -> str:
-    """Return the projection as a title has it."""
-    if _is_net(projection):
-        return "Schmidt net (equal-area)" if projection.is_equal_area else "Wulff net (equal-angle)"
-    return projection.title
-
-
-def map_caption(
-    space: Space,
-    projection: projections.Projection,
-    notes: Sequence[str] = (),
-    *,
-    dots: tuple[int, int] | None = None,
-    coastlines: bool = False,
-) -> str:
-    """Return a map's caption: projection, centre, which points are one, lines and dots, and notes.
-
-    >>> from orbiflow.density import Sphere
-    >>> from orbiflow.density.pictures.projections import Mollweide
-    >>> map_caption(Sphere(), Mollweide((0.0, 150.0)))
-    'The sphere in the Mollweide projection (equal-area), about 150° E. Lines every 30°.'
-    """
-    parts = [_description(space, projection)]
-    if space.name == "projective-plane":
-        parts.append(
-            "An axis is drawn at the end in this hemisphere; opposite points of the rim are one axis"
-        )
-    lats, lons = graticule(projection)
-    steps = {f"{line[1] - line[0]:g}°" for line in (lats, lons) if len(line) > 1}
-    steps = sorted(steps, key=lambda text: float(text[:-1]))
-    lines = f"Lines every {steps[0]}"
-    if len(steps) > 1:
-        lines = f"Parallels every {lats[1] - lats[0]:g}°, meridians every {lons[1] - lons[0]:g}°"
-    parts.append(lines + (", and coastlines" if coastlines else ""))
-    if dots is not None:
-        shown, known = dots
-        parts.append(f"Dots are {f'{shown} of ' if shown < known else ''}{known} points")
-    parts += [note[0].upper() + note[1:] for note in notes]
-    return " ".join(f"{part}." for part in parts)
-
-
-def _description(space: Space, projection: projections.Projection) -> str:
-    lat, lon = projection.center
-    frame = (
-        ""
-        if space.columns[0] == "lat"
-        else "; latitudes are from the x, y plane towards z, longitudes from x towards y"
-    )
-    if not isinstance(projection, projections.Azimuthal):
-        middle = degrees_text((lon + 180) % 360 - 180, "EW")
-        return f"The sphere in {projection.title}, about {middle}{frame}"
-    within = (
-        "the hemisphere" if projection.radius == 90 else f"what is within {projection.radius:g}°"
-    )
-    if _is_net(projection):
-        return (
-            f"Lower hemisphere, {subtitle(projection)}: the vertical (latitude, plunge or inclination "
-            "90°) is in the middle, longitude (trend, declination) runs clockwise from the top"
-        )
-    if abs(lat) == 90:
-        where = "the north pole" if lat > 0 else "the south pole"
-    else:
-        where = f"{degrees_text(lat, 'NS')}, {degrees_text((lon + 180) % 360 - 180, 'EW')}"
-    seen = f"about {where} in {projection.title}, seen from outside{frame}"
-    return f"{within[0].upper()}{within[1:]} {seen}"
-
-
-def _is_net(projection: projections.Projection) -> bool:
-    return isinstance(projection, projections.Azimuthal) and projection.flipped

@@ -14,12 +14,10 @@ from orbiflow.density.models import Density
 from orbiflow.density.pictures.axes import INK
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.regions import DensityLevels, DensityRegion, samples_for
-from orbiflow.drawing import Sheet
 from orbiflow.errors import SettingError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.patches import Patch
 
 MAX_DOTS = 3000
 
@@ -119,15 +117,8 @@ def thinned(points: Array, limit: int = MAX_DOTS) -> Array:
     return points[np.random.default_rng(0).choice(len(points), limit, replace=False)]
 
 
-def dot_scale(sheet: Sheet, side: float) -> float:
-    """Return the factor of the area of dots in a square of `side` inches, 1 on a screen."""
-    return max(0.2, (side / 5.6) ** 2) if sheet.printed else 1.0
-
-
 STYLES = ("solid", "dashed", "dotted", "dashdot")
 """Styles of the lines, beginning with the smallest mass."""
-
-HALO, LINE = "#16202a", "#ffffff"
 
 
 def region_lines(density: Density, settings: PlotSettings) -> tuple[DensityRegion, ...]:
@@ -155,39 +146,6 @@ def region_note(masses: Sequence[float]) -> str:
         return f"the line is about the smallest region that holds {100 * masses[0]:.10g} %"
     parts = [f"{100 * mass:.10g} % ({style})" for mass, style in zip(masses, STYLES, strict=False)]
     return f"lines are about the smallest regions that hold {', '.join(parts[:-1])} and {parts[-1]}"
-
-
-def draw_regions(
-    axes: Axes,
-    lines: Sequence[DensityRegion],
-    log_natural: Array,
-    extent: tuple[float, float, float, float],
-    sheet: Sheet,
-    clip: Patch | None = None,
-) -> None:
-    """Draw lines where the density is that of each region's edge, cut along the patch `clip`.
-
-    `log_natural` has its logarithms (R, C) in natural measure, the lowest row first, NaN where there
-    is none; `extent` is left, right, bottom and top of these pixels on the axes.
-    """
-    from matplotlib.patheffects import Stroke
-
-    rows, columns = log_natural.shape
-    left, right, below, above = extent
-    x = left + (right - left) * (np.arange(columns) + 0.5) / columns
-    y = below + (above - below) * (np.arange(rows) + 0.5) / rows
-    for line, style in zip(lines, STYLES, strict=False):
-        if not np.nanmin(log_natural) < line.log_prob < np.nanmax(log_natural):
-            continue
-        width = 0.11 * sheet.text
-        drawn = axes.contour(
-            x, y, log_natural, levels=[line.log_prob], colors=LINE, linestyles=style,
-            linewidths=width, zorder=4,
-        )  # fmt: skip
-        halo = Stroke(linewidth=1.9 * width, foreground=HALO, alpha=0.55)
-        if clip is not None:
-            drawn.set_clip_path(clip)
-        drawn.set_path_effects([halo, Stroke(linewidth=width, foreground=LINE)])
 
 
 def log_natural(density: Density, values: Array, points: Tensor, measure: str) -> Array:

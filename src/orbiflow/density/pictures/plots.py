@@ -103,16 +103,22 @@ def plot_density(
         told(k / (len(makers) + 1), f"drawing {name}.{form}")
         pictures[name] = make()
     captions = tuple(f"{own.title}. {own.caption}".strip() for own in pictures.values())
+    notes: tuple[str, ...] = ()
+    if shown.space.dim == 2 and shown.density.flow_part is None:
+        notes = ("the flow has no part in this density, so that there is no picture of it",)
     if single:
         path = write_atomic(out, pdf_pages(list(pictures.values())))
-        return Plotted((path,), captions, shown.notes)
+        return Plotted((path,), captions, notes)
     contents: dict[str, str | bytes] = {
         f"{name}.{form}": _content(name, picture) for name, picture in pictures.items()
     }
     if shown.space.dim == 2:
         told(0.75, f"drawing {PAGE}")
-        contents[PAGE] = shown.page()
-    return Plotted(tuple(write_set(out, PICTURES, contents)), captions, shown.notes)
+        lines = simplified(list(map(np.asarray, shown.coastlines)), PAGE_POINTS)
+        contents[PAGE] = density_page(
+            shown.density, shown.settings, samples=shown.points, coastlines=lines
+        )
+    return Plotted(tuple(write_set(out, PICTURES, contents)), captions, notes)
 
 
 def refuse_foreign_files(out: Path) -> None:
@@ -157,10 +163,7 @@ def _content(name: str, picture: Picture) -> bytes:
 
 
 class _Shown:
-    """A density and what is drawn with it: settings, chart points, lines around regions, a map.
-
-    All that can be wrong is checked before the work.
-    """
+    """A density and what is drawn with it; all that can be wrong is checked before the work."""
 
     def __init__(
         self,
@@ -182,18 +185,6 @@ class _Shown:
         self.points = self.samples if self.data is None else self.data
         self.map = chosen_map(space, self.points, settings, columns) if space.is_round else None
         self.regions = region_lines(self.density, settings)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What is not drawn, and why."""
-        if self.space.dim != 2 or self.density.flow_part is not None:
-            return ()
-        return ("the flow has no part in this density, so that there is no picture of it",)
-
-    def page(self) -> str:
-        """Return the page of the surface to turn in a browser."""
-        lines = simplified(list(map(np.asarray, self.coastlines)), PAGE_POINTS)
-        return density_page(self.density, self.settings, samples=self.points, coastlines=lines)
 
     def makers(self) -> dict[str, Callable[[], Picture]]:
         """Return functions that draw the figures, by the names of their files without the ending."""

@@ -70,6 +70,9 @@ def density_picture(
             drawn, always the same; dots are smaller where they crowd, so that peaks stay in sight.
         settings: How it is drawn.
         sheet: The sheet. Default: that of the settings.
+
+    Raises:
+        OrbiflowError: If the space has another dimension, or samples or settings do not fit it.
     """
     settings = settings or PlotSettings()
     square = Square(density.space, settings)

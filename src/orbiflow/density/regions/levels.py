@@ -71,6 +71,9 @@ class DensityLevels:
         density: A density or a fitted estimator.
         samples: Number of samples, 1000 to 10 million; `samples_for` says how many masses need.
         seed: Seed of the samples.
+
+    Raises:
+        OrbiflowError: If it is no density, or a number is out of range.
     """
 
     @one_thread()

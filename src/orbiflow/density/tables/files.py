@@ -179,7 +179,7 @@ def column_names(
     kind = kind_of_file(path)
     if kind == "text":
         return layout_of(path, wanted, has_header).header
-    return npy_names(path) if kind == "npy" else parquet_names(path)
+    return _npy_header(path)[1].names if kind == "npy" else parquet_names(path)
 
 
 def read_labels(
@@ -282,11 +282,6 @@ def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
             f"{left} follow; the file is cut short or damaged: save it again"
         )
     return shape, dtype
-
-
-def npy_names(path: Path) -> tuple[str, ...] | None:
-    """Return the names of a structured array's fields, or None for a plain one."""
-    return _npy_header(path)[1].names
 
 
 @contextmanager
