@@ -150,8 +150,6 @@ def test_what_does_not_fit_the_density_is_refused_before_anything_is_written(
         density = density or UniformDensity(space)
         with pytest.raises(OrbiflowError, match=message):
             plot_density(density, out, settings)
-    with pytest.raises(OrbiflowError, match="coastlines apply to the sphere"):
-        plot_density(example(), out, coastlines=[np.zeros((2, 2))])
     with pytest.raises(OrbiflowError):
         plot_density(example(), out, data=DATA[:, :1])
     assert not out.exists()

@@ -17,16 +17,12 @@ from orbiflow.arguments import as_array, is_a
 from orbiflow.arrays import Array
 from orbiflow.density.comparing.resampling import Groups, resampled_sums
 from orbiflow.density.comparing.settings import ComparisonSettings
-from orbiflow.density.comparing.two_samples import MAX_ROWS, TestResult, chosen_rows, mmd_test
+from orbiflow.density.comparing.two_samples import TestResult, mmd_test
 from orbiflow.density.fitting import DensitySettings, Progress, fit_automatic
 from orbiflow.density.spaces import Space, space_class
 from orbiflow.errors import OrbiflowError
 
 T = TypeVar("T")
-
-
-PARTS = ("kernels",)
-"""Components of the densities, which are fitted in a second or so."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +122,7 @@ def compare_samples(
 ) -> DataComparison:
     """Test whether two data sets come from one density, and measure how far apart they are.
 
-    The test is `mmd_test`, on `MAX_ROWS` rows at most; the divergences are `cross_fitted`.
+    The test is `mmd_test`, the divergences are `cross_fitted`.
 
     Args:
         samples: Two data sets (N, k) by their names, in the space's own units.
@@ -158,14 +154,10 @@ def compare_samples(
     members.require()
     notes = members.notes()
     _require_movable(members, first)
-    kept = chosen_rows(first, members, MAX_ROWS, seed)
-    if len(kept) < len(points):
-        notes.append(f"the test looks at {len(kept)} of {len(points)} rows, drawn at random")
     progress(0.0, "permuting")
-    looked_at, among = points[torch.as_tensor(kept)], members.index[kept]
-    chosen = Groups.of(among if members.given else None, len(kept))
-    most = settings.permutations
-    test = mmd_test(own, looked_at, first[kept], chosen, permutations=most, seed=seed)
+    test = mmd_test(own, points, first, members, permutations=settings.permutations, seed=seed)
+    if test.rows < len(points):
+        notes.append(f"the test looks at {test.rows} of {len(points)} rows, drawn at random")
     divergence = None
     try:
         told: Progress = lambda share, what: progress(0.3 + 0.7 * share, what)  # noqa: E731
@@ -317,7 +309,8 @@ def _held_out_ratio(
             progress((2 * number + which) / 4, "fitting halves")
             train = points[torch.as_tensor(rows & ~held)]
             try:
-                settings = DensitySettings(components=PARTS, seed=seed)
+                # kernels are fitted in a second or so
+                settings = DensitySettings(components=("kernels",), seed=seed)
                 density, _ = fit_automatic(space, train, settings)
             except OrbiflowError as error:
                 raise OrbiflowError(f"half of a data set is too small to fit: {error}") from error

@@ -262,8 +262,7 @@ def compare_models(
         groups: A label for each row, as for `compare_scores`.
 
     Raises:
-        OrbiflowError: If models are on different spaces or have different units, data are not on the
-            space, or as `compare_scores`.
+        OrbiflowError: If models or data are not of one space and unit, or as `compare_scores`.
     """
     if not is_a(models, Mapping) or len(models) < 2:
         raise OrbiflowError("give two models or more, by their names")

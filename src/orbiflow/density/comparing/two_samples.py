@@ -65,7 +65,11 @@ def mmd_test(
     a group with rows in both change places. All permutations, with the observed one among them, are
     standardised alike, so that p is exact.
     `points` are chart points (N, d) of both data sets; `first` says which (N,) are of the first one.
+    The test looks at `MAX_ROWS` of them at most.
     """
+    kept = chosen_rows(first, groups, MAX_ROWS, seed)
+    points, first = points[torch.as_tensor(kept)], first[kept]
+    groups = Groups.of(groups.index[kept] if groups.given else None, len(kept))
     rng = np.random.default_rng(seed)
     labels = _permuted(first, groups, permutations, rng)
     index = torch.as_tensor(groups.index)

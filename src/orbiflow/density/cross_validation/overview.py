@@ -199,15 +199,14 @@ def run(
             items, work, folder, tell, cancel, gone="of other folds or settings"
         )
     found = overview.comparison
-    words = [f"no comparison: {found}"] if isinstance(found, str) else found.words()
-    notes = () if isinstance(found, str) else found.notes
-    for text in (*words, *notes):
+    failed = isinstance(found, str)
+    for text in [f"no comparison: {found}"] if failed else [*found.words(), *found.notes]:
         tell(runtime.Note(text))
     summary = {
         "folder": str(out),
         **{key: str(out / name) for key, name in files.items()},
         "fits": len(fits),
-        "comparison": None if isinstance(found, str) else found.to_json(),
+        "comparison": None if failed else found.to_json(),
         "seconds": time.perf_counter() - begin,
     }
     return counts.outcome(len(fits), out / TABLE, out / PAGE, summary, tell)

@@ -172,17 +172,14 @@ def _require_format(out: Path, kind: str, space: Space) -> None:
 def _region_notes(found: list[DensityRegion], drawn: list[Outline]) -> list[str]:
     """Return what the user should know of regions, whose outlines may not have been drawn."""
     space = found[0].density.space
-    notes: list[str] = []
-    if not drawn:
-        notes.append(
-            f"outlines are drawn in two dimensions, this {space.name} has {space.dim}: there are "
-            "thresholds and sizes alone; `orbiflow density score --region` says of each row how far "
-            "inside it is"
-        )
-    for k, one in enumerate(found):
-        notes.append(_described(one, drawn[k] if drawn else None))
-        notes += drawn[k].notes if drawn else ()
-    return notes
+    if drawn:
+        return [note for one in drawn for note in (_described(one.region, one), *one.notes)]
+    return [
+        f"outlines are drawn in two dimensions, this {space.name} has {space.dim}: there are "
+        "thresholds and sizes alone; `orbiflow density score --region` says of each row how far "
+        "inside it is",
+        *(_described(one, None) for one in found),
+    ]
 
 
 def _described(found: DensityRegion, outline: Outline | None) -> str:

@@ -42,14 +42,6 @@ class ScoreSettings(Settings, group="Scores"):
     """Read log densities off a table, in two dimensions: faster where kernels are wide or a flow has a
     weight. Its error is told."""
 
-    def check_whole_rows(self) -> None:
-        """Refuse what cannot be found of rows that lack angles."""
-        for name in ("region", "gradient", "table"):
-            if getattr(self, name):
-                raise SettingError(
-                    f"{{{name}}} requires complete rows; leave it out, or {{missing}} marginalise"
-                )
-
 
 @runtime.operation("density score")
 def score(
@@ -71,8 +63,11 @@ def score(
     """
     check_table_name(out)
     may_lack = reading.missing == "marginalise"
-    if may_lack:
-        settings.check_whole_rows()
+    for name in ("region", "gradient", "table") if may_lack else ():
+        if getattr(settings, name):
+            raise SettingError(
+                f"{{{name}}} requires complete rows; leave it out, or {{missing}} marginalise"
+            )
 
     from orbiflow.density.operations.saved import check_fits, model_at, with_columns_of
     from orbiflow.density.operations.scores import score_rows

@@ -57,10 +57,6 @@ def density_page(
         resolution: Cells along an edge of the square, 2 to 250. Default: 160, or 240 for a density
             with kernels.
         title: The title. Default: "Density on the" and the space.
-
-    Raises:
-        OrbiflowError: If the space has another dimension, names do not fit, there are coastlines on a
-            space without latitudes, or the page would be larger than `MAX_BYTES`.
     """
     from matplotlib import colormaps
 

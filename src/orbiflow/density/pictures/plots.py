@@ -7,11 +7,11 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
 from orbiflow.arguments import as_path
+from orbiflow.arrays import Array
 from orbiflow.density.comparing import density_of
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models import Density, read_density
@@ -64,7 +64,6 @@ def plot_density(
     settings: PlotSettings | None = None,
     *,
     data: ArrayLike | None = None,
-    coastlines: Sequence[ArrayLike] = (),
     told: Callable[[float, str], None] = lambda *_: None,
 ) -> Plotted:
     """Draw a density, its flow, samples beside the data, and the surface to turn.
@@ -80,7 +79,6 @@ def plot_density(
             .pdf, which gets a page for each figure, without the surface.
         settings: How it is drawn. An `out` that ends in .pdf is a PDF whatever they say.
         data: Data (N, k) in the space's own units, to be drawn beside the samples.
-        coastlines: Lines (M, 2) of latitude and longitude, beside those in the settings' file.
         told: A function that is called with the share of the work done and what is drawn. What it
             raises ends the work.
 
@@ -95,7 +93,7 @@ def plot_density(
         settings = settings.replace(format="pdf")
     else:
         refuse_foreign_files(out)
-    shown = _Shown(density, settings, data, coastlines)
+    shown = _Shown(density, settings, data)
     if not single:
         make_folder(out)
     form, makers, pictures = settings.sheet.format, shown.makers(), dict[str, Picture]()
@@ -114,7 +112,7 @@ def plot_density(
     }
     if shown.space.dim == 2:
         told(0.75, f"drawing {PAGE}")
-        lines = simplified(list(map(np.asarray, shown.coastlines)), PAGE_POINTS)
+        lines = simplified(shown.coastlines, PAGE_POINTS)
         contents[PAGE] = density_page(
             shown.density, shown.settings, samples=shown.points, coastlines=lines
         )
@@ -170,14 +168,13 @@ class _Shown:
         given: Density | DensityEstimator | str | Path,
         settings: PlotSettings,
         data: ArrayLike | None,
-        coastlines: Sequence[ArrayLike],
     ) -> None:
         self.density, columns = _density_of(given)
         self.space = space = self.density.space
         if settings.names is None:
             settings = settings.replace(names=known_names(space, columns))
         self.settings = settings
-        self.coastlines = _all_coastlines(space, settings, coastlines)
+        self.coastlines = _coastlines(space, settings)
         _check_space(space, settings)
         self.data = None if data is None else space.to_chart(data)
         generator = torch.Generator().manual_seed(settings.seed)
@@ -243,13 +240,9 @@ def _check_space(space: Space, settings: PlotSettings) -> None:
         )
 
 
-def _all_coastlines(
-    space: Space, settings: PlotSettings, lines: Sequence[ArrayLike]
-) -> Sequence[ArrayLike]:
-    if settings.coastlines is None and not lines:
-        return ()
+def _coastlines(space: Space, settings: PlotSettings) -> list[Array]:
+    if settings.coastlines is None:
+        return []
     if space.name != "sphere":
         raise SettingError(f"{{coastlines}} apply to the sphere, not to the {space.name}")
-    if settings.coastlines is None:
-        return lines
-    return [*lines, *read_coastlines(settings.coastlines)]
+    return read_coastlines(settings.coastlines)

@@ -15,6 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.spaces import RoundSpace, Space
 from orbiflow.errors import OrbiflowError
@@ -106,8 +107,7 @@ def vector_immersion(space: Space) -> Callable[[Array], Array]:
 def mesh(space: Space, resolution: int) -> Mesh:
     """Return an even grid on the canonical square, whose edges a group identifies, in triangles."""
     immersion(space)
-    if isinstance(resolution, bool) or not 2 <= resolution <= MAX_RESOLUTION:
-        raise OrbiflowError(f"resolution must be 2 to {MAX_RESOLUTION}, got {resolution!r}")
+    as_whole(resolution, "resolution", 2, MAX_RESOLUTION)
     t = torch.linspace(0.0, 1.0, resolution + 1, dtype=torch.float64)
     points = torch.stack(torch.meshgrid(t, t, indexing="ij"), dim=-1).reshape(-1, 2)
     number = np.arange((resolution + 1) ** 2).reshape(resolution + 1, -1)

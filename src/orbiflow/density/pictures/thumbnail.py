@@ -42,12 +42,8 @@ MARGIN = 6
 def density_thumbnail(density: Density, data: ArrayLike) -> bytes:
     """Return a PNG of 360 x 240 pixels, the same every time.
 
-    Colours are by logarithms where most of the picture would be dark otherwise.
-
-    Args:
-        density: A density on any space.
-        data: The data (N, k) that it was fitted to, in the space's own units. Rows that lack angles
-            are left out.
+    Colours are by logarithms where most of the picture would be dark otherwise. `data` (N, k) are those
+    that the density was fitted to; rows that lack angles are left out.
     """
     space, table = density.space, np.asarray(data, dtype=np.float64)
     whole = table[~np.isnan(table).any(axis=1)]

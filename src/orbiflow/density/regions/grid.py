@@ -149,9 +149,7 @@ def with_islands(
     """Draw a shape again in those of a grid's cells that have seeds on its wrong side.
 
     Cells with the most seeds are first; those beyond the budget of evaluations are left as they are.
-
-    Returns:
-        The shape, the number of evaluations, and the number of cells left.
+    The numbers of evaluations and of cells left come after the shape.
     """
     most = max(1, budget // (PARTS + 1) ** 2)
     cells = _wrong(shape, grid, level)

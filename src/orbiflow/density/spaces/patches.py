@@ -112,11 +112,6 @@ def klein_patch(theta: ArrayLike, phi: ArrayLike) -> Array:
     return (np.cos(phi)[..., None] * edge + np.sin(phi)[..., None] * line) @ DCT_BASIS[:, :5].T
 
 
-def dct_to_pixels(coordinates: ArrayLike) -> Array:
-    """Return patches (N, 9) of mean 0, row by row from the top left, from DCT coordinates (N, 8)."""
-    return checked_table(coordinates, (8,), "DCT coordinates of patches") @ DCT_BASIS.T
-
-
 def pixels_to_dct(patches: ArrayLike) -> Array:
     """Return DCT coordinates (N, 8) of patches (N, 9), whose length is the contrast norm."""
     # the basis is orthogonal in the plain product, too
