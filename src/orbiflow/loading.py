@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
-from orbiflow.arguments import path as as_path
+from orbiflow.arguments import as_path
 from orbiflow.density import MODEL, REPORT, DensityEstimator, read_density, report_from_json
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
 from orbiflow.runtime import is_list

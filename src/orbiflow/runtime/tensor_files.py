@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from safetensors import SafetensorError
 
-from orbiflow.arguments import path as as_path
+from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime.files import is_object
