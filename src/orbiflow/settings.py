@@ -284,7 +284,7 @@ class Field:
 
         With `text`, it comes from the command line.
         """
-        return self._read(self.kind.parse if text else self.kind.read, value)
+        return self._read(lambda given: self.kind.read(given, text=text), value)
 
     def finish(self, value: Any, values: Mapping[str, Any]) -> Any:
         """Return the value of a text that could not be read without another field."""
