@@ -12,7 +12,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_tensor, is_a
+from orbiflow.arguments import as_instance, as_number, as_tensor, as_whole, is_a
 from orbiflow.density.models import AdaptiveKernels, Density, Mixture, Split, mixture_of
 from orbiflow.density.spaces import CHART, Space, Torus
 from orbiflow.errors import OrbiflowError
@@ -272,9 +272,9 @@ def check_torus(space: Space, what: str) -> Torus:
 
 def kept_axes(axes: Iterable[int] | int, dim: int) -> tuple[int, ...]:
     """Return the numbers of the angles to keep, 0 to dim - 1, each once."""
-    listed: Any = [axes] if isinstance(axes, numbers.Integral) else axes
+    given: Any = [axes] if isinstance(axes, numbers.Integral) else axes
     try:
-        found = tuple(_axis(axis, dim) for axis in listed)
+        found = tuple(as_whole(axis, "axes", 0, dim - 1) for axis in given)
     except TypeError:
         raise OrbiflowError(f"axes must be numbers of angles, got {axes!r}") from None
     if not found or len(set(found)) < len(found):
@@ -286,25 +286,10 @@ def given_axes(given: Mapping[int, float], dim: int) -> tuple[tuple[int, ...], t
     """Return the numbers of the angles that are known, and their values."""
     if not is_a(given, Mapping) or not given:
         raise OrbiflowError(f"given must hold known angles, such as {{1: 0.25}}, got {given!r}")
-    axes = tuple(_axis(axis, dim) for axis in given)
+    axes = tuple(as_whole(axis, "axes", 0, dim - 1) for axis in given)
     if len(axes) == dim:
         raise OrbiflowError(f"all {dim} angles are given: nothing is left to have a density")
-    pairs = zip(axes, given.values(), strict=True)
-    return axes, tuple(_known(value, f"angle {axis}") for axis, value in pairs)
-
-
-def _known(value: Any, name: str) -> float:
-    real = not isinstance(value, bool) and isinstance(value, numbers.Real)
-    if not real or not math.isfinite(float(value)):
-        raise OrbiflowError(f"{name} must be given as a finite number, got {value!r}")
-    return float(value)
-
-
-def _axis(axis: Any, dim: int) -> int:
-    whole = not isinstance(axis, bool) and isinstance(axis, numbers.Integral)
-    if not whole or not 0 <= int(axis) < dim:
-        raise OrbiflowError(f"axes are numbers of angles from 0 to {dim - 1}, got {axis!r}")
-    return int(axis)
+    return axes, tuple(as_number(value, f"angle {axis}") for axis, value in given.items())
 
 
 def axes_named(wanted: Sequence[str | int], names: Sequence[str]) -> list[int]:
@@ -316,10 +301,10 @@ def axes_named(wanted: Sequence[str | int], names: Sequence[str]) -> list[int]:
     >>> axes_named(["psi", 0], ["phi", "psi"])
     [1, 0]
     """
-    return [_named_axis(one, list(names)) for one in wanted]
+    return [_named_axis(one, names) for one in wanted]
 
 
-def _named_axis(wanted: Any, names: list[str]) -> int:
+def _named_axis(wanted: Any, names: Sequence[str]) -> int:
     if not isinstance(wanted, bool) and isinstance(wanted, numbers.Integral):
         return int(wanted)
     hits = [i for i, name in enumerate(names) if name == wanted]
@@ -345,10 +330,10 @@ def given_named(
     torus = check_torus(space, "conditional densities")
     found: dict[int, float] = {}
     for key, value in given:
-        axis = _named_axis(key, list(names))
+        axis = _named_axis(key, names)
         if axis in found:
             raise OrbiflowError(f"{names[axis]!r} is given twice")
-        found[axis] = _known(value, repr(names[axis])) / torus.period
+        found[axis] = as_number(value, repr(names[axis])) / torus.period
     return found
 
 
