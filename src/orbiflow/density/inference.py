@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import torch
@@ -94,11 +93,11 @@ def _restricted(density: Density, split: Split, torus: Torus) -> Mixture:
     closed, left = density.restricted(split, space)
     error = 0.0
     if left:
-        table, off = _tabulated(left, split, space)
+        kernels, log_total, off = _tabulated(left, split, space)
         sums = torch.tensor([log for log, _ in closed], dtype=torch.float64).logsumexp(0).item()
-        weight = 1 / (1 + math.exp(sums - table.log_total))
-        error = math.sqrt(weight) * max(table.error, off)
-        closed.append((table.log_total, table.kernels))
+        weight = 1 / (1 + math.exp(sums - log_total))
+        error = math.sqrt(weight) * off
+        closed.append((log_total, kernels))
     # kernels first, where they are: the order of components is that of the draws of samples
     closed.sort(key=lambda part: part[1].kernel_part is None)
     logs = torch.tensor([log for log, _ in closed], dtype=torch.float64)
@@ -116,8 +115,14 @@ def _restricted(density: Density, split: Split, torus: Torus) -> Mixture:
 
 def _tabulated(
     left: list[tuple[float, Density]], split: Split, space: Torus
-) -> tuple[Table, float]:
-    """Return densities without a closed form as one table, and the error of its values in nats."""
+) -> tuple[AdaptiveKernels, float, float]:
+    """Return kernels on an even grid instead of densities without a closed form.
+
+    Also the logarithm of the densities' integral, and the error of the kernels in nats. Von Mises
+    kernels whose deviation is one step interpolate what is smooth over a few steps nearly to rounding:
+    their weights are one deconvolution by Fourier transform. The grid is refined until random points
+    agree as well.
+    """
     if space.dim > MOST_TABULATED:
         kinds = " and ".join(sorted({own.article or own.kind for _, own in left}))
         raise OrbiflowError(
@@ -132,10 +137,14 @@ def _tabulated(
         return torch.stack(logs).logsumexp(dim=0)
 
     costly = any(own.is_costly(split) for _, own in left)
-    table = tabulated(log_function, space, COSTLY_GRID[space.dim] if costly else None)
-    drawn = table.kernels.sample(CHECKED_TWICE, torch.Generator().manual_seed(1))
+    count, most = FIRST_GRID[space.dim], (COSTLY_GRID if costly else FINEST_GRID)[space.dim]
+    kernels, log_total, error = _on_grid(log_function, space, count)
+    while not error < ENOUGH and 2 * count <= most:
+        count *= 2
+        kernels, log_total, error = _on_grid(log_function, space, count)
+    drawn = kernels.sample(CHECKED_TWICE, torch.Generator().manual_seed(1))
     twice = log_function(drawn) - log_function(drawn, seed=1)  # where nodes are quasi-random
-    return table, float(twice.square().mean().sqrt())
+    return kernels, log_total, max(error, float(twice.square().mean().sqrt()))
 
 
 @one_thread()
@@ -196,34 +205,9 @@ DROPPED = 1e-8
 """The weight that the lightest kernels may have together, to be left out."""
 
 
-@dataclass(frozen=True)
-class Table:
-    """Normalised kernels, the log of the tabulated function's integral, and the error in nats."""
-
-    kernels: AdaptiveKernels
-    log_total: float
-    error: float
-
-
-def tabulated(
-    log_function: Callable[[Tensor], Tensor], space: Torus, most: int | None = None
-) -> Table:
-    """Return kernels on an even grid that take a function's values there, of one or two angles.
-
-    Von Mises kernels whose deviation is one step interpolate what is smooth over a few steps nearly to
-    rounding: their weights are one deconvolution by Fourier transform. The grid is refined until
-    random points agree as well. The function is positive, given by its logarithm at points (N, r) of
-    r = 1 or 2 angles, and of any integral; the grid has at most `most` points along an angle.
-    """
-    count, most = FIRST_GRID[space.dim], most or FINEST_GRID[space.dim]
-    while True:
-        found = _on_grid(log_function, space, count)
-        if found.error < ENOUGH or 2 * count > most:
-            return found
-        count *= 2
-
-
-def _on_grid(log_function: Callable[[Tensor], Tensor], space: Torus, count: int) -> Table:
+def _on_grid(
+    log_function: Callable[[Tensor], Tensor], space: Torus, count: int
+) -> tuple[AdaptiveKernels, float, float]:
     line = torch.arange(count, dtype=torch.float64) / count
     grid = torch.cartesian_prod(*[line] * space.dim).reshape(-1, space.dim)
     logs = log_function(grid)
@@ -253,7 +237,7 @@ def _on_grid(log_function: Callable[[Tensor], Tensor], space: Torus, count: int)
     generator = torch.Generator().manual_seed(0)
     drawn = kernels.sample(CHECKED, generator)
     off = kernels.log_prob(drawn) + log_total - log_function(drawn)
-    return Table(kernels, log_total, float(off.square().mean().sqrt()))
+    return kernels, log_total, float(off.square().mean().sqrt())
 
 
 def check_torus(space: Space, what: str) -> Torus:

@@ -14,7 +14,7 @@ import numpy as np
 from orbiflow.arguments import described
 from orbiflow.arrays import Array
 from orbiflow.density.tables import read_table
-from orbiflow.errors import InputFileError
+from orbiflow.errors import InputFileError, system_errors
 
 MAX_BYTES = 32_000_000
 MAX_POINTS = 1_000_000
@@ -43,7 +43,7 @@ def read_coastlines(path: Path) -> list[Array]:
     Raises:
         InputFileError: If the file cannot be read, is too large, or holds no lines in degrees.
     """
-    try:
+    with system_errors(InputFileError, f"cannot read {path}"):
         if path.exists() and not path.is_file():
             raise InputFileError(f"cannot read {path}: it is not a file")
         size = path.stat().st_size
@@ -53,8 +53,6 @@ def read_coastlines(path: Path) -> list[Array]:
             )
         with path.open("rb") as file:
             start = file.read(4096)
-    except OSError as error:
-        raise InputFileError(f"cannot read {path}: {error.strerror or error}") from error
     known = {b"\x00\x00\x27\x0a": "a shapefile", b"PK\x03\x04": "a zip archive"}
     for magic, what in known.items():
         if start.startswith(magic):
