@@ -170,8 +170,9 @@ class NumberKind(Kind):
         made, abstract = (int, Integral) if self.whole else (float, Real)
         if not text and (isinstance(value, bool) or not isinstance(value, abstract)):
             raise Refused
+        given: Any = value
         try:
-            number = made(value)
+            number = made(given)
         except (OverflowError, ValueError):
             raise Refused from None
         if number not in self.allowed:
@@ -208,8 +209,9 @@ class ListKind(Kind):
         )
 
     def read(self, value: Any, *, text: bool = False) -> tuple[Any, ...]:
-        parts = [value] if text and self.repeated else _parts(value, text)
-        parts = list(filter(None, parts)) if text else parts
+        parts: Sequence[Any] = [value] if text and self.repeated else _parts(value, text)
+        if text:
+            parts = [part for part in parts if part]
         if not parts and not self.may_be_empty:
             raise Refused
         return _entries(parts, repeat(self.item), text)

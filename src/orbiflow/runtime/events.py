@@ -30,11 +30,11 @@ from orbiflow.settings import Field, check_names
 class Event:
     """Base of all events."""
 
-    KIND: ClassVar[str]
+    kind: ClassVar[str]
     """The name of the class in JSON, such as "tile-found"."""
 
     def __init_subclass__(cls) -> None:
-        cls.KIND = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", cls.__name__).lower()
+        cls.kind = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", cls.__name__).lower()
 
     def to_json(self) -> dict[str, Any]:
         """Return the event as JSON has it; `event_from_json` restores an equal one."""
@@ -42,7 +42,7 @@ class Event:
             name: str(value) if isinstance(value, Path) else value
             for name, value in vars(self).items()
         }
-        return {"kind": self.KIND, **values}
+        return {"kind": self.kind, **values}
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ class Failed(Event):
     failure: Literal["mistake", "error", "died"]
 
 
-EVENTS: dict[str, type[Event]] = {event.KIND: event for event in Event.__subclasses__()}
+EVENTS: dict[str, type[Event]] = {event.kind: event for event in Event.__subclasses__()}
 
 
 def event_from_json(document: object) -> Event:
