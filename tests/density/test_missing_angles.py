@@ -137,7 +137,7 @@ def test_mistakes_are_named() -> None:
         ({}, "missing"),
         ({"missing": "marginalise", "components": "chains"}, "chains cannot be fitted"),
         ({"missing": "marginalise", "components": "flow"}, "missing marginalise needs kernels"),
-        ({"missing": "guess"}, "missing must be one of"),
+        ({"missing": "guess"}, "missing must be refuse or marginalise"),
         ({"missing": "marginalise", "space": "klein-bottle"}, "missing or infinite"),
     ):
         with pytest.raises(OrbiflowError, match=message):
