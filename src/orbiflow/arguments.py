@@ -334,23 +334,3 @@ def _fits(actual: tuple[int, ...], wanted: Shape) -> bool:
     return len(actual) == len(wanted) and all(
         isinstance(want, str) or have == want for have, want in zip(actual, wanted, strict=True)
     )
-
-
-# The names of version 0.1, until every room uses the ones above.
-instance, numbers, path = as_instance, as_array, as_path
-
-
-def whole(value: Any, name: str, least: int, most: int | None = None) -> int:
-    """Return `as_whole`, under its former name."""
-    return as_whole(value, name, least, most)
-
-
-def number(
-    value: Any, name: str, least: float = -math.inf, most: float = math.inf, *, above: bool = False
-) -> float:
-    """Return `as_number`, under its former name."""
-    low = None if least == -math.inf else least
-    high = None if most == math.inf else most
-    if above:
-        return as_number(value, name, None, high, above=low)
-    return as_number(value, name, low, high)

@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.arguments import numbers
+from orbiflow.arguments import as_array
 from orbiflow.errors import OrbiflowError
 
 Array: TypeAlias = NDArray[Any]
@@ -25,7 +25,7 @@ def checked_window(window: Sequence[float]) -> Window:
     Raises `OrbiflowError` for anything else.
     """
     try:
-        values = numbers(window, "window", (4,)).tolist()
+        values = as_array(window, "window", (4,)).tolist()
     except OrbiflowError:
         values = [0.0] * 4
     if not (values[0] < values[2] and values[1] < values[3]):

@@ -5,7 +5,8 @@ Every message says what is wrong, where, and what to do. All are kinds of `Orbif
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 
 
 class OrbiflowError(ValueError):
@@ -53,6 +54,22 @@ class InputFileError(OrbiflowError):
 
 class OutputError(OrbiflowError):
     """A result that cannot be written to the requested place."""
+
+
+@contextmanager
+def system_errors(kind: type[OrbiflowError], what: str, cure: str = "") -> Generator[None]:
+    """Raise what the system refuses in a block as an error of this kind: what failed, why, the cure.
+
+    >>> with system_errors(InputFileError, "cannot read it", "check its name"):
+    ...     open("no such file")
+    Traceback (most recent call last):
+    orbiflow.errors.InputFileError: cannot read it: No such file or directory; check its name
+    """
+    try:
+        yield
+    except OSError as error:
+        more = f"; {cure}" if cure else ""
+        raise kind(f"{what}: {error.strerror or error}{more}") from error
 
 
 class GroupError(OrbiflowError):

@@ -1,7 +1,7 @@
 """Kinds of values that a setting may have, compiled from the annotation of its field.
 
-A kind reads a value from Python or JSON (`read`) and from the command line (`parse`), writes it as
-JSON (`plain`), and describes itself in words and as JSON Schema. Annotations may be built from `bool`,
+A kind reads a value from Python, JSON or the command line (`read`), writes it as JSON (`plain`), and
+describes itself in words and as JSON Schema. Annotations may be built from `bool`,
 `int`, `float` (always finite), `str`, `Path`, `Literal`, tuples, unions of these and None, and
 `Annotated` with `Range`, `Unit`, `Parsed` and `Repeated`.
 """
@@ -11,6 +11,7 @@ from __future__ import annotations
 import types
 import typing
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import repeat
 from numbers import Integral, Real
@@ -93,15 +94,14 @@ class Kind:
     repeated: bool = False
     needs: str = ""
 
-    def read(self, value: Any) -> Any:
-        """Return a value from Python or JSON as it will be used; raise `Refused` otherwise."""
+    def read(self, value: Any, *, text: bool = False) -> Any:
+        """Return a value from Python or JSON as it will be used; raise `Refused` otherwise.
+
+        With `text`, it is one that the command line gives.
+        """
         raise NotImplementedError
 
-    def parse(self, text: str) -> Any:
-        """Return a text of the command line as it will be used; raise `Refused` otherwise."""
-        return self.read(text)
-
-    def finish(self, text: str, known: Any) -> Any:
+    def finish(self, text: str, *known: Any) -> Any:
         """Return what a text means, given the value of the field that the kind `needs`."""
         raise NotImplementedError
 
@@ -116,7 +116,7 @@ class TextKind(Kind):
     def __init__(self) -> None:
         super().__init__("text", {"type": "string"})
 
-    def read(self, value: Any) -> str:
+    def read(self, value: Any, *, text: bool = False) -> str:  # noqa: ARG002
         if not isinstance(value, str):
             raise Refused
         return str(value)
@@ -129,11 +129,11 @@ class PathKind(Kind):
         schema = {"type": "string", "minLength": 1, "format": "path"}
         super().__init__("a path", schema, metavar="PATH")
 
-    def read(self, value: Any) -> Path:
-        text = path_text(value)
-        if text is None:
+    def read(self, value: Any, *, text: bool = False) -> Path:  # noqa: ARG002
+        path = path_text(value)
+        if path is None:
             raise Refused
-        return Path(text)
+        return Path(path)
 
     def plain(self, value: Any) -> str:
         return str(value)
@@ -145,16 +145,12 @@ class FlagKind(Kind):
     def __init__(self) -> None:
         super().__init__("true or false", {"type": "boolean"})
 
-    def read(self, value: Any) -> bool:
-        if not isinstance(value, bool):
-            raise Refused
-        return value
-
-    def parse(self, text: str) -> bool:
+    def read(self, value: Any, *, text: bool = False) -> bool:
         known = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
-        if text.lower() not in known:
+        found = known.get(value.lower()) if text else value
+        if not isinstance(found, bool):
             raise Refused
-        return known[text.lower()]
+        return found
 
 
 class NumberKind(Kind):
@@ -170,25 +166,18 @@ class NumberKind(Kind):
             metavar="INT" if whole else "NUMBER",
         )
 
-    def read(self, value: Any) -> float:
-        abstract: type = Integral if self.whole else Real
-        if isinstance(value, bool) or not isinstance(value, abstract):
+    def read(self, value: Any, *, text: bool = False) -> float:
+        made, abstract = (int, Integral) if self.whole else (float, Real)
+        if not text and (isinstance(value, bool) or not isinstance(value, abstract)):
             raise Refused
         given: Any = value
         try:
-            number = int(given) if self.whole else float(given)
+            number = made(given)
         except (OverflowError, ValueError):
             raise Refused from None
         if number not in self.allowed:
             raise Refused(wanted=number_wanted(self.allowed, number, whole=self.whole))
         return number
-
-    def parse(self, text: str) -> float:
-        try:
-            number = int(text) if self.whole else float(text)
-        except ValueError:
-            raise Refused from None
-        return self.read(number)
 
 
 class ChoiceKind(Kind):
@@ -197,7 +186,7 @@ class ChoiceKind(Kind):
     def __init__(self, choices: tuple[str, ...]) -> None:
         super().__init__(one_of(choices), {"enum": list(choices)}, choices=choices)
 
-    def read(self, value: Any) -> str:
+    def read(self, value: Any, *, text: bool = False) -> str:  # noqa: ARG002
         if not isinstance(value, str) or value not in self.choices:
             raise Refused(hint=meant(value, self.choices))
         return str(value)
@@ -219,17 +208,13 @@ class ListKind(Kind):
             repeated=repeated,
         )
 
-    def read(self, value: Any) -> tuple[Any, ...]:
-        return self._whole(_entries(_sequence(value), repeat(self.item), _read))
-
-    def parse(self, text: str) -> tuple[Any, ...]:
-        parts = [text] if self.repeated else [part.strip() for part in text.split(",")]
-        return self._whole(_entries(list(filter(None, parts)), repeat(self.item), _parse))
-
-    def _whole(self, entries: tuple[Any, ...]) -> tuple[Any, ...]:
-        if not entries and not self.may_be_empty:
+    def read(self, value: Any, *, text: bool = False) -> tuple[Any, ...]:
+        parts: Sequence[Any] = [value] if text and self.repeated else _parts(value, text)
+        if text:
+            parts = [part for part in parts if part]
+        if not parts and not self.may_be_empty:
             raise Refused
-        return entries
+        return _entries(parts, repeat(self.item), text)
 
     def plain(self, value: Any) -> list[Any]:
         return [self.item.plain(part) for part in value]
@@ -248,16 +233,11 @@ class TupleKind(Kind):
             unit=unit,
         )
 
-    def read(self, value: Any) -> tuple[Any, ...]:
-        return self._taken(_sequence(value), _read)
-
-    def parse(self, text: str) -> tuple[Any, ...]:
-        return self._taken([part.strip() for part in text.split(",")], _parse)
-
-    def _taken(self, parts: Sequence[Any], take: Callable[[Kind, Any], Any]) -> tuple[Any, ...]:
+    def read(self, value: Any, *, text: bool = False) -> tuple[Any, ...]:
+        parts = _parts(value, text)
         if len(parts) != len(self.items):
             raise Refused
-        return _entries(parts, self.items, take)
+        return _entries(parts, self.items, text)
 
     def plain(self, value: Any) -> list[Any]:
         return [item.plain(part) for item, part in zip(self.items, value, strict=True)]
@@ -275,22 +255,17 @@ class EitherKind(Kind):
             unit=unit,
         )
 
-    def read(self, value: Any) -> Any:
-        return self._first(_read, value)[1]
-
-    def parse(self, text: str) -> Any:
-        return self._first(_parse, text)[1]
+    def read(self, value: Any, *, text: bool = False) -> Any:
+        return self._first(value, text)[1]
 
     def plain(self, value: Any) -> Any:
-        kind, value = self._first(_read, value)
+        kind, value = self._first(value)
         return kind.plain(value)
 
-    def _first(self, take: Callable[[Kind, Any], Any], value: Any) -> tuple[Kind, Any]:
+    def _first(self, value: Any, text: bool = False) -> tuple[Kind, Any]:
         for kind in self.kinds:
-            try:
-                return kind, take(kind, value)
-            except Refused:
-                continue
+            with suppress(Refused):
+                return kind, kind.read(value, text=text)
         raise Refused
 
 
@@ -301,10 +276,10 @@ class OptionalKind(Kind):
         for name in ("wanted", "limits", "unit", "metavar", "choices", "repeated", "needs"):
             setattr(self, name, getattr(inner, name))
         self.schema = {"anyOf": [inner.schema, {"type": "null"}]}
-        self.inner, self.parse, self.finish = inner, inner.parse, inner.finish
+        self.inner, self.finish = inner, inner.finish
 
-    def read(self, value: Any) -> Any:
-        return None if value is None else self.inner.read(value)
+    def read(self, value: Any, *, text: bool = False) -> Any:
+        return None if value is None else self.inner.read(value, text=text)
 
     def plain(self, value: Any) -> Any:
         return None if value is None else self.inner.plain(value)
@@ -326,16 +301,12 @@ class ParsedKind(Kind):
             needs=parsed.needs,
         )
 
-    def read(self, value: Any) -> Any:
-        return self.parse(value) if isinstance(value, str) else self.inner.read(value)
+    def read(self, value: Any, *, text: bool = False) -> Any:  # noqa: ARG002
+        if not isinstance(value, str):
+            return self.inner.read(value)
+        return value if self.needs else self.finish(value)
 
-    def parse(self, text: str) -> Any:
-        return text if self.needs else self._meaning(text)
-
-    def finish(self, text: str, known: Any) -> Any:
-        return self._meaning(text, known)
-
-    def _meaning(self, text: str, *known: Any) -> Any:
+    def finish(self, text: str, *known: Any) -> Any:
         try:
             value = self.parsed.read(text, *known)
         except OrbiflowError as error:
@@ -391,14 +362,12 @@ def _plain_kind(annotation: Any, allowed: Range, unit: str, repeated: bool) -> K
     raise TypeError(f"no setting can be annotated {annotation!r}")
 
 
-def _entries(
-    parts: Sequence[Any], kinds: Iterable[Kind], take: Callable[[Kind, Any], Any]
-) -> tuple[Any, ...]:
+def _entries(parts: Sequence[Any], kinds: Iterable[Kind], text: bool) -> tuple[Any, ...]:
     """What kinds take of the entries of a list; a refusal says which entry."""
     taken: list[Any] = []
     for part, kind in zip(parts, kinds, strict=False):
         try:
-            taken.append(take(kind, part))
+            taken.append(kind.read(part, text=text))
         except Refused as error:
             wrong = f"must be {error.wanted or kind.wanted}, got {described(part)}"
             more = f"; {error.hint}" if error.hint else ""
@@ -406,15 +375,10 @@ def _entries(
     return tuple(taken)
 
 
-def _read(kind: Kind, value: Any) -> Any:
-    return kind.read(value)
-
-
-def _parse(kind: Kind, text: str) -> Any:
-    return kind.parse(text)
-
-
-def _sequence(value: object) -> Sequence[Any]:
+def _parts(value: Any, text: bool) -> Sequence[Any]:
+    """The entries of a list, or those that a text has between commas."""
+    if text:
+        return [part.strip() for part in value.split(",")]
     if not isinstance(value, list | tuple):
         raise Refused
     return cast(Sequence[Any], value)

@@ -6,12 +6,12 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias, cast
+from typing import Any, TypeAlias
 
-from orbiflow.arguments import path as as_path
+from orbiflow.arguments import as_path, described
 from orbiflow.density import MODEL, REPORT, DensityEstimator, read_density, report_from_json
-from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
-from orbiflow.runtime import is_list
+from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, system_errors
+from orbiflow.runtime import is_list, is_object
 from orbiflow.tiles import (
     RESULT,
     TILE_MODEL,
@@ -143,21 +143,17 @@ def _settings(settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def _json(file: Path) -> dict[str, Any]:
-    try:
+    with system_errors(InputFileError, f"{file}: cannot be read"):
         if file.stat().st_size > MOST_BYTES:
             raise InputFileError(f"{file}: too large for a report")
-        document = json.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputFileError(f"{file}: cannot be read: {error.strerror or error}") from error
+        text = file.read_bytes()
+    try:
+        document = json.loads(text)
     except (ValueError, RecursionError) as error:
-        if isinstance(error, OrbiflowError):
-            raise
         raise InputFileError(f"{file}: not JSON: {error}") from error
-    if not isinstance(document, dict):
-        raise InputFileError(
-            f"{file}: not a report: {type(document).__name__} instead of an object"
-        )
-    return cast(dict[str, Any], document)
+    if not is_object(document):
+        raise InputFileError(f"{file}: not a report: {described(document)} instead of an object")
+    return document
 
 
 def _run(path: Path, uncertified: bool) -> LoadedRun:

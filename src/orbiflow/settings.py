@@ -48,31 +48,13 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Self, cast, dataclass_transform
 
-from orbiflow.arguments import Range, described, meant, one_of, placeholder, refusal
+from orbiflow.arguments import Range as Range
+from orbiflow.arguments import described, meant, one_of, placeholder, refusal
 from orbiflow.errors import SettingError, literal
-from orbiflow.kinds import Kind, Parsed, Refused, Repeated, Unit, kind_of
-
-__all__ = [
-    "DefaultText",
-    "Ending",
-    "Field",
-    "FileSettings",
-    "Group",
-    "Hidden",
-    "Needs",
-    "NotWith",
-    "OnlyWith",
-    "Option",
-    "Parsed",
-    "Range",
-    "Repeated",
-    "SettingError",
-    "Settings",
-    "Unit",
-    "check_names",
-    "check_rules",
-    "fields_of",
-]
+from orbiflow.kinds import Kind, Refused, kind_of
+from orbiflow.kinds import Parsed as Parsed
+from orbiflow.kinds import Repeated as Repeated
+from orbiflow.kinds import Unit as Unit
 
 
 class Option:
@@ -284,7 +266,7 @@ class Field:
 
         With `text`, it comes from the command line.
         """
-        return self._read(self.kind.parse if text else self.kind.read, value)
+        return self._read(lambda given: self.kind.read(given, text=text), value)
 
     def finish(self, value: Any, values: Mapping[str, Any]) -> Any:
         """Return the value of a text that could not be read without another field."""

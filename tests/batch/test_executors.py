@@ -198,14 +198,14 @@ def test_what_could_not_connect_is_closed() -> None:
 
 @pytest.mark.parametrize("name", ["/etc/passwd", "../up", "a/../../b", "", "a\\b"])
 def test_an_answer_cannot_write_elsewhere(name: str) -> None:
-    text = '[{"kind": "finished", "state": "done", "summary": {}}]'
+    text = '{"kind": "finished", "state": "done", "summary": {}}'
     with pytest.raises(OrbiflowError, match="a name that cannot be used"):
         Answer.from_worker("key", text, {name: b""})
 
 
 def test_an_answer_without_an_end() -> None:
     with pytest.raises(OrbiflowError, match="without an end"):
-        Answer.from_worker("key", '[{"kind": "note", "text": ""}]', {})
+        Answer.from_worker("key", '{"kind": "note", "text": ""}', {})
 
 
 @given(st.binary(max_size=200))

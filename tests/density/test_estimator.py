@@ -110,7 +110,7 @@ def test_other_random_states_are_refused(wrong, fitted: DensityEstimator) -> Non
     with pytest.raises(OrbiflowError, match="random_state must be None, an integer"):
         fitted.sample(2, random_state=wrong)
     for count in (0, 1.5, "2"):
-        with pytest.raises(OrbiflowError, match="n_samples must be an integer"):
+        with pytest.raises(OrbiflowError, match="n_samples must be "):
             fitted.sample(count)  # type: ignore[arg-type]
 
 

@@ -47,7 +47,11 @@ def test_em_climbs_on_the_likelihood_of_what_is_there(seed: int) -> None:
     scores = []
     for iterations in (1, 2, 4, 8, 16):
         part = fit_mixture(
-            space, points, 2, iterations=iterations, generator=torch.Generator().manual_seed(seed)
+            space,
+            Rows(points),
+            2,
+            iterations=iterations,
+            generator=torch.Generator().manual_seed(seed),
         )
         scores.append(float(at_observed(part, points).mean()))
     # but for the imaginary points that hold concentrations finite
@@ -133,7 +137,7 @@ def test_mistakes_are_named() -> None:
         ({}, "missing"),
         ({"missing": "marginalise", "components": "chains"}, "chains cannot be fitted"),
         ({"missing": "marginalise", "components": "flow"}, "missing marginalise needs kernels"),
-        ({"missing": "guess"}, "missing must be one of"),
+        ({"missing": "guess"}, "missing must be refuse or marginalise"),
         ({"missing": "marginalise", "space": "klein-bottle"}, "missing or infinite"),
     ):
         with pytest.raises(OrbiflowError, match=message):

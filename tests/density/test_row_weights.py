@@ -37,8 +37,8 @@ def repeated(seed: int, count: int) -> tuple[torch.Tensor, torch.Tensor, torch.T
 def test_kernels_of_weighted_rows_are_those_of_repeated_ones(seed: int) -> None:
     points, weights, rows = repeated(seed, 40)
     space = make_space("torus")
-    found = kernel_estimates(space, points, repeats=False, row_weights=weights)
-    expected = kernel_estimates(space, rows, repeats=False)
+    found = kernel_estimates(space, Rows(points, weights), repeats=False)
+    expected = kernel_estimates(space, Rows(rows), repeats=False)
     at = space.uniform(30, torch.Generator().manual_seed(seed))
     assert found.keys() == expected.keys()
     for name, part in found.items():
@@ -75,8 +75,8 @@ def test_mixtures_of_one_component_are_those_of_repeated_rows(seed: int) -> None
     def generator() -> torch.Generator:
         return torch.Generator().manual_seed(0)
 
-    one = fit_mixture(space, points, 1, generator=generator(), row_weights=weights)
-    other = fit_mixture(space, rows, 1, generator=generator())
+    one = fit_mixture(space, Rows(points, weights), 1, generator=generator())
+    other = fit_mixture(space, Rows(rows), 1, generator=generator())
     assert torch.allclose(one.log_prob(at), other.log_prob(at), atol=1e-6)
 
 

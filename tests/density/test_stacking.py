@@ -96,7 +96,9 @@ def test_a_gain_has_its_standard_error() -> None:
 def test_mixtures_integrate_to_one_and_are_invariant(name: str, seed: int) -> None:
     space = make_space(name)
     generator = torch.Generator().manual_seed(seed)
-    found = fit_mixture(space, clustered(name, 200, seed), 3, narrowest=300.0, generator=generator)
+    found = fit_mixture(
+        space, Rows(clustered(name, 200, seed)), 3, narrowest=300.0, generator=generator
+    )
     grid = midpoints(space, 200)
     assert float(found.log_prob(grid).exp().mean()) == pytest.approx(1, abs=2e-3)
     points = 2 * torch.rand(20, 2, dtype=torch.float64, generator=generator)
@@ -110,10 +112,10 @@ def test_mixtures_integrate_to_one_and_are_invariant(name: str, seed: int) -> No
 def test_a_mixture_finds_clusters(name: str) -> None:
     space, points = make_space(name), clustered(name, 900, 1)
     generator = torch.Generator().manual_seed(0)
-    one, three = (fit_mixture(space, points, k, generator=generator) for k in (1, 3))
+    one, three = (fit_mixture(space, Rows(points), k, generator=generator) for k in (1, 3))
     test = clustered(name, 300, 2)
     assert float(three.log_prob(test).mean()) > float(one.log_prob(test).mean()) + 0.3
-    again = fit_mixture(space, points, 1, generator=torch.Generator().manual_seed(0))
+    again = fit_mixture(space, Rows(points), 1, generator=torch.Generator().manual_seed(0))
     assert torch.equal(again.concentrations, one.concentrations)
 
 
@@ -121,7 +123,7 @@ def test_a_mixture_finds_clusters(name: str) -> None:
 def test_the_gradient_of_a_mixture(name: str) -> None:
     space = make_space(name)
     generator = torch.Generator().manual_seed(0)
-    found = fit_mixture(space, clustered(name, 100, 0), 2, generator=generator)
+    found = fit_mixture(space, Rows(clustered(name, 100, 0)), 2, generator=generator)
     at = clustered(name, 4, 3).requires_grad_()
     assert torch.autograd.gradcheck(found.log_prob, (at,), atol=1e-4)
 
@@ -130,7 +132,7 @@ def test_the_gradient_of_a_mixture(name: str) -> None:
 def test_kernel_estimates_are_normalised(name: str) -> None:
     space = make_space(name)
     points = clustered(name, 60, 0)
-    found = kernel_estimates(space, torch.cat([points, points[:5]]), narrowest=100.0)
+    found = kernel_estimates(space, Rows(torch.cat([points, points[:5]])), narrowest=100.0)
     assert {"repeated", "near 2, 0.4, 1" if space.is_round else "near 2, 0.4, 0.3"} <= set(found)
     grid = midpoints(space, 120)
     for part in found.values():
@@ -139,7 +141,7 @@ def test_kernel_estimates_are_normalised(name: str) -> None:
     both = AdaptiveKernels.joined(parts, torch.tensor([1.0, 3.0]))
     expected = 0.25 * parts[0].log_prob(grid).exp() + 0.75 * parts[1].log_prob(grid).exp()
     assert torch.allclose(both.log_prob(grid).exp(), expected)
-    alone = kernel_estimates(space, torch.cat([points, points[:5]]), repeats=False)
+    alone = kernel_estimates(space, Rows(torch.cat([points, points[:5]])), repeats=False)
     assert "repeated" not in alone
 
 

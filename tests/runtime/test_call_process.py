@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from orbiflow.runtime import ClassFailed, Event, Failed, Finished, Progress, TileFound, start
+from orbiflow.runtime import CallProcess, ClassFailed, Event, Failed, Finished, Progress, TileFound
 from runtime.searches import ENDLESS, boot_call, check_order
 
 
 def test_a_search_in_a_process(tmp_path: Path) -> None:
-    with start(boot_call(tmp_path, "IH4", "IH6", workers=2)) as process:
+    with CallProcess(boot_call(tmp_path, "IH4", "IH6", workers=2)) as process:
         events = list(process.events())
         assert process.wait() == process.exitcode == 0
     check_order(events, "IH4", "IH6")
@@ -29,7 +29,7 @@ def test_two_calls_are_started_from_threads(tmp_path: Path) -> None:
 
     def work(name: str) -> None:
         (tmp_path / name).mkdir()
-        with start(boot_call(tmp_path / name, name)) as process:
+        with CallProcess(boot_call(tmp_path / name, name)) as process:
             found[name] = list(process.events())
 
     threads = [threading.Thread(target=work, args=(name,)) for name in ("IH4", "IH6")]
@@ -46,7 +46,7 @@ def test_two_calls_are_started_from_threads(tmp_path: Path) -> None:
 def test_cancelling_keeps_the_order_and_ends_the_process(workers: int, tmp_path: Path) -> None:
     call = boot_call(tmp_path, "IH4", "IH6", iterations=ENDLESS, workers=workers)
     events = []
-    with start(call) as process:
+    with CallProcess(call) as process:
         for event in process.events():
             events.append(event)
             if isinstance(event, Progress) and event.class_name:
@@ -64,7 +64,7 @@ def test_cancelling_keeps_the_order_and_ends_the_process(workers: int, tmp_path:
 
 def test_a_mistake_is_the_last_event(tmp_path: Path) -> None:
     call = boot_call(tmp_path, "IH8")
-    with start(call) as process:
+    with CallProcess(call) as process:
         events = list(process.events())
         assert process.wait() == 1
     check_order(events)
@@ -76,7 +76,7 @@ def test_a_mistake_is_the_last_event(tmp_path: Path) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_a_process_that_dies_is_the_last_event(tmp_path: Path) -> None:
     events = []
-    with start(boot_call(tmp_path, "IH4", iterations=ENDLESS)) as process:
+    with CallProcess(boot_call(tmp_path, "IH4", iterations=ENDLESS)) as process:
         for event in process.events():
             events.append(event)
             if isinstance(event, Progress):
@@ -92,7 +92,7 @@ def test_a_process_that_dies_is_the_last_event(tmp_path: Path) -> None:
 
 
 def test_waiting_has_a_limit(tmp_path: Path) -> None:
-    with start(boot_call(tmp_path, "IH4", iterations=ENDLESS)) as process:
+    with CallProcess(boot_call(tmp_path, "IH4", iterations=ENDLESS)) as process:
         assert process.exitcode is None
         with pytest.raises(TimeoutError, match="still runs"):
             process.wait(timeout=0.01)

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from orbiflow.cli import app
-from orbiflow.runtime import Call, Operation, Outcome, all_operations, find
+from orbiflow.operations import OPERATIONS
+from orbiflow.runtime import Call, Operation, Outcome, find
 
 
 @pytest.fixture
@@ -109,7 +110,7 @@ def test_mistakes_are_one_line_with_status_2(line: str, capsys: pytest.CaptureFi
         assert words in told.err
 
 
-@pytest.mark.parametrize("made", all_operations(), ids=lambda made: made.name)
+@pytest.mark.parametrize("made", list(map(find, OPERATIONS)), ids=lambda made: made.name)
 def test_help_names_every_option(
     made: Operation, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

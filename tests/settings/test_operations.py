@@ -14,13 +14,13 @@ import pytest
 
 from orbiflow.cli.reference import reference
 from orbiflow.errors import OrbiflowError
+from orbiflow.operations import OPERATIONS
 from orbiflow.runtime import (
     Cancel,
     Cancelled,
     Operation,
     Outcome,
     Sink,
-    all_operations,
     call_from_json,
     find,
     ignore,
@@ -147,7 +147,7 @@ def test_wrong_json_is_refused(document: object) -> None:
         call_from_json(document)
 
 
-@pytest.mark.parametrize("made", all_operations(), ids=lambda made: made.name)
+@pytest.mark.parametrize("made", list(map(find, OPERATIONS)), ids=lambda made: made.name)
 def test_every_operation_describes_itself(made: Operation) -> None:
     jsonschema.Draft202012Validator.check_schema(made.schema)
     assert find(made.name) is made
@@ -157,13 +157,14 @@ def test_every_operation_describes_itself(made: Operation) -> None:
 
 def test_the_reference_page_is_up_to_date() -> None:
     hint = "run python -m orbiflow.cli.reference docs/reference/settings.md"
-    assert PAGE.read_text("utf-8") == reference(all_operations()), hint
+    assert PAGE.read_text("utf-8") == reference(list(map(find, OPERATIONS))), hint
 
 
 def test_operations_are_known_without_numerical_libraries() -> None:
     code = (
-        "import sys; from orbiflow.runtime import all_operations, call_from_json\n"
-        "[made.schema for made in all_operations()]\n"
+        "import sys; from orbiflow.operations import OPERATIONS\n"
+        "from orbiflow.runtime import call_from_json, find\n"
+        "[find(name).schema for name in OPERATIONS]\n"
         "call_from_json({'schema_version': 2, 'operation': 'export', 'result': 'x'})\n"
         "print({'numpy', 'torch', 'scipy', 'rich', 'cyclopts'} & set(sys.modules))"
     )

@@ -27,7 +27,8 @@ from orbiflow.kinds import (
     Refused,
     TupleKind,
 )
-from orbiflow.runtime import all_operations
+from orbiflow.operations import OPERATIONS
+from orbiflow.runtime import find
 from orbiflow.settings import (
     DefaultText,
     Field,
@@ -87,7 +88,7 @@ class Point(Settings):
 FIELDS = {entry.name: entry for entry in fields_of(Sheet)}
 EVERY_FIELD = {
     f"{operation.name}: {entry.name}": entry
-    for operation in all_operations()
+    for operation in list(map(find, OPERATIONS))
     for entry in operation.fields
 } | FIELDS
 WORD = st.text("abcxyz{}0 ", min_size=1).map(str.strip).filter(bool)

@@ -1,7 +1,7 @@
 """Who does the work of a batch: processes of this machine, or the workers of a Dask cluster.
 
-What travels is text and bytes: a call with the file that it reads, its events with the files that it
-wrote.
+What travels is text and bytes: a call with the file that it reads, its last event with the files that
+it wrote.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import json
 import os
 import tempfile
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
@@ -26,10 +27,7 @@ from orbiflow.runtime import (
     Failed,
     Finished,
     Note,
-    Progress,
     Sink,
-    Table,
-    Written,
     call_from_json,
     event_from_json,
     process_context,
@@ -92,12 +90,12 @@ class Answer:
     """What came of a parcel.
 
     - `key`: The parcel's key.
-    - `events`: The events that matter afterwards; the last is `Finished` or `Failed`.
+    - `end`: The last event of its call.
     - `files`: The files that it wrote, by path relative to its folder, with slashes.
     """
 
     key: str
-    events: tuple[Event, ...]
+    end: Finished | Failed
     files: Mapping[str, bytes]
 
     @classmethod
@@ -107,13 +105,13 @@ class Answer:
         Raises:
             OrbiflowError: If it is none, or has a file that would be written elsewhere.
         """
-        events = tuple(event_from_json(document) for document in json.loads(text))
-        if not events or not isinstance(events[-1], Finished | Failed):
+        end = event_from_json(json.loads(text))
+        if not isinstance(end, Finished | Failed):
             raise OrbiflowError("a worker gave an answer without an end")
         for name in files:
             if not stays_inside(name):
                 raise OrbiflowError(f"a worker gave a file a name that cannot be used: {name!r}")
-        return cls(key, events, files)
+        return cls(key, end, files)
 
     @classmethod
     def died(cls, key: str, times: int) -> Answer:
@@ -121,14 +119,7 @@ class Answer:
         message = (
             f"{times} workers died while they were at it: was memory short? A simpler file may do"
         )
-        return cls(key, (Failed(message, "died"),), {})
-
-    @property
-    def end(self) -> Finished | Failed:
-        """The last event."""
-        last = self.events[-1]
-        assert isinstance(last, Finished | Failed)
-        return last
+        return cls(key, Failed(message, "died"), {})
 
 
 class Executor(ABC):
@@ -227,11 +218,11 @@ def carry_out(header: str, data: bytes, cancel: Cancel) -> tuple[str, dict[str, 
     """Run a parcel's call in this thread, in a folder that is removed afterwards.
 
     Returns:
-        Events as text, and files, for `Answer.from_worker`. Whatever fails is among the events.
+        The last event as text, and files, for `Answer.from_worker`. Whatever fails is in the event.
     """
     with tempfile.TemporaryDirectory(prefix="orbiflow-", ignore_cleanup_errors=True) as folder:
-        events, files = _run(json.loads(header), data, Path(folder), cancel)
-    text = json.dumps([event.to_json() for event in events], allow_nan=False)
+        end, files = _run(json.loads(header), data, Path(folder), cancel)
+    text = json.dumps(end.to_json(), allow_nan=False)
     for part in ("in", "out"):  # a folder that is gone is not to be named
         text = text.replace(json.dumps(str(Path(folder, part, "_")))[1:-2], "")
     return text, files
@@ -239,16 +230,11 @@ def carry_out(header: str, data: bytes, cancel: Cancel) -> tuple[str, dict[str, 
 
 def _run(
     order: Mapping[str, Any], data: bytes, folder: Path, cancel: Cancel
-) -> tuple[list[Event], dict[str, bytes]]:
+) -> tuple[Event, dict[str, bytes]]:
     if order["version"] != __version__:
         text = f"this worker has orbiflow {__version__}, not {order['version']}"
-        return [Failed(text, "mistake")], {}
-    events: list[Event] = []
-
-    def keep(event: Event) -> None:
-        if not isinstance(event, Progress | Table | Written):
-            events.append(event)
-
+        return Failed(text, "mistake"), {}
+    last: deque[Event] = deque([Failed("the work ended without a word", "error")], maxlen=1)
     try:
         read, written = folder / "in" / order["name"], folder / "out"
         read.parent.mkdir()
@@ -256,13 +242,12 @@ def _run(
         there = {order["reads"]: str(read), order["writes"]: str(written)}
         call = call_from_json({**order["call"], **there})
         with suppress(Exception):  # the last event says what
-            call.run(keep, cancel)
-        files = _packed(written)
+            call.run(last.append, cancel)
+        return last[0], _packed(written)
     except OSError as error:
-        return [Failed(f"{type(error).__name__}: {error.strerror or error}", "error")], {}
+        return Failed(f"{type(error).__name__}: {error.strerror or error}", "error"), {}
     except OrbiflowError as error:
-        return [Failed(str(error), "mistake")], {}
-    return events or [Failed("the work ended without a word", "error")], files
+        return Failed(str(error), "mistake"), {}
 
 
 def _packed(folder: Path) -> dict[str, bytes]:

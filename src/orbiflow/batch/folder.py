@@ -13,7 +13,7 @@ from filelock import FileLock, Timeout
 
 from orbiflow.batch.journal import Entry, Journal
 from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Kind, Overview
-from orbiflow.errors import OrbiflowError, OutputError
+from orbiflow.errors import OrbiflowError, OutputError, system_errors
 from orbiflow.runtime import LITTER, ResultFolder, make_folder, write_atomic, write_set
 
 THUMBNAILS, LOCK = "thumbnails", ".batch.lock"
@@ -46,18 +46,14 @@ class BatchFolder:
         self._written, self._cost = 0.0, 0.0
 
     def __enter__(self) -> Self:
-        lock = FileLock(self.path / LOCK, timeout=0)
-        try:
-            self._open.enter_context(lock)
-        except Timeout as error:
-            raise OutputError(
-                f"another {self.overview.what} is at work in {self.path}: wait for it or choose "
-                "another --out"
-            ) from error
-        except OSError as error:
-            raise OutputError(
-                f"cannot write into {self.path}: {error.strerror or error}"
-            ) from error
+        with system_errors(OutputError, f"cannot write into {self.path}"):
+            try:
+                self._open.enter_context(FileLock(self.path / LOCK, timeout=0))
+            except Timeout as error:
+                raise OutputError(
+                    f"another {self.overview.what} is at work in {self.path}: wait for it or choose "
+                    "another --out"
+                ) from error
         self.journal = Journal(self.path / self.overview.journal)  # as the last one left it
         self._open.enter_context(self.journal)
         return self
@@ -103,15 +99,12 @@ class BatchFolder:
 
     def _check(self) -> None:
         """Raise an `OutputError` for a folder that holds something other than a batch."""
-        try:
+        what = f"cannot write into {self.path}"
+        with system_errors(OutputError, what, "choose another --out"):
             if not self.path.exists() or (self.path / self.overview.journal).exists():
                 return
             known = (*LITTER, LOCK)
             found = next((p for p in sorted(self.path.iterdir()) if p.name not in known), None)
-        except OSError as error:
-            raise OutputError(
-                f"cannot write into {self.path}: {error.strerror or error}; choose another --out"
-            ) from error
         if found is not None:
             raise OutputError(
                 f"{self.path} holds {found.name}, which is of no earlier {self.overview.what}: "
@@ -122,14 +115,10 @@ class BatchFolder:
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:
     for name, data in files.items():
         path = folder / PurePosixPath(name)
-        try:
+        what, cure = f"cannot write {name} into {folder}", "free the disk or choose another --out"
+        with system_errors(OutputError, what, cure):
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
-        except OSError as error:
-            raise OutputError(
-                f"cannot write {name} into {folder}: {error.strerror or error}; free the disk or "
-                "choose another --out"
-            ) from error
 
 
 def _small(picture: bytes) -> bytes:

@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
 from orbiflow.batch.overview import Kind
-from orbiflow.errors import InputFileError
+from orbiflow.errors import InputFileError, system_errors
 from orbiflow.runtime import Call
 
 LONGEST_NAME = 80
@@ -51,12 +51,9 @@ class FileSource:
         return self.path.name
 
     def read(self) -> bytes:
-        try:
-            with self.path.open("rb") as file:
-                data = file.read(self.most + 1)
-        except OSError as error:
-            why = error.strerror or error
-            raise InputFileError(f"{self.name}: cannot be read ({why}); check it") from error
+        system = system_errors(InputFileError, f"{self.name}: cannot be read", "check it")
+        with system, self.path.open("rb") as file:
+            data = file.read(self.most + 1)
         if len(data) > self.most:
             raise InputFileError(
                 f"{self.name}: larger than {self.most / 2**20:.0f} MB, the most that is read; simplify "

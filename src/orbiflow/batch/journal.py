@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import json
 import os
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal, Self, cast, get_args
 
-from orbiflow.errors import OutputError
+from orbiflow.errors import OutputError, system_errors
 from orbiflow.runtime import is_object, stays_inside, write_atomic
 
 MOST_BYTES = 2**30
@@ -67,10 +67,8 @@ class Journal:
     def __enter__(self) -> Self:
         """Write the last entries anew, and open the file for more."""
         write_atomic(self.path, "".join(entry.line() for entry in self.entries.values()))
-        try:
+        with self._writing():
             self._file = self.path.open("ab")
-        except OSError as error:
-            raise _cannot(self.path, error) from error
         return self
 
     def __exit__(self, *_error: object) -> None:
@@ -78,21 +76,20 @@ class Journal:
 
     def add(self, entry: Entry) -> None:
         """Add an entry, which is on the disk when this returns."""
-        try:
+        with self._writing():
             self._file.write(entry.line().encode())
             self._file.flush()
             os.fsync(self._file.fileno())
-        except OSError as error:
-            raise _cannot(self.path, error) from error
         self.entries[entry.file] = entry
 
+    def _writing(self) -> AbstractContextManager[None]:
+        return system_errors(OutputError, f"cannot write {self.path}", "free the disk or its file")
+
     def _read(self) -> None:
-        try:
+        with self._writing():
             if self.path.stat().st_size > MOST_BYTES:
                 raise OutputError(f"{self.path} is too large to be a batch's; move it")
             lines = self.path.read_bytes().splitlines()
-        except OSError as error:
-            raise _cannot(self.path, error) from error
         for line in lines:
             with suppress(ValueError, TypeError, RecursionError):  # cut short: to be done again
                 document = json.loads(line)
@@ -115,7 +112,3 @@ def _is_sound(entry: Entry) -> bool:
         and is_object(entry.best)
         and is_object(entry.settings)
     )
-
-
-def _cannot(path: Path, error: OSError) -> OutputError:
-    return OutputError(f"cannot write {path}: {error.strerror or error}; free the disk or its file")

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from orbiflow.errors import SettingError
-from orbiflow.runtime import Operation, all_operations
+from orbiflow.operations import OPERATIONS
+from orbiflow.runtime import Operation, find
 from orbiflow.settings import Field, Hidden
 
 TOP = """# Operations and settings
@@ -59,7 +60,7 @@ def _code(name: str) -> str:
 
 def main() -> None:
     """Write the page to a file, or to standard output."""
-    text = reference(all_operations())
+    text = reference(map(find, OPERATIONS))
     if len(sys.argv) > 1:
         Path(sys.argv[1]).write_text(text, "utf-8")
     else:

@@ -37,7 +37,7 @@ class Terminal:
     def __init__(self) -> None:
         self.forks = False
         self.best = (0.0, "")
-        self.bar: _Bar | None = None
+        self.bar: Bar | None = None
 
     def __enter__(self) -> Terminal:
         return self
@@ -51,9 +51,7 @@ class Terminal:
             case Started():
                 self.forks = find(event.operation).starts_processes
             case Progress():
-                if self.bar is None:
-                    self.bar = _Bar(forks=self.forks)
-                self.bar.update(event, self.best)
+                self._show_progress(event)
             case Note():
                 self._end_bar()  # notes come before the work and after it
                 _say(event.text, errors if event.warning else output)
@@ -82,39 +80,28 @@ class Terminal:
     def _found(self, event: Preview | TileFound) -> None:
         self.best = max(self.best, (event.iou, event.class_name))
 
+    def _show_progress(self, event: Progress) -> None:
+        if self.bar is None:
+            columns = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+            # no thread that refreshes: workers are forked from a process with one thread
+            self.bar = Bar(
+                *columns,
+                TextColumn("{task.description}"),
+                console=output,
+                transient=True,
+                auto_refresh=not self.forks,
+            )
+            self.bar.add_task("", total=1.0)
+            self.bar.start()
+        iou, name = self.best
+        shown = escape(f"{event.what}, best {iou:.4f} ({name})" if name else event.what)
+        (task,) = self.bar.task_ids
+        self.bar.update(task, completed=event.share, description=shown, refresh=self.forks)
+
     def _end_bar(self) -> None:
         if self.bar is not None:
-            self.bar.progress.stop()
+            self.bar.stop()
             self.bar = None
-
-
-class _Bar:
-    """How far an operation is; gone when it has finished."""
-
-    def __init__(self, *, forks: bool) -> None:
-        self.forks = forks
-        # no thread that refreshes: workers are forked from a process with one thread
-        self.progress = Bar(
-            BarColumn(),
-            TaskProgressColumn(),
-            TimeElapsedColumn(),
-            TextColumn("{task.description}"),
-            console=output,
-            transient=True,
-            auto_refresh=not forks,
-        )
-        self.task = self.progress.add_task("", total=1.0)
-        self.progress.start()
-
-    def update(self, event: Progress, best: tuple[float, str]) -> None:
-        iou, name = best
-        shown = f", best {iou:.4f} ({name})" if name else ""
-        self.progress.update(
-            self.task,
-            completed=event.share,
-            description=escape(f"{event.what}{shown}"),
-            refresh=self.forks,
-        )
 
 
 def _say(text: str, console: Console = output) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_instance
+from orbiflow.arguments import as_instance, as_whole, refusal
 from orbiflow.arrays import Array
 from orbiflow.density.fitting import (
     ComponentSettings,
@@ -37,50 +37,6 @@ from orbiflow.density.spaces import Space, space_class
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import check_names, fields_of
 
-
-class Parameters:
-    """What scikit-learn asks of an estimator whose constructor keeps its arguments as they are."""
-
-    def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """The constructor's arguments, by name."""
-        del deep
-        return {name: getattr(self, name) for name in self._names()}
-
-    def set_params(self, **params: Any) -> Self:
-        """Change constructor arguments."""
-        for name, value in params.items():
-            if name not in self._names():
-                raise OrbiflowError(f"no parameter {name!r}; there are {', '.join(self._names())}")
-            setattr(self, name, value)
-        return self
-
-    def __sklearn_tags__(self) -> Any:
-        # asked for by scikit-learn alone, which is therefore there
-        from sklearn.utils import Tags, TargetTags  # pyright: ignore[reportMissingImports, reportMissingTypeStubs]
-
-        return Tags(
-            estimator_type="density_estimator",
-            target_tags=TargetTags(required=False),
-            transformer_tags=None,
-            regressor_tags=None,
-            classifier_tags=None,
-        )
-
-    def __repr__(self) -> str:
-        shown = [f"{name}={value!r}" for name, value in self._changed(self._names()).items()]
-        return f"{type(self).__name__}({', '.join(shown)})"
-
-    @classmethod
-    def _names(cls) -> list[str]:
-        return list(inspect.signature(cls).parameters)
-
-    def _changed(self, names: Iterable[str]) -> dict[str, Any]:
-        """Parameters that are not at their defaults."""
-        defaults = inspect.signature(type(self)).parameters
-        given = {name: getattr(self, name) for name in names}
-        return {name: v for name, v in given.items() if v != defaults[name].default}
-
-
 RandomState: TypeAlias = int | np.integer | np.random.RandomState | np.random.Generator | None
 """As scikit-learn has it, and NumPy's newer generators."""
 
@@ -95,10 +51,8 @@ def seed_of(random_state: RandomState) -> int:
         return int(random_state.integers(2**31))
     if not isinstance(random_state, bool) and isinstance(random_state, numbers.Integral):
         return int(random_state) % 2**63
-    raise OrbiflowError(
-        "random_state must be None, an integer, a NumPy RandomState or Generator, got "
-        f"{random_state!r}"
-    )
+    wanted = "None, an integer, or a NumPy RandomState or Generator"
+    raise refusal("random_state", wanted, random_state)
 
 
 def _signature() -> inspect.Signature:
@@ -112,7 +66,7 @@ def _signature() -> inspect.Signature:
     )
 
 
-class DensityEstimator(Parameters):
+class DensityEstimator:
     """Exact, normalised density of angles, directions, axes or Klein-bottle coordinates.
 
     Follows scikit-learn's conventions: works in a `GridSearchCV` and a `Pipeline`.
@@ -344,10 +298,48 @@ class DensityEstimator(Parameters):
             OrbiflowError: before `fit`, for fewer than one sample, or another random state.
         """
         density = self._fitted()
-        if not isinstance(n_samples, numbers.Integral) or n_samples < 1:
-            raise OrbiflowError(f"n_samples must be an integer of at least 1, got {n_samples!r}")
+        count = as_whole(n_samples, "n_samples", 1)
         generator = torch.Generator().manual_seed(seed_of(random_state))
-        return self.space_.from_chart(density.sample((int(n_samples),), generator))
+        return self.space_.from_chart(density.sample((count,), generator))
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """The constructor's arguments, by name."""
+        del deep
+        return {name: getattr(self, name) for name in self._names()}
+
+    def set_params(self, **params: Any) -> Self:
+        """Change constructor arguments."""
+        for name, value in params.items():
+            if name not in self._names():
+                raise OrbiflowError(f"no parameter {name!r}; there are {', '.join(self._names())}")
+            setattr(self, name, value)
+        return self
+
+    def __sklearn_tags__(self) -> Any:
+        # asked for by scikit-learn alone, which is therefore there
+        from sklearn.utils import Tags, TargetTags  # pyright: ignore[reportMissingImports, reportMissingTypeStubs]
+
+        return Tags(
+            estimator_type="density_estimator",
+            target_tags=TargetTags(required=False),
+            transformer_tags=None,
+            regressor_tags=None,
+            classifier_tags=None,
+        )
+
+    def __repr__(self) -> str:
+        shown = [f"{name}={value!r}" for name, value in self._changed(self._names()).items()]
+        return f"{type(self).__name__}({', '.join(shown)})"
+
+    @classmethod
+    def _names(cls) -> list[str]:
+        return list(inspect.signature(cls).parameters)
+
+    def _changed(self, names: Iterable[str]) -> dict[str, Any]:
+        """Parameters that are not at their defaults."""
+        defaults = inspect.signature(type(self)).parameters
+        given = {name: getattr(self, name) for name in names}
+        return {name: v for name, v in given.items() if v != defaults[name].default}
 
     def _space_for(self, data: np.ndarray) -> Space:
         if isinstance(self.space, Space):

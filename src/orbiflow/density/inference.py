@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_tensor, is_a
+from orbiflow.arguments import as_instance, as_number, as_tensor, as_whole, is_a
 from orbiflow.density.models import AdaptiveKernels, Density, Mixture, Split, mixture_of
 from orbiflow.density.spaces import CHART, Space, Torus
 from orbiflow.errors import OrbiflowError
@@ -94,11 +93,11 @@ def _restricted(density: Density, split: Split, torus: Torus) -> Mixture:
     closed, left = density.restricted(split, space)
     error = 0.0
     if left:
-        table, off = _tabulated(left, split, space)
+        kernels, log_total, off = _tabulated(left, split, space)
         sums = torch.tensor([log for log, _ in closed], dtype=torch.float64).logsumexp(0).item()
-        weight = 1 / (1 + math.exp(sums - table.log_total))
-        error = math.sqrt(weight) * max(table.error, off)
-        closed.append((table.log_total, table.kernels))
+        weight = 1 / (1 + math.exp(sums - log_total))
+        error = math.sqrt(weight) * off
+        closed.append((log_total, kernels))
     # kernels first, where they are: the order of components is that of the draws of samples
     closed.sort(key=lambda part: part[1].kernel_part is None)
     logs = torch.tensor([log for log, _ in closed], dtype=torch.float64)
@@ -116,8 +115,14 @@ def _restricted(density: Density, split: Split, torus: Torus) -> Mixture:
 
 def _tabulated(
     left: list[tuple[float, Density]], split: Split, space: Torus
-) -> tuple[Table, float]:
-    """Return densities without a closed form as one table, and the error of its values in nats."""
+) -> tuple[AdaptiveKernels, float, float]:
+    """Return kernels on an even grid instead of densities without a closed form.
+
+    Also the logarithm of the densities' integral, and the error of the kernels in nats. Von Mises
+    kernels whose deviation is one step interpolate what is smooth over a few steps nearly to rounding:
+    their weights are one deconvolution by Fourier transform. The grid is refined until random points
+    agree as well.
+    """
     if space.dim > MOST_TABULATED:
         kinds = " and ".join(sorted({own.article or own.kind for _, own in left}))
         raise OrbiflowError(
@@ -132,10 +137,14 @@ def _tabulated(
         return torch.stack(logs).logsumexp(dim=0)
 
     costly = any(own.is_costly(split) for _, own in left)
-    table = tabulated(log_function, space, COSTLY_GRID[space.dim] if costly else None)
-    drawn = table.kernels.sample(CHECKED_TWICE, torch.Generator().manual_seed(1))
+    count, most = FIRST_GRID[space.dim], (COSTLY_GRID if costly else FINEST_GRID)[space.dim]
+    kernels, log_total, error = _on_grid(log_function, space, count)
+    while not error < ENOUGH and 2 * count <= most:
+        count *= 2
+        kernels, log_total, error = _on_grid(log_function, space, count)
+    drawn = kernels.sample(CHECKED_TWICE, torch.Generator().manual_seed(1))
     twice = log_function(drawn) - log_function(drawn, seed=1)  # where nodes are quasi-random
-    return table, float(twice.square().mean().sqrt())
+    return kernels, log_total, max(error, float(twice.square().mean().sqrt()))
 
 
 @one_thread()
@@ -196,34 +205,9 @@ DROPPED = 1e-8
 """The weight that the lightest kernels may have together, to be left out."""
 
 
-@dataclass(frozen=True)
-class Table:
-    """Normalised kernels, the log of the tabulated function's integral, and the error in nats."""
-
-    kernels: AdaptiveKernels
-    log_total: float
-    error: float
-
-
-def tabulated(
-    log_function: Callable[[Tensor], Tensor], space: Torus, most: int | None = None
-) -> Table:
-    """Return kernels on an even grid that take a function's values there, of one or two angles.
-
-    Von Mises kernels whose deviation is one step interpolate what is smooth over a few steps nearly to
-    rounding: their weights are one deconvolution by Fourier transform. The grid is refined until
-    random points agree as well. The function is positive, given by its logarithm at points (N, r) of
-    r = 1 or 2 angles, and of any integral; the grid has at most `most` points along an angle.
-    """
-    count, most = FIRST_GRID[space.dim], most or FINEST_GRID[space.dim]
-    while True:
-        found = _on_grid(log_function, space, count)
-        if found.error < ENOUGH or 2 * count > most:
-            return found
-        count *= 2
-
-
-def _on_grid(log_function: Callable[[Tensor], Tensor], space: Torus, count: int) -> Table:
+def _on_grid(
+    log_function: Callable[[Tensor], Tensor], space: Torus, count: int
+) -> tuple[AdaptiveKernels, float, float]:
     line = torch.arange(count, dtype=torch.float64) / count
     grid = torch.cartesian_prod(*[line] * space.dim).reshape(-1, space.dim)
     logs = log_function(grid)
@@ -253,7 +237,7 @@ def _on_grid(log_function: Callable[[Tensor], Tensor], space: Torus, count: int)
     generator = torch.Generator().manual_seed(0)
     drawn = kernels.sample(CHECKED, generator)
     off = kernels.log_prob(drawn) + log_total - log_function(drawn)
-    return Table(kernels, log_total, float(off.square().mean().sqrt()))
+    return kernels, log_total, float(off.square().mean().sqrt())
 
 
 def check_torus(space: Space, what: str) -> Torus:
@@ -272,9 +256,9 @@ def check_torus(space: Space, what: str) -> Torus:
 
 def kept_axes(axes: Iterable[int] | int, dim: int) -> tuple[int, ...]:
     """Return the numbers of the angles to keep, 0 to dim - 1, each once."""
-    listed: Any = [axes] if isinstance(axes, numbers.Integral) else axes
+    given: Any = [axes] if isinstance(axes, numbers.Integral) else axes
     try:
-        found = tuple(_axis(axis, dim) for axis in listed)
+        found = tuple(as_whole(axis, "axes", 0, dim - 1) for axis in given)
     except TypeError:
         raise OrbiflowError(f"axes must be numbers of angles, got {axes!r}") from None
     if not found or len(set(found)) < len(found):
@@ -286,25 +270,10 @@ def given_axes(given: Mapping[int, float], dim: int) -> tuple[tuple[int, ...], t
     """Return the numbers of the angles that are known, and their values."""
     if not is_a(given, Mapping) or not given:
         raise OrbiflowError(f"given must hold known angles, such as {{1: 0.25}}, got {given!r}")
-    axes = tuple(_axis(axis, dim) for axis in given)
+    axes = tuple(as_whole(axis, "axes", 0, dim - 1) for axis in given)
     if len(axes) == dim:
         raise OrbiflowError(f"all {dim} angles are given: nothing is left to have a density")
-    pairs = zip(axes, given.values(), strict=True)
-    return axes, tuple(_known(value, f"angle {axis}") for axis, value in pairs)
-
-
-def _known(value: Any, name: str) -> float:
-    real = not isinstance(value, bool) and isinstance(value, numbers.Real)
-    if not real or not math.isfinite(float(value)):
-        raise OrbiflowError(f"{name} must be given as a finite number, got {value!r}")
-    return float(value)
-
-
-def _axis(axis: Any, dim: int) -> int:
-    whole = not isinstance(axis, bool) and isinstance(axis, numbers.Integral)
-    if not whole or not 0 <= int(axis) < dim:
-        raise OrbiflowError(f"axes are numbers of angles from 0 to {dim - 1}, got {axis!r}")
-    return int(axis)
+    return axes, tuple(as_number(value, f"angle {axis}") for axis, value in given.items())
 
 
 def axes_named(wanted: Sequence[str | int], names: Sequence[str]) -> list[int]:
@@ -316,10 +285,10 @@ def axes_named(wanted: Sequence[str | int], names: Sequence[str]) -> list[int]:
     >>> axes_named(["psi", 0], ["phi", "psi"])
     [1, 0]
     """
-    return [_named_axis(one, list(names)) for one in wanted]
+    return [_named_axis(one, names) for one in wanted]
 
 
-def _named_axis(wanted: Any, names: list[str]) -> int:
+def _named_axis(wanted: Any, names: Sequence[str]) -> int:
     if not isinstance(wanted, bool) and isinstance(wanted, numbers.Integral):
         return int(wanted)
     hits = [i for i, name in enumerate(names) if name == wanted]
@@ -345,10 +314,10 @@ def given_named(
     torus = check_torus(space, "conditional densities")
     found: dict[int, float] = {}
     for key, value in given:
-        axis = _named_axis(key, list(names))
+        axis = _named_axis(key, names)
         if axis in found:
             raise OrbiflowError(f"{names[axis]!r} is given twice")
-        found[axis] = _known(value, repr(names[axis])) / torus.period
+        found[axis] = as_number(value, repr(names[axis])) / torus.period
     return found
 
 

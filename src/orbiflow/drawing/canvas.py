@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orbiflow.arrays import Array, Window
-from orbiflow.errors import OrbiflowError
+from orbiflow.drawing.sheet import Sheet
 from orbiflow.symmetry import CrystallographicGroup, reduced_basis, symmetry_elements
 
 if TYPE_CHECKING:
@@ -17,28 +17,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DPI = 200
-MAX_PIXELS = 20_000
-"""Largest width or height of a picture in pixels."""
-
-
-def check_size(width_px: int, height_px: int) -> None:
-    """Check that a picture can have this size."""
-    if not (16 <= width_px <= MAX_PIXELS and 16 <= height_px <= MAX_PIXELS):
-        raise OrbiflowError(
-            f"a picture of {width_px} by {height_px} pixels cannot be made: sides go from 16 to "
-            f"{MAX_PIXELS}; change the width or the window"
-        )
 
 
 def blank_figure(width_px: int, height_px: int) -> Figure:
     """Return an empty figure of this size in pixels."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    check_size(width_px, height_px)
-    figure = Figure(figsize=(width_px / DPI, height_px / DPI), dpi=DPI, facecolor="#ffffff")
-    FigureCanvasAgg(figure)
-    return figure
+    return Sheet.screen(width_px).figure(height_px / DPI)
 
 
 def plane_axes(

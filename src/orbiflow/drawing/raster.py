@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from orbiflow.arrays import Array, Window
-from orbiflow.drawing.canvas import check_size
-from orbiflow.drawing.sheet import Picture, Sheet
+from orbiflow.drawing.sheet import Picture, Sheet, check_size
 
 if TYPE_CHECKING:
     from matplotlib.path import Path

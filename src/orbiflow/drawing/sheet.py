@@ -34,6 +34,18 @@ _FULL = 8.0
 
 _LOCK = Lock()
 
+MAX_PIXELS = 20_000
+"""Largest width or height of a picture in pixels."""
+
+
+def check_size(width_px: int, height_px: int) -> None:
+    """Check that a picture can have this size."""
+    if not (16 <= width_px <= MAX_PIXELS and 16 <= height_px <= MAX_PIXELS):
+        raise OrbiflowError(
+            f"a picture of {width_px} by {height_px} pixels cannot be made: sides go from 16 to "
+            f"{MAX_PIXELS}; change the width or the window"
+        )
+
 
 @dataclass(frozen=True)
 class Sheet:
@@ -108,8 +120,6 @@ class Sheet:
         """
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
-
-        from orbiflow.drawing.canvas import check_size
 
         if self.format == "png":
             check_size(round(self.width * self.dpi), round(height * self.dpi))

@@ -1,6 +1,5 @@
 """Flows on disk: safetensors, never pickle."""
 
-import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, cast
@@ -8,8 +7,7 @@ from typing import Any, cast
 import torch
 from torch import Tensor, nn
 
-from orbiflow.arguments import instance, number, whole
-from orbiflow.arguments import path as as_path
+from orbiflow.arguments import as_instance, as_number, as_path, as_whole
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.fields import FourierField, InvariantField, PeriodicFeatures, SplineField, Symmetrized
 from orbiflow.flows.flow import Flow
@@ -109,20 +107,20 @@ class Reader:
         raise OrbiflowError(f"a field of kind {kind!r}")
 
     def _group(self, header: Mapping[str, Any]) -> CrystallographicGroup:
-        return self.groups[whole(header["group"], "group", 0, len(self.groups) - 1)]
+        return self.groups[as_whole(header["group"], "group", 0, len(self.groups) - 1)]
 
     def _series(self, header: Mapping[str, Any], place: str) -> InvariantField:
         group = self._group(header)
-        frequency = whole(header["max_frequency"], "max_frequency", 0, MAX_FREQUENCY)
-        count = whole(header["parameters"], "parameters", 0)
-        batch = None if header["batch"] is None else whole(header["batch"], "batch", 0)
+        frequency = as_whole(header["max_frequency"], "max_frequency", 0, MAX_FREQUENCY)
+        count = as_whole(header["parameters"], "parameters", 0)
+        batch = None if header["batch"] is None else as_whole(header["batch"], "batch", 0)
         expected = (count,) if batch is None else (batch, count)
         self._check(f"{place}.parameters_", expected)
         # about one coefficient in |G| is free, so the file's size bounds the work of its header
         if (2 * frequency + 1) ** group.dim * group.dim > 4 * group.order * (count + 100):
             raise OrbiflowError(f"max_frequency {frequency} with {count} parameters")
         options: dict[str, Any] = {
-            "smoothness": number(header["smoothness"], "smoothness", -1e6, 1e6),
+            "smoothness": as_number(header["smoothness"], "smoothness", -1e6, 1e6),
             "dtype": DTYPES[header["dtype"]],
         }
         if batch is not None:
@@ -131,8 +129,8 @@ class Reader:
 
     def _perceptron(self, header: Mapping[str, Any], place: str) -> nn.Sequential:
         group = self._group(header)
-        frequency = whole(header["max_frequency"], "max_frequency", 1, MAX_FREQUENCY)
-        sizes = [whole(size, "sizes", 1, 2**20) for size in header["sizes"]]
+        frequency = as_whole(header["max_frequency"], "max_frequency", 1, MAX_FREQUENCY)
+        sizes = [as_whole(size, "sizes", 1, 2**20) for size in header["sizes"]]
         if not 1 <= len(sizes) <= MAX_LAYERS:
             raise OrbiflowError(f"a perceptron of {len(sizes)} layers")
         d = group.dim
@@ -209,7 +207,7 @@ def save_flow(flow: Flow, path: str | Path) -> Path:
         OutputError: if the file cannot be written.
     """
     path = as_path(path, "the flow's file")
-    instance(flow, Flow, "the flow")
+    as_instance(flow, Flow, "the flow")
     if type(flow) is not Flow:
         raise OrbiflowError(
             f"the flow is a {type(flow).__name__}; where that adds nothing to the map, save "
@@ -277,14 +275,14 @@ def _restored(
     fields: list[Any] = []
     for index, part in enumerate(segments):
         if part["kind"] == "same":
-            fields.append(fields[whole(part["segment"], "segment", 0, index - 1)])
+            fields.append(fields[as_whole(part["segment"], "segment", 0, index - 1)])
         else:
             fields.append(reader.field(part, f"segments.{index}"))
     flow = Flow(
         fields,
-        steps=whole(header["steps"], "steps", 1, MAX_STEPS),
+        steps=as_whole(header["steps"], "steps", 1, MAX_STEPS),
         method=str(header["method"]),
-        duration=number(header["duration"], "duration", -math.inf),
+        duration=as_number(header["duration"], "duration"),
         warn=bool(header["warn"]),
     )
     _fill(flow, tensors)

@@ -1,5 +1,4 @@
 from .call_process import CallProcess as CallProcess
-from .call_process import start as start
 from .events import Cancel as Cancel
 from .events import Cancelled as Cancelled
 from .events import ClassFailed as ClassFailed
@@ -33,7 +32,6 @@ from .operations import Call as Call
 from .operations import Operation as Operation
 from .operations import Outcome as Outcome
 from .operations import Sink as Sink
-from .operations import all_operations as all_operations
 from .operations import call_from_json as call_from_json
 from .operations import find as find
 from .operations import ignore as ignore

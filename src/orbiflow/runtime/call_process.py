@@ -26,20 +26,14 @@ from orbiflow.runtime.operations import Call, call_from_json
 from orbiflow.runtime.threads import one_thread_environment
 
 
-def start(call: Call) -> CallProcess:
-    """Run a call in a fresh process; may be called from any thread.
+class CallProcess:
+    """A call that runs in a fresh process from the start; any thread may make it.
 
     The process shares nothing with this one but a pipe, so neither can harm the other: if it dies, that
     is a `Failed` event; if this process dies, it stops as if cancelled.
-    """
-    return CallProcess(call)
 
-
-class CallProcess:
-    """A call that runs in a process of its own; made by `start`.
-
-    >>> from orbiflow.runtime import find, start
-    >>> process = start(find("escherize").call({"image": "no such.png"}))
+    >>> from orbiflow.runtime import CallProcess, find
+    >>> process = CallProcess(find("escherize").call({"image": "no such.png"}))
     >>> list(process.events())[-1].failure
     'mistake'
     >>> process.wait()

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 import typing
 from contextlib import suppress
 from dataclasses import dataclass
@@ -29,7 +30,11 @@ from orbiflow.settings import Field, check_names
 class Event:
     """Base of all events."""
 
-    KIND: ClassVar[str]
+    kind: ClassVar[str]
+    """The name of the class in JSON, such as "tile-found"."""
+
+    def __init_subclass__(cls) -> None:
+        cls.kind = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", cls.__name__).lower()
 
     def to_json(self) -> dict[str, Any]:
         """Return the event as JSON has it; `event_from_json` restores an equal one."""
@@ -37,14 +42,12 @@ class Event:
             name: str(value) if isinstance(value, Path) else value
             for name, value in vars(self).items()
         }
-        return {"kind": self.KIND, **values}
+        return {"kind": self.kind, **values}
 
 
 @dataclass(frozen=True)
 class Started(Event):
     """An operation of this name has begun."""
-
-    KIND = "started"
 
     operation: str
 
@@ -55,8 +58,6 @@ class Note(Event):
 
     - `warning`: Whether it is something that went wrong, rather than what was done.
     """
-
-    KIND = "note"
 
     text: str
     warning: bool = False
@@ -69,8 +70,6 @@ class Table(Event):
     - `columns`: The headings.
     - `rows`: The cells of each row.
     """
-
-    KIND = "table"
 
     title: str
     columns: tuple[str, ...]
@@ -89,8 +88,6 @@ class Progress(Event):
       is not known.
     """
 
-    KIND = "progress"
-
     share: float
     what: str
     class_name: str | None = None
@@ -102,8 +99,6 @@ class Progress(Event):
 class Preview(Event):
     """A first certified tile, `seconds` after the start; the search is going to improve on it."""
 
-    KIND = "preview"
-
     class_name: str
     iou: float
     seconds: float
@@ -112,8 +107,6 @@ class Preview(Event):
 @dataclass(frozen=True)
 class TileFound(Event):
     """The best tile of a class."""
-
-    KIND = "tile-found"
 
     class_name: str
     iou: float
@@ -124,8 +117,6 @@ class TileFound(Event):
 @dataclass(frozen=True)
 class ClassFailed(Event):
     """A class that gave no tile, or was interrupted."""
-
-    KIND = "class-failed"
 
     class_name: str
     reason: str
@@ -139,8 +130,6 @@ class ItemDone(Event):
     - `what`: Its result, or why it has none, in words.
     """
 
-    KIND = "item-done"
-
     name: str
     state: Literal["done", "nothing found", "failed"]
     what: str
@@ -149,8 +138,6 @@ class ItemDone(Event):
 @dataclass(frozen=True)
 class Written(Event):
     """A file is complete and has its final name."""
-
-    KIND = "written"
 
     path: Path
 
@@ -165,8 +152,6 @@ class Finished(Event):
     - `state`: "cancelled" if it was told to stop; what was found by then is written.
     - `summary`: What was done, as JSON has it; each operation has its own.
     """
-
-    KIND = "finished"
 
     state: State
     summary: dict[str, Any]
@@ -185,13 +170,11 @@ class Failed(Event):
       process that ended without a word.
     """
 
-    KIND = "failed"
-
     message: str
     failure: Literal["mistake", "error", "died"]
 
 
-EVENTS: dict[str, type[Event]] = {event.KIND: event for event in Event.__subclasses__()}
+EVENTS: dict[str, type[Event]] = {event.kind: event for event in Event.__subclasses__()}
 
 
 def event_from_json(document: object) -> Event:

@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path, PurePosixPath
 from typing import Any, TypeGuard
 
-from orbiflow.errors import OutputError
+from orbiflow.errors import OutputError, system_errors
 
 
 def write_atomic(path: str | os.PathLike[str], content: bytes | str) -> Path:
@@ -26,38 +26,38 @@ def write_atomic(path: str | os.PathLike[str], content: bytes | str) -> Path:
     """
     target = Path(path)
     data = content.encode() if isinstance(content, str) else content
-    if not target.parent.is_dir():
-        raise OutputError(
-            f"cannot write {target}: there is no folder {target.parent}; create it first"
-        )
-    if target.exists() and not target.is_file():
-        raise OutputError(f"cannot write {target}: it is not a file; choose another name")
+    _check_replaceable(target)
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
-    try:
-        with temporary.open("xb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(target)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise OutputError(
-            f"cannot write {target}: {error.strerror or error}; choose another place or free the one"
-        ) from error
+    with system_errors(
+        OutputError, f"cannot write {target}", "choose another place or free the one"
+    ):
+        try:
+            with temporary.open("xb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(target)
+        except OSError:
+            temporary.unlink(missing_ok=True)
+            raise
     return target
+
+
+def _check_replaceable(path: Path) -> None:
+    """Check that there is a folder for a file, and nothing else under its name."""
+    if path.exists() and not path.is_file():
+        raise OutputError(f"cannot write {path}: it is not a file; choose another name")
+    if not path.parent.is_dir():
+        raise OutputError(f"cannot write {path}: there is no folder {path.parent}; create it first")
 
 
 def make_folder(path: Path) -> Path:
     """Create a folder (and its parents) that can be written to, or raise an `OutputError`."""
-    try:
+    with system_errors(OutputError, f"cannot write into {path}", "choose another --out"):
         path.mkdir(parents=True, exist_ok=True)
         probe = path / ".orbiflow-write-test"
         probe.touch()
         probe.unlink()
-    except OSError as error:
-        raise OutputError(
-            f"cannot write into {path}: {error.strerror or error}; choose another --out"
-        ) from error
     return path
 
 
@@ -67,13 +67,9 @@ def write_set(
     """Write files that belong together, and remove those of `names` that are not among them."""
     for name in names:
         if name not in contents:
-            try:
+            what = f"cannot remove {folder / name}"
+            with system_errors(OutputError, what, "it belongs to an earlier run"):
                 (folder / name).unlink(missing_ok=True)
-            except OSError as error:
-                raise OutputError(
-                    f"cannot remove {folder / name}: {error.strerror or error}; it belongs to an "
-                    "earlier run"
-                ) from error
     return [write_atomic(folder / name, content) for name, content in contents.items()]
 
 
@@ -258,10 +254,7 @@ def check_output_file(out: Path, *reads: Path | None) -> None:
     """
     if out.is_dir():
         raise OutputError(f"cannot write {out}: it is a folder; give a file's name in it")
-    if out.exists() and not out.is_file():
-        raise OutputError(f"cannot write {out}: it is not a file; choose another name")
-    if not out.parent.is_dir():
-        raise OutputError(f"cannot write {out}: there is no folder {out.parent}; create it first")
+    _check_replaceable(out)
     check_inputs_kept(out, *reads)
     check_outside_runs(out, *reads)
 

@@ -315,13 +315,6 @@ def find(name: str) -> Operation:
     return getattr(import_module(module), function).operation
 
 
-def all_operations() -> tuple[Operation, ...]:
-    """Return all operations of `orbiflow.operations`."""
-    from orbiflow.operations import OPERATIONS
-
-    return tuple(map(find, OPERATIONS))
-
-
 def call_from_json(document: object) -> Call:
     """Return the call that a JSON object of `Call.to_json` describes.
 

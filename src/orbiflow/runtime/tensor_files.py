@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from safetensors import SafetensorError
 
-from orbiflow.arguments import path as as_path
+from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.errors import InputFileError, OrbiflowError, system_errors
 from orbiflow.runtime.files import is_object
 
 if TYPE_CHECKING:
@@ -68,15 +68,13 @@ def _read(
     load: Callable[[bytes], dict[str, Values]],
 ) -> tuple[dict[str, Any], dict[str, Values]]:
     path = as_path(path, "the file")
-    try:
+    with system_errors(InputFileError, f"cannot read {path}"):
         size = path.stat().st_size
         if size > max_bytes:
             raise InputFileError(
                 f"{path}: {size:,} bytes, too large for {what}: at most {max_bytes:,}"
             )
         data = path.read_bytes()
-    except OSError as error:
-        raise InputFileError(f"cannot read {path}: {error.strerror or error}") from error
     try:
         return _header(data, key), load(data)
     except (SafetensorError, ValueError, KeyError, TypeError, RecursionError) as error:

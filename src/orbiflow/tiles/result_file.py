@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.arguments import path as as_path
+from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import ResultFolder, is_list, is_object, make_folder, write_atomic

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
-from orbiflow.arguments import instance
+from orbiflow.arguments import as_instance
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
 from orbiflow.tiles.likeness import (
     Fidelity,
@@ -119,7 +119,7 @@ class EscherTile:
             return source
         if isinstance(source, str | Path):
             return cls.load(source)
-        return cls(instance(source, Tile, "the tile", "EscherTile.load(folder) gives one"))
+        return cls(as_instance(source, Tile, "the tile", "EscherTile.load(folder) gives one"))
 
     @staticmethod
     def load(path: str | Path, which: str | int = 1) -> EscherTile:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.arguments import path as as_path
+from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import read_arrays

@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given, settings
 
 from awkward import NOT_SIMPLE, STRANGE
-from orbiflow.arguments import numbers
+from orbiflow.arguments import as_array
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import orient, resampled, signed_area
@@ -85,7 +85,7 @@ def test_finer_inside_where_asked(ring: Array) -> None:
 
 @pytest.mark.parametrize("name", sorted(STRANGE))
 def test_strange_polygons(name: str) -> None:
-    ring = unit(orient(numbers(STRANGE[name], "the ring", ("N", 2))))
+    ring = unit(orient(as_array(STRANGE[name], "the ring", ("N", 2))))
     assert_fills(triangulate(ring), ring)
 
 

@@ -173,9 +173,11 @@ def _rows(
         return weighed(own, weights, labels), settings, []
     own, known = observed_points(space, points)
     labels = None if groups is None else torch.as_tensor(group_numbers(groups, len(known)))[known]
-    rows = weighed(own, None if weights is None else weights_of(weights, known), labels)
+    given = None if weights is None else weights_of(weights, len(known))[known]
+    rows = weighed(own, given, labels)
+    notes = missing_notes(rows, int((~known).sum()))
     if not bool(rows.points.isnan().any()):
-        return rows, settings, missing_notes(rows, int((~known).sum()))
+        return rows, settings, notes
     chosen = tuple(part for part in settings.allowed if part in MARGINAL_PARTS)
     if not chosen or (settings.allowed != COMPONENTS and chosen != settings.allowed):
         raise OrbiflowError(
@@ -183,11 +185,8 @@ def _rows(
             "be fitted to rows that lack angles: choose among kernels and mixture, or leave out those "
             "rows"
         )
-    return (
-        rows,
-        settings.replace(components=chosen, max_frequency=None, segments=None),
-        missing_notes(rows, int((~known).sum())),
-    )
+    settings = settings.replace(components=chosen, max_frequency=None, segments=None)
+    return rows, settings, notes
 
 
 def _families(
@@ -239,12 +238,11 @@ def _wants_flow(space: Space, folds: Folds, settings: DensitySettings) -> bool:
 def _untried_note(space: Space, folds: Folds, settings: DensitySettings) -> list[str]:
     """What to say where a flow was meant, and not only one of all parts, and none was tried."""
     meant = "flow" in settings.allowed and (settings.of_flow or settings.allowed != COMPONENTS)
-    if not meant or _wants_flow(space, folds, settings):
-        return []
-    return [
+    note = (
         f"no flow was tried: of fewer than {LEAST_FLOW_ROWS} rows, here {len(folds.rows)}, none has "
         "gained anything"
-    ]
+    )
+    return [note] if meant and not _wants_flow(space, folds, settings) else []
 
 
 def _report(

@@ -97,13 +97,7 @@ class KernelFamily(Family[AdaptiveKernels]):
     def _estimates(self, rows: Rows) -> dict[str, AdaptiveKernels]:
         known = is_whole(rows)
         whole = rows[known]
-        found = kernel_estimates(
-            self.space,
-            whole.points,
-            narrowest=self.narrowest,
-            repeats=self.repeats,
-            row_weights=whole.weights,
-        )
+        found = kernel_estimates(self.space, whole, narrowest=self.narrowest, repeats=self.repeats)
         if len(whole) == len(rows):
             return found
         total = float(len(whole)) if whole.weights is None else float(whole.weights.sum())
@@ -146,12 +140,7 @@ class MixtureFamily(SizedFamily[AdaptiveKernels]):
         def fit(size: int) -> AdaptiveKernels:
             say(f"mixture of {size}")
             return fit_mixture(
-                self.space,
-                train.points,
-                size,
-                narrowest=self.narrowest,
-                generator=generator,
-                row_weights=train.weights,
+                self.space, train, size, narrowest=self.narrowest, generator=generator
             )
 
         if self.sizes is None:

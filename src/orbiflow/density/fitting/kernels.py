@@ -15,7 +15,7 @@ from orbiflow.arguments import as_instance, as_points
 from orbiflow.density.fitting.chains import PRIOR, PRIOR_RESULTANT, concentration, far_apart
 from orbiflow.density.fitting.folds import places
 from orbiflow.density.fitting.likelihood import training
-from orbiflow.density.fitting.rows import mean_of
+from orbiflow.density.fitting.rows import Rows, is_whole, mean_of
 from orbiflow.density.models import (
     FAINT,
     AdaptiveKernels,
@@ -152,22 +152,16 @@ LADDER = 27
 
 
 def kernel_estimates(
-    space: Space,
-    train: Tensor,
-    *,
-    narrowest: float = NARROWEST,
-    repeats: bool = True,
-    row_weights: Tensor | None = None,
+    space: Space, rows: Rows, *, narrowest: float = NARROWEST, repeats: bool = True
 ) -> dict[str, AdaptiveKernels]:
-    """Return estimates about training points (N, d) in random order, by their names.
+    """Return estimates about training rows in random order, by their names.
 
     "width ..." have one concentration, in a ladder; "near ..." a share of the mean square distance to
     the nearest neighbours, on tori axis by axis (Breiman, Meisel, Purcell, 1977); "repeated" are the
     narrowest kernels, about the places of several points alone, if `repeats` are real.
     """
-    train = train[:MOST_CENTERS]
-    own = None if row_weights is None else row_weights[:MOST_CENTERS]
-    own = None if own is None else own / own.sum()
+    rows = rows[:MOST_CENTERS]
+    train, own = rows.points, None if rows.weights is None else rows.weights / rows.weights.sum()
     found: dict[str, AdaptiveKernels] = {}
     for kappa in np.geomspace(WIDEST, narrowest, LADDER):
         found[f"width {kappa**-0.5:.2g}"] = even_kernels(space, train, float(kappa), own)
@@ -207,13 +201,12 @@ BLOCK = 4_096
 @torch.no_grad()
 def fit_mixture(
     space: Space,
-    train: Tensor,
+    train: Rows,
     components: int,
     *,
     iterations: int = 60,
     narrowest: float = NARROWEST,
     generator: torch.Generator,
-    row_weights: Tensor | None = None,
 ) -> AdaptiveKernels:
     """Fit a mixture of few components with places, widths and weights of their own.
 
@@ -222,29 +215,26 @@ def fit_mixture(
     using von Mises-Fisher distributions, 2005), summed over the group. A few prior points hold each
     concentration finite.
 
-    Of the canonical points (N, d), as many rows as components are whole. On tori, others may lack
+    Of the rows, as many as components are whole. On tori, others may lack
     angles (NaN) and count by their marginal likelihood (Ghahramani and Jordan, Supervised learning
-    from incomplete data via an EM approach, 1994). `row_weights` (N,) have the mean 1.
+    from incomplete data via an EM approach, 1994). Weights have the mean 1.
     """
-    absent = train.isnan()
-    whole = ~absent.any(dim=1)
-    images = space.features(train.nan_to_num(0.0))
+    points, row_weights, whole = train.points, train.weights, is_whole(train)
+    absent = points.isnan()
+    images = space.features(points.nan_to_num(0.0))
     if not bool(whole.all()):
         images = images * ~torch.cat([absent, absent], dim=1)
     blocks = torch.split(images, BLOCK, dim=1)
     owns = [None] * len(blocks) if row_weights is None else torch.split(row_weights, BLOCK)
     gaps = [None] * len(blocks) if bool(whole.all()) else torch.split(absent.to(images), BLOCK)
-    start = None if row_weights is None else row_weights[whole]
-    mean = _spread_out(images[:, whole], components, generator, start)
+    every = list(zip(blocks, owns, gaps, strict=True))
+    mean = _spread_out(images[:, whole], components, generator, train[whole].weights)
     width = 1 if space.is_round else space.dim
     kappa = mean.new_full((components, width), 10.0)
     weights = mean.new_full((components,), 1 / components)
     last = -math.inf
     for _ in range(iterations):
-        found = _expectation(
-            space, list(zip(blocks, owns, gaps, strict=True)), mean, kappa, weights
-        )
-        count, known, total, score = found
+        count, known, total, score = _expectation(space, every, mean, kappa, weights)
         weights = (count + 0.01) / (count + 0.01).sum()
         mean, length = _directions(space, total)
         resultant = (length + PRIOR * PRIOR_RESULTANT) / (known + PRIOR)

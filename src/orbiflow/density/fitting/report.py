@@ -201,19 +201,17 @@ def mass_with(weight: float, mass: float) -> float:
 
 def repeats_note(count: int, duplicates: int) -> list[str]:
     """What to say of `duplicates` among `count` points."""
-    if not duplicates:
-        return []
-    return [
+    note = (
         f"{duplicates} of {count} points repeat another: they count as often as they come, and "
         "equal points were kept on the same side of the validation split"
-    ]
+    )
+    return [note] if duplicates else []
 
 
 def steps_note(steps: int, error: float) -> list[str]:
     """What to say of the error that `settle` left."""
-    if error <= MASS_TOLERANCE:
-        return []
-    return [
+    note = (
         f"the integrator has not converged at {steps} steps a segment: the mean log "
         f"density changes by {error:.1e} when they are doubled"
-    ]
+    )
+    return [note] if error > MASS_TOLERANCE else []

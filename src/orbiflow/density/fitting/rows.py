@@ -10,7 +10,7 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_tensor, described
+from orbiflow.arguments import as_choice, as_instance, as_tensor, described
 from orbiflow.density.inference import at_observed, check_torus, observed_rows
 from orbiflow.density.models import AdaptiveKernels, Density
 from orbiflow.density.spaces import Space, row_count
@@ -63,14 +63,14 @@ def effective_rows(weights: Tensor) -> float:
     return float(weights.sum() ** 2 / weights.square().sum())
 
 
-def weights_of(weights: Any, known: Tensor) -> Tensor:
-    """Return the weights of the rows that are `known` (N,)."""
-    own = as_tensor(weights, "weights")
-    if own.shape != known.shape:
+def weights_of(weights: Any, rows: int) -> Tensor:
+    """Return the weights of so many rows, as they were given."""
+    own = as_tensor(weights, "weights").detach().double().clone()
+    if own.shape != (rows,):
         raise OrbiflowError(
-            f"expected a weight for each of {len(known)} rows, got an array {tuple(own.shape)}"
+            f"expected a weight for each of {rows} rows, got an array {tuple(own.shape)}"
         )
-    return own[known]
+    return own
 
 
 def group_numbers(labels: ArrayLike, rows: int) -> NDArray[np.int64]:
@@ -100,11 +100,7 @@ def weighed(points: Tensor, weights: Any, groups: Tensor | None = None) -> Rows:
     """
     if weights is None:
         return Rows(points, None, groups)
-    own = as_tensor(weights, "weights").detach().double().clone()
-    if own.shape != points.shape[:1]:
-        raise OrbiflowError(
-            f"expected a weight for each of {len(points)} rows, got an array {tuple(own.shape)}"
-        )
+    own = weights_of(weights, len(points))
     bad = torch.nonzero(~(own.isfinite() & (own >= 0)))[:, 0]
     if len(bad):
         raise OrbiflowError(
@@ -146,9 +142,7 @@ BLOCK_ENTRIES = 2_000_000
 
 def check_missing(missing: Any) -> str:
     """Return what is done with rows that lack an angle."""
-    if not isinstance(missing, str) or missing not in MISSING:
-        raise OrbiflowError(f"missing must be one of {', '.join(MISSING)}, got {missing!r}")
-    return missing
+    return as_choice(missing, MISSING, "missing")
 
 
 def observed_points(space: Space, points: Any) -> tuple[Tensor, Tensor]:
@@ -168,20 +162,15 @@ def is_whole(rows: Rows) -> Tensor:
 def missing_notes(rows: Rows, empty: int) -> list[str]:
     """Return what the report says about rows that lack angles, and `empty` ones that were left out."""
     lacking = len(rows) - int(is_whole(rows).sum())
-    notes: list[str] = []
-    if lacking:
-        notes.append(
-            f"{lacking} of {len(rows)} rows lack some angles and count by the density of those that "
-            "they have; kernels are about the whole rows alone; chains, networks and flows were not "
-            "tried, as they need whole rows"
-        )
-    if empty:
-        notes.append(
-            "1 row lacks all angles and was left out"
-            if empty == 1
-            else f"{empty} rows lack all angles and were left out"
-        )
-    return notes
+    some = (
+        f"{lacking} of {len(rows)} rows lack some angles and count by the density of those that "
+        "they have; kernels are about the whole rows alone; chains, networks and flows were not "
+        "tried, as they need whole rows"
+    )
+    were = (
+        "1 row lacks all angles and was" if empty == 1 else f"{empty} rows lack all angles and were"
+    )
+    return [*([some] if lacking else []), *([f"{were} left out"] if empty else [])]
 
 
 def log_prob_of_rows(density: Density, points: Tensor) -> Tensor:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -13,7 +13,6 @@ from torch import Tensor
 from orbiflow.arguments import as_tensor
 from orbiflow.density.models.chain_integrals import SCALES, chains_at, waves
 from orbiflow.density.models.density import Density, Restriction, Split, in_blocks
-from orbiflow.density.models.headers import checked_integer, checked_tensors
 from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
@@ -21,10 +20,6 @@ from orbiflow.typed_torch import special
 
 BLOCK = 256
 """Points at a time: few enough for the cache."""
-
-
-MOST_COMPONENTS = 65536
-"""The most components that a file may hold."""
 
 
 class VonMisesChains(Density, kind="chains"):
@@ -47,6 +42,8 @@ class VonMisesChains(Density, kind="chains"):
         OrbiflowError: for another space, wrong shapes or values that make no distribution.
     """
 
+    stored = ("log_weights", "means", "concentrations", "order")
+
     def __init__(
         self,
         space: Space,
@@ -59,17 +56,14 @@ class VonMisesChains(Density, kind="chains"):
         if not space.is_torus:
             raise OrbiflowError(f"von Mises chains need a torus, got the {space.name}")
         d = space.dim
-        log_weights, means, concentrations = (
-            as_tensor(log_weights, "log_weights"),
-            as_tensor(means, "means"),
-            as_tensor(concentrations, "concentrations"),
-        )
+        given = zip(self.stored, (log_weights, means, concentrations), strict=False)
+        log_weights, means, concentrations = (as_tensor(value, name) for name, value in given)
         count = concentrations.shape[0] if concentrations.dim() == 2 else 0
         if order is None:
             order = torch.arange(d, device=concentrations.device).repeat(count, 1)
-        shapes = _shapes(count, d)
-        given = (log_weights, means, concentrations, order)
-        for tensor, (name, shape) in zip(given, shapes.items(), strict=True):
+        tensors = (log_weights, means, concentrations, order)
+        shapes = ((count, len(SCALES)), (count, d, 1 + 2 * d), (count, d), (count, d))
+        for name, tensor, shape in zip(self.stored, tensors, shapes, strict=True):
             if count < 1 or tuple(tensor.shape) != shape:
                 raise OrbiflowError(f"{name} has shape {tuple(tensor.shape)}, expected {shape}")
         # a weight may be 0, its logarithm -inf
@@ -191,35 +185,6 @@ class VonMisesChains(Density, kind="chains"):
 
     def header(self) -> dict[str, Any]:
         return {"components": len(self.concentrations), "scales": list(SCALES)}
-
-    def tensors(self) -> dict[str, Tensor]:
-        return {
-            "log_weights": self.log_weights,
-            "means": self.means,
-            "concentrations": self.concentrations,
-            "order": self.order.double(),
-        }
-
-    @classmethod
-    def from_header(
-        cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
-    ) -> Self:
-        count, d = checked_integer(header, "components", MOST_COMPONENTS), space.dim
-        if header.get("scales") != list(SCALES):
-            raise OrbiflowError(f"scales {header.get('scales')!r}, expected {list(SCALES)}")
-        # a component of no weight has the logarithm -inf
-        return cls(space, *checked_tensors(tensors, _shapes(count, d), least=-math.inf))
-
-
-def _shapes(count: int, d: int) -> dict[str, tuple[int, ...]]:
-    """Return the shapes of the tensors of so many chains of d angles, by name."""
-    each = (count, d)
-    return {
-        "log_weights": (count, len(SCALES)),
-        "means": (*each, 1 + 2 * d),
-        "concentrations": each,
-        "order": each,
-    }
 
 
 def chained(order: Tensor) -> Tensor:

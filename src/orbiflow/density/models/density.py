@@ -41,8 +41,9 @@ class Density(Distribution):
         class Bump(Density, kind="bump"):
             ...
 
-    Then it can be evaluated, sampled, drawn and blended. With `header`, `tensors` and `from_header`
-    it can be saved; with `log_marginal` and `restricted` it has marginal and conditional densities.
+    Then it can be evaluated, sampled, drawn and blended. With its tensors named in `stored`, or with
+    `header`, `tensors` and `from_header`, it can be saved; with `log_marginal` and `restricted` it has
+    marginal and conditional densities.
 
     Args:
         space: The identification space.
@@ -165,21 +166,30 @@ class Density(Distribution):
 
     # Saving and loading: see orbiflow.density.models.files.
 
+    stored: ClassVar[tuple[str, ...]] = ()
+    """The names of the tensors that make the density again, in the order of the constructor."""
+
     def header(self) -> dict[str, Any]:
         """Return what makes the density again, together with `tensors`; ready for JSON."""
         return {}
 
     def tensors(self) -> dict[str, Tensor]:
-        """Return the density's tensors by name."""
-        return {}
+        """Return the density's tensors by name, in float64."""
+        return {name: getattr(self, name).double() for name in self.stored}
 
     @classmethod
     def from_header(
         cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
     ) -> Self:
         """Make the density that `header` and `tensors` describe."""
-        del header, tensors
-        return cls(space)
+        given = {name: tensors[name] for name in cls.stored if name in tensors}
+        if len(given) < len(cls.stored) or not all(t.is_floating_point() for t in given.values()):
+            raise OrbiflowError(f"tensors are missing or no floats: wanted {', '.join(cls.stored)}")
+        made = cls(space, *given.values())
+        own = made.header()
+        if any(header.get(name) != value for name, value in own.items()):
+            raise OrbiflowError(f"its tensors are those of {own}, its header says otherwise")
+        return made
 
     # What follows is the same for all densities.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, cast
 
@@ -10,6 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.arguments import as_number, as_whole
 from orbiflow.density.models.density import KINDS, Density
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
@@ -59,31 +59,6 @@ def within(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
         for name, tensor in tensors.items()
         if name.startswith(prefix)
     }
-
-
-def checked_tensors(
-    tensors: Mapping[str, Tensor], shapes: Mapping[str, tuple[int, ...]], *, least: float = -1e30
-) -> list[Tensor]:
-    """Return the tensors of these names and shapes, in this order."""
-    found: list[Tensor] = []
-    for name, shape in shapes.items():
-        if name not in tensors:
-            raise OrbiflowError(f"the tensor {name} is missing")
-        value = tensors[name]
-        if tuple(value.shape) != tuple(shape):
-            raise OrbiflowError(f"{name} has shape {tuple(value.shape)}, expected {tuple(shape)}")
-        if not value.is_floating_point() or not bool(((value >= least) & (value < 1e30)).all()):
-            raise OrbiflowError(f"{name} has values that are not finite numbers")
-        found.append(value)
-    return found
-
-
-def checked_integer(header: Mapping[str, Any], name: str, most: int, least: int = 1) -> int:
-    """Return an entry of a header that must be an integer of a range."""
-    value = header.get(name)
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        raise OrbiflowError(f"{name} must be an integer from {least} to {most}, got {value!r}")
-    return value
 
 
 TOLERANCE = 1e-9
@@ -194,9 +169,9 @@ def series_from_header(
         raise ValueError("no segments, or too many")
     return Flow(
         [_field(part, tensors[f"flow.{k}"], space) for k, part in enumerate(segments)],
-        steps=checked_integer(header, "steps", MAX_STEPS, 0),
+        steps=as_whole(header["steps"], "steps", 0, MAX_STEPS),
         method=str(header["method"]),
-        duration=_finite(header["duration"], "duration"),
+        duration=as_number(header["duration"], "duration"),
         warn=False,  # the fit has settled them and said if it could not
     )
 
@@ -213,8 +188,8 @@ def _of_version_1(
 
 
 def _field(header: Mapping[str, Any], row: Tensor, space: Space) -> InvariantField:
-    frequency = checked_integer(header, "max_frequency", MAX_FREQUENCY, 0)
-    smoothness = _finite(header["smoothness"], "smoothness")
+    frequency = as_whole(header["max_frequency"], "max_frequency", 0, MAX_FREQUENCY)
+    smoothness = as_number(header["smoothness"], "smoothness")
     if not bool(torch.isfinite(row).all()):
         raise ValueError("parameters that are not finite")
     field = FIELDS[header["kind"]](space.group, frequency, smoothness=smoothness)
@@ -223,9 +198,3 @@ def _field(header: Mapping[str, Any], row: Tensor, space: Space) -> InvariantFie
     with torch.no_grad():
         field.parameters_.copy_(row)
     return field
-
-
-def _finite(value: Any, name: str) -> float:
-    if not math.isfinite(float(value)):
-        raise ValueError(f"{name} {value!r}")
-    return float(value)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Self, cast
 
 import numpy as np
@@ -13,7 +13,6 @@ from torch import Tensor
 from orbiflow.arguments import as_tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models.density import Density, Restriction, Split
-from orbiflow.density.models.headers import checked_integer, checked_tensors
 from orbiflow.density.models.near_sums import TOLERANCE, near_log_sum
 from orbiflow.density.models.terms import Terms, log_sum_exp, shares_of
 from orbiflow.density.spaces import RoundSpace, Space, Torus, rectangle
@@ -44,15 +43,14 @@ class AdaptiveKernels(Density, kind="kernels"):
         OrbiflowError: for wrong shapes or values.
     """
 
+    stored = ("centers", "concentrations", "weights")
+
     def __init__(
         self, space: Space, centers: Tensor, concentrations: Tensor, weights: Tensor
     ) -> None:
         super().__init__(space)
-        centers, concentrations, weights = (
-            as_tensor(centers, "centers"),
-            as_tensor(concentrations, "concentrations"),
-            as_tensor(weights, "weights"),
-        )
+        given = zip(self.stored, (centers, concentrations, weights), strict=True)
+        centers, concentrations, weights = (as_tensor(value, name) for name, value in given)
         width = 1 if space.is_round else space.dim
         shapes = [tuple(t.shape) for t in (centers, concentrations, weights)]
         count = len(centers) if centers.dim() else 0
@@ -181,25 +179,6 @@ class AdaptiveKernels(Density, kind="kernels"):
                 f"there are {len(self.centers)} kernels: {MOST_KERNELS} at most are saved"
             )
         return {"kernels": len(self.centers)}
-
-    def tensors(self) -> dict[str, Tensor]:
-        return {
-            "centers": self.centers,
-            "concentrations": self.concentrations,
-            "weights": self.weights,
-        }
-
-    @classmethod
-    def from_header(
-        cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
-    ) -> Self:
-        count = checked_integer(header, "kernels", MOST_KERNELS)
-        shapes = {
-            "centers": (count, space.dim),
-            "concentrations": (count, 1 if space.is_round else space.dim),
-            "weights": (count,),
-        }
-        return cls(space, *checked_tensors(tensors, shapes))
 
 
 def _terms(space: Space, images: Tensor, kappa: Tensor, weights: Tensor) -> Terms:

@@ -13,7 +13,7 @@ from torch import Tensor
 from orbiflow.arguments import as_instance, as_tensor
 from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.flow import FlowDensity
-from orbiflow.density.models.headers import checked_tensors, density_from, density_parts, within
+from orbiflow.density.models.headers import density_from, density_parts, within
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
@@ -172,12 +172,11 @@ class Mixture(Density, kind="mixture"):
         headers = header["components"]
         if not is_list(headers) or not 1 <= len(headers) <= MOST_COMPONENTS:
             raise OrbiflowError("no components, or too many")
-        (weights,) = checked_tensors(tensors, {"weights": (len(headers),)})
         components = [
             density_from(space, own, within(tensors, f"{number}."))
             for number, own in enumerate(headers)
         ]
-        return cls(components, weights)
+        return cls(components, tensors["weights"])
 
     def _weighted(self) -> list[tuple[float, Density]]:
         """Return the components, each with the logarithm of its weight."""

@@ -14,7 +14,7 @@ import numpy as np
 from orbiflow.arguments import described
 from orbiflow.arrays import Array
 from orbiflow.density.tables import read_table
-from orbiflow.errors import InputFileError
+from orbiflow.errors import InputFileError, system_errors
 
 MAX_BYTES = 32_000_000
 MAX_POINTS = 1_000_000
@@ -40,7 +40,7 @@ def read_coastlines(path: Path) -> list[Array]:
     Polygons become rings, without edges along longitude 180 or at a pole, where files cut what is
     whole on the globe. In a table, a row whose latitude is beyond 90 ends a line.
     """
-    try:
+    with system_errors(InputFileError, f"cannot read {path}"):
         if path.exists() and not path.is_file():
             raise InputFileError(f"cannot read {path}: it is not a file")
         size = path.stat().st_size
@@ -50,8 +50,6 @@ def read_coastlines(path: Path) -> list[Array]:
             )
         with path.open("rb") as file:
             start = file.read(4096)
-    except OSError as error:
-        raise InputFileError(f"cannot read {path}: {error.strerror or error}") from error
     known = {b"\x00\x00\x27\x0a": "a shapefile", b"PK\x03\x04": "a zip archive"}
     for magic, what in known.items():
         if start.startswith(magic):

@@ -11,7 +11,7 @@ import shapely
 import svgelements
 from shapely.errors import GEOSException
 
-from orbiflow.arguments import path as as_path
+from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.art.raster import Grid, Paint

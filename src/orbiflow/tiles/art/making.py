@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 
 from orbiflow import __version__
-from orbiflow.arguments import path as as_path
+from orbiflow.arguments import as_path
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orbiflow import __version__
-from orbiflow.arguments import path as as_path
+from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError

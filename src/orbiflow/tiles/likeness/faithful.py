@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import numbers
+from orbiflow.arguments import as_array
 from orbiflow.arrays import Array, Complex
 from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
 from orbiflow.tiles.likeness.bending_onto import bent_onto
@@ -194,7 +194,7 @@ class _Overlay(NamedTuple):
 def _ring(points: ArrayLike, what: str) -> Array:
     """Return the ring (n, 2), counter-clockwise about the origin, with area 1."""
     as_region(points, what)
-    ring = orient(numbers(points, what, ("N", 2)), counter_clockwise=True)
+    ring = orient(as_array(points, what, ("N", 2)), counter_clockwise=True)
     return np.ascontiguousarray((ring - centroid(ring)) / np.sqrt(signed_area(ring)))
 
 

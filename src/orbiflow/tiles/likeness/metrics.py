@@ -14,7 +14,7 @@ import shapely
 from numpy.typing import ArrayLike
 from shapely.geometry import MultiPolygon, Polygon, box
 
-from orbiflow.arguments import numbers
+from orbiflow.arguments import as_array
 from orbiflow.arrays import Array, Integers, Window
 from orbiflow.errors import OrbiflowError
 
@@ -231,7 +231,7 @@ def as_region(shape: Shape, name: str) -> Region:
 
 def _ring_polygon(ring: ArrayLike, name: str) -> Polygon:
     try:
-        points = numbers(ring, name, (...,), finite=False)
+        points = as_array(ring, name, (...,), finite=False)
     except OrbiflowError as exc:
         raise OrbiflowError(f"{name}: not a polygon; give an array of shape (N, 2)") from exc
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3:

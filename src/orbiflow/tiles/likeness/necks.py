@@ -19,7 +19,7 @@ import shapely
 from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
-from orbiflow.arguments import number, numbers
+from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import arc_lengths, orient, polygons_in, ring_length
@@ -144,19 +144,19 @@ def hair_share(ring: ArrayLike, width: float) -> float:
     (0.0, 1.0)
     """
     _, polygon = _checked(ring)
-    return _thin_share(polygon, polygon, number(width, "width", 0, above=True))
+    return _thin_share(polygon, polygon, as_number(width, "width", above=0))
 
 
 def slit_share(ring: ArrayLike, width: float) -> float:
     """Return the share of a polygon's outline that bounds gaps thinner than `width`."""
     _, polygon = _checked(ring)
-    width = number(width, "width", 0, above=True)
+    width = as_number(width, "width", above=0)
     around = shapely.box(*polygon.buffer(2 * width).bounds)
     return _thin_share(polygon, around.difference(polygon), width)
 
 
 def _checked(ring: ArrayLike) -> tuple[Array, shapely.Polygon]:
-    points = numbers(ring, "the polygon", ("N", 2))
+    points = as_array(ring, "the polygon", ("N", 2))
     polygon = shapely.Polygon(points) if len(points) > 2 else shapely.Polygon()
     if not polygon.is_valid or not polygon.area > 0:
         raise OrbiflowError("the polygon crosses itself or has no area: give a simple polygon")

@@ -14,7 +14,7 @@ import scipy.optimize
 import shapely
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import number, numbers, whole
+from orbiflow.arguments import as_array, as_number, as_whole
 from orbiflow.arrays import Array, Complex
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
@@ -35,7 +35,7 @@ def prepared_region(ring: Array) -> shapely.Polygon:
     Use it to choose among candidates, as intersections with thousands of vertices take seconds;
     final results are measured with the ring itself.
     """
-    ring = numbers(ring, "the region's ring", ("N", 2))
+    ring = as_array(ring, "the region's ring", ("N", 2))
     if len(ring) < 3:
         raise OrbiflowError(f"the region's ring needs at least 3 vertices, got {len(ring)}")
     region = shapely.Polygon(ring)
@@ -78,7 +78,7 @@ class Overlap:
         >>> value, gradient[:, 0].round(12).tolist()
         (0.25, [-0.25, 0.25, 0.25, -0.25])
         """
-        ring = numbers(ring, "the ring", ("N", 2))
+        ring = as_array(ring, "the ring", ("N", 2))
         try:
             common = float(shapely.Polygon(ring).intersection(self.region).area)
         except (shapely.errors.GEOSException, ValueError) as error:
@@ -189,7 +189,7 @@ def rank_score(iou: float, recognisability: float) -> float:
     True
     """
     for name, value in (("iou", iou), ("recognisability", recognisability)):
-        number(value, name, 0, 1)
+        as_number(value, name, 0, 1)
     return float(iou**IOU_WEIGHT * recognisability ** (1 - IOU_WEIGHT))
 
 
@@ -224,10 +224,10 @@ def diverse(
     >>> diverse([0.9, 0.89, 0.8, 0.81], 3, lambda i, j: 1 - abs(position[i] - position[j]))
     [0, 3, 2]
     """
-    values = numbers(scores, "scores", ("n",))
-    whole(count, "count", 1)
-    number(twin, "twin", 0, 1)
-    number(variety, "variety", 0)
+    values = as_array(scores, "scores", ("n",))
+    as_whole(count, "count", 1)
+    as_number(twin, "twin", 0, 1)
+    as_number(variety, "variety", 0)
     nearest = np.zeros(len(values))
     left = np.ones(len(values), dtype=bool)
     chosen: list[int] = []

@@ -26,7 +26,7 @@ from scipy.linalg import polar
 from scipy.sparse import bmat, coo_array, csc_array
 from scipy.sparse.linalg import spsolve
 
-from orbiflow.arguments import instance
+from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import Isometry, identity
@@ -58,7 +58,7 @@ class OwnFrame:
     @classmethod
     def of(cls, tile: Tile) -> OwnFrame:
         """Of a tile whose class and corners are known, as those of every search are."""
-        instance(tile, Tile, "the tile", "read_result(folder) gives one")
+        as_instance(tile, Tile, "the tile", "read_result(folder) gives one")
         if not tile.isohedral_class:
             raise OrbiflowError("this tile's class is not known, so neither is what it comes from")
         kind = isohedral_class(tile.isohedral_class)

@@ -8,8 +8,7 @@ import json
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from orbiflow.arguments import instance
-from orbiflow.arguments import path as as_path
+from orbiflow.arguments import as_instance, as_path
 from orbiflow.drawing import Picture, Sheet, field_picture
 from orbiflow.runtime import (
     Note,
@@ -213,7 +212,7 @@ def write_run(
     Raises:
         OutputError: If the folder holds what orbiflow did not write, or cannot be written.
     """
-    instance(result, SearchResult, "the result", "escherize(target) gives one")
+    as_instance(result, SearchResult, "the result", "escherize(target) gives one")
     folder, tiles = result_folder(out), result.tiles
     earlier = folder.has_a_run and (folder.path / OVERVIEW).is_file()
     if earlier and all(tile.isohedral_class in result.interrupted for tile in tiles):

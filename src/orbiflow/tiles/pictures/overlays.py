@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import ArrayLike
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.arguments import numbers
+from orbiflow.arguments import as_array
 from orbiflow.arrays import Array
 from orbiflow.drawing import (
     Picture,
@@ -109,7 +109,7 @@ def _swatch(raster: Raster, left: float, right: float, high: float, colour: str)
 
 def _target(target: ArrayLike | BaseGeometry) -> BaseGeometry:
     if not isinstance(target, BaseGeometry):
-        outline = numbers(target, "the target's outline", (...,))
+        outline = as_array(target, "the target's outline", (...,))
         if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
             raise OrbiflowError(f"a target's outline is (M >= 3, 2) numbers, got {outline.shape}")
         target = shapely.Polygon(outline)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from PIL import Image
 
-from orbiflow.arguments import whole
+from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array, Window, checked_window
 from orbiflow.drawing import (
     CENTER_COLOURS,
@@ -182,7 +182,7 @@ def tilings_png(
     Raises:
         OrbiflowError: If there are no tilings, the palette is unknown or the size is impossible.
     """
-    columns = whole(columns, "columns", 1, 100)
+    columns = as_whole(columns, "columns", 1, 100)
     if not tilings:
         raise OrbiflowError("a sheet of tilings needs at least one")
     chosen = palette(palette_name)

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import shapely
 
-from orbiflow.arguments import instance
+from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import one_thread
@@ -122,10 +122,12 @@ def certified_tiles(
         OrbiflowError: for what holds no candidates.
         CertificationError: if none of them is certified and `force` is not set.
     """
-    instance(target, Target, "the target", HOW)
+    as_instance(target, Target, "the target", HOW)
     if not isinstance(found, Fit):
         if not hasattr(found, "finished"):
-            instance(found, Fit, "what was found", "fit_tile gives a Fit, load_model a TileModel")
+            as_instance(
+                found, Fit, "what was found", "fit_tile gives a Fit, load_model a TileModel"
+            )
         found = Fit(found, found.size, 0, found.size)
     with one_thread():
         return best_tiles(target, found, force=force, min_neck=least_neck(target.normal, min_neck))

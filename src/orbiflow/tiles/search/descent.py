@@ -20,7 +20,7 @@ import shapely
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import instance
+from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.fields import FourierField, group_factor, steepness
 from orbiflow.flows import METHODS, Flow
@@ -284,8 +284,8 @@ def fit_descent(
     loss.
     """
     kind = isohedral_class(kind)
-    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
-    settings = instance(settings or OverlapSearch(), OverlapSearch, "settings")
+    as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    settings = as_instance(settings or OverlapSearch(), OverlapSearch, "settings")
     outline = shapely.Polygon(target.normal).exterior
     settings = settings.for_outline(outline.length)
     soft = soft or SoftTarget(target)

@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 
 from orbiflow import __version__
-from orbiflow.arguments import instance
+from orbiflow.arguments import as_instance
 from orbiflow.runtime import Cancel, ClassFailed, Note, Preview, Progress, Sink, TileFound, ignore
 from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
 from orbiflow.tiles.search.certifying import ClassFailure
@@ -88,8 +88,8 @@ def escherize(
         OrbiflowError: For an unknown class, a mask that cannot be read, or workers that die.
     """
     begin = time.perf_counter()
-    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
-    settings = instance(settings or EscherizeSettings(), EscherizeSettings, "settings")
+    as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    settings = as_instance(settings or EscherizeSettings(), EscherizeSettings, "settings")
     if emphasis is None and settings.emphasis is not None:
         strength = {} if settings.strength is None else {"strength": settings.strength}
         emphasis = Emphasis.read(settings.emphasis, target, **strength)

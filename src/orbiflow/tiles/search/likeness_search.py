@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from orbiflow.arguments import number, whole
+from orbiflow.arguments import as_number, as_whole
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.likeness import least_neck
@@ -62,13 +62,13 @@ class LikenessSearch(SearchMethod):
 
     def __post_init__(self) -> None:
         for name in ("placements", "held", "starts", "finalists", "rounds"):
-            whole(getattr(self, name), name, 1)
-        number(self.share, "share", 0, 1, above=True)
-        whole(self.below, "below", 0, 2)
+            as_whole(getattr(self, name), name, 1)
+        as_number(self.share, "share", above=0, most=1)
+        as_whole(self.below, "below", 0, 2)
         if not self.multiples or min(self.multiples) < 1:
             raise OrbiflowError(f"multiples must be at least 1, got {self.multiples}")
-        number(self.min_neck, "min_neck", 0, 0.2)
-        whole(self.seed, "seed", 0, 2**32 - 1)
+        as_number(self.min_neck, "min_neck", 0, 0.2)
+        as_whole(self.seed, "seed", 0, 2**32 - 1)
 
     def fit(
         self,

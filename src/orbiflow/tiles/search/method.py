@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from importlib import import_module
 from typing import Any, ClassVar, Self
 
-from orbiflow.arguments import whole
+from orbiflow.arguments import as_whole
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.search.candidates import Fit, Progress
@@ -143,7 +143,7 @@ MAX_FREQUENCY = 60  # largest Omega that a fit takes on; time and memory grow wi
 
 def check_max_frequency(value: int) -> None:
     """Check an Omega: 0 is a constant field (paper, figure of Omega)."""
-    if not 0 <= whole(value, "max_frequency", 0) <= MAX_FREQUENCY:
+    if not 0 <= as_whole(value, "max_frequency", 0) <= MAX_FREQUENCY:
         raise OrbiflowError(
             f"max_frequency must be from 0 to {MAX_FREQUENCY}, got {value}: "
             "10 is plenty for most silhouettes"

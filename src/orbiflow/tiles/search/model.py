@@ -11,7 +11,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
-from orbiflow.arguments import instance, is_a, number, numbers, whole
+from orbiflow.arguments import as_array, as_instance, as_number, as_whole, is_a
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
@@ -76,14 +76,14 @@ class TileModel(nn.Module):
             raise OrbiflowError(
                 f"dtype must be a floating-point type such as torch.float64, got {dtype}"
             )
-        number(smoothness, "smoothness", 0)
-        whole(segments, "segments", 1)
+        as_number(smoothness, "smoothness", 0)
+        as_whole(segments, "segments", 1)
         if prototiles is not None:
-            instance(prototiles, Prototiles, "prototiles")
+            as_instance(prototiles, Prototiles, "prototiles")
             angles, mirrored = prototiles.angle, prototiles.mirrored
         if angles is None:
             raise OrbiflowError("a tile model needs angles or prototiles")
-        turns = torch.as_tensor(np.atleast_1d(numbers(angles, "angles", (...,))))
+        turns = torch.as_tensor(np.atleast_1d(as_array(angles, "angles", (...,))))
         if turns.ndim != 1 or not len(turns):
             raise OrbiflowError(
                 f"angles: expected shape (S,), S at least 1, got {tuple(turns.shape)}"
@@ -97,7 +97,7 @@ class TileModel(nn.Module):
         self.offset = nn.Parameter(torch.zeros(size, 2, dtype=dtype))
         self.shape = nn.Parameter(torch.zeros(size, isohedral_class.shape_dim, dtype=dtype))
         self.stretch = nn.Parameter(torch.zeros(size, isohedral_class.stretch_dim, dtype=dtype))
-        flips = np.zeros(size) if mirrored is None else numbers(mirrored, "mirrored", (size,))
+        flips = np.zeros(size) if mirrored is None else as_array(mirrored, "mirrored", (size,))
         self.register_buffer("mirror", torch.as_tensor(flips != 0))
         fields = [
             FourierField(self.group, max_frequency, batch=size, smoothness=smoothness, dtype=dtype)
@@ -168,7 +168,7 @@ class TileModel(nn.Module):
         """`points` if they suit the model; arrays and lists become tensors of its dtype."""
         if not isinstance(points, Tensor):
             return torch.as_tensor(
-                numbers(points, "points", (..., "N", 2), finite=False),
+                as_array(points, "points", (..., "N", 2), finite=False),
                 dtype=self.angle.dtype,
                 device=self.angle.device,
             )
@@ -191,14 +191,14 @@ class TileModel(nn.Module):
 
     def boundary(self, pieces: int) -> Tensor:
         """Points (S, N pieces, 2) along the prototile, `pieces` evenly spaced on each side."""
-        whole(pieces, "pieces", 1)
+        as_whole(pieces, "pieces", 1)
         vertices, _ = self.prototile()
         return subdivided(vertices, pieces)
 
     def take(self, indices: Sequence[int] | int) -> TileModel:
         """A new model with the candidates at `indices` only, at the same parameters."""
         several = indices if isinstance(indices, Sequence | np.ndarray) else [indices]
-        chosen = [whole(i, "a candidate's index", 0, self.size - 1) for i in several]
+        chosen = [as_whole(i, "a candidate's index", 0, self.size - 1) for i in several]
         if not chosen:
             raise OrbiflowError(f"choose at least one of the {self.size} candidates")
         fields = [field.parameters_.detach()[chosen] for field in self.fourier_fields()]

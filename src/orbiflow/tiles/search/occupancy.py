@@ -14,7 +14,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from orbiflow.arguments import instance, whole
+from orbiflow.arguments import as_instance, as_whole
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.search.candidates import Progress, silent
 from orbiflow.tiles.search.descent import between
@@ -39,8 +39,8 @@ class OccupancySamples:
     def __init__(
         self, target: Target, count: int, *, seed: int, dtype: torch.dtype = torch.float32
     ) -> None:
-        instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
-        whole(count, "count", 1)
+        as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+        as_whole(count, "count", 1)
         rng = np.random.default_rng(seed)
         region = shapely.Polygon(target.normal)
         uniform = count // 3
@@ -89,8 +89,8 @@ def fit_occupancy(
     Returns the surviving candidates, best loss first. They are not certified yet.
     """
     kind = isohedral_class(kind)
-    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
-    settings = instance(settings or OccupancySearch(), OccupancySearch, "settings")
+    as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    settings = as_instance(settings or OccupancySearch(), OccupancySearch, "settings")
     # the mean over the candidates is all that couples them: separate fits, one tensor
     samples = OccupancySamples(target, 16384, seed=settings.seed)
     cancel = cancel or Cancel()

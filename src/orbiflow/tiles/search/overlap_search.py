@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from orbiflow.arguments import instance, number, numbers, whole
+from orbiflow.arguments import as_array, as_instance, as_number, as_whole
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import Cancel, one_thread
 from orbiflow.tiles.search.candidates import Fit, Progress
@@ -106,31 +106,31 @@ class OverlapSearch(SearchMethod):
 
     def __post_init__(self) -> None:
         for name in ("candidates", "projected", "measured", "turns", "finalists"):
-            whole(getattr(self, name), name, 1)
+            as_whole(getattr(self, name), name, 1)
         check_max_frequency(self.max_frequency)
         if self.starts not in ("outline", "template"):
             raise OrbiflowError(f'starts must be "outline" or "template", got {self.starts!r}')
-        if whole(self.boundary, "boundary", 0) < 60 or self.boundary % 30:
+        if as_whole(self.boundary, "boundary", 0) < 60 or self.boundary % 30:
             raise OrbiflowError(f"boundary must be a multiple of 30 from 60, got {self.boundary}")
-        for points in numbers(self.resolutions, "resolutions", ("n",)):
+        for points in as_array(self.resolutions, "resolutions", ("n",)):
             if points < 24 or self.boundary % points:
                 raise OrbiflowError(
                     f"resolutions must be at least 24 and divide boundary = {self.boundary}, "
                     f"got {points:g}"
                 )
-        stages = numbers(self.stages, "stages", (...,))
+        stages = as_array(self.stages, "stages", (...,))
         pairs = stages.ndim == 2 and stages.shape[1] == 2
         if not pairs or (stages < 1).any() or (stages % 1).any():
             raise OrbiflowError(f"stages need steps and survivors of at least 1: {self.stages}")
         if self.iterations >= MAX_SEGMENTS:
             raise OrbiflowError(f"stages must have less than {MAX_SEGMENTS} steps in all")
         for name in ("smoothness", "reach", "blur"):
-            for value in numbers(getattr(self, name), name, (2,)):
-                number(value, f"{name}, first and last,", 0, above=name != "smoothness")
-        number(self.momentum, "momentum", 0, 1)
-        number(self.stretch, "stretch", 0)
-        whole(self.polish, "polish", 0, 1000)
-        whole(self.seed, "seed", 0, 2**32 - 1)
+            for value in as_array(getattr(self, name), name, (2,)):
+                as_number(value, f"{name}, first and last,", above=0)
+        as_number(self.momentum, "momentum", 0, 1)
+        as_number(self.stretch, "stretch", 0)
+        as_whole(self.polish, "polish", 0, 1000)
+        as_whole(self.seed, "seed", 0, 2**32 - 1)
 
     @property
     def iterations(self) -> int:
@@ -258,16 +258,16 @@ class OccupancySearch(SearchMethod):
         from orbiflow.flows import method as integrator
 
         for name in ("turns", "finalists", "iterations", "points", "segments", "steps"):
-            whole(getattr(self, name), name, 1)
+            as_whole(getattr(self, name), name, 1)
         check_max_frequency(self.max_frequency)
-        integrator(instance(self.method, str, "method"))
-        whole(self.affine_iterations, "affine_iterations", 0)
-        number(self.smoothness, "smoothness", 0)
-        number(self.learning_rate, "learning_rate", 0, above=True)
+        integrator(as_instance(self.method, str, "method"))
+        as_whole(self.affine_iterations, "affine_iterations", 0)
+        as_number(self.smoothness, "smoothness", 0)
+        as_number(self.learning_rate, "learning_rate", above=0)
         for name in ("hardness", "penalty"):
-            for value in numbers(getattr(self, name), name, (2,)):
-                number(value, f"{name}, first and last,", 0, above=True)
-        whole(self.seed, "seed", 0, 2**32 - 1)
+            for value in as_array(getattr(self, name), name, (2,)):
+                as_number(value, f"{name}, first and last,", above=0)
+        as_whole(self.seed, "seed", 0, 2**32 - 1)
 
     def fit(
         self,

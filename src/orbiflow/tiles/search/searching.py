@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.arguments import described, instance, is_a
+from orbiflow.arguments import as_instance, described, is_a
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import Cancel, Cancelled, one_thread, process_context, work
 from orbiflow.tiles.likeness import diverse, mutual_iou
@@ -111,7 +111,7 @@ def _task(
     force: bool = False,
 ) -> Task:
     """Return the task, checked, by default for likeness, with what its method needs imported."""
-    instance(target, Target, "the target", HOW)
+    as_instance(target, Target, "the target", HOW)
     if method is None:
         method = LikenessSearch.for_effort("normal")
     if not is_a(method, SearchMethod):
@@ -120,7 +120,7 @@ def _task(
             'level of effort: LikenessSearch.for_effort("fast")'
         )
     if pins is not None:
-        instance(pins, Pins, "pins", "Pins.read and Pins.at make one")
+        as_instance(pins, Pins, "pins", "Pins.read and Pins.at make one")
         if not method.takes_pins:
             raise OrbiflowError("pins belong to the search for likeness, where silhouettes bend")
     method.load()

@@ -12,7 +12,7 @@ import shapely
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from orbiflow.arguments import instance, whole
+from orbiflow.arguments import as_instance, as_whole
 from orbiflow.arrays import Array, Complex
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel
@@ -106,9 +106,9 @@ def outline_starts(
     the fewer, the smoother the start. A seed changes `phase`, the place of the points in spacings.
     """
     kind = isohedral_class(kind)
-    instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
     for points in resolutions:
-        if vertices % whole(points, "a resolution", 24):
+        if vertices % as_whole(points, "a resolution", 24):
             raise OrbiflowError(f"resolutions must divide vertices = {vertices}, got {points}")
     cancel = cancel or Cancel()
     parts: list[Prototiles] = []

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from orbiflow.arguments import instance, number, whole
+from orbiflow.arguments import as_instance, as_number, as_whole
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.tiles.search.candidates import CORNERS, VERTICES, simplest_tile
@@ -57,7 +57,7 @@ def extract_tile(model: TileModel, *, force: bool = False) -> tuple[Tile, TileMo
 
     The polygon is the coarsest that is simple, see `simplest_tile`; with `force`, the finest.
     """
-    instance(model, TileModel, "the model", "load_model and the fits give one")
+    as_instance(model, TileModel, "the model", "load_model and the fits give one")
     model.require_single()
     model = model.take([0]).double()
     model.flow = model.flow.with_steps(max(1, 8 // model.segments), method="rk4")
@@ -83,7 +83,7 @@ MAX_SIDES = 100_000
 
 def as_map(model: TileModel, frame: Frame | None = None, bending: Bending | None = None) -> TileMap:
     """Return a single candidate as plain arrays; `frame` and `bending` go with it."""
-    instance(model, TileModel, "the model", "load_model and the fits give one").require_single()
+    as_instance(model, TileModel, "the model", "load_model and the fits give one").require_single()
     settings = {
         "class": model.isohedral_class.name,
         "max_frequency": model.max_frequency,
@@ -118,10 +118,10 @@ def as_model(stored: TileMap) -> TileModel:
             isohedral_class(settings["class"]),
             torch.zeros(1, dtype=torch.float64),
             mirrored=torch.tensor([bool(settings["mirrored"])]),
-            max_frequency=whole(settings["max_frequency"], "max_frequency", 0, MAX_FREQUENCY),
-            segments=whole(settings["segments"], "segments", 1, MAX_SEGMENTS),
-            smoothness=number(settings["smoothness"], "smoothness", 0, 100),
-            steps=whole(settings["steps"], "steps", 1, 1_000_000),
+            max_frequency=as_whole(settings["max_frequency"], "max_frequency", 0, MAX_FREQUENCY),
+            segments=as_whole(settings["segments"], "segments", 1, MAX_SEGMENTS),
+            smoothness=as_number(settings["smoothness"], "smoothness", 0, 100),
+            steps=as_whole(settings["steps"], "steps", 1, 1_000_000),
             method=str(settings["method"]),
         )
     except (KeyError, TypeError) as error:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arguments import is_tensor, numbers
+from orbiflow.arguments import as_array, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import best_similarity, complex_points
@@ -56,8 +56,8 @@ class Bending:
     triangles: NDArray[np.int64]
 
     def __post_init__(self) -> None:
-        rest = numbers(self.rest, "the bending's rest", ("N", 2))
-        images = numbers(self.images, "the bending's images", (len(rest), 2))
+        rest = as_array(self.rest, "the bending's rest", ("N", 2))
+        images = as_array(self.images, "the bending's images", (len(rest), 2))
         triangles = _indices(self.triangles, len(rest))
         for name, array in (("rest", rest), ("images", images)):
             with np.errstate(all="ignore"):  # an overflow counts as turned over
@@ -148,7 +148,7 @@ def _indices(values: ArrayLike, count: int) -> NDArray[np.int64]:
 
 def _mapped(given: Any, function: _PiecewiseAffine) -> Any:
     """Return the images of an array or a tensor as the same."""
-    result = function(numbers(given, "points", (..., 2), finite=False))
+    result = function(as_array(given, "points", (..., 2), finite=False))
     if not is_tensor(given):
         return result
     import torch

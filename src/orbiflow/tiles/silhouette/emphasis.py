@@ -9,7 +9,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from orbiflow.arguments import instance, number, numbers
+from orbiflow.arguments import as_array, as_instance, as_number
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.silhouette.outlines import percent
@@ -58,13 +58,13 @@ class Emphasis:
 
     def __post_init__(self) -> None:
         # without emphasis everything has weight 1
-        number(self.strength, "strength of the emphasis", 1, MAX_STRENGTH, above=True)
-        mask = numbers(self.mask, self.source, (...,), finite=False).astype(np.float32)
+        as_number(self.strength, "strength of the emphasis", above=1, most=MAX_STRENGTH)
+        mask = as_array(self.mask, self.source, (...,), finite=False).astype(np.float32)
         if mask.ndim != 2 or not mask.size or not (mask.min() >= 0 and mask.max() <= 1):
             raise OrbiflowError(
                 f"{self.source}: a mask needs shape (H, W) and values from 0 to 1, got {mask.shape}"
             )
-        xmin, ymin, xmax, ymax = numbers(self.box, f"{self.source}: the box", (4,), finite=False)
+        xmin, ymin, xmax, ymax = as_array(self.box, f"{self.source}: the box", (4,), finite=False)
         if not (np.isfinite(self.box).all() and xmin < xmax and ymin < ymax):
             raise OrbiflowError(f"{self.source}: the box {self.box} has no area")
         mask.setflags(write=False)
@@ -84,7 +84,7 @@ class Emphasis:
         an image, a mask of another aspect, a uniform mask, and one that emphasises no part of the
         silhouette; `OrbiflowError` for a strength that is not above 1 and at most 100.
         """
-        instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+        as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
         path = Path(path)
         picture = read_mask(path)
         box, covered = _covered(target)
@@ -135,7 +135,7 @@ class Emphasis:
             raise OrbiflowError(
                 f"points must have shape (..., 2) and finite coordinates, got shape {at.shape}"
             )
-        xmin, ymin, xmax, ymax = numbers(self.box, f"{self.source}: the box", (4,), finite=False)
+        xmin, ymin, xmax, ymax = as_array(self.box, f"{self.source}: the box", (4,), finite=False)
         inside = np.clip(at, [xmin, ymin], [xmax, ymax])
         height, width = self.mask.shape
         column = (inside[..., 0] - xmin) / (xmax - xmin) * width - 0.5

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.arguments import numbers
+from orbiflow.arguments import as_array
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import (
@@ -64,7 +64,7 @@ def clean_ring(
 
 def _as_points(points: ArrayLike, where: str, error: type[OrbiflowError]) -> Array:
     try:
-        ring = numbers(points, where, ("N", 2), finite=False)
+        ring = as_array(points, where, ("N", 2), finite=False)
     except (TypeError, ValueError) as exc:
         what = "the vertices are not numbers in pairs, of shape (N, 2)"
         raise error(f"{where}: {what}; give them as [[x, y], ...]") from exc

@@ -12,7 +12,7 @@ import scipy.sparse.csgraph
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.arguments import instance, number, numbers
+from orbiflow.arguments import as_array, as_instance, as_number
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import resampled
@@ -76,7 +76,7 @@ class Pins:
             InputFileError: for masks that cannot be read or do not touch the silhouette.
             OrbiflowError: as for `at`.
         """
-        instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+        as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
         words = [str(one) for one in given]
         spots = [word for word in words if _SPOT.fullmatch(word)]
         files = [word for word in words if not _SPOT.fullmatch(word)]
@@ -97,7 +97,7 @@ class Pins:
         masks: tuple[Emphasis, ...],
         keep_angle: bool,
     ) -> Self:
-        instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+        as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
         discs = [_disc(spot, target) for spot in spots]
         if not discs and not masks:
             raise OrbiflowError("no pin was given: give a spot x,y or x,y,radius, or a mask")
@@ -160,7 +160,7 @@ def _warnings(pins: Pins, target: Target) -> list[str]:
 
 def _disc(spot: ArrayLike, target: Target) -> tuple[float, float, float]:
     """Return a spot as x, y and radius in input units."""
-    values = numbers(spot, "a pin", ("2 or 3",))
+    values = as_array(spot, "a pin", ("2 or 3",))
     if len(values) not in (2, 3):
         raise OrbiflowError(f"a pin must be x,y or x,y,radius, got {len(values)} numbers")
     x, y = (float(value) for value in values[:2])
@@ -168,7 +168,7 @@ def _disc(spot: ArrayLike, target: Target) -> tuple[float, float, float]:
     centre = shapely.Point(x, y)
     radius = DEFAULT_RADIUS * float(np.ptp(target.outline, axis=0).max())
     if len(values) == 3:
-        radius = number(values[2], "the radius of a pin", 0, above=True)
+        radius = as_number(values[2], "the radius of a pin", above=0)
     elif region.contains(centre):
         radius = max(radius, REACH_PAST_OUTLINE * centre.distance(region.exterior))
     if centre.distance(region) > radius:

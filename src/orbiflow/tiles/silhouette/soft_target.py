@@ -7,7 +7,7 @@ import torch.nn.functional as F
 from scipy.ndimage import distance_transform_edt
 from torch import Tensor
 
-from orbiflow.arguments import instance, number, whole
+from orbiflow.arguments import as_instance, as_number, as_whole
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.silhouette.emphasis import Emphasis
 from orbiflow.tiles.silhouette.target import Target
@@ -35,9 +35,9 @@ class SoftTarget:
         emphasis: Emphasis | None = None,
         dtype: torch.dtype = torch.float32,
     ) -> None:
-        instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
-        resolution = whole(resolution, "resolution", 2)
-        margin = number(margin, "margin", 0)
+        as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+        resolution = as_whole(resolution, "resolution", 2)
+        margin = as_number(margin, "margin", 0)
         low, high = target.normal.min(axis=0) - margin, target.normal.max(axis=0) + margin
         center, self.reach = (low + high) / 2, float((high - low).max() / 2)
         axis = self.reach * ((np.arange(resolution) + 0.5) / resolution * 2 - 1)
@@ -62,7 +62,7 @@ class SoftTarget:
 
     def occupancy(self, points: Tensor, blur: float) -> Tensor:
         """Return the soft occupancy, 0 to 1, at points (..., 2): a sigmoid of distance over `blur`."""
-        blur = number(blur, "blur", 0, above=True)
+        blur = as_number(blur, "blur", above=0)
         return torch.sigmoid(self._sample(self.image, points) * (1.7 / blur))
 
     def weight(self, points: Tensor) -> Tensor:
@@ -122,7 +122,7 @@ def signed_distance(points: Tensor, vertices: Tensor) -> Tensor:
     [0.5, -1.4142135381698608]
     """
     for name, tensor in (("points", points), ("vertices", vertices)):
-        instance(tensor, Tensor, name, "torch.as_tensor makes one of an array")
+        as_instance(tensor, Tensor, name, "torch.as_tensor makes one of an array")
         if not tensor.is_floating_point() or tensor.ndim < 2 or tensor.shape[-1] != 2:
             raise OrbiflowError(
                 f"{name} must be floating-point numbers of shape (..., N, 2), got "

@@ -12,7 +12,7 @@ from typing import IO, TYPE_CHECKING, Any, Self, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import described, is_a, is_tensor, numbers
+from orbiflow.arguments import as_array, described, is_a, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import centroid, orient, signed_area
@@ -56,7 +56,7 @@ class Frame:
     inverse: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        linear = numbers(self.linear, "a frame's linear", (2, 2))
+        linear = as_array(self.linear, "a frame's linear", (2, 2))
         size = None if self.size is None else _pair(self.size, "size")
         if size is not None and not min(size) > 0:
             raise OrbiflowError(f"a frame's size must be positive, got {size}")
@@ -66,7 +66,7 @@ class Frame:
             raise OrbiflowError(f"a frame's linear part has no inverse: {linear.tolist()}")
         arrays = {
             "linear": linear,
-            "offset": numbers(self.offset, "a frame's offset", (2,)),
+            "offset": as_array(self.offset, "a frame's offset", (2,)),
             "inverse": np.linalg.inv(linear),
         }
         for name, array in arrays.items():
@@ -89,7 +89,7 @@ class Frame:
         if is_tensor(points):
             points = _tensor(points)
             return points @ points.new_tensor(self.linear).T + points.new_tensor(self.offset)
-        return numbers(points, "points", (..., 2), finite=False) @ self.linear.T + self.offset
+        return as_array(points, "points", (..., 2), finite=False) @ self.linear.T + self.offset
 
     @overload
     def to_normal(self, points: torch.Tensor) -> torch.Tensor: ...
@@ -100,7 +100,7 @@ class Frame:
         if is_tensor(points):
             points = _tensor(points)
             return (points - points.new_tensor(self.offset)) @ points.new_tensor(self.inverse).T
-        local = numbers(points, "points", (..., 2), finite=False) - self.offset
+        local = as_array(points, "points", (..., 2), finite=False) - self.offset
         scale = np.diag(self.linear)
         if np.array_equal(self.linear, np.diag(scale)):
             return local / scale  # rounded once
@@ -149,7 +149,7 @@ def _tensor(points: torch.Tensor) -> torch.Tensor:
 
 
 def _pair(values: Any, name: str) -> tuple[float, float]:
-    first, second = numbers(values, f"a frame's {name}", (2,)).tolist()
+    first, second = as_array(values, f"a frame's {name}", (2,)).tolist()
     return first, second
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from orbiflow.arguments import number
+from orbiflow.arguments import as_number
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.tiles.tilings.prototile import Prototile
@@ -137,7 +137,7 @@ def certify(tile: Tiles, *, tolerance: float = 1e-9) -> Certificate:
     (True, 3)
     """
     tiling = as_tiling(tile)
-    tolerance = number(tolerance, "tolerance", 0, above=True)
+    tolerance = as_number(tolerance, "tolerance", above=0)
     shares = np.bincount(tiling.aspects.prototiles, minlength=len(tiling.prototiles))
     area = float(shares @ [p.signed_area for p in tiling.prototiles] / shares.sum())
     size, nan = tiling.tile_area, math.nan

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, cast, overload
 
 import numpy as np
 
-from orbiflow.arguments import described, is_tensor, numbers
+from orbiflow.arguments import as_array, described, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import (
@@ -309,7 +309,7 @@ class IsohedralClass:
 
     def _parameters(self, values: Any, size: int, what: str) -> Any:
         if not is_tensor(values):
-            values = numbers(values, f"{what} parameters", (...,))
+            values = as_array(values, f"{what} parameters", (...,))
         elif not values.is_floating_point():
             values = values.double()
         if values.ndim == 0 or values.shape[-1] != size:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from orbiflow.arguments import numbers, whole
+from orbiflow.arguments import as_array, as_whole
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, Isometry
@@ -38,11 +38,11 @@ class Prototile:
     corners: tuple[int, ...] = field(default=())
 
     def __post_init__(self) -> None:
-        polygon = numbers(self.polygon, "the tile's polygon", ("N", 2))
+        polygon = as_array(self.polygon, "the tile's polygon", ("N", 2))
         if len(polygon) < 3:
             raise OrbiflowError(f"the tile's polygon needs at least 3 vertices, got {len(polygon)}")
         corners = tuple(
-            whole(k, "a tile's corner, an index of its vertices,", 0, len(polygon) - 1)
+            as_whole(k, "a tile's corner, an index of its vertices,", 0, len(polygon) - 1)
             for k in self.corners
         )
         polygon.setflags(write=False)

@@ -13,7 +13,7 @@ import shapely
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from orbiflow.arguments import number, whole
+from orbiflow.arguments import as_number, as_whole
 from orbiflow.arrays import Array, Integers, checked_window
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import Isometry
@@ -254,8 +254,8 @@ def neighbours(tile: Tiles, prototile: int = 0, *, tolerance: float = 1e-7) -> N
     (5, 3)
     """
     tiling = as_tiling(tile)
-    tolerance = number(tolerance, "tolerance", 0)
-    prototile = whole(prototile, "the prototile", 0, len(tiling.prototiles) - 1)
+    tolerance = as_number(tolerance, "tolerance", 0)
+    prototile = as_whole(prototile, "the prototile", 0, len(tiling.prototiles) - 1)
     around = surroundings(tiling, prototile, tolerance)
     near, shares = touching(around, tolerance)
     return Neighbours(near.select(shares).elements(), near.select(~shares).elements())

@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import described, instance, is_a, numbers
+from orbiflow.arguments import as_array, as_instance, described, is_a
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, Isometry, reduced_basis
@@ -93,7 +93,7 @@ def _first_cosets(
 
 def coset_and_cell(group: CrystallographicGroup, element: Isometry) -> tuple[int, Cell]:
     """Return (i, n) with element = translation by B n after the i-th coset representative."""
-    instance(element, Isometry, "an element of the group")
+    as_instance(element, Isometry, "an element of the group")
     steps = (element.translation - group.translations) @ group.inverse_lattice.T
     error = np.abs(steps - np.round(steps)).max(axis=1)
     error += np.abs(group.linear_parts - element.linear).max(axis=(1, 2))
@@ -135,7 +135,7 @@ class Tiling:
         self, group: CrystallographicGroup, prototiles: Sequence[Prototile | ArrayLike]
     ) -> None:
         how = "isohedral_class(name).group() and wallpaper_group(name) make one"
-        instance(group, CrystallographicGroup, "the tile's group", how)
+        as_instance(group, CrystallographicGroup, "the tile's group", how)
         if group.dim != 2:
             raise OrbiflowError(f"a tile needs a group of the plane, got dimension {group.dim}")
         try:
@@ -226,7 +226,7 @@ class Tile:
     def __post_init__(self) -> None:
         prototile = Prototile(self.polygon, self.corners)
         object.__setattr__(self, "tiling", Tiling(self.group, (prototile,)))
-        instance(self.isohedral_class, str, "the tile's isohedral class", 'give its name, "IH4"')
+        as_instance(self.isohedral_class, str, "the tile's isohedral class", 'give its name, "IH4"')
         object.__setattr__(self, "polygon", prototile.polygon)
         object.__setattr__(self, "corners", prototile.corners)
 
@@ -290,7 +290,7 @@ def dirichlet_tile(group: CrystallographicGroup, point: ArrayLike) -> Tile:
     >>> len(hexagon.polygon), hexagon.tiling.stabilisers[0].order
     (6, 12)
     """
-    site = numbers(point, "the point of a Dirichlet cell", (2,))
+    site = as_array(point, "the point of a Dirichlet cell", (2,))
     return Tile(dirichlet_tiling(group, [site]).prototiles[0].polygon, group)
 
 
@@ -309,10 +309,10 @@ def dirichlet_tiling(group: CrystallographicGroup, points: Sequence[ArrayLike]) 
     >>> [len(prototile.polygon) for prototile in squares.prototiles]
     [4, 4]
     """
-    instance(group, CrystallographicGroup, "the group", "wallpaper_group(name) makes one")
+    as_instance(group, CrystallographicGroup, "the group", "wallpaper_group(name) makes one")
     if group.dim != 2:
         raise OrbiflowError(f"a tile needs a group of the plane, got dimension {group.dim}")
-    given = numbers(points, "the points of Dirichlet cells", ("K", 2))
+    given = as_array(points, "the points of Dirichlet cells", ("K", 2))
     if not len(given):
         raise OrbiflowError("a Dirichlet tiling needs at least one point")
     same = _SAME_DISTANCE * float(np.sqrt(group.cell_volume))

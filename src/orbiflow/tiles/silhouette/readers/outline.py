@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.arguments import path as as_path
+from orbiflow.arguments import as_path
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import is_list, is_object
 from orbiflow.tiles.silhouette.outlines import MAX_VERTICES, clean_ring
