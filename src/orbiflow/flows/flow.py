@@ -125,12 +125,7 @@ class Flow(nn.Module):
         """Return a view of the flow, with the same fields and parameters, integrated otherwise.
 
         This flow does not change. The view has the same `state_dict`; training it trains this flow.
-
-        Args:
-            steps: The number of Runge-Kutta steps in each segment.
-            method: As in the constructor. Default: this flow's.
-
-        Raises `OrbiflowError` for `steps` < 1 or an unknown method.
+        Both arguments are as in the constructor; the default method is this flow's.
 
         >>> flow = Flow(torch.sin, steps=8)
         >>> flow.with_steps(2 * flow.steps).steps, flow.steps
