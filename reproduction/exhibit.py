@@ -118,7 +118,7 @@ class Exhibit:
     @property
     def label(self) -> str:
         """The paper's label, such as "Figure 1"."""
-        return self.name.replace("-", " ").capitalize()
+        return self.name.replace("-", " ").title()
 
 
 @dataclass(frozen=True)
