@@ -153,10 +153,9 @@ class Flow(nn.Module):
         return self._last(points, (points,), inverse=inverse)[0]
 
     def forward_and_log_det(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        """Return `forward` and the log-determinant of its Jacobian, from one integration.
+        """Return `forward` and the log-determinant (...,) of its Jacobian, from one integration.
 
-        The second is the integral of the divergence along the path (instantaneous change of
-        variables; paper, section 5.2), shape (...,).
+        It is the integral of the divergence along the path (paper, section 5.2).
         """
         self._check(points)
         return self._with_log_det(points, inverse=False)
