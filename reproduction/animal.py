@@ -167,7 +167,6 @@ def _row(name: str, outcome: Any, error: float | None) -> tuple[str, ...]:
 
 EXHIBIT = Exhibit(
     "figure-7",
-    "Figure 7",
     "One animal in all nine classes",
     "Given the target image of a rabbit, Escherization for the nine classes: the tile, the "
     "tiling it admits, the magnitude of the vector field and its flow lines. The field has the "
@@ -266,7 +265,6 @@ def _straightness(outcome: Any, name: str) -> float:
 
 FREQUENCIES = Exhibit(
     "figure-8",
-    "Figure 8",
     "The effect of the maximum frequency Ω",
     "For Ω = 0 there is no deformation in the shape of the tile, as the diffeomorphism only has "
     "translational effects. The higher the allowed frequency, the more complex the tile shape.",

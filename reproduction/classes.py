@@ -146,7 +146,6 @@ def _draw_groups(_canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findin
 
 TEMPLATES = Exhibit(
     "figure-2",
-    "Figure 2",
     "The nine isohedral classes and their identified edges",
     "The identification constraints of nine isohedral classes: hexagons and pentagons with edges "
     "colour-coded and oriented by arrowheads, in some cases with additional angular constraints.",
@@ -154,7 +153,6 @@ TEMPLATES = Exhibit(
 )
 GROUPS_TABLE = Exhibit(
     "table-1",
-    "Table 1",
     "The classes' symmetry groups",
     "IH1 p1, IH2 and IH3 pg, IH4 p2, IH5 and IH6 pgg, IH7 p3, IH21 p6, IH28 p4.",
     _draw_groups,
@@ -242,7 +240,6 @@ def _key(figure: Figure) -> None:
 
 TILINGS = Exhibit(
     "figure-6",
-    "Figure 6",
     "The symmetries of each tiling",
     "The tiling pattern of each of the nine classes: its unit of periodicity as a black "
     "quadrilateral, lines of transflection in red, rotation centres of each order as coloured "

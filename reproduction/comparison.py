@@ -261,7 +261,6 @@ def _mean_row(
 
 TILES = Exhibit(
     "figure-9",
-    "Figure 9",
     "Comparison with ARAP on nine goals",
     "Nine target shapes; the tiles of ARAP (Nagata and Imahori, 2021); the tiles of the paper's "
     "method, which demonstrates comparable performance.",
@@ -270,7 +269,6 @@ TILES = Exhibit(
 )
 TABLE = Exhibit(
     "table-3",
-    "Table 3",
     "IoU and pixel accuracy, against ARAP",
     "IoU and pixel accuracy of the paper's tiles and of ARAP's for nine goals: from 0.809 and "
     "0.818 (octopus) to 0.927 and 0.935 (penguin) under IoU. ARAP is ahead or level in all but "

@@ -178,7 +178,6 @@ def _image(axes: Axes, values: Array, top: float) -> None:
 
 TABLE = Exhibit(
     "table-5",
-    "Table 5",
     "KL divergence of estimated densities",
     "KL divergence between target and estimated distribution. Torus: 0.03, 0.45, 0.67; sphere: "
     "0.03, 0.47, 0.56, for 4 Gaussians, 6 Gaussians and the 5 × 5 checkerboard. The results "
@@ -188,7 +187,6 @@ TABLE = Exhibit(
 )
 SIX_GAUSSIANS = Exhibit(
     "figure-10",
-    "Figure 10",
     "Density estimation: six Gaussians",
     "The densities estimated for a mixture of six Gaussians on torus, sphere, Klein bottle and "
     "projective plane, black where probability is low; the flow fields clearly show the symmetry "
@@ -198,7 +196,6 @@ SIX_GAUSSIANS = Exhibit(
 )
 CHECKERBOARD = Exhibit(
     "figure-12",
-    "Figure 12",
     "Density estimation: the checkerboard",
     "The same for a 5 × 5 checkerboard on the four spaces.",
     functools.partial(_draw_flat, "checkerboard"),
@@ -261,7 +258,6 @@ def _draw_surfaces(canvas: Canvas, extent: Extent, values: list[Any]) -> Finding
 
 SURFACES = Exhibit(
     "figure-11",
-    "Figure 11",
     "Densities on torus and sphere, in space",
     "The densities estimated on torus and sphere with the standard embedding, for 4 Gaussians, 6 "
     "Gaussians and the 5 × 5 checkerboard.",

@@ -103,7 +103,6 @@ class Exhibit:
     """A figure or table of the paper.
 
     - `name`: The name with which its files begin, such as "figure-1".
-    - `label`: The paper's label, such as "Figure 1".
     - `title`: What it is about.
     - `states`: What the paper shows or claims.
     - `draw`: The function that draws it.
@@ -111,11 +110,15 @@ class Exhibit:
     """
 
     name: str
-    label: str
     title: str
     states: str
     draw: Draw
     needs: Callable[[Extent], list[Work]] = lambda _extent: []
+
+    @property
+    def label(self) -> str:
+        """The paper's label, such as "Figure 1"."""
+        return self.name.replace("-", " ").title()
 
 
 @dataclass(frozen=True)

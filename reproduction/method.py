@@ -111,7 +111,6 @@ def _dots(axes: Axes, points: Array, colours: Array) -> None:
 
 EXHIBIT = Exhibit(
     "figure-5",
-    "Figure 5",
     "The method: inverse map and occupancy loss",
     "Points sampled about the target S are mapped to the template's domain through D⁻¹. Points "
     "inside S must land inside the template T, points outside S outside; the occupancy loss "

@@ -165,16 +165,10 @@ def _draw_symmetrization(_canvas: Canvas, _extent: Extent, _values: list[Any]) -
         )  # fmt: skip
     closed = all(row[-1] == "0" for row in rows)
     title = "The paper's operators against the mean over the group (Reynolds operator)."
-    headings = [
-        "space",
-        "cell",
-        "generators",
-        "group",
-        "order",
-        "terms of the nested sums",
-        "difference",
-    ]
-    headings.append("order against |det B|")
+    headings = (
+        "space", "cell", "generators", "group", "order", "terms of the nested sums", "difference",
+        "order against |det B|",
+    )  # fmt: skip
     return Findings(
         "agrees in part" if max(errors) < 1e-12 and closed else "differs",
         "The printed lattices and generators close: each group's order is the number of squares "
@@ -192,7 +186,6 @@ def _draw_symmetrization(_canvas: Canvas, _extent: Extent, _values: list[Any]) -
 
 SPACES_FIGURE = Exhibit(
     "figure-3",
-    "Figure 3",
     "Four identifications of a square, and their tilings",
     "Different ways of identification in a template square result in torus, sphere, Klein bottle "
     "and projective plane. Copies of the square joined by the identification rule result in "
@@ -201,7 +194,6 @@ SPACES_FIGURE = Exhibit(
 )
 SYMMETRIZATION = Exhibit(
     "table-4",
-    "Table 4",
     "Symmetrization for identification spaces",
     "For each space the template, the translational unit B, its symmetries, and the symmetrized "
     "vector field as nested operators: V = P_B(F) for the torus, R_c(P_B(F)) for the sphere, "

@@ -15,6 +15,7 @@ from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup, identification_group
 from reproduction.drawing import INK, Canvas, around, grid_box, panel, tiny
 from reproduction.exhibit import Exhibit, Extent, Findings
+from reproduction.symmetrization import random_field
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,12 +48,7 @@ class Deformed(NamedTuple):
 
 def unconstrained_field(seed: int = 56) -> FourierField:
     """Return a smooth field of period 2.7, which has no symmetry of the unit square."""
-    field = FourierField(_LARGER, 5, smoothness=2.0)
-    generator = torch.Generator().manual_seed(seed)
-    with torch.no_grad():
-        drawn = torch.randn(field.size, generator=generator, dtype=torch.float64)
-        field.parameters_.copy_(0.35 * drawn)
-    return field
+    return random_field(_LARGER, 5, 0.35, smoothness=2.0, seed=seed)
 
 
 def deformed(field: VectorField) -> Deformed:
@@ -172,7 +168,6 @@ def _fill(axes: Axes, geometry: shapely.Geometry, colour: str) -> None:
 
 EXHIBIT = Exhibit(
     "figure-1",
-    "Figure 1",
     "Constrained against unconstrained deformation",
     "A template square has its opposite sides identified: they must deform identically. An "
     "unconstrained diffeomorphism violates the constraint; flow symmetrization deforms the "

@@ -160,7 +160,6 @@ def _draw_element(axes: Axes, kind: Kind, size: float) -> None:
 
 EXHIBIT = Exhibit(
     "figure-4",
-    "Figure 4",
     "Three types of symmetry of a vector field",
     "Periodicity, rotation equivariance and transflection equivariance arise in the vector field "
     "of a diffeomorphism under identification constraints; each is illustrated with its equation "

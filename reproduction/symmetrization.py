@@ -41,14 +41,21 @@ _HEADINGS = (
 )  # fmt: skip
 
 
-def unit_field(max_frequency: int = 3, seed: int = 0) -> FourierField:
-    """Return the paper's F: periodic on the unit square, with random coefficients."""
-    field = FourierField(UNIT_CELL, max_frequency, smoothness=1.0)
+def random_field(
+    group: CrystallographicGroup, max_frequency: int, size: float, *, smoothness: float, seed: int
+) -> FourierField:
+    """Return a smooth field of a group, with random parameters of standard deviation `size`."""
+    field = FourierField(group, max_frequency, smoothness=smoothness)
     generator = torch.Generator().manual_seed(seed)
     with torch.no_grad():
-        drawn = torch.randn(field.size, generator=generator, dtype=torch.float64)
-        field.parameters_.copy_(drawn / math.sqrt(field.size))
+        field.parameters_.normal_(generator=generator).mul_(size)
     return field
+
+
+def unit_field(max_frequency: int = 3, seed: int = 0) -> FourierField:
+    """Return the paper's F: periodic on the unit square, with random coefficients."""
+    size = 1 / math.sqrt(FourierField(UNIT_CELL, max_frequency).size)
+    return random_field(UNIT_CELL, max_frequency, size, smoothness=1.0, seed=seed)
 
 
 def nested(field: VectorField, operators: Sequence[Operator]) -> VectorField:
@@ -147,7 +154,6 @@ def _draw(_canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:
 
 EXHIBIT = Exhibit(
     "table-2",
-    "Table 2",
     "Symmetrization for the nine isohedral classes",
     "For each class the template, the basic translation unit B = [b1, b2], all its symmetries, "
     "and the symmetrized vector field: nested operators around P_B(F), composed with A⁻¹, the "

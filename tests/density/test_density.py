@@ -9,6 +9,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from networks import neural_field
 from orbiflow.density import (
     MEASURES,
     Density,
@@ -23,7 +24,7 @@ from orbiflow.density import (
     midpoints,
 )
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import FourierField, neural_field
+from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 
 SPACES = (Torus(2), Sphere(), KleinBottle(), ProjectivePlane())

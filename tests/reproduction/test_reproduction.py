@@ -56,7 +56,7 @@ class Needs:
 
 
 def exhibit(name: str, draw, *works: Work) -> Exhibit:
-    return Exhibit(name, name.replace("-", " ").title(), "A title", "A claim.", draw, Needs(*works))
+    return Exhibit(name, "A title", "A claim.", draw, Needs(*works))
 
 
 @pytest.mark.parametrize("workers", [1, 2])

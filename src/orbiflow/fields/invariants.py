@@ -218,8 +218,16 @@ class InvariantField(nn.Module, ABC):
         """Return the basis in the coefficients that the field evaluates, as (row, column, value)."""
 
     @abstractmethod
+    def bound(self) -> Callable[[Tensor], Tensor]:
+        """Return the field with what its parameters determine computed once, for many evaluations."""
+
+    @abstractmethod
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
         """Return the gradient (P,) of sum forces . V(points) in the parameters; inputs (N, d)."""
+
+    def forward(self, points: Tensor) -> Tensor:
+        """Return V at points (..., d): vectors of the same shape."""
+        return self.bound()(points)
 
     def _check_points(self, points: Tensor) -> None:
         """Raise OrbiflowError for points that the field cannot be evaluated at."""
@@ -288,12 +296,7 @@ MAX_SIGNED_TERMS = 6
 def steepness(parameters: Tensor, magnitude: Tensor) -> Tensor:
     """Return sum_j |c_j| 2 pi sqrt 2 |kappa_j|: times `group_factor`, a bound of |DV| anywhere.
 
-    Args:
-        parameters: Coordinates c (..., P) in the orthonormal basis.
-        magnitude: |kappa| (P,) of each, `InvariantBasis.magnitude`.
-
-    Returns:
-        The bounds (...,), per unit of time.
+    Coordinates c are (..., P) in the orthonormal basis, |kappa| (P,) is `InvariantBasis.magnitude`.
     """
     return math.sqrt(2.0) * (parameters.abs() * (2.0 * math.pi * magnitude)).sum(dim=-1)
 
@@ -352,12 +355,10 @@ def _largest_sum(terms: Array) -> Array:
 def coefficient_bound(
     group: CrystallographicGroup, basis: InvariantBasis, coefficients: Tensor
 ) -> Tensor:
-    """Return an upper bound of the Jacobian's spectral norm for given coefficients.
+    """Return sum over kappa of 2 pi sqrt 2 |kappa| |[a, b]|, a bound (S,) of the Jacobian's norm.
 
-    The bound is the sum over kappa of 2 pi sqrt 2 |kappa| |[a, b]|.
-
-    Sharper than `group_factor` for given coefficients, since parameters at one frequency are added
-    before their size is taken.
+    Sharper than `group_factor` for given coefficients (S, P), since parameters at one frequency are
+    added before their size is taken.
     """
     d, modes = group.dim, len(basis.frequencies)
     rows, columns = (

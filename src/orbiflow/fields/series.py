@@ -23,15 +23,10 @@ BLOCK_BYTES = 2**21
 
 
 def trigonometric_table(u: Tensor, order: int, out: Tensor | None = None) -> Tensor:
-    """Return rows 1, cos 2 pi u, ..., cos 2 pi K u, sin 2 pi u, ..., sin 2 pi K u.
+    """Return rows 1, cos 2 pi u, ..., cos 2 pi K u, sin 2 pi u, ..., sin 2 pi K u, K = `order`.
 
-    Args:
-        u: Fractional coordinates (..., N).
-        order: The largest frequency K.
-        out: A tensor for the result.
-
-    Returns:
-        A tensor (..., 2 K + 1, N), not tracked by autograd.
+    For fractional coordinates (..., N) they are (..., 2 K + 1, N), in `out` if it is given, and not
+    tracked by autograd.
     """
     if out is None:
         out = u.new_empty(*u.shape[:-1], 2 * order + 1, u.shape[-1])
@@ -202,15 +197,10 @@ def _plain_table(weights: Tensor, u: Tensor, i: int) -> Tensor:
 
 
 def evaluate(weights: Tensor, u: Tensor) -> Tensor:
-    """Return values of the series at points.
+    """Return values (S, C, N) of series (S, C, A_1, ..., A_d) at fractional points (S, d, N).
 
-    Args:
-        weights: Coefficients (S, C, A_1, ..., A_d).
-        u: Fractional coordinates (S, d, N).
-
-    Returns:
-        Values (S, C, N). First derivatives in both arguments are in closed form; higher ones, and
-        those of `torch.func`, use ordinary operations.
+    First derivatives in both arguments are in closed form; higher ones, and those of `torch.func`,
+    use ordinary operations.
     """
     if transformed():
         return evaluate_plainly(weights, u)

@@ -201,10 +201,7 @@ def _outer(factors: list[Tensor]) -> Tensor:
 
 
 def spline_sum(table: Tensor, u: Tensor) -> Tensor:
-    """Return values (C, N) of splines at `u` (d, N), in cells of the grid.
-
-    Args:
-        table: The `padded` coefficients.
+    """Return values (C, N) of splines at `u` (d, N), in cells of a `padded` grid of coefficients.
 
     First derivatives in both arguments are in closed form; higher ones, and those of `torch.func`, use
     ordinary operations. A cubic spline's third derivatives are constant in each cell.

@@ -125,12 +125,7 @@ class Flow(nn.Module):
         """Return a view of the flow, with the same fields and parameters, integrated otherwise.
 
         This flow does not change. The view has the same `state_dict`; training it trains this flow.
-
-        Args:
-            steps: The number of Runge-Kutta steps in each segment.
-            method: As in the constructor. Default: this flow's.
-
-        Raises `OrbiflowError` for `steps` < 1 or an unknown method.
+        Both arguments are as in the constructor; the default method is this flow's.
 
         >>> flow = Flow(torch.sin, steps=8)
         >>> flow.with_steps(2 * flow.steps).steps, flow.steps
@@ -158,10 +153,9 @@ class Flow(nn.Module):
         return self._last(points, (points,), inverse=inverse)[0]
 
     def forward_and_log_det(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        """Return `forward` and the log-determinant of its Jacobian, from one integration.
+        """Return `forward` and the log-determinant (...,) of its Jacobian, from one integration.
 
-        The second is the integral of the divergence along the path (instantaneous change of
-        variables; paper, section 5.2), shape (...,).
+        It is the integral of the divergence along the path (paper, section 5.2).
         """
         self._check(points)
         return self._with_log_det(points, inverse=False)

@@ -114,10 +114,7 @@ METHODS: dict[str, RungeKutta] = {
 
 
 def method(name: str) -> RungeKutta:
-    """Look a method up.
-
-    Raises `OrbiflowError` for an unknown name.
-    """
+    """Return a method by its name; raise `OrbiflowError` for an unknown one."""
     if name not in METHODS:
         raise OrbiflowError(f"unknown integrator {name!r}; choose from {', '.join(METHODS)}")
     return METHODS[name]

@@ -62,12 +62,9 @@ WALLPAPER_GROUPS: dict[str, WallpaperGroup] = {
 
 
 def wallpaper_group(name: str, lattice: ArrayLike | None = None) -> CrystallographicGroup:
-    """Return the wallpaper group `name`.
+    """Return the wallpaper group `name`, one of `WALLPAPER_GROUPS`.
 
-    Args:
-        name: The group's name, one of `WALLPAPER_GROUPS`.
-        lattice: The basis vectors as columns, shape (2, 2). Default: a lattice of the group's system.
-
+    The lattice has basis vectors as columns, (2, 2); by default it is one of the group's system.
     Raises `GroupError` for an unknown name, or a lattice that is not of the group's system.
 
     >>> wallpaper_group("p6m").order

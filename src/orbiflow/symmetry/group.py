@@ -198,12 +198,8 @@ class CrystallographicGroup:
         """Return all elements that take the point `source` within `radius` of `center`, nearest first.
 
         With the bounding disc of a tile as source, and radius = tile radius + region radius, these
-        are the elements whose image of the tile can meet the region.
-
-        Args:
-            center: A point (d,).
-            radius: The distance, in the units of the points.
-            source: A point (d,). Default: `center`.
+        are the elements whose image of the tile can meet the region. Both points are (d,); the source
+        is by default the centre.
         """
         center = np.asarray(center, dtype=np.float64)
         source = center if source is None else np.asarray(source, dtype=np.float64)
@@ -259,10 +255,7 @@ class CrystallographicGroup:
 
 
 def checked_group(group: object) -> CrystallographicGroup:
-    """Return `group` if it is a group.
-
-    Raises `GroupError` if it is anything else, such as a group's name.
-    """
+    """Return `group` if it is a group; raise `GroupError` if not, such as for a group's name."""
     if isinstance(group, CrystallographicGroup):
         return group
     hint = "see orbiflow.symmetry for groups"
@@ -363,10 +356,7 @@ def group_header(group: CrystallographicGroup) -> dict[str, Any]:
 
 
 def group_from_header(header: Mapping[str, Any], name: str = "") -> CrystallographicGroup:
-    """Return the group of a `group_header`, with bit-identical basis and representatives.
-
-    Raises `GroupError` if the header does not describe a group.
-    """
+    """Return the group of a `group_header`, bit-identical; raise `GroupError` if it describes none."""
     try:
         lattice, linear, shifts = (
             np.array(header[key], dtype=np.float64) for key in ("lattice", "linear", "translations")

@@ -25,9 +25,7 @@ TOLERANCE = 1e-9
 
 
 def cast_like(array: Array, like: Points) -> Points:
-    """Return a float64 array in the form of `like`.
-
-    For NumPy it is returned as it is, for torch as a tensor of the dtype and device of `like`.
+    """Return a float64 array, or for a tensor `like` the same as a tensor of its dtype and device.
 
     Raises `GroupError` for an integer tensor, in which a rotation would be truncated.
     """

@@ -170,10 +170,9 @@ def _step(body: Elastic, slide: _Slide, z: Complex) -> tuple[_Slide, Complex]:
     own[:-1, :-1] = matrix * (np.conj(along)[:, None] * along[None]).real
     own[:-1, -1] = own[-1, :-1] = (np.conj(along) * product).real
     own[-1, -1] = np.vdot(p, product).real
-    if low is not None:
-        less = low.conj().T @ np.concatenate([np.diag(along), p[:, None]], axis=1)
-        own -= (less.conj().T @ less).real
-        product -= low @ (low.conj().T @ p)
+    less = low.conj().T @ np.concatenate([np.diag(along), p[:, None]], axis=1)
+    own -= (less.conj().T @ less).real
+    product -= low @ (low.conj().T @ p)
     gap = pull - product
     right = np.append((np.conj(along) * gap).real, np.vdot(p, gap).real)
     own[np.diag_indices_from(own)] += 1e-8 * np.trace(own) / len(own)

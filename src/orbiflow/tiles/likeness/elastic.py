@@ -317,9 +317,9 @@ class Condensed:
     inverse: Array
 
     @property
-    def low(self) -> Complex | None:
-        """A factor (n, k) or None: the outline's matrix is `outline` less it times its adjoint."""
-        return None
+    def low(self) -> Complex:
+        """A factor (n, k): the outline's matrix is `outline` less it times its adjoint."""
+        return np.zeros((len(self.outline), 0), dtype=complex)
 
     def forces(self, forces: Complex) -> Complex:
         """Return forces (N, C) as forces (n, C) on the outline."""

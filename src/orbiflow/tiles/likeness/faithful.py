@@ -80,12 +80,9 @@ class Fidelity:
 
 
 def fidelity(rest: Complex, bent: Complex, cost: float) -> Fidelity:
-    """Compare an outline with what it was bent from.
+    """Compare an outline with what it was bent from, at a cost `Elastic.cost`.
 
-    Args:
-        rest, bent: Outlines (n,) x + iy, counter-clockwise and nearly evenly spaced, whose points
-            correspond.
-        cost: The cost of bending, `Elastic.cost`.
+    Outlines (n,) x + iy are counter-clockwise and nearly evenly spaced, and their points correspond.
 
     >>> square = np.array([0, 1, 2, 2 + 1j, 2 + 2j, 1 + 2j, 2j, 1j])
     >>> fidelity(square, 3 * square * 1j + 7, 0.0).score > 0.999

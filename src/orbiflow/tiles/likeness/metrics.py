@@ -17,22 +17,14 @@ from shapely.geometry import MultiPolygon, Polygon, box
 from orbiflow.arguments import as_array
 from orbiflow.arrays import Array, Integers, Window
 from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.geometry import polygons_in
 
 # the accuracy of Hausdorff distances, as a share of the diagonal of the box around both curves
 HAUSDORFF_TOLERANCE = 1e-6
 
 
-def hausdorff_distance(a: Array, b: Array, *, tolerance: float) -> float:
-    """Return the Hausdorff distance between the unions of the segments `a` and `b`, each (M, 2, 2).
-
-    The result is too small by at most `tolerance`, in the unit of the coordinates, never too large.
-    """
-    forth = _directed(a, b, tolerance)
-    return max(forth, _directed(b, a, tolerance, at_least=forth))
-
-
 def _directed(a: Array, b: Array, tolerance: float, at_least: float = 0.0) -> float:
-    """Return the greatest distance from a point of `a` to the nearest point of `b`."""
+    """Return the greatest distance from a point of segments `a` (M, 2, 2) to the nearest one of `b`."""
     tree = shapely.STRtree(list(np.asarray(shapely.linestrings(b), dtype=object)))
     start, end = a[:, 0], a[:, 1]
     best = at_least
@@ -165,7 +157,9 @@ def hausdorff(a: Shape, b: Shape) -> float:
     one, other = as_region(a, "a"), as_region(b, "b")
     xmin, ymin, xmax, ymax = shapely.total_bounds([one, other])
     tolerance = HAUSDORFF_TOLERANCE * float(np.hypot(xmax - xmin, ymax - ymin))
-    return hausdorff_distance(_edges(one), _edges(other), tolerance=tolerance)
+    a_edges, b_edges = _edges(one), _edges(other)
+    forth = _directed(a_edges, b_edges, tolerance)
+    return max(forth, _directed(b_edges, a_edges, tolerance, at_least=forth))
 
 
 def compare(tile: Shape, target: Shape, window: Shape | None = None) -> ShapeMetrics:
@@ -198,9 +192,8 @@ def share(value: float) -> float:
 
 def _edges(region: Region) -> Array:
     """Return boundary segments of `region`, (M, 2 ends, 2 coordinates)."""
-    polygons = region.geoms if isinstance(region, MultiPolygon) else [region]
-    rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
-    coords = [np.asarray(ring.coords, dtype=np.float64)[:, :2] for ring in rings]
+    rings = [ring for part in polygons_in(region) for ring in (part.exterior, *part.interiors)]
+    coords = [shapely.get_coordinates(ring) for ring in rings]
     return np.concatenate([np.stack([xy[:-1], xy[1:]], axis=1) for xy in coords])
 
 

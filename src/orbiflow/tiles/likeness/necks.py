@@ -130,14 +130,8 @@ def hair_share(ring: ArrayLike, width: float) -> float:
 
     A part is thin if no disc of that diameter inside the polygon covers it (the residue of a
     morphological opening). It counts if it has more than `OUTLINE_PER_WIDTH` widths of the outline,
-    so corners count only if they are sharper than 23 degrees.
-
-    Args:
-        ring: The vertices (n, 2) of a simple polygon, in either orientation.
-        width: The width, in the polygon's own units.
-
-    Raises:
-        OrbiflowError: for a polygon that crosses itself or has no area, or a width of 0 or less.
+    so corners count only if they are sharper than 23 degrees. The width is in the polygon's own
+    units. The ring and errors are as for `narrowest_neck`; a width of 0 or less is refused.
 
     >>> bar = [[0.0, 0.0], [9.5, 0.0], [9.5, 0.5], [0.0, 0.5]]
     >>> hair_share(bar, 0.4), hair_share(bar, 0.6)

@@ -58,13 +58,10 @@ def boundary_iou(goal: shapely.Polygon, boundaries: Array) -> Array:
 
 
 class Overlap:
-    """The overlap of rings with one region.
+    """The overlap of rings with one region, a simple ring (M, 2), see `prepared_region`.
 
     The common area of P and T changes at the rate of the normal speed integrated over the part of
     P's boundary inside T; along a side the speed is linear between its ends.
-
-    Args:
-        target: The simple ring (M, 2) of the region, in either orientation; see `prepared_region`.
     """
 
     def __init__(self, target: Array) -> None:

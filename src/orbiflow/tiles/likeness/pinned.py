@@ -159,7 +159,6 @@ class PinnedCondensed(Condensed):
 
     @property
     def low(self) -> Complex:
-        """The factor (n, k) of the correction of the outline's matrix."""
         return self.coupling @ np.linalg.cholesky(self.solve)
 
     def forces(self, forces: Complex) -> Complex:

@@ -93,12 +93,11 @@ def held_on_tiles(body: Elastic, space: TileSpace, z: Complex, rounds: int) -> B
 class _Reduced:
     """The outline's equations in the parameters of one placement's tiles."""
 
-    def __init__(self, matrix: Array, low: Complex | None, real: Array, imaginary: Array) -> None:
+    def __init__(self, matrix: Array, low: Complex, real: Array, imaginary: Array) -> None:
         self.real, self.imaginary = real, imaginary
         own = real.T @ (matrix @ real) + imaginary.T @ (matrix @ imaginary)
-        if low is not None:
-            less = low.conj().T @ (real + 1j * imaginary)
-            own -= (less.conj().T @ less).real
+        less = low.conj().T @ (real + 1j * imaginary)
+        own -= (less.conj().T @ less).real
         # IH1 does not care about the offset
         own[np.diag_indices_from(own)] += 1e-10 * np.trace(own) / len(own)
         self.factor = scipy.linalg.cho_factor(own, overwrite_a=True, check_finite=False)

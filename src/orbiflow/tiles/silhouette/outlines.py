@@ -159,18 +159,22 @@ def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
     components = polygons_in(geometry)
     solid = polygons_in(shapely.unary_union([filled(part) for part in components]))
     shape = filled(max(solid, key=lambda part: part.area))
-    notes: list[str] = []
-    if len(solid) > 1:
-        share = shape.area / sum(part.area for part in solid)
-        notes.append(
-            f"kept the largest of {len(solid)} components ({percent(share)} of the filled area)"
-        )
     own = shapely.intersection(geometry, shape)
-    n_holes = sum(len(part.interiors) for part in polygons_in(own))
-    if n_holes:
-        share = 1 - own.area / shape.area
-        notes.append(f"filled {n_holes} hole{'s' * (n_holes > 1)} ({percent(share)} of the area)")
-    return shape, notes
+    holes = sum(len(part.interiors) for part in polygons_in(own))
+    kept = shape.area / sum(part.area for part in solid)
+    return shape, left_out(len(solid), kept, holes, 1 - own.area / shape.area)
+
+
+def left_out(components: int, kept: float, holes: int, filled: float) -> list[str]:
+    """Return notes that one of these components was kept, and its holes filled, with their shares."""
+    notes: list[str] = []
+    if components > 1:
+        notes.append(
+            f"kept the largest of {components} components ({percent(kept)} of the filled area)"
+        )
+    if holes:
+        notes.append(f"filled {holes} hole{'s' * (holes > 1)} ({percent(filled)} of the area)")
+    return notes
 
 
 # the length of an outline of area 1 that is sampled with the fewest points; a disc has 3.5

@@ -120,12 +120,7 @@ class Pins:
         return held
 
     def parts(self, points: Array, triangles: Integers) -> list[Integers]:
-        """Return the indices of pinned points, an array per connected part.
-
-        Args:
-            points: The points (N, 2) of a mesh, in the normal form.
-            triangles: The triangles (M, 3) of the mesh.
-        """
+        """Return the indices of a mesh's pinned points (N, 2), by parts that triangles connect."""
         held = self.holds(points)
         pairs = np.concatenate([triangles[:, [k - 1, k]] for k in range(3)])
         pairs = pairs[held[pairs].all(axis=1)]

@@ -95,11 +95,7 @@ class Colouring:
         return int(self.table[aspect, first, second])
 
     def colours(self, copies: Copies) -> Integers:
-        """Return the colour (M,) of each copy.
-
-        Args:
-            copies: Copies in `tiling`, or in one with the same group and aspects.
-        """
+        """Return the colour (M,) of each copy, in `tiling` or one with the same group and aspects."""
         a, b, c = self.sublattice
         wraps, second = np.divmod(copies.cells[:, 1], c)
         return self.table[copies.aspects, (copies.cells[:, 0] - wraps * b) % a, second]
@@ -112,9 +108,6 @@ def colouring(tile: Tiles) -> Colouring:
     3 ... colours in turn. It is deterministic: of equals the smallest index wins, so that colours
     follow the aspects where possible. Colour 0 is the most frequent, and so on. Extremely skew
     lattices, whose tiles meet their own translates modulo all those sublattices, get a larger one.
-
-    Args:
-        tile: A tile or a tiling.
 
     Raises `OrbiflowError` if polygon and group are of very different size.
 

@@ -234,11 +234,9 @@ class IsohedralClass:
     def template(self, shape: Any = None) -> Any:
         """Return vertices (..., K, 2) of the template, counter-clockwise.
 
-        Args:
-            shape: Parameters (..., shape_dim), NumPy or torch (then differentiable); for the pentagons
-                the displacement of p1 from its default. None means the default, as a NumPy array.
-
-        Raises `OrbiflowError` if the last axis of `shape` is not `shape_dim` long.
+        Parameters are (..., shape_dim), NumPy or torch (then differentiable); for the pentagons the
+        displacement of p1 from its default. None means the default, as a NumPy array. Raises
+        `OrbiflowError` if the last axis has another length.
         """
         if shape is None:
             return self._default.copy()
@@ -248,10 +246,8 @@ class IsohedralClass:
     def stretch(self, parameters: Points) -> Points:
         """Return unimodular maps L (..., 2, 2) that commute with the point group.
 
-        Args:
-            parameters: Parameters (..., stretch_dim), NumPy or torch (then differentiable).
-
-        Raises `OrbiflowError` if the last axis of `parameters` is not `stretch_dim` long.
+        Parameters are (..., stretch_dim), NumPy or torch (then differentiable). Raises `OrbiflowError`
+        if their last axis has another length.
         """
         own = self._parameters(parameters, self.stretch_dim, "stretch")
         return stretch_matrix(self._freedom, own)
@@ -259,10 +255,6 @@ class IsohedralClass:
     def group(self) -> CrystallographicGroup:
         """Return the group of the template; the same for all shape parameters."""
         return self._group
-
-    def generators(self) -> tuple[Isometry, ...]:
-        """Return the paper's rotations and transflections, in the table's order."""
-        return tuple(operator.isometry for operator in self.paper_operators())
 
     def paper_operators(self) -> tuple[PaperOperator, ...]:
         """Return the paper's symmetrization operators, outermost first: V = O_1(O_2(...(F)))."""
@@ -291,7 +283,8 @@ class IsohedralClass:
         ]
         # another basis of the paper's lattice: with the shortest, |k_i| <= Omega is isotropic
         basis = reduced_basis(np.stack(columns, axis=1))
-        return CrystallographicGroup.generate(basis, self.generators(), name=self.row.group)
+        generators = [operator.isometry for operator in self.paper_operators()]
+        return CrystallographicGroup.generate(basis, generators, name=self.row.group)
 
     @cached_property
     def _freedom(self) -> Array:

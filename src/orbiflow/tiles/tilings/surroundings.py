@@ -281,13 +281,7 @@ def touching(around: Surroundings, tolerance: float) -> tuple[Surroundings, NDAr
 
 
 def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:
-    """Return the tiles that meet the rectangle, as elements of the group, nearest the middle first.
-
-    Args:
-        tile: A tile or a tiling, which need not be certified.
-        window: A rectangle (xmin, ymin, xmax, ymax) in the tile's units.
-
-    Raises `OrbiflowError` for an empty window, or one of more than `MAX_TILES` tiles.
+    """Return `copies_meeting` as elements of the group, nearest the window's middle first.
 
     >>> from orbiflow.tiles import Tile, isohedral_class
     >>> ih1 = isohedral_class("IH1")
@@ -304,11 +298,7 @@ def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:
 def aspects(tile: Tiles, elements: Sequence[Isometry]) -> list[int]:
     """Return the aspect of each element's tile: tiles of one aspect are translates.
 
-    Args:
-        tile: A tile or a tiling.
-        elements: The elements; a plain isometry moves prototile 0.
-
-    Raises `OrbiflowError` for an isometry that is not in the tile's group.
+    A plain isometry moves prototile 0. Raises `OrbiflowError` for one that is not in the tile's group.
     """
     tiling = as_tiling(tile)
     find, group = tiling.aspects.find, tiling.group

@@ -251,14 +251,7 @@ def aspect_boxes(tiling: Tiling) -> tuple[Array, Array]:
 
 
 def _cells_within(lattice: Array, least: Array, most: Array) -> tuple[Integers, Integers]:
-    """Return all integer n with least <= lattice @ n <= most, for A boxes at once.
-
-    Args:
-        least, most: The corners (A, 2) of the boxes.
-
-    Returns:
-        The number (M,) of the box, and n (M, 2).
-    """
+    """Return all integer n (M, 2) with least <= lattice @ n <= most, and of which of A boxes (M,)."""
     inverse = np.linalg.inv(lattice)[1]
     # the range of the second coordinate over a box; its rows; and the range of the first in a row
     middle, half = (least + most) @ inverse / 2, (most - least) @ abs(inverse) / 2

@@ -339,9 +339,6 @@ def edge_to_edge(tile: Tiles) -> Tiling:
     Then neighbours have the same vertices on their common boundary. A tiling that is edge to edge
     keeps its vertices.
 
-    Args:
-        tile: A tile or a tiling.
-
     Raises `OrbiflowError` if polygon and group are of very different size.
 
     >>> from orbiflow.symmetry import wallpaper_group

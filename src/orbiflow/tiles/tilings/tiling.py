@@ -257,10 +257,7 @@ Tiles: TypeAlias = Tile | Tiling
 
 
 def as_tiling(tiles: Tiles) -> Tiling:
-    """Return a tile or a tiling as a tiling.
-
-    Raises `OrbiflowError` for anything else.
-    """
+    """Return a tile or a tiling as a tiling; raise `OrbiflowError` for anything else."""
     if isinstance(tiles, Tiling):
         return tiles
     if is_a(tiles, Tile):

@@ -11,7 +11,7 @@ from skimage.measure import find_contours
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette.outlines import outer_ring, percent, simplified
+from orbiflow.tiles.silhouette.outlines import left_out, outer_ring, simplified
 from orbiflow.tiles.silhouette.readers.reading import Source
 
 MIN_AREA = 30.0  # square pixels
@@ -78,16 +78,10 @@ def _largest(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], list[str]]:
     areas = np.bincount(labels.ravel())
     areas[0] = 0
     shape = labels == areas.argmax()
-    notes: list[str] = []
-    if n > 1:
-        share = areas.max() / areas.sum()
-        notes.append(f"kept the largest of {n} components ({percent(share)} of the filled area)")
     holes = shape & ~mask
     n_holes = ndimage.label(holes, structure=np.ones((3, 3), dtype=int))[1]
-    if n_holes:
-        share = holes.sum() / shape.sum()
-        notes.append(f"filled {n_holes} hole{'s' * (n_holes > 1)} ({percent(share)} of the area)")
-    return shape, notes
+    kept, bare = areas.max() / max(areas.sum(), 1), holes.sum() / max(shape.sum(), 1)
+    return shape, left_out(n, kept, n_holes, bare)
 
 
 def _polygon(values: Array, cut: float, inside: float) -> tuple[Polygon, bool]:
