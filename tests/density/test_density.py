@@ -9,7 +9,6 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from networks import neural_field
 from orbiflow.density import (
     MEASURES,
     Density,
@@ -24,7 +23,7 @@ from orbiflow.density import (
     midpoints,
 )
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import FourierField
+from orbiflow.fields import FourierField, neural_field
 from orbiflow.flows import Flow
 
 SPACES = (Torus(2), Sphere(), KleinBottle(), ProjectivePlane())

@@ -4,8 +4,7 @@ import pytest
 import torch
 from hypothesis import given
 
-from networks import neural_field
-from orbiflow.fields import divergence, jacobian, prepared_with_divergence
+from orbiflow.fields import divergence, jacobian, neural_field, prepared_with_divergence
 from orbiflow.symmetry import wallpaper_group
 from strategies import central_difference, random_field, random_tensor, seeds
 

@@ -8,8 +8,14 @@ import pytest
 import torch
 from torch import nn
 
-from networks import neural_field
-from orbiflow.fields import FourierField, SplineField, divergence, jacobian, symmetrize
+from orbiflow.fields import (
+    FourierField,
+    SplineField,
+    divergence,
+    jacobian,
+    neural_field,
+    symmetrize,
+)
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup, wallpaper_group
 from strategies import random_tensor

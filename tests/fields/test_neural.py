@@ -5,9 +5,8 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from networks import neural_field
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import PeriodicFeatures
+from orbiflow.fields import PeriodicFeatures, neural_field
 from orbiflow.symmetry import CrystallographicGroup, wallpaper_group
 from strategies import equivariance_error, groups, largest, random_tensor, seeds
 

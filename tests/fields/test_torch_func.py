@@ -12,9 +12,8 @@ from torch import Tensor, nn
 from torch.autograd import forward_ad
 from torch.func import functional_call, grad, hessian, jacfwd, jacrev, jvp, vjp, vmap
 
-from networks import neural_field
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import SplineField, divergence, jacobian, symmetrize
+from orbiflow.fields import SplineField, divergence, jacobian, neural_field, symmetrize
 from orbiflow.symmetry import CrystallographicGroup, identification_group, wallpaper_group
 from strategies import central_difference, groups, random_field, random_tensor, seeds
 

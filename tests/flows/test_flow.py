@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from torch import nn
 
-from networks import neural_field
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import FourierField, symmetrize
+from orbiflow.fields import FourierField, neural_field, symmetrize
 from orbiflow.flows import METHODS, Flow
 from orbiflow.symmetry import wallpaper_group
 from strategies import (

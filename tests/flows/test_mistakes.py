@@ -8,9 +8,15 @@ import torch
 from hypothesis import given
 from torch import nn
 
-from networks import neural_field
 from orbiflow.errors import GroupError, OrbiflowError
-from orbiflow.fields import FourierField, PeriodicFeatures, SplineField, jacobian, symmetrize
+from orbiflow.fields import (
+    FourierField,
+    PeriodicFeatures,
+    SplineField,
+    jacobian,
+    neural_field,
+    symmetrize,
+)
 from orbiflow.flows import Flow
 from orbiflow.symmetry import IDENTIFICATION_SPACES, identification_group, wallpaper_group
 from strategies import groups, random_tensor

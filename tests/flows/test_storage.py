@@ -16,9 +16,8 @@ from hypothesis import strategies as st
 from safetensors.torch import load, save
 from torch import Tensor, nn
 
-from networks import neural_field
 from orbiflow.errors import InputFileError, OrbiflowError, OutputError
-from orbiflow.fields import FourierField, SplineField, symmetrize, time_dependent
+from orbiflow.fields import FourierField, SplineField, neural_field, symmetrize, time_dependent
 from orbiflow.flows import METHODS, Flow, load_flow, save_flow
 from orbiflow.symmetry import CrystallographicGroup, identification_group, wallpaper_group
 from strategies import groups, random_tensor, seeds, space_group

@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from torch import Tensor
 from torch.func import functional_call, grad, hessian, jacfwd, jacrev, vmap
 
-from networks import neural_field
 from orbiflow.errors import CoarseStepsWarning
-from orbiflow.fields import SplineField, symmetrize, time_dependent
+from orbiflow.fields import SplineField, neural_field, symmetrize, time_dependent
 from orbiflow.flows import Flow
 from orbiflow.symmetry import identification_group, wallpaper_group
 from strategies import central_difference, gentle_field, groups, random_tensor, seeds, several

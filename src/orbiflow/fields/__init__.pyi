@@ -18,6 +18,9 @@ from .splines import spline_sum as spline_sum
 from .splines import symbol as symbol
 from .symmetrization import PeriodicFeatures as PeriodicFeatures
 from .symmetrization import Symmetrized as Symmetrized
+from .symmetrization import neural_field as neural_field
 from .symmetrization import periodic_operator as periodic_operator
+from .symmetrization import rotation_operator as rotation_operator
 from .symmetrization import summed_over_powers as summed_over_powers
 from .symmetrization import symmetrize as symmetrize
+from .symmetrization import transflection_operator as transflection_operator

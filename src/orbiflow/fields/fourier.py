@@ -8,7 +8,12 @@ import torch
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.fields.invariants import InvariantBasis, InvariantField, coefficient_bound
+from orbiflow.fields.invariants import (
+    InvariantBasis,
+    InvariantField,
+    coefficient_bound,
+    sobolev_weights,
+)
 from orbiflow.fields.series import differentiate, evaluate, weight_cotangent
 from orbiflow.symmetry import CrystallographicGroup
 
@@ -90,6 +95,10 @@ class FourierField(InvariantField):
         # not reshape(-1, P): P is 0 for Omega = 0 and a group without invariant vectors
         return parameters if parameters.dim() == 2 else parameters.unsqueeze(0)
 
+    def sobolev_weights(self, smoothness: float) -> Array:
+        """Return factors (P,) (1 + |kappa|^2 vol^(2/d))^(-smoothness / 2), which have no unit."""
+        return sobolev_weights(self.group, self.basis, smoothness)
+
     def weights(self) -> Tensor:
         """Return the Fourier weights in the tensor basis of `series`.
 
@@ -111,7 +120,13 @@ class FourierField(InvariantField):
         """Return the gradient of sum forces . V(points) in the parameters, without autograd.
 
         This is the projection of a force on the invariant fields (design point 10). V is linear in
-        the parameters, so their values do not matter. Of a stack, inputs are (S, N, d).
+        the parameters, so their values do not matter.
+
+        Args:
+            points, forces: Arrays (N, d), or (S, N, d) for a stack.
+
+        Returns:
+            (P,) or (S, P).
         """
         flat, cotangents = (
             t.reshape(self._stacked(self.parameters_).shape[0], -1, self.group.dim)
@@ -122,6 +137,10 @@ class FourierField(InvariantField):
         gradient = flat.new_zeros(len(flat), self.size)
         gradient.index_add_(1, self.columns, table[:, self.rows] * self.values)
         return (gradient * self.scale).reshape(self.parameters_.shape)
+
+    def forward(self, points: Tensor) -> Tensor:
+        """Return V at points (..., d): vectors of the same shape."""
+        return self._values(self.weights(), points)
 
     def divergence(self, points: Tensor) -> Tensor:
         """Return the trace of the Jacobian, (...,), in closed form: itself one Fourier sum."""

@@ -218,16 +218,8 @@ class InvariantField(nn.Module, ABC):
         """Return the basis in the coefficients that the field evaluates, as (row, column, value)."""
 
     @abstractmethod
-    def bound(self) -> Callable[[Tensor], Tensor]:
-        """Return the field with what its parameters determine computed once, for many evaluations."""
-
-    @abstractmethod
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
         """Return the gradient (P,) of sum forces . V(points) in the parameters; inputs (N, d)."""
-
-    def forward(self, points: Tensor) -> Tensor:
-        """Return V at points (..., d): vectors of the same shape."""
-        return self.bound()(points)
 
     def _check_points(self, points: Tensor) -> None:
         """Raise OrbiflowError for points that the field cannot be evaluated at."""

@@ -12,6 +12,7 @@ must do what is described here. `jacobian` returns dV_i / dp_j (..., d, d), `div
 | `bound_with_divergence()` | V and its divergence come from shared work |
 | `lipschitz_bound()` | the accuracy of integration steps is judged without trying them |
 | `time_dependent` true | it is called as V(points, time), see `TimeDependentField` |
+| `with_divergence(points, time)`, if time-dependent | V and its divergence come from shared work |
 
 Built-in fields are evaluated by autograd functions with hand-written derivatives. Under `torch.func`
 ordinary operations compute the same sums: nested forward mode (`jacfwd` of `jacfwd`) through an
@@ -95,6 +96,8 @@ def prepared_with_divergence(field: Callable[..., Tensor]) -> Callable[..., tupl
     """Return, as `prepared` does, a function for V and its divergence, sharing work if possible."""
     own: Any = field
     timed = is_time_dependent(field)
+    if timed and hasattr(field, "with_divergence"):
+        return own.with_divergence
     if not timed and hasattr(field, "bound_with_divergence"):
         return own.bound_with_divergence()
     in_closed_form = not timed and (hasattr(field, "divergence") or hasattr(field, "jacobian"))

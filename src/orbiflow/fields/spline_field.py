@@ -110,6 +110,10 @@ class SplineField(InvariantField):
 
         return both
 
+    def forward(self, points: Tensor) -> Tensor:
+        """Return V at points (..., d): vectors of the same shape."""
+        return self.bound()(points)
+
     def divergence(self, points: Tensor) -> Tensor:
         """Return the trace of the Jacobian, (...,), exact."""
         return self.bound_with_divergence()(points)[1]
