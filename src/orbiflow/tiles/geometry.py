@@ -13,7 +13,8 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import is_tensor
-from orbiflow.arrays import Array, Complex
+from orbiflow.arrays import Array, Complex, Integers
+from orbiflow.errors import OrbiflowError
 
 if TYPE_CHECKING:
     import torch
@@ -174,6 +175,18 @@ def arc_lengths(ring: Array) -> Array:
     """
     sides = np.roll(ring, -1, axis=0) - ring
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(sides, axis=1))])
+
+
+def border(triangles: Integers) -> Integers:
+    """Return the points, in order, of the sides that belong to one of the triangles (M, 3) alone."""
+    sides = {(int(t[k - 1]), int(t[k])) for t in triangles for k in range(3)}
+    after = {a: b for a, b in sides if (b, a) not in sides}
+    ring = [min(after)]
+    while len(ring) <= len(after) and (follower := after[ring[-1]]) != ring[0]:
+        ring.append(follower)
+    if len(ring) != len(after):
+        raise OrbiflowError("the bending's triangles do not fill one outline")
+    return np.array(ring)
 
 
 def polygons_in(geometry: BaseGeometry) -> list[Polygon]:

@@ -10,8 +10,7 @@ from orbiflow.runtime import Cancel, Cancelled
 from orbiflow.tiles import CLASSES, complex_points, plane_points, resampled, signed_area
 from orbiflow.tiles.likeness import Elastic
 from orbiflow.tiles.search.co_deformation import Stage, _moves, shifted
-from orbiflow.tiles.search.placements import Placements, best_placements
-from orbiflow.tiles.search.tile_space import TileSpace
+from orbiflow.tiles.search.tile_space import Placements, TileSpace, best_placements
 from outlines import animal
 from strategies import seeds
 

@@ -43,11 +43,7 @@ FARTHEST = 1e6  # greatest reach of a drawing, in sizes of the silhouette
 
 
 def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
-    """Read an SVG file and carry its drawing onto a tile, in the tile's units; return it with notes.
-
-    Fills and strokes are kept and gradients become one colour; texts, pictures and clips are left
-    out. `currentColor` without a `color` is the ink that shows on each tile.
-    """
+    """Read an SVG file and carry its fills and strokes onto a tile, in the tile's units, with notes."""
     check_file(path)
     drawing = Drawing(path, parse_xml(path, read_bytes(path, MAX_BYTES)))
     drawing.collect()

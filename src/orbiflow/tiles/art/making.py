@@ -68,8 +68,6 @@ class Artwork:
 
     def _repr_png_(self) -> bytes:
         """Return what a notebook shows."""
-        from orbiflow.tiles.art.making import png_of
-
         return png_of(render_artwork(self), self.settings.dpi)
 
 
@@ -149,10 +147,7 @@ TILE, MOTIF = "tile", "motif"
 
 
 def art_scene(art: Artwork) -> Scene:
-    """Return the page in millimetres, as `render_artwork` draws it.
-
-    A picture of pixels becomes part of the drawing, already carried onto the tile.
-    """
+    """Return the page in millimetres, as `render_artwork` draws it, with pixels carried already."""
     page, chosen = art.page, palette(art.settings.palette)
     unit = INCH / art.settings.dpi  # a pixel in mm
     linear, offset = unit * page.linear, unit * page.offset
@@ -237,21 +232,14 @@ def draw_art(
     """Write a picture of a tiling with something on its tiles, and return what was drawn.
 
     Args:
-        tile: A tile in memory, or a run's folder; see `with_map`.
+        tile, settings, force, on_event, cancel: As for `export`; the tile needs a map for a picture.
         out: The file, .png or .svg.
-        settings: How it is drawn.
         picture: The file of a picture or drawing over the silhouette.
         target: The target of a search in memory that left no map, such as one for overlap.
-        force: Take a tile that is not certified.
-        on_event: Called with the `Progress`.
-        cancel: Stops the work; nothing is then written.
 
     Raises:
-        CertificationError: If the tile is not certified.
         InputFileError: If the picture cannot be read.
-        OrbiflowError: For another ending, and as `artwork`.
-        OutputError: If the file cannot be written.
-        Cancelled: If it was cancelled.
+        OrbiflowError: For another ending, as `artwork`, and as `export`.
     """
     out, cancel = as_path(out, "the file to draw to"), cancel or Cancel()
     if out.suffix.lower() not in (".png", ".svg"):
@@ -261,8 +249,6 @@ def draw_art(
         force=force, otherwise="so it is not exported; --force exports it, marked so"
     )
     on_event(Progress(0.0, "laying out"))
-    if picture is not None:
-        source.require_map()
     over = Over() if picture is None else read_over(picture, source)
     made = artwork(source, settings, picture=over.picture, drawing=over.drawing, notes=over.notes)
     cancel.check()

@@ -144,7 +144,7 @@ class _Raster:
     """The no-fit regions of a piece with itself and with itself turned, on square cells."""
 
     def __init__(self, ring: Array, gap: float) -> None:
-        self.center = (ring.min(axis=0) + ring.max(axis=0)) / 2
+        self.center = _middle(ring)
         extent = float(np.ptp(ring, axis=0).max()) + gap
         self.cell = extent / CELLS
         polygon = shapely.Polygon(ring - self.center).buffer(gap / 2)
@@ -169,10 +169,9 @@ class _Raster:
         return steps[int(np.argmin(known & region[index[:, 0], index[:, 1]]))]
 
     def lattices(self, region: Mask, pieces: int) -> list[tuple[float, Array]]:
-        """Return the area and lattice, in mm, of lattices outside a region, the densest first.
+        """Return area and lattice, in mm, with basis vectors outside a region, the densest first.
 
-        Their basis vectors lie outside it; longer vectors may still lie in it. A cell smaller than
-        so many `pieces` is left out.
+        Longer vectors may still lie in it. A cell smaller than so many `pieces` is left out.
         """
         half = (len(region) - 1) // 2
         axis = np.arange(-half, half + 1)
@@ -236,10 +235,7 @@ class Placed:
 
 
 def dense_arrangements(tile: Tile, ring: Array, gap: float, *, seed: int = 0) -> list[Arrangement]:
-    """Return arrangements of pieces cut along `ring` (M, 2), at least `gap` apart, the densest first.
-
-    The same seed, of the small changes, gives the same arrangements.
-    """
+    """Return arrangements of pieces cut along `ring` (M, 2), `gap` apart, densest first, by a seed."""
     rng = np.random.default_rng(seed)
     coarse = _simplified(ring, gap)
     group = tile.group
@@ -287,8 +283,7 @@ def on_sheet(
 ) -> Placed:
     """Fill a rectangle from the origin with as many pieces as fit, in rows from the top.
 
-    Each arrangement is tried, turned and shifted in several ways; among equally good ones the first
-    is taken. A single piece goes in whichever way it fits.
+    Each arrangement is tried in several ways; among equally good ones the first is taken.
     """
     best = Placed(np.zeros((0, 2, 2)), np.zeros((0, 2)), np.zeros(0, dtype=np.int64))
     turns = [(found, angle) for found in arrangements for angle in _angles(found, ring)]

@@ -34,8 +34,7 @@ def fitted(points: Array, tolerance: float) -> Curve:
     corners = [0, *(np.flatnonzero(turn > CORNER) + 1), len(points) - 1]
     found: list[tuple[Array, bool]] = []
     for first, last in pairwise(corners):
-        run = points[first : last + 1]
-        found += _run(run, tolerance)
+        found += _run(points[first : last + 1], tolerance)
     return Curve(np.stack([piece for piece, _ in found]), np.array([flat for _, flat in found]))
 
 
@@ -182,10 +181,8 @@ class Outline:
 def outline(tile: Tile, tolerance: float) -> Outline:
     """Fit smooth curves near a tile's polygon that tile the plane as exactly as it does.
 
-    One edge of each class of identified edges is fitted and the others are its images; an edge that
-    is its own image, by a half-turn or a mirror across it, is fitted up to its middle. Where curves
-    would touch each other within the tolerance, they are fitted more closely, at worst along the
-    polygon itself.
+    One edge of each class is fitted, up to its middle if it is its own image, and the others are its
+    images. Where curves would touch, they are fitted more closely, at worst along the polygon.
     """
     try:
         own = edges(tile)
@@ -197,8 +194,7 @@ def outline(tile: Tile, tolerance: float) -> Outline:
         ring = Curve.joined(curves, closed=True).flattened(tolerance / 20)
         if shapely.Polygon(ring).is_valid:
             return Outline(tile, own, curves)
-    plain_edges = [Curve.polyline(own.points(k)) for k in range(len(own.starts))]
-    return Outline(tile, own, tuple(plain_edges))
+    return Outline(tile, own, tuple(Curve.polyline(own.points(k)) for k in range(len(own))))
 
 
 def _curves(own: Edges, tolerance: float) -> tuple[Curve, ...]:

@@ -115,11 +115,9 @@ def write_json(scene: Scene, *, tolerance: float, decimals: int = 4) -> str:
 def _tile(
     tile: PlacedTile, number: int, prototile: np.ndarray | None, decimals: int
 ) -> dict[str, Any]:
-    placed = (
-        {}
-        if prototile is None
-        else {"polygon": _rounded(prototile @ tile.linear.T + tile.offset, decimals)}
-    )
+    placed = {}
+    if prototile is not None:
+        placed["polygon"] = _rounded(prototile @ tile.linear.T + tile.offset, decimals)
     return {
         "number": number,
         "aspect": tile.aspect,
@@ -341,11 +339,7 @@ def export(
 def scenes(
     tile: TileSource, settings: ExportSettings, *, force: bool = False
 ) -> tuple[list[Scene], tuple[str, ...]]:
-    """Return the sheets, and what the user should know.
-
-    Raises:
-        As `export`.
-    """
+    """Return the sheets, and what the user should know. Raises as `export`."""
     given = EscherTile.of(tile)
     certificate = given.require_certified(
         force=force, otherwise="so it is not exported; --force exports it, marked so"

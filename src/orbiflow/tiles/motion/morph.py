@@ -50,11 +50,6 @@ class OwnFrame:
     linear: Array
     offset: Array
 
-    @property
-    def counts(self) -> tuple[int, ...]:
-        """Sides of the polygon along each edge of the class."""
-        return tuple(np.diff([*self.starts, len(self.points)]).tolist())
-
     @classmethod
     def of(cls, tile: Tile) -> OwnFrame:
         """Of a tile whose class and corners are known, as those of every search are."""
@@ -95,10 +90,7 @@ class OwnFrame:
         return self.points[np.arange(ends[number], ends[number + 1] + 1) % len(self.points)]
 
     def straight(self) -> OwnFrame:
-        """The class's template with as many vertices: each where, along its edge, this one's are.
-
-        Its frame has the turn and the scale of this one, and no stretch.
-        """
+        """The template, its vertices spaced along edges as here, in a frame that does not stretch."""
         corners = self.kind.template()
         parts: list[Array] = []
         for k in range(len(corners)):
@@ -137,10 +129,7 @@ class OwnFrame:
 
 
 def _offset(kind: IsohedralClass, placed: Array, starts: tuple[int, ...], linear: Array) -> Array:
-    """Where the own frame's origin lies, from the edges that the group identifies.
-
-    Where the group leaves a direction open, the corners come as near to the template's as can be.
-    """
+    """Where the own frame's origin lies, by identified edges; by corners where these are silent."""
     rows: list[Array] = []
     values: list[Array] = []
     inverse = np.linalg.inv(linear)
@@ -239,8 +228,7 @@ of the finite differences."""
 # Number of places at which the way of the weights is measured, so that the outline moves evenly
 EVEN = 24
 
-CHECKED = 96
-"""Number of places at which the straight way is checked."""
+CHECKED = 96  # number of places at which the straight way is checked
 
 
 class Morph:
@@ -344,8 +332,7 @@ class _Weights:
     def _solved(self, weights: Array, ways: Array) -> tuple[Array, Array]:
         """Return places (N, 2) in which each orbit is the mean of its neighbours, and a force (k,).
 
-        The force, along the directions that the group leaves open, is what the weights lack to keep
-        the whole in place, for walks by them drift. It is the same on all orbits.
+        The force, along the open directions and the same on all orbits, is what stops the drift.
         """
         weights = weights / _sums(weights, self.sides, self.orbits)
         guess, orbits = self.guess, self.orbits
@@ -373,10 +360,7 @@ class _Weights:
 
 
 def _bordered(matrix: csc_array, right: Array, guess: Array, ways: Array) -> tuple[Array, Array]:
-    """Return the solution with the guess's mean along the open ways (k, 2), and the force (k,).
-
-    The force on all orbits is what keeps the mean.
-    """
+    """Return the solution with the guess's mean along the open ways (k, 2), and the force (k,)."""
     size, border = right.size, np.tile(ways, (1, len(right)))
     whole, value = matrix, right.ravel()
     if len(ways):
@@ -409,16 +393,14 @@ def _sums(weights: Array, sides: NDArray[np.int64], orbits: Orbits) -> Array:
 
 
 def _stiff_edges(own: OwnFrame, sides: NDArray[np.int64]) -> Array:
-    """Return weights (E,) whose solution is a tile with edges that are straight up to 1 / `STIFF`.
-
-    An edge pulls with the same force however many sides it has.
-    """
+    """Return weights (E,) whose solution is a tile with edges that are straight up to 1 / `STIFF`."""
     n = len(own.points)
     weights = np.ones(len(sides))
     along = (sides < n).all(axis=1)  # no side crosses the inside from outline to outline
     behind = np.where((sides[:, 0] + 1) % n == sides[:, 1], sides[:, 0], sides[:, 1])[along]
     edge = np.searchsorted(own.starts, behind, side="right") - 1
-    weights[along] = STIFF * np.array(own.counts)[edge]
+    # an edge pulls with the same force however many sides it has
+    weights[along] = STIFF * np.diff([*own.starts, n])[edge]
     return weights
 
 

@@ -24,7 +24,6 @@ from orbiflow.runtime import (
 from orbiflow.tiles.exporting import tile_svg, tiling_svg
 from orbiflow.tiles.pages.overview import TILE_FILES, index_page, overview_png
 from orbiflow.tiles.pictures import (
-    FrontPoint,
     bending_picture,
     bending_png,
     front_png,
@@ -36,8 +35,7 @@ from orbiflow.tiles.pictures import (
 from orbiflow.tiles.result_file import RESULT, folder_names
 from orbiflow.tiles.search import ClassFailure, SearchResult, placed_field, report
 from orbiflow.tiles.silhouette import Target
-from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tile_map import TileMap
+from orbiflow.tiles.tile import EscherTile, TileMap
 from orbiflow.tiles.tilings import Colouring, colouring
 
 FIELD_FILES = ("field.png", "field.pdf")
@@ -146,27 +144,14 @@ def _draw(
     write_tile_folder(tile, target, folder, colours=colours, figures=figures)
 
 
-def write_front(
-    results: Sequence[EscherTile], found: Iterable[EscherTile], target: Target, out: Path
-) -> None:
+def write_front(results: Sequence[EscherTile], found: Iterable[EscherTile], out: Path) -> None:
     """Write `front.png`: the listed tiles among all that were found, by deformation and overlap."""
     listed = {id(result.tile) for result in results}
-    others = [result for result in found if id(result.tile) not in listed]
-    points = [
-        FrontPoint(
-            result.deformation,
-            result.metrics.iou,
-            result.tile.polygon,
-            result.isohedral_class,
-            result.objective,
-            id(result.tile) in listed,
-            bool(result.front),
-        )
-        for result in (*others, *results)
-        if result.deformation is not None
-    ]
-    if points:
-        write_atomic(out / FRONT, front_png(points, y_down=target.y_down))
+    known = [result for result in (*found, *results) if result.deformation is not None]
+    others = [result for result in known if id(result.tile) not in listed]
+    if known:
+        chosen = [result for result in results if result.deformation is not None]
+        write_atomic(out / FRONT, front_png(chosen, others))
 
 
 def written_files(folder: Path) -> set[str]:
@@ -233,7 +218,7 @@ def write_run(
                 workers=result.workers if figures else 1,
             )
             if result.method.objective == "both":
-                write_front(tiles, result.found or tiles, result.target, staged)
+                write_front(tiles, result.found or tiles, staged)
         write_atomic(staged / RESULT, json.dumps(report(result), allow_nan=False))
         files = [path.relative_to(staged) for path in staged.rglob("*") if path.is_file()]
     written = [folder.path / path for path in sorted(files)]

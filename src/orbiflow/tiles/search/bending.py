@@ -38,9 +38,8 @@ from orbiflow.tiles.search.co_deformation import (
     shifted,
 )
 from orbiflow.tiles.search.likeness_search import LikenessSearch
-from orbiflow.tiles.search.placements import Placements, best_placements
-from orbiflow.tiles.search.starts import mirror_closed
-from orbiflow.tiles.search.tile_space import NearestTiles, TileSpace
+from orbiflow.tiles.search.starts import template_symmetries
+from orbiflow.tiles.search.tile_space import NearestTiles, Placements, TileSpace, best_placements
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass
 
@@ -78,15 +77,12 @@ def bent_tiles(
     *,
     wanted: int = 1,
 ) -> tuple[list[Bent], int]:
-    """Return the finalists of one class, best score first and without twins, and how many crossed.
-
-    There are at least `wanted` of each hand, if so many are found.
-    """
+    """Return finalists, at best `wanted` of each hand and without twins, and how many crossed."""
     told: Callable[[float], None] = progress or (lambda _share: None)
     cancel = cancel or Cancel()
     found: list[Bent] = []
     dropped = done = 0
-    sides = both[:1] if mirror_closed(kind) else both
+    sides = both[:1] if template_symmetries(kind)[1] else both
     tasks = [(hand, own) for own in settings.searches(wanted) for hand in sides]
     work = sum(own.starts for _, own in tasks)
     for hand, own in tasks:
@@ -250,10 +246,7 @@ class PlacedBent(NamedTuple):
 
     @property
     def outlines(self) -> tuple[Array, Array]:
-        """The outline at rest and bent near its tile, (n, 2) each, counter-clockwise, point by point.
-
-        In the normal form, where the silhouette lies as it is.
-        """
+        """The outline at rest and bent, (n, 2) each, counter-clockwise, in the normal form."""
         hand = self.bent.hand
         rest = hand.samples.fine * ((1.0, -1.0) if hand.mirrored else (1.0, 1.0))
         bent = self.place(self.bent.relaxed)
@@ -292,10 +285,7 @@ def fit_bending(
 
 
 def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:
-    """Lay a bent tile over the silhouette that was bent by the similarity of largest IoU.
-
-    From the one that lays the bent points nearest to where they were, by L-BFGS on exact gradients.
-    """
+    """Lay a bent tile over its silhouette by the similarity of largest IoU, found by L-BFGS."""
     rest, points = bent.hand.fine.rest, bent.points
     center = points.mean()
     ring = bent.points[: bent.hand.fine.size] - center

@@ -14,8 +14,8 @@ near the present outline are worked out, by springs.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from dataclasses import dataclass
+from functools import cache, cached_property, lru_cache
 from itertools import permutations
 from typing import NamedTuple
 
@@ -29,8 +29,7 @@ from orbiflow.runtime import Cancel
 from orbiflow.tiles.geometry import plane_points, signed_area
 from orbiflow.tiles.likeness import Elastic, Pinned, Stiffness
 from orbiflow.tiles.search.likeness_search import LikenessSearch
-from orbiflow.tiles.search.placements import Placements
-from orbiflow.tiles.search.tile_space import TileSpace
+from orbiflow.tiles.search.tile_space import Placements, TileSpace
 from orbiflow.tiles.silhouette import Emphasis, Pins, Samples, Target, sampled, triangulate
 from orbiflow.tiles.tilings import IsohedralClass
 
@@ -55,10 +54,7 @@ def drawn_to_tiles(
     strengths: tuple[float, ...] = TIGHTER,
     rounds: int = ROUNDS,
 ) -> tuple[Complex, TileSpace]:
-    """Bend a body towards tiles of C placements of a class by springs that tighten.
-
-    Returns shapes (N, C), nearly tiles, and the space of tiles, its glide axes turned to suit them.
-    """
+    """Bend a body by springs that tighten: shapes (N, C), nearly tiles, and the space of the tiles."""
     space = TileSpace(kind, placements)
     z = np.repeat(body.rest[:, None], space.count, axis=1)
     for strength in strengths:
@@ -139,7 +135,6 @@ class Hand:
     mirrored: bool  # whether the latter
     samples: Samples  # points of its outline, coarse to fine
     made: Callable[[str, Stiffness], Elastic]
-    _bodies: dict[Stiffness, Bodies] = field(default_factory=dict[Stiffness, Bodies])
 
     @cached_property
     def fine(self) -> Elastic:
@@ -147,14 +142,10 @@ class Hand:
         return self.made("fine", Stiffness())
 
     def bodies(self, stiffness: Stiffness) -> Bodies:
-        """The bodies of a stiffness, made when they are first asked for."""
-        found = self._bodies.get(stiffness)
-        if found is None:
-            coarse, fine = self.made("coarse", stiffness), self.made("fine", stiffness)
-            same = len(self.samples.middle) == len(self.samples.fine)
-            middle = fine if same else self.made("middle", stiffness)
-            found = self._bodies[stiffness] = Bodies(coarse, middle, fine)
-        return found
+        """The bodies of a stiffness."""
+        same = len(self.samples.middle) == len(self.samples.fine)
+        levels = ("coarse", "fine" if same else "middle", "fine")
+        return Bodies(*(self.made(level, stiffness) for level in levels))
 
 
 @lru_cache(maxsize=2)  # one serves all classes
@@ -174,6 +165,7 @@ def hands(
     def hand(points: Samples, mirrored: bool) -> Hand:
         meshes = {name: triangulate(ring) for name, ring in points._asdict().items()}
 
+        @cache  # of a level and stiffness, when it is first asked for
         def made(level: str, stiffness: Stiffness) -> Elastic:
             ring: Array = getattr(points, level)
             mesh = meshes[level]
@@ -228,10 +220,9 @@ def shifted(
     share: float,
     cancel: Cancel | None = None,
 ) -> Drawn:
-    """Move the corners of each placement of shapes (N, C) until no neighbour is better.
+    """Move the corners of placements of shapes (N, C) until none of the `share` nearest is better.
 
-    Of all neighbours the `share` with the nearest tiles is worked out. Returns the placements that
-    are left, best first, no two the same.
+    Returns those that are left, best first, no two the same.
     """
     cancel = cancel or Cancel()
     drawn = _drawn(body, kind, placements, points)
