@@ -25,16 +25,10 @@ else:  # torch is imported by those who have tensors
 
 
 def signed_area(ring: AnyRing) -> AnyRing:
-    """Return the area that each ring encloses, positive where it is counter-clockwise with y up.
+    """Return the area (...) that each ring (..., N, 2) encloses, positive if counter-clockwise, y up.
 
     Uses the shoelace formula about the first vertex: about the origin it would lose all digits of a
-    distant ring's area to cancellation.
-
-    Args:
-        ring: Rings (..., N, 2), NumPy or torch.
-
-    Returns:
-        The areas (...), a NumPy scalar for a single ring, in square units of the ring.
+    distant ring's area to cancellation. Takes NumPy or torch.
 
     >>> square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
     >>> float(signed_area(square)), float(signed_area(square + 1e8))
@@ -113,15 +107,8 @@ def plane_points(z: Complex) -> Array:
 def best_similarity(points: Complex, images: Complex) -> Complex:
     """Return the factors of the similarities z -> factor (z - mean) + mean' nearest to given images.
 
-    These are rotations and scalings, without mirror images, by least squares over the first axis
-    (Procrustes).
-
-    Args:
-        points: Points (N,) x + iy.
-        images: Their images (N,), or C sets of images (N, C).
-
-    Returns:
-        The factors, () or (C,), in the images' units over the points'.
+    These are rotations and scalings, without mirror images, by least squares (Procrustes): () or (C,)
+    for `points` (N,) x + iy and their `images` (N,), or C sets of images (N, C).
 
     >>> triangle = np.array([0, 1, 1j])
     >>> complex(best_similarity(triangle, 2j * triangle + 5))

@@ -165,7 +165,6 @@ def art_scene(art: Artwork) -> Scene:
     symbols = {TILE: symbol.moved(scale * np.eye(2), np.zeros(2))}
     motifs = {MOTIF: motif.moved(scale * np.eye(2), np.zeros(2))}
     box = Box(0.0, 0.0, unit * page.width, unit * page.height)
-    width = unit * art.outline
     layers = [Layer("paper", "paper", Style(fill=chosen.paper), (rectangle(box),))]
     drawn = bool(motif.parts or motif.rasters)
     for colour in sorted(set(page.colours.tolist())):
@@ -180,7 +179,7 @@ def art_scene(art: Artwork) -> Scene:
             name, ink = f"drawing on {name}", chosen.ink(colour)
             layers.append(Layer(name, "tiles", Style(), (uses,), clipped=True, ink=ink))
     if art.outline > 0:
-        style = Style(None, chosen.outline, width)
+        style = Style(None, chosen.outline, unit * art.outline)
         uses = Uses(TILE, turned, copies.cosets, places)
         layers.append(Layer("outlines", "tiles", style, (uses,), clipped=True))
     notes = (f"Artwork of {tile.isohedral_class or 'a tile'}, made with orbiflow {__version__}.",)

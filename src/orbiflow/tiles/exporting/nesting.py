@@ -79,25 +79,29 @@ class Arrangement:
         return np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
-def tightened(start: Arrangement, ring: Array, gap: float, *, most: float = 4.0) -> Arrangement:
+MOST_SPREAD = 4.0  # how far apart pieces are moved at most, in their distances
+
+
+def tightened(start: Arrangement, ring: Array, gap: float) -> Arrangement:
     """Move the pieces' middles evenly, apart or together, until the pieces are just clear."""
     middle = _middle(ring)
+
+    def spread(factor: float) -> Arrangement:
+        return start.scaled(factor * np.eye(2), middle)
+
     low, high = 0.0, 1.0
-    while not start.scaled(high * np.eye(2), middle).clear(ring, gap):
+    while not spread(high).clear(ring, gap):
         low, high = high, 1 + 2 * (high - 1) + 0.02
-        if high > most:
-            return start.scaled(most * np.eye(2), middle)
+        if high > MOST_SPREAD:
+            return spread(MOST_SPREAD)
     if low == 0.0:
         low = 0.9
-        if start.scaled(low * np.eye(2), middle).clear(ring, gap):
-            return start.scaled(low * np.eye(2), middle)
+        if spread(low).clear(ring, gap):
+            return spread(low)
     while high - low > 5e-4:
         between = (low + high) / 2
-        if start.scaled(between * np.eye(2), middle).clear(ring, gap):
-            high = between
-        else:
-            low = between
-    return start.scaled(high * np.eye(2), middle)
+        low, high = (low, between) if spread(between).clear(ring, gap) else (between, high)
+    return spread(high)
 
 
 def _middle(ring: Array) -> Array:
@@ -213,14 +217,11 @@ ANGLES = 36  # angles of an arrangement that are tried on a sheet
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """N pieces on a sheet: a point p of the piece goes to linear[n] p + offsets[n].
-
-    - `aspects`: The number (N,) of each piece in the arrangement's cell.
-    """
+    """N pieces on a sheet: a point p of the piece goes to linear[n] p + offsets[n]."""
 
     linear: Array
     offsets: Array
-    aspects: NDArray[np.int64]
+    aspects: NDArray[np.int64]  # the number (N,) of each piece in the arrangement's cell
 
     def __len__(self) -> int:
         return len(self.linear)

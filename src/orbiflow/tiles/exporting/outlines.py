@@ -126,12 +126,11 @@ def _least_squares(samples: Array, share: Array, start: Array, end: Array) -> Ar
     u = 1 - t
     left, right = 3 * u**2 * t * start, -3 * u * t**2 * end
     rest = samples - (u**3 + 3 * u**2 * t) * first - (t**3 + 3 * u * t**2) * last
-    matrix = np.array(
-        [[(left**2).sum(), (left * right).sum()], [(left * right).sum(), (right**2).sum()]]
-    )
+    mixed = (left * right).sum()
+    matrix = np.array([[(left**2).sum(), mixed], [mixed, (right**2).sum()]])
     goal = np.array([(left * rest).sum(), (right * rest).sum()])
     chord = float(np.linalg.norm(last - first))
-    determinant = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] ** 2
+    determinant = matrix[0, 0] * matrix[1, 1] - mixed**2
     lengths = np.full(2, chord / 3)
     if determinant > 1e-12 * matrix[0, 0] * matrix[1, 1]:
         solved = np.linalg.solve(matrix, goal)
@@ -162,13 +161,10 @@ _SHARES = (0.6, 0.15, 0.04)  # of the tolerance; finer where curves would otherw
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """The outline of a tile in curves.
-
-    - `edges`: How its outline falls into edges; None if that is not known (`note` says why).
-    """
+    """The outline of a tile in curves."""
 
     tile: Tile
-    edges: Edges | None
+    edges: Edges | None  # how it falls into edges; None if not known (`note` says why)
     curves: tuple[Curve, ...]  # one curve for each edge, end to end; or a single closed curve
     note: str = ""  # what the user should know, or ""
 

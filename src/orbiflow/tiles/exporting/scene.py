@@ -300,12 +300,10 @@ def rectangle(box: Box) -> Curve:
     return Curve.polyline([[left, top], [right, top], [right, bottom], [left, bottom]], closed=True)
 
 
-def inside(curve: Curve, box: Box, *, slack: float = 1e-9) -> bool:
+def inside(curve: Curve, box: Box) -> bool:
     """Return whether a box holds a curve with all its control points."""
-    low, high = curve.bounds()
-    return bool(
-        (low >= np.array(box[:2]) - slack).all() and (high <= np.array(box[2:]) + slack).all()
-    )
+    (low, high), corners = curve.bounds(), np.array(box).reshape(2, 2)
+    return bool((low >= corners[0] - 1e-9).all() and (high <= corners[1] + 1e-9).all())
 
 
 def clipped_region(curve: Curve, box: Box, tolerance: float) -> list[Curve]:

@@ -30,22 +30,18 @@ class Places(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """An outline that changes, and M copies of it.
-
-    All lengths are in pixels, with y down; the progress of the animation runs from 0 to 1.
-
-    - `outline`: The outline (N, 2) at a progress, relative to a point of its own; N does not change.
-    - `places`: The places of the copies at a progress; the first is the tile itself.
-    - `births`: The progress (M, 2) from which to which each copy grows; below 0 if always there.
-    - `keys`: Values of the progress between which the outline moves in nearly straight lines.
-    """
+    """An outline that changes, and M copies of it, in pixels, y down; the progress runs from 0 to 1."""
 
     page: Page
-    outline: Callable[[float], Array]
-    places: Callable[[float], Places]
+    outline: Callable[
+        [float], Array
+    ]  # (N, 2) at a progress, about a point of its own; N is the same
+    places: Callable[[float], Places]  # of the copies at a progress; the first is the tile itself
     colours: NDArray[np.int64]  # the numbers (M,) of the palette's fills
-    births: Array
-    keys: tuple[float, ...]
+    births: (
+        Array  # the progress (M, 2) from which to which each copy grows; below 0 if always there
+    )
+    keys: tuple[float, ...]  # progress between which the outline moves in nearly straight lines
     what: str  # the motion in words, for titles
 
     def grown(self, progress: float) -> Array:

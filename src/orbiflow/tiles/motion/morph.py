@@ -39,15 +39,12 @@ TOLERANCE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class OwnFrame:
-    """A tile as an affine image of one whose group is its class's own.
-
-    - `linear`, `offset`: (2, 2) and (2,): a point p of the own frame lies at linear p + offset.
-    """
+    """A tile as an affine image of one whose group is its class's own."""
 
     kind: IsohedralClass
     points: Array  # (N, 2) the polygon in the own frame, from corner 0 on
     starts: tuple[int, ...]  # indices of the corners in it, increasing from 0
-    linear: Array
+    linear: Array  # with `offset`: a point p of the own frame lies at linear p + offset
     offset: Array
 
     @classmethod
@@ -221,9 +218,8 @@ def _links(own: OwnFrame) -> list[list[tuple[int, Isometry]]]:
 ROUNDS = 12  # number of times that sides of the outline may be halved for the triangulation
 STIFF = 1e4  # how much more strongly edges pull than the inside where they are to be straight
 
+# Most steps in which weights are tilted, the force that counts as none, the finite difference's step
 TILTS, BALANCED, TINY = 12, 1e-9, 1e-4
-"""Greatest number of steps in which weights are tilted, the force that counts as none, and the step
-of the finite differences."""
 
 # Number of places at which the way of the weights is measured, so that the outline moves evenly
 EVEN = 24
@@ -273,16 +269,12 @@ class Morph:
 
 @dataclass(frozen=True, eq=False)
 class _Weights:
-    """The weights of template and tile, from which places between them are solved for.
+    """The weights of template and tile, from which places between them are solved for."""
 
-    - `own`: The tile with as many vertices as the triangles need; they are the first n points.
-    - `first`, `last`: The weights (E,) of template and tile, which add up to one for each orbit.
-    """
-
-    own: OwnFrame
+    own: OwnFrame  # with as many vertices as the triangles need; they are the first n points
     orbits: Orbits  # the orbits of all points
     sides: NDArray[np.int64]  # each side (E, 2) of a triangle, from either end
-    first: Array
+    first: Array  # with `last`: weights (E,) of template and tile, which add up to 1 for each orbit
     last: Array
     guess: Array  # the points (N, 2) of the tile
 

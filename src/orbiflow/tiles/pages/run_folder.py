@@ -39,9 +39,8 @@ from orbiflow.tiles.tile import EscherTile, TileMap
 from orbiflow.tiles.tilings import Colouring, colouring
 
 FIELD_FILES = ("field.png", "field.pdf")
+# The further files, for print, if figures were asked for; the field if a flow made the tile
 FIGURE_FILES = ("tiling.pdf", "overlay.pdf", *FIELD_FILES)
-"""The further files if figures were asked for: for print, as wide as a journal's column; and the field
-of the flow if there is one."""
 
 
 def figure_files(result: EscherTile) -> tuple[str, ...]:
@@ -215,7 +214,7 @@ def write_run(
                 staged,
                 failures=result.failures,
                 figures=figures,
-                workers=result.workers if figures else 1,
+                workers=result.workers,
             )
             if result.method.objective == "both":
                 write_front(tiles, result.found or tiles, staged)

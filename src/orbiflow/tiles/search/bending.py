@@ -29,10 +29,8 @@ from orbiflow.tiles.search.candidates import Fit, Progress, Prototiles, StillTil
 from orbiflow.tiles.search.co_deformation import (
     FIRM,
     SOFT,
-    Bodies,
     Drawn,
     Hand,
-    Stage,
     drawn_to_tiles,
     held_on_tiles,
     shifted,
@@ -106,38 +104,34 @@ def _finalists(
     hand: Hand, stiffness: Stiffness, kind: IsohedralClass, settings: LikenessSearch, cancel: Cancel
 ) -> tuple[list[Bent], int]:
     """The best of one hand and stiffness worked out, and how many of them cross themselves."""
-    bodies = hand.bodies(stiffness)
-    best = _best_placements(bodies, kind, settings, cancel)
+    best = _best_placements(hand, stiffness, kind, settings, cancel)
+    _, _, fine = hand.bodies(stiffness)
     found: list[Bent] = []
     for k in range(len(best.costs)):
         cancel.check()
         one = best.take(np.array([k]))
-        bent = _detailed(hand, bodies.fine, kind, one, settings.rounds)
+        bent = _detailed(hand, fine, kind, one, settings.rounds)
         found += [] if bent is None else [bent]
     return found, len(best.costs) - len(found)
 
 
 def _best_placements(
-    bodies: Bodies, kind: IsohedralClass, settings: LikenessSearch, cancel: Cancel
+    hand: Hand, stiffness: Stiffness, kind: IsohedralClass, settings: LikenessSearch, cancel: Cancel
 ) -> Drawn:
     """Placements of the fine outline whose tiles cost least: few points, then more and more."""
-    coarse, middle, fine = bodies
+    coarse, middle, fine = hand.bodies(stiffness)
     placements, points = _best_coarse(coarse, kind, settings)
     share = settings.share
     if middle is not fine:
         placements, points = _finer(coarse, middle, placements, points)
-        stages = [Stage(2, settings.starts), Stage(1, 2 * settings.finalists)]
+        stages = [(2, settings.starts), (1, 2 * settings.finalists)]
         drawn = shifted(middle, kind, placements, points, stages, share=share, cancel=cancel)
         drawn = drawn.take(np.arange(min(len(drawn.costs), settings.finalists)))
         placements, points = _finer(middle, fine, drawn.placements, drawn.points)
-        stages = [Stage(1, settings.finalists)]
+        stages = [(1, settings.finalists)]
     else:
         placements, points = _finer(coarse, fine, placements, points)
-        stages = [
-            Stage(4, settings.starts),
-            Stage(2, 2 * settings.finalists),
-            Stage(1, settings.finalists),
-        ]
+        stages = [(4, settings.starts), (2, 2 * settings.finalists), (1, settings.finalists)]
     return shifted(fine, kind, placements, points, stages, share=share, cancel=cancel)
 
 
@@ -230,13 +224,10 @@ def _apart(a: Complex, b: Complex) -> float:
 
 
 class PlacedBent(NamedTuple):
-    """A bent silhouette that is a tile, laid over the target by a similarity.
-
-    - `factor`, `shift`: z -> factor z + shift, after which a mirrored one is reflected in the x axis.
-    """
+    """A bent silhouette that is a tile, laid over the target by a similarity."""
 
     bent: Bent  # the silhouette, in a frame of its own, mirrored if its hand is
-    factor: complex
+    factor: complex  # z -> factor z + shift, after which a mirrored one is reflected in the x axis
     shift: complex
 
     def place(self, z: Complex) -> Array:

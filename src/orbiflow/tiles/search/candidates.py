@@ -173,10 +173,9 @@ def _chosen_samples(kind: IsohedralClass, closed: list[Array], tolerance: float)
         if pair.folded:
             half = _simplified(curve[: len(curve) // 2 + 1], tolerance)
             masks[pair.first] = np.concatenate([half, half[-2::-1]])
-            continue
-        mask = _simplified(curve, tolerance)
-        masks[pair.first] = mask
-        masks[pair.second] = mask[::-1] if pair.reversed else mask
+        else:
+            mask = masks[pair.first] = _simplified(curve, tolerance)
+            masks[pair.second] = mask[::-1] if pair.reversed else mask
     return [masks[i] for i in range(len(closed))]
 
 

@@ -106,46 +106,31 @@ class _Reduced:
         return self.real @ self.parameters + 1j * (self.imaginary @ self.parameters)
 
 
+# Of the search: bodies and heads are stiff; thin parts are not, and keep their places. Tiles bent so
+# are seen to be more like the silhouette: docs/likeness.md has the comparison.
 FIRM = Stiffness(salience=-0.5, pose=60.0)
-"""Of the search: bodies and heads are stiff; thin parts are not, and keep their places.
-
-Tiles bent so cost more by the usual stiffness than the least, and are seen to be more like the
-silhouette: docs/likeness.md has the comparison.
-"""
-
 # Of the search where too few tiles of a firm body are simple: many long limbs, which cross
 SOFT = Stiffness(salience=0.0)
 
 
-class Bodies(NamedTuple):
-    """An elastic silhouette with few points, more and all."""
-
-    coarse: Elastic
-    middle: Elastic
-    fine: Elastic
-
-
 @dataclass(frozen=True, eq=False)
 class Hand:
-    """A silhouette or its mirror image.
-
-    - `made`: the elastic body of a level of points, "coarse", "middle" or "fine", and a stiffness.
-    """
+    """A silhouette or its mirror image."""
 
     mirrored: bool  # whether the latter
     samples: Samples  # points of its outline, coarse to fine
-    made: Callable[[str, Stiffness], Elastic]
+    made: Callable[[str, Stiffness], Elastic]  # the body of a level of points and a stiffness
 
     @cached_property
     def fine(self) -> Elastic:
         """The body of usual stiffness with all points: what costs are measured by."""
         return self.made("fine", Stiffness())
 
-    def bodies(self, stiffness: Stiffness) -> Bodies:
-        """The bodies of a stiffness."""
-        same = len(self.samples.middle) == len(self.samples.fine)
-        levels = ("coarse", "fine" if same else "middle", "fine")
-        return Bodies(*(self.made(level, stiffness) for level in levels))
+    def bodies(self, stiffness: Stiffness) -> tuple[Elastic, Elastic, Elastic]:
+        """The bodies of a stiffness with few points, more and all."""
+        middle = "fine" if len(self.samples.middle) == len(self.samples.fine) else "middle"
+        fine = self.made("fine", stiffness)
+        return self.made("coarse", stiffness), self.made(middle, stiffness), fine
 
 
 @lru_cache(maxsize=2)  # one serves all classes
@@ -189,25 +174,15 @@ MOST_MOVES = 8  # of each placement with each step
 
 
 class Drawn(NamedTuple):
-    """C shapes drawn to tiles of their placements by springs.
-
-    - `costs`: (C,) energy, springs and displacement together; `CROSSED` more of what crosses itself.
-    """
+    """C shapes drawn to tiles of their placements by springs."""
 
     placements: Placements  # C of them
     points: Complex  # (N, C)
-    costs: Array
+    costs: Array  # (C,) energy, springs and displacement; `CROSSED` more of what crosses itself
 
     def take(self, index: Integers) -> Drawn:
         """Those at `index`."""
         return Drawn(self.placements.take(index), self.points[:, index], self.costs[index])
-
-
-class Stage(NamedTuple):
-    """One stage of moving corners."""
-
-    step: int  # points of the outline by which corners move
-    keep: int  # placements that go on, the best and no two the same
 
 
 def shifted(
@@ -215,23 +190,23 @@ def shifted(
     kind: IsohedralClass,
     placements: Placements,
     points: Complex,
-    stages: Sequence[Stage],
+    stages: Sequence[tuple[int, int]],
     *,
     share: float,
     cancel: Cancel | None = None,
 ) -> Drawn:
     """Move the corners of placements of shapes (N, C) until none of the `share` nearest is better.
 
-    Returns those that are left, best first, no two the same.
+    Each stage is the points by which corners move and how many of the best go on, no two the same.
     """
     cancel = cancel or Cancel()
     drawn = _drawn(body, kind, placements, points)
-    for stage in stages:
-        drawn = _distinct(drawn, stage.keep)
+    for step, keep in stages:
+        drawn = _distinct(drawn, keep)
         live = np.arange(len(drawn.costs))
         for _ in range(MOST_MOVES):
             cancel.check()
-            owners, options = _neighbours(body, kind, drawn, live, stage.step, share)
+            owners, options = _neighbours(body, kind, drawn, live, step, share)
             if not len(owners):
                 break
             tried = _drawn(body, kind, options, drawn.points[:, owners])

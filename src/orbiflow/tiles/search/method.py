@@ -8,7 +8,6 @@ from dataclasses import dataclass, fields
 from importlib import import_module
 from typing import Any, ClassVar, Self
 
-from orbiflow.arguments import whole
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.search.candidates import Fit, Progress
@@ -140,15 +139,4 @@ class SearchMethod(ABC):
 
 
 MAX_FREQUENCY = 60  # largest Omega that a fit takes on; time and memory grow with its square
-
-
-def check_max_frequency(value: int) -> None:
-    """Check an Omega: 0 is a constant field (paper, figure of Omega)."""
-    if not 0 <= whole(value, "max_frequency", 0) <= MAX_FREQUENCY:
-        raise OrbiflowError(
-            f"max_frequency must be from 0 to {MAX_FREQUENCY}, got {value}: "
-            "10 is plenty for most silhouettes"
-        )
-
-
 MAX_SEGMENTS = 2000  # of a flow; the descent adds one a step

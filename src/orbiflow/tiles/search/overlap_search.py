@@ -10,7 +10,7 @@ from orbiflow.arguments import instance, number, numbers, whole
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import Cancel, one_thread
 from orbiflow.tiles.search.candidates import Fit, Progress
-from orbiflow.tiles.search.method import MAX_SEGMENTS, Goal, SearchMethod, check_max_frequency
+from orbiflow.tiles.search.method import MAX_FREQUENCY, MAX_SEGMENTS, Goal, SearchMethod
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass
 
 POINTS = 60  # points of the outline that the preview looks at
@@ -100,7 +100,7 @@ class OverlapSearch(SearchMethod):
     def __post_init__(self) -> None:
         for name in ("candidates", "projected", "measured", "turns", "finalists"):
             whole(getattr(self, name), name, 1)
-        check_max_frequency(self.max_frequency)
+        whole(self.max_frequency, "max_frequency", 0, MAX_FREQUENCY)
         if self.starts not in ("outline", "template"):
             raise OrbiflowError(f'starts must be "outline" or "template", got {self.starts!r}')
         if whole(self.boundary, "boundary", 0) < 60 or self.boundary % 30:
@@ -239,7 +239,7 @@ class OccupancySearch(SearchMethod):
 
         for name in ("turns", "finalists", "iterations", "points", "segments", "steps"):
             whole(getattr(self, name), name, 1)
-        check_max_frequency(self.max_frequency)
+        whole(self.max_frequency, "max_frequency", 0, MAX_FREQUENCY)
         integrator(instance(self.method, str, "method"))
         whole(self.affine_iterations, "affine_iterations", 0)
         number(self.smoothness, "smoothness", 0)

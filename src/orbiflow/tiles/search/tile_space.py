@@ -32,14 +32,11 @@ MOST_PLACEMENTS = 4_000_000
 
 
 class Placements(NamedTuple):
-    """Ways to lay an outline of n points along the edges of a template, best first.
-
-    - `turns`: (C,) radians; turn of the glide axes, 0 in classes without glide reflections.
-    """
+    """Ways to lay an outline of n points along the edges of a template, best first."""
 
     lengths: Integers  # (C, K) steps of each edge, sum n
     starts: Integers  # (C,) point of the outline at the template's first corner
-    turns: NDArray[np.float64]
+    turns: NDArray[np.float64]  # (C,) radians; turn of the glide axes, 0 without these
     gains: NDArray[np.float64]  # (C,) at most 1, which is an outline that is a tile already
 
     def take(self, index: Integers) -> Placements:
@@ -170,20 +167,15 @@ class NearestTiles(NamedTuple):
 
 
 class TileSpace:
-    """The tiles of C placements of one class.
-
-    Args:
-        kind: the class.
-        placements: C of them, all of n steps; `turns` is the direction of the glide axes.
-    """
+    """The tiles of C placements of one class, all of n steps."""
 
     def __init__(self, kind: IsohedralClass, placements: Placements) -> None:
         self.kind, self.placements = kind, placements
         self.count, self.size = len(placements.starts), int(placements.lengths[0].sum())
         self._orbits = _Orbits(kind, placements.lengths)
         self.corners = self._orbits.corners  # (C, K) vertices at the template's corners
+        # (C, n) the outline's point at each vertex
         self.order = (np.arange(self.size) + placements.starts[:, None]) % self.size
-        """(C, n): the outline's point at each vertex."""
         self._place = np.argsort(self.order, axis=1)
         flat = self._orbits.source + np.arange(self.count)[:, None] * self.size
         self._flat = flat.ravel()
