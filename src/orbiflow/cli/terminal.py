@@ -127,8 +127,9 @@ def _aligned(event: Table) -> TextTable:
     table = TextTable(title=event.title)
     cells = zip(*event.rows, strict=True) if event.rows else ((),) * len(event.columns)
     for heading, column in zip(event.columns, cells, strict=True):
-        numbers = all(cell[:1] in "0123456789+-" for cell in column)
-        table.add_column(heading, justify="right" if numbers else "left", no_wrap=True)
+        words = any(" " in cell for cell in column)
+        numbers = not words and all(cell[:1] in "0123456789+-" for cell in column)
+        table.add_column(heading, justify="right" if numbers else "left", no_wrap=not words)
     for row in event.rows:
         table.add_row(*map(escape, row))
     return table

@@ -363,13 +363,13 @@ def classes(
     from orbiflow.tiles.tilings import CLASSES
 
     cancel.check()
+    facts = [_facts(kind) for kind in CLASSES.values()]
+    rows = tuple(tuple(fact.values()) for fact in facts)
+    on_event(Table("The nine isohedral classes", tuple(facts[0]), rows))
     if out is not None:
         write_atomic(out, classes_png())
         on_event(Written(out))
         on_event(Note(f"drawn in {out}"))
-    facts = [_facts(kind) for kind in CLASSES.values()]
-    rows = tuple(tuple(fact.values()) for fact in facts)
-    on_event(Table("The nine isohedral classes", tuple(facts[0]), rows))
     return Outcome({"classes": facts, "file": None if out is None else str(out)})
 
 
