@@ -13,7 +13,7 @@ import pytest
 
 HOME = Path(__file__).parents[1] / "src" / "orbiflow"
 
-TILES = ["geometry", "tilings", "silhouette", "likeness", "tile_map", "tile", "result_file"]
+TILES = ["geometry", "tilings", "silhouette", "likeness", "tile", "result_file"]
 TILES += ["search", "pictures", "exporting"]
 TILES += ["art", "motion", "pages"]
 DENSITY = ["spaces", "models", "inference", "fitting"]

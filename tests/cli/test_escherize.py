@@ -21,7 +21,7 @@ from orbiflow.tiles import CLASSES, Fit, Target, TileModel, load_model, write_ti
 from orbiflow.tiles.pages.run_folder import FIGURE_FILES
 from orbiflow.tiles.search import occupancy
 from orbiflow.tiles.search.certifying import best_tiles
-from orbiflow.tiles.search.stored_models import extract_tile
+from orbiflow.tiles.search.model import extract_tile
 
 DOCS = Path(__file__).parents[2] / "docs"
 FILES = {"tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors"}

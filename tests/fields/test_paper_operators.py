@@ -56,6 +56,18 @@ def group_and_operators(name):
     return identification_group(name), [(g, orders.get(name, 2)) for g in generators]
 
 
+def center_of(g):
+    return np.linalg.solve(np.eye(2) - g.linear, g.translation)
+
+
+def axis_of(g):
+    """Line and mu of a transflection."""
+    values, vectors = np.linalg.eigh(g.linear)
+    direction = vectors[:, np.argmax(values)]
+    mu = float(g.translation @ direction)
+    return Line((g.translation - mu * direction) / 2, direction), mu
+
+
 def nested(field, name):
     """The field of the paper's table: its operators around P_B(F), innermost last."""
     group, operators = group_and_operators(name)

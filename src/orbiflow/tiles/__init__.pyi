@@ -106,6 +106,9 @@ from .search.escherizing import report as report
 from .search.likeness_search import LikenessSearch as LikenessSearch
 from .search.method import SearchMethod as SearchMethod
 from .search.model import TileModel as TileModel
+from .search.model import as_map as as_map
+from .search.model import as_model as as_model
+from .search.model import load_model as load_model
 from .search.model import placed_field as placed_field
 from .search.occupancy import OccupancySamples as OccupancySamples
 from .search.occupancy import fit_occupancy as fit_occupancy
@@ -116,9 +119,6 @@ from .search.searching import Event as Event
 from .search.searching import escherize_class as escherize_class
 from .search.searching import fit_tile as fit_tile
 from .search.searching import search_classes as search_classes
-from .search.stored_models import as_map as as_map
-from .search.stored_models import as_model as as_model
-from .search.stored_models import load_model as load_model
 from .silhouette.bending import Bending as Bending
 from .silhouette.emphasis import Emphasis as Emphasis
 from .silhouette.pins import Pins as Pins
@@ -131,7 +131,7 @@ from .silhouette.soft_target import signed_distance as signed_distance
 from .silhouette.target import Frame as Frame
 from .silhouette.target import Target as Target
 from .tile import EscherTile as EscherTile
-from .tile_map import TileMap as TileMap
+from .tile import TileMap as TileMap
 from .tilings.certificate import Certificate as Certificate
 from .tilings.certificate import certify as certify
 from .tilings.colourings import Colouring as Colouring

@@ -13,7 +13,8 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import is_tensor
-from orbiflow.arrays import Array, Complex
+from orbiflow.arrays import Array, Complex, Integers
+from orbiflow.errors import OrbiflowError
 
 if TYPE_CHECKING:
     import torch
@@ -24,16 +25,10 @@ else:  # torch is imported by those who have tensors
 
 
 def signed_area(ring: AnyRing) -> AnyRing:
-    """Return the area that each ring encloses, positive where it is counter-clockwise with y up.
+    """Return the area (...) that each ring (..., N, 2) encloses, positive if counter-clockwise, y up.
 
     Uses the shoelace formula about the first vertex: about the origin it would lose all digits of a
-    distant ring's area to cancellation.
-
-    Args:
-        ring: Rings (..., N, 2), NumPy or torch.
-
-    Returns:
-        The areas (...), a NumPy scalar for a single ring, in square units of the ring.
+    distant ring's area to cancellation. Takes NumPy or torch.
 
     >>> square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
     >>> float(signed_area(square)), float(signed_area(square + 1e8))
@@ -112,15 +107,8 @@ def plane_points(z: Complex) -> Array:
 def best_similarity(points: Complex, images: Complex) -> Complex:
     """Return the factors of the similarities z -> factor (z - mean) + mean' nearest to given images.
 
-    These are rotations and scalings, without mirror images, by least squares over the first axis
-    (Procrustes).
-
-    Args:
-        points: Points (N,) x + iy.
-        images: Their images (N,), or C sets of images (N, C).
-
-    Returns:
-        The factors, () or (C,), in the images' units over the points'.
+    These are rotations and scalings, without mirror images, by least squares (Procrustes): () or (C,)
+    for `points` (N,) x + iy and their `images` (N,), or C sets of images (N, C).
 
     >>> triangle = np.array([0, 1, 1j])
     >>> complex(best_similarity(triangle, 2j * triangle + 5))
@@ -174,6 +162,18 @@ def arc_lengths(ring: Array) -> Array:
     """
     sides = np.roll(ring, -1, axis=0) - ring
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(sides, axis=1))])
+
+
+def border(triangles: Integers) -> Integers:
+    """Return the points, in order, of the sides that belong to one of the triangles (M, 3) alone."""
+    sides = {(int(t[k - 1]), int(t[k])) for t in triangles for k in range(3)}
+    after = {a: b for a, b in sides if (b, a) not in sides}
+    ring = [min(after)]
+    while len(ring) <= len(after) and (follower := after[ring[-1]]) != ring[0]:
+        ring.append(follower)
+    if len(ring) != len(after):
+        raise OrbiflowError("the bending's triangles do not fill one outline")
+    return np.array(ring)
 
 
 def polygons_in(geometry: BaseGeometry) -> list[Polygon]:

@@ -128,34 +128,26 @@ def _table(tiles: Sequence[EscherTile]) -> Table:
     """The tiles that were found, to look at."""
     both = any(tile.front is not None for tile in tiles)
     title = "Tiles for likeness, then for overlap" if both else "Tiles, best first"
-    # for 80 columns
-    columns = ("score", "bent", "IoU", "recognised", "certified", "edges", "s")
-    if both:
-        columns = ("for", "deformation", "overlap", "front", "certified", "s")
-    rows = tuple(
-        (f"{tile.name} ({tile.group_name})", *(_cells(tile)[name] for name in columns))
-        for tile in tiles
-    )
-    return Table(title, ("class", *columns), rows)
+    rows = [_cells(tile, both=both) for tile in tiles]
+    return Table(title, tuple(rows[0]), tuple(tuple(row.values()) for row in rows))
 
 
-def _cells(tile: EscherTile) -> dict[str, str]:
-    mismatch = tile.certificate.edge_mismatch
+def _cells(tile: EscherTile, *, both: bool) -> dict[str, str]:
+    """Return a row by the names of its columns, which fit into 80 characters."""
+    mismatch, overlap = tile.certificate.edge_mismatch, f"{tile.metrics.iou:.4f}"
+    edges = f"{mismatch:.0e}" if mismatch < float("inf") else "-"
     bent = "-" if tile.deformation is None else f"{tile.deformation:.3f}"
-    overlap = f"{tile.metrics.iou:.4f}"
-    return {
-        "score": f"{tile.score:.3f}",
-        "for": tile.objective,
-        "bent": bent,
-        "deformation": bent,
-        "IoU": overlap,
-        "overlap": overlap,
-        "recognised": f"{tile.recognisability.score:.3f}",
-        "front": "yes" if tile.front else "near",
-        "certified": "yes" if tile.certificate.valid else "NO",
-        "edges": f"{mismatch:.0e}" if mismatch < float("inf") else "-",
-        "s": f"{tile.seconds:.1f}",
-    }
+    certified = "yes" if tile.certificate.valid else "NO"
+    if both:
+        front = "yes" if tile.front else "near"
+        middle = {"for": tile.objective, "deformation": bent, "overlap": overlap, "front": front}
+        middle["certified"] = certified
+    else:
+        same = f"{tile.recognisability.score:.3f}"
+        middle = {"score": f"{tile.score:.3f}", "bent": bent, "IoU": overlap, "recognised": same}
+        middle |= {"certified": certified, "edges": edges}
+    name = f"{tile.name} ({tile.group_name})"
+    return {"class": name, **middle, "s": f"{tile.seconds:.1f}"}
 
 
 def _closing(out: Path, written: bool, found: bool, seconds: float) -> Note:

@@ -70,7 +70,7 @@ def _contents(file: Path, document: dict[str, Any]) -> tuple[list[str], str, dic
 
 
 def folder_names(classes: Iterable[str]) -> list[str]:
-    """Of results of these classes; further tiles of a class are IH4-2, IH4-3 and so on.
+    """Return a folder's name for each tile of these classes; a class's second is IH4-2 and so on.
 
     >>> folder_names(["IH4", "IH6", "IH4"])
     ['IH4', 'IH6', 'IH4-2']

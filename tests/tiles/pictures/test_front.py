@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from PIL import Image
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.pictures import FrontPoint, front_png
+from orbiflow.tiles import EscherTile, Tile, isohedral_class
+from orbiflow.tiles.pictures import front_png
 from orbiflow.tiles.pictures.front import COLOURS, PALE, _apart
 
 HOUSE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [1.0, 3.0], [0.0, 2.0]])
@@ -21,14 +23,16 @@ def share(image: Array, colour: str) -> float:
     return float((np.abs(image.astype(int) - rgb).max(axis=-1) <= 2).mean())
 
 
-def point(deformation: float, iou: float, objective: str, listed: bool = True) -> FrontPoint:
-    return FrontPoint(deformation, iou, HOUSE, "IH4", objective, listed, listed)
+def found(deformation: float, iou: float, objective: str, front: bool = True) -> EscherTile:
+    tile = EscherTile(Tile(HOUSE, isohedral_class("IH4").group(), "IH4"), front=front)
+    metrics = replace(tile.metrics, iou=iou)
+    return tile.changed(deformation=deformation, metrics=metrics, objective=objective)
 
 
 def test_listed_tiles_are_coloured_and_others_pale() -> None:
-    points = [point(0.1, 0.7, "likeness"), point(0.3, 0.9, "overlap")]
-    points.append(point(0.2, 0.75, "likeness", listed=False))
-    image = np.asarray(Image.open(io.BytesIO(front_png(points, width_px=800))).convert("RGB"))
+    chosen = [found(0.1, 0.7, "likeness"), found(0.3, 0.9, "overlap")]
+    data = front_png(chosen, [found(0.2, 0.75, "likeness", front=False)], width_px=800)
+    image = np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
     assert image.shape == (560, 800, 3)
     areas = [share(image, colour) for colour in (*COLOURS.values(), PALE)]
     assert areas[0] > 2 * areas[2]
@@ -46,7 +50,7 @@ def test_listed_tiles_are_coloured_and_others_pale() -> None:
 
 @pytest.mark.parametrize("count", [1, 12])
 def test_equal_points_make_room(count: int) -> None:
-    data = front_png([point(0.2, 0.8, "likeness")] * count, width_px=600)
+    data = front_png([found(0.2, 0.8, "likeness")] * count, width_px=600)
     assert Image.open(io.BytesIO(data)).size == (600, 420)
     corner = np.array([0.0, 0.0]), np.array([600.0, 420.0])
     places = _apart(np.full((count, 2), 200.0), 50.0, corner)

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 from orbiflow.runtime import Cancel, Cancelled
 from orbiflow.tiles import CLASSES, complex_points, plane_points, resampled, signed_area
 from orbiflow.tiles.likeness import Elastic
-from orbiflow.tiles.search.co_deformation import Stage, _moves, shifted
-from orbiflow.tiles.search.placements import Placements, best_placements
-from orbiflow.tiles.search.tile_space import TileSpace
+from orbiflow.tiles.search.co_deformation import _moves, shifted
+from orbiflow.tiles.search.tile_space import Placements, TileSpace, best_placements
 from outlines import animal
 from strategies import seeds
 
@@ -67,7 +66,7 @@ def test_corners_find_back_to_a_tile(name: str, seed: int) -> None:
     away = own._replace(
         lengths=own.lengths + lengths[way], starts=(own.starts + starts[way]) % body.size
     )
-    found = shifted(body, CLASSES[name], away, at_rest(body, 1), [Stage(1, 1)], share=1.0)
+    found = shifted(body, CLASSES[name], away, at_rest(body, 1), [(1, 1)], share=1.0)
     assert (found.placements.lengths == own.lengths).all()
     assert found.placements.starts == own.starts
 
@@ -78,7 +77,7 @@ def test_no_placement_becomes_worse(name: str, share: float) -> None:
     kind = CLASSES[name]
     placements = best_placements(kind, complex_points(RING), 12)
     stay = shifted(BODY, kind, placements, at_rest(BODY, 12), [], share=share)
-    stages = [Stage(2, 12), Stage(1, 3)]
+    stages = [(2, 12), (1, 3)]
     gone = shifted(BODY, kind, placements, at_rest(BODY, 12), stages, share=share)
     assert len(gone.costs) <= 3
     assert (np.diff(gone.costs) >= 0).all()
@@ -95,11 +94,5 @@ def test_it_can_be_cancelled() -> None:
     placements = best_placements(CLASSES["IH4"], complex_points(RING), 2)
     with pytest.raises(Cancelled):
         shifted(
-            BODY,
-            CLASSES["IH4"],
-            placements,
-            at_rest(BODY, 2),
-            [Stage(1, 2)],
-            share=1.0,
-            cancel=cancel,
+            BODY, CLASSES["IH4"], placements, at_rest(BODY, 2), [(1, 2)], share=1.0, cancel=cancel
         )

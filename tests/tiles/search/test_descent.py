@@ -29,8 +29,8 @@ from orbiflow.tiles import (
 from orbiflow.tiles.likeness import boundary_iou
 from orbiflow.tiles.search.descent import CALM, Descent
 from orbiflow.tiles.search.method import Goal
+from orbiflow.tiles.search.model import extract_tile
 from orbiflow.tiles.search.starts import template_starts
-from orbiflow.tiles.search.stored_models import extract_tile
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 TARGET = Target.from_polygon(BOOT)

@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from orbiflow.arrays import Array
 from orbiflow.tiles import CLASSES, Target, Tile, TileModel, certify, resampled
 from orbiflow.tiles.search.candidates import Prototiles
-from orbiflow.tiles.search.placements import (
+from orbiflow.tiles.search.starts import outline_starts, template_starts, template_symmetries
+from orbiflow.tiles.search.tile_space import (
     Placements,
     _compositions,
     _count,
     best_placements,
     edge_lengths,
+    nearest_tiles,
 )
-from orbiflow.tiles.search.starts import mirror_closed, outline_starts, template_starts
-from orbiflow.tiles.search.tile_space import nearest_tiles
 
 BOOT = np.array([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]])
 TARGET = Target.from_polygon(BOOT)
@@ -179,7 +179,7 @@ def test_thin_limbs_still_give_starts() -> None:
 
 
 def test_only_ih21_needs_mirror_images() -> None:
-    assert [name for name, kind in CLASSES.items() if not mirror_closed(kind)] == ["IH21"]
+    assert [name for name, kind in CLASSES.items() if not template_symmetries(kind)[1]] == ["IH21"]
     image = Target.from_polygon(BOOT * (-1, 1))
     one, two = (
         outline_starts(t, CLASSES["IH21"], count=40, resolutions=(60,)) for t in (TARGET, image)

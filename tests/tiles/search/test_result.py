@@ -22,7 +22,7 @@ def best_tile(
     target: Target, model: TileModel, *, starts: int, seconds: float, force: bool = False
 ) -> EscherTile:
     fit = Fit(model, starts, 0, model.size)
-    return best_tiles(target, fit, seconds=seconds, force=force)[0]
+    return best_tiles(target, fit, force=force)[0].changed(seconds=seconds)
 
 
 def finalists(*shapes: float, angles: tuple[float, ...] | None = None) -> TileModel:

@@ -25,8 +25,8 @@ from orbiflow.tiles import (
     certify,
     load_model,
 )
-from orbiflow.tiles.search.stored_models import extract_tile
-from orbiflow.tiles.tile_map import BENDING, FORMAT, MAX_BYTES
+from orbiflow.tiles.search.model import extract_tile
+from orbiflow.tiles.tile import BENDING, FORMAT, MAX_BYTES
 from strategies import seeds
 
 

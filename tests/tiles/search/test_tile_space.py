@@ -16,8 +16,7 @@ from orbiflow.tiles import (
     resampled,
     signed_area,
 )
-from orbiflow.tiles.search.placements import Placements, best_placements
-from orbiflow.tiles.search.tile_space import TileSpace
+from orbiflow.tiles.search.tile_space import Placements, TileSpace, best_placements
 from outlines import animal
 from strategies import angles, seeds
 

@@ -13,6 +13,7 @@ from shapely.errors import GEOSException
 
 from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
+from orbiflow.drawing import plane_axes
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.art.raster import Grid, Paint
 from orbiflow.tiles.art.source import SAME_ASPECT, Picture, covered_area, read_picture
@@ -43,11 +44,7 @@ FARTHEST = 1e6  # greatest reach of a drawing, in sizes of the silhouette
 
 
 def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
-    """Read an SVG file and carry its drawing onto a tile, in the tile's units; return it with notes.
-
-    Fills and strokes are kept and gradients become one colour; texts, pictures and clips are left
-    out. `currentColor` without a `color` is the ink that shows on each tile.
-    """
+    """Read an SVG file and carry its fills and strokes onto a tile, in the tile's units, with notes."""
     check_file(path)
     drawing = Drawing(path, parse_xml(path, read_bytes(path, MAX_BYTES)))
     drawing.collect()
@@ -248,10 +245,8 @@ def _canvas(parts: list[Part], grid: Grid) -> Array:
 
     figure = Figure(figsize=(grid.width / DOTS, grid.height / DOTS), dpi=DOTS)
     figure.patch.set_alpha(0)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set_axis_off()
-    axes.set_xlim(0, grid.width)
-    axes.set_ylim(grid.height, 0)
+    axes = plane_axes(figure, (0.0, 0.0, grid.width, grid.height), y_down=True)
+    axes.set_aspect("auto")  # which rounding would otherwise decide
     for part in parts:
         fill, stroke = (
             "#000000" if colour == INK else colour

@@ -68,8 +68,6 @@ class Artwork:
 
     def _repr_png_(self) -> bytes:
         """Return what a notebook shows."""
-        from orbiflow.tiles.art.making import png_of
-
         return png_of(render_artwork(self), self.settings.dpi)
 
 
@@ -149,10 +147,7 @@ TILE, MOTIF = "tile", "motif"
 
 
 def art_scene(art: Artwork) -> Scene:
-    """Return the page in millimetres, as `render_artwork` draws it.
-
-    A picture of pixels becomes part of the drawing, already carried onto the tile.
-    """
+    """Return the page in millimetres, as `render_artwork` draws it, with pixels carried already."""
     page, chosen = art.page, palette(art.settings.palette)
     unit = INCH / art.settings.dpi  # a pixel in mm
     linear, offset = unit * page.linear, unit * page.offset
@@ -170,7 +165,6 @@ def art_scene(art: Artwork) -> Scene:
     symbols = {TILE: symbol.moved(scale * np.eye(2), np.zeros(2))}
     motifs = {MOTIF: motif.moved(scale * np.eye(2), np.zeros(2))}
     box = Box(0.0, 0.0, unit * page.width, unit * page.height)
-    width = unit * art.outline
     layers = [Layer("paper", "paper", Style(fill=chosen.paper), (rectangle(box),))]
     drawn = bool(motif.parts or motif.rasters)
     for colour in sorted(set(page.colours.tolist())):
@@ -185,7 +179,7 @@ def art_scene(art: Artwork) -> Scene:
             name, ink = f"drawing on {name}", chosen.ink(colour)
             layers.append(Layer(name, "tiles", Style(), (uses,), clipped=True, ink=ink))
     if art.outline > 0:
-        style = Style(None, chosen.outline, width)
+        style = Style(None, chosen.outline, unit * art.outline)
         uses = Uses(TILE, turned, copies.cosets, places)
         layers.append(Layer("outlines", "tiles", style, (uses,), clipped=True))
     notes = (f"Artwork of {tile.isohedral_class or 'a tile'}, made with orbiflow {__version__}.",)
@@ -237,21 +231,14 @@ def draw_art(
     """Write a picture of a tiling with something on its tiles, and return what was drawn.
 
     Args:
-        tile: A tile in memory, or a run's folder; see `with_map`.
+        tile, settings, force, on_event, cancel: As for `export`; the tile needs a map for a picture.
         out: The file, .png or .svg.
-        settings: How it is drawn.
         picture: The file of a picture or drawing over the silhouette.
         target: The target of a search in memory that left no map, such as one for overlap.
-        force: Take a tile that is not certified.
-        on_event: Called with the `Progress`.
-        cancel: Stops the work; nothing is then written.
 
     Raises:
-        CertificationError: If the tile is not certified.
         InputFileError: If the picture cannot be read.
-        OrbiflowError: For another ending, and as `artwork`.
-        OutputError: If the file cannot be written.
-        Cancelled: If it was cancelled.
+        OrbiflowError: For another ending, as `artwork`, and as `export`.
     """
     out, cancel = as_path(out, "the file to draw to"), cancel or Cancel()
     if out.suffix.lower() not in (".png", ".svg"):
@@ -261,8 +248,6 @@ def draw_art(
         force=force, otherwise="so it is not exported; --force exports it, marked so"
     )
     on_event(Progress(0.0, "laying out"))
-    if picture is not None:
-        source.require_map()
     over = Over() if picture is None else read_over(picture, source)
     made = artwork(source, settings, picture=over.picture, drawing=over.drawing, notes=over.notes)
     cancel.check()

@@ -138,12 +138,11 @@ SIZE_TOLERANCE = 0.02  # greatest relative change of the size so that the cell i
 
 
 class Rectangle(NamedTuple):
-    """A rectangular cell of whole pixels that repeats.
+    """A rectangular cell of whole pixels that repeats."""
 
-    - `linear`: The map (2, 2) from the lattice's units to pixels: a similarity, but for `strain`.
-    """
-
-    linear: Array
+    linear: (
+        Array  # the map (2, 2) from the lattice's units to pixels: a similarity, but for `strain`
+    )
     width: int  # with `height`: the size in pixels
     height: int
     cells: int  # the number of lattice cells in it

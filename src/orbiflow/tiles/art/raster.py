@@ -17,9 +17,9 @@ from orbiflow.tiles.art.page import ArtPage
 
 NOWHERE = -1  # the label of samples that lie in no region
 
+# Distance, in samples, by which rows of samples are moved down: rounding would otherwise decide about
+# vertices that a symmetric placement puts exactly on a row
 NUDGE = 3.1415926e-7
-"""Distance, in samples, by which rows of samples are moved down: rounding would otherwise decide about
-vertices that a symmetric placement puts exactly on a row."""
 
 
 class Runs(NamedTuple):
@@ -190,14 +190,11 @@ class Paint:
     def coloured(self, palette: Palette, colours: int) -> Array:
         """Return the raster (colours, height, width, 3) in each colour of the palette."""
         rgb, own, ink = self.values[..., :3], self.values[..., 3:4], self.values[..., 4:]
-        return np.stack(
-            [
-                rgb
-                + own * rgb_of(palette.fill(k)).astype(np.float32)
-                + ink * rgb_of(palette.ink(k)).astype(np.float32)
-                for k in range(colours)
-            ]
+        fills, inks = (
+            [rgb_of(colour(k)).astype(np.float32) for k in range(colours)]
+            for colour in (palette.fill, palette.ink)
         )
+        return np.stack([rgb + own * f + ink * i for f, i in zip(fills, inks, strict=True)])
 
 
 def rgb_of(colour: str) -> Array:

@@ -14,10 +14,10 @@ from scipy.ndimage import distance_transform_edt
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.art.raster import Grid, polygon_sides, runs, triangle_sides
+from orbiflow.tiles.geometry import border
 from orbiflow.tiles.search import matched
 from orbiflow.tiles.silhouette import Bending, Frame, Target, deep_channel, open_image, upright
-from orbiflow.tiles.tile import EscherTile, TileSource
-from orbiflow.tiles.tile_map import TileMap
+from orbiflow.tiles.tile import EscherTile, TileMap, TileSource
 
 
 def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
@@ -67,7 +67,7 @@ def silhouette_outline(tile: EscherTile) -> Array:
     bending, frame = tile.bending, tile.frame
     if bending is None or frame is None:
         return tile.tile.polygon
-    return frame.to_input(_border(bending.rest, bending.triangles))
+    return frame.to_input(bending.rest[border(bending.triangles)])
 
 
 class Covered(NamedTuple):
@@ -115,17 +115,6 @@ def _silhouette(own: dict[str, Any]) -> Target:
             f"the run saved no map, and {source} is not the silhouette that it was; search again"
         )
     return target
-
-
-def _border(points: Array, triangles: np.ndarray) -> Array:
-    """Return the border (N, 2) of triangles without holes, in order."""
-    sides = {(int(t[k - 1]), int(t[k])) for t in triangles for k in range(3)}
-    after = {a: b for a, b in sides if (b, a) not in sides}
-    first = next(iter(after))
-    ring = [first]
-    while (following := after[ring[-1]]) != first:
-        ring.append(following)
-    return points[ring]
 
 
 SAME_ASPECT = 0.01  # relative difference up to which two aspect ratios count as the same
@@ -212,8 +201,7 @@ def carried_picture(picture: Picture, tile: EscherTile, grid: Grid) -> tuple[Arr
 def _spread(colours: Array, outline: Array) -> Array:
     """Extend the colours (height, width, 4) just inside an outline, in pixels, to all outside it.
 
-    So neither the background of a cut-out shows nor the pixels along the outline that it mixed
-    with.
+    So neither the background of a cut-out shows nor the outline's pixels that it mixed with.
     """
     height, width = colours.shape[:2]
     found = runs(polygon_sides(outline), 0, height, width)
@@ -234,10 +222,7 @@ def _spread(colours: Array, outline: Array) -> Array:
 
 
 def _places(tile: EscherTile, grid: Grid) -> Array:
-    """Return the point of the silhouette (height, width, 2) that is carried to each texel.
-
-    Points for texels outside the tile are arbitrary: those are painted from inside.
-    """
+    """Return the point (height, width, 2) that is carried to each texel; any, outside the tile."""
     bending, frame = tile.require_map()
     images = grid.texels(frame.to_input(bending.images))
     rest = frame.to_input(bending.rest)

@@ -49,11 +49,7 @@ MOST_TILES_TO_SHIFT = 1000
 
 
 def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
-    """Scale the tile and put it on the page, the way up it has, turned as the settings say.
-
-    It lies in the middle; where tiles are not cut at the page's edge, it lies nearby, so that as
-    many as possible are whole.
-    """
+    """Scale and turn the tile and put it in the middle, or nearby where that makes most tiles whole."""
     width, height = settings.page
     box = Box(0.0, 0.0, width, height - (STRIP if settings.calibrate else 0.0))
     scale = settings.tile_size / longer_side(tile.polygon)
@@ -84,8 +80,7 @@ def longer_side(ring: Array) -> float:
 def rectangle_sides(ring: Array) -> tuple[float, float]:
     """Return the sides of the smallest rectangle by area around a ring, the shorter first.
 
-    Among rectangles of the same area, as around a regular hexagon, it is the one with the shortest
-    sides, so that the choice does not depend on rounding.
+    Of the same area, as around a regular hexagon, the shortest: rounding does not choose.
 
     >>> square = np.array([[0.0, 0.0], [1.0, 1.0], [0.0, 2.0], [-1.0, 1.0]])
     >>> [round(side, 6) for side in rectangle_sides(square)]
@@ -212,10 +207,9 @@ MITRE = 4.0  # the greatest reach of a sharp corner of a cut, in offsets
 
 
 def cut_ring(ring: Array, kerf: float, clearance: float) -> Array:
-    """Return the line (M, 2) that the middle of the beam follows to cut a piece with this outline.
+    """Return the line (M, 2) of the beam's middle that leaves `ring` (N, 2), less half the clearance.
 
-    The piece that is left is `ring` (N, 2), less half the clearance all around. A neck no wider
-    than kerf or clearance is an error, and so is a slit that the beam would close.
+    A neck no wider than kerf or clearance is an error, and so is a slit that the beam would close.
 
     >>> bar = np.array([[0.0, 0.0], [20, 0], [20, 4], [0, 4]])
     >>> shapely.Polygon(cut_ring(bar, 0.2, 0.0)).bounds
@@ -269,10 +263,7 @@ LEAST_EDGE = 0.1  # twice the least distance in mm of cuts from the sheet's edge
 
 
 def pieces_scenes(layout: Layout, *, fine: bool = True) -> list[Scene]:
-    """Return a scene for each sheet; there is one unless a bed is given and does not hold all copies.
-
-    The cuts are smooth curves if `fine`, else polygons.
-    """
+    """Return a scene for each sheet, several where a bed does not hold all; smooth cuts if `fine`."""
     settings, box = layout.settings, layout.box
     flat = settings.deviation / 4
     # flattening and fitting again share what the outline's fit left of the tolerance

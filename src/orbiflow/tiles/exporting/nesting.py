@@ -79,25 +79,29 @@ class Arrangement:
         return np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
-def tightened(start: Arrangement, ring: Array, gap: float, *, most: float = 4.0) -> Arrangement:
+MOST_SPREAD = 4.0  # how far apart pieces are moved at most, in their distances
+
+
+def tightened(start: Arrangement, ring: Array, gap: float) -> Arrangement:
     """Move the pieces' middles evenly, apart or together, until the pieces are just clear."""
     middle = _middle(ring)
+
+    def spread(factor: float) -> Arrangement:
+        return start.scaled(factor * np.eye(2), middle)
+
     low, high = 0.0, 1.0
-    while not start.scaled(high * np.eye(2), middle).clear(ring, gap):
+    while not spread(high).clear(ring, gap):
         low, high = high, 1 + 2 * (high - 1) + 0.02
-        if high > most:
-            return start.scaled(most * np.eye(2), middle)
+        if high > MOST_SPREAD:
+            return spread(MOST_SPREAD)
     if low == 0.0:
         low = 0.9
-        if start.scaled(low * np.eye(2), middle).clear(ring, gap):
-            return start.scaled(low * np.eye(2), middle)
+        if spread(low).clear(ring, gap):
+            return spread(low)
     while high - low > 5e-4:
         between = (low + high) / 2
-        if start.scaled(between * np.eye(2), middle).clear(ring, gap):
-            high = between
-        else:
-            low = between
-    return start.scaled(high * np.eye(2), middle)
+        low, high = (low, between) if spread(between).clear(ring, gap) else (between, high)
+    return spread(high)
 
 
 def _middle(ring: Array) -> Array:
@@ -144,7 +148,7 @@ class _Raster:
     """The no-fit regions of a piece with itself and with itself turned, on square cells."""
 
     def __init__(self, ring: Array, gap: float) -> None:
-        self.center = (ring.min(axis=0) + ring.max(axis=0)) / 2
+        self.center = _middle(ring)
         extent = float(np.ptp(ring, axis=0).max()) + gap
         self.cell = extent / CELLS
         polygon = shapely.Polygon(ring - self.center).buffer(gap / 2)
@@ -169,10 +173,9 @@ class _Raster:
         return steps[int(np.argmin(known & region[index[:, 0], index[:, 1]]))]
 
     def lattices(self, region: Mask, pieces: int) -> list[tuple[float, Array]]:
-        """Return the area and lattice, in mm, of lattices outside a region, the densest first.
+        """Return area and lattice, in mm, with basis vectors outside a region, the densest first.
 
-        Their basis vectors lie outside it; longer vectors may still lie in it. A cell smaller than
-        so many `pieces` is left out.
+        Longer vectors may still lie in it. A cell smaller than so many `pieces` is left out.
         """
         half = (len(region) - 1) // 2
         axis = np.arange(-half, half + 1)
@@ -214,14 +217,11 @@ ANGLES = 36  # angles of an arrangement that are tried on a sheet
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """N pieces on a sheet: a point p of the piece goes to linear[n] p + offsets[n].
-
-    - `aspects`: The number (N,) of each piece in the arrangement's cell.
-    """
+    """N pieces on a sheet: a point p of the piece goes to linear[n] p + offsets[n]."""
 
     linear: Array
     offsets: Array
-    aspects: NDArray[np.int64]
+    aspects: NDArray[np.int64]  # the number (N,) of each piece in the arrangement's cell
 
     def __len__(self) -> int:
         return len(self.linear)
@@ -236,10 +236,7 @@ class Placed:
 
 
 def dense_arrangements(tile: Tile, ring: Array, gap: float, *, seed: int = 0) -> list[Arrangement]:
-    """Return arrangements of pieces cut along `ring` (M, 2), at least `gap` apart, the densest first.
-
-    The same seed, of the small changes, gives the same arrangements.
-    """
+    """Return arrangements of pieces cut along `ring` (M, 2), `gap` apart, densest first, by a seed."""
     rng = np.random.default_rng(seed)
     coarse = _simplified(ring, gap)
     group = tile.group
@@ -287,8 +284,7 @@ def on_sheet(
 ) -> Placed:
     """Fill a rectangle from the origin with as many pieces as fit, in rows from the top.
 
-    Each arrangement is tried, turned and shifted in several ways; among equally good ones the first
-    is taken. A single piece goes in whichever way it fits.
+    Each arrangement is tried in several ways; among equally good ones the first is taken.
     """
     best = Placed(np.zeros((0, 2, 2)), np.zeros((0, 2)), np.zeros(0, dtype=np.int64))
     turns = [(found, angle) for found in arrangements for angle in _angles(found, ring)]

@@ -34,8 +34,7 @@ def fitted(points: Array, tolerance: float) -> Curve:
     corners = [0, *(np.flatnonzero(turn > CORNER) + 1), len(points) - 1]
     found: list[tuple[Array, bool]] = []
     for first, last in pairwise(corners):
-        run = points[first : last + 1]
-        found += _run(run, tolerance)
+        found += _run(points[first : last + 1], tolerance)
     return Curve(np.stack([piece for piece, _ in found]), np.array([flat for _, flat in found]))
 
 
@@ -127,12 +126,11 @@ def _least_squares(samples: Array, share: Array, start: Array, end: Array) -> Ar
     u = 1 - t
     left, right = 3 * u**2 * t * start, -3 * u * t**2 * end
     rest = samples - (u**3 + 3 * u**2 * t) * first - (t**3 + 3 * u * t**2) * last
-    matrix = np.array(
-        [[(left**2).sum(), (left * right).sum()], [(left * right).sum(), (right**2).sum()]]
-    )
+    mixed = (left * right).sum()
+    matrix = np.array([[(left**2).sum(), mixed], [mixed, (right**2).sum()]])
     goal = np.array([(left * rest).sum(), (right * rest).sum()])
     chord = float(np.linalg.norm(last - first))
-    determinant = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] ** 2
+    determinant = matrix[0, 0] * matrix[1, 1] - mixed**2
     lengths = np.full(2, chord / 3)
     if determinant > 1e-12 * matrix[0, 0] * matrix[1, 1]:
         solved = np.linalg.solve(matrix, goal)
@@ -163,13 +161,10 @@ _SHARES = (0.6, 0.15, 0.04)  # of the tolerance; finer where curves would otherw
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """The outline of a tile in curves.
-
-    - `edges`: How its outline falls into edges; None if that is not known (`note` says why).
-    """
+    """The outline of a tile in curves."""
 
     tile: Tile
-    edges: Edges | None
+    edges: Edges | None  # how it falls into edges; None if not known (`note` says why)
     curves: tuple[Curve, ...]  # one curve for each edge, end to end; or a single closed curve
     note: str = ""  # what the user should know, or ""
 
@@ -182,10 +177,8 @@ class Outline:
 def outline(tile: Tile, tolerance: float) -> Outline:
     """Fit smooth curves near a tile's polygon that tile the plane as exactly as it does.
 
-    One edge of each class of identified edges is fitted and the others are its images; an edge that
-    is its own image, by a half-turn or a mirror across it, is fitted up to its middle. Where curves
-    would touch each other within the tolerance, they are fitted more closely, at worst along the
-    polygon itself.
+    One edge of each class is fitted, up to its middle if it is its own image, and the others are its
+    images. Where curves would touch, they are fitted more closely, at worst along the polygon.
     """
     try:
         own = edges(tile)
@@ -197,8 +190,7 @@ def outline(tile: Tile, tolerance: float) -> Outline:
         ring = Curve.joined(curves, closed=True).flattened(tolerance / 20)
         if shapely.Polygon(ring).is_valid:
             return Outline(tile, own, curves)
-    plain_edges = [Curve.polyline(own.points(k)) for k in range(len(own.starts))]
-    return Outline(tile, own, tuple(plain_edges))
+    return Outline(tile, own, tuple(Curve.polyline(own.points(k)) for k in range(len(own))))
 
 
 def _curves(own: Edges, tolerance: float) -> tuple[Curve, ...]:

@@ -29,8 +29,8 @@ class Curve:
     - `closed`: Whether the last piece ends where the first starts.
 
     >>> square = Curve.polyline([[0, 0], [1, 0], [1, 1], [0, 1]], closed=True)
-    >>> len(square.pieces), square.length
-    (4, 4.0)
+    >>> len(square.pieces)
+    4
     """
 
     pieces: Array
@@ -62,14 +62,6 @@ class Curve:
     def end(self) -> Array:
         """The last point (2,)."""
         return self.pieces[-1, 3]
-
-    @property
-    def length(self) -> float:
-        """The length of a polygon through points of each piece; exact for straight pieces."""
-        points = self.flattened(1e-3)
-        if self.closed:
-            points = np.concatenate([points, points[:1]])
-        return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
     def moved(self, linear: Array, offset: ArrayLike) -> Curve:
         """Return the image under the affine map p -> linear p + offset."""
@@ -308,19 +300,14 @@ def rectangle(box: Box) -> Curve:
     return Curve.polyline([[left, top], [right, top], [right, bottom], [left, bottom]], closed=True)
 
 
-def inside(curve: Curve, box: Box, *, slack: float = 1e-9) -> bool:
+def inside(curve: Curve, box: Box) -> bool:
     """Return whether a box holds a curve with all its control points."""
-    low, high = curve.bounds()
-    return bool(
-        (low >= np.array(box[:2]) - slack).all() and (high <= np.array(box[2:]) + slack).all()
-    )
+    (low, high), corners = curve.bounds(), np.array(box).reshape(2, 2)
+    return bool((low >= corners[0] - 1e-9).all() and (high <= corners[1] + 1e-9).all())
 
 
 def clipped_region(curve: Curve, box: Box, tolerance: float) -> list[Curve]:
-    """Return the part of the region inside a closed curve that is in the box, as closed curves.
-
-    It is the curve itself if all of it is in the box, else polygons within `tolerance` of it.
-    """
+    """Return what a closed curve and the box share: the curve if all is, else polygons near it."""
     if inside(curve, box):
         return [curve]
     polygon = shapely.Polygon(curve.flattened(tolerance))

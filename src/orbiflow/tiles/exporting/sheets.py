@@ -46,17 +46,10 @@ def split(scene: Scene, bed: tuple[float, float], tolerance: float) -> list[Scen
             f"sheets of {bed[0]:g} x {bed[1]:g} mm; the most is {MOST_SHEETS}"
         )
     crosses = _crosses(columns, rows)
-    total = len(columns) * len(rows)
+    pages = [Box(left, top, right, bottom) for top, bottom in rows for left, right in columns]
     return [
-        _sheet(
-            scene,
-            (left, top, right, bottom),
-            crosses,
-            tolerance,
-            f"{i * len(columns) + j + 1} of {total}",
-        )
-        for i, (top, bottom) in enumerate(rows)
-        for j, (left, right) in enumerate(columns)
+        _sheet(scene, page, crosses, tolerance, f"{k} of {len(pages)}")
+        for k, page in enumerate(pages, 1)
     ]
 
 
@@ -89,13 +82,8 @@ def _crosses(
 
 
 def _sheet(
-    scene: Scene,
-    bounds: tuple[float, float, float, float],
-    crosses: list[tuple[float, float]],
-    tolerance: float,
-    number: str,
+    scene: Scene, page: Box, crosses: list[tuple[float, float]], tolerance: float, number: str
 ) -> Scene:
-    page = Box(*bounds)
     half = OVERLAP / 2
     # each side that is not the scene's own border is a seam
     seams = Box(
@@ -111,10 +99,7 @@ def _sheet(
     marks = [
         Curve.polyline(np.array([[x - dx, y - dy], [x + dx, y + dy]]) + back)
         for x, y in crosses
-        if page.left < x - ARM
-        and x + ARM < page.right
-        and page.top < y - ARM
-        and y + ARM < page.bottom
+        if page.left + ARM < x < page.right - ARM and page.top + ARM < y < page.bottom - ARM
         for dx, dy in ((ARM, 0.0), (0.0, ARM))
     ]
     layers.append(Layer("registration", "mark", BLUE, tuple(marks)))

@@ -181,13 +181,9 @@ def tile_svg(
     """Return the SVG of one tile, on a page with a small margin.
 
     Args:
-        tile: The tile.
-        width_mm: The page's width in mm.
         palette_name: A palette, whose second colour fills the tile.
         fill: A colour, or "none" for cutting. Default: the palette's.
-        outline_mm: The outline's width in mm.
-        y_down: Whether the tile's y axis points down, as in images.
-        title: The file's title. Default: the class.
+        tile, width_mm, outline_mm, y_down, title: As for `tiling_svg`.
 
     Raises:
         OrbiflowError: If the palette is unknown or the page has no size.

@@ -15,7 +15,7 @@ import numpy as np
 from orbiflow import __version__
 from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
-from orbiflow.drawing import palette
+from orbiflow.drawing import palette, plane_axes
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
 from orbiflow.tiles.exporting.layouts import Layout, layout, pieces_scenes, place_on, tiling_scene
@@ -91,7 +91,7 @@ def _polylines(
 SCHEMA_VERSION = 1
 
 
-def write_json(scene: Scene, *, tolerance: float, decimals: int = 4) -> str:
+def write_json(scene: Scene, *, tolerance: float) -> str:
     """Return the scene as JSON; all lengths in mm, y down from the page's upper left corner."""
     prototile = scene.prototile
     document: dict[str, Any] = {
@@ -103,23 +103,17 @@ def write_json(scene: Scene, *, tolerance: float, decimals: int = 4) -> str:
         "y": "down",
         "page": {"width": scene.width, "height": scene.height, "window": list(scene.clip)},
         **scene.facts,
-        "prototile": None if prototile is None else _rounded(prototile, decimals),
-        "tiles": [
-            _tile(tile, number, prototile, decimals) for number, tile in enumerate(scene.tiles)
-        ],
-        "layers": [_layer(scene, layer, tolerance, decimals) for layer in scene.layers],
+        "prototile": None if prototile is None else _rounded(prototile),
+        "tiles": [_tile(tile, number, prototile) for number, tile in enumerate(scene.tiles)],
+        "layers": [_layer(scene, layer, tolerance) for layer in scene.layers],
     }
     return json.dumps(document, allow_nan=False, separators=(",", ":"))
 
 
-def _tile(
-    tile: PlacedTile, number: int, prototile: np.ndarray | None, decimals: int
-) -> dict[str, Any]:
-    placed = (
-        {}
-        if prototile is None
-        else {"polygon": _rounded(prototile @ tile.linear.T + tile.offset, decimals)}
-    )
+def _tile(tile: PlacedTile, number: int, prototile: np.ndarray | None) -> dict[str, Any]:
+    placed = {}
+    if prototile is not None:
+        placed["polygon"] = _rounded(prototile @ tile.linear.T + tile.offset)
     return {
         "number": number,
         "aspect": tile.aspect,
@@ -131,11 +125,11 @@ def _tile(
     }
 
 
-def _layer(scene: Scene, layer: Layer, tolerance: float, decimals: int) -> dict[str, Any]:
+def _layer(scene: Scene, layer: Layer, tolerance: float) -> dict[str, Any]:
     paths: list[dict[str, Any]] = []
     if layer.role in ("cut", "mark"):  # tiles are listed as such
         paths = [
-            {"closed": curve.closed, "points": _rounded(curve.flattened(tolerance), decimals)}
+            {"closed": curve.closed, "points": _rounded(curve.flattened(tolerance))}
             for curve in scene.curves(layer)
         ]
     style = layer.style
@@ -149,7 +143,7 @@ def _layer(scene: Scene, layer: Layer, tolerance: float, decimals: int) -> dict[
     }
 
 
-def _rounded(values: np.ndarray, decimals: int) -> list[Any]:
+def _rounded(values: np.ndarray, decimals: int = 4) -> list[Any]:
     return (np.round(values, decimals) + 0.0).tolist()
 
 
@@ -166,10 +160,8 @@ def drawn(scene: Scene, *, least_width: float = 0.0) -> Figure:
     scene.require_plain()
     figure = Figure(figsize=(scene.width / INCH, scene.height / INCH))
     figure.patch.set_facecolor("white")
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set_axis_off()
-    axes.set_xlim(0, scene.width)
-    axes.set_ylim(scene.height, 0)
+    axes = plane_axes(figure, (0.0, 0.0, scene.width, scene.height), y_down=True)
+    axes.set_aspect("auto")  # which rounding would otherwise decide
     for layer in scene.layers:
         width = max(layer.style.width, least_width) * 72 / INCH
         collection = PathCollection(
@@ -341,11 +333,7 @@ def export(
 def scenes(
     tile: TileSource, settings: ExportSettings, *, force: bool = False
 ) -> tuple[list[Scene], tuple[str, ...]]:
-    """Return the sheets, and what the user should know.
-
-    Raises:
-        As `export`.
-    """
+    """Return the sheets, and what the user should know. Raises as `export`."""
     given = EscherTile.of(tile)
     certificate = given.require_certified(
         force=force, otherwise="so it is not exported; --force exports it, marked so"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from scipy.sparse.linalg import splu
 
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.geometry import border
 from orbiflow.tiles.motion.morph import Morph, OwnFrame
 from orbiflow.tiles.pictures import ASPECT, default_window
 from orbiflow.tiles.silhouette import Bending
@@ -29,31 +30,24 @@ class Places(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """An outline that changes, and M copies of it.
+    """An outline that changes, and M copies of it, in pixels, y down; the progress runs from 0 to 1."""
 
-    All lengths are in pixels, with y down; the progress of the animation runs from 0 to 1.
-
-    - `outline`: The outline (N, 2) at a progress, relative to a point of its own; N does not change.
-    - `places`: The places of the copies at a progress; the first is the tile itself.
-    - `births`: The progress (M, 2) from which to which each copy grows; below 0 if always there.
-    - `keys`: Values of the progress between which the outline moves in nearly straight lines.
-    """
-
-    width: int  # with `height`: the size of the picture
-    height: int
-    outline: Callable[[float], Array]
-    places: Callable[[float], Places]
+    page: Page
+    outline: Callable[
+        [float], Array
+    ]  # (N, 2) at a progress, about a point of its own; N is the same
+    places: Callable[[float], Places]  # of the copies at a progress; the first is the tile itself
     colours: NDArray[np.int64]  # the numbers (M,) of the palette's fills
-    births: Array
-    steady: bool  # whether the places do not change
-    keys: tuple[float, ...]
+    births: (
+        Array  # the progress (M, 2) from which to which each copy grows; below 0 if always there
+    )
+    keys: tuple[float, ...]  # progress between which the outline moves in nearly straight lines
     what: str  # the motion in words, for titles
 
     def grown(self, progress: float) -> Array:
         """Return the size (M,) of each copy, 0 to 1."""
         start, end = self.births.T
-        share = np.clip((progress - start) / (end - start), 0, 1)
-        return share * share * (3 - 2 * share)
+        return eased(np.clip((progress - start) / (end - start), 0, 1))
 
     def rings(self, progress: float) -> Iterator[tuple[Array, int, bool]]:
         """Yield every visible copy (N, 2), the number of its colour, and whether it is whole."""
@@ -103,8 +97,7 @@ class Page:
 def morph(tile: Tile, width: int, *, y_down: bool = False, steady: bool = False) -> Motion:
     """Return the tiling by the class's template, with straight edges, becoming the tile's.
 
-    It is a tiling throughout. If `steady`, the tile's lattice is there from the start: then the
-    template is stretched as the lattice is, and only edges move.
+    It is a tiling throughout; if `steady`, the tile's lattice is there from the start.
     """
     way, page = Morph(OwnFrame.of(tile)), Page(tile, width, y_down)
     end = way.end
@@ -127,13 +120,11 @@ def morph(tile: Tile, width: int, *, y_down: bool = False, steady: bool = False)
     copies = _seen(own, center, linear, outline, places, page)
     still = places(1.0, copies)
     return Motion(
-        page.width,
-        page.height,
+        page,
         outline,
         (lambda _: still) if steady else (lambda progress: places(progress, copies)),
         colouring(own).colours(copies),
         np.tile(ALWAYS, (len(copies), 1)),
-        steady,
         (0.0, 1.0) if way.is_straight and steady else tuple(np.linspace(0, 1, 17).tolist()),
         f"A tiling with straight edges becomes the tiling of {tile.isohedral_class}",
     )
@@ -145,13 +136,11 @@ def grow(tile: Tile, width: int, *, y_down: bool = False) -> Motion:
     outline = (tile.polygon - page.center) @ page.linear.T
     places, colours = _still_places(tile, page)
     return Motion(
-        page.width,
-        page.height,
+        page,
         lambda _: outline,
         lambda _: places,
         colours,
         _births(places, 0.0),
-        True,
         (0.0, 1.0),
         f"The tiling of {tile.isohedral_class or 'a tile'} grows around one tile",
     )
@@ -173,13 +162,11 @@ def bend(given: EscherTile, width: int) -> Motion:
         return (ring - page.center) @ page.linear.T
 
     return Motion(
-        page.width,
-        page.height,
+        page,
         outline,
         lambda _: places,
         colours,
         _births(places, BEND),
-        True,
         (*np.linspace(0, BEND, 13).tolist(), 1.0),
         f"The silhouette bends into a tile of {tile.isohedral_class}, and its tiling grows",
     )
@@ -240,7 +227,7 @@ class BendingWay:
     def __init__(self, bending: Bending) -> None:
         self.rest, self.images = bending.rest, bending.images
         triangles = bending.triangles
-        self.ring = _outline(triangles)
+        self.ring = border(triangles)
         corners, images = self.rest[triangles], self.images[triangles]
         sides, moved = (
             np.stack([c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]], axis=2) for c in (corners, images)
@@ -285,18 +272,7 @@ def _rotations(angles: Array) -> Array:
     return np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)
 
 
-def _outline(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the points of the sides that belong to one triangle alone, in order."""
-    ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    known = {(int(a), int(b)) for a, b in ends}
-    after = {a: b for a, b in known if (b, a) not in known}
-    ring = [min(after)]
-    while len(ring) <= len(after) and (follower := after[ring[-1]]) != ring[0]:
-        ring.append(follower)
-    if len(ring) != len(after):
-        raise OrbiflowError("the bending's triangles do not fill one outline")
-    return np.array(ring)
-
+Share = TypeVar("Share", float, Array)
 
 # Shares of the loop: the rest at the start, each way, and the rest at the end, at the tile
 REST, MOVE, SHOW = 0.07, 0.37, 0.19
@@ -309,7 +285,7 @@ class Frame(NamedTuple):
     seconds: float
 
 
-def eased(share: float) -> float:
+def eased(share: Share) -> Share:
     """Return a share of a way, 0 to 1, slow at both ends.
 
     >>> [round(eased(share), 3) for share in (0.0, 0.25, 0.5, 1.0)]
@@ -319,10 +295,7 @@ def eased(share: float) -> float:
 
 
 def frames(seconds: float, fps: float) -> list[Frame]:
-    """Return the pictures of a loop, there and back; equal ones in a row are one.
-
-    The way back has the same pictures as the way there.
-    """
+    """Return the pictures of a loop, there and back by the same; equal ones in a row are one."""
     way = max(2, round(MOVE * seconds * fps))
     there = [Frame(eased(k / way), MOVE * seconds / way) for k in range(1, way)]
     return [

@@ -39,21 +39,13 @@ TOLERANCE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class OwnFrame:
-    """A tile as an affine image of one whose group is its class's own.
-
-    - `linear`, `offset`: (2, 2) and (2,): a point p of the own frame lies at linear p + offset.
-    """
+    """A tile as an affine image of one whose group is its class's own."""
 
     kind: IsohedralClass
     points: Array  # (N, 2) the polygon in the own frame, from corner 0 on
     starts: tuple[int, ...]  # indices of the corners in it, increasing from 0
-    linear: Array
+    linear: Array  # with `offset`: a point p of the own frame lies at linear p + offset
     offset: Array
-
-    @property
-    def counts(self) -> tuple[int, ...]:
-        """Sides of the polygon along each edge of the class."""
-        return tuple(np.diff([*self.starts, len(self.points)]).tolist())
 
     @classmethod
     def of(cls, tile: Tile) -> OwnFrame:
@@ -95,10 +87,7 @@ class OwnFrame:
         return self.points[np.arange(ends[number], ends[number + 1] + 1) % len(self.points)]
 
     def straight(self) -> OwnFrame:
-        """The class's template with as many vertices: each where, along its edge, this one's are.
-
-        Its frame has the turn and the scale of this one, and no stretch.
-        """
+        """The template, its vertices spaced along edges as here, in a frame that does not stretch."""
         corners = self.kind.template()
         parts: list[Array] = []
         for k in range(len(corners)):
@@ -137,10 +126,7 @@ class OwnFrame:
 
 
 def _offset(kind: IsohedralClass, placed: Array, starts: tuple[int, ...], linear: Array) -> Array:
-    """Where the own frame's origin lies, from the edges that the group identifies.
-
-    Where the group leaves a direction open, the corners come as near to the template's as can be.
-    """
+    """Where the own frame's origin lies, by identified edges; by corners where these are silent."""
     rows: list[Array] = []
     values: list[Array] = []
     inverse = np.linalg.inv(linear)
@@ -232,15 +218,13 @@ def _links(own: OwnFrame) -> list[list[tuple[int, Isometry]]]:
 ROUNDS = 12  # number of times that sides of the outline may be halved for the triangulation
 STIFF = 1e4  # how much more strongly edges pull than the inside where they are to be straight
 
+# Most steps in which weights are tilted, the force that counts as none, the finite difference's step
 TILTS, BALANCED, TINY = 12, 1e-9, 1e-4
-"""Greatest number of steps in which weights are tilted, the force that counts as none, and the step
-of the finite differences."""
 
 # Number of places at which the way of the weights is measured, so that the outline moves evenly
 EVEN = 24
 
-CHECKED = 96
-"""Number of places at which the straight way is checked."""
+CHECKED = 96  # number of places at which the straight way is checked
 
 
 class Morph:
@@ -285,16 +269,12 @@ class Morph:
 
 @dataclass(frozen=True, eq=False)
 class _Weights:
-    """The weights of template and tile, from which places between them are solved for.
+    """The weights of template and tile, from which places between them are solved for."""
 
-    - `own`: The tile with as many vertices as the triangles need; they are the first n points.
-    - `first`, `last`: The weights (E,) of template and tile, which add up to one for each orbit.
-    """
-
-    own: OwnFrame
+    own: OwnFrame  # with as many vertices as the triangles need; they are the first n points
     orbits: Orbits  # the orbits of all points
     sides: NDArray[np.int64]  # each side (E, 2) of a triangle, from either end
-    first: Array
+    first: Array  # with `last`: weights (E,) of template and tile, which add up to 1 for each orbit
     last: Array
     guess: Array  # the points (N, 2) of the tile
 
@@ -344,8 +324,7 @@ class _Weights:
     def _solved(self, weights: Array, ways: Array) -> tuple[Array, Array]:
         """Return places (N, 2) in which each orbit is the mean of its neighbours, and a force (k,).
 
-        The force, along the directions that the group leaves open, is what the weights lack to keep
-        the whole in place, for walks by them drift. It is the same on all orbits.
+        The force, along the open directions and the same on all orbits, is what stops the drift.
         """
         weights = weights / _sums(weights, self.sides, self.orbits)
         guess, orbits = self.guess, self.orbits
@@ -373,10 +352,7 @@ class _Weights:
 
 
 def _bordered(matrix: csc_array, right: Array, guess: Array, ways: Array) -> tuple[Array, Array]:
-    """Return the solution with the guess's mean along the open ways (k, 2), and the force (k,).
-
-    The force on all orbits is what keeps the mean.
-    """
+    """Return the solution with the guess's mean along the open ways (k, 2), and the force (k,)."""
     size, border = right.size, np.tile(ways, (1, len(right)))
     whole, value = matrix, right.ravel()
     if len(ways):
@@ -409,16 +385,14 @@ def _sums(weights: Array, sides: NDArray[np.int64], orbits: Orbits) -> Array:
 
 
 def _stiff_edges(own: OwnFrame, sides: NDArray[np.int64]) -> Array:
-    """Return weights (E,) whose solution is a tile with edges that are straight up to 1 / `STIFF`.
-
-    An edge pulls with the same force however many sides it has.
-    """
+    """Return weights (E,) whose solution is a tile with edges that are straight up to 1 / `STIFF`."""
     n = len(own.points)
     weights = np.ones(len(sides))
     along = (sides < n).all(axis=1)  # no side crosses the inside from outline to outline
     behind = np.where((sides[:, 0] + 1) % n == sides[:, 1], sides[:, 0], sides[:, 1])[along]
     edge = np.searchsorted(own.starts, behind, side="right") - 1
-    weights[along] = STIFF * np.array(own.counts)[edge]
+    # an edge pulls with the same force however many sides it has
+    weights[along] = STIFF * np.diff([*own.starts, n])[edge]
     return weights
 
 

@@ -52,18 +52,9 @@ def animate(
     """Write an animation of a tile.
 
     Args:
-        tile: A tile in memory, or a run's folder; see `read_result`.
         out: The file. Its ending, .gif, .mp4 or .svg, decides the format, unless the settings give one.
-        settings: How it is animated.
-        force: Animate a tile that is not certified.
         on_event: Called with each `Note` and `Progress`.
-        cancel: Stops the work; nothing is then written.
-
-    Raises:
-        CertificationError: If the tile is not certified.
-        OrbiflowError: If the settings cannot be met, or nothing says the format.
-        OutputError: If the file cannot be written.
-        Cancelled: If it was cancelled.
+        tile, settings, force, cancel: As for `export`, which raises the same errors.
     """
     out, cancel = as_path(out, "the file to animate to"), cancel or Cancel()
     settings, given = (settings or AnimationSettings()).for_file(out), EscherTile.of(tile)
@@ -86,14 +77,7 @@ def animation(
     force: bool = False,
     told: Callable[[float], None] = lambda _: None,
 ) -> bytes | str:
-    """The content of the file.
-
-    Args:
-        told: told the share of the work done; what it raises ends it.
-
-    Raises:
-        As `animate`.
-    """
+    """Return the content of the file; `told` hears the share of the work done. Raises as `animate`."""
     settings = (settings or AnimationSettings()).for_file(None)
     if settings.format == "mp4":
         require_ffmpeg()  # before the work
@@ -104,8 +88,7 @@ def animation(
     loop = frames(settings.seconds, settings.fps)
     match settings.file_format:
         case "svg":
-            title = f"{given.name}: {made.what}"
-            name = f"{given.name}-{settings.kind}"
+            title, name = f"{given.name}: {made.what}", f"{given.name}-{settings.kind}"
             return write_motion_svg(made, colours, seconds=settings.seconds, name=name, title=title)
         case "mp4":
             return write_mp4(made, colours, loop, settings.fps, told)
@@ -127,16 +110,15 @@ def motion(tile: EscherTile, settings: AnimationSettings) -> Motion:
 
 OUTLINE = 0.0016  # width of outlines, as a share of the picture's
 
-ProgressCall = Callable[[float], None]
-"""Called with the share of the work that is done."""
+ProgressCall = Callable[[float], None]  # called with the share of the work that is done
 
 
 def picture(motion: Motion, palette: Palette, progress: float) -> Raster:
     """Draw one frame."""
-    window = (0.0, 0.0, float(motion.width), float(motion.height))
-    raster = Raster(window, motion.width, y_down=True, paper=palette.paper)
-    rings = list(motion.rings(progress))
-    width = max(1.0, OUTLINE * motion.width)
+    page, rings = motion.page, list(motion.rings(progress))
+    window = (0.0, 0.0, float(page.width), float(page.height))
+    raster = Raster(window, page.width, y_down=True, paper=palette.paper)
+    width = max(1.0, OUTLINE * page.width)
     for ring, colour, whole in rings:  # growing tiles lie below whole ones
         if not whole:
             raster.fill([ring], palette.fill(colour))
@@ -192,7 +174,8 @@ def write_mp4(
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "loop.mp4"
         command = [ffmpeg, "-loglevel", "error", "-nostdin", "-y", "-f", "rawvideo"]
-        command += ["-pix_fmt", "rgb24", "-s", f"{motion.width}x{motion.height}", "-r", f"{fps:g}"]
+        size = f"{motion.page.width}x{motion.page.height}"
+        command += ["-pix_fmt", "rgb24", "-s", size, "-r", f"{fps:g}"]
         command += ["-i", "-", "-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18"]
         command += ["-movflags", "+faststart", str(out)]
         content = b"".join(
@@ -229,14 +212,12 @@ _EASE, _EVEN = "0.42 0 0.58 1", "0 0 1 1"
 
 
 def write_motion_svg(
-    motion: Motion, palette: Palette, *, seconds: float, name: str, title: str = ""
+    motion: Motion, palette: Palette, *, seconds: float, name: str, title: str
 ) -> str:
-    """Return an animated SVG; readers who prefer less motion see the tiling at rest.
-
-    All ids and classes begin with `name`, so that a page can hold several animations.
-    """
+    """Return an animated SVG; readers who prefer less motion see the tiling at rest."""
+    # ids and classes begin with the key, so that a page can hold several animations
     key = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "tile"
-    width, height = motion.width, motion.height
+    width, height = motion.page.width, motion.page.height
     still = motion.places(1.0)
     # growing tiles lie below whole ones
     order = range(len(motion.colours))[::-1]
@@ -247,7 +228,7 @@ def write_motion_svg(
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" \
 width="{width}" height="{height}" role="img" class="{key}">
-<title>{escape(title or motion.what)}</title>
+<title>{escape(title)}</title>
 <style>
 .{key} .still {{ display: none }}
 @media (prefers-reduced-motion: reduce) {{

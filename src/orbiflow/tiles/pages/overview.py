@@ -88,14 +88,6 @@ _TITLE, _NAME, _WORDS = 46, 34, 26
 _THUMB = 156
 
 
-class _Place(NamedTuple):
-    """Where a tile is on the sheet: its tiling, and what is `below` it."""
-
-    left: int
-    top: int
-    below: int
-
-
 def overview_png(
     results: Sequence[EscherTile],
     target: Target,
@@ -123,17 +115,17 @@ def overview_png(
     _header(sheet, pen, target, len(results), [failure.name for failure in failures])
     for k, result in enumerate(results):
         row, column = divmod(k, columns)
-        top = _HEADER + row * (height + _GAP)
-        place = _Place(_MARGIN + column * (cell + _GAP), top, top + round(cell / 1.5) + 14)
-        _write_words(pen, result, place, k + 1)
+        left, top = _MARGIN + column * (cell + _GAP), _HEADER + row * (height + _GAP)
+        below = top + round(cell / 1.5) + 14
+        _write_words(pen, result, left + _THUMB + 22, below, k + 1)
         own = colours[k] if colours else None
         tiling = tiling_raster(
             result.tile, width_px=cell, colours=own, outline_px=1.4, y_down=target.y_down
         )
-        sheet.paste(tiling.image(), (place.left, place.top))
+        sheet.paste(tiling.image(), (left, top))
         thumb = _small(result, target).image()
         thumb.thumbnail((_THUMB, _THUMB))
-        sheet.paste(thumb, (place.left + (_THUMB - thumb.width) // 2, place.below))
+        sheet.paste(thumb, (left + (_THUMB - thumb.width) // 2, below))
     buffer = io.BytesIO()
     sheet.save(buffer, "PNG", compress_level=4)
     return buffer.getvalue()
@@ -159,8 +151,9 @@ def _header(
         pen.text((left, middle + 76), text, WARNING, font(_WORDS), anchor="ls")
 
 
-def _write_words(pen: ImageDraw.ImageDraw, result: EscherTile, place: _Place, rank: int) -> None:
-    left, below = place.left + _THUMB + 22, place.below
+def _write_words(
+    pen: ImageDraw.ImageDraw, result: EscherTile, left: int, below: int, rank: int
+) -> None:
     cost = result.deformation
     same = f"recognised {result.recognisability.score:.2f}"
     how = same if cost is None else f"bent {cost:.2f}"

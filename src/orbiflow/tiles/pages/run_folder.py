@@ -23,7 +23,6 @@ from orbiflow.runtime import (
 from orbiflow.tiles.exporting import tile_svg, tiling_svg
 from orbiflow.tiles.pages.overview import TILE_FILES, index_page, overview_png
 from orbiflow.tiles.pictures import (
-    FrontPoint,
     bending_picture,
     bending_png,
     front_png,
@@ -35,14 +34,12 @@ from orbiflow.tiles.pictures import (
 from orbiflow.tiles.result_file import RESULT, folder_names
 from orbiflow.tiles.search import ClassFailure, SearchResult, placed_field, report
 from orbiflow.tiles.silhouette import Target
-from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tile_map import TileMap
+from orbiflow.tiles.tile import EscherTile, TileMap
 from orbiflow.tiles.tilings import Colouring, colouring
 
 FIELD_FILES = ("field.png", "field.pdf")
+# The further files, for print, if figures were asked for; the field if a flow made the tile
 FIGURE_FILES = ("tiling.pdf", "overlay.pdf", *FIELD_FILES)
-"""The further files if figures were asked for: for print, as wide as a journal's column; and the field
-of the flow if there is one."""
 
 
 def figure_files(result: EscherTile) -> tuple[str, ...]:
@@ -145,27 +142,14 @@ def _draw(
     write_tile_folder(tile, target, folder, colours=colours, figures=figures)
 
 
-def write_front(
-    results: Sequence[EscherTile], found: Iterable[EscherTile], target: Target, out: Path
-) -> None:
+def write_front(results: Sequence[EscherTile], found: Iterable[EscherTile], out: Path) -> None:
     """Write `front.png`: the listed tiles among all that were found, by deformation and overlap."""
     listed = {id(result.tile) for result in results}
-    others = [result for result in found if id(result.tile) not in listed]
-    points = [
-        FrontPoint(
-            result.deformation,
-            result.metrics.iou,
-            result.tile.polygon,
-            result.isohedral_class,
-            result.objective,
-            id(result.tile) in listed,
-            bool(result.front),
-        )
-        for result in (*others, *results)
-        if result.deformation is not None
-    ]
-    if points:
-        write_atomic(out / FRONT, front_png(points, y_down=target.y_down))
+    known = [result for result in (*found, *results) if result.deformation is not None]
+    others = [result for result in known if id(result.tile) not in listed]
+    if known:
+        chosen = [result for result in results if result.deformation is not None]
+        write_atomic(out / FRONT, front_png(chosen, others))
 
 
 def written_files(folder: Path) -> set[str]:
@@ -229,10 +213,10 @@ def write_run(
                 staged,
                 failures=result.failures,
                 figures=figures,
-                workers=result.workers if figures else 1,
+                workers=result.workers,
             )
             if result.method.objective == "both":
-                write_front(tiles, result.found or tiles, result.target, staged)
+                write_front(tiles, result.found or tiles, staged)
         write_atomic(staged / RESULT, json.dumps(report(result), allow_nan=False))
         files = [path.relative_to(staged) for path in staged.rglob("*") if path.is_file()]
     written = [folder.path / path for path in sorted(files)]

@@ -1,4 +1,3 @@
-from .front import FrontPoint as FrontPoint
 from .front import front_png as front_png
 from .overlays import bending_picture as bending_picture
 from .overlays import bending_png as bending_png

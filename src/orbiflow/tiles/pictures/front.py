@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from orbiflow.errors import OrbiflowError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from orbiflow.tiles.tile import EscherTile
+
 INK, PALE, GRID = "#1a1a1a", "#c4ccd4", "#eceff2"
 COLOURS = {"likeness": "#1d4e79", "overlap": "#c8702a"}
 NAMES = {"likeness": "found for likeness", "overlap": "found for overlap"}
@@ -23,62 +25,55 @@ SIZE, SMALL = 0.075, 0.03
 PUSHES = 400  # number of steps in which the silhouettes make room for each other
 
 
-class FrontPoint(NamedTuple):
-    """A tile in the picture."""
-
-    deformation: float  # with `iou`: its place in the picture
-    iou: float
-    polygon: Array  # the polygon (N, 2) in the input's coordinates
-    label: str  # the words beside it, such as its class
-    objective: str  # what it was found for: "likeness" or "overlap"
-    listed: bool  # whether it is in the list; others are pale
-    front: bool  # whether no other tile beats it in both
-
-
-def front_png(points: Sequence[FrontPoint], *, width_px: int = 1600, y_down: bool = False) -> bytes:
+def front_png(
+    chosen: Sequence[EscherTile], others: Sequence[EscherTile] = (), *, width_px: int = 1600
+) -> bytes:
     """Return a PNG of tiles by deformation (to the right) and overlap (upwards), as silhouettes.
 
-    Listed tiles are large and coloured by what they were found for, with a line to their place if
+    Chosen tiles are large and coloured by what they were found for, with a line to their place if
     they had to make room; full colour means that no other beats them. Others are pale, and the
-    dashed steps are the border of what is beaten. The height is seven tenths of the width.
+    dashed steps are the border of what is beaten. All have a deformation. The height is seven tenths
+    of the width.
 
     Raises:
-        OrbiflowError: If there are no points or the size is impossible.
+        OrbiflowError: If there are no tiles or the size is impossible.
     """
-    if not points:
+    if not (chosen or others):
         raise OrbiflowError("a picture of a front needs at least one tile")
     figure = blank_figure(width_px, round(0.7 * width_px))
-    axes = _axes(figure, points)
-    _steps(axes, points)
+    axes = _axes(figure, chosen, others)
+    _steps(axes, (*others, *chosen))
     corner = axes.transAxes.transform((0, 0)), axes.transAxes.transform((1, 1))
-    anchors = axes.transData.transform([(p.deformation, p.iou) for p in points])
-    listed = np.array([p.listed for p in points])
-    for point, anchor in zip(points, anchors, strict=True):
-        if not point.listed:
-            _silhouette(axes, point, anchor, SMALL * width_px, y_down, PALE, zorder=2)
-    places = _apart(anchors[listed], 1.25 * SIZE * width_px, corner)
-    chosen = [point for point in points if point.listed]
-    for point, anchor, place in zip(chosen, anchors[listed], places, strict=True):
-        colour = COLOURS[point.objective]
+    for tile, anchor in zip(others, axes.transData.transform(_values(others)), strict=True):
+        _silhouette(axes, tile, anchor, SMALL * width_px, PALE, zorder=2)
+    anchors = axes.transData.transform(_values(chosen))
+    places = _apart(anchors, 1.25 * SIZE * width_px, corner)
+    for tile, anchor, place in zip(chosen, anchors, places, strict=True):
+        colour = COLOURS[tile.objective]
         if np.hypot(*(place - anchor)) > 2:
             axes.plot(*_in(axes, [anchor, place]), color=colour, linewidth=0.6, zorder=3)
         axes.plot(*_in(axes, [anchor]), "o", color=colour, markersize=3.2, zorder=6)
-        alpha = 1.0 if point.front else 0.55
-        _silhouette(axes, point, place, SIZE * width_px, y_down, colour, zorder=4, alpha=alpha)
+        alpha = 1.0 if tile.front else 0.55
+        _silhouette(axes, tile, place, SIZE * width_px, colour, zorder=4, alpha=alpha)
         below = place - (0, 0.52 * SIZE * width_px)
         (x,), (y,) = _in(axes, [below])
-        axes.text(x, y, point.label, ha="center", va="top", fontsize=6.5, color=INK, zorder=7)
+        axes.text(
+            x, y, tile.isohedral_class, ha="center", va="top", fontsize=6.5, color=INK, zorder=7
+        )
     return png_bytes(figure)
 
 
-def _axes(figure: object, points: Sequence[FrontPoint]) -> Axes:
+def _values(tiles: Sequence[EscherTile]) -> Array:
+    """Return deformation and IoU (n, 2) of tiles."""
+    return np.array([(t.deformation, t.metrics.iou) for t in tiles], dtype=float).reshape(-1, 2)
+
+
+def _axes(figure: object, chosen: Sequence[EscherTile], others: Sequence[EscherTile]) -> Axes:
     from matplotlib.lines import Line2D
 
     axes: Axes = figure.add_axes((0.075, 0.1, 0.9, 0.82))  # pyright: ignore[reportAttributeAccessIssue]
-    values = np.array([(p.deformation, p.iou) for p in points])
-    # points far from all that are listed would press the rest into a corner
-    listed = np.array([p.listed for p in points])
-    near = values[listed] if listed.any() else values
+    # points far from all that are chosen would press the rest into a corner
+    near = _values(chosen or others)
     low, high = near.min(axis=0), near.max(axis=0)
     room = np.maximum(0.18 * (high - low), (0.02, 0.01))
     axes.set_xlim(max(0.0, low[0] - room[0]), high[0] + 2 * room[0])
@@ -92,7 +87,7 @@ def _axes(figure: object, points: Sequence[FrontPoint]) -> Axes:
         spine.set_visible(side in ("left", "bottom"))
         spine.set_color("#8a949e")
         spine.set_linewidth(0.7)
-    kinds = [kind for kind in COLOURS if any(p.objective == kind for p in points)]
+    kinds = [kind for kind in COLOURS if any(tile.objective == kind for tile in (*chosen, *others))]
     names = {COLOURS[kind]: NAMES[kind] for kind in kinds}
     names[PALE] = "left out: beaten, or much like one that is shown"
     marks = [
@@ -104,14 +99,14 @@ def _axes(figure: object, points: Sequence[FrontPoint]) -> Axes:
     return axes
 
 
-def _steps(axes: Axes, points: Sequence[FrontPoint]) -> None:
+def _steps(axes: Axes, tiles: Sequence[EscherTile]) -> None:
     """Draw the border of what is beaten by others."""
     x: list[float] = []
     y: list[float] = []
-    for point in sorted(points, key=lambda p: (p.deformation, -p.iou)):
-        if not y or point.iou > y[-1]:
-            x.append(point.deformation)
-            y.append(point.iou)
+    for cost, overlap in sorted(_values(tiles).tolist(), key=lambda pair: (pair[0], -pair[1])):
+        if not y or overlap > y[-1]:
+            x.append(cost)
+            y.append(overlap)
     x.append(axes.get_xlim()[1])
     y.append(y[-1])
     axes.step(x, y, where="post", color="#8a949e", linewidth=0.8, linestyle="--", zorder=1)
@@ -119,10 +114,9 @@ def _steps(axes: Axes, points: Sequence[FrontPoint]) -> None:
 
 def _silhouette(
     axes: Axes,
-    point: FrontPoint,
+    tile: EscherTile,
     place: Array,
     size: float,
-    y_down: bool,
     colour: str,
     *,
     zorder: int,
@@ -130,7 +124,7 @@ def _silhouette(
 ) -> None:
     from matplotlib.patches import Polygon
 
-    ring = point.polygon * (1.0, -1.0 if y_down else 1.0)
+    ring = tile.tile.polygon * (1.0, -1.0 if tile.y_down else 1.0)
     low, high = ring.min(axis=0), ring.max(axis=0)
     pixels = place + (ring - (low + high) / 2) * (size / float((high - low).max()))
     patch = Polygon(pixels, closed=True, facecolor=colour, edgecolor="white", linewidth=0.5)

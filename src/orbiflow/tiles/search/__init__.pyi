@@ -13,6 +13,9 @@ from .likeness_search import LikenessSearch as LikenessSearch
 from .method import Goal as Goal
 from .method import SearchMethod as SearchMethod
 from .model import TileModel as TileModel
+from .model import as_map as as_map
+from .model import as_model as as_model
+from .model import load_model as load_model
 from .model import placed_field as placed_field
 from .occupancy import OccupancySamples as OccupancySamples
 from .occupancy import fit_occupancy as fit_occupancy
@@ -23,6 +26,3 @@ from .searching import Event as Event
 from .searching import escherize_class as escherize_class
 from .searching import fit_tile as fit_tile
 from .searching import search_classes as search_classes
-from .stored_models import as_map as as_map
-from .stored_models import as_model as as_model
-from .stored_models import load_model as load_model

@@ -29,18 +29,15 @@ from orbiflow.tiles.search.candidates import Fit, Progress, Prototiles, StillTil
 from orbiflow.tiles.search.co_deformation import (
     FIRM,
     SOFT,
-    Bodies,
     Drawn,
     Hand,
-    Stage,
     drawn_to_tiles,
     held_on_tiles,
     shifted,
 )
 from orbiflow.tiles.search.likeness_search import LikenessSearch
-from orbiflow.tiles.search.placements import Placements, best_placements
-from orbiflow.tiles.search.starts import mirror_closed
-from orbiflow.tiles.search.tile_space import NearestTiles, TileSpace
+from orbiflow.tiles.search.starts import template_symmetries
+from orbiflow.tiles.search.tile_space import NearestTiles, Placements, TileSpace, best_placements
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass
 
@@ -78,15 +75,12 @@ def bent_tiles(
     *,
     wanted: int = 1,
 ) -> tuple[list[Bent], int]:
-    """Return the finalists of one class, best score first and without twins, and how many crossed.
-
-    There are at least `wanted` of each hand, if so many are found.
-    """
+    """Return finalists, at best `wanted` of each hand and without twins, and how many crossed."""
     told: Callable[[float], None] = progress or (lambda _share: None)
     cancel = cancel or Cancel()
     found: list[Bent] = []
     dropped = done = 0
-    sides = both[:1] if mirror_closed(kind) else both
+    sides = both[:1] if template_symmetries(kind)[1] else both
     tasks = [(hand, own) for own in settings.searches(wanted) for hand in sides]
     work = sum(own.starts for _, own in tasks)
     for hand, own in tasks:
@@ -110,38 +104,34 @@ def _finalists(
     hand: Hand, stiffness: Stiffness, kind: IsohedralClass, settings: LikenessSearch, cancel: Cancel
 ) -> tuple[list[Bent], int]:
     """The best of one hand and stiffness worked out, and how many of them cross themselves."""
-    bodies = hand.bodies(stiffness)
-    best = _best_placements(bodies, kind, settings, cancel)
+    best = _best_placements(hand, stiffness, kind, settings, cancel)
+    _, _, fine = hand.bodies(stiffness)
     found: list[Bent] = []
     for k in range(len(best.costs)):
         cancel.check()
         one = best.take(np.array([k]))
-        bent = _detailed(hand, bodies.fine, kind, one, settings.rounds)
+        bent = _detailed(hand, fine, kind, one, settings.rounds)
         found += [] if bent is None else [bent]
     return found, len(best.costs) - len(found)
 
 
 def _best_placements(
-    bodies: Bodies, kind: IsohedralClass, settings: LikenessSearch, cancel: Cancel
+    hand: Hand, stiffness: Stiffness, kind: IsohedralClass, settings: LikenessSearch, cancel: Cancel
 ) -> Drawn:
     """Placements of the fine outline whose tiles cost least: few points, then more and more."""
-    coarse, middle, fine = bodies
+    coarse, middle, fine = hand.bodies(stiffness)
     placements, points = _best_coarse(coarse, kind, settings)
     share = settings.share
     if middle is not fine:
         placements, points = _finer(coarse, middle, placements, points)
-        stages = [Stage(2, settings.starts), Stage(1, 2 * settings.finalists)]
+        stages = [(2, settings.starts), (1, 2 * settings.finalists)]
         drawn = shifted(middle, kind, placements, points, stages, share=share, cancel=cancel)
         drawn = drawn.take(np.arange(min(len(drawn.costs), settings.finalists)))
         placements, points = _finer(middle, fine, drawn.placements, drawn.points)
-        stages = [Stage(1, settings.finalists)]
+        stages = [(1, settings.finalists)]
     else:
         placements, points = _finer(coarse, fine, placements, points)
-        stages = [
-            Stage(4, settings.starts),
-            Stage(2, 2 * settings.finalists),
-            Stage(1, settings.finalists),
-        ]
+        stages = [(4, settings.starts), (2, 2 * settings.finalists), (1, settings.finalists)]
     return shifted(fine, kind, placements, points, stages, share=share, cancel=cancel)
 
 
@@ -234,13 +224,10 @@ def _apart(a: Complex, b: Complex) -> float:
 
 
 class PlacedBent(NamedTuple):
-    """A bent silhouette that is a tile, laid over the target by a similarity.
-
-    - `factor`, `shift`: z -> factor z + shift, after which a mirrored one is reflected in the x axis.
-    """
+    """A bent silhouette that is a tile, laid over the target by a similarity."""
 
     bent: Bent  # the silhouette, in a frame of its own, mirrored if its hand is
-    factor: complex
+    factor: complex  # z -> factor z + shift, after which a mirrored one is reflected in the x axis
     shift: complex
 
     def place(self, z: Complex) -> Array:
@@ -250,10 +237,7 @@ class PlacedBent(NamedTuple):
 
     @property
     def outlines(self) -> tuple[Array, Array]:
-        """The outline at rest and bent near its tile, (n, 2) each, counter-clockwise, point by point.
-
-        In the normal form, where the silhouette lies as it is.
-        """
+        """The outline at rest and bent, (n, 2) each, counter-clockwise, in the normal form."""
         hand = self.bent.hand
         rest = hand.samples.fine * ((1.0, -1.0) if hand.mirrored else (1.0, 1.0))
         bent = self.place(self.bent.relaxed)
@@ -292,10 +276,7 @@ def fit_bending(
 
 
 def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:
-    """Lay a bent tile over the silhouette that was bent by the similarity of largest IoU.
-
-    From the one that lays the bent points nearest to where they were, by L-BFGS on exact gradients.
-    """
+    """Lay a bent tile over its silhouette by the similarity of largest IoU, found by L-BFGS."""
     rest, points = bent.hand.fine.rest, bent.points
     center = points.mean()
     ring = bent.points[: bent.hand.fine.size] - center

@@ -26,8 +26,7 @@ SAME = 1e-9  # distance along the outline, in outlines, below which points are o
 def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bending:
     """Return the map that a bent silhouette and its similarity z -> factor z + shift make.
 
-    The tile, in the target's normal form, may have fewer vertices than the bent outline, which is
-    laid onto it. It is an `OrbiflowError` if the silhouette's inside cannot follow without folds.
+    Its outline is laid onto the tile; an `OrbiflowError` if the inside cannot follow without folds.
     """
     hand = bent.hand
     flip = np.array([1.0, -1.0]) if hand.mirrored else np.ones(2)
@@ -51,10 +50,9 @@ def onto_polygon(
 ) -> tuple[Mesh, Array]:
     """Move the outline's images (of `images` (N, 2)) onto a polygon (Q, 2); return the mesh and images.
 
-    Where a vertex of the polygon belongs to none of the outline's points, a point is put on the
-    outline and its triangle divided; points between two vertices are laid onto the side between
-    them, in proportion to where they were. The outline's points `corners` (K,) go to the polygon's
-    `vertices` (K,), both in order round.
+    A vertex of the polygon that is none of the outline's points becomes one; points between two
+    vertices are laid onto their side in proportion. The points `corners` (K,) go to the `vertices`
+    (K,), both in order round.
     """
     n, outline = mesh.size, mesh.size + len(mesh.sides)
     knots = arc_lengths(np.roll(images[:n], -corners[0], axis=0))
@@ -113,8 +111,7 @@ def _snapped(places: Array, known: Array, total: float) -> tuple[Array, NDArray[
 def _with_points(mesh: Mesh, at: Array, order: Integers, slots: Integers) -> Mesh:
     """The mesh with points on the outline at `at` (m,), in vertices from the first.
 
-    Point j lies between the outline's points `order[slots[j] - 1]` and `order[slots[j]]`, and after
-    those before it in the same gap.
+    Point j lies between `order[slots[j] - 1]` and `order[slots[j]]`, after those before it there.
     """
     if not len(at):
         return mesh

@@ -18,7 +18,7 @@ from orbiflow.runtime import Cancel
 from orbiflow.tiles.geometry import orient
 from orbiflow.tiles.likeness import bent_onto, mutual_iou
 from orbiflow.tiles.search.candidates import Fit
-from orbiflow.tiles.search.co_deformation import Hand, hands
+from orbiflow.tiles.search.co_deformation import Hand
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.method import Goal, SearchMethod
 from orbiflow.tiles.search.overlap_search import OverlapSearch
@@ -58,11 +58,9 @@ class BothSearch(SearchMethod):
         """Refuse: each of the `parts` has candidates of its own."""
         raise OrbiflowError("a search for both fits twice: take its likeness or its overlap")
 
-    def preview(
-        self, goal: Goal, names: Sequence[str], cancel: Cancel | None = None
-    ) -> EscherTile | None:
-        """Return the preview of the search for likeness."""
-        return self.likeness.preview(goal, names, cancel)
+    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel | None = None) -> Fit:
+        """Return the sketch of the search for likeness."""
+        return self.likeness.sketch(goal, kind, cancel)
 
     def prepare(self, goal: Goal) -> None:
         """Prepare both."""
@@ -75,7 +73,7 @@ class BothSearch(SearchMethod):
 
     def finish(self, tiles: Sequence[EscherTile], goal: Goal) -> Sequence[EscherTile]:
         """Return the tiles with their deformation measured."""
-        hand, _ = hands(goal.target, self.likeness, emphasis=goal.emphasis, pins=goal.pins)
+        hand, _ = self.likeness.hands(goal)
         return [measured(tile, hand) for tile in tiles]
 
     def short_list(self, tiles: Sequence[EscherTile]) -> list[EscherTile]:

@@ -14,7 +14,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError
 from orbiflow.tiles.geometry import plane_points, subdivided
 from orbiflow.tiles.search.tile_space import NearestTiles
-from orbiflow.tiles.tile_map import TileMap
+from orbiflow.tiles.tile import TileMap
 from orbiflow.tiles.tilings import CLASSES, EdgeIdentification, IsohedralClass, Tile
 
 if TYPE_CHECKING:
@@ -59,8 +59,7 @@ class Prototiles:
     ) -> Prototiles:
         """Turn placed polygons, whose `linear` keeps orientation, into start tiles of `count` vertices.
 
-        `count` is a multiple of the polygons' own number: their sides are divided evenly. Polygons
-        that belong to the target's mirror image in the x axis are placed on the target itself.
+        That is a multiple of the polygons' own; those of the mirror image are placed on the target.
         """
         placed = plane_points(tiles.vertices)
         inverse = np.linalg.inv(tiles.linear)
@@ -145,10 +144,7 @@ def _moved_edges(
     pieces: int,
     moved: Callable[[Array], Array],
 ) -> list[Array]:
-    """Return samples along each edge of the tile, both ends included.
-
-    Half of them are moved, the others are their images: what moves them commutes with the group.
-    """
+    """Return samples along each edge, both ends included: half are moved, the others their images."""
     before = subdivided(vertices, pieces)
     closed = np.concatenate([before, before[:1]])
     first = [*(int(corner) * pieces for corner in corners), len(before)]
@@ -177,10 +173,9 @@ def _chosen_samples(kind: IsohedralClass, closed: list[Array], tolerance: float)
         if pair.folded:
             half = _simplified(curve[: len(curve) // 2 + 1], tolerance)
             masks[pair.first] = np.concatenate([half, half[-2::-1]])
-            continue
-        mask = _simplified(curve, tolerance)
-        masks[pair.first] = mask
-        masks[pair.second] = mask[::-1] if pair.reversed else mask
+        else:
+            mask = masks[pair.first] = _simplified(curve, tolerance)
+            masks[pair.second] = mask[::-1] if pair.reversed else mask
     return [masks[i] for i in range(len(closed))]
 
 

@@ -32,17 +32,14 @@ class ClassFailure:
 
 
 def best_tiles(
-    target: Target, fit: Fit, *, seconds: float = 0.0, force: bool = False, min_neck: float = 0.0
+    target: Target, fit: Fit, *, force: bool = False, min_neck: float = 0.0
 ) -> list[EscherTile]:
-    """Turn finalists into polygons and certify them, best first, until there are enough.
-
-    Returns certified tiles, best score first; none, unless forced, is a `CertificationError`.
-    """
+    """Return certified polygons of finalists, best score first, as soon as there are enough."""
     found: list[EscherTile] = []
     reasons: list[str] = []
     for index in range(fit.candidates.size):
         try:
-            result = _result(target, fit, index, seconds, force=force)
+            result = _result(target, fit, index, force=force)
             result = result.changed(min_neck=min_neck)
             if not force:
                 result.certificate.require()
@@ -59,7 +56,7 @@ def best_tiles(
     return [result.changed(dropped=fit.crossed + len(reasons)) for result in found]
 
 
-def _result(target: Target, fit: Fit, index: int, seconds: float, *, force: bool) -> EscherTile:
+def _result(target: Target, fit: Fit, index: int, *, force: bool) -> EscherTile:
     tile, flow = fit.candidates.finished(index, force=force)
     placed = tile.transformed(target.frame.linear, target.frame.offset)
     region, simple = _region(placed.polygon)
@@ -72,7 +69,6 @@ def _result(target: Target, fit: Fit, index: int, seconds: float, *, force: bool
         metrics=compare(region, target.outline),
         recognisability=recogniser(target)(region),
         starts=fit.starts,
-        seconds=seconds,
         thinnest=narrowest_neck(placed.polygon) if simple else None,
     )
 

@@ -14,8 +14,8 @@ near the present outline are worked out, by springs.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from dataclasses import dataclass
+from functools import cache, cached_property, lru_cache
 from itertools import permutations
 from typing import NamedTuple
 
@@ -29,8 +29,7 @@ from orbiflow.runtime import Cancel
 from orbiflow.tiles.geometry import plane_points, signed_area
 from orbiflow.tiles.likeness import Elastic, Pinned, Stiffness
 from orbiflow.tiles.search.likeness_search import LikenessSearch
-from orbiflow.tiles.search.placements import Placements
-from orbiflow.tiles.search.tile_space import TileSpace
+from orbiflow.tiles.search.tile_space import Placements, TileSpace
 from orbiflow.tiles.silhouette import Emphasis, Pins, Samples, Target, sampled, triangulate
 from orbiflow.tiles.tilings import IsohedralClass
 
@@ -55,10 +54,7 @@ def drawn_to_tiles(
     strengths: tuple[float, ...] = TIGHTER,
     rounds: int = ROUNDS,
 ) -> tuple[Complex, TileSpace]:
-    """Bend a body towards tiles of C placements of a class by springs that tighten.
-
-    Returns shapes (N, C), nearly tiles, and the space of tiles, its glide axes turned to suit them.
-    """
+    """Bend a body by springs that tighten: shapes (N, C), nearly tiles, and the space of the tiles."""
     space = TileSpace(kind, placements)
     z = np.repeat(body.rest[:, None], space.count, axis=1)
     for strength in strengths:
@@ -109,51 +105,31 @@ class _Reduced:
         return self.real @ self.parameters + 1j * (self.imaginary @ self.parameters)
 
 
+# Of the search: bodies and heads are stiff; thin parts are not, and keep their places. Tiles bent so
+# are seen to be more like the silhouette: docs/likeness.md has the comparison.
 FIRM = Stiffness(salience=-0.5, pose=60.0)
-"""Of the search: bodies and heads are stiff; thin parts are not, and keep their places.
-
-Tiles bent so cost more by the usual stiffness than the least, and are seen to be more like the
-silhouette: docs/likeness.md has the comparison.
-"""
-
 # Of the search where too few tiles of a firm body are simple: many long limbs, which cross
 SOFT = Stiffness(salience=0.0)
 
 
-class Bodies(NamedTuple):
-    """An elastic silhouette with few points, more and all."""
-
-    coarse: Elastic
-    middle: Elastic
-    fine: Elastic
-
-
 @dataclass(frozen=True, eq=False)
 class Hand:
-    """A silhouette or its mirror image.
-
-    - `made`: the elastic body of a level of points, "coarse", "middle" or "fine", and a stiffness.
-    """
+    """A silhouette or its mirror image."""
 
     mirrored: bool  # whether the latter
     samples: Samples  # points of its outline, coarse to fine
-    made: Callable[[str, Stiffness], Elastic]
-    _bodies: dict[Stiffness, Bodies] = field(default_factory=dict[Stiffness, Bodies])
+    made: Callable[[str, Stiffness], Elastic]  # the body of a level of points and a stiffness
 
     @cached_property
     def fine(self) -> Elastic:
         """The body of usual stiffness with all points: what costs are measured by."""
         return self.made("fine", Stiffness())
 
-    def bodies(self, stiffness: Stiffness) -> Bodies:
-        """The bodies of a stiffness, made when they are first asked for."""
-        found = self._bodies.get(stiffness)
-        if found is None:
-            coarse, fine = self.made("coarse", stiffness), self.made("fine", stiffness)
-            same = len(self.samples.middle) == len(self.samples.fine)
-            middle = fine if same else self.made("middle", stiffness)
-            found = self._bodies[stiffness] = Bodies(coarse, middle, fine)
-        return found
+    def bodies(self, stiffness: Stiffness) -> tuple[Elastic, Elastic, Elastic]:
+        """The bodies of a stiffness with few points, more and all."""
+        middle = "fine" if len(self.samples.middle) == len(self.samples.fine) else "middle"
+        fine = self.made("fine", stiffness)
+        return self.made("coarse", stiffness), self.made(middle, stiffness), fine
 
 
 @lru_cache(maxsize=2)  # one serves all classes
@@ -173,6 +149,7 @@ def hands(
     def hand(points: Samples, mirrored: bool) -> Hand:
         meshes = {name: triangulate(ring) for name, ring in points._asdict().items()}
 
+        @cache  # of a level and stiffness, when it is first asked for
         def made(level: str, stiffness: Stiffness) -> Elastic:
             ring: Array = getattr(points, level)
             mesh = meshes[level]
@@ -196,25 +173,15 @@ MOST_MOVES = 8  # of each placement with each step
 
 
 class Drawn(NamedTuple):
-    """C shapes drawn to tiles of their placements by springs.
-
-    - `costs`: (C,) energy, springs and displacement together; `CROSSED` more of what crosses itself.
-    """
+    """C shapes drawn to tiles of their placements by springs."""
 
     placements: Placements  # C of them
     points: Complex  # (N, C)
-    costs: Array
+    costs: Array  # (C,) energy, springs and displacement; `CROSSED` more of what crosses itself
 
     def take(self, index: Integers) -> Drawn:
         """Those at `index`."""
         return Drawn(self.placements.take(index), self.points[:, index], self.costs[index])
-
-
-class Stage(NamedTuple):
-    """One stage of moving corners."""
-
-    step: int  # points of the outline by which corners move
-    keep: int  # placements that go on, the best and no two the same
 
 
 def shifted(
@@ -222,24 +189,23 @@ def shifted(
     kind: IsohedralClass,
     placements: Placements,
     points: Complex,
-    stages: Sequence[Stage],
+    stages: Sequence[tuple[int, int]],
     *,
     share: float,
     cancel: Cancel | None = None,
 ) -> Drawn:
-    """Move the corners of each placement of shapes (N, C) until no neighbour is better.
+    """Move the corners of placements of shapes (N, C) until none of the `share` nearest is better.
 
-    Of all neighbours the `share` with the nearest tiles is worked out. Returns the placements that
-    are left, best first, no two the same.
+    Each stage is the points by which corners move and how many of the best go on, no two the same.
     """
     cancel = cancel or Cancel()
     drawn = _drawn(body, kind, placements, points)
-    for stage in stages:
-        drawn = _distinct(drawn, stage.keep)
+    for step, keep in stages:
+        drawn = _distinct(drawn, keep)
         live = np.arange(len(drawn.costs))
         for _ in range(MOST_MOVES):
             cancel.check()
-            owners, options = _neighbours(body, kind, drawn, live, stage.step, share)
+            owners, options = _neighbours(body, kind, drawn, live, step, share)
             if not len(owners):
                 break
             tried = _drawn(body, kind, options, drawn.points[:, owners])

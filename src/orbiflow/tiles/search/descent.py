@@ -101,10 +101,7 @@ class Descent:
         self.done += 1
 
     def _force(self, soft: SoftTarget, placed: Tensor, blur: float) -> Tensor:
-        """(occupancy - Dice / 2) n ds at the boundary points, outward: the gradient of the IoU.
-
-        For tiles of fixed area the constant has no effect; it decides where scale may change.
-        """
+        """(occupancy - Dice / 2) n ds at the boundary points, outward: the gradient of the IoU."""
         along = (placed.roll(-1, dims=1) - placed.roll(1, dims=1)) / 2
         outward = torch.stack([along[..., 1], -along[..., 0]], dim=-1)
         outward = torch.where(self.model.mirror[:, None, None], -outward, outward)
@@ -166,11 +163,7 @@ STALL = 2e-5  # polishing stops when ten iterations together gain less IoU than 
 def polish(
     model: TileModel, target: Target, iterations: int, *, cancel: Cancel | None = None
 ) -> TileModel:
-    """Improve a single candidate: a last stationary segment and its pose, by exact gradients.
-
-    Returns a float64 model with one segment more, or as many if nothing was gained. Its sampled
-    boundary is simple and its IoU no smaller.
-    """
+    """Improve a single candidate's IoU: a last segment, if it gains, and its pose; float64."""
     cancel = cancel or Cancel()
     work = _Polish(model, target)
     if work.best_iou == 0.0:  # crosses itself already

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from orbiflow.arguments import as_number, as_whole
-from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.likeness import least_neck
 from orbiflow.tiles.search.candidates import Fit, Progress
-from orbiflow.tiles.search.method import Goal, SearchMethod, preferred_class
-from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.search.method import Goal, SearchMethod
 from orbiflow.tiles.tilings import IsohedralClass
+
+if TYPE_CHECKING:
+    from orbiflow.tiles.search.co_deformation import Hand
 
 # Settings of the preview
 SKETCH = {"placements": 60, "held": 6, "starts": 1, "share": 0.1, "finalists": 1, "rounds": 10}
@@ -63,7 +65,7 @@ class LikenessSearch(SearchMethod):
     def __post_init__(self) -> None:
         for name in ("placements", "held", "starts", "finalists", "rounds"):
             as_whole(getattr(self, name), name, 1)
-        as_number(self.share, "share", above=0, most=1)
+        as_number(self.share, "share", None, 1, above=0)
         as_whole(self.below, "below", 0, 2)
         if not self.multiples or min(self.multiples) < 1:
             raise OrbiflowError(f"multiples must be at least 1, got {self.multiples}")
@@ -81,34 +83,26 @@ class LikenessSearch(SearchMethod):
     ) -> Fit:
         """Let the silhouette bend into tiles of the class."""
         from orbiflow.tiles.search.bending import fit_bending
-        from orbiflow.tiles.search.co_deformation import hands
 
-        both = hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins)
-        return fit_bending(
-            goal.target, kind, self, both, per_class=per_class, progress=progress, cancel=cancel
-        )
+        told: dict[str, Any] = {"per_class": per_class, "progress": progress, "cancel": cancel}
+        return fit_bending(goal.target, kind, self, self.hands(goal), **told)
 
-    def preview(
-        self, goal: Goal, names: Sequence[str], cancel: Cancel | None = None
-    ) -> EscherTile | None:
-        """Return a tile that the silhouette bends to in haste; None if none is simple."""
+    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel | None = None) -> Fit:
+        """Let the silhouette bend in haste."""
         from orbiflow.tiles.search.bending import fit_bending
-        from orbiflow.tiles.search.certifying import best_tiles
-        from orbiflow.tiles.search.co_deformation import hands
 
-        both = hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins)
         quick = replace(self, below=0, **SKETCH)
-        try:
-            found = fit_bending(goal.target, preferred_class(names), quick, both, cancel=cancel)
-            return best_tiles(goal.target, found._replace(enough=1))[0]
-        except CertificationError:
-            return None
+        return fit_bending(goal.target, kind, quick, self.hands(goal), cancel=cancel)
 
     def prepare(self, goal: Goal) -> None:
         """Triangulate the silhouette and its mirror image."""
+        self.hands(goal)
+
+    def hands(self, goal: Goal) -> tuple[Hand, Hand]:
+        """Return the silhouette and its mirror image, ready to be bent."""
         from orbiflow.tiles.search.co_deformation import hands
 
-        hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins)
+        return hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins)
 
     def least_neck(self, goal: Goal) -> float:
         """Return `min_neck`, or a part of the silhouette's own narrowest neck."""

@@ -8,13 +8,15 @@ from dataclasses import dataclass, fields
 from importlib import import_module
 from typing import Any, ClassVar, Self
 
-from orbiflow.arguments import as_whole
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.search.candidates import Fit, Progress
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
+
+# The classes by how often they come near a silhouette at once, for the time that they take
+PREFERRED = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,13 +90,20 @@ class SearchMethod(ABC):
         """
 
     def preview(
-        self,
-        goal: Goal,  # noqa: ARG002 - for methods that can
-        names: Sequence[str],  # noqa: ARG002
-        cancel: Cancel | None = None,  # noqa: ARG002
+        self, goal: Goal, names: Sequence[str], cancel: Cancel | None = None
     ) -> EscherTile | None:
         """Return a certified tile of one of the classes in a moment, if the method can."""
-        return None
+        from orbiflow.tiles.search.certifying import best_tiles
+
+        kind = isohedral_class(next(name for name in PREFERRED if name in names))
+        try:
+            return best_tiles(goal.target, self.sketch(goal, kind, cancel)._replace(enough=1))[0]
+        except CertificationError:
+            return None
+
+    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel | None = None) -> Fit:  # noqa: ARG002
+        """Return candidates in a moment, for `preview`, or raise `CertificationError`."""
+        raise CertificationError(f"{self.method_name} has no quick way to tiles of {kind.name}")
 
     def load(self) -> None:
         """Import what `fit` needs, before worker processes start."""
@@ -129,25 +138,5 @@ class SearchMethod(ABC):
         return list(tiles)
 
 
-# The classes by how often they come near a silhouette at once, for the time that they take
-PREFERRED = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")
-
-
-def preferred_class(names: Sequence[str]) -> IsohedralClass:
-    """Return the class of `names` that a preview takes."""
-    return isohedral_class(next(name for name in PREFERRED if name in names))
-
-
 MAX_FREQUENCY = 60  # largest Omega that a fit takes on; time and memory grow with its square
-
-
-def check_max_frequency(value: int) -> None:
-    """Check an Omega: 0 is a constant field (paper, figure of Omega)."""
-    if not 0 <= as_whole(value, "max_frequency", 0) <= MAX_FREQUENCY:
-        raise OrbiflowError(
-            f"max_frequency must be from 0 to {MAX_FREQUENCY}, got {value}: "
-            "10 is plenty for most silhouettes"
-        )
-
-
 MAX_SEGMENTS = 2000  # of a flow; the descent adds one a step

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -10,14 +10,7 @@ from orbiflow.arguments import as_array, as_instance, as_number, as_whole
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import Cancel, one_thread
 from orbiflow.tiles.search.candidates import Fit, Progress
-from orbiflow.tiles.search.method import (
-    MAX_SEGMENTS,
-    Goal,
-    SearchMethod,
-    check_max_frequency,
-    preferred_class,
-)
-from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.search.method import MAX_FREQUENCY, MAX_SEGMENTS, Goal, SearchMethod
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass
 
 POINTS = 60  # points of the outline that the preview looks at
@@ -107,7 +100,7 @@ class OverlapSearch(SearchMethod):
     def __post_init__(self) -> None:
         for name in ("candidates", "projected", "measured", "turns", "finalists"):
             as_whole(getattr(self, name), name, 1)
-        check_max_frequency(self.max_frequency)
+        as_whole(self.max_frequency, "max_frequency", 0, MAX_FREQUENCY)
         if self.starts not in ("outline", "template"):
             raise OrbiflowError(f'starts must be "outline" or "template", got {self.starts!r}')
         if as_whole(self.boundary, "boundary", 0) < 60 or self.boundary % 30:
@@ -124,7 +117,9 @@ class OverlapSearch(SearchMethod):
             raise OrbiflowError(f"stages need steps and survivors of at least 1: {self.stages}")
         if self.iterations >= MAX_SEGMENTS:
             raise OrbiflowError(f"stages must have less than {MAX_SEGMENTS} steps in all")
-        for name in ("smoothness", "reach", "blur"):
+        for value in as_array(self.smoothness, "smoothness", (2,)):
+            as_number(value, "smoothness, first and last,", 0)
+        for name in ("reach", "blur"):
             for value in as_array(getattr(self, name), name, (2,)):
                 as_number(value, f"{name}, first and last,", above=0)
         as_number(self.momentum, "momentum", 0, 1)
@@ -161,33 +156,23 @@ class OverlapSearch(SearchMethod):
             )
         return found._replace(enough=1 if per_class == 1 else 2 * per_class)
 
-    def preview(
-        self, goal: Goal, names: Sequence[str], cancel: Cancel | None = None
-    ) -> EscherTile | None:
-        """Return the tile nearest to the outline; None if none is simple."""
-        if self.starts != "outline":
-            return None
-        from orbiflow.tiles.search.certifying import best_tiles
+    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel | None = None) -> Fit:
+        """Return the tiles nearest to the outline."""
         from orbiflow.tiles.search.model import TileModel
         from orbiflow.tiles.search.starts import outline_starts
 
-        kind, target = preferred_class(names), goal.target
-        found = outline_starts(
-            target,
-            kind,
-            count=3,
-            resolutions=(POINTS,),
-            measured=40,
-            vertices=POINTS,
-            cancel=cancel,
-        )
-        if not len(found.prototiles):
-            return None
-        model = TileModel(kind, max_frequency=1, steps=1, prototiles=found.prototiles)
-        try:
-            return best_tiles(target, Fit(model, len(found.prototiles), 0, 1))[0]
-        except CertificationError:
-            return None
+        if self.starts != "outline":
+            return super().sketch(goal, kind, cancel)
+        few: dict[str, Any] = {
+            "count": 3,
+            "resolutions": (POINTS,),
+            "measured": 40,
+            "vertices": POINTS,
+        }
+        own = outline_starts(goal.target, kind, **few, cancel=cancel).prototiles
+        if not len(own):
+            raise CertificationError("no tile near the outline is simple")
+        return Fit(TileModel(kind, max_frequency=1, steps=1, prototiles=own), len(own), 0, 1)
 
     def prepare(self, goal: Goal) -> None:
         """Draw the silhouette's soft edge."""
@@ -200,10 +185,7 @@ class OverlapSearch(SearchMethod):
         return self.min_neck
 
     def for_outline(self, length: float) -> OverlapSearch:
-        """More starts for a ragged silhouette: there are more ways to lay it out, and more fail.
-
-        `length` is the outline's, in square roots of the silhouette's area; a disc has 3.5.
-        """
+        """More starts for a ragged silhouette, with an outline of this `length`; a disc has 3.5."""
         share = min(max((length / PLAIN) ** RAGGED, 1.0), MOST_TIMES)
         (steps, kept), *later = self.stages
         return replace(
@@ -259,7 +241,7 @@ class OccupancySearch(SearchMethod):
 
         for name in ("turns", "finalists", "iterations", "points", "segments", "steps"):
             as_whole(getattr(self, name), name, 1)
-        check_max_frequency(self.max_frequency)
+        as_whole(self.max_frequency, "max_frequency", 0, MAX_FREQUENCY)
         integrator(as_instance(self.method, str, "method"))
         as_whole(self.affine_iterations, "affine_iterations", 0)
         as_number(self.smoothness, "smoothness", 0)

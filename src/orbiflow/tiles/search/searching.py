@@ -253,10 +253,7 @@ class _Teller:
                 self.tell(Event(name, self.shares.get(name, 0.0), float("nan"), failure))
 
     def sorted(self, names: Sequence[str]) -> tuple[list[EscherTile], list[ClassFailure]]:
-        """Tiles, best first, and failures; ties in the order in which classes were asked for.
-
-        Those of a search for likeness come before those for overlap: their scores are of two kinds.
-        """
+        """Tiles, best first, those for likeness before those for overlap; and failures."""
         failures = [o for o in self.outcomes.values() if isinstance(o, ClassFailure)]
         best = [o for o in self.outcomes.values() if isinstance(o, EscherTile)]
         if self.preview and ClassFailure(self.preview.name, INTERRUPTED) in failures:

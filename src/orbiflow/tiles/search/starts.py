@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -27,17 +28,22 @@ from orbiflow.symmetry import (
 from orbiflow.tiles.geometry import plane_points, resampled, reverse, subdivided
 from orbiflow.tiles.likeness import boundary_iou, prepared_region
 from orbiflow.tiles.search.candidates import Prototiles
-from orbiflow.tiles.search.placements import Placements, best_placements
-from orbiflow.tiles.search.tile_space import NearestTiles, nearest_tiles
+from orbiflow.tiles.search.tile_space import (
+    NearestTiles,
+    Placements,
+    best_placements,
+    nearest_tiles,
+)
 from orbiflow.tiles.silhouette import Target
-from orbiflow.tiles.tilings import EdgeIdentification, IsohedralClass, isohedral_class
+from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 
 
+@lru_cache(maxsize=16)
 def template_symmetries(isohedral_class: IsohedralClass) -> tuple[int, bool]:
     """Return how many rotations of the template keep its group, and whether a mirror does.
 
     Two starts that differ by such a map give the same tiles: with a mirror, mirrored targets need
-    none.
+    none, for the mirror image of a tile of the class is one under another placement.
     """
     vertices = isohedral_class.template()
     group = isohedral_class.group()
@@ -51,13 +57,10 @@ def template_symmetries(isohedral_class: IsohedralClass) -> tuple[int, bool]:
 
 
 def initial_poses(isohedral_class: IsohedralClass, turns: int) -> tuple[Array, NDArray[np.bool_]]:
-    """Angles (S,) in radians and mirror flags (S,): `turns` angles, twice if mirroring matters.
-
-    The angles divide the range in which the template does not look the same.
-    """
-    order, mirror_closed = template_symmetries(isohedral_class)
+    """Angles (S,) in radians that tell templates apart, and mirror flags (S,) if these matter."""
+    order, symmetric = template_symmetries(isohedral_class)
     angles = np.arange(turns, dtype=np.float64) * (2 * math.pi / order / turns)
-    if mirror_closed:
+    if symmetric:
         return angles, np.zeros(turns, dtype=np.bool_)
     return np.tile(angles, 2), np.arange(2 * turns) >= turns
 
@@ -114,7 +117,7 @@ def outline_starts(
     parts: list[Prototiles] = []
     scores: list[Array] = []
     places: list[Array] = []
-    for mirrored in (False,) if mirror_closed(kind) else (False, True):
+    for mirrored in (False,) if template_symmetries(kind)[1] else (False, True):
         ring = reverse(target.normal * (1.0, -1.0)) if mirrored else target.normal
         goal = prepared_region(ring)
         for points in resolutions:
@@ -140,9 +143,8 @@ def template_starts(
 ) -> Prototiles:
     """Return the template itself, turned and stretched: starts that know nothing of the target.
 
-    There are so many `turns`, over the range in which the template does not look the same, twice as
-    many for classes without lattice freedom; and stretches of size `stretch` along each axis of
-    that freedom, besides none. `phase` moves the angles, in steps.
+    There are so many `turns`, twice as many for classes without lattice freedom, moved by `phase`
+    steps; and stretches of size `stretch` along each axis of that freedom, besides none.
     """
     kind = isohedral_class(kind)
     order, symmetric = template_symmetries(kind)
@@ -175,27 +177,6 @@ def template_starts(
     )
 
 
-def mirror_closed(kind: IsohedralClass) -> bool:
-    """Whether reading the template's edges backwards gives the same identifications.
-
-    Then the mirror image of a tile of the class is a tile of the class under another placement.
-    """
-    size = len(kind.template())
-    own = {(frozenset((p.first, p.second)), _turn_order(p)) for p in kind.identified_edges}
-    for k in range(size):
-        image = {(frozenset(((k - e) % size) for e in edges), turn) for edges, turn in own}
-        if image == own:
-            return True
-    return False
-
-
-def _turn_order(pair: EdgeIdentification) -> int:
-    linear = pair.isometry.linear
-    if np.linalg.det(linear) < 0:
-        return -1
-    return round(np.degrees(abs(np.arctan2(linear[1, 0], linear[0, 0]))))
-
-
 def _simple_tiles(
     kind: IsohedralClass,
     goal: shapely.Polygon,
@@ -205,8 +186,7 @@ def _simple_tiles(
 ) -> Iterator[tuple[NearestTiles, Placements, Array]]:
     """The `wanted` nearest tiles that do not cross themselves, their placements and their IoU.
 
-    Where the nearest tile to the outline crosses itself, that to the outline smoothed may not: the
-    limbs are shorter, their roots at the same places, and the descent lets them grow.
+    Near an outline that was smoothed fewer cross: limbs are shorter, and the descent lets them grow.
     """
     for spread in SMOOTHING:
         if not len(placements.starts) or wanted < 1:
