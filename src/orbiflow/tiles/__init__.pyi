@@ -8,6 +8,10 @@ from .art.making import render_artwork as render_artwork
 from .art.making import write_artwork as write_artwork
 from .art.settings import ArtSettings as ArtSettings
 from .art.source import with_map as with_map
+from .exporting.formats import write_dxf as write_dxf
+from .exporting.formats import write_json as write_json
+from .exporting.formats import write_pdf as write_pdf
+from .exporting.formats import write_png as write_png
 from .exporting.scene import Curve as Curve
 from .exporting.scene import Layer as Layer
 from .exporting.scene import Scene as Scene
@@ -21,10 +25,6 @@ from .exporting.writing import Exported as Exported
 from .exporting.writing import export as export
 from .exporting.writing import scenes as scenes
 from .exporting.writing import sheet_names as sheet_names
-from .exporting.writing import write_dxf as write_dxf
-from .exporting.writing import write_json as write_json
-from .exporting.writing import write_pdf as write_pdf
-from .exporting.writing import write_png as write_png
 from .exporting.writing import write_scene as write_scene
 from .geometry import arc_lengths as arc_lengths
 from .geometry import best_similarity as best_similarity
@@ -57,9 +57,9 @@ from .likeness.necks import narrowest_neck as narrowest_neck
 from .likeness.necks import narrowest_slit as narrowest_slit
 from .likeness.necks import slit_share as slit_share
 from .likeness.overlap import Overlap as Overlap
-from .likeness.overlap import diverse as diverse
 from .likeness.overlap import prepared_region as prepared_region
-from .likeness.overlap import rank_score as rank_score
+from .likeness.ranking import diverse as diverse
+from .likeness.ranking import rank_score as rank_score
 from .likeness.recognition import Recognisability as Recognisability
 from .likeness.recognition import Recogniser as Recogniser
 from .likeness.recognition import recognisability as recognisability

@@ -21,7 +21,7 @@ from orbiflow.density.regions import DensityLevels, resolvable_masses, samples_f
 from orbiflow.density.tables import TableRows
 
 if TYPE_CHECKING:
-    from orbiflow.density.operations.using import ScoreSettings
+    from orbiflow.density.operations.queries import ScoreSettings
 
 BLOCK, BLOCK_GRADIENT = 2**18, 2**16
 """Rows at a time: many cost less each, few leave room and tell how far it is."""

@@ -1,3 +1,9 @@
+from .formats import INCH as INCH
+from .formats import curves_path as curves_path
+from .formats import write_dxf as write_dxf
+from .formats import write_json as write_json
+from .formats import write_pdf as write_pdf
+from .formats import write_png as write_png
 from .layouts import longer_side as longer_side
 from .scene import INK as INK
 from .scene import Box as Box
@@ -15,13 +21,7 @@ from .svg import Numbers as Numbers
 from .svg import tile_svg as tile_svg
 from .svg import tiling_svg as tiling_svg
 from .svg import write_svg as write_svg
-from .writing import INCH as INCH
 from .writing import Exported as Exported
-from .writing import curves_path as curves_path
 from .writing import export as export
 from .writing import scenes as scenes
-from .writing import write_dxf as write_dxf
-from .writing import write_json as write_json
-from .writing import write_pdf as write_pdf
-from .writing import write_png as write_png
 from .writing import write_scene as write_scene

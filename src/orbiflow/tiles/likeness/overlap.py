@@ -1,30 +1,17 @@
-"""The exact overlap of polygons with a region, its exact gradient in the vertices, and ranking.
-
-Tiles are ranked by their overlap and recognisability; a short list of the best is without repeats.
-"""
+"""The exact overlap of polygons with a region, and its exact gradient in the vertices."""
 
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
-from collections.abc import Callable, Sequence
-from functools import cache
-
 import numpy as np
 import scipy.optimize
 import shapely
-from numpy.typing import ArrayLike
 
-from orbiflow.arguments import as_array, as_number, as_whole
+from orbiflow.arguments import as_array
 from orbiflow.arrays import Array, Complex
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
+from orbiflow.tiles.geometry import complex_points, plane_points, signed_area
 
-IOU_WEIGHT = 0.25
-TWIN_SIMILARITY = 0.97
-VARIETY_WEIGHT = 0.1
-
-# A symmetric function of two candidates' indices: how alike they are, 0 to 1
-Similarity = Callable[[int, int], float]
 # the number of vertices beyond which a region of area 1 is simplified, and the tolerance
 MAX_REGION_VERTICES, REGION_TOLERANCE = 1500, 2e-3
 
@@ -136,103 +123,3 @@ def best_overlay(
     )
     best = complex(factor * np.exp(found.x[0] + 1j * found.x[1]))
     return best, complex(middle + found.x[2] + 1j * found.x[3]), -float(found.fun)
-
-
-MAX_IOU_GAIN = 0.15  # the largest gain in IoU that is expected from a better overlay of two tiles
-
-
-def mutual_iou(tiles: Sequence[Array], decisive: float = 0.9) -> Similarity:
-    """Return the mutual IoU of tiles (N, 2) over one silhouette by their indices, for `diverse`.
-
-    A better overlay is searched only where it can matter: for pairs whose IoU, with equal areas and
-    centroids, is at most `MAX_IOU_GAIN` below `decisive`, with which it is compared.
-
-    >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    >>> turned = square @ [[0.98, 0.2], [-0.2, 0.98]] * 3 + 7
-    >>> round(mutual_iou([square, turned])(0, 1), 3)
-    1.0
-    """
-    rings: list[Array] = []
-    for tile in tiles:
-        ring = orient(np.asarray(tile, dtype=np.float64))
-        rings.append((ring - centroid(ring)) / np.sqrt(signed_area(ring)))
-
-    @cache
-    def region(index: int) -> Overlap:
-        return Overlap(rings[index])
-
-    @cache
-    def alike(i: int, j: int) -> float:
-        shared = shapely.Polygon(rings[i]).intersection(shapely.Polygon(rings[j])).area
-        plain = float(min(shared / (2 - shared), 1.0))
-        if not decisive - MAX_IOU_GAIN <= plain < decisive:
-            return plain
-        return max(plain, best_overlay(complex_points(rings[i]), region(j))[2])
-
-    return lambda i, j: alike(min(i, j), max(i, j))
-
-
-def rank_score(iou: float, recognisability: float) -> float:
-    """Return the score of a tile, 0 to 1: the geometric mean of both, IoU with weight 1/4.
-
-    A geometric mean compares ratios, so it does not matter that IoU varies little between tiles (a
-    blob without limbs has nine tenths of the best tile's) and recognisability much; and a tile needs
-    some of both. With more weight on IoU blobs win; with none, a tile may lie beside its target.
-    docs/recognisability.md has the numbers.
-
-    Raises `OrbiflowError` for a value outside [0, 1].
-
-    >>> rank_score(0.72, 0.55) < rank_score(0.65, 0.74)
-    True
-    """
-    for name, value in (("iou", iou), ("recognisability", recognisability)):
-        as_number(value, name, 0, 1)
-    return float(iou**IOU_WEIGHT * recognisability ** (1 - IOU_WEIGHT))
-
-
-def diverse(
-    scores: ArrayLike,
-    count: int,
-    similarity: Similarity,
-    *,
-    twin: float = TWIN_SIMILARITY,
-    variety: float = VARIETY_WEIGHT,
-) -> list[int]:
-    """Choose up to `count` good candidates that differ from each other, the best first.
-
-    This is maximal marginal relevance (Carbonell, Goldstein, 1998): the first candidate has the
-    largest score, each next one the largest score minus `variety` times its largest similarity to a
-    chosen one. Candidates with a similarity above `twin` to a chosen one are left out, so there may be
-    fewer than `count`.
-
-    Args:
-        scores: The scores (n,), larger is better; of equal ones the earlier comes first.
-        count: The largest number of candidates, at least 1.
-        similarity: The similarity of a candidate and a chosen one, called once for each pair.
-        twin: The largest similarity, 0 to 1; with 1 nothing is left out.
-        variety: The weight of similarity, at least 0, in the unit of the scores.
-
-    Returns:
-        Indices of `scores`, in the order of choice.
-
-    Raises `OrbiflowError` for scores that are not finite numbers, and for arguments out of range.
-
-    >>> position = [0.0, 0.01, 0.5, 1.0]
-    >>> diverse([0.9, 0.89, 0.8, 0.81], 3, lambda i, j: 1 - abs(position[i] - position[j]))
-    [0, 3, 2]
-    """
-    values = as_array(scores, "scores", ("n",))
-    as_whole(count, "count", 1)
-    as_number(twin, "twin", 0, 1)
-    as_number(variety, "variety", 0)
-    nearest = np.zeros(len(values))
-    left = np.ones(len(values), dtype=bool)
-    chosen: list[int] = []
-    while left.any() and len(chosen) < count:
-        best = int(np.argmax(np.where(left, values - variety * nearest, -np.inf)))
-        chosen.append(best)
-        left[best] = False
-        for other in np.flatnonzero(left):
-            nearest[other] = max(nearest[other], similarity(int(other), best))
-        left &= nearest <= twin
-    return chosen

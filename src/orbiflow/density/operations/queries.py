@@ -1,4 +1,4 @@
-"""Using a saved density: the commands score, sample, marginal and conditional."""
+"""Questions to a saved density: the commands score, sample, marginal and conditional."""
 
 from __future__ import annotations
 
