@@ -225,7 +225,7 @@ def test_efforts_are_valid_settings(effort: str) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"max_frequency": -1}, "max_frequency must be at least 0"),
+        ({"max_frequency": -1}, "max_frequency must be from 0"),
         ({"max_frequency": 61}, "from 0 to 60"),
         ({"candidates": 0}, "candidates must be at least 1"),
         ({"starts": "random"}, 'starts must be "outline" or "template"'),
