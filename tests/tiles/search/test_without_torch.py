@@ -42,3 +42,24 @@ def test_a_search_for_likeness_imports_no_torch(tmp_path) -> None:
         )
         assert done.returncode == 0, done.stderr
         assert done.stdout.strip() == "[]"
+
+
+COMMAND = """
+import json, sys
+from pathlib import Path
+from orbiflow.cli.app import run
+
+boot = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]]
+Path("boot.json").write_text(json.dumps(boot))
+words = ["escherize", "boot.json", "--effort", "fast", "--classes", "IH4", "--workers", "1"]
+assert run(words) == 0
+assert "torch" not in sys.modules
+"""
+
+
+def test_the_command_imports_none_either(tmp_path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", COMMAND], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out" / "IH4" / "model.safetensors").exists()

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from orbiflow.arguments import as_instance, as_path
-from orbiflow.drawing import Picture, Sheet, field_picture
+from orbiflow.drawing import Picture, Sheet
 from orbiflow.runtime import (
     Note,
     ResultFolder,
@@ -32,7 +32,7 @@ from orbiflow.tiles.pictures import (
     tiling_png,
 )
 from orbiflow.tiles.result_file import RESULT, folder_names
-from orbiflow.tiles.search import ClassFailure, SearchResult, placed_field, report
+from orbiflow.tiles.search import ClassFailure, SearchResult, report
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile, TileMap
 from orbiflow.tiles.tilings import Colouring, colouring
@@ -81,6 +81,10 @@ def write_tile_folder(
 
     def field(sheet: Sheet) -> bytes:
         normal = result.normal_tile
+        # flows need torch, which the search for likeness does without
+        from orbiflow.drawing import field_picture
+        from orbiflow.tiles.search import placed_field
+
         return field_picture(placed_field(result.model()), normal.group, normal, sheet=sheet).file()
 
     contents: dict[str, Callable[[], str | bytes]] = {
