@@ -157,15 +157,15 @@ def as_number(
 
     >>> as_number(float("nan"), "dpi", above=0)
     Traceback (most recent call last):
-    orbiflow.errors.SettingError: dpi must be a number above 0, got nan
+    orbiflow.errors.SettingError: dpi must be a finite number above 0, got nan
     """
     allowed = Range(least, most, above, below)
     try:
         given = not (isinstance(value, str | bytes) or _is_boolean(value))
-        result = float(value) if given else math.nan
+        result = float(value) if given else None
     except (TypeError, ValueError, OverflowError):
-        result = math.nan
-    if result not in allowed:
+        result = None
+    if result is None or result not in allowed:
         raise refusal(name, number_wanted(allowed, result), value)
     return result
 
@@ -277,10 +277,13 @@ def number_wanted(allowed: Range, number: float | None = None, *, whole: bool = 
 
     >>> number_wanted(Range(above=0)), number_wanted(Range(above=0), -1.0)
     ('a number above 0', 'above 0')
+    >>> number_wanted(Range(above=0), math.nan)
+    'a finite number above 0'
     """
     if isinstance(number, int) or (number is not None and math.isfinite(number)):
         return str(allowed)
-    return f"a {'whole ' if whole else ''}number {allowed}".strip()
+    noun = "whole number" if whole else "number" if number is None else "finite number"
+    return f"a {noun} {allowed}".strip()
 
 
 def one_of(choices: Sequence[object]) -> str:

@@ -92,7 +92,7 @@ def png_that_says(width: int, height: int) -> bytes:
         (("--outline", "thick"), "--outline ... 'thick' is not a length"),
         (("--eye", "5,5"), "the eye at 5,5 lies outside the silhouette, which reaches from"),
         (("--eye", "here"), "--eye ... 'here' is not x,y or x,y,radius"),
-        (("--eye", "nan,1"), "--eye ... must be a number, got nan"),
+        (("--eye", "nan,1"), "--eye ... must be a finite number, got nan"),
         (("--eye", "210,190,-3"), "--eye ... radius ... got 210,190,-3"),
         (("--repeat", "--size", "30x30"), "--size and --repeat exclude each other"),
         (("--tolerance", "0.1"), "--tolerance ... --repeat"),

@@ -93,7 +93,7 @@ def test_plots_for_papers(tmp_path: Path, orbiflow) -> None:
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     for options, message in (
         (("--width", "2mm"), "--width: a figure is 40 to 1000 mm wide"),
-        (("--width", "90"), "has no unit"),
+        (("--width", "90"), "--width: '90' has no unit"),
         (("--out", out, "--format", "png"), "--out ends in .pdf but --format is png"),
         (("--out", tmp_path / "plot.png"), "several pictures; give a folder, or a .pdf"),
         (("--out", tmp_path / "none" / "plots.pdf"), "create it first"),
@@ -210,8 +210,8 @@ def test_mistakes_in_the_options(tmp_path: Path, orbiflow) -> None:
             ("density", "plot", "--model", model, "--coastlines", data),
             "--coastlines apply to the sphere",
         ),
-        (("density", "plot", "--model", model, "--center", "0,north"), "--center"),
-        (("density", "plot", "--model", model, "--center", "0,nan"), "--center"),
+        (("density", "plot", "--model", model, "--center", "0,north"), "is not a list of angles"),
+        (("density", "plot", "--model", model, "--center", "0,nan"), "finite number"),
         (("density", "plot", "--model", model, "--scale", "root"), "root"),
     ):
         outcome = orbiflow(*arguments)
@@ -295,8 +295,8 @@ def test_maps_as_asked_for(tmp_path: Path, orbiflow) -> None:
     assert (out / "samples.svg").exists()
     before = (out / "density.svg").read_bytes()
     for options, message in (
-        (("--center", "40,140,3"), "--center"),
-        (("--center", "north"), "--center"),
+        (("--center", "40,140,3"), "--center must be a latitude and a longitude"),
+        (("--center", "north"), "--center: 'north' is not a list of angles"),
         (("--center", "40,140", "--projection", "mollweide"), "centred on a meridian"),
         (("--radius", "100"), "--radius must be above 0 and at most 90"),
         (("--samples", "0"), "--samples must be from 1"),

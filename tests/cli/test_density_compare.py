@@ -271,7 +271,7 @@ MISTAKES: dict[str, tuple[tuple[object, ...], str]] = {
     "mass": (("region", "-m", "good", "--mass", "95"), "--mass: entry 1: must be above 0 and below 1"),
     "mass of words": (("region", "-m", "good", "--mass", "half"), "--mass: entry 1: must be a number"),
     "no mass": (("region", "-m", "good", "--mass", ","), "--mass must be a list of one or more"),
-    "level nan": (("region", "-m", "good", "--level", "nan"), "--level"),
+    "level nan": (("region", "-m", "good", "--level", "nan"), "finite number"),
     "samples": (("region", "-m", "good", "--samples", "3"), "--samples must be"),
     "place": (("region", "-m", "good", "-o", "none/r.json"), "no folder none"),
 }  # fmt: skip

@@ -59,7 +59,7 @@ def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--folds", "1"), "--folds must be from 2 to 1000"),
+        (("--folds", "1"), "--folds must be from 2 to 1000, got '1'"),
         (("--folds", "41"), "41 folds need as many rows, there are 40"),
         (("--group", "protein", "--folds", "11"), "11 folds need as many groups, there are 10"),
         (("--group", "chain"), "no column 'chain'; it has phi, psi, protein"),

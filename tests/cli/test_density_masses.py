@@ -73,7 +73,7 @@ def test_lines_far_out(folder: Path, orbiflow) -> None:
         ("region --mass 0.99999 --samples 20000", "--samples must be at least 1000000"),
         ("region --mass 0.000001 --samples 20000", "cannot be told from 0 with 20000 samples"),
         ("region --mass 0.99999999", "too near to 1: take one from 1e-06 to 0.999999"),
-        ("region --samples 10", "--samples must be from 1000 to 10000000"),
+        ("region --samples 10", "--samples must be from 1000 to 10000000, got '10'"),
         ("score data.csv --samples 20000", "--samples needs --region; give both or neither"),
         ("score data.csv --region --samples 20", "--samples must be from 1000 to 10000000"),
         (
@@ -82,9 +82,15 @@ def test_lines_far_out(folder: Path, orbiflow) -> None:
         ),
         ("plot --regions 0.9999999", "too near to 1"),
         ("plot --region-samples 20000", "--region-samples needs --regions"),
-        ("plot --regions 0.5 --region-samples 3", "--region-samples must be from 1000 to 10000000"),
-        ("plot --regions abc", "--regions: entry 1: must be a number above 0"),
-        ("plot --regions 1.2", "--regions: entry 1: must be above 0 and below 1"),
+        (
+            "plot --regions 0.5 --region-samples 3",
+            "--region-samples must be from 1000 to 10000000, got '3'",
+        ),
+        (
+            "plot --regions abc",
+            "--regions: entry 1: must be a number above 0 and below 1, got 'abc'",
+        ),
+        ("plot --regions 1.2", "--regions: entry 1: must be above 0 and below 1, got '1.2'"),
     ],
 )
 def test_mistakes(words: str, message: str, folder: Path, orbiflow) -> None:

@@ -70,7 +70,7 @@ def test_marginal_and_conditional(tmp_path: Path, model: Path, orbiflow: Run) ->
     [
         ("conditional --given chi", "such as psi=-45, got 'chi'"),
         ("conditional --given chi=much", "such as psi=-45"),
-        ("conditional --given chi=nan", "must be a number"),
+        ("conditional --given chi=nan", "'chi' must be a finite number"),
         ("conditional --given omega=3", "no column 'omega'; there are phi, psi, chi"),
         ("conditional --given chi=3,chi=4", "given twice"),
         ("conditional --given phi=1,psi=2,chi=3", "nothing is left"),

@@ -182,7 +182,7 @@ def test_mistakes_are_named() -> None:
         conditional(density, {})
     with pytest.raises(OrbiflowError, match="nothing is left"):
         conditional(density, {0: 0.1, 1: 0.1, 2: 0.1})
-    with pytest.raises(OrbiflowError, match="angle 0 must be a number"):
+    with pytest.raises(OrbiflowError, match="angle 0 must be a finite number"):
         conditional(density, {0: math.nan})
     with pytest.raises(OrbiflowError, match="infinite"):
         log_prob_observed(density, torch.tensor([[0.1, math.inf, 0.2]]))

@@ -219,7 +219,7 @@ def test_the_centre_moves_the_picture_but_not_its_colours(monkeypatch):
 def test_the_centre_is_checked(draw):
     with pytest.raises(OrbiflowError, match="not to the klein-bottle"):
         draw(example(SPACES[1]), center=(0, 0))
-    for center, message in (((0,), "2 angles"), ((0, np.nan), "must be a number")):
+    for center, message in (((0,), "2 angles"), ((0, np.nan), "must be a finite number")):
         with pytest.raises(OrbiflowError, match=message):
             draw(example(SPACES[0]), center=center)
 

@@ -220,7 +220,7 @@ def test_the_map_that_suits() -> None:
         (Sphere(), {"projection": "mollweide", "radius": 40}, "has no radius"),
         (Sphere(), {"center": (95, 0)}, "latitude must be from -90 to 90"),
         (Sphere(), {"center": (0, 0, 0)}, "a latitude and a longitude"),
-        (Sphere(), {"center": (math.nan,)}, "must be a number"),
+        (Sphere(), {"center": (math.nan,)}, "must be a finite number"),
         (Sphere(), {"projection": "lambert", "radius": 120}, "radius must be"),
         (ProjectivePlane(), {"projection": "mollweide"}, "one point of the projective plane"),
         (ProjectivePlane(), {"projection": "schmidt", "center": (10, 20)}, "give no centre"),
