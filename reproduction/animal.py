@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,7 @@ import numpy as np
 import shapely
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import draw_flow, draw_magnitude, fill_rings, mark_symmetry, outline_cell
+from orbiflow.drawing import draw_flow, draw_magnitude, mark_symmetry, outline_cell
 from orbiflow.fields import FourierField
 from orbiflow.tiles import (
     CLASSES,
@@ -20,20 +21,18 @@ from orbiflow.tiles import (
     placed_field,
 )
 from reproduction.drawing import (
-    EDGE,
-    GOAL,
     SAMPLES,
-    TILE,
-    Box,
     Canvas,
     around,
+    aspect_of,
     caption,
     draw_over,
     draw_tiling,
+    grid_box,
     label,
     panel,
+    panel_of,
     tiny,
-    window_of,
 )
 from reproduction.exhibit import Exhibit, Extent, Findings, Table, Work
 from reproduction.published import animal
@@ -67,20 +66,19 @@ COLUMNS = (
     "(c) magnitude of the field",
     "(d) flow lines",
 )
-HEIGHT = 0.70
-_HEAD, _LEFT = 0.075, 0.07
+_LEFT = 0.07
+_box = partial(grid_box, rows=3, columns=4, gap=0.008, left=_LEFT, top=0.075)
 
 
 def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
     outcomes = dict(zip(CLASSES, values, strict=True))
     outline = animal().normal
     for part, names in PARTS:
-        figure = canvas.figure(HEIGHT)
+        figure = canvas.figure(0.70)
         for row, name in enumerate(names):
             _draw_row(figure, row, outcomes[name], outline)
         for column, title in enumerate(COLUMNS):
-            box = _box(0, column)
-            caption(figure, (box[0], box[1], box[2], box[3] + 0.004), title, size=0.95)
+            caption(figure, _box(0, column), title, size=0.95)
         canvas.add(
             figure,
             f"Three rows, of {', '.join(names)}: a tile like a turtle, its tiling, and the field "
@@ -90,15 +88,11 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
             "tile; black: a lattice cell; signs: rotation centres; dashed: glide lines.",
             part=part,
         )
-    good = {name: one for name, one in outcomes.items() if isinstance(one, EscherTile)}
-    symmetry = {
-        name: equivariance_error(placed_field(one.model()), one.normal_tile.group.cosets)
-        for name, one in good.items()
-    }
-    rows = [_row(name, one, symmetry.get(name)) for name, one in outcomes.items()]
+    numbers = {n: _numbers(one) for n, one in outcomes.items() if isinstance(one, EscherTile)}
+    rows = [_row(one, numbers.get(name)) for name, one in outcomes.items()]
     headings = ("class", "IoU", "edges match to", "field symmetric to", "certified")
-    worst = max(symmetry.values(), default=float("inf"))
-    certified = sum(one.certificate.valid for one in good.values())
+    worst = max((one["symmetry_error"] for one in numbers.values()), default=float("inf"))
+    certified = sum(row[-1] == "yes" for row in rows)
     return Findings(
         "agrees" if certified == len(CLASSES) and worst < 1e-9 else "agrees in part",
         f"The paper's own method, from the template, with one stationary field and Ω = {OMEGA} "
@@ -106,19 +100,15 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
         f"that match to rounding. The field has its group's symmetry to {tiny(worst)} of its "
         "size. The animal is a turtle in the public domain: the paper's rabbit does not come "
         "with it.",
-        numbers={name: _numbers(one, symmetry[name]) for name, one in good.items()},
+        numbers=numbers,
         tables=[Table(f"The tiles of Ω = {OMEGA}.", headings, rows)],
     )
 
 
-def _numbers(tile: EscherTile, symmetry_error: float) -> dict[str, float]:
+def _numbers(tile: EscherTile) -> dict[str, float]:
+    error = equivariance_error(placed_field(tile.model()), tile.normal_tile.group.cosets)
     measures = {"iou": tile.metrics.iou, "edge_mismatch": tile.certificate.edge_mismatch}
-    return {**measures, "symmetry_error": symmetry_error}
-
-
-def _box(row: int, column: int) -> Box:
-    width, height = (1 - _LEFT) / 4, (1 - _HEAD) / 3
-    return _LEFT + column * width + 0.004, (2 - row) * height + 0.006, width - 0.008, height - 0.012
+    return {**measures, "symmetry_error": error}
 
 
 def _draw_row(figure: Figure, row: int, outcome: Any, outline: Array) -> None:
@@ -129,11 +119,10 @@ def _draw_row(figure: Figure, row: int, outcome: Any, outline: Array) -> None:
         return
     tile = outcome.normal_tile
     boxes = [_box(row, column) for column in range(4)]
-    aspect = boxes[0][2] / (boxes[0][3] * HEIGHT)
-    axes = panel(figure, boxes[0], window_of([tile.polygon, outline], aspect))
-    draw_over(axes, tile.polygon, outline, width=1.4)
+    axes = panel_of(figure, boxes[0], [tile.polygon, outline])
+    draw_over(axes, [tile.polygon], outline, 1.4)
     high = 1.75
-    window = around(tile.center, high * aspect, high)
+    window = around(tile.center, high * aspect_of(figure, boxes[0]), high)
     draw_tiling(panel(figure, boxes[1], window), tile, window)
     field = placed_field(outcome.model())
     ring = np.concatenate([tile.polygon, tile.polygon[:1]])
@@ -152,17 +141,12 @@ def _draw_row(figure: Figure, row: int, outcome: Any, outline: Array) -> None:
         mark_symmetry(axes, tile.group, window, size=0.075, halo=halo)
 
 
-def _row(name: str, outcome: Any, error: float | None) -> tuple[str, ...]:
-    if not isinstance(outcome, EscherTile):
-        return name, "–", "–", "–", outcome.reason
-    certificate = outcome.certificate
-    return (
-        f"{name} ({outcome.group_name})",
-        f"{outcome.metrics.iou:.3f}",
-        tiny(certificate.edge_mismatch),
-        tiny(error or 0.0),
-        "yes" if certificate.valid else "no",
-    )
+def _row(outcome: Any, numbers: dict[str, float] | None) -> tuple[str, ...]:
+    if numbers is None:
+        return outcome.name, "–", "–", "–", outcome.reason
+    errors = tiny(numbers["edge_mismatch"]), tiny(numbers["symmetry_error"])
+    certified = "yes" if outcome.certificate.valid else "no"
+    return f"{outcome.name} ({outcome.group_name})", f"{numbers['iou']:.3f}", *errors, certified
 
 
 EXHIBIT = Exhibit(
@@ -175,29 +159,24 @@ EXHIBIT = Exhibit(
     lambda extent: animal_work(extent, OMEGA),
 )
 
-_GRID_LEFT, _GRID_HEAD = 0.06, 0.025
-
 
 def _draw_frequencies(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
     omegas, names = extent.frequencies, list(CLASSES)
     table = dict(zip(((w, name) for w in omegas for name in names), values, strict=True))
     outline = animal().normal
-    height = 0.097 * len(omegas) + 0.025
+    head, left = 0.025, 0.06
+    height = 0.097 * len(omegas) + head
     figure = canvas.figure(height)
     for row, omega in enumerate(omegas):
         for column, name in enumerate(names):
-            outcome, box = table[omega, name], _grid_box(row, column, len(omegas), height)
-            rings = [outcome.normal_tile.polygon] if isinstance(outcome, EscherTile) else []
-            view = window_of([outline, *rings], box[2] / (box[3] * height), margin=0.04)
-            axes = panel(figure, box, view)
-            fill_rings(axes, rings, TILE, EDGE, 0.7)
-            fill_rings(axes, [outline], "none", GOAL, 0.8)
-    for column, name in enumerate(names):
-        box = _grid_box(0, column, len(omegas), height)
-        label(figure, box[0] + box[2] / 2, 1 - 0.6 * _GRID_HEAD / height, name, weight="bold")
-    for row, omega in enumerate(omegas):
-        box = _grid_box(row, 0, len(omegas), height)
-        label(figure, _GRID_LEFT / 2, box[1] + box[3] / 2, f"Ω = {omega}")
+            box = grid_box(
+                row, column, len(omegas), len(names), gap=0.004, left=left, top=head / height
+            )
+            rings = _rings(table[omega, name])
+            draw_over(panel_of(figure, box, [outline, *rings], 0.04), rings, outline, 0.8)
+            if row == 0:
+                label(figure, box[0] + box[2] / 2, 1 - 0.6 * head / height, name, weight="bold")
+        label(figure, left / 2, box[1] + box[3] / 2, f"Ω = {omega}")
     canvas.add(
         figure,
         "A grid of tiles, a column for each class and a row for each maximum frequency: polygons "
@@ -210,7 +189,7 @@ def _draw_frequencies(canvas: Canvas, extent: Extent, values: list[Any]) -> Find
     lengths = {w: float(np.nanmean([_length(table[w, name]) for name in names])) for w in omegas}
     free = {name: FourierField(kind.group(), 0).size for name, kind in CLASSES.items()}
     moving = ", ".join(f"{name} {n}" for name, n in free.items() if n)
-    straight = max(_straightness(table[omegas[0], name], name) for name in names)
+    straight = max(_straightness(table[omegas[0], name]) for name in names)
     rising = all(lengths[a] <= lengths[b] for a, b in pairwise(omegas))
     rows = (
         *((name, *(f"{_iou(table[w, name]):.3f}" for w in omegas)) for name in names),
@@ -235,31 +214,26 @@ def _draw_frequencies(canvas: Canvas, extent: Extent, values: list[Any]) -> Find
     )
 
 
-def _grid_box(row: int, column: int, rows: int, height: float) -> Box:
-    head = _GRID_HEAD / height
-    wide, tall = (1 - _GRID_LEFT) / len(CLASSES), (1 - head) / rows
-    x, y = _GRID_LEFT + column * wide + 0.002, 1 - head - (row + 1) * tall + 0.004
-    return x, y, wide - 0.004, tall - 0.008
+def _rings(outcome: Any) -> list[Array]:
+    return [outcome.normal_tile.polygon] if isinstance(outcome, EscherTile) else []
 
 
 def _iou(outcome: Any) -> float:
-    return outcome.metrics.iou if isinstance(outcome, EscherTile) else float("nan")
+    return outcome.metrics.iou if isinstance(outcome, EscherTile) else np.nan
 
 
 def _length(outcome: Any) -> float:
-    if not isinstance(outcome, EscherTile):
-        return float("nan")
-    polygon = shapely.Polygon(outcome.normal_tile.polygon)
-    return polygon.length / polygon.area**0.5
+    """Return the length of the outline of a tile of area 1."""
+    shapes = map(shapely.Polygon, _rings(outcome))
+    return next((shape.length / shape.area**0.5 for shape in shapes), np.nan)
 
 
-def _straightness(outcome: Any, name: str) -> float:
+def _straightness(outcome: Any) -> float:
     """Return how far a tile is from the polygon through its corners."""
     if not isinstance(outcome, EscherTile):
         return 0.0
     tile = outcome.normal_tile
     corners = shapely.LinearRing(tile.polygon[list(tile.corners)])
-    assert len(tile.corners) == len(CLASSES[name].template())
     return float(shapely.hausdorff_distance(corners, shapely.LinearRing(tile.polygon)))
 
 

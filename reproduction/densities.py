@@ -20,13 +20,20 @@ from orbiflow.density import (
     make_space,
     mean_field,
     midpoints,
+    viewpoint,
 )
 from orbiflow.drawing import draw_flow, draw_magnitude
-from reproduction.density_fits import TARGETS, Fitted, fit_work, kl_of_uniform, target
+from reproduction.density_fits import (
+    TARGETS,
+    Fitted,
+    TargetMeasure,
+    fit_work,
+    kl_of_uniform,
+    target,
+)
 from reproduction.drawing import (
     INK,
     SAMPLES,
-    Box,
     Canvas,
     caption,
     draw_surface,
@@ -49,7 +56,7 @@ NAMES = {
     "6-gaussian": "6 Gaussians",
     "checkerboard": "5 × 5 checkerboard",
 }
-ROUND = ("sphere", "projective-plane")
+_box = functools.partial(grid_box, rows=2, columns=5, title=0.12, left=0.03)
 _HALF_WINDOW = (-0.5, -0.5, 1.5, 1.5)
 
 
@@ -59,30 +66,27 @@ def square_values(density: Density, count: int) -> Array:
     return density_on_grid(density, t, t, "square")
 
 
+def _fits(extent: Extent) -> list[tuple[str, TargetMeasure]]:
+    """Return the spaces and measures of the table; if there is time, more than the paper's."""
+    if extent.name == "fast":
+        return [(space, "flat") for space in KL]
+    return [*((space, "flat") for space in SPACES), ("sphere", "round")]
+
+
 def _needs_table(extent: Extent) -> list[Work]:
-    works = [fit_work(space, name, extent) for space in _table_spaces(extent) for name in TARGETS]
-    if extent.round_measure:
-        works += [fit_work("sphere", name, extent, "round") for name in TARGETS]
-    return works
-
-
-def _table_spaces(extent: Extent) -> tuple[str, ...]:
-    """Return the spaces of the paper's table; all four if there is time."""
-    return tuple(KL) if extent.name == "fast" else tuple(SPACES)
+    return [fit_work(s, name, extent, measure) for s, measure in _fits(extent) for name in TARGETS]
 
 
 def _draw_table(_canvas: Canvas, extent: Extent, values: list[Fitted]) -> Findings:
     found = {(one.space, one.target, one.measure): one for one in values}
     uniform = {name: kl_of_uniform(name, make_space("torus")) for name in TARGETS}
     rows = []
-    for space in _table_spaces(extent):
-        printed = KL.get(space, {})
+    for space, measure in _fits(extent):
+        printed = KL.get(space, {}) if measure == "flat" else {}
         cells = [f"{printed[name]:.2f}" if printed else "–" for name in TARGETS]
-        ours = [f"{found[space, name, 'flat'].kl:.4f}" for name in TARGETS]
-        rows.append((TITLES[space], *cells, *ours))
-    if extent.round_measure:
-        ours = [f"{found['sphere', name, 'round'].kl:.4f}" for name in TARGETS]
-        rows.append(("sphere, round area", "–", "–", "–", *ours))
+        ours = [f"{found[space, name, measure].kl:.4f}" for name in TARGETS]
+        title = TITLES[space] if measure == "flat" else f"{TITLES[space]}, round area"
+        rows.append((title, *cells, *ours))
     rows.append(("the even density", *(f"{uniform[name]:.3f}" for name in TARGETS), "", "", ""))
     heads = ("space", *(f"{who}, {NAMES[n]}" for who in ("paper", "here") for n in TARGETS))
     cells = [(space, name) for space in KL for name in TARGETS]
@@ -115,10 +119,6 @@ def _draw_table(_canvas: Canvas, extent: Extent, values: list[Fitted]) -> Findin
         },
         tables=[Table("KL divergence from the target, nats: the paper's, and ours.", heads, rows)],
     )  # fmt: skip
-
-
-def _needs_flat(name: str, extent: Extent) -> list[Work]:
-    return [fit_work(space, name, extent) for space in SPACES]
 
 
 def _draw_flat(name: str, canvas: Canvas, _extent: Extent, values: list[Fitted]) -> Findings:
@@ -166,10 +166,6 @@ def _draw_flat(name: str, canvas: Canvas, _extent: Extent, values: list[Fitted])
     )  # fmt: skip
 
 
-def _box(row: int, column: int) -> Box:
-    return grid_box(row, column, 2, 5, title=0.12, gap=0.012, left=0.03)
-
-
 def _image(axes: Axes, values: Array, top: float) -> None:
     square = {"origin": "lower", "extent": (0, 1, 0, 1), "interpolation": "bilinear"}
     axes.imshow(values.T, cmap=COLOURS, vmin=0, vmax=top, **square)
@@ -192,14 +188,14 @@ SIX_GAUSSIANS = Exhibit(
     "projective plane, black where probability is low; the flow fields clearly show the symmetry "
     "of each space.",
     functools.partial(_draw_flat, "6-gaussian"),
-    functools.partial(_needs_flat, "6-gaussian"),
+    lambda extent: [fit_work(space, "6-gaussian", extent) for space in SPACES],
 )
 CHECKERBOARD = Exhibit(
     "figure-12",
     "Density estimation: the checkerboard",
     "The same for a 5 × 5 checkerboard on the four spaces.",
     functools.partial(_draw_flat, "checkerboard"),
-    functools.partial(_needs_flat, "checkerboard"),
+    lambda extent: [fit_work(space, "checkerboard", extent) for space in SPACES],
 )
 
 EMBEDDED = ("torus", "sphere")
@@ -216,18 +212,18 @@ def _draw_surfaces(canvas: Canvas, extent: Extent, values: list[Any]) -> Finding
         density = one.density()
         # the chart of the sphere stretches the middle of the square
         finer = 1.0 if one.space == "torus" else 1.5
-        shown = square_values(density, round(finer * extent.resolution))
+        n = round(finer * extent.resolution)
+        shown = square_values(density, n)
         top = float(np.quantile(shown, 0.998))
         box = grid_box(row, column, 2, 3, title=0.02, gap=0.0, left=0.04, top=0.05)
         axes = figure.add_axes(box)
         colours = colormaps[COLOURS](np.clip(shown / top, 0, 1))[..., :3]
-        at = np.unravel_index(shown.argmax(), shown.shape)
-        front = (float(at[0] + 0.5) / len(shown), float(at[1] + 0.5) / len(shown))
-        turn = TORUS_TURN if one.space == "torus" else None
-        draw_surface(axes, density.space, colours, turn=turn, front=front)
+        highest = (torch.tensor(divmod(int(shown.argmax()), n), dtype=torch.float64) + 0.5) / n
+        seen = viewpoint(density.space, highest)
+        turn = TORUS_TURN if one.space == "torus" else (seen.yaw, seen.pitch)
+        draw_surface(axes, density.space, colours, turn)
         if row == 0:
-            higher = (box[0], box[1], box[2], box[3] + 0.01)
-            caption(figure, higher, NAMES[one.target], weight="bold")
+            caption(figure, box, NAMES[one.target], weight="bold")
         if column == 0:
             name = TITLES[one.space]
             label(figure, 0.02, box[1] + box[3] / 2, name, rotation=90, weight="bold")

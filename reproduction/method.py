@@ -13,7 +13,7 @@ from orbiflow.drawing import fill_rings
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import CLASSES, EscherTile, OccupancySamples, TileModel, occupancy_loss
 from reproduction.animal import OMEGA, animal_work
-from reproduction.drawing import Canvas, caption, draw_over, grid_box, panel, window_of
+from reproduction.drawing import INK, Canvas, caption, draw_over, grid_box, panel_of
 from reproduction.exhibit import Exhibit, Extent, Findings
 from reproduction.published import animal
 
@@ -24,7 +24,6 @@ CLASS = "IH4"
 COUNT = 2500
 HARDNESS = 70.0  # tau, as at the end of the fit
 INSIDE, OUTSIDE, WRONG = "#1d4e79", "#b8c4cf", "#d1242f"
-HEIGHT = 0.30
 
 
 class Pulled:
@@ -61,9 +60,8 @@ def _draw(canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings:
         raise OrbiflowError(f"{CLASS} gave no certified tile: {result.reason}")
     pulled = Pulled(result.model())
     outline, ring = animal().normal, result.normal_tile.polygon
-    figure = canvas.figure(HEIGHT)
+    figure = canvas.figure(0.30)
     boxes = [grid_box(0, k, 1, 4, title=0.12, gap=0.01) for k in range(4)]
-    aspect = boxes[0][2] / (boxes[0][3] * HEIGHT)
     titles = (
         "samples q about S",
         "A⁻¹ q: affine map alone",
@@ -72,17 +70,12 @@ def _draw(canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings:
     )
     for box, title in zip(boxes, titles, strict=True):
         caption(figure, box, title)
-    around_all = window_of([outline, ring], aspect, margin=0.12)
-    axes = panel(figure, boxes[0], around_all)
-    fill_rings(axes, [outline], "#f4ecdc", "#16202a", 1.0)
-    _dots(axes, pulled.points, np.where(pulled.inside, INSIDE, OUTSIDE))
-    inside_frame = window_of([pulled.template], aspect, margin=0.32)
+    side = np.where(pulled.inside, INSIDE, OUTSIDE)
+    _dots(panel_of(figure, boxes[0], [outline, ring], 0.12), outline, pulled.points, side)
     for box, places in ((boxes[1], pulled.affine), (boxes[2], pulled.full)):
-        axes = panel(figure, box, inside_frame)
-        fill_rings(axes, [pulled.template], "#f4ecdc", "#16202a", 1.0)
-        right = np.where(pulled.inside, INSIDE, OUTSIDE)
-        _dots(axes, places, np.where(pulled.wrong(places), WRONG, right))
-    draw_over(panel(figure, boxes[3], around_all), ring, outline, width=1.4)
+        axes = panel_of(figure, box, [pulled.template], 0.32)
+        _dots(axes, pulled.template, places, np.where(pulled.wrong(places), WRONG, side))
+    draw_over(panel_of(figure, boxes[3], [outline, ring], 0.12), [ring], outline, 1.4)
     canvas.add(
         figure,
         "Four panels: points in and about a turtle; the same points over a hexagon after an "
@@ -105,7 +98,8 @@ def _draw(canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings:
     )
 
 
-def _dots(axes: Axes, points: Array, colours: Array) -> None:
+def _dots(axes: Axes, ring: Array, points: Array, colours: Array) -> None:
+    fill_rings(axes, [ring], "#f4ecdc", INK, 1.0)
     axes.scatter(*points.T, s=5, c=list(colours), linewidths=0, zorder=4)
 
 

@@ -23,26 +23,19 @@ GROUPS = {
 }  # fmt: skip
 
 
-class PublishedTile(NamedTuple):
-    """A tile of another method: its class, and its polygon (N, 2) laid on the goal."""
-
-    isohedral_class: str
-    polygon: Array
-
-
 class Goal(NamedTuple):
     """One of the paper's nine goals.
 
     - `name`: The name in words.
     - `outline`: The outline (N, 2), y down.
-    - `tiles`: Tiles by "est", "arap" (each method's first) and "est_largest", "arap_largest" (the one
-      of its first twenty that overlaps most).
+    - `tiles`: Polygons (N, 2) laid on the goal, by "est", "arap" (each method's first) and
+      "est_largest", "arap_largest" (the one of its first twenty that overlaps most).
     - `printed`: The paper's table, by "iou" and "pixel_accuracy", then "paper" and "arap".
     """
 
     name: str
     outline: Array
-    tiles: dict[str, PublishedTile]
+    tiles: dict[str, Array]
     printed: dict[str, dict[str, float]]
 
     def target(self) -> Target:
@@ -59,10 +52,16 @@ class Goal(NamedTuple):
 @cache
 def goals() -> dict[str, Goal]:
     """Return the nine goals by name, in the order of the paper's table."""
-    document = json.loads(_data("nine_goals.json").read_text("utf-8"))
+    rows = json.loads(_data("nine_goals.json").read_text("utf-8"))["goals"]
+    keys = ("est", "est_largest", "arap", "arap_largest")
     return {
-        name: Goal(name, np.array(row["outline"]), _tiles(row), row["table"])
-        for name, row in document["goals"].items()
+        name: Goal(
+            name,
+            np.array(row["outline"]),
+            {key: np.array(row[key]["tile"]) for key in keys},
+            row["table"],
+        )
+        for name, row in rows.items()
     }
 
 
@@ -71,11 +70,6 @@ def animal() -> Target:
     with resources.as_file(_data("turtle.png")) as path:
         target = Target.read(path)
     return replace(target, source="turtle.png")
-
-
-def _tiles(row: dict[str, Any]) -> dict[str, PublishedTile]:
-    keys = ("est", "est_largest", "arap", "arap_largest")
-    return {key: PublishedTile(row[key]["class"], np.array(row[key]["tile"])) for key in keys}
 
 
 def _data(name: str) -> Any:
