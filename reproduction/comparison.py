@@ -1,10 +1,14 @@
 """The comparison on the paper's nine goals: our searches, pictures of tiles, the table of overlaps."""
 
+import json
 from collections.abc import Sequence
-from typing import Any, Literal
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from orbiflow.arrays import Array
 from orbiflow.drawing import fill_rings
 from orbiflow.tiles import (
     CLASSES,
@@ -18,7 +22,44 @@ from orbiflow.tiles import (
 )
 from reproduction.drawing import EDGE, GOAL, Canvas, grid_box, label, panel_of
 from reproduction.exhibit import Exhibit, Extent, Findings, Table, Work
-from reproduction.published import Goal, goals
+
+
+class Goal(NamedTuple):
+    """One of the paper's nine goals.
+
+    - `name`: The name in words.
+    - `outline`: The outline (N, 2), y down.
+    - `tiles`: Polygons (N, 2) laid on the goal, by "est", "arap" (each method's first) and
+      "est_largest", "arap_largest" (the one of its first twenty that overlaps most).
+    - `printed`: The paper's table, by "iou" and "pixel_accuracy", then "paper" and "arap".
+    """
+
+    name: str
+    outline: Array
+    tiles: dict[str, Array]
+    printed: dict[str, dict[str, float]]
+
+    def target(self) -> Target:
+        """Return the goal at its true aspect."""
+        return Target.from_polygon(self.outline, y_down=True, source=self.name)
+
+    def squared(self) -> Target:
+        """Return the goal as the paper used it: each axis stretched to the side of a square."""
+        low, high = self.outline.min(axis=0), self.outline.max(axis=0)
+        outline = 200.0 * (self.outline - low) / (high - low)
+        return Target.from_polygon(outline, y_down=True, source=self.name)
+
+
+@cache
+def goals() -> dict[str, Goal]:
+    """Return the nine goals by name, in the order of the paper's table."""
+    file = Path(__file__).parent / "data" / "nine_goals.json"
+    found: dict[str, Goal] = {}
+    for name, row in json.loads(file.read_text("utf-8"))["goals"].items():
+        tiles = {key: np.array(row[key]["tile"]) for key in row if key.startswith(("est", "arap"))}
+        found[name] = Goal(name, np.array(row["outline"]), tiles, row["table"])
+    return found
+
 
 # What a search is for: overlap with the goal, or with the goal stretched to a square as in the paper;
 # or likeness

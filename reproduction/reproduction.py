@@ -14,17 +14,7 @@ from markupsafe import Markup
 from orbiflow.drawing import rendered
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_blas_thread, one_thread, process_context, work, write_atomic
-from reproduction import (
-    animal,
-    classes,
-    comparison,
-    densities,
-    method,
-    spaces,
-    square,
-    symmetries,
-    symmetrization,
-)
+from reproduction import animal, classes, comparison, densities, spaces, square, symmetrization
 from reproduction.drawing import Canvas, Picture
 from reproduction.exhibit import Draw, Exhibit, Extent, Findings, Shown, Work
 
@@ -34,10 +24,10 @@ EXHIBITS: tuple[Exhibit, ...] = (
     classes.TEMPLATES,
     classes.GROUPS_TABLE,
     spaces.SPACES_FIGURE,
-    symmetries.EXHIBIT,
-    method.EXHIBIT,
+    symmetrization.FIGURE,
+    animal.METHOD,
     classes.TILINGS,
-    symmetrization.EXHIBIT,
+    symmetrization.TABLE,
     animal.EXHIBIT,
     animal.FREQUENCIES,
     comparison.TILES,

@@ -12,24 +12,22 @@ from orbiflow.density import SPACES, kl_by_quadrature, make_space, midpoints
 from orbiflow.fields import symmetrize
 from orbiflow.symmetry import identification_group, rotation_matrix
 from orbiflow.tiles import CLASSES, EscherTile, Target, compare
-from reproduction.animal import animal_tile
+from reproduction.animal import Pulled, animal, animal_tile
 from reproduction.classes import (
+    GROUPS,
     center_orbits,
     constrained_angles,
     drawn_elements,
     identification_error,
     symbol,
 )
-from reproduction.comparison import goal_tile, impossible_rows
-from reproduction.density_fits import TARGETS, drawn, fitted, kl_of_uniform, target, weighted
+from reproduction.comparison import goal_tile, goals, impossible_rows
+from reproduction.densities import KL, TARGETS, drawn, fitted, kl_of_uniform, target, weighted
 from reproduction.exhibit import FAST, Extent, Findings
-from reproduction.method import Pulled
-from reproduction.published import GROUPS, KL, animal, goals
 from reproduction.reproduction import EXHIBITS, reproduce
 from reproduction.spaces import euler_characteristic, orientable
 from reproduction.square import deformed, unconstrained_field
-from reproduction.symmetries import KINDS
-from reproduction.symmetrization import as_printed, equivariance_error, nested_error, pushed
+from reproduction.symmetrization import KINDS, as_printed, equivariance_error, nested_error, pushed
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "silhouettes"
 
