@@ -5,7 +5,6 @@ from .executors import Parcel as Parcel
 from .executors import WorkSettings as WorkSettings
 from .folder import BatchFolder as BatchFolder
 from .items import Item as Item
-from .items import code_of as code_of
 from .journal import Entry as Entry
 from .overview import Column as Column
 from .overview import Kind as Kind

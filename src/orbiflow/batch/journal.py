@@ -45,10 +45,6 @@ class Entry:
     best: dict[str, Any] = field(default_factory=dict[str, Any])
     seconds: float | None = None
 
-    def same_work(self, code: str, settings: dict[str, Any], version: str) -> bool:
-        """Return whether it is about these bytes, settings and version."""
-        return (self.code, self.settings, self.version) == (code, settings, version)
-
     def line(self) -> str:
         """Return its line in a journal."""
         return json.dumps({"kind": "entry", **asdict(self)}, allow_nan=False) + "\n"
