@@ -2,8 +2,8 @@
 
 A kind reads a value from Python, JSON or the command line (`read`), writes it as JSON (`plain`), and
 describes itself in words. Annotations may be built from `bool`, `int`, `float` (always finite), `str`,
-`Path`, `Literal`, tuples, unions of these and None, and `Annotated` with `Range`, `Unit`, `Parsed` and
-`Repeated`.
+`Path`, `Literal`, tuples, unions of one of these and None, and `Annotated` with `Range`, `Unit`,
+`Parsed` and `Repeated`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 import types
 import typing
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import repeat
 from numbers import Integral, Real
@@ -220,28 +219,6 @@ class TupleKind(Kind):
         return [item.plain(part) for item, part in zip(self.items, value, strict=True)]
 
 
-class EitherKind(Kind):
-    """A value of the first of several kinds that takes it."""
-
-    def __init__(self, kinds: tuple[Kind, ...], unit: str) -> None:
-        self.kinds, self.unit = kinds, unit
-        self.wanted = " or ".join(kind.wanted for kind in kinds)
-        self.limits = " or ".join(kind.limits or ", ".join(kind.choices) for kind in kinds)
-
-    def read(self, value: Any, *, text: bool = False) -> Any:
-        return self._first(value, text)[1]
-
-    def plain(self, value: Any) -> Any:
-        kind, value = self._first(value)
-        return kind.plain(value)
-
-    def _first(self, value: Any, text: bool = False) -> tuple[Kind, Any]:
-        for kind in self.kinds:
-            with suppress(Refused):
-                return kind, kind.read(value, text=text)
-        raise Refused
-
-
 class OptionalKind(Kind):
     """A value of a kind, or None."""
 
@@ -310,17 +287,10 @@ def _plain_kind(annotation: Any, allowed: Range, unit: str, repeated: bool) -> K
         return ListKind(kind_of(arguments[0]), repeated=repeated)
     if origin is tuple:
         return TupleKind(tuple(map(kind_of, arguments)), unit)
-    if origin in (Union, types.UnionType):
-        # a range or a unit of the whole union is of its numbers
-        plain = [part for part in arguments if part is not type(None)]
-        kinds = [
-            _plain_kind(part, allowed, unit, repeated) if part in (int, float) or repeated
-            else kind_of(part)
-            for part in plain
-        ]  # fmt: skip
-        kind = kinds[0] if len(kinds) == 1 else EitherKind(tuple(kinds), unit)
-        if len(plain) == len(arguments):
-            return kind
+    if origin in (Union, types.UnionType) and len(arguments) == 2 and type(None) in arguments:
+        (part,) = (part for part in arguments if part is not type(None))
+        is_own = typing.get_origin(part) is typing.Annotated
+        kind = kind_of(part) if is_own else _plain_kind(part, allowed, unit, repeated)
         if isinstance(kind, ListKind):  # None is for nothing
             kind = ListKind(kind.item, repeated=kind.repeated, may_be_empty=False)
         return OptionalKind(kind)

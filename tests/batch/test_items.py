@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.batch.folder import RESERVED
+from orbiflow.batch import Entry
+from orbiflow.batch.folder import RESERVED, Journal
 from orbiflow.batch.items import folder_names, listed, read_file
-from orbiflow.batch.journal import Entry, Journal
 from orbiflow.errors import InputFileError, OrbiflowError, OutputError
 from orbiflow.runtime import stays_inside
 

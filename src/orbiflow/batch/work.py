@@ -15,8 +15,7 @@ from orbiflow import __version__
 from orbiflow.batch.executors import Answer, Parcel, WorkSettings, executor_for
 from orbiflow.batch.folder import RESERVED, BatchFolder
 from orbiflow.batch.items import Item, code_of, folder_names, listed, read_file
-from orbiflow.batch.journal import Entry
-from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Kind
+from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Entry, Kind
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import (
     Call,
