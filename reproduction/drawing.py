@@ -86,7 +86,6 @@ class Canvas:
 
 
 INK, FAINT = "#16202a", "#56626e"
-SAMPLES = 200  # number of samples of a field's magnitude along a panel's side
 
 Box = tuple[float, float, float, float]
 """Left, bottom, width and height in shares of the figure."""
@@ -120,16 +119,6 @@ def text_size(figure: Figure) -> float:
     return 1.05 * figure.get_figwidth()
 
 
-def panel(
-    figure: Figure, box: Box, window: Window, title: str = "", *, y_down: bool = False
-) -> Axes:
-    """Return axes that show a window of the plane, with a title above."""
-    axes = plane_axes(figure, window, box=box, y_down=y_down)
-    if title:
-        caption(figure, box, title)
-    return axes
-
-
 def panel_of(
     figure: Figure, box: Box, rings: list[Array], margin: float = 0.05, *, y_down: bool = False
 ) -> Axes:
@@ -139,7 +128,8 @@ def panel_of(
     aspect = aspect_of(figure, box)
     half = (0.5 + margin) * (high - low)
     half = np.maximum(half, half[::-1] * (aspect, 1 / aspect))
-    return panel(figure, box, around((low + high) / 2, *half), y_down=y_down)
+    window = around((low + high) / 2, *half)
+    return plane_axes(figure, window, box=box, y_down=y_down)
 
 
 def aspect_of(figure: Figure, box: Box) -> float:
@@ -147,12 +137,9 @@ def aspect_of(figure: Figure, box: Box) -> float:
     return box[2] * figure.get_figwidth() / (box[3] * figure.get_figheight())
 
 
-def caption(
-    figure: Figure, box: Box, title: str, *, weight: str = "normal", size: float = 1.0
-) -> None:
-    """Write a title above a box."""
-    x, y = box[0] + box[2] / 2, box[1] + box[3] + 0.006
-    label(figure, x, y, title, size=size, va="bottom", weight=weight)
+def caption(figure: Figure, box: Box, title: str, **style: Any) -> None:
+    """Write a title above a box, in a style as `label`."""
+    label(figure, box[0] + box[2] / 2, box[1] + box[3] + 0.006, title, va="bottom", **style)
 
 
 def label(

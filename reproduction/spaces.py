@@ -8,7 +8,7 @@ import numpy as np
 
 from orbiflow.arrays import Array, Window
 from orbiflow.density import SPACES, Space, edge_pairs, make_space
-from orbiflow.drawing import mark_symmetry, rgb
+from orbiflow.drawing import mark_symmetry, plane_axes, rgb
 from orbiflow.symmetry import IDENTIFICATION_SPACES, CrystallographicGroup
 from reproduction.drawing import (
     INK,
@@ -19,7 +19,6 @@ from reproduction.drawing import (
     draw_heads,
     draw_surface,
     grid_box,
-    panel,
     same_orbit,
     tiny,
 )
@@ -66,10 +65,10 @@ def _draw_spaces(canvas: Canvas, extent: Extent, _values: list[Any]) -> Findings
         space = make_space(name)
         box = grid_box(0, column, 3, 4, title=0.10, gap=0.02)
         caption(figure, box, TITLES[name], weight="bold", size=1.1)
-        _draw_square(panel(figure, box, around((0.5, 0.5), 0.72, 0.72)), space.group)
+        _draw_square(plane_axes(figure, around((0.5, 0.5), 0.72, 0.72), box=box), space.group)
         box = grid_box(1, column, 3, 4, gap=0.02)
         window = around((1.0, 1.0), 2.0, 2.0 / aspect_of(figure, box))
-        _draw_cells(panel(figure, box, window), space.group, window)
+        _draw_cells(plane_axes(figure, window, box=box), space.group, window)
         axes = figure.add_axes(grid_box(2, column, 3, 4, gap=0.0))
         draw_surface(axes, space, _checked(space, extent.resolution), TURNS[name])
         found[name] = chi, sided = euler_characteristic(space.group), orientable(space.group)

@@ -9,11 +9,11 @@ import shapely
 import torch
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import fill_rings
+from orbiflow.drawing import fill_rings, plane_axes
 from orbiflow.fields import FourierField, VectorField, symmetrize
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup, identification_group
-from reproduction.drawing import INK, Canvas, around, draw_heads, grid_box, panel, tiny
+from reproduction.drawing import INK, Canvas, around, caption, draw_heads, grid_box, tiny
 from reproduction.exhibit import Exhibit, Extent, Findings
 from reproduction.symmetrization import random_field
 
@@ -84,7 +84,8 @@ def _draw(canvas: Canvas, _extent: Extent, _values: list[object]) -> Findings:
     )
     for k, (one, title) in enumerate(panels):
         box = grid_box(0, k, 1, 3, title=0.09)
-        axes = panel(figure, box, around(one.ring.mean(axis=0), 1.04, 0.95), title)
+        axes = plane_axes(figure, around(one.ring.mean(axis=0), 1.04, 0.95), box=box)
+        caption(figure, box, title)
         _draw_square(axes, one, copies=k > 0)
     canvas.add(
         figure,
