@@ -7,6 +7,7 @@ from .events import Failed as Failed
 from .events import Finished as Finished
 from .events import ItemDone as ItemDone
 from .events import Note as Note
+from .events import Polled as Polled
 from .events import Preview as Preview
 from .events import Progress as Progress
 from .events import Started as Started
