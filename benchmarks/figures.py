@@ -18,9 +18,9 @@ from orbiflow.tiles import (
     Target,
     TileMap,
     colouring,
+    escherize,
     overlay_png,
     overview_png,
-    search_classes,
     tile_svg,
     tiling_png,
     tiling_svg,
@@ -38,7 +38,7 @@ def main() -> None:
     )
     given = parser.parse_args()
     target = Target.read(given.silhouette)
-    results, _ = search_classes(target, method=LikenessSearch.for_effort("fast"), workers=1)
+    results = escherize(target, method=LikenessSearch.for_effort("fast")).tiles
     colours = [colouring(result.tile) for result in results]
     both = list(zip(results, colours, strict=True))
     print(f"{len(results)} tiles of {target.source}; CPU seconds for all of them")

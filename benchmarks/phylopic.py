@@ -17,12 +17,12 @@ from common import DATA, needed
 from PIL import Image, ImageDraw, ImageFont
 
 from orbiflow.tiles import (
-    CLASSES,
+    EscherizeSettings,
     EscherTile,
     OverlapSearch,
     Target,
+    escherize,
     overlay_png,
-    search_classes,
     tiling_png,
 )
 
@@ -66,7 +66,8 @@ def main() -> None:
     for path in files:
         target = Target.read(path)
         begin = time.perf_counter()
-        results, failures = search_classes(target, CLASSES, settings, workers=os.cpu_count() or 1)
+        search = escherize(target, EscherizeSettings(workers=os.cpu_count()), method=settings)
+        results, failures = search.tiles, search.failures
         seconds = time.perf_counter() - begin
         best = results[0]
         found.append((path.stem, target, best))

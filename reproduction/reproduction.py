@@ -116,7 +116,7 @@ def _run(
             yield index, _outcome(function, item, lambda _news: None, cancel)
         return
     told = functools.partial(_outcome, function)
-    context = process_context(("orbiflow.tiles.search.searching",))
+    context = process_context(("orbiflow.tiles.search.escherizing",))
     pool = work(told, items, workers, context=context, cancel=cancel)
     with contextlib.closing(pool), contextlib.suppress(OrbiflowError):
         for news in pool:

@@ -250,3 +250,7 @@ class Cancel:
         """Raise `Cancelled` if the end was asked for; to be called between steps."""
         if self.cancelled:
             raise Cancelled
+
+
+NEVER = Cancel()
+"""The default of functions that take a token: nobody cancels it."""

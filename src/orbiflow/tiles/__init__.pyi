@@ -102,6 +102,8 @@ from .search.escherize_settings import EscherizeSettings as EscherizeSettings
 from .search.escherize_settings import SearchSettings as SearchSettings
 from .search.escherizing import SearchResult as SearchResult
 from .search.escherizing import escherize as escherize
+from .search.escherizing import escherize_class as escherize_class
+from .search.escherizing import fit_tile as fit_tile
 from .search.escherizing import report as report
 from .search.likeness_search import LikenessSearch as LikenessSearch
 from .search.method import SearchMethod as SearchMethod
@@ -115,10 +117,6 @@ from .search.occupancy import fit_occupancy as fit_occupancy
 from .search.occupancy import occupancy_loss as occupancy_loss
 from .search.overlap_search import OccupancySearch as OccupancySearch
 from .search.overlap_search import OverlapSearch as OverlapSearch
-from .search.searching import Event as Event
-from .search.searching import escherize_class as escherize_class
-from .search.searching import fit_tile as fit_tile
-from .search.searching import search_classes as search_classes
 from .silhouette.bending import Bending as Bending
 from .silhouette.emphasis import Emphasis as Emphasis
 from .silhouette.pins import Pins as Pins

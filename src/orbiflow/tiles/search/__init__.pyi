@@ -8,6 +8,8 @@ from .escherize_settings import EscherizeSettings as EscherizeSettings
 from .escherize_settings import SearchSettings as SearchSettings
 from .escherizing import SearchResult as SearchResult
 from .escherizing import escherize as escherize
+from .escherizing import escherize_class as escherize_class
+from .escherizing import fit_tile as fit_tile
 from .escherizing import report as report
 from .likeness_search import LikenessSearch as LikenessSearch
 from .method import Goal as Goal
@@ -22,7 +24,3 @@ from .occupancy import fit_occupancy as fit_occupancy
 from .occupancy import occupancy_loss as occupancy_loss
 from .overlap_search import OccupancySearch as OccupancySearch
 from .overlap_search import OverlapSearch as OverlapSearch
-from .searching import Event as Event
-from .searching import escherize_class as escherize_class
-from .searching import fit_tile as fit_tile
-from .searching import search_classes as search_classes

@@ -194,7 +194,7 @@ def _simplified(curve: Array, tolerance: float) -> Array:
     return mask
 
 
-Progress = Callable[[float, float], None]
+OnProgress = Callable[[float, float], None]
 """Called with the share of the work done and the best loss so far."""
 
 # Names under which the arrays of a map hold the start tile, if it is not the template

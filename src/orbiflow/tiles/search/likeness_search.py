@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from orbiflow.arguments import as_number, as_whole
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Cancel
+from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles.likeness import least_neck
-from orbiflow.tiles.search.candidates import Fit, Progress
+from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.search.method import Goal, SearchMethod
 from orbiflow.tiles.tilings import IsohedralClass
 
@@ -78,8 +78,8 @@ class LikenessSearch(SearchMethod):
         kind: IsohedralClass,
         *,
         per_class: int = 1,
-        progress: Progress | None = None,
-        cancel: Cancel | None = None,
+        progress: OnProgress = silent,
+        cancel: Cancel = NEVER,
     ) -> Fit:
         """Let the silhouette bend into tiles of the class."""
         from orbiflow.tiles.search.bending import fit_bending
@@ -87,7 +87,7 @@ class LikenessSearch(SearchMethod):
         told: dict[str, Any] = {"per_class": per_class, "progress": progress, "cancel": cancel}
         return fit_bending(goal.target, kind, self, self.hands(goal), **told)
 
-    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel | None = None) -> Fit:
+    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:
         """Let the silhouette bend in haste."""
         from orbiflow.tiles.search.bending import fit_bending
 

@@ -9,8 +9,8 @@ from importlib import import_module
 from typing import Any, ClassVar, Self
 
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.runtime import Cancel
-from orbiflow.tiles.search.candidates import Fit, Progress
+from orbiflow.runtime import NEVER, Cancel
+from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
@@ -71,8 +71,8 @@ class SearchMethod(ABC):
         kind: IsohedralClass,
         *,
         per_class: int = 1,
-        progress: Progress | None = None,
-        cancel: Cancel | None = None,
+        progress: OnProgress = silent,
+        cancel: Cancel = NEVER,
     ) -> Fit:
         """Return candidates of one class, best first.
 
@@ -90,7 +90,7 @@ class SearchMethod(ABC):
         """
 
     def preview(
-        self, goal: Goal, names: Sequence[str], cancel: Cancel | None = None
+        self, goal: Goal, names: Sequence[str], cancel: Cancel = NEVER
     ) -> EscherTile | None:
         """Return a certified tile of one of the classes in a moment, if the method can."""
         from orbiflow.tiles.search.certifying import best_tiles
@@ -101,7 +101,7 @@ class SearchMethod(ABC):
         except CertificationError:
             return None
 
-    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel | None = None) -> Fit:  # noqa: ARG002
+    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:  # noqa: ARG002
         """Return candidates in a moment, for `preview`, or raise `CertificationError`."""
         raise CertificationError(f"{self.method_name} has no quick way to tiles of {kind.name}")
 

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 from orbiflow.arguments import as_array, as_instance, as_number, as_whole
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.runtime import Cancel, one_thread
-from orbiflow.tiles.search.candidates import Fit, Progress
+from orbiflow.runtime import NEVER, Cancel, one_thread
+from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.search.method import MAX_FREQUENCY, MAX_SEGMENTS, Goal, SearchMethod
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass
 
@@ -138,8 +138,8 @@ class OverlapSearch(SearchMethod):
         kind: IsohedralClass,
         *,
         per_class: int = 1,
-        progress: Progress | None = None,
-        cancel: Cancel | None = None,
+        progress: OnProgress = silent,
+        cancel: Cancel = NEVER,
     ) -> Fit:
         """Let flows carry near tiles closer to the silhouette."""
         from orbiflow.tiles.search.descent import fit_descent, shared_soft_target
@@ -156,7 +156,7 @@ class OverlapSearch(SearchMethod):
             )
         return found._replace(enough=1 if per_class == 1 else 2 * per_class)
 
-    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel | None = None) -> Fit:
+    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:
         """Return the tiles nearest to the outline."""
         from orbiflow.tiles.search.model import TileModel
         from orbiflow.tiles.search.starts import outline_starts
@@ -257,8 +257,8 @@ class OccupancySearch(SearchMethod):
         kind: IsohedralClass,
         *,
         per_class: int = 1,  # noqa: ARG002 - all survivors are given
-        progress: Progress | None = None,
-        cancel: Cancel | None = None,
+        progress: OnProgress = silent,
+        cancel: Cancel = NEVER,
     ) -> Fit:
         """Let flows carry templates onto the silhouette; each class has a seed of its own."""
         from orbiflow.tiles.search.occupancy import fit_occupancy
