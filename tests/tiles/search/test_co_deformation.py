@@ -126,9 +126,8 @@ def test_the_model_keeps_every_vertex() -> None:
 def test_finalists_are_in_order_and_told() -> None:
     told: list[tuple[float, float]] = []
     several = LikenessSearch(placements=40, held=12, finalists=3, rounds=8, multiples=(4,), below=1)
-    found, dropped = bent_tiles(
-        squirrel_hands(), CLASSES["IH4"], several, lambda *step: told.append(step)
-    )
+    own = squirrel_hands(), CLASSES["IH4"], several
+    found, dropped = bent_tiles(*own, lambda *step: told.append(step))
     shares = [share for share, _ in told]
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(0.9)  # what is left is to lay them over the silhouette
