@@ -20,7 +20,7 @@ from orbiflow.tiles import (
 from orbiflow.tiles.likeness import Elastic
 from orbiflow.tiles.search.bending import bent_tiles
 from orbiflow.tiles.search.co_deformation import drawn_to_tiles, held_on_tiles
-from orbiflow.tiles.search.model import extract_tile
+from orbiflow.tiles.search.tile_model import extract_tile
 from orbiflow.tiles.search.tile_space import Placements, TileSpace, best_placements
 from outlines import SMALL, animal, bent_squirrel, flowless, squirrel_hands
 from strategies import seeds

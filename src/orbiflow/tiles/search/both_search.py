@@ -20,8 +20,8 @@ from orbiflow.tiles.likeness import bent_onto, mutual_iou
 from orbiflow.tiles.search.candidates import Fit
 from orbiflow.tiles.search.co_deformation import Hand
 from orbiflow.tiles.search.likeness_search import LikenessSearch
-from orbiflow.tiles.search.method import Goal, SearchMethod
 from orbiflow.tiles.search.overlap_search import OverlapSearch
+from orbiflow.tiles.search.search_method import Goal, SearchMethod
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass
 

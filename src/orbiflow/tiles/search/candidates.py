@@ -19,7 +19,7 @@ from orbiflow.tiles.tilings import CLASSES, EdgeIdentification, IsohedralClass, 
 
 if TYPE_CHECKING:
     from orbiflow.tiles.search.bending import PlacedBent
-    from orbiflow.tiles.search.model import TileModel
+    from orbiflow.tiles.search.tile_model import TileModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,7 +302,7 @@ class StillTiles:
 
     def as_model(self) -> TileModel:
         """Return the candidates as a torch module, with a field of frequency 1 that is zero."""
-        from orbiflow.tiles.search.model import TileModel
+        from orbiflow.tiles.search.tile_model import TileModel
 
         own = self.prototiles
         return TileModel(self.kind, max_frequency=1, smoothness=0.0, steps=1, prototiles=own)

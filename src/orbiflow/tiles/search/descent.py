@@ -27,9 +27,9 @@ from orbiflow.flows import METHODS, Flow
 from orbiflow.runtime import NEVER, Cancel, one_thread
 from orbiflow.tiles.likeness import Overlap, Recogniser, boundary_iou, prepared_region, rank_score
 from orbiflow.tiles.search.candidates import Fit, OnProgress, Prototiles, silent
-from orbiflow.tiles.search.model import TileModel
 from orbiflow.tiles.search.overlap_search import OverlapSearch
 from orbiflow.tiles.search.starts import Starts, outline_starts, template_starts
+from orbiflow.tiles.search.tile_model import TileModel
 from orbiflow.tiles.silhouette import Emphasis, SoftTarget, Target
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 from orbiflow.typed_torch import linalg

@@ -37,10 +37,10 @@ from orbiflow.tiles.likeness import diverse, mutual_iou
 from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
 from orbiflow.tiles.search.both_search import ALIKE
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
-from orbiflow.tiles.search.certifying import HOW, ClassFailure, best_tiles
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
+from orbiflow.tiles.search.finished_tiles import HOW, ClassFailure, best_tiles
 from orbiflow.tiles.search.likeness_search import LikenessSearch
-from orbiflow.tiles.search.method import Goal, SearchMethod
+from orbiflow.tiles.search.search_method import Goal, SearchMethod
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass, isohedral_class

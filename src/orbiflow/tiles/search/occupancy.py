@@ -17,9 +17,9 @@ from orbiflow.arguments import as_instance, as_whole
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles.search.candidates import OnProgress, silent
 from orbiflow.tiles.search.descent import between
-from orbiflow.tiles.search.model import TileModel
 from orbiflow.tiles.search.overlap_search import OccupancySearch
 from orbiflow.tiles.search.starts import initial_poses, template_symmetries
+from orbiflow.tiles.search.tile_model import TileModel
 from orbiflow.tiles.silhouette import Target, signed_distance
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 from orbiflow.typed_torch import adam, linalg, listed
