@@ -22,8 +22,8 @@ from orbiflow.tiles import (
     OverlapSearch,
     Target,
     escherize,
-    overlay_png,
-    tiling_png,
+    overlay_raster,
+    tiling_raster,
 )
 
 PANEL = 420  # pixels
@@ -40,8 +40,8 @@ def sheet(found: list[tuple[str, Target, EscherTile]]) -> Image.Image:
         text = f"{name}  {best.name}  IoU {best.metrics.iou:.3f}"
         pen.text((x + 12, y + 8), text, fill="#1a1a1a", font=font)
         pictures = (
-            overlay_png(best.tile, target.outline, y_down=target.y_down, width_px=640),
-            tiling_png(best.tile, y_down=target.y_down, width_px=640),
+            overlay_raster(best.tile, target.outline, y_down=target.y_down, width_px=640).png(),
+            tiling_raster(best.tile, y_down=target.y_down, width_px=640).png(),
         )
         for j, data in enumerate(pictures):
             picture = Image.open(io.BytesIO(data)).convert("RGB")
