@@ -10,7 +10,7 @@ from orbiflow.errors import CertificationError
 from orbiflow.tiles import CLASSES, TileModel, certify
 from orbiflow.tiles.search import model
 from orbiflow.tiles.search.candidates import DENSE, TOLERANCES
-from orbiflow.tiles.search.model import converge, extract_tile
+from orbiflow.tiles.search.tile_model import converge, extract_tile
 from strategies import error_estimate
 
 

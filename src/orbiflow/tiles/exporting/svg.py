@@ -215,7 +215,7 @@ def tiling_svg(
     so that no paper shines through between neighbours.
 
     Args:
-        tile, window, palette_name, colours, y_down: As for `tiling_png`.
+        tile, window, palette_name, colours, y_down: As for `tiling_raster`.
         width_mm: The page's width in mm.
         outline_mm: The outline's width in mm; 0 means a hairline in the tile's own colour.
         title: The file's title. Default: the class.
