@@ -78,7 +78,6 @@ def test_parts_that_are_none(tmp_path: Path, orbiflow) -> None:
             ("--components", "trees"),
             "--components: entry 1: must be flow, kernels, mixture, chains",
         ),
-        (("--components", "kernels", "--kernels"), "--kernels and --components exclude each other"),
         (("--repeats", "noise"), "noise"),
     ):
         outcome = orbiflow(*fit, *options)

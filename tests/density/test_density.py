@@ -103,10 +103,10 @@ def test_it_is_continuous_over_every_edge(space, seed: int, side: int, t: float)
 @every
 @settings(max_examples=10)
 @given(seed=seeds)
-def test_to_base_and_back(space, seed: int) -> None:
+def test_the_flow_and_back(space, seed: int) -> None:
     density = make(space, seed)
     points = density.sample((50,), torch.Generator().manual_seed(seed % 2**31))
-    again = density.from_base(density.to_base(points)).detach()
+    again = space.project(density.flow(density.flow.inverse(points))).detach()
     # an integrator's inverse is that of its order
     assert float(space.distance(points, again).max()) < 1e-4
 
@@ -193,9 +193,10 @@ def test_entropy_and_divergence() -> None:
     grid = midpoints(Torus(2), 150)
     with torch.no_grad():
         exact = kl_by_quadrature(one.log_prob(grid).exp(), other.log_prob(grid))
+        points = one.sample(40_000, generator)
+        drawn = float((one.log_prob(points) - other.log_prob(points)).mean())
     assert exact > 0.01
-    assert float(one.kl_to(other, 40_000, generator=generator)) == pytest.approx(exact, rel=0.1)
-    assert float(one.kl_to(one, 100, generator=generator)) == 0.0
+    assert drawn == pytest.approx(exact, rel=0.1)
 
 
 def test_large_batches_are_the_same_in_blocks(monkeypatch) -> None:

@@ -87,13 +87,13 @@ MODES = {
 
 @lru_cache
 def fitted_without_a_mode(name: str) -> DensityEstimator:
-    return DensityEstimator(name, kernels=True, **QUICK).fit(DATA)
+    return DensityEstimator(name, components=("flow",), **QUICK).fit(DATA)
 
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("name", SPACES)
 def test_fits_do_not_depend_on_the_callers_mode(name: str, mode: str) -> None:
-    estimator = DensityEstimator(name, kernels=True, **QUICK)
+    estimator = DensityEstimator(name, components=("flow",), **QUICK)
     with MODES[mode]():
         estimator.fit(DATA)
     assert estimator.score(DATA) == fitted_without_a_mode(name).score(DATA)

@@ -114,10 +114,12 @@ def test_chains_start_at_rows_that_weigh_something(seed: int, count: int) -> Non
 @few
 def test_merged_points_carry_their_weights(seed: int, cells: int) -> None:
     points, weights, rows = repeated(seed, 80)
-    found, shares = merged(points, cells, 10**6, weights)
-    expected, counts = merged(rows, cells, 10**6)
-    assert torch.allclose(found, expected)
-    assert torch.allclose(shares, counts)
+    found = merged(Rows(points, weights), cells, 10**6)
+    expected = merged(Rows(rows), cells, 10**6)
+    assert found.weights is not None
+    assert expected.weights is not None
+    assert torch.allclose(found.points, expected.points)
+    assert torch.allclose(found.weights, expected.weights)
 
 
 def test_a_flow_descends_on_the_weighted_likelihood() -> None:
@@ -127,15 +129,15 @@ def test_a_flow_descends_on_the_weighted_likelihood() -> None:
     )
     density = estimator.fit(points.numpy() * 2 * math.pi, sample_weight=weights.numpy()).density_
     both = [
-        Objective(flow_of(density), part, own, kinetic=0.0, roughness=1e-3)
-        for part, own in ((points, weights / weights.sum()), (rows, None))
+        Objective(flow_of(density), own, roughness=1e-3)
+        for own in (Rows(points, weights / weights.sum()), Rows(rows))
     ]
     (loss, slope), (expected, also) = (one(one.get()) for one in both)
     assert loss == pytest.approx(expected, abs=1e-9)
     assert slope == pytest.approx(also, abs=1e-9)
 
 
-@pytest.mark.parametrize("options", [{}, {"components": "flow"}, {"kernels": True}])
+@pytest.mark.parametrize("options", [{}, {"components": "flow"}])
 def test_equal_weights_are_none(options: dict[str, object]) -> None:
     angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (310, 2))
     few_waves = {"max_frequency": 2, "segments": 1, "iterations": 3}

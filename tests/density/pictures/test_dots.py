@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from density.blends import blended
+from density.blends import blended, identity_flow
 from orbiflow.density import (
     AdaptiveKernels,
     Mixture,
@@ -23,7 +23,6 @@ from orbiflow.density import (
     make_space,
     map_picture,
 )
-from orbiflow.density.models import identity_flow
 from orbiflow.density.pictures.overlays import MAX_COVER, uncrowded
 from orbiflow.drawing import Picture, Sheet
 

@@ -16,8 +16,7 @@ from orbiflow import __version__, batch, runtime
 from orbiflow.arrays import Array
 from orbiflow.batch import Entry
 from orbiflow.density.comparing import ModelComparison
-from orbiflow.density.cross_validation.fold import written_files
-from orbiflow.density.cross_validation.operations import UNIFORM, CrossValidation
+from orbiflow.density.cross_validation.operations import UNIFORM, CrossValidation, written_files
 from orbiflow.density.cross_validation.splits import (
     Fit,
     HeldOut,
@@ -170,7 +169,7 @@ FITS = batch.Kind(
     items="fits",
     reads="data",
     writes="out",
-    modules=("orbiflow.density.cross_validation.fold",),
+    modules=("orbiflow.density.estimator",),
     columns=(batch.Column("log_likelihood", "held out", ".4f"), batch.Column("rows", "rows", "d")),
     best=lambda summary: {name: summary[name] for name in FIGURES},
     picture=lambda _summary: None,

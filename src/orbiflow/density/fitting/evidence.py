@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
@@ -15,7 +15,7 @@ from orbiflow.density.fitting.flow import fit_density
 from orbiflow.density.fitting.folds import Folds
 from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence, FitReport, Progress
-from orbiflow.density.fitting.rows import Rows, log_prob_of_rows, mean_of
+from orbiflow.density.fitting.rows import Rows, mean_of
 from orbiflow.density.fitting.settings import FlowSettings
 from orbiflow.density.fitting.weights import (
     NEGLIGIBLE,
@@ -25,6 +25,7 @@ from orbiflow.density.fitting.weights import (
     stacked,
     stacking_weights,
 )
+from orbiflow.density.inference import at_observed
 from orbiflow.density.models import MOST_DIM, Density, Mixture, UniformDensity, mixture_of
 from orbiflow.density.spaces import Space
 from orbiflow.typed_torch import listed
@@ -72,7 +73,7 @@ class Candidates:
 
 
 def candidates_of(
-    space: Space, families: list[Family[Any]], folds: Folds, say: Progress, budget: Budget
+    space: Space, families: list[Family], folds: Folds, say: Progress, budget: Budget
 ) -> Candidates:
     """Fit all families to all folds; after the first, only what may be of use."""
     blocks: list[dict[tuple[str, str], Tensor]] = []
@@ -88,8 +89,8 @@ def candidates_of(
             fitted[family.name].append(found)
             with torch.no_grad():
                 for name, part in found.items():
-                    block[family.name, name] = log_prob_of_rows(part, held.points)
-        block[FLOOR, FLOOR] = log_prob_of_rows(UniformDensity(space), held.points)
+                    block[family.name, name] = at_observed(part, held.points)
+        block[FLOOR, FLOOR] = at_observed(UniformDensity(space), held.points)
         blocks.append(block)
         weights.append(held.weights)
         if number == 0:
@@ -117,7 +118,7 @@ def _teller(number: int, used: int, say: Progress) -> Callable[[str], None]:
     return tell
 
 
-def _narrow(families: list[Family[Any]], block: dict[tuple[str, str], Tensor], held: Rows) -> None:
+def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: Rows) -> None:
     """Keep of each family what has most weight in the first fold, and the best alone."""
     keys = list(block)
     table = torch.stack([block[key] for key in keys])
@@ -164,7 +165,7 @@ def judged(candidates: Candidates, weights: Tensor) -> list[ComponentEvidence]:
 
 def assembled(
     space: Space,
-    families: list[Family[Any]],
+    families: list[Family],
     candidates: Candidates,
     weights: Tensor,
     rows: Rows,
@@ -228,42 +229,40 @@ def try_flow(
     rows speak for has streaks that are not in the data. The candidates beside it have `weights` (P,).
     """
 
-    def fitted(number: int) -> tuple[Density, FitReport]:
-        train = folds.train(number)
+    tables: list[Tensor] = []
+    held: list[Rows] = []
+
+    def tried(number: int) -> tuple[Density, FitReport, ComponentEvidence]:
+        train, rows = folds.train(number), folds.held(number)
         begin, end = ((0.0, FIRST), (FIRST, 1.0))[number]
-        return fit_density(
+        density, report = fit_density(
             space,
             train.points,
             chosen.replace(seconds=budget.seconds_left),
             weights=train.weights,
             progress=lambda done, what: told(begin + (end - begin) * done, f"flow: {what}"),
         )
+        start = sum(map(len, held))
+        columns = candidates.table[:, start : start + len(rows)]
+        with torch.no_grad():
+            own = density.log_prob(rows.points)
+        tables.append(torch.stack([stacked(columns, weights), own, columns[-1]]))
+        held.append(rows)
+        return density, report, _worth(tables, held)
 
-    density, report = fitted(0)
-    held = [folds.held(0)]
-    tables = [_beside(density, held[0], candidates.table[:, : len(held[0])], weights)]
-    worth = _worth(tables, held)
+    density, report, worth = tried(0)
     kept = _is_worth_it(worth)
     sure = Gain(worth.gain, worth.error).is_sure
     if kept and not sure and folds.used > 1 and not budget.is_spent:
-        held.append(folds.held(1))
-        columns = candidates.table[:, len(held[0]) : len(held[0]) + len(held[1])]
-        tables.append(_beside(fitted(1)[0], held[1], columns, weights))
-        worth = _worth(tables, held)
+        worth = tried(1)[2]
         kept = _is_worth_it(worth) and worth.gain >= LIKELY * worth.error
     if not kept:
         worth = replace(worth, share=0.0, gain=0.0, error=0.0)
     return TriedFlow(density if kept else None, worth.share, (worth,), report)
 
 
-def _beside(density: Density, held: Rows, columns: Tensor, weights: Tensor) -> Tensor:
-    """Log densities (3, N) at rows held out: of the other parts, the flow, and the uniform one."""
-    with torch.no_grad():
-        own = density.log_prob(held.points)
-    return torch.stack([stacked(columns, weights), own, columns[-1]])
-
-
 def _worth(tables: list[Tensor], held: list[Rows]) -> ComponentEvidence:
+    """Judge a flow by log densities (3, N) at rows held out: the others', its own, the uniform one."""
     others, own, uniform = torch.cat(tables, dim=1)
     known = [rows.weights for rows in held if rows.weights is not None]
     row_weights = torch.cat(known) if known else None

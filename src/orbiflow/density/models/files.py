@@ -39,14 +39,8 @@ def density_to_bytes(density: Density, **extra: Any) -> bytes:
     """Return a density as bytes that `read_density` makes the same again.
 
     Saved are densities whose class has a `kind`, on the four spaces as `make_space` makes them, and
-    flows of Fourier and spline fields on the space's own group. Parameters are written in float64.
-
-    Args:
-        density: The density.
-        extra: Further values for the reader, ready for JSON.
-
-    Raises:
-        OrbiflowError: naming the part that cannot be saved, rather than save another density.
+    flows of Fourier and spline fields on the space's own group; anything else is refused by the name of
+    the part. Parameters are written in float64. `extra` are further values for the reader, for JSON.
     """
     header, tensors = density_parts(as_instance(density, Density, "density"), "density")
     space = _checked_space(density.space)
@@ -79,12 +73,7 @@ def _checked_space(space: Space) -> Space:
 
 
 def read_density(path: str | Path) -> tuple[Density, dict[str, Any]]:
-    """Return a saved density, float64, and what was saved with it; files of version 0.1 as well.
-
-    Raises:
-        InputFileError: if the file is missing, too large, damaged or of another kind, or if it holds
-            a neural flow, as files of version 0.1 may.
-    """
+    """Return a saved density, float64, and what was saved with it; files of version 0.1 as well."""
     header, tensors = read_tensors(path, "a density")
     try:
         if header["format"] not in (FORMAT, *FORMATS_BEFORE):

@@ -51,12 +51,12 @@ def near_log_sum(
     what the caller adds to the sum, to which errors are relative as well; it is not in the result.
 
     Differentiable in the features: the gradient in closed form, as fast as the sum; higher
-    derivatives by autograd through the terms that count.
+    derivatives by autograd through all terms.
     """
     if features.shape[1] * terms.size < FEWEST_PAIRS:
         return terms.plain_log_sum(features)
     if not (features.requires_grad and torch.is_grad_enabled()):
-        return _Walk(features, terms, floor, tolerance).done()
+        return _Walk(features, terms, floor, tolerance).log_sum
     return applied(_NearLogSum, features, terms, floor, tolerance)
 
 
@@ -64,11 +64,9 @@ class _NearLogSum(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, features: Tensor, terms: Terms, floor: float, tolerance: float) -> Tensor:
         walk = _Walk(features, terms, floor, tolerance, slope=True)
-        values = walk.done()
-        assert walk.slope is not None
         ctx.save_for_backward(features, walk.slope)
-        ctx.rest = terms, floor, tolerance
-        return values
+        ctx.terms = terms
+        return walk.log_sum
 
     @staticmethod
     def backward(ctx: Any, *gradients: Any) -> Any:
@@ -77,7 +75,7 @@ class _NearLogSum(torch.autograd.Function):
             return gradients[0] * slope, None, None, None
         # second derivatives were asked for: let autograd have them
         view: Tensor = features.view_as(features)
-        plain = _Walk(view, *ctx.rest, by_autograd=True).done()
+        plain = ctx.terms.plain_log_sum(view)
         (found,) = torch.autograd.grad(plain, view, gradients[0], create_graph=True)
         return found, None, None, None
 
@@ -95,40 +93,23 @@ class _Part(NamedTuple):
 
 
 class _Walk:
-    """Sums as they grow, and their gradients in the features if they are wanted."""
+    """Logarithms (N,) of sums, and their gradients (m, N) in the features if they are wanted."""
 
     def __init__(
-        self,
-        features: Tensor,
-        terms: Terms,
-        floor: float,
-        tolerance: float,
-        *,
-        slope: bool = False,
-        by_autograd: bool = False,
+        self, features: Tensor, terms: Terms, floor: float, tolerance: float, *, slope: bool = False
     ) -> None:
-        self.features, self.terms, self.floor = features, terms, floor
+        self.floor = floor
         self.tolerance, self.each = math.log(tolerance), math.log(tolerance / terms.size)
-        self.by_autograd = by_autograd
         # the number of points of a tile from which on interpolation may pay
         self.worth = WORTH_ROUND if len(terms.centers) == 3 else WORTH_FLAT
-        if by_autograd or terms.factors > 2:
+        if terms.factors > 2:
             self.worth = math.inf
-        plain = features.detach()
-        self.log_sum = torch.full_like(plain[0], -math.inf)
-        self.slope = torch.zeros_like(plain) if slope else None
-        self.places: list[np.ndarray] = []
-        self.sums: list[Tensor] = []
-
-    def done(self) -> Tensor:
-        """Return the logarithms (N,) of the sums."""
-        stack = [_Part(np.arange(len(self.log_sum)), self.features.detach(), self.terms, 0)]
+        features = features.detach()
+        self.log_sum = torch.full_like(features[0], -math.inf)
+        self.slope = torch.zeros_like(features) if slope else None
+        stack = [_Part(np.arange(len(self.log_sum)), features, terms, 0)]
         while stack and len(self.log_sum):
             stack += self.step(stack.pop())
-        if not self.sums:
-            return self.log_sum
-        at = torch.as_tensor(np.concatenate(self.places))
-        return self.log_sum.index_copy(0, at, torch.cat(self.sums))
 
     def step(self, part: _Part) -> list[_Part]:
         """Treat a part, or return its halves."""
@@ -150,14 +131,8 @@ class _Walk:
                 for at in _halves(features, tile)
             ]
         spread = float(terms.peaks.max()) - bottom
-        at = torch.as_tensor(index)
-        if self.by_autograd:
-            self.places.append(index)
-            self.sums.append(terms.log_sum(self.features[:, at], tile.middle, spread))
-        elif self.slope is None:
-            self._add(at, terms.log_sum(features, tile.middle, spread), None)
-        else:
-            self._add(at, *terms.log_sum_and_slope(features, tile.middle, spread))
+        found = terms.log_sum(features, tile.middle, spread, slope=self.slope is not None)
+        self._add(torch.as_tensor(index), *found)
         return []
 
     def _add(self, at: Tensor, log_sum: Tensor, slope: Tensor | None) -> None:

@@ -12,8 +12,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance
-from orbiflow.density.models.chain_integrals import SCALES, quantiles, waves
-from orbiflow.density.models.chains import BLOCK, VonMisesChains
+from orbiflow.density.models.chains import BLOCK, SCALES, VonMisesChains, quantiles, waves
 from orbiflow.density.models.density import Density, Split, in_blocks
 from orbiflow.density.models.headers import within
 from orbiflow.density.models.terms import log_sum_exp, shares_of
@@ -144,12 +143,14 @@ class VonMisesNetwork(Density, kind="network"):
         even = {axis: draws[:, 2 * k : 2 * k + 2] for k, axis in enumerate(hidden)}
         same: list[bool] = listed((points == points[0]).all(dim=0))
         known = {axis: points[:1, k, None] for k, axis in enumerate(axes) if same[k]}
-        once = _Once.of(factors, known, even)
+        # what does not depend on the points is worked on once
+        mixtures = dict[int, _Mixture]()
+        total, left = _taken(factors, known, even, mixtures)
         found: list[Tensor] = []
         for block in torch.split(points, AT_ONCE // count):
             at = {axis: block[:, k, None] for k, axis in enumerate(axes) if not same[k]}
-            logs = once.weighted(at, even).expand(len(block), count)
-            found.append(log_sum_exp(logs) - math.log(count))
+            logs = total + _taken(left, {**known, **at}, even, mixtures)[0]
+            found.append(log_sum_exp(logs.expand(len(block), count)) - math.log(count))
         return torch.cat(found)
 
     def is_costly(self, split: Split) -> bool:
@@ -276,49 +277,33 @@ class _Mixture:
         return torch.cat(found)[place]
 
 
-@dataclass(frozen=True)
-class _Once:
-    """What does not depend on the points, and is worked on once, and the `factors` that do.
+def _taken(
+    factors: Sequence[Factor],
+    at: dict[int, Tensor],
+    even: dict[int, Tensor],
+    mixtures: dict[int, _Mixture],
+) -> tuple[Tensor, list[Factor]]:
+    """Return the log density of the observed angles, and the factors that need angles not there yet.
 
-    - `at`, `total`: Angles that are known (1, 1) or drawn (1, Q), and the log density of those known.
-    - `mixtures`: Those of angles whose parents are among them.
+    Angles `at` are known (N, 1) or drawn (N, Q) by probabilities `even`, and more are drawn on the way.
+    `mixtures` are those of angles whose parents were all there; those that could be made are added.
     """
-
-    factors: list[Factor]
-    at: dict[int, Tensor]
-    total: Tensor
-    mixtures: dict[int, _Mixture]
-
-    @classmethod
-    def of(cls, factors: list[Factor], known: dict[int, Tensor], even: dict[int, Tensor]) -> _Once:
-        at, mixtures = dict(known), dict[int, _Mixture]()
-        total = torch.zeros(1, 1, dtype=torch.float64)
-        left: list[Factor] = []
-        for axes, chains in factors:
-            axis = axes[-1]
-            fixed = all(parent in at for parent in axes[:-1])
-            if fixed and axis in even:
-                at[axis] = _drawn_at(chains, axes, at, even[axis])
-            elif fixed and axis in at:
-                total = total + _along(lambda p, c=chains: log_conditional(c, p), axes, at)
-            else:
-                left.append(Factor(axes, chains))
-                if fixed:
-                    mixtures[axis] = _Mixture.of(chains, axes, at)
-        return cls(left, at, total, mixtures)
-
-    def weighted(self, points: dict[int, Tensor], even: dict[int, Tensor]) -> Tensor:
-        """Return log densities of the observed angles given the draws, which broadcast to (N, Q)."""
-        at, total = {**self.at, **points}, self.total
-        for axes, chains in self.factors:
-            axis = axes[-1]
-            if axis in even:
-                at[axis] = _drawn_at(chains, axes, at, even[axis])
-            elif axis in self.mixtures:
-                total = total + self.mixtures[axis].log_prob(at[axis])
-            else:
-                total = total + _along(lambda p, c=chains: log_conditional(c, p), axes, at)
-        return total
+    total = torch.zeros(1, 1, dtype=torch.float64)
+    left: list[Factor] = []
+    for axes, chains in factors:
+        axis = axes[-1]
+        fixed = all(parent in at for parent in axes[:-1])
+        if axis in mixtures:
+            total = total + mixtures[axis].log_prob(at[axis])
+        elif fixed and axis in even:
+            at[axis] = _drawn_at(chains, axes, at, even[axis])
+        elif fixed and axis in at:
+            total = total + _along(lambda p, c=chains: log_conditional(c, p), axes, at)
+        else:
+            left.append(Factor(axes, chains))
+            if fixed:
+                mixtures[axis] = _Mixture.of(chains, axes, at)
+    return total, left
 
 
 def _along(

@@ -15,7 +15,7 @@ from orbiflow.density import comparing, models, pictures, tables
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
 from orbiflow.density.run_folder import write_files, written_files
 from orbiflow.density.tables import RowSettings, SpaceSettings, TableSettings
-from orbiflow.settings import Group, Hidden, NotWith, Option, SettingError
+from orbiflow.settings import Group, Hidden, Option, SettingError
 
 if TYPE_CHECKING:
     from orbiflow.density.estimator import DensityEstimator
@@ -26,8 +26,7 @@ MOST_SCORED = 20_000
 fit's time at most; of 100,000 rows of six angles it would be two fifths."""
 
 REPORTED = (
-    "components", "repeats", "missing", "weights", "group", "max_frequency", "segments", "kernels",
-    "seed",
+    "components", "repeats", "missing", "weights", "group", "max_frequency", "segments", "seed",
 )  # fmt: skip
 """Settings that the report repeats."""
 
@@ -40,11 +39,7 @@ def fit(
     reading: RowSettings = RowSettings(),
     *,
     out: Annotated[Path, Option("--out", "-o")] = Path("density"),
-    group: Annotated[
-        str | None,
-        Group("Reading the table"),
-        NotWith("kernels", because="a flow has no components to choose"),
-    ] = None,
+    group: Annotated[str | None, Group("Reading the table")] = None,
     picture: Annotated[bool, Hidden()] = False,
     on_event: runtime.Sink = runtime.ignore,
     cancel: runtime.Cancel = runtime.Cancel(),

@@ -15,7 +15,7 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.comparing import scores_of
 from orbiflow.density.fitting import Progress, mean_of, weighed
-from orbiflow.density.inference import chart_of_observed, log_prob_observed
+from orbiflow.density.inference import at_observed, chart_of_observed
 from orbiflow.density.models import CHECKED, Density, TabulatedDensity, log_density_gradient
 from orbiflow.density.regions import DensityLevels, resolvable_masses, samples_for
 from orbiflow.density.tables import TableRows
@@ -76,10 +76,8 @@ def _log_densities(
             f"{source.largest:.1e} at most among {CHECKED} of them and as many anywhere"
         )
         log_prob: Callable[..., Tensor] = source.log_prob
-    elif bool(points.isnan().any()):
-        log_prob = partial(log_prob_observed, density)
     else:
-        log_prob = density.log_prob
+        log_prob = partial(at_observed, density)
     found: list[NDArray[np.float64]] = []
     end = SCORED if settings.gradient else 1.0
     for start in range(0, len(points), BLOCK):
