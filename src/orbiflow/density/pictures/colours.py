@@ -15,6 +15,7 @@ from orbiflow.density.models import AdaptiveKernels, Density, midpoints
 from orbiflow.density.pictures.surfaces import off_cones
 from orbiflow.density.spaces import Space, rectangle
 
+COLOURS = "viridis"
 _TOLERANCE = 1e-5
 """Relative error of the sums over kernels."""
 

@@ -15,7 +15,8 @@ from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, FlowDensity
 from orbiflow.density.pictures.axes import INK, require_plane, space_title, view_of
-from orbiflow.density.pictures.ground import COLOURS, Room, colour_bar, make_frame, printed_room
+from orbiflow.density.pictures.colours import COLOURS
+from orbiflow.density.pictures.frames import Room, colour_bar, make_frame, printed_room
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.drawing import Picture, Sheet, draw_flow, draw_magnitude
 from orbiflow.errors import OrbiflowError

@@ -7,20 +7,18 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
-import torch
-from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
-from orbiflow.density.pictures import ground, projections
+from orbiflow.density.pictures import frames, projections
 from orbiflow.density.pictures.axes import chart_points, degrees_text
 from orbiflow.density.pictures.colours import chosen_scale, density_on_map, is_sharp, shading
 from orbiflow.density.pictures.map_axes import draw_map_lines, graticule
-from orbiflow.density.pictures.overlays import log_natural
+from orbiflow.density.pictures.overlays import LIGHT, Colouring, log_natural
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.density.spaces import RoundSpace, Space, checked_table, to_latlon, to_vectors
-from orbiflow.drawing import Picture, Sheet
+from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors
+from orbiflow.drawing import Sheet
 from orbiflow.errors import OrbiflowError, SettingError
 
 if TYPE_CHECKING:
@@ -36,66 +34,15 @@ _BESIDE = 120 / 25.4
 """Inches of a printed figure below which discs are above each other, for room round their rims."""
 
 
-def map_picture(
-    density: Density,
-    samples: Tensor | None = None,
-    settings: PlotSettings | None = None,
-    *,
-    about: Tensor | None = None,
-    coastlines: Sequence[ArrayLike] = (),
-    sheet: Sheet | None = None,
-) -> Picture:
-    """Draw a density on the sphere or the projective plane on a map with its graticule.
-
-    The density is evaluated at each pixel of the map, so that nothing is stretched or sewn; the
-    pixels end at a curve. On the projective plane each axis is drawn at the end that the map shows.
-
-    Args:
-        density, samples, settings, sheet: As for `density_picture`.
-        about: Chart points (N, 2) that the map should show. Default: `samples`.
-        coastlines: Lines (M, 2) of latitude and longitude.
-    """
-    settings = settings or PlotSettings()
-    drawn = _map_about(density.space, samples if about is None else about, settings, coastlines)
-    return ground.draw_density(drawn, density, settings, dots=samples, sheet=sheet)
-
-
-def map_samples_picture(
-    density: Density,
-    data: Tensor | None,
-    samples: Tensor,
-    settings: PlotSettings | None = None,
-    *,
-    coastlines: Sequence[ArrayLike] = (),
-    sheet: Sheet | None = None,
-) -> Picture:
-    """Draw data (N, 2) and samples (M, 2) on two maps, as `samples_picture` does on two squares."""
-    settings = settings or PlotSettings()
-    about = samples if data is None else data
-    drawn = _map_about(density.space, about, settings, coastlines)
-    return ground.draw_samples(drawn, density, settings, data, samples, sheet=sheet)
-
-
-def _map_about(
-    space: Space, about: Tensor | None, settings: PlotSettings, coastlines: Sequence[ArrayLike]
-) -> Map:
-    about = torch.empty(0, 2) if about is None else about
-    chosen = chosen_map(space, chart_points(space, about), settings, settings.names)
-    return Map(space, chosen, coastlines)
-
-
-class Map(ground.Ground):
+class Map:
     """A map of the sphere or the projective plane, with coastlines (N, 2) in degrees."""
 
     caption_below = True
 
     def __init__(
-        self, space: Space, projection: projections.Projection, coastlines: Sequence[ArrayLike] = ()
+        self, space: Space, projection: projections.Projection, coastlines: Sequence[Array] = ()
     ) -> None:
-        self.space, self.projection = space, projection
-        self.coastlines = [checked_table(line, (2,), "a coastline") for line in coastlines]
-        for line in self.coastlines:
-            to_vectors(line)  # refuses latitudes beyond the poles
+        self.space, self.projection, self.coastlines = space, projection, coastlines
         self.outline = projection.outline()
         width, height = np.ptp(self.outline, axis=0)
         self.width, self.aspect = float(width), float(width / height)
@@ -111,45 +58,41 @@ class Map(ground.Ground):
         latlon = to_latlon(vectors)
         return projection.forward(latlon[projection.contains(latlon)])
 
-    def colouring(self, density: Density, settings: PlotSettings) -> ground.Colouring:
+    def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
         pixels = pixels_of(self.projection)
         points = cast(RoundSpace, self.space).vectors_to_chart(to_vectors(pixels.latlon))
         values = density_on_map(density, points, settings.measure, pixels.angle)
         chosen = chosen_scale(density, settings.measure, settings.scale)
         shade = shading(values[pixels.within], pixels.areas[pixels.within], log=chosen.log)
-
-        def logs() -> Array:
-            found = log_natural(density, values, points, settings.measure)
-            return pixels.table(found, math.nan)
-
+        logs = None
+        if settings.regions:
+            logs = pixels.table(log_natural(density, values, points, settings.measure), math.nan)
         note = ""
         if is_sharp(density, angle=pixels.angle):
             size = f"{math.degrees(pixels.angle):.2g}°"
             note = f"peaks narrower than {size} are averaged over it"
         places = pixels.table(shade.places(values), 0.0)
-        return ground.Colouring(
-            places, pixels.extent, shade, chosen.reason, note, logs, self.outline
-        )
+        return Colouring(places, pixels.extent, shade, chosen.reason, note, logs, self.outline)
 
-    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> ground.Room:
+    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> frames.Room:
         above = 0.8 if sheet.printed else 3.2
-        if self.is_disc and (not sheet.printed or sheet.width >= ground.NARROW):
-            beside = ground.Room(3.6, 1.8, 0.0, above + 1.2, 4.4, 1.2)
-            return ground.room_for_bar_beside(sheet, beside, label, ticks)
+        if self.is_disc and (not sheet.printed or sheet.width >= frames.NARROW):
+            beside = frames.Room(3.6, 1.8, 0.0, above + 1.2, 4.4, 1.2)
+            return frames.room_for_bar_beside(sheet, beside, label, ticks)
         left, right, top = (3.4, 3.4, 1.2) if self.is_disc else (3.6, 1.8, 0.0)
-        under = ground.Room(left, 0.0, right, above + top, 2.2, 1.0)
-        return ground.room_for_bar_below(sheet, under, label)
+        under = frames.Room(left, 0.0, right, above + top, 2.2, 1.0)
+        return frames.room_for_bar_below(sheet, under, label)
 
-    def panels_room(self, sheet: Sheet) -> tuple[ground.Room, bool]:
+    def panels_room(self, sheet: Sheet) -> tuple[frames.Room, bool]:
         if not self.is_disc:
-            return ground.Room(3.6, 2.4, 1.8, 2.2, 4.4, 0.0), True
+            return frames.Room(3.6, 2.4, 1.8, 2.2, 4.4, 0.0), True
         stacked = sheet.printed and sheet.width < _BESIDE
-        return ground.Room(3.6, 1.8, 3.6, 3.8, 5.6 if stacked else 7.4, 0.0), stacked
+        return frames.Room(3.6, 1.8, 3.6, 3.8, 5.6 if stacked else 7.4, 0.0), stacked
 
     def fill(self, axes: Axes) -> None:
-        axes.fill(*self.outline.T, color=ground.LIGHT, linewidth=0, zorder=0)
+        axes.fill(*self.outline.T, color=LIGHT, linewidth=0, zorder=0)
 
-    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: ground.Panel) -> None:
+    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: frames.Panel) -> None:
         """Draw the outline, the graticule with its degrees, and coastlines."""
         draw_map_lines(
             axes, self.projection, sheet, side, coastlines=self.coastlines, light=panel.light
@@ -215,20 +158,18 @@ class Map(ground.Ground):
 
     def write_on_screen(
         self,
-        frame: ground.Frame,
+        frame: frames.Frame,
         sheet: Sheet,
         title: str,
-        caption: str,
         notes: Sequence[str],
-        dots: bool,
+        dots: tuple[int, int] | None,
     ) -> None:
-        del notes, dots  # the caption has them
         top = 1 - 1.6 * sheet.em / frame.figure.get_size_inches()[1]
         frame.figure.text(
             0.5, top, f"{title}: {self._subtitle}", ha="center", va="center",
             fontsize=1.15 * sheet.text,
         )  # fmt: skip
-        ground.write_caption(frame.figure, caption, sheet)
+        frames.write_caption(frame.figure, self.caption(notes, dots), sheet)
 
 
 class Pixels(NamedTuple):
