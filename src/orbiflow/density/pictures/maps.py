@@ -16,6 +16,7 @@ from orbiflow.density.pictures.axes import chart_points, degrees_text
 from orbiflow.density.pictures.colours import chosen_scale, density_on_map, is_sharp, shading
 from orbiflow.density.pictures.map_axes import draw_map_lines, graticule
 from orbiflow.density.pictures.overlays import LIGHT, Colouring, log_natural
+from orbiflow.density.pictures.projections import Azimuthal, Projection
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors
 from orbiflow.drawing import Sheet
@@ -40,20 +41,20 @@ class Map:
     caption_below = True
 
     def __init__(
-        self, space: Space, projection: projections.Projection, coastlines: Sequence[Array] = ()
+        self, space: Space, projection: Projection, coastlines: Sequence[Array] = ()
     ) -> None:
         self.space, self.projection, self.coastlines = space, projection, coastlines
         self.outline = projection.outline()
         width, height = np.ptp(self.outline, axis=0)
         self.width, self.aspect = float(width), float(width / height)
-        self.is_disc = isinstance(projection, projections.Azimuthal)
+        self.is_disc = isinstance(projection, Azimuthal)
         self.title_gap = 2.2 if self.is_disc else 0.6
 
     def places(self, points: Tensor) -> Array:
         """Return places (M, 2) of chart points (N, 2); of axes, those of the end that the map shows."""
         space, projection = self.space, self.projection
         vectors = cast(RoundSpace, space).vectors(chart_points(space, points))
-        if space.name == "projective-plane" and isinstance(projection, projections.Azimuthal):
+        if space.name == "projective-plane" and isinstance(projection, Azimuthal):
             vectors = np.where(vectors @ projection.frame[2] < 0, -1.0, 1.0)[:, None] * vectors
         latlon = to_latlon(vectors)
         return projection.forward(latlon[projection.contains(latlon)])
@@ -130,7 +131,7 @@ class Map:
         if self.space.columns[0] != "lat":
             frame = "; latitudes are from the x, y plane towards z, longitudes from x towards y"
         middle = degrees_text((lon + 180) % 360 - 180, "EW")
-        if not isinstance(projection, projections.Azimuthal):
+        if not isinstance(projection, Azimuthal):
             return f"The sphere in {projection.title}, about {middle}{frame}"
         if projection.flipped:
             return (
@@ -149,7 +150,7 @@ class Map:
     def _subtitle(self) -> str:
         """The projection as a title has it."""
         projection = self.projection
-        if not (isinstance(projection, projections.Azimuthal) and projection.flipped):
+        if not (isinstance(projection, Azimuthal) and projection.flipped):
             return projection.title
         return "Schmidt net (equal-area)" if projection.is_equal_area else "Wulff net (equal-angle)"
 
@@ -197,7 +198,7 @@ class Pixels(NamedTuple):
         return table
 
 
-def pixels_of(projection: projections.Projection, count: int | None = None) -> Pixels:
+def pixels_of(projection: Projection, count: int | None = None) -> Pixels:
     """Return about `count` pixels of a map, by default `_PIXELS`."""
     from matplotlib.path import Path
     from scipy.ndimage import binary_dilation
@@ -219,27 +220,15 @@ def pixels_of(projection: projections.Projection, count: int | None = None) -> P
     return Pixels(shown, latlon, within[kept], _areas(projection, latlon), step, extent)
 
 
-def _areas(projection: projections.Projection, latlon: Array) -> Array:
+def _areas(projection: Projection, latlon: Array) -> Array:
     """Return the areas on the sphere of equal pixels of the map."""
     if projection.is_equal_area:
         return np.ones(len(latlon))
-    if isinstance(projection, projections.Azimuthal):
+    if isinstance(projection, Azimuthal):
         cosines = to_vectors(latlon) @ projection.frame[2]
         return ((1 + cosines) / 2) ** 2  # conformal: scale 2 / (1 + cos), squared
     return np.cos(np.radians(latlon[:, 0]))
 
-
-WORLD: dict[str, type[projections.WorldMap]] = {
-    c.name: c for c in (projections.EqualEarth, projections.Mollweide, projections.PlateCarree)
-}
-CENTRED: dict[str, type[projections.Azimuthal]] = {
-    c.name: c for c in (projections.Lambert, projections.Stereographic)
-}
-NETS: dict[str, type[projections.Azimuthal]] = {
-    "schmidt": projections.Lambert,
-    "wulff": projections.Stereographic,
-}
-"""Nets of structural geology: latitude is plunge or inclination, longitude trend or declination."""
 
 _NET_WORDS = ("inc", "plunge", "dip")
 """How names of the first column begin if rows are directions in a net, not places on a globe."""
@@ -254,7 +243,7 @@ def chosen_map(
     points: Tensor,
     settings: PlotSettings | None = None,
     names: Sequence[str] | None = None,
-) -> projections.Projection:
+) -> Projection:
     """Return the map of a sphere or projective plane that settings ask for, or that suits points.
 
     `points` are chart points (N, 2); `names` of the data's columns may ask for a net.
@@ -284,22 +273,33 @@ def chosen_map(
             projection = "lambert" if len(middle) == 2 and middle[0] else "equal-earth"
         else:
             projection = "equal-earth" if cap is None and radius is None else "lambert"
-    if projection in WORLD:
-        return _world(WORLD[projection], space, middle, radius)
-    if projection in NETS:
+    kind = projections.PROJECTIONS[projection]
+    if issubclass(kind, projections.WorldMap):
+        if axial:
+            discs = [n for n, c in projections.PROJECTIONS.items() if issubclass(c, Azimuthal)]
+            raise SettingError(
+                "a direction and its opposite are one point of the projective plane, which needs a "
+                f"map of one hemisphere: {{projection}} must be {', '.join(discs)}, got {projection}"
+            )
+        if radius is not None:
+            raise SettingError(
+                f"a map of the whole sphere ({projection}) has no radius: leave {{radius}} out"
+            )
+        lat, lon = (0.0, 0.0, *(middle or ()))[-2:]
+        return kind((lat, lon))
+    if projection in ("schmidt", "wulff"):
         if middle is not None:
             raise SettingError(
                 f"{{center}} does not apply to a {projection} net, which has the vertical in its "
                 "middle: give no centre"
             )
-        return NETS[projection]((90.0, 0.0), float(radius or 90.0), flipped=True)
+        return kind((90.0, 0.0), float(radius or 90.0), flipped=True)
+    reach = 90.0
     if middle is None:
         middle, reach = cap or ((90.0, 0.0), 90.0)
-    else:
-        reach = 90.0
-        if len(middle) == 1:
-            middle = (90.0 if axial else 0.0, middle[0])
-    return CENTRED[projection]((middle[0], middle[1]), float(radius or reach))
+    elif len(middle) == 1:
+        middle = (90.0 if axial else 0.0, *middle)
+    return kind((middle[0], middle[1]), float(radius or reach))
 
 
 def smallest_cap(vectors: Array) -> tuple[tuple[float, float], float] | None:
@@ -316,22 +316,3 @@ def smallest_cap(vectors: Array) -> tuple[tuple[float, float], float] | None:
     reach = 1.1 * float(np.quantile(apart, _SHARE, method="higher"))
     fitting = [float(r) for r in _RADII if r >= reach]
     return ((float(lat), float(lon)), fitting[0]) if fitting else None
-
-
-def _world(
-    kind: type[projections.WorldMap],
-    space: Space,
-    middle: tuple[float, ...] | None,
-    radius: float | None,
-) -> projections.Projection:
-    if space.name == "projective-plane":
-        raise SettingError(
-            "a direction and its opposite are one point of the projective plane, which needs a map "
-            f"of one hemisphere: {{projection}} must be {', '.join((*CENTRED, *NETS))}, got {kind.name}"
-        )
-    if radius is not None:
-        raise SettingError(
-            f"a map of the whole sphere ({kind.name}) has no radius: leave {{radius}} out"
-        )
-    lat, lon = middle if middle and len(middle) == 2 else (0.0, *(middle or (0.0,)))
-    return kind((lat, lon))
