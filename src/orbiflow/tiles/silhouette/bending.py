@@ -13,7 +13,7 @@ from orbiflow.arguments import as_array, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import best_similarity, complex_points
-from orbiflow.tiles.silhouette.mesh import Locator, Mesh, doubled_areas
+from orbiflow.tiles.silhouette.mesh import Locator, Mesh, doubled_areas, harmonic
 
 if TYPE_CHECKING:
     import torch
@@ -173,7 +173,8 @@ def unfolded(mesh: Mesh, points: Array) -> Array:
     """
     if not folded(mesh, points).any():
         return points
-    for start in (points, _spread(mesh, points)):  # the second is a start for tangled points
+    outline = points[: mesh.size + len(mesh.sides)]
+    for start in (points, harmonic(mesh, outline)):  # the second is a start for tangled points
         found = _untangled(_Distortion(mesh, start))
         if found is not None:
             return found
@@ -196,25 +197,6 @@ def _untangled(work: _Distortion) -> Array | None:
             return work.points(x)
         work.sharpen(smallest)
     return None
-
-
-def _spread(mesh: Mesh, points: Array) -> Array:
-    """Return inner points in the middle of their neighbours (Tutte, 1963)."""
-    import scipy.sparse
-    import scipy.sparse.linalg
-
-    fixed, count = mesh.size + len(mesh.sides), len(points)
-    i, j = (np.concatenate([mesh.triangles[:, k] for k in turn]) for turn in ((0, 1, 2), (1, 2, 0)))
-    ones = np.ones(2 * len(i))
-    pairs = (np.concatenate([i, j]), np.concatenate([j, i]))
-    touching: Any = scipy.sparse.csr_matrix((ones, pairs), shape=(count, count))
-    degree: Any = scipy.sparse.diags(np.asarray(touching.sum(axis=1)).ravel())
-    laplacian: Any = (degree - touching).tocsc()[fixed:]
-    spread = points.copy()
-    right = -(laplacian[:, :fixed] @ points[:fixed])
-    inner: Any = scipy.sparse.linalg.spsolve(laplacian[:, fixed:].tocsc(), right)
-    spread[fixed:] = inner
-    return spread
 
 
 class _Distortion:
