@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +16,7 @@ from orbiflow.tiles.geometry import best_similarity, complex_points
 from orbiflow.tiles.silhouette.mesh import Locator, Mesh, doubled_areas, harmonic
 
 if TYPE_CHECKING:
-    import torch
+    pass
 
 MAX_POINTS, MAX_TRIANGLES = 100_000, 200_000
 """Beyond these a mesh is refused: real ones have some thousands."""
@@ -70,11 +70,7 @@ class Bending:
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
-    @overload
-    def forward(self, points: torch.Tensor) -> torch.Tensor: ...
-    @overload
-    def forward(self, points: ArrayLike) -> Array: ...
-    def forward(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
+    def forward(self, points: Any) -> Any:
         """Return where points (..., 2) of the silhouette go, in the target's normal form.
 
         Arrays and lists give an array, tensors a tensor of their dtype and device, without a gradient;
@@ -82,11 +78,7 @@ class Bending:
         """
         return _mapped(points, self._forward)
 
-    @overload
-    def inverse(self, points: torch.Tensor) -> torch.Tensor: ...
-    @overload
-    def inverse(self, points: ArrayLike) -> Array: ...
-    def inverse(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
+    def inverse(self, points: Any) -> Any:
         """Return where points (..., 2) of the tile come from; as `forward`."""
         return _mapped(points, self._backward)
 
