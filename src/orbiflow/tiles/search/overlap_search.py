@@ -123,7 +123,7 @@ class OverlapSearch(Settings, SearchMethod):
         cancel: Cancel = NEVER,
     ) -> Fit:
         """Let flows carry near tiles closer to the silhouette."""
-        from orbiflow.tiles.search.descent import fit_descent, shared_soft_target
+        from orbiflow.tiles.search.descent import fit_descent
 
         stages = tuple((steps, max(kept, 2 * per_class)) for steps, kept in self.stages)
         with one_thread():
@@ -131,7 +131,7 @@ class OverlapSearch(Settings, SearchMethod):
                 goal.target,
                 kind,
                 replace(self, stages=stages),
-                soft=shared_soft_target(goal.target, goal.emphasis),
+                emphasis=goal.emphasis,
                 progress=progress,
                 cancel=cancel,
             )
