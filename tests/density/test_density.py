@@ -23,8 +23,9 @@ from orbiflow.density import (
     midpoints,
 )
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import FourierField, neural_field
+from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
+from strategies import neural_field
 
 SPACES = (Torus(2), Sphere(), KleinBottle(), ProjectivePlane())
 every = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)

@@ -377,9 +377,9 @@ class EscherTile:
 
     def draw(self, *, width_px: int = 1600) -> bytes:
         """Return a PNG of the tiling."""
-        from orbiflow.tiles.pictures import tiling_png
+        from orbiflow.tiles.pictures import tiling_raster
 
-        return tiling_png(self.tile, y_down=self.y_down, width_px=width_px)
+        return tiling_raster(self.tile, y_down=self.y_down, width_px=width_px).png()
 
     def draw_art(
         self,

@@ -25,7 +25,7 @@ from orbiflow.tiles import (
     certify,
     load_model,
 )
-from orbiflow.tiles.search.model import extract_tile
+from orbiflow.tiles.search.tile_model import extract_tile
 from orbiflow.tiles.tile import BENDING, FORMAT, MAX_BYTES
 from strategies import seeds
 

@@ -323,10 +323,10 @@ def stacking_weights(table: Tensor, row_weights: Tensor | None = None) -> Tensor
     """
     relative = (table - table.amax(dim=0)).exp()
     weights = torch.full_like(table[:, 0], 1 / len(table))
-    row_share = None if row_weights is None else (row_weights / row_weights.sum()).to(table)
+    own = torch.ones_like(table[0]) if row_weights is None else row_weights.to(table)
+    shares = own / own.sum()
     for iteration in range(ITERATIONS):
-        ratio = relative / (weights @ relative)
-        ratio = ratio.mean(dim=1) if row_share is None else ratio @ row_share
+        ratio = relative @ (shares / (weights @ relative))
         if iteration % EVERY == 0 and float(ratio.max()) - 1 < TOLERANCE:
             break
         weights = weights * ratio

@@ -22,6 +22,9 @@ TOLERANCE = 1e-12
 FEW_POINTS, FEW_PAIRS = 256, 200_000
 """Tiles with fewer points, or fewer points times terms, are not divided further."""
 
+FEWEST_PAIRS = 20_000
+"""Fewer points times terms are summed one by one at once: looking for tiles would take longer."""
+
 WORTH_FLAT, WORTH_ROUND = 500, 2_000
 """The fewest points of a tile for which smooth terms are interpolated, flat and round."""
 
@@ -53,6 +56,8 @@ def near_log_sum(
     Differentiable in the features: the gradient in closed form, as fast as the sum; higher
     derivatives by autograd through all terms.
     """
+    if features.shape[1] * terms.size < FEWEST_PAIRS:
+        return terms.plain_log_sum(features)
     if not (features.requires_grad and torch.is_grad_enabled()):
         return _Walk(features, terms, floor, tolerance).log_sum
     return applied(_NearLogSum, features, terms, floor, tolerance)

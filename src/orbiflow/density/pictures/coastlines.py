@@ -13,8 +13,10 @@ import numpy as np
 
 from orbiflow.arguments import described
 from orbiflow.arrays import Array
+from orbiflow.density.pictures.settings import PlotSettings
+from orbiflow.density.spaces import Space
 from orbiflow.density.tables import read_table
-from orbiflow.errors import InputFileError, system_errors
+from orbiflow.errors import InputFileError, SettingError, system_errors
 
 MAX_BYTES = 32_000_000
 MAX_POINTS = 1_000_000
@@ -32,6 +34,15 @@ _EDGE = 1e-4
 
 _ROUNDING = 1e-3
 """Degrees beyond a pole that are taken for rounding."""
+
+
+def coastlines_for(space: Space, settings: PlotSettings) -> list[Array]:
+    """Return the lines that settings ask for, which only the sphere can have."""
+    if settings.coastlines is None:
+        return []
+    if space.name != "sphere":
+        raise SettingError(f"{{coastlines}} apply to the sphere, not to the {space.name}")
+    return read_coastlines(settings.coastlines)
 
 
 def read_coastlines(path: Path) -> list[Array]:

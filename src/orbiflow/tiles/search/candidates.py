@@ -19,7 +19,7 @@ from orbiflow.tiles.tilings import CLASSES, EdgeIdentification, IsohedralClass, 
 
 if TYPE_CHECKING:
     from orbiflow.tiles.search.bending import PlacedBent
-    from orbiflow.tiles.search.model import TileModel
+    from orbiflow.tiles.search.tile_model import TileModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +194,7 @@ def _simplified(curve: Array, tolerance: float) -> Array:
     return mask
 
 
-Progress = Callable[[float, float], None]
+OnProgress = Callable[[float, float], None]
 """Called with the share of the work done and the best loss so far."""
 
 # Names under which the arrays of a map hold the start tile, if it is not the template
@@ -302,7 +302,7 @@ class StillTiles:
 
     def as_model(self) -> TileModel:
         """Return the candidates as a torch module, with a field of frequency 1 that is zero."""
-        from orbiflow.tiles.search.model import TileModel
+        from orbiflow.tiles.search.tile_model import TileModel
 
         own = self.prototiles
         return TileModel(self.kind, max_frequency=1, smoothness=0.0, steps=1, prototiles=own)

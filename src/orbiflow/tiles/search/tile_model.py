@@ -23,7 +23,7 @@ from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles.geometry import subdivided
 from orbiflow.tiles.search.candidates import CORNERS, VERTICES, Prototiles, simplest_tile
-from orbiflow.tiles.search.method import MAX_FREQUENCY, MAX_SEGMENTS
+from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS
 from orbiflow.tiles.silhouette import Bending, Frame
 from orbiflow.tiles.tile import TileMap, naming_file
 from orbiflow.tiles.tilings import IsohedralClass, Tile
