@@ -143,16 +143,7 @@ class DensityEstimator:
         self.report_: FitReport
         if self.space_.dim > MOST_DIM:
             _refuse_flows(settings, self.space_)
-        if settings.flow_alone and self.missing != "refuse":
-            raise SettingError(
-                "{missing} marginalise needs kernels or mixtures, as flows cannot be fitted to rows "
-                "that lack angles; give other {components}, or leave {missing} out"
-            )
-        if settings.flow_alone and groups is not None:
-            raise SettingError(
-                "{groups} are held out where components are chosen, and a flow alone has no choice; "
-                "leave {groups} out, or give other {components}"
-            )
+        settings.check_rows(self.missing, None if groups is None else "groups")
         if settings.flow_alone:
             found = fit_density(
                 self.space_, points, settings.flow, weights=sample_weight, progress=progress

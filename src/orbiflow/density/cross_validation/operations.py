@@ -208,7 +208,7 @@ def fold(
         where.space,
         DensitySettings(**density.to_json()),
         unit=tables.angle_unit(where.space, where.unit, table, on_event),
-        missing="marginalise" if rows.missing == "marginalise" else "refuse",
+        missing=rows.kept_missing,
     )
     folder = runtime.ResultFolder(out, written_files)
     estimator.fit(

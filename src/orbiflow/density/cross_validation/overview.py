@@ -225,7 +225,7 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
         "weights": str(angles + 1) if weighted else None,
         # a flow alone has no components to choose
         "group": str(angles + weighted + 1) if grouped and fit.components != ("flow",) else None,
-        "missing": "marginalise" if asked.rows.missing == "marginalise" else "refuse",
+        "missing": asked.rows.kept_missing,
         "unit": split.rows.unit if space in ("torus", "klein-bottle") else None,
         "components": fit.components,
         "repeats": density.repeats,

@@ -18,6 +18,8 @@ from orbiflow.density.fitting.evidence import (
     candidates_of,
     flow_settings,
     judged,
+    stacked,
+    supported_weights,
     try_flow,
     without_idle,
 )
@@ -55,7 +57,6 @@ from orbiflow.density.fitting.rows import (
     weights_of,
 )
 from orbiflow.density.fitting.settings import COMPONENTS, DensitySettings
-from orbiflow.density.fitting.weights import stacked, supported_weights
 from orbiflow.density.models import MOST_DIM, Mixture
 from orbiflow.density.spaces import Space, Torus, whole_turn
 from orbiflow.errors import OrbiflowError

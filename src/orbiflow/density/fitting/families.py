@@ -18,8 +18,7 @@ from orbiflow.density.fitting.chains import (
     spread_chains,
 )
 from orbiflow.density.fitting.kernels import NARROWEST, fit_mixture, kernel_estimates
-from orbiflow.density.fitting.rows import Rows, is_whole, with_incomplete
-from orbiflow.density.fitting.weights import gain_of
+from orbiflow.density.fitting.rows import Rows, gain_of, is_whole, with_incomplete
 from orbiflow.density.inference import at_observed
 from orbiflow.density.models import Density, averaged_networks
 from orbiflow.density.spaces import Space, Torus

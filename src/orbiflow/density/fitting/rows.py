@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -66,6 +67,34 @@ def effective_rows(weights: Tensor) -> float:
     2.0
     """
     return float(weights.sum() ** 2 / weights.square().sum())
+
+
+SURE = 2.0
+"""Standard errors by which a gain must exceed 0 to be no accident."""
+
+
+class Gain(NamedTuple):
+    """A mean difference of log densities in nats, and its standard error over the rows."""
+
+    nats: float
+    error: float
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it is no accident of few rows."""
+        return self.nats >= SURE * self.error
+
+
+def gain_of(better: Tensor, worse: Tensor, row_weights: Tensor | None = None) -> Gain:
+    """Return the gain of one log density (N,) over another at the same rows, which may be weighted."""
+    difference = better - worse
+    if row_weights is not None:
+        mean = mean_of(difference, row_weights)
+        rows = effective_rows(row_weights)
+        variance = mean_of((difference - mean) ** 2, row_weights)
+        return Gain(mean, math.sqrt(variance / (rows - 1)) if rows > 1 else math.nan)
+    spread = float(difference.std()) if len(difference) > 1 else math.nan
+    return Gain(float(difference.mean()), spread / math.sqrt(len(difference)))
 
 
 def weights_of(weights: Any, rows: int) -> Tensor:

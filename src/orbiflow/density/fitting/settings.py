@@ -123,6 +123,19 @@ class DensitySettings(FlowOptions, ComponentSettings, group="Density"):
         """Whether there is nothing to choose."""
         return self.components == ("flow",)
 
+    def check_rows(self, missing: str, groups: str | None = None) -> None:
+        """Refuse what a flow alone cannot be fitted to; `groups` are known by their argument's name."""
+        if self.flow_alone and missing == "marginalise":
+            raise SettingError(
+                "{missing} marginalise is for kernels and mixtures: a flow cannot be fitted to rows "
+                "that lack angles; give other {components}"
+            )
+        if self.flow_alone and groups is not None:
+            raise SettingError(
+                f"{{{groups}}} serves to choose among {{components}}, and a flow alone has no choice; "
+                "leave it out"
+            )
+
     @property
     def flow(self) -> FlowSettings:
         """Settings of a flow that is fitted alone."""

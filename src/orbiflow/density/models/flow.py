@@ -14,7 +14,7 @@ from torch import Tensor
 from orbiflow.arguments import as_instance, is_a
 from orbiflow.density.models.density import Density, Restriction, Split, in_blocks
 from orbiflow.density.models.evaluation import midpoints
-from orbiflow.density.models.headers import (
+from orbiflow.density.models.files import (
     density_from,
     density_parts,
     series_from_header,
