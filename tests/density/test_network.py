@@ -181,7 +181,7 @@ def test_some_angles_without_hidden_parents_are_exact(
     seen = order[: data.draw(st.integers(1, dim))]
     points = at_random(seed, 5, len(seen))
     hidden = [axis for axis in range(dim) if axis not in seen]
-    grid = even_grid(32, len(hidden)) if hidden else torch.zeros(1, 0).double()
+    grid = even_grid(24, len(hidden)) if hidden else torch.zeros(1, 0).double()
     whole = torch.zeros(5, len(grid), dim, dtype=torch.float64)
     whole[..., seen], whole[..., hidden] = points[:, None], grid
     expected = network.log_prob(whole).exp().mean(dim=1).log()
@@ -215,7 +215,7 @@ def test_conditional_and_marginal_say_how_far_they_are_off() -> None:
 
 def test_what_cannot_be_had_well_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """The second parent of the last angle is drawn for each value of the first; and both are sharp."""
-    monkeypatch.setattr(network_of_some, "DRAWS", 512)  # all of them do no better, and take seconds
+    monkeypatch.setattr(network_of_some, "DRAWS", 128)  # all of them do no better, and take seconds
     torus, pair = Torus(4), Torus(2)
     means = torch.zeros(1, 2, 5, dtype=torch.float64)
     means[0, 1, 1] = 1.0
