@@ -99,7 +99,7 @@ def _outcomes(calls: Sequence[Work], workers: int) -> Iterator[tuple[int, Outcom
     if min(workers, len(calls)) <= 1:
         yield from ((index, _outcome(call)) for index, call in enumerate(calls))
         return
-    context = process_context(("orbiflow.tiles.search.searching",))
+    context = process_context(("orbiflow.tiles.search.escherizing",))
     with contextlib.suppress(OrbiflowError):
         for news in work(_outcome, calls, workers, context=context):
             yield news.index, news.value

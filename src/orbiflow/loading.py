@@ -134,7 +134,7 @@ def _settings(settings: dict[str, Any]) -> dict[str, Any]:
     settings = {
         {"parts": "components", "detail": "max_frequency"}.get(k, k): v for k, v in settings.items()
     }
-    own = ("components", "repeats", "missing", "max_frequency", "segments", "kernels", "seed")
+    own = ("components", "repeats", "missing", "max_frequency", "segments", "seed")
     return {name: settings[name] for name in own if name in settings}
 
 

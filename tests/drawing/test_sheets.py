@@ -86,7 +86,7 @@ def test_density_figures_have_room_and_letters_of_7_to_8_points(space: Any, widt
             density, points(50), PlotSettings(measure="uniform", names=names), sheet=sheet
         ),
         density_picture(density, settings=PlotSettings(scale="log"), sheet=sheet),
-        flow_picture(density, cells=2, sheet=sheet),
+        flow_picture(density, sheet=sheet),
         samples_picture(density, points(60), points(40), sheet=sheet),
     ]
     for picture in made:
@@ -143,7 +143,7 @@ def test_print_leaves_title_and_legend_to_the_caption() -> None:
 
 
 def test_pages_of_one_pdf() -> None:
-    pictures = [tiling_picture(bent_tile("IH4")), flow_picture(example(SPACES[0]), cells=1)]
+    pictures = [tiling_picture(bent_tile("IH4")), flow_picture(example(SPACES[0]))]
     assert [p.sheet.format for p in pictures] == ["pdf", "png"]
     document = pypdfium2.PdfDocument(pdf_pages(pictures))
     assert [round(page.get_width()) for page in document] == [241, 576]

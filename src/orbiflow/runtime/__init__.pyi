@@ -1,4 +1,5 @@
 from .call_process import CallProcess as CallProcess
+from .events import NEVER as NEVER
 from .events import Cancel as Cancel
 from .events import Cancelled as Cancelled
 from .events import ClassFailed as ClassFailed

@@ -268,3 +268,7 @@ class Polled(Cancel):
             except OSError:
                 self._told = True
         return self._told
+
+
+NEVER = Cancel()
+"""The default of functions that take a token: nobody cancels it."""

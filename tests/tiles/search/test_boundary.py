@@ -8,9 +8,9 @@ import torch
 
 from orbiflow.errors import CertificationError
 from orbiflow.tiles import CLASSES, TileModel, certify
-from orbiflow.tiles.search import model
+from orbiflow.tiles.search import tile_model
 from orbiflow.tiles.search.candidates import DENSE, TOLERANCES
-from orbiflow.tiles.search.model import converge, extract_tile
+from orbiflow.tiles.search.tile_model import converge, extract_tile
 from strategies import error_estimate
 
 
@@ -110,7 +110,7 @@ def test_a_crossing_boundary_is_refused_unless_forced() -> None:
 
 
 def test_force_takes_an_inaccurate_flow(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(model, "MAX_STEPS", 8)
+    monkeypatch.setattr(tile_model, "MAX_STEPS", 8)
     with pytest.raises(CertificationError, match="not accurate"):
         extract_tile(bent("IH3"))
     # edges match at any number of steps (design point 5)

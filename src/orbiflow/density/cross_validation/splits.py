@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array
 from orbiflow.batch import Entry
 from orbiflow.density import comparing
-from orbiflow.density.cross_validation.fold import SCORES
-from orbiflow.density.cross_validation.operations import UNIFORM, CrossValidation
+from orbiflow.density.cross_validation.operations import SCORES, UNIFORM, CrossValidation
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
 from orbiflow.density.inference import chart_of_observed
 from orbiflow.density.spaces import Space, space_class
