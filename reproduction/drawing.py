@@ -225,8 +225,11 @@ def draw_surface(axes: Axes, space: Space, colours: Array, turn: tuple[float, fl
     points = immersion(space)(grid)
     points = points - (points.min(axis=0) + points.max(axis=0)) / 2
     radius = float(np.linalg.norm(points, axis=1).max())
-    seen_points = (points / radius) @ _camera(*turn).T
-    corners = seen_points.reshape(n + 1, n + 1, 3)
+    yaw, pitch = turn
+    toward = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
+    right = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+    seen = (points / radius) @ np.stack([right, np.cross(toward, right), toward]).T
+    corners = seen.reshape(n + 1, n + 1, 3)
     around_face = corners[:-1, :-1], corners[1:, :-1], corners[1:, 1:], corners[:-1, 1:]
     faces = np.stack(around_face, axis=2).reshape(-1, 4, 3)
     normals = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
@@ -241,10 +244,3 @@ def draw_surface(axes: Axes, space: Space, colours: Array, turn: tuple[float, fl
     axes.add_collection(PolyCollection(list(flat[order]), linewidths=0.35, rasterized=True, **inks))
     axes.set(xlim=(-1.12, 1.12), ylim=(-1.12, 1.12), aspect="equal")
     axes.set_axis_off()
-
-
-def _camera(yaw: float, pitch: float) -> Array:
-    """Return the directions right, up and towards the eye, as rows (3, 3)."""
-    toward = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
-    right = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
-    return np.stack([right, np.cross(toward, right), toward])
