@@ -221,7 +221,7 @@ def paint_motif(paint: Paint, motif: Motif) -> None:
     """Draw a motif, antialiased, over a painting."""
     grid = paint.grid
     placed = motif.moved(grid.density * np.eye(2), -grid.density * grid.corner)
-    for inked, parts in groupby(placed.parts, key=lambda part: part.inked):
+    for inked, parts in groupby(placed.parts, key=lambda part: INK in part.style):
         canvas = _canvas(list(parts), grid)
         alpha = canvas[..., 3]
         if inked:

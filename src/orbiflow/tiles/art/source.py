@@ -136,15 +136,10 @@ class Picture:
     covered: Covered  # the rectangle that it covers in the silhouette's coordinates
     notes: tuple[str, ...] = ()  # what was decided for the user
 
-    @property
-    def pixel(self) -> float:
-        """The side of a pixel in the silhouette's units."""
-        size = self.covered.high - self.covered.low
-        return float(np.sqrt(size.prod() / (self.image.width * self.image.height)))
-
     def reduced(self, pixel: float) -> Picture:
         """Return the picture averaged to pixels no smaller than `pixel` in the silhouette's units."""
-        share = self.pixel / pixel
+        area = (self.covered.high - self.covered.low).prod()
+        share = float(np.sqrt(area / (self.image.width * self.image.height))) / pixel
         if share >= 0.9:
             return self
         size = [max(1, round(side * share)) for side in self.image.size]

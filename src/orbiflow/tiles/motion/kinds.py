@@ -114,7 +114,7 @@ def morph(tile: Tile, width: int, *, y_down: bool = False, steady: bool = False)
         (lambda _: still) if steady else (lambda progress: places(progress, copies)),
         colouring(own).colours(copies),
         np.tile(ALWAYS, (len(copies), 1)),
-        (0.0, 1.0) if way.is_straight and steady else tuple(np.linspace(0, 1, 17).tolist()),
+        (0.0, 1.0) if way.weights is None and steady else tuple(np.linspace(0, 1, 17).tolist()),
         f"A tiling with straight edges becomes the tiling of {tile.isohedral_class}",
     )
 
