@@ -62,8 +62,7 @@ class Fidelity:
     def damage(self) -> float:
         """The overall damage, about 0 for a tile of medium likeness; smaller is better.
 
-        This is `necks` plus the weighted logarithms of the other values, each relative to its usual
-        value, with `NEGLIGIBLE_SHARE` added.
+        `necks` plus the weighted logarithms of the other values, relative to usual ones.
         """
         values = (*self.pieces, self.notches, self.narrowed, self.cost)
         relative = [value / usual for value, usual in zip(values, USUAL_VALUES, strict=True)]

@@ -46,11 +46,10 @@ def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bend
 def onto_polygon(
     mesh: Mesh, images: Array, polygon: Array, corners: Integers, vertices: Integers
 ) -> tuple[Mesh, Array]:
-    """Move the outline's images (of `images` (N, 2)) onto a polygon (Q, 2); return the mesh and images.
+    """Move the outline's images, of `images` (N, 2), onto a polygon (Q, 2); return mesh and images.
 
-    A vertex of the polygon that is none of the outline's points becomes one; points between two
-    vertices are laid onto their side in proportion. The points `corners` (K,) go to the `vertices`
-    (K,), both in order round.
+    Vertices of the polygon become points of the mesh; points between two vertices are laid onto their
+    side in proportion. The points `corners` (K,) go to the `vertices` (K,), both in order round.
     """
     n, outline = mesh.size, mesh.size + len(mesh.sides)
     knots = arc_lengths(np.roll(images[:n], -corners[0], axis=0))
@@ -148,11 +147,8 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
     """Return a map without folds from a silhouette (N, 2) to a tile (M, 2) over it, in normal form.
 
     Points of the outlines are matched in order, near ones with near ones (dynamic programming over
-    both outlines, from the two points that are nearest); the inside follows harmonically and
-    is untangled.
-
-    Raises:
-        OrbiflowError: if the inside cannot follow without folds.
+    both outlines, from the two points that are nearest); the inside follows harmonically and is
+    untangled. Raises `OrbiflowError` if it cannot follow without folds.
     """
     rest = orient(silhouette, counter_clockwise=True)
     ring = orient(polygon, counter_clockwise=True)

@@ -104,9 +104,9 @@ def outline_starts(
 ) -> Starts:
     """Return the best start tiles of one class for a target, no two of them twins.
 
-    At each of the `resolutions`, points of the outline that divide `vertices`, so many placements
-    are `projected` onto tiles and the nearest `measured`: several for the sake of thin limbs, for
-    the fewer, the smoother the start. A seed changes `phase`, the place of the points in spacings.
+    At each of the `resolutions`, points of the outline that divide `vertices`, so many placements are
+    `projected` onto tiles and the nearest `measured`. A seed changes `phase`, the place of the points
+    in spacings.
     """
     kind = isohedral_class(kind)
     as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")

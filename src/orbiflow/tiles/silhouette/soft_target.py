@@ -101,13 +101,8 @@ class SoftTarget:
 def signed_distance(points: Tensor, vertices: Tensor) -> Tensor:
     """Return the true distance to the boundary, positive inside (paper, equation of phi).
 
-    Args:
-        points: Points (..., N, 2).
-        vertices: Simple polygons (..., K, 2), in either orientation; the leading axes broadcast with
-            those of the points.
-
-    Returns:
-        Distances (..., N), whose gradients are unit vectors except on the boundary and the medial axis.
+    Of points (..., N, 2) to simple polygons `vertices` (..., K, 2), in either orientation; leading
+    axes broadcast. Gradients are unit vectors except on the boundary and the medial axis.
 
     >>> square = torch.tensor([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
     >>> signed_distance(torch.tensor([[1.0, 0.5], [3.0, 3.0]]), square).tolist()
