@@ -56,7 +56,7 @@ def test_the_record_is_the_flow(name: str, soft: SoftTarget) -> None:
     start = state.points.clone()
     for _ in range(10):
         state.step(soft)
-    model = state.flow_model()
+    model = state.model.with_fields(state.record)
     assert model.segments == 10
     with torch.no_grad():
         moved = model.flow(start)
@@ -144,7 +144,7 @@ def test_broken_prototiles_are_refused() -> None:
     outline, corners = saved.arrays["prototile.outline"], saved.arrays["prototile.corners"]
     broken = {
         "shape": {"prototile.outline": outline[:, :1]},
-        "entries": {"prototile.outline": np.full_like(outline, np.nan)},
+        "must be finite": {"prototile.outline": np.full_like(outline, np.nan)},
         "increasing": {"prototile.corners": corners[::-1].copy()},
         "indices": {"prototile.corners": corners + len(outline)},
     }

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
@@ -154,7 +155,7 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
     ring = orient(polygon, counter_clockwise=True)
     mesh = triangulate(ring)
     tile, goal = resampled(ring, TILE), resampled(rest, SILHOUETTE)
-    first, start = np.unravel_index(_apart(tile, goal).argmin(), (TILE, SILHOUETTE))
+    first, start = np.unravel_index(cdist(tile, goal, "sqeuclidean").argmin(), (TILE, SILHOUETTE))
     steps = _matching(np.roll(tile, -first, axis=0), np.roll(goal, -start, axis=0))
     even = np.linspace(0, SILHOUETTE, TILE + 1)
     places = (1 - PROPORTION) * steps + PROPORTION * even
@@ -176,14 +177,9 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
         ) from error
 
 
-def _apart(first: Array, second: Array) -> Array:
-    """(N, M) squared distances."""
-    return ((first[:, None] - second[None]) ** 2).sum(axis=2)
-
-
 def _matching(tile: Array, goal: Array) -> Array:
     """(TILE + 1,) for each point of the tile, from 0 to SILHOUETTE, its point of the silhouette."""
-    cost = _apart(tile, np.concatenate([goal, goal[:1]]))
+    cost = cdist(tile, np.concatenate([goal, goal[:1]]), "sqeuclidean")
     cost = np.concatenate([cost, cost[:1]])
     pay = EVENNESS * (np.arange(STEPS + 1) - SILHOUETTE / TILE) ** 2
     best = np.full(SILHOUETTE + 1, np.inf)

@@ -21,7 +21,6 @@ from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.tiles.geometry import subdivided
 from orbiflow.tiles.search.candidates import CORNERS, VERTICES, Prototiles, simplest_tile
 from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS
 from orbiflow.tiles.silhouette import Bending, Frame
@@ -185,12 +184,6 @@ class TileModel(nn.Module):
             corners = torch.arange(template.shape[1], device=template.device)
             return template, corners.expand(len(template), -1)
         return self.vertices.to(self.angle.dtype), self.corners
-
-    def boundary(self, pieces: int) -> Tensor:
-        """Points (S, N pieces, 2) along the prototile, `pieces` evenly spaced on each side."""
-        as_whole(pieces, "pieces", 1)
-        vertices, _ = self.prototile()
-        return subdivided(vertices, pieces)
 
     def take(self, indices: Sequence[int] | int) -> TileModel:
         """A new model with the candidates at `indices` only, at the same parameters."""
