@@ -86,7 +86,7 @@ def test_density_figures_have_room_and_letters_of_7_to_8_points(space: Any, widt
             density, points(50), PlotSettings(measure="uniform", names=names), sheet=sheet
         ),
         density_picture(density, settings=PlotSettings(scale="log"), sheet=sheet),
-        flow_picture(density, cells=2, sheet=sheet),
+        flow_picture(density, sheet=sheet),
         samples_picture(density, points(60), points(40), sheet=sheet),
     ]
     for picture in made:
@@ -143,7 +143,7 @@ def test_print_leaves_title_and_legend_to_the_caption() -> None:
 
 
 def test_pages_of_one_pdf() -> None:
-    pictures = [tiling_picture(bent_tile("IH4")), flow_picture(example(SPACES[0]), cells=1)]
+    pictures = [tiling_picture(bent_tile("IH4")), flow_picture(example(SPACES[0]))]
     assert [p.sheet.format for p in pictures] == ["pdf", "png"]
     document = pypdfium2.PdfDocument(pdf_pages(pictures))
     assert [round(page.get_width()) for page in document] == [241, 576]
@@ -161,11 +161,11 @@ def test_every_width_is_kept(width: float, form: Any) -> None:
 @pytest.mark.parametrize(
     ("width", "form", "message"),
     [
-        ("triple", "pdf", "width must be single, double or a number of mm, got 'triple'"),
-        (39.9, "pdf", "40 to 1000 mm wide, got 39.9"),
-        (float("nan"), "pdf", "40 to 1000 mm"),
-        (True, "pdf", "40 to 1000 mm"),
-        ("single", "eps", "format must be one of png, pdf, svg, got 'eps'"),
+        ("triple", "pdf", "width must be single or double, got 'triple'"),
+        (39.9, "pdf", "width must be from 40 to 1000, got 39.9"),
+        (float("nan"), "pdf", "a finite number from 40 to 1000, got nan"),
+        (True, "pdf", "a number from 40 to 1000, got True"),
+        ("single", "eps", "format must be png, pdf or svg, got 'eps'"),
     ],
 )
 def test_other_sheets_are_refused(width: Any, form: Any, message: str) -> None:

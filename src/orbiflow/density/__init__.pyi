@@ -20,7 +20,6 @@ from .fitting.automatic import fit_automatic as fit_automatic
 from .fitting.flow import fit_density as fit_density
 from .fitting.folds import LEAST_PLACES as LEAST_PLACES
 from .fitting.folds import places as places
-from .fitting.kernels import blend_kernels as blend_kernels
 from .fitting.likelihood import Refinement as Refinement
 from .fitting.report import FitReport as FitReport
 from .fitting.report import Progress as Progress
@@ -55,14 +54,16 @@ from .models.network import Factor as Factor
 from .models.network import VonMisesNetwork as VonMisesNetwork
 from .pictures.axes import space_title as space_title
 from .pictures.coastlines import read_coastlines as read_coastlines
+from .pictures.colours import COLOURS as COLOURS
 from .pictures.colours import density_on_grid as density_on_grid
 from .pictures.corner import corner_picture as corner_picture
+from .pictures.figures import density_picture as density_picture
+from .pictures.figures import map_picture as map_picture
+from .pictures.figures import map_samples_picture as map_samples_picture
+from .pictures.figures import samples_picture as samples_picture
 from .pictures.flow import draw_cells as draw_cells
 from .pictures.flow import flow_picture as flow_picture
 from .pictures.flow import mean_field as mean_field
-from .pictures.ground import COLOURS as COLOURS
-from .pictures.maps import map_picture as map_picture
-from .pictures.maps import map_samples_picture as map_samples_picture
 from .pictures.page import density_page as density_page
 from .pictures.plots import MODEL as MODEL
 from .pictures.plots import PICTURES as PICTURES
@@ -74,8 +75,6 @@ from .pictures.plots import is_one_file as is_one_file
 from .pictures.plots import known_names as known_names
 from .pictures.plots import plot_density as plot_density
 from .pictures.settings import PlotSettings as PlotSettings
-from .pictures.square import density_picture as density_picture
-from .pictures.square import samples_picture as samples_picture
 from .pictures.surfaces import edge_pairs as edge_pairs
 from .pictures.surfaces import immersion as immersion
 from .pictures.surfaces import viewpoint as viewpoint
@@ -96,7 +95,6 @@ from .spaces.catalogue import space_class as space_class
 from .spaces.flat import KleinBottle as KleinBottle
 from .spaces.flat import Torus as Torus
 from .spaces.patches import KleinCoordinates as KleinCoordinates
-from .spaces.patches import from_klein as from_klein
 from .spaces.patches import to_klein as to_klein
 from .spaces.round import ProjectivePlane as ProjectivePlane
 from .spaces.round import RoundSpace as RoundSpace

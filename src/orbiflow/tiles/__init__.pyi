@@ -82,6 +82,7 @@ from .pictures.overlays import overlay_picture as overlay_picture
 from .pictures.overlays import overlay_raster as overlay_raster
 from .pictures.tilings import classes_png as classes_png
 from .pictures.tilings import default_window as default_window
+from .pictures.tilings import draw_key as draw_key
 from .pictures.tilings import draw_template as draw_template
 from .pictures.tilings import draw_tiling as draw_tiling
 from .pictures.tilings import tiling_picture as tiling_picture

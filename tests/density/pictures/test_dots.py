@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from density.blends import blended
+from density.blends import blended, identity_flow
 from orbiflow.density import (
     AdaptiveKernels,
     Mixture,
@@ -21,9 +21,9 @@ from orbiflow.density import (
     density_page,
     density_picture,
     make_space,
-    map_picture,
 )
-from orbiflow.density.models import identity_flow
+from orbiflow.density.pictures.figures import draw_density
+from orbiflow.density.pictures.maps import Map, chosen_map
 from orbiflow.density.pictures.overlays import MAX_COVER, uncrowded
 from orbiflow.drawing import Picture, Sheet
 
@@ -98,7 +98,8 @@ def test_a_peak_is_seen_through_its_dots(
 
     def picture(dots: torch.Tensor | None) -> np.ndarray:
         if density.space.is_round:
-            made = map_picture(density, dots, settings, about=drawn, sheet=sheet)
+            drawn_map = Map(density.space, chosen_map(density.space, drawn))
+            made = draw_density(drawn_map, density, settings, dots=dots, sheet=sheet)
         else:
             made = density_picture(density, dots, settings, sheet=sheet)
         return pixels(made)

@@ -11,6 +11,7 @@ from orbiflow.tiles import CLASSES, TileModel, certify, subdivided
 from orbiflow.tiles.search import tile_model
 from orbiflow.tiles.search.candidates import DENSE, TOLERANCES
 from orbiflow.tiles.search.tile_model import converge, extract_tile
+from strategies import error_estimate
 
 
 def bent(name: str, rms: float = 0.15, seed: int = 0) -> TileModel:
@@ -44,7 +45,7 @@ def test_converge_doubles_until_accurate() -> None:
         exact = model.flow.with_steps(16 * chosen)(points)
     assert (moved - exact).norm(dim=-1).max().item() <= 1e-7
     # no finer than need be: an eighth of the steps is too coarse
-    assert model.flow.with_steps(max(1, chosen // 8)).error_estimate(points) > 1e-7
+    assert error_estimate(model.flow.with_steps(max(1, chosen // 8)), points) > 1e-7
 
 
 def test_converge_gives_up_on_a_steep_field() -> None:

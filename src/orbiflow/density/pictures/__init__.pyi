@@ -1,13 +1,15 @@
 from .axes import space_title as space_title
 from .coastlines import read_coastlines as read_coastlines
+from .colours import COLOURS as COLOURS
 from .colours import density_on_grid as density_on_grid
 from .corner import corner_picture as corner_picture
+from .figures import density_picture as density_picture
+from .figures import map_picture as map_picture
+from .figures import map_samples_picture as map_samples_picture
+from .figures import samples_picture as samples_picture
 from .flow import draw_cells as draw_cells
 from .flow import flow_picture as flow_picture
 from .flow import mean_field as mean_field
-from .ground import COLOURS as COLOURS
-from .maps import map_picture as map_picture
-from .maps import map_samples_picture as map_samples_picture
 from .page import density_page as density_page
 from .plots import MODEL as MODEL
 from .plots import PICTURES as PICTURES
@@ -19,8 +21,6 @@ from .plots import is_one_file as is_one_file
 from .plots import known_names as known_names
 from .plots import plot_density as plot_density
 from .settings import PlotSettings as PlotSettings
-from .square import density_picture as density_picture
-from .square import samples_picture as samples_picture
 from .surfaces import edge_pairs as edge_pairs
 from .surfaces import immersion as immersion
 from .surfaces import viewpoint as viewpoint

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from orbiflow.density.models import AdaptiveKernels, Density, midpoints
 from orbiflow.density.pictures.surfaces import off_cones
 from orbiflow.density.spaces import Space, rectangle
 
+COLOURS = "viridis"
 _TOLERANCE = 1e-5
 """Relative error of the sums over kernels."""
 
@@ -23,10 +24,6 @@ _KERNELS = 4096
 
 _COARSE = 120
 """Points along a side by which a scale is chosen."""
-
-
-Sums = Callable[[AdaptiveKernels, Tensor], Tensor]
-"""A function that returns a mixture of kernels at points."""
 
 
 @torch.no_grad()
@@ -55,12 +52,7 @@ def density_on_grid(
     if part is None:
         return density_at(density, points, measure).reshape(shape)
     half = _half_pixels(part[1], pixel or float(x[1] - x[0]))
-    sums = _round_sums
-    if density.space.is_round:
-        points = off_cones(points)
-    else:
-        sums = lambda wide, _: _flat_sums(wide, x, y).reshape(-1)  # noqa: E731
-    return _averaged(density, points, measure, half, sums).reshape(shape)
+    return _averaged(density, points, measure, half, (x, y)).reshape(shape)
 
 
 @torch.no_grad()
@@ -69,8 +61,7 @@ def density_on_map(density: Density, points: Tensor, measure: str, angle: float)
     part = density.kernel_part
     if part is None:
         return density_at(density, points, measure)
-    half = torch.tensor(angle / 2)
-    return _averaged(density, off_cones(points), measure, half, _round_sums)
+    return _averaged(density, points, measure, torch.tensor(angle / 2))
 
 
 class ChosenScale(NamedTuple):
@@ -105,17 +96,27 @@ def is_sharp(density: Density, *, pixel: float | None = None, angle: float | Non
     return bool((part[1].concentrations ** -0.5 < 2 * half).any())
 
 
-def _averaged(density: Density, points: Tensor, measure: str, half: Tensor, sums: Sums) -> Array:
-    """Return the density (N,) with kernels whose deviations are at least `half` a pixel."""
+def _averaged(
+    density: Density, points: Tensor, measure: str, half: Tensor, sides: tuple[Tensor, ...] = ()
+) -> Array:
+    """Return the density (N,) with kernels whose deviations are at least `half` a pixel.
+
+    Points of a flat space are a grid with these `sides`, x and y.
+    """
     part = density.kernel_part
     assert part is not None
     weight, own = part
     kappa = 1 / (1 / own.concentrations + half**2)
     widened = AdaptiveKernels(own.space, own.centers, kappa, own.weights)
-    logs = density.log_density_without_kernels(points)
     if density.space.is_round:
-        logs = logs + density.space.log_area(points)
-    values = logs.exp() + weight * sums(widened, points)
+        points = off_cones(points)
+        areas = density.space.log_area(points)
+        logs = density.log_density_without_kernels(points) + areas
+        sums = (widened.log_density(points, tolerance=_TOLERANCE) + areas).exp()
+    else:
+        logs = density.log_density_without_kernels(points)
+        sums = _flat_sums(widened, *sides).reshape(-1)
+    values = logs.exp() + weight * sums
     return (values * density.space.log_density_factor(points, measure).exp()).numpy()
 
 
@@ -146,12 +147,6 @@ def _flat_sums(kernels: AdaptiveKernels, x: Tensor, y: Tensor) -> Tensor:
                 tables.append((own * (angle.cos() - 1)).exp() / (period * torch.special.i0e(own)))
             total += (tables[0] * kernels.weights[part]) @ tables[1].T
     return total
-
-
-def _round_sums(kernels: AdaptiveKernels, points: Tensor) -> Tensor:
-    """Return the mixture of kernels (N,) at points off the cone points, per area of the square."""
-    values = kernels.log_density(points, tolerance=_TOLERANCE)
-    return (values + kernels.space.log_area(points)).exp()
 
 
 MAX_DECADES = 5

@@ -21,8 +21,7 @@ from orbiflow.density.pictures.axes import (
     view_of,
 )
 from orbiflow.density.pictures.colours import density_at
-from orbiflow.density.pictures.ground import LIGHT
-from orbiflow.density.pictures.overlays import MAX_DOTS, draw_dots
+from orbiflow.density.pictures.overlays import LIGHT, MAX_DOTS, draw_dots
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.drawing import Picture, Sheet
 from orbiflow.errors import OrbiflowError

@@ -11,11 +11,9 @@ import torch
 from PIL import Image
 from torch import Tensor
 
-from orbiflow.arguments import as_whole
-from orbiflow.arrays import Array
 from orbiflow.density.models import Density, FlowDensity
 from orbiflow.density.pictures.axes import INK, require_plane, space_title, view_of
-from orbiflow.density.pictures.ground import COLOURS, Room, colour_bar, make_frame, printed_room
+from orbiflow.density.pictures.frames import Room, colour_bar, make_frame, printed_room
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.drawing import Picture, Sheet, draw_flow, draw_magnitude
 from orbiflow.errors import OrbiflowError
@@ -24,17 +22,16 @@ from orbiflow.symmetry import CrystallographicGroup
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+CELLS = 3
+"""Number of cells along each side of the picture."""
+
 SPEED = "speed, sides of the square per unit time"
 SCREEN = Room(1.8, 3.8, 10.8, 2.7, 1.7, 1.5)
 """Room on a screen, with a caption below."""
 
 
 def flow_picture(
-    density: Density,
-    settings: PlotSettings | None = None,
-    *,
-    cells: int = 3,
-    sheet: Sheet | None = None,
+    density: Density, settings: PlotSettings | None = None, *, sheet: Sheet | None = None
 ) -> Picture:
     """Draw the time mean of a flow's vector fields, over the canonical square and its images.
 
@@ -44,19 +41,16 @@ def flow_picture(
     Args:
         density: A density on a two-dimensional space.
         settings: How it is drawn.
-        cells: Number of cells along each side of the picture, 1 to 9.
         sheet: The sheet. Default: that of the settings.
 
     Raises:
-        OrbiflowError: If the space has another dimension, the number of cells is not allowed, or a
-            centre does not fit.
+        OrbiflowError: If the space has another dimension, or a centre does not fit.
     """
     settings, space = settings or PlotSettings(), density.space
     sheet = sheet or settings.sheet
     require_plane(space)
-    as_whole(cells, "cells", 1, 9)
     view = view_of(space, center=None if space.is_round else settings.center)
-    low, high = 0.5 - cells / 2, 0.5 + cells / 2
+    low, high = 0.5 - CELLS / 2, 0.5 + CELLS / 2
     window = (low, low, high, high)
     printed = printed_room(sheet, 0.4, 0.6, 0.6, SPEED, ("0.00",))
     frame = make_frame(sheet, printed if sheet.printed else SCREEN)
@@ -91,32 +85,11 @@ def flow_of(density: Density) -> tuple[float, FlowDensity]:
 
 def few_colours(png: bytes) -> bytes:
     """Return a picture of a flow in 256 colours, a third of the bytes."""
-    chart = Image.new("P", (1, 1))
-    chart.putpalette(_palette().tobytes().ljust(768, b"\0"))
-    image = Image.open(io.BytesIO(png)).convert("RGB")
     buffer = io.BytesIO()
     # no dither: it would triple the bytes
-    image.quantize(palette=chart, dither=Image.Dither.NONE).save(buffer, "PNG", optimize=True)
+    few = Image.open(io.BytesIO(png)).convert("RGB").quantize(kmeans=1, dither=Image.Dither.NONE)
+    few.save(buffer, "PNG", optimize=True)
     return buffer.getvalue()
-
-
-def _palette() -> Array:
-    """Return the colours (N, 3), uint8, of a picture of a flow.
-
-    There are those of the speed, so finely that no bands are seen, more coarsely their mixtures with
-    the lines' white, and those of outline and letters.
-    """
-    from matplotlib import colormaps
-
-    def speeds(count: int) -> Array:
-        return 255 * colormaps[COLOURS](np.linspace(0, 1, count))[:, :3]
-
-    steps = ((0.15, 24), (0.3, 20), (0.45, 16), (0.6, 16), (0.75, 12), (0.88, 12))
-    mixed = [(1 - white) * speeds(count) + 255 * white for white, count in steps]
-    greys = np.repeat([[17.0], [26.0], [80.0], [128.0], [200.0], [255.0]], 3, axis=1)
-    share = np.linspace(0.2, 1.0, 5)[:, None]
-    outline = (1 - share) * 17.0 + share * (0xFF, 0xD1, 0x66)
-    return np.rint(np.concatenate([speeds(128), *mixed, greys, outline])).astype(np.uint8)
 
 
 @torch.no_grad()

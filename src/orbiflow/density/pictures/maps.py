@@ -7,20 +7,19 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
-import torch
-from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
-from orbiflow.density.pictures import ground, projections
+from orbiflow.density.pictures import frames, projections
 from orbiflow.density.pictures.axes import chart_points, degrees_text
 from orbiflow.density.pictures.colours import chosen_scale, density_on_map, is_sharp, shading
 from orbiflow.density.pictures.map_axes import draw_map_lines, graticule
-from orbiflow.density.pictures.overlays import log_natural
+from orbiflow.density.pictures.overlays import LIGHT, Colouring, log_natural
+from orbiflow.density.pictures.projections import Azimuthal, Projection
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.density.spaces import RoundSpace, Space, checked_table, to_latlon, to_vectors
-from orbiflow.drawing import Picture, Sheet
+from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors
+from orbiflow.drawing import Sheet
 from orbiflow.errors import OrbiflowError, SettingError
 
 if TYPE_CHECKING:
@@ -36,120 +35,65 @@ _BESIDE = 120 / 25.4
 """Inches of a printed figure below which discs are above each other, for room round their rims."""
 
 
-def map_picture(
-    density: Density,
-    samples: Tensor | None = None,
-    settings: PlotSettings | None = None,
-    *,
-    about: Tensor | None = None,
-    coastlines: Sequence[ArrayLike] = (),
-    sheet: Sheet | None = None,
-) -> Picture:
-    """Draw a density on the sphere or the projective plane on a map with its graticule.
-
-    The density is evaluated at each pixel of the map, so that nothing is stretched or sewn; the
-    pixels end at a curve. On the projective plane each axis is drawn at the end that the map shows.
-
-    Args:
-        density, samples, settings, sheet: As for `density_picture`.
-        about: Chart points (N, 2) that the map should show. Default: `samples`.
-        coastlines: Lines (M, 2) of latitude and longitude.
-    """
-    settings = settings or PlotSettings()
-    drawn = _map_about(density.space, samples if about is None else about, settings, coastlines)
-    return ground.draw_density(drawn, density, settings, dots=samples, sheet=sheet)
-
-
-def map_samples_picture(
-    density: Density,
-    data: Tensor | None,
-    samples: Tensor,
-    settings: PlotSettings | None = None,
-    *,
-    coastlines: Sequence[ArrayLike] = (),
-    sheet: Sheet | None = None,
-) -> Picture:
-    """Draw data (N, 2) and samples (M, 2) on two maps, as `samples_picture` does on two squares."""
-    settings = settings or PlotSettings()
-    about = samples if data is None else data
-    drawn = _map_about(density.space, about, settings, coastlines)
-    return ground.draw_samples(drawn, density, settings, data, samples, sheet=sheet)
-
-
-def _map_about(
-    space: Space, about: Tensor | None, settings: PlotSettings, coastlines: Sequence[ArrayLike]
-) -> Map:
-    about = torch.empty(0, 2) if about is None else about
-    chosen = chosen_map(space, chart_points(space, about), settings, settings.names)
-    return Map(space, chosen, coastlines)
-
-
-class Map(ground.Ground):
+class Map:
     """A map of the sphere or the projective plane, with coastlines (N, 2) in degrees."""
 
     caption_below = True
 
     def __init__(
-        self, space: Space, projection: projections.Projection, coastlines: Sequence[ArrayLike] = ()
+        self, space: Space, projection: Projection, coastlines: Sequence[Array] = ()
     ) -> None:
-        self.space, self.projection = space, projection
-        self.coastlines = [checked_table(line, (2,), "a coastline") for line in coastlines]
-        for line in self.coastlines:
-            to_vectors(line)  # refuses latitudes beyond the poles
+        self.space, self.projection, self.coastlines = space, projection, coastlines
         self.outline = projection.outline()
         width, height = np.ptp(self.outline, axis=0)
         self.width, self.aspect = float(width), float(width / height)
-        self.is_disc = isinstance(projection, projections.Azimuthal)
+        self.is_disc = isinstance(projection, Azimuthal)
         self.title_gap = 2.2 if self.is_disc else 0.6
 
     def places(self, points: Tensor) -> Array:
         """Return places (M, 2) of chart points (N, 2); of axes, those of the end that the map shows."""
         space, projection = self.space, self.projection
         vectors = cast(RoundSpace, space).vectors(chart_points(space, points))
-        if space.name == "projective-plane" and isinstance(projection, projections.Azimuthal):
+        if space.name == "projective-plane" and isinstance(projection, Azimuthal):
             vectors = np.where(vectors @ projection.frame[2] < 0, -1.0, 1.0)[:, None] * vectors
         latlon = to_latlon(vectors)
         return projection.forward(latlon[projection.contains(latlon)])
 
-    def colouring(self, density: Density, settings: PlotSettings) -> ground.Colouring:
+    def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
         pixels = pixels_of(self.projection)
         points = cast(RoundSpace, self.space).vectors_to_chart(to_vectors(pixels.latlon))
         values = density_on_map(density, points, settings.measure, pixels.angle)
         chosen = chosen_scale(density, settings.measure, settings.scale)
         shade = shading(values[pixels.within], pixels.areas[pixels.within], log=chosen.log)
-
-        def logs() -> Array:
-            found = log_natural(density, values, points, settings.measure)
-            return pixels.table(found, math.nan)
-
+        logs = None
+        if settings.regions:
+            logs = pixels.table(log_natural(density, values, points, settings.measure), math.nan)
         note = ""
         if is_sharp(density, angle=pixels.angle):
             size = f"{math.degrees(pixels.angle):.2g}°"
             note = f"peaks narrower than {size} are averaged over it"
         places = pixels.table(shade.places(values), 0.0)
-        return ground.Colouring(
-            places, pixels.extent, shade, chosen.reason, note, logs, self.outline
-        )
+        return Colouring(places, pixels.extent, shade, chosen.reason, note, logs, self.outline)
 
-    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> ground.Room:
+    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> frames.Room:
         above = 0.8 if sheet.printed else 3.2
-        if self.is_disc and (not sheet.printed or sheet.width >= ground.NARROW):
-            beside = ground.Room(3.6, 1.8, 0.0, above + 1.2, 4.4, 1.2)
-            return ground.room_for_bar_beside(sheet, beside, label, ticks)
+        if self.is_disc and (not sheet.printed or sheet.width >= frames.NARROW):
+            beside = frames.Room(3.6, 1.8, 0.0, above + 1.2, 4.4, 1.2)
+            return frames.room_for_bar_beside(sheet, beside, label, ticks)
         left, right, top = (3.4, 3.4, 1.2) if self.is_disc else (3.6, 1.8, 0.0)
-        under = ground.Room(left, 0.0, right, above + top, 2.2, 1.0)
-        return ground.room_for_bar_below(sheet, under, label)
+        under = frames.Room(left, 0.0, right, above + top, 2.2, 1.0)
+        return frames.room_for_bar_below(sheet, under, label)
 
-    def panels_room(self, sheet: Sheet) -> tuple[ground.Room, bool]:
+    def panels_room(self, sheet: Sheet) -> tuple[frames.Room, bool]:
         if not self.is_disc:
-            return ground.Room(3.6, 2.4, 1.8, 2.2, 4.4, 0.0), True
+            return frames.Room(3.6, 2.4, 1.8, 2.2, 4.4, 0.0), True
         stacked = sheet.printed and sheet.width < _BESIDE
-        return ground.Room(3.6, 1.8, 3.6, 3.8, 5.6 if stacked else 7.4, 0.0), stacked
+        return frames.Room(3.6, 1.8, 3.6, 3.8, 5.6 if stacked else 7.4, 0.0), stacked
 
     def fill(self, axes: Axes) -> None:
-        axes.fill(*self.outline.T, color=ground.LIGHT, linewidth=0, zorder=0)
+        axes.fill(*self.outline.T, color=LIGHT, linewidth=0, zorder=0)
 
-    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: ground.Panel) -> None:
+    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: frames.Panel) -> None:
         """Draw the outline, the graticule with its degrees, and coastlines."""
         draw_map_lines(
             axes, self.projection, sheet, side, coastlines=self.coastlines, light=panel.light
@@ -187,7 +131,7 @@ class Map(ground.Ground):
         if self.space.columns[0] != "lat":
             frame = "; latitudes are from the x, y plane towards z, longitudes from x towards y"
         middle = degrees_text((lon + 180) % 360 - 180, "EW")
-        if not isinstance(projection, projections.Azimuthal):
+        if not isinstance(projection, Azimuthal):
             return f"The sphere in {projection.title}, about {middle}{frame}"
         if projection.flipped:
             return (
@@ -206,7 +150,7 @@ class Map(ground.Ground):
     def _subtitle(self) -> str:
         """The projection as a title has it."""
         projection = self.projection
-        if not (isinstance(projection, projections.Azimuthal) and projection.flipped):
+        if not (isinstance(projection, Azimuthal) and projection.flipped):
             return projection.title
         return "Schmidt net (equal-area)" if projection.is_equal_area else "Wulff net (equal-angle)"
 
@@ -215,20 +159,18 @@ class Map(ground.Ground):
 
     def write_on_screen(
         self,
-        frame: ground.Frame,
+        frame: frames.Frame,
         sheet: Sheet,
         title: str,
-        caption: str,
         notes: Sequence[str],
-        dots: bool,
+        dots: tuple[int, int] | None,
     ) -> None:
-        del notes, dots  # the caption has them
         top = 1 - 1.6 * sheet.em / frame.figure.get_size_inches()[1]
         frame.figure.text(
             0.5, top, f"{title}: {self._subtitle}", ha="center", va="center",
             fontsize=1.15 * sheet.text,
         )  # fmt: skip
-        ground.write_caption(frame.figure, caption, sheet)
+        frames.write_caption(frame.figure, self.caption(notes, dots), sheet)
 
 
 class Pixels(NamedTuple):
@@ -256,7 +198,7 @@ class Pixels(NamedTuple):
         return table
 
 
-def pixels_of(projection: projections.Projection, count: int | None = None) -> Pixels:
+def pixels_of(projection: Projection, count: int | None = None) -> Pixels:
     """Return about `count` pixels of a map, by default `_PIXELS`."""
     from matplotlib.path import Path
     from scipy.ndimage import binary_dilation
@@ -278,27 +220,15 @@ def pixels_of(projection: projections.Projection, count: int | None = None) -> P
     return Pixels(shown, latlon, within[kept], _areas(projection, latlon), step, extent)
 
 
-def _areas(projection: projections.Projection, latlon: Array) -> Array:
+def _areas(projection: Projection, latlon: Array) -> Array:
     """Return the areas on the sphere of equal pixels of the map."""
     if projection.is_equal_area:
         return np.ones(len(latlon))
-    if isinstance(projection, projections.Azimuthal):
+    if isinstance(projection, Azimuthal):
         cosines = to_vectors(latlon) @ projection.frame[2]
         return ((1 + cosines) / 2) ** 2  # conformal: scale 2 / (1 + cos), squared
     return np.cos(np.radians(latlon[:, 0]))
 
-
-WORLD: dict[str, type[projections.WorldMap]] = {
-    c.name: c for c in (projections.EqualEarth, projections.Mollweide, projections.PlateCarree)
-}
-CENTRED: dict[str, type[projections.Azimuthal]] = {
-    c.name: c for c in (projections.Lambert, projections.Stereographic)
-}
-NETS: dict[str, type[projections.Azimuthal]] = {
-    "schmidt": projections.Lambert,
-    "wulff": projections.Stereographic,
-}
-"""Nets of structural geology: latitude is plunge or inclination, longitude trend or declination."""
 
 _NET_WORDS = ("inc", "plunge", "dip")
 """How names of the first column begin if rows are directions in a net, not places on a globe."""
@@ -313,7 +243,7 @@ def chosen_map(
     points: Tensor,
     settings: PlotSettings | None = None,
     names: Sequence[str] | None = None,
-) -> projections.Projection:
+) -> Projection:
     """Return the map of a sphere or projective plane that settings ask for, or that suits points.
 
     `points` are chart points (N, 2); `names` of the data's columns may ask for a net.
@@ -343,22 +273,33 @@ def chosen_map(
             projection = "lambert" if len(middle) == 2 and middle[0] else "equal-earth"
         else:
             projection = "equal-earth" if cap is None and radius is None else "lambert"
-    if projection in WORLD:
-        return _world(WORLD[projection], space, middle, radius)
-    if projection in NETS:
+    kind = projections.PROJECTIONS[projection]
+    if issubclass(kind, projections.WorldMap):
+        if axial:
+            discs = [n for n, c in projections.PROJECTIONS.items() if issubclass(c, Azimuthal)]
+            raise SettingError(
+                "a direction and its opposite are one point of the projective plane, which needs a "
+                f"map of one hemisphere: {{projection}} must be {', '.join(discs)}, got {projection}"
+            )
+        if radius is not None:
+            raise SettingError(
+                f"a map of the whole sphere ({projection}) has no radius: leave {{radius}} out"
+            )
+        lat, lon = (0.0, 0.0, *(middle or ()))[-2:]
+        return kind((lat, lon))
+    if projection in ("schmidt", "wulff"):
         if middle is not None:
             raise SettingError(
                 f"{{center}} does not apply to a {projection} net, which has the vertical in its "
                 "middle: give no centre"
             )
-        return NETS[projection]((90.0, 0.0), float(radius or 90.0), flipped=True)
+        return kind((90.0, 0.0), float(radius or 90.0), flipped=True)
+    reach = 90.0
     if middle is None:
         middle, reach = cap or ((90.0, 0.0), 90.0)
-    else:
-        reach = 90.0
-        if len(middle) == 1:
-            middle = (90.0 if axial else 0.0, middle[0])
-    return CENTRED[projection]((middle[0], middle[1]), float(radius or reach))
+    elif len(middle) == 1:
+        middle = (90.0 if axial else 0.0, *middle)
+    return kind((middle[0], middle[1]), float(radius or reach))
 
 
 def smallest_cap(vectors: Array) -> tuple[tuple[float, float], float] | None:
@@ -375,22 +316,3 @@ def smallest_cap(vectors: Array) -> tuple[tuple[float, float], float] | None:
     reach = 1.1 * float(np.quantile(apart, _SHARE, method="higher"))
     fitting = [float(r) for r in _RADII if r >= reach]
     return ((float(lat), float(lon)), fitting[0]) if fitting else None
-
-
-def _world(
-    kind: type[projections.WorldMap],
-    space: Space,
-    middle: tuple[float, ...] | None,
-    radius: float | None,
-) -> projections.Projection:
-    if space.name == "projective-plane":
-        raise SettingError(
-            "a direction and its opposite are one point of the projective plane, which needs a map "
-            f"of one hemisphere: {{projection}} must be {', '.join((*CENTRED, *NETS))}, got {kind.name}"
-        )
-    if radius is not None:
-        raise SettingError(
-            f"a map of the whole sphere ({kind.name}) has no radius: leave {{radius}} out"
-        )
-    lat, lon = middle if middle and len(middle) == 2 else (0.0, *(middle or (0.0,)))
-    return kind((lat, lon))

@@ -8,17 +8,16 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import ArrayLike
 from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
 from orbiflow.density.pictures import axes, colours, surfaces
-from orbiflow.density.pictures.ground import COLOURS, SMALLER
-from orbiflow.density.pictures.overlays import thinned, uncrowded
+from orbiflow.density.pictures.colours import COLOURS
+from orbiflow.density.pictures.overlays import SMALLER, thinned, uncrowded
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import average_note
-from orbiflow.density.spaces import Space, checked_table, to_vectors
+from orbiflow.density.spaces import Space, to_vectors
 from orbiflow.drawing import rendered
 from orbiflow.errors import OrbiflowError
 
@@ -36,7 +35,7 @@ def density_page(
     settings: PlotSettings | None = None,
     *,
     samples: Tensor | None = None,
-    coastlines: Sequence[ArrayLike] = (),
+    coastlines: Sequence[Array] = (),
     resolution: int | None = None,
     title: str = "",
 ) -> str:
@@ -53,7 +52,7 @@ def density_page(
         settings: How it is drawn; `dots` says whether the samples are seen at first.
         samples: Chart points (N, 2) to draw as dots, which a box in the page shows and hides. Of more
             than `MAX_DOTS` a random choice is drawn.
-        coastlines: For the sphere and the projective plane, lines (M, 2) of latitude and longitude.
+        coastlines: For the sphere and the projective plane, lines (M, 2) from `read_coastlines`.
         resolution: Cells along an edge of the square, 2 to 250. Default: 160, or 240 for a density
             with kernels.
         title: The title. Default: "Density on the" and the space.
@@ -69,7 +68,7 @@ def density_page(
     areas = space.log_area(grid.points).exp().numpy()
     chosen = colours.chosen_scale(density, settings.measure, settings.scale)
     shade = colours.shading(values, areas, log=chosen.log)
-    lines = (*_coordinate_lines(space), (1.6, _coast(space, coastlines)))
+    lines = (*_coordinate_lines(space), (1.6, _on_surface(space, coastlines)))
     notes = []
     data = {
         **_surface(space, grid.points, int(values.argmax())),
@@ -134,17 +133,6 @@ def _polylines(lines: list[Array]) -> dict[str, Any]:
     }
 
 
-def _coast(space: Space, coastlines: Sequence[ArrayLike]) -> list[Array]:
-    if not coastlines:
-        return []
-    if not space.is_round:
-        raise OrbiflowError(f"coastlines need latitudes and longitudes, the {space.name} has none")
-    tables = [checked_table(line, (2,), "a coastline") for line in coastlines]
-    return [
-        surfaces.vector_immersion(space)(to_vectors(table)) for table in tables if len(table) > 1
-    ]
-
-
 Lines = tuple[tuple[float, list[Array]], tuple[float, list[Array]]]
 """Lines (M, 3) of equal coordinates with their widths, then those of coordinate 0, which are wider."""
 
@@ -159,11 +147,14 @@ def _coordinate_lines(space: Space) -> Lines:
     across = [np.stack([np.full(181, lat), t], axis=-1) for lat in range(0, 90, step)]
     across += [line * (-1, 1) for line in across[1:]]
     along = [np.stack([t / 2, np.full(181, lon)], axis=-1) for lon in range(0, 360, step)]
-    surface = surfaces.vector_immersion(space)
-    parallels, meridians = (
-        [surface(to_vectors(line)) for line in lines] for lines in (across, along)
-    )
+    parallels, meridians = _on_surface(space, across), _on_surface(space, along)
     return (1.0, parallels + meridians), (2.0, [parallels[0], meridians[0]])
+
+
+def _on_surface(space: Space, lines: Sequence[Array]) -> list[Array]:
+    """Return lines of directions (M, 2), of more than a point, on the surface of a round space."""
+    surface = surfaces.vector_immersion(space)
+    return [surface(to_vectors(line)) for line in lines if len(line) > 1]
 
 
 def _eighths(space: Space, steps: int, zero: int) -> Lines:

@@ -11,15 +11,14 @@ import torch
 from numpy.typing import ArrayLike
 
 from orbiflow.arguments import as_path
-from orbiflow.arrays import Array
 from orbiflow.density.comparing import density_of
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models import Density, read_density
 from orbiflow.density.pictures.axes import view_of
-from orbiflow.density.pictures.coastlines import read_coastlines, simplified
+from orbiflow.density.pictures.coastlines import coastlines_for, simplified
 from orbiflow.density.pictures.corner import MAX_COLUMNS, corner_picture
+from orbiflow.density.pictures.figures import Ground, draw_density, draw_samples
 from orbiflow.density.pictures.flow import few_colours, flow_picture
-from orbiflow.density.pictures.ground import Ground, draw_density, draw_samples
 from orbiflow.density.pictures.maps import Map, chosen_map
 from orbiflow.density.pictures.overlays import region_lines
 from orbiflow.density.pictures.page import density_page
@@ -174,7 +173,7 @@ class _Shown:
         if settings.names is None:
             settings = settings.replace(names=known_names(space, columns))
         self.settings = settings
-        self.coastlines = _coastlines(space, settings)
+        self.coastlines = coastlines_for(space, settings)
         _check_space(space, settings)
         self.data = None if data is None else space.to_chart(data)
         generator = torch.Generator().manual_seed(settings.seed)
@@ -238,11 +237,3 @@ def _check_space(space: Space, settings: PlotSettings) -> None:
             f"{{{name}}} applies to maps of the sphere and the projective plane, not to the "
             f"{space.name}"
         )
-
-
-def _coastlines(space: Space, settings: PlotSettings) -> list[Array]:
-    if settings.coastlines is None:
-        return []
-    if space.name != "sphere":
-        raise SettingError(f"{{coastlines}} apply to the sphere, not to the {space.name}")
-    return read_coastlines(settings.coastlines)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 
@@ -23,7 +23,7 @@ FINEST = 1.0
 
 
 @dataclass(frozen=True)
-class Projection(ABC):
+class _Centred:
     """A map of directions about `center`, a latitude and a longitude.
 
     - `name`: Its name in settings. `title`: Its name in a sentence.
@@ -39,26 +39,6 @@ class Projection(ABC):
     def __post_init__(self) -> None:
         as_number(self.center[0], "the centre's latitude", -90, 90)
         as_number(self.center[1], "the centre's longitude", -360, 360)
-
-    @abstractmethod
-    def forward(self, latlon: Array) -> Array:
-        """Return the places of directions."""
-
-    @abstractmethod
-    def inverse(self, places: Array) -> Array:
-        """Return directions of places, even a little off the map; longitudes are in [-180, 180)."""
-
-    @abstractmethod
-    def outline(self) -> Array:
-        """Return the closed ring (N, 2) of places around the map."""
-
-    @abstractmethod
-    def pieces(self, latlon: Array) -> list[Array]:
-        """Return a line (M, 2) of directions on the map, cut where the map is: places (K, 2), K > 1."""
-
-    def contains(self, latlon: Array) -> Array:
-        """Return which directions the map shows, (N,) of bool: all, unless it is of a part."""
-        return np.ones(len(latlon), dtype=bool)
 
 
 def refined(latlon: Array) -> Array:
@@ -85,7 +65,7 @@ def _without_points(lines: list[Array]) -> list[Array]:
 
 
 @dataclass(frozen=True)
-class Azimuthal(Projection):
+class Azimuthal(_Centred, ABC):
     """A map of what is within `radius` degrees of the centre, in its true direction from there.
 
     It is seen from outside, north up, and at the poles with the centre's longitude down (north) or up
@@ -125,22 +105,27 @@ class Azimuthal(Projection):
         return np.stack([east, -up if self.flipped else up, out])
 
     def forward(self, latlon: Array) -> Array:
+        """Return the places of directions."""
         return self._placed(to_vectors(latlon))
 
     def inverse(self, places: Array) -> Array:
+        """Return directions of places, even a little off the map; longitudes are in [-180, 180)."""
         distance = np.linalg.norm(places, axis=1)
         angle = self.angle(distance)
         flat = places * (np.sin(angle) / np.maximum(distance, 1e-300))[:, None]
         return to_latlon(np.concatenate([flat, np.cos(angle)[:, None]], axis=1) @ self.frame)
 
     def outline(self) -> Array:
+        """Return the closed ring (N, 2) of places around the map."""
         turn = np.linspace(0, 2 * math.pi, 361)
         return self.rim * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
 
     def contains(self, latlon: Array) -> Array:
+        """Return which directions the map shows, (N,) of bool."""
         return to_vectors(latlon) @ self.frame[2] >= math.cos(math.radians(self.radius)) - 1e-12
 
     def pieces(self, latlon: Array) -> list[Array]:
+        """Return a line (M, 2) of directions in pieces (K, 2), K > 1, cut where the map is."""
         vectors = to_vectors(refined(latlon))
         above = vectors @ self.frame[2] - math.cos(math.radians(self.radius))
         inside = above >= 0
@@ -197,7 +182,7 @@ _NEWTON = 12
 """Newton steps, twice as many as are needed from the starts below."""
 
 
-class WorldMap(Projection):
+class WorldMap(_Centred, ABC):
     """A map of the whole sphere, cut along the meridian opposite the map's own."""
 
     def __post_init__(self) -> None:
@@ -221,21 +206,29 @@ class WorldMap(Projection):
         """Return x per radian of longitude."""
 
     def forward(self, latlon: Array) -> Array:
+        """Return the places of directions."""
         return self._placed(latlon[:, 0], wrapped(latlon[:, 1] - self.center[1]))
 
     def inverse(self, places: Array) -> Array:
+        """Return directions of places, even a little off the map; longitudes are in [-180, 180)."""
         x, y = places.T
         lat = self.latitude(y)
         lon = x / np.maximum(self.stretch(self.height(lat)), 1e-12)
         return np.stack([np.degrees(lat), wrapped(np.degrees(lon) + self.center[1])], axis=-1)
 
     def outline(self) -> Array:
+        """Return the closed ring (N, 2) of places around the map."""
         up = np.linspace(-90.0, 90.0, 181)
         side = np.full_like(up, 180.0)
         right, left = self._placed(up, side), self._placed(up[::-1], -side)
         return np.concatenate([right, left, right[:1]])
 
+    def contains(self, latlon: Array) -> Array:
+        """Return which directions the map shows: all."""
+        return np.ones(len(latlon), dtype=bool)
+
     def pieces(self, latlon: Array) -> list[Array]:
+        """Return a line (M, 2) of directions in pieces (K, 2), K > 1, cut where the map is."""
         latlon = refined(latlon)
         lat, lon = latlon[:, 0], wrapped(latlon[:, 1] - self.center[1])
         found: list[Array] = []
@@ -329,3 +322,14 @@ class EqualEarth(WorldMap):
     def stretch(self, y: Array) -> Array:
         theta = self._theta(y)
         return 2 / math.sqrt(3) * np.cos(theta) / self._SLOPE(theta)
+
+
+Projection: TypeAlias = Azimuthal | WorldMap
+
+PROJECTIONS: dict[str, type[Projection]] = {
+    **{c.name: c for c in (Lambert, Stereographic)},
+    "schmidt": Lambert,
+    "wulff": Stereographic,
+    **{c.name: c for c in (EqualEarth, Mollweide, PlateCarree)},
+}
+"""By their names in settings; Schmidt's and Wulff's nets of structural geology are `flipped`."""

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, midpoints
-from orbiflow.density.pictures import ground
+from orbiflow.density.pictures import frames
 from orbiflow.density.pictures.axes import (
     INK,
     angle_axis,
@@ -22,11 +22,11 @@ from orbiflow.density.pictures.axes import (
     view_of,
 )
 from orbiflow.density.pictures.colours import chosen_scale, density_on_grid, is_sharp, shading
-from orbiflow.density.pictures.overlays import log_natural
+from orbiflow.density.pictures.overlays import LIGHT, Colouring, log_natural
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.surfaces import edge_pairs
 from orbiflow.density.spaces import Space
-from orbiflow.drawing import CENTER_COLOURS, Picture, Sheet, center_sign
+from orbiflow.drawing import CENTER_COLOURS, Sheet, center_sign
 from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ EDGE_COLOURS = ("#d95f02", "#1f78b4")
 HEAD = 0.035
 """Length of an arrow's head on a screen, in sides of the square."""
 
-SCREEN = ground.Room(6.67, 10.4, 11.52, 5.26, 3.33, 1.52)
+SCREEN = frames.Room(6.67, 10.4, 11.52, 5.26, 3.33, 1.52)
 """Room on a screen, with a title above and a legend of five lines below."""
 
 TURNS, SIGNS = {2: "half", 4: "quarter"}, {2: "Lenses", 4: "Squares"}
@@ -51,53 +51,13 @@ TURNS, SIGNS = {2: "half", 4: "quarter"}, {2: "Lenses", 4: "Squares"}
 CROWDED = "dots crowd where the square shrinks areas"
 
 
-def density_picture(
-    density: Density,
-    samples: Tensor | None = None,
-    settings: PlotSettings | None = None,
-    *,
-    sheet: Sheet | None = None,
-) -> Picture:
-    """Draw a density on the canonical square, with the edges marked that are the same edge.
+class Square:
+    """The canonical square of a two-dimensional space.
 
-    Edges of one colour and number of arrow heads are identified, in the sense of the arrows. Ticks
-    are in the user's units where the chart is a plain rescaling of them (torus, Klein bottle).
-    Peaks narrower than a pixel are averaged over it, and a note says so.
-
-    Args:
-        density: A density on a two-dimensional space.
-        samples: Data or samples to draw as dots, chart points (N, 2). Of too many a random choice is
-            drawn, always the same; dots are smaller where they crowd, so that peaks stay in sight.
-        settings: How it is drawn.
-        sheet: The sheet. Default: that of the settings.
-
-    Raises:
-        OrbiflowError: If the space has another dimension, or samples or settings do not fit it.
+    - `width`, `aspect`: Its width in units of the axes, and its width over its height.
+    - `title_gap`: Distance of a panel's title, in sizes of the text.
+    - `caption_below`: Whether the caption of a single picture is below it on a screen.
     """
-    settings = settings or PlotSettings()
-    square = Square(density.space, settings)
-    return ground.draw_density(square, density, settings, dots=samples, sheet=sheet)
-
-
-def samples_picture(
-    density: Density,
-    data: Tensor | None,
-    samples: Tensor,
-    settings: PlotSettings | None = None,
-    *,
-    sheet: Sheet | None = None,
-) -> Picture:
-    """Draw data (N, 2) and samples (M, 2) on two squares; without data, the density and samples.
-
-    Points are of the chart, such as `space.to_chart(table)` and `density.sample((M,))`.
-    """
-    settings = settings or PlotSettings()
-    square = Square(density.space, settings)
-    return ground.draw_samples(square, density, settings, data, samples, sheet=sheet)
-
-
-class Square(ground.Ground):
-    """The canonical square of a two-dimensional space."""
 
     width = aspect = 1.0
     title_gap = 0.7
@@ -110,9 +70,11 @@ class Square(ground.Ground):
         self.view = view_of(space, settings.names, None if space.is_round else settings.center)
 
     def places(self, points: Tensor) -> Array:
+        """Return where chart points (N, 2) lie on the axes."""
         return self.view.places(points)
 
-    def colouring(self, density: Density, settings: PlotSettings) -> ground.Colouring:
+    def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
+        """Return the colours of a density."""
         count = _FINE_GRID if density.has_fine_detail else _GRID
         middles = (torch.arange(count, dtype=torch.float64) + 0.5) / count
         x, y = (middles + low for low in self.view.low)
@@ -120,31 +82,32 @@ class Square(ground.Ground):
         areas = self.space.log_area(midpoints(self.space, count)).exp().numpy()
         chosen = chosen_scale(density, settings.measure, settings.scale)
         shade = shading(values, areas.reshape(count, count), log=chosen.log)
-
-        def logs() -> Array:
+        logs = None
+        if settings.regions:
             points = torch.stack(torch.meshgrid(x, y, indexing="ij"), dim=-1).reshape(-1, 2)
-            found = log_natural(density, values.ravel(), points, settings.measure)
-            return found.reshape(count, count).T
-
+            logs = log_natural(density, values.ravel(), points, settings.measure)
+            logs = logs.reshape(count, count).T
         note = average_note(count) if is_sharp(density, pixel=1 / count) else ""
-        places = shade.places(values).T
-        return ground.Colouring(places, (0, 1, 0, 1), shade, chosen.reason, note, logs)
+        return Colouring(shade.places(values).T, (0, 1, 0, 1), shade, chosen.reason, note, logs)
 
-    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> ground.Room:
+    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> frames.Room:
+        """Return the room around a single picture and its colour bar."""
         if not sheet.printed:
             return SCREEN
         edges = (5.4, 3.8, 0.8) if self._has_ticks else (1.0, 2.8, 2.8)
-        return ground.printed_room(sheet, *edges, label, ticks)
+        return frames.printed_room(sheet, *edges, label, ticks)
 
-    def panels_room(self, sheet: Sheet) -> tuple[ground.Room, bool]:
+    def panels_room(self, sheet: Sheet) -> tuple[frames.Room, bool]:
+        """Return the room around two panels, and whether one is above the other."""
         edges = (5.4, 4.2, 1.6, 2.4, 4.2) if self._has_ticks else (1.0, 1.0, 1.0, 2.4, 1.6)
-        room, stacked = ground.Room(*edges, 0.0), sheet.printed and sheet.width < ground.NARROW
+        room, stacked = frames.Room(*edges, 0.0), sheet.printed and sheet.width < frames.NARROW
         return (room._replace(gap=room.below + 2.0) if stacked else room), stacked
 
     def fill(self, axes: Axes) -> None:
-        axes.set_facecolor(ground.LIGHT)
+        """Fill the ground with one light colour."""
+        axes.set_facecolor(LIGHT)
 
-    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: ground.Panel) -> None:
+    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: frames.Panel) -> None:
         """Draw ticks, edges with their arrows, and cone points with their places in the data."""
         axes.set_xlim(0, 1)
         axes.set_ylim(0, 1)
@@ -167,6 +130,7 @@ class Square(ground.Ground):
                 self._write_place(axes, corner, sheet)
 
     def caption(self, notes: Sequence[str], dots: tuple[int, int] | None) -> str:
+        """Return what is seen, and `notes`, as sentences."""
         parts = ["The edges with one arrow head are one edge, and so are those with two"]
         parts += [
             f"{SIGNS[order]} are cone points of a {TURNS[order]} turn, which no flow moves"
@@ -176,20 +140,22 @@ class Square(ground.Ground):
         return _sentences([*parts, *self._notes(notes, bool(dots))])
 
     def samples_caption(self, notes: Sequence[str]) -> str:
+        """Return the caption of points on two grounds."""
         return self.caption(notes, (0, 0))
 
     def write_on_screen(
         self,
-        frame: ground.Frame,
+        frame: frames.Frame,
         sheet: Sheet,
         title: str,
-        caption: str,
         notes: Sequence[str],
-        dots: bool,
+        dots: tuple[int, int] | None,
     ) -> None:
-        del caption  # the legend says it
+        """Write the title, and a legend with notes."""
         frame.axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
-        self._draw_legend(frame.figure, sheet, _sentences(self._notes(notes, dots)), dots)
+        self._draw_legend(
+            frame.figure, sheet, _sentences(self._notes(notes, bool(dots))), bool(dots)
+        )
 
     @property
     def _has_ticks(self) -> bool:
@@ -257,8 +223,8 @@ class Square(ground.Ground):
         if dots:
             style = {"markerfacecolor": "#ffffff", "markeredgecolor": INK, "linestyle": "none"}
             entries.append(Line2D([], [], marker="o", label="points", **style))
-        ground.write_caption(figure, notes, sheet)
-        lines = len(ground.caption_lines(notes, sheet))
+        frames.write_caption(figure, notes, sheet)
+        lines = len(frames.caption_lines(notes, sheet))
         up = (0.6 + 1.25 * lines) * sheet.em / figure.get_size_inches()[1]
         figure.legend(
             handles=entries, loc="lower left", bbox_to_anchor=(0.02, up), ncols=2, frameon=False,

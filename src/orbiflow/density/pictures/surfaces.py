@@ -202,7 +202,9 @@ def viewpoint(space: Space, place: Tensor) -> Viewpoint:
         pitch = np.concatenate([s * np.linspace(0.4, 1.2, 9) for s in (1, -1)])
     yaw = np.arctan2(spot[1], spot[0]) + np.linspace(0, 2 * np.pi, 36, endpoint=False)
     angles = np.stack(np.meshgrid(yaw, pitch, indexing="ij"), axis=-1).reshape(-1, 2)
-    toward = _directions(angles)
+    yaws, pitches = angles.T
+    toward = [np.cos(pitches) * np.cos(yaws), np.cos(pitches) * np.sin(yaws), np.sin(pitches)]
+    toward = np.stack(toward, axis=-1)
     sight = EYE * toward - spot
     sight /= np.linalg.norm(sight, axis=1, keepdims=True)
     relative = (cloud - center) / radius - spot
@@ -216,9 +218,3 @@ def viewpoint(space: Space, place: Tensor) -> Viewpoint:
     best = int(score.argmax())
     depth = min(1.0, float(toward[best] @ spot) + _NEAR / 2)
     return Viewpoint(*angles[best].tolist(), cut=50 * (1 - depth) if hidden[best] else 0.0)
-
-
-def _directions(angles: Array) -> Array:
-    """Return unit vectors (M, 3) of yaws and pitches (M, 2)."""
-    yaw, pitch = angles.T
-    return np.stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)], -1)

@@ -19,7 +19,7 @@ from PIL import Image, ImageDraw
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, midpoints
 from orbiflow.density.pictures.axes import view_of
-from orbiflow.density.pictures.colours import density_on_grid, density_on_map, shading
+from orbiflow.density.pictures.colours import COLOURS, density_on_grid, density_on_map, shading
 from orbiflow.density.pictures.maps import chosen_map, pixels_of
 from orbiflow.density.spaces import RoundSpace, to_vectors
 
@@ -69,7 +69,7 @@ def _coloured(places: Array) -> Image.Image:
     """Return an image of places (rows, columns) on the colour bar, the first row on top."""
     from matplotlib import colormaps
 
-    shades = colormaps["viridis"](np.clip(places, 0, 1))[..., :3]
+    shades = colormaps[COLOURS](np.clip(places, 0, 1))[..., :3]
     return Image.fromarray((255 * shades + 0.5).astype(np.uint8), "RGB")
 
 

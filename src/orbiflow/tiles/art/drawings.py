@@ -17,7 +17,7 @@ from orbiflow.drawing import plane_axes
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.art.raster import Grid, Paint
 from orbiflow.tiles.art.source import SAME_ASPECT, Picture, covered_area, read_picture
-from orbiflow.tiles.exporting import INK, Curve, Motif, Part, Style, curves_path
+from orbiflow.tiles.exporting import INK, Curve, Motif, Part, Style, curves_path, draw_paths
 from orbiflow.tiles.geometry import orient, polygons_in
 from orbiflow.tiles.silhouette import (
     MAX_BYTES,
@@ -240,7 +240,6 @@ def paint_motif(paint: Paint, motif: Motif) -> None:
 def _canvas(parts: list[Part], grid: Grid) -> Array:
     """Return parts drawn as RGBA (height, width, 4), straight, 0 to 1."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.collections import PathCollection
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(grid.width / DOTS, grid.height / DOTS), dpi=DOTS)
@@ -252,16 +251,8 @@ def _canvas(parts: list[Part], grid: Grid) -> Array:
             "#000000" if colour == INK else colour
             for colour in (part.style.fill, part.style.stroke)
         )
-        collection = PathCollection(
-            [curves_path(part.curves)],
-            facecolors=fill or "none",
-            edgecolors=stroke or "none",
-            linewidths=part.style.width * 72 / DOTS if stroke else 0,
-            alpha=part.opacity if part.opacity < 1 else None,
-            joinstyle="round",
-            capstyle="round",
-        )
-        axes.add_collection(collection, autolim=False)
+        style = Style(fill, stroke, part.style.width * 72 / DOTS if stroke else 0)
+        draw_paths(axes, [curves_path(part.curves)], style, part.opacity)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba(), dtype=np.float32) / 255

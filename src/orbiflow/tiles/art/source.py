@@ -16,7 +16,7 @@ from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.art.raster import Grid, polygon_sides, runs, triangle_sides
 from orbiflow.tiles.geometry import border
 from orbiflow.tiles.search import matched
-from orbiflow.tiles.silhouette import Bending, Frame, Target, deep_channel, open_image, upright
+from orbiflow.tiles.silhouette import Frame, Target, deep_channel, open_image, upright
 from orbiflow.tiles.tile import EscherTile, TileMap, TileSource
 
 
@@ -34,32 +34,25 @@ def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
     tile = EscherTile.of(source)
     if tile.no_map or (tile.bending is not None and tile.frame is not None):
         return tile
-    if tile.rank is not None and tile.silhouette is not None:  # out of a file
-        try:
-            target = _silhouette(tile.silhouette)
-        except OrbiflowError as error:
-            return _without_map(tile, tile.frame, str(error))
-    if target is None:
-        reason = "there is no map of the silhouette; give the search's target as well"
-        return _without_map(tile, tile.frame, reason)
-    frame = target.frame
+    frame, bending, known = tile.frame, None, tile.map or TileMap()
+    said: dict[str, Any] = {}
     try:
+        if tile.rank is not None and tile.silhouette is not None:  # out of a file
+            target = _silhouette(tile.silhouette)
+        if target is None:
+            raise OrbiflowError(
+                "there is no map of the silhouette; give the search's target as well"
+            )
+        frame = target.frame
         bending = matched(target.normal, frame.to_normal(tile.tile.polygon))
+        note = "the search left no map of the silhouette; its outline was matched with the tile's"
+        said["notes"] = (*tile.notes, note)
     except OrbiflowError as error:
-        return _without_map(tile, frame, str(error))
-    note = "the search left no map of the silhouette; its outline was matched with the tile's"
-    return _mapped(tile, frame, bending).changed(notes=(*tile.notes, note))
-
-
-def _without_map(tile: EscherTile, frame: Frame | None, reason: str) -> EscherTile:
-    size = np.sqrt(abs(tile.tile.signed_area))
-    frame = frame or Frame(size * np.diag([1.0, -1.0 if tile.y_down else 1.0]), np.zeros(2))
-    return _mapped(tile, frame, None).changed(no_map=reason)
-
-
-def _mapped(tile: EscherTile, frame: Frame, bending: Bending | None) -> EscherTile:
-    known = tile.map or TileMap()
-    return tile.changed(map_source=TileMap(known.settings, known.arrays, frame, bending))
+        said["no_map"] = str(error)
+    if frame is None:
+        size = np.sqrt(abs(tile.tile.signed_area))
+        frame = Frame(size * np.diag([1.0, -1.0 if tile.y_down else 1.0]), np.zeros(2))
+    return tile.changed(map_source=TileMap(known.settings, known.arrays, frame, bending), **said)
 
 
 def silhouette_outline(tile: EscherTile) -> Array:

@@ -17,12 +17,15 @@ from orbiflow.tiles.exporting.scene import (
     Layer,
     PlacedTile,
     Scene,
+    Style,
     Uses,
     clipped_line,
     clipped_region,
 )
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.path import Path as PlotPath
 
@@ -139,7 +142,6 @@ INCH = 25.4
 
 def drawn(scene: Scene, *, least_width: float = 0.0) -> Figure:
     """Return a figure of the page in real size; strokes are at least `least_width` mm wide."""
-    from matplotlib.collections import PathCollection
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
 
@@ -149,22 +151,27 @@ def drawn(scene: Scene, *, least_width: float = 0.0) -> Figure:
     axes = plane_axes(figure, (0.0, 0.0, scene.width, scene.height), y_down=True)
     axes.set_aspect("auto")  # which rounding would otherwise decide
     for layer in scene.layers:
-        width = max(layer.style.width, least_width) * 72 / INCH
-        collection = PathCollection(
-            _paths(scene, layer),
-            facecolors=layer.style.fill or "none",
-            edgecolors=layer.style.stroke or "none",
-            linewidths=width,
-            joinstyle="round",
-            capstyle="round",
-        )
-        axes.add_collection(collection, autolim=False)
+        style = layer.style._replace(width=max(layer.style.width, least_width) * 72 / INCH)
+        collection = draw_paths(axes, _paths(scene, layer), style)
         if layer.clipped:
             box = scene.clip
             window = Rectangle((box.left, box.top), box.width, box.height)
             window.set_transform(axes.transData)
             collection.set_clip_path(window)
     return figure
+
+
+def draw_paths(axes: Axes, paths: list[PlotPath], style: Style, opacity: float = 1.0) -> Artist:
+    """Draw paths on axes, with the stroke's width in points."""
+    from matplotlib.collections import PathCollection
+
+    collection = PathCollection(
+        paths, facecolors=style.fill or "none", edgecolors=style.stroke or "none",
+        linewidths=style.width, alpha=opacity if opacity < 1 else None,
+        joinstyle="round", capstyle="round",
+    )  # fmt: skip
+    axes.add_collection(collection, autolim=False)
+    return collection
 
 
 def _paths(scene: Scene, layer: Layer) -> list[PlotPath]:

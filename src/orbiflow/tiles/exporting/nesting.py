@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 from orbiflow.arrays import Array
+from orbiflow.tiles.exporting.scene import Uses
 from orbiflow.tiles.tilings import Tile
 
 
@@ -215,29 +216,9 @@ KEPT = 4  # number of densest arrangements that are tried on a sheet
 ANGLES = 36  # angles of an arrangement that are tried on a sheet
 
 
-@dataclass(frozen=True, eq=False)
-class Placed:
-    """N pieces on a sheet: a point p of the piece goes to linear[n] p + offsets[n]."""
-
-    linear: Array
-    offsets: Array
-    aspects: NDArray[np.int64]  # the number (N,) of each piece in the arrangement's cell
-
-    def __len__(self) -> int:
-        return len(self.linear)
-
-    def rings(self, ring: Array) -> Array:
-        """Return the images (N, M, 2) of a ring."""
-        return np.einsum("nij,mj->nmi", self.linear, ring) + self.offsets[:, None]
-
-    def first(self, count: int) -> Placed:
-        """Return the first `count` pieces."""
-        return Placed(self.linear[:count], self.offsets[:count], self.aspects[:count])
-
-
-def dense_arrangements(tile: Tile, ring: Array, gap: float, *, seed: int = 0) -> list[Arrangement]:
-    """Return arrangements of pieces cut along `ring` (M, 2), `gap` apart, densest first, by a seed."""
-    rng = np.random.default_rng(seed)
+def dense_arrangements(tile: Tile, ring: Array, gap: float) -> list[Arrangement]:
+    """Return arrangements of pieces cut along `ring` (M, 2), `gap` apart, densest first."""
+    rng = np.random.default_rng(0)
     coarse = _simplified(ring, gap)
     group = tile.group
     own = Arrangement(group.lattice, group.linear_parts, group.translations)
@@ -279,14 +260,12 @@ def _improved(start: Arrangement, ring: Array, gap: float, rng: np.random.Genera
     return best
 
 
-def on_sheet(
-    arrangements: Sequence[Arrangement], ring: Array, width: float, height: float
-) -> Placed:
+def on_sheet(arrangements: Sequence[Arrangement], ring: Array, width: float, height: float) -> Uses:
     """Fill a rectangle from the origin with as many pieces as fit, in rows from the top.
 
     Each arrangement is tried in several ways; among equally good ones the first is taken.
     """
-    best = Placed(np.zeros((0, 2, 2)), np.zeros((0, 2)), np.zeros(0, dtype=np.int64))
+    best = Uses("piece", np.eye(2)[None], np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
     turns = [(found, angle) for found in arrangements for angle in _angles(found, ring)]
     for arrangement, angle in turns:
         turned = arrangement.turned(angle)
@@ -310,7 +289,7 @@ def _angles(arrangement: Arrangement, ring: Array) -> list[float]:
 
 def _within(
     turned: Arrangement, low: Array, high: Array, shift: Array, width: float, height: float
-) -> Placed:
+) -> Uses:
     inverse = np.linalg.inv(turned.lattice)
     corners = np.array([[x, y] for x in (0, width) for y in (0, height)])
     steps = (corners - low.mean(axis=0)) @ inverse.T
@@ -327,4 +306,4 @@ def _within(
     order = np.lexsort((least[aspects, numbers, 0], np.round(least[aspects, numbers, 1], 3)))
     aspects, numbers = aspects[order], numbers[order]
     offsets = turned.offsets[aspects] + shift + moves[numbers]
-    return Placed(turned.linear[aspects], offsets, aspects)
+    return Uses("piece", turned.linear, aspects, offsets)

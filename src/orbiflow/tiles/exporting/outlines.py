@@ -58,16 +58,11 @@ def _run(run: Array, tolerance: float) -> list[tuple[Array, bool]]:
         if piece is not None:
             pieces.append((piece, False))
         elif last - first == 1:
-            pieces.append((_line(part[0], part[1]), True))
+            pieces.append((Curve.polyline(part).pieces[0], True))
         else:
             middle = first + worst
             todo += [(middle, last), (first, middle)]
     return pieces
-
-
-def _line(start: Array, end: Array) -> Array:
-    step = (end - start) / 3
-    return np.stack([start, start + step, end - step, end])
 
 
 def _tangents(run: Array) -> Array:

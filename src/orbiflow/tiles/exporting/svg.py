@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from orbiflow.arrays import Array, Window
-from orbiflow.drawing import DEFAULT_PALETTE, Palette, palette
-from orbiflow.errors import OrbiflowError
+from orbiflow.arrays import Array, Window, checked_window
+from orbiflow.drawing import DEFAULT_PALETTE, palette
 from orbiflow.tiles.exporting.scene import Box, Curve, Layer, Motif, Scene, Style, Uses, rectangle
 from orbiflow.tiles.pictures import default_window
 from orbiflow.tiles.tilings import Colouring, Tile, Tiles, as_tiling, colouring, patch
@@ -168,64 +167,44 @@ def _uses(uses: Uses, reach: float, number: Numbers) -> Iterator[str]:
         yield f'    <use xlink:href="#{uses.symbol}" transform="{how}"/>\n'
 
 
-def tile_svg(
-    tile: Tile,
-    *,
-    width_mm: float = 100.0,
-    palette_name: str | Palette = DEFAULT_PALETTE,
-    fill: str | None = None,
-    outline_mm: float = 0.3,
-    y_down: bool = False,
-    title: str = "",
-) -> str:
-    """Return the SVG of one tile, on a page with a small margin.
+TILE_WIDTH, TILING_WIDTH = 100.0, 300.0
+"""Widths of the pages of `tile_svg` and `tiling_svg` in mm."""
 
-    Args:
-        palette_name: A palette, whose second colour fills the tile.
-        fill: A colour, or "none" for cutting. Default: the palette's.
-        tile, width_mm, outline_mm, y_down, title: As for `tiling_svg`.
 
-    Raises:
-        OrbiflowError: If the palette is unknown or the page has no size.
-    """
-    colours = palette(palette_name)
+def tile_svg(tile: Tile, *, y_down: bool = False, title: str = "") -> str:
+    """Return the SVG of one tile, on a page with a small margin; arguments as for `tiling_svg`."""
+    colours = palette(DEFAULT_PALETTE)
     low, high = tile.polygon.min(axis=0), tile.polygon.max(axis=0)
     margin = 0.04 * float((high - low).max())
-    page = _Page((*(low - margin), *(high + margin)), width_mm, y_down)
-    style = Style(fill or colours.fill(1), colours.outline, outline_mm)
+    page = _Page((*(low - margin), *(high + margin)), TILE_WIDTH, y_down)
+    style = Style(colours.fill(1), colours.outline, 0.3)
     layer = Layer("tile", "tiles", style, (page.curve(tile.polygon),))
-    title = title or _name(tile)
-    return page.document([layer], title, "A tile of the plane, made with orbiflow")
+    return page.document([layer], title or _name(tile), "A tile of the plane, made with orbiflow")
 
 
 def tiling_svg(
     tile: Tiles,
     window: Window | None = None,
     *,
-    width_mm: float = 300.0,
-    palette_name: str | Palette = DEFAULT_PALETTE,
     colours: Colouring | None = None,
-    outline_mm: float = 0.25,
     y_down: bool = False,
     title: str = "",
 ) -> str:
     """Return the SVG of the tiles that meet a window, clipped to it: one closed path per tile.
 
     Each colour's paths are a group, with the ids "colour-1", "colour-2" ... Every tile has a stroke,
-    so that no paper shines through between neighbours.
+    so that no paper shines through between neighbours. For another size or palette see `export`.
 
     Args:
-        tile, window, palette_name, colours, y_down: As for `tiling_raster`.
-        width_mm: The page's width in mm.
-        outline_mm: The outline's width in mm; 0 means a hairline in the tile's own colour.
+        tile, window, colours, y_down: As for `tiling_raster`.
         title: The file's title. Default: the class.
 
     Raises:
-        OrbiflowError: If the palette is unknown, or the window is empty or holds too many tiles.
+        OrbiflowError: If the window is empty or holds too many tiles.
     """
-    chosen, tiling = palette(palette_name), as_tiling(tile)
+    chosen, tiling = palette(DEFAULT_PALETTE), as_tiling(tile)
     colours = colours or colouring(tiling)
-    page = _Page(window or default_window(tile), width_mm, y_down)
+    page = _Page(window or default_window(tile), TILING_WIDTH, y_down)
     groups: list[list[Curve]] = [[] for _ in range(colours.count)]
     for element in patch(tiling, page.window):
         polygon = tiling.prototiles[element.prototile].polygon
@@ -233,10 +212,8 @@ def tiling_svg(
     border = rectangle(Box(0.0, 0.0, page.width, page.height))
     layers = [Layer("paper", "paper", Style(chosen.paper), (border,))]
     for number, curves in enumerate(groups):
-        fill = chosen.fill(number)
-        line = (chosen.outline, outline_mm) if outline_mm > 0 else (fill, 0.1)
-        name = f"colour {number + 1}"
-        layers.append(Layer(name, "tiles", Style(fill, *line), tuple(curves), clipped=True))
+        style = Style(chosen.fill(number), chosen.outline, 0.25)
+        layers.append(Layer(f"colour {number + 1}", "tiles", style, tuple(curves), clipped=True))
     what = "An isohedral tiling" if len(tiling.prototiles) == 1 else "A tiling"
     note = (
         f"{what} of the plane ({_name(tile)}), made with orbiflow. "
@@ -248,14 +225,8 @@ def tiling_svg(
 class _Page:
     """A window of a tile's coordinates on a page in millimetres, with y pointing down."""
 
-    def __init__(self, window: Iterable[float], width_mm: float, y_down: bool) -> None:
-        xmin, ymin, xmax, ymax = (float(value) for value in window)
-        if not (width_mm > 0 and np.isfinite(width_mm) and xmax > xmin and ymax > ymin):
-            raise OrbiflowError(
-                f"a page needs a positive width and a window with xmin < xmax, ymin < ymax; got "
-                f"{width_mm} mm and {(xmin, ymin, xmax, ymax)}"
-            )
-        self.window: Window = (xmin, ymin, xmax, ymax)
+    def __init__(self, window: Sequence[float], width_mm: float, y_down: bool) -> None:
+        xmin, ymin, xmax, ymax = self.window = checked_window(window)
         self.width, self.height = width_mm, width_mm * (ymax - ymin) / (xmax - xmin)
         self._origin = np.array([xmin, ymin if y_down else ymax])
         self._scale = np.array([1.0, 1.0 if y_down else -1.0]) * (width_mm / (xmax - xmin))

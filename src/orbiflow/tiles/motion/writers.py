@@ -143,15 +143,9 @@ def write_gif(motion: Motion, palette: Palette, frames: list[Frame], told: Progr
     lasting = np.maximum(np.diff([0, *ends]), 2) * 10
     buffer = io.BytesIO()
     shown[0].save(
-        buffer,
-        "GIF",
-        save_all=True,
-        append_images=shown[1:],
-        duration=lasting.tolist(),
-        loop=0,
-        disposal=1,
-        optimize=False,
-    )
+        buffer, "GIF", save_all=True, append_images=shown[1:], duration=lasting.tolist(), loop=0,
+        disposal=1, optimize=False,
+    )  # fmt: skip
     return buffer.getvalue()
 
 

@@ -220,7 +220,7 @@ def classes_png(*, width_px: int = 2400) -> bytes:
         _class_panel(
             figure, kind, (column / 3, 0.045 + 0.955 * (1 - (row + 1) / 3)), (1 / 3, 0.955 / 3)
         )
-    _key(figure, width_px)
+    draw_key(figure)
     return png_bytes(figure)
 
 
@@ -291,9 +291,10 @@ def draw_tiling(axes: Axes, kind: IsohedralClass, window: Window) -> None:
     mark_symmetry(axes, kind.group(), window, size=0.18)
 
 
-def _key(figure: Figure, width_px: int) -> None:
+def draw_key(figure: Figure) -> None:
+    """Draw what the marks of symmetry mean, in a strip at the bottom of a figure."""
     height = 0.045
-    aspect = width_px / (figure.get_figheight() * figure.dpi * height)
+    aspect = figure.get_figwidth() / (figure.get_figheight() * height)
     axes = plane_axes(figure, (0.0, 0.0, aspect, 1.0), box=(0.0, 0.0, 1.0, height))
     font, x = 0.95 * figure.get_figwidth(), 0.6
     for order, colour in CENTER_COLOURS.items():

@@ -11,14 +11,8 @@ from orbiflow.errors import CertificationError
 from orbiflow.runtime import NEVER, Cancel, one_thread
 from orbiflow.settings import Range, Settings
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
-from orbiflow.tiles.search.search_method import (
-    MAX_FREQUENCY,
-    MAX_SEGMENTS,
-    Count,
-    Goal,
-    SearchMethod,
-    Seed,
-)
+from orbiflow.tiles.search.escherize_settings import Count, Seed
+from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS, Goal, SearchMethod
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass
 
 NotNegative = Annotated[float, Range(0)]

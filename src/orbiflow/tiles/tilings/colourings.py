@@ -15,11 +15,15 @@ from orbiflow.tiles.tilings.tiling import Cell, Tiles, Tiling, as_tiling
 Graph: TypeAlias = list[set[int]]  # the neighbours of each vertex, symmetric and without loops
 
 
-def colour_graph(graph: Graph, count: int, *, max_steps: int = 4000) -> list[int] | None:
+MAX_STEPS = 4000
+"""Number of assignments after which a graph counts as one that cannot be coloured."""
+
+
+def colour_graph(graph: Graph, count: int) -> list[int] | None:
     """Return a proper colouring with colours 0 ... count - 1, or None.
 
     Backtracking in the order of saturation (Brélaz, "New methods to color the vertices of a graph",
-    CACM 22, 1979). None means that there is none, or that none was found in `max_steps`
+    CACM 22, 1979). None means that there is none, or that none was found in `MAX_STEPS`
     assignments; with more colours than the largest degree it is always found, without backtracking.
 
     >>> colour_graph([{1, 2}, {0, 2}, {0, 1}], 3)
@@ -28,38 +32,23 @@ def colour_graph(graph: Graph, count: int, *, max_steps: int = 4000) -> list[int
     """
     colours = [-1] * len(graph)
     trail: list[tuple[int, list[int]]] = []  # vertex and the colours still to try there
-    for _ in range(max(max_steps, len(graph))):
-        vertex = _most_constrained(graph, colours)
-        if vertex is None:
+    for _ in range(max(MAX_STEPS, len(graph))):
+        free = [v for v in range(len(graph)) if colours[v] < 0]
+        if not free:
             return colours
-        taken = {colours[n] for n in graph[vertex]}
+        # most colours around it, ties to the larger degree
+        around = {v: {colours[n] for n in graph[v]} - {-1} for v in free}
+        vertex = max(free, key=lambda v: (len(around[v]), len(graph[v]), -v))
         highest = max(colours)  # colours not used yet are interchangeable: try only the first
-        options = [c for c in range(min(count, highest + 2)) if c not in taken]
+        options = [c for c in range(min(count, highest + 2)) if c not in around[vertex]]
         trail.append((vertex, options))
-        if not _advance(trail, colours):
+        while trail and not trail[-1][1]:  # back to where another colour can be tried
+            colours[trail.pop()[0]] = -1
+        if not trail:
             return None
-    return colours if min(colours) >= 0 else None
-
-
-def _most_constrained(graph: Graph, colours: list[int]) -> int | None:
-    """Return the uncoloured vertex with most colours around it, ties to the larger degree."""
-    free = [v for v in range(len(graph)) if colours[v] < 0]
-    if not free:
-        return None
-    return max(free, key=lambda v: (len({colours[n] for n in graph[v]} - {-1}), len(graph[v]), -v))
-
-
-def _advance(trail: list[tuple[int, list[int]]], colours: list[int]) -> bool:
-    """Colour the last vertex of the trail with its next option, going back while there is none."""
-    while trail:
         vertex, options = trail[-1]
-        if options:
-            colours[vertex] = options.pop(0)
-            return True
-        colours[vertex] = -1
-        trail.pop()
-        # the next iteration tries the next option of the vertex before
-    return False
+        colours[vertex] = options.pop(0)
+    return colours if min(colours) >= 0 else None
 
 
 # (a, b, c): spanned by a B_1 and b B_1 + c B_2, with 0 <= b < a; its index is a c

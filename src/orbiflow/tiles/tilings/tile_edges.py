@@ -413,7 +413,7 @@ def skeleton(own: Edges, copies: Copies) -> Skeleton:
     >>> len(both), len(skeleton(edges(tile), both))
     (2, 11)
     """
-    beyond = copies.beyond(own.across, own.owners)
+    beyond = copies.neighbours(own.across, own.owners)
     mine = copies.prototiles[:, None] == np.array(own.owners)
     numbers = np.arange(len(copies))[:, None]
     copy, edge = np.nonzero(mine & ((beyond.copy < 0) | (beyond.copy > numbers)))
