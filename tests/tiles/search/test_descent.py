@@ -8,7 +8,7 @@ import shapely
 import torch
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Cancel, Event, Progress
+from orbiflow.runtime import NEVER, Cancel, Event, Progress
 from orbiflow.tiles import (
     CLASSES,
     OccupancySearch,
@@ -25,6 +25,7 @@ from orbiflow.tiles import (
     isohedral_class,
 )
 from orbiflow.tiles.likeness import boundary_iou
+from orbiflow.tiles.search.candidates import silent
 from orbiflow.tiles.search.descent import CALM, Descent
 from orbiflow.tiles.search.search_method import Goal
 from orbiflow.tiles.search.starts import template_starts
@@ -196,7 +197,7 @@ def test_a_preview_is_certified() -> None:
 def test_methods_have_names() -> None:
     assert QUICK.method_name == "descent"
     assert OccupancySearch().method_name == "occupancy"
-    assert QUICK.fit(Goal(TARGET), isohedral_class("IH1"), per_class=2).enough == 4
+    assert QUICK.fit(Goal(TARGET), isohedral_class("IH1"), 2, silent, NEVER).enough == 4
 
 
 def test_soft_target_agrees_with_the_polygon(soft: SoftTarget) -> None:

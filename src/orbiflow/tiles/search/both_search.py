@@ -54,7 +54,7 @@ class BothSearch(SearchMethod):
         """Return the two searches."""
         return [(0.3, self.likeness), (0.7, self.overlap)]
 
-    def fit(self, goal: Goal, kind: IsohedralClass, **_: Any) -> Fit:  # noqa: ARG002
+    def fit(self, goal: Goal, kind: IsohedralClass, *_: Any, **__: Any) -> Fit:  # noqa: ARG002
         """Refuse: each of the `parts` has candidates of its own."""
         raise OrbiflowError("a search for both fits twice: take its likeness or its overlap")
 
