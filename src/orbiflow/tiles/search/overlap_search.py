@@ -120,14 +120,10 @@ class OverlapSearch(Settings, SearchMethod):
         from orbiflow.tiles.search.descent import fit_descent
 
         stages = tuple((steps, max(kept, 2 * per_class)) for steps, kept in self.stages)
+        own = replace(self, stages=stages)
         with one_thread():
             found = fit_descent(
-                goal.target,
-                kind,
-                replace(self, stages=stages),
-                emphasis=goal.emphasis,
-                progress=progress,
-                cancel=cancel,
+                goal.target, kind, own, emphasis=goal.emphasis, progress=progress, cancel=cancel
             )
         return found._replace(enough=1 if per_class == 1 else 2 * per_class)
 

@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any, ClassVar, Self
 
 from orbiflow.arguments import as_choice
-from orbiflow.errors import CertificationError
+from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles.search.candidates import Fit, OnProgress
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
@@ -60,6 +60,8 @@ class SearchMethod(ABC):
         Raises:
             OrbiflowError: for an unknown level or setting.
         """
+        if not cls.efforts:
+            raise OrbiflowError(f"{cls.__name__} has no levels of effort; give its settings")
         return cls(**{**cls.efforts[as_choice(effort, tuple(cls.efforts), "effort")], **changes})
 
     @abstractmethod

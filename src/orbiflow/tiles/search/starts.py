@@ -158,9 +158,7 @@ def template_starts(
     pieces = vertices // len(corners)
     count = len(poses)
     area = kind.group().cell_volume / kind.group().order
-    mirrored = np.array([side for side, _, _ in poses])
-    angle = np.array([turn for _, turn, _ in poses])
-    pull = np.array([pull for _, _, pull in poses])
+    mirrored, angle, pull = (np.array(column) for column in zip(*poses, strict=True))
     scale = area**-0.5
     turned = np.array([rotation_matrix(a) for a in angle])
     turned[mirrored, :, 1] *= -1
