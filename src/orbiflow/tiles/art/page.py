@@ -126,7 +126,7 @@ class Rectangle(NamedTuple):
     """A rectangular cell of whole pixels that repeats."""
 
     linear: (
-        Array  # the map (2, 2) from the lattice's units to pixels: a similarity, but for `strain`
+        Array  # the map (2, 2) from the lattice's units to pixels, a similarity but for `strain`
     )
     width: int  # with `height`: the size in pixels
     height: int
@@ -180,11 +180,8 @@ def _best_pair(lattice: Array, tolerance: float) -> tuple[Array, int] | None:
     sine = abs(dot) / (length[first][:, None] * length)
     # a shear by the angle's cotangent stretches one direction by about as much
     fits = (cells >= 1) & (cells <= LARGEST) & (sine <= min(2 * tolerance + EXACT, 0.5))
-    found = np.argwhere(fits)
-    if not len(found):
-        return None
     options = []
-    for i, j in found:
+    for i, j in np.argwhere(fits):
         pair = np.stack([vectors[first[i]], vectors[j]], axis=1)
         strain = _strain(_squared(pair))
         if strain <= tolerance + EXACT:

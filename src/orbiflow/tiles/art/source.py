@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -78,6 +79,16 @@ class Covered(NamedTuple):
             found[..., 1] = 1 - found[..., 1]
         return found
 
+    def require_aspect(self, path: Path, what: str, size: Sequence[float]) -> None:
+        """Refuse a picture or drawing of this width and height unless its aspect is the same."""
+        (width, height), (wide, high) = size, self.high - self.low
+        if abs(width * high / (height * wide) - 1) > SAME_ASPECT:
+            raise InputFileError(
+                f"{path}: the {what} is {width:.6g} x {height:.6g} and {self.name} is "
+                f"{wide:.6g} x {high:.6g}; a {what} covers all of that and must have its aspect "
+                "within 1 %, so paint or draw over a copy of it"
+            )
+
 
 def covered_area(tile: EscherTile) -> Covered:
     """Return what a picture covers: the input picture, the drawing's page, or the outline's box."""
@@ -125,15 +136,10 @@ class Picture:
     covered: Covered  # the rectangle that it covers in the silhouette's coordinates
     notes: tuple[str, ...] = ()  # what was decided for the user
 
-    @property
-    def pixel(self) -> float:
-        """The side of a pixel in the silhouette's units."""
-        size = self.covered.high - self.covered.low
-        return float(np.sqrt(size.prod() / (self.image.width * self.image.height)))
-
     def reduced(self, pixel: float) -> Picture:
         """Return the picture averaged to pixels no smaller than `pixel` in the silhouette's units."""
-        share = self.pixel / pixel
+        area = (self.covered.high - self.covered.low).prod()
+        share = float(np.sqrt(area / (self.image.width * self.image.height))) / pixel
         if share >= 0.9:
             return self
         size = [max(1, round(side * share)) for side in self.image.size]
@@ -147,14 +153,9 @@ def read_picture(path: Path, tile: EscherTile) -> Picture:
     """Read a picture of a tile's silhouette from a file; it must have the silhouette's aspect."""
     image, notes = open_image(path, _decode)
     covered = covered_area(tile)
+    covered.require_aspect(path, "picture", image.size)
     wide, high = covered.high - covered.low
     width, height = image.size
-    if abs(width * high / (height * wide) - 1) > SAME_ASPECT:
-        raise InputFileError(
-            f"{path}: the picture is {width} x {height} pixels and {covered.name} is "
-            f"{wide:.6g} x {high:.6g}; a picture covers all of that and must have its aspect within "
-            "1 %, so paint over a copy of it"
-        )
     if (width, height) != (round(wide), round(high)):
         notes = (
             *notes,

@@ -207,19 +207,15 @@ def _path(points: Array, codes: Array) -> PlotPath:
 def _points_and_codes(curve: Curve) -> tuple[Array, Array]:
     from matplotlib.path import Path as PlotPath
 
-    move, line, cubic = (
-        np.uint8(code) for code in (PlotPath.MOVETO, PlotPath.LINETO, PlotPath.CURVE4)
-    )
     # of straight pieces only the end is kept
-    kept = np.repeat(~curve.straight, 3)
+    straight = np.repeat(curve.straight, 3)
+    kept = ~straight
     kept[2::3] = True
-    points = curve.pieces[:, 1:].reshape(-1, 2)[kept]
-    codes = np.where(np.repeat(curve.straight, 3), line, cubic)[kept]
-    points, codes = np.concatenate([curve.start[None], points]), np.concatenate([[move], codes])
-    if curve.closed:
-        points = np.concatenate([points, curve.start[None]])
-        codes = np.concatenate([codes, [np.uint8(PlotPath.CLOSEPOLY)]])
-    return points, codes
+    ends = [curve.start] if curve.closed else []
+    points = [curve.start, *curve.pieces[:, 1:].reshape(-1, 2)[kept], *ends]
+    codes = np.where(straight, PlotPath.LINETO, PlotPath.CURVE4)[kept]
+    closing = [PlotPath.CLOSEPOLY for _ in ends]
+    return np.array(points), np.array([PlotPath.MOVETO, *codes, *closing], dtype=np.uint8)
 
 
 def write_pdf(scene: Scene) -> bytes:

@@ -117,17 +117,17 @@ PAIRS = 24  # places of the turned piece of a pair that are tried
 KEPT_LATTICES = 3  # number of best lattices that are then tightened exactly
 
 
-def lattice_starts(ring: Array, gap: float) -> list[Arrangement]:
-    """Return dense lattices of the piece, to the raster's precision."""
-    raster = _Raster(ring, gap)
-    found = raster.lattices(raster.same, 1)
-    still = np.eye(2)[None]
-    return [Arrangement(lattice, still, np.zeros((1, 2))) for _, lattice in found[:KEPT_LATTICES]]
+def raster_starts(ring: Array, gap: float) -> list[Arrangement]:
+    """Return dense lattices of the piece, and of pairs, to the raster's precision.
 
-
-def pair_starts(ring: Array, gap: float) -> list[Arrangement]:
-    """Return dense lattices of pairs, the piece and the piece turned by 180 degrees."""
+    A pair is the piece and the piece turned by 180 degrees.
+    """
     raster = _Raster(ring, gap)
+    still, center = np.eye(2), raster.center
+    single = [
+        Arrangement(lattice, still[None], np.zeros((1, 2)))
+        for _, lattice in raster.lattices(raster.same, 1)[:KEPT_LATTICES]
+    ]
     found = []
     for angle in np.arange(PAIRS) * 2 * np.pi / PAIRS:
         place = raster.first_outside(raster.turned, angle)
@@ -136,9 +136,8 @@ def pair_starts(ring: Array, gap: float) -> list[Arrangement]:
         pair = raster.same | there | there[::-1, ::-1]
         found += [(area, lattice, place) for area, lattice in raster.lattices(pair, 2)[:1]]
     found.sort(key=lambda item: item[0])
-    turns = np.stack([np.eye(2), -np.eye(2)])
-    center = raster.center
-    return [
+    turns = np.stack([still, -still])
+    return single + [
         # q = c - (p - c) + w in the raster's frame, whose origin is the piece's centre c
         Arrangement(lattice, turns, np.stack([np.zeros(2), 2 * center + place * raster.cell]))
         for _, lattice, place in found[:KEPT_LATTICES]
@@ -201,13 +200,10 @@ class _Raster:
 
 def _shifted(region: Mask, step: NDArray[np.int64]) -> Mask:
     """Return the region moved by whole cells; what comes from beyond the raster is free."""
-    moved = np.zeros_like(region)
-    rows, columns = region.shape
-    i, j = int(step[0]), int(step[1])
-    if abs(i) < rows and abs(j) < columns:
-        moved[max(i, 0) : rows + min(i, 0), max(j, 0) : columns + min(j, 0)] = region[
-            max(-i, 0) : rows + min(-i, 0), max(-j, 0) : columns + min(-j, 0)
-        ]
+    moved, steps = np.zeros_like(region), list(zip(step.tolist(), region.shape, strict=True))
+    if all(abs(by) < size for by, size in steps):
+        there = tuple(slice(max(by, 0), size + min(by, 0)) for by, size in steps)
+        moved[there] = region[tuple(slice(max(-by, 0), size + min(-by, 0)) for by, size in steps)]
     return moved
 
 
@@ -222,7 +218,7 @@ def dense_arrangements(tile: Tile, ring: Array, gap: float) -> list[Arrangement]
     coarse = _simplified(ring, gap)
     group = tile.group
     own = Arrangement(group.lattice, group.linear_parts, group.translations)
-    starts = [own, *lattice_starts(coarse, gap), *pair_starts(coarse, gap)]
+    starts = [own, *raster_starts(coarse, gap)]
     tight = sorted((tightened(start, coarse, gap) for start in starts), key=attrgetter("cell_area"))
     clear = [found for found in tight if found.clear(ring, gap)]
     improved = [_improved(found, coarse, gap, rng) for found in clear[:3]]

@@ -168,13 +168,14 @@ class Copies:
         if not len(self):
             return np.full(len(aspects), -1)
         low, high = self.cells.min(axis=0), self.cells.max(axis=0)
-        rows, columns = high - low + 1
-        mine, wanted = (
-            (aspect * rows + (cell - low)[:, 0]) * columns + (cell - low)[:, 1]
-            for aspect, cell in ((self.aspects, self.cells), (aspects, cells))
-        )
+        rows, columns = (int(n) for n in high - low + 1)
+
+        def number(aspects: Integers, cells: Integers) -> Integers:
+            return (aspects * rows + (cells - low)[:, 0]) * columns + (cells - low)[:, 1]
+
+        mine, wanted = number(self.aspects, self.cells), number(aspects, cells)
         order = np.argsort(mine)
-        found = order[np.minimum(np.searchsorted(mine[order], wanted), len(self) - 1)]
+        found = order[np.minimum(np.searchsorted(np.sort(mine), wanted), len(self) - 1)]
         known = ((cells >= low) & (cells <= high)).all(axis=1) & (mine[found] == wanted)
         return np.where(known, found, -1)
 
