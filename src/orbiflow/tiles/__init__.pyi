@@ -121,7 +121,7 @@ from .search.tile_model import placed_field as placed_field
 from .silhouette.bending import Bending as Bending
 from .silhouette.emphasis import Emphasis as Emphasis
 from .silhouette.pins import Pins as Pins
-from .silhouette.readers.outline import read_outline as read_outline
+from .silhouette.readers.files import read_outline as read_outline
 from .silhouette.readers.pictures import read_mask_array as read_mask_array
 from .silhouette.readers.reading import FileContent as FileContent
 from .silhouette.readers.reading import Reading as Reading

@@ -352,14 +352,9 @@ class EscherTile:
         return self.bending, self.frame
 
     def require_certified(self, *, force: bool = False, otherwise: str) -> Certificate:
-        """Return the certificate.
+        """Return the certificate; raise `CertificationError` if it is not valid and `force` is not set.
 
-        Args:
-            force: Accept a tile that is not certified.
-            otherwise: What does not happen to such a tile, and what to do, for the message.
-
-        Raises:
-            CertificationError: if it is not valid and `force` is not set.
+        `otherwise` says what does not happen to such a tile, and what to do.
         """
         if not self.certificate.valid and not force:
             reasons = "; ".join(self.certificate.reasons)

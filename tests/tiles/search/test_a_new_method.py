@@ -9,7 +9,7 @@ import pytest
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
-from orbiflow.runtime import NEVER, Cancel
+from orbiflow.runtime import Cancel
 from orbiflow.tiles import (
     CLASSES,
     EscherizeSettings,
@@ -21,7 +21,7 @@ from orbiflow.tiles import (
     report,
 )
 from orbiflow.tiles.search import BothSearch, Goal, SearchMethod
-from orbiflow.tiles.search.candidates import WAVES, OnProgress, StillTiles, silent
+from orbiflow.tiles.search.candidates import WAVES, OnProgress, StillTiles
 from orbiflow.tiles.search.starts import template_starts
 from orbiflow.tiles.tilings import IsohedralClass
 from outlines import searched
@@ -38,13 +38,7 @@ class TemplateSearch(SearchMethod):
     seed: int = 0
 
     def fit(
-        self,
-        goal: Goal,
-        kind: IsohedralClass,
-        *,
-        per_class: int = 1,
-        progress: OnProgress = silent,
-        cancel: Cancel = NEVER,
+        self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
     ) -> Fit:
         starts = template_starts(kind, turns=self.turns, stretch=0.2, phase=self.seed / 10)
         cancel.check()

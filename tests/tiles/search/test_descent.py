@@ -8,7 +8,7 @@ import shapely
 import torch
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Cancel, Event, Progress
+from orbiflow.runtime import NEVER, Cancel, Event, Progress
 from orbiflow.tiles import (
     CLASSES,
     OccupancySearch,
@@ -25,6 +25,7 @@ from orbiflow.tiles import (
     isohedral_class,
 )
 from orbiflow.tiles.likeness import boundary_iou
+from orbiflow.tiles.search.candidates import silent
 from orbiflow.tiles.search.descent import CALM, Descent
 from orbiflow.tiles.search.search_method import Goal
 from orbiflow.tiles.search.starts import template_starts
@@ -56,7 +57,7 @@ def test_the_record_is_the_flow(name: str, soft: SoftTarget) -> None:
     start = state.points.clone()
     for _ in range(10):
         state.step(soft)
-    model = state.flow_model()
+    model = state.model.with_fields(state.record)
     assert model.segments == 10
     with torch.no_grad():
         moved = model.flow(start)
@@ -144,7 +145,7 @@ def test_broken_prototiles_are_refused() -> None:
     outline, corners = saved.arrays["prototile.outline"], saved.arrays["prototile.corners"]
     broken = {
         "shape": {"prototile.outline": outline[:, :1]},
-        "entries": {"prototile.outline": np.full_like(outline, np.nan)},
+        "must be finite": {"prototile.outline": np.full_like(outline, np.nan)},
         "increasing": {"prototile.corners": corners[::-1].copy()},
         "indices": {"prototile.corners": corners + len(outline)},
     }
@@ -196,7 +197,7 @@ def test_a_preview_is_certified() -> None:
 def test_methods_have_names() -> None:
     assert QUICK.method_name == "descent"
     assert OccupancySearch().method_name == "occupancy"
-    assert QUICK.fit(Goal(TARGET), isohedral_class("IH1"), per_class=2).enough == 4
+    assert QUICK.fit(Goal(TARGET), isohedral_class("IH1"), 2, silent, NEVER).enough == 4
 
 
 def test_soft_target_agrees_with_the_polygon(soft: SoftTarget) -> None:

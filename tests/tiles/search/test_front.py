@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from orbiflow.runtime import NEVER
 from orbiflow.tiles import CLASSES, EscherTile, LikenessSearch
 from orbiflow.tiles.search.bending import fit_bending
 from orbiflow.tiles.search.both_search import behind, deformation, front_list, measured
+from orbiflow.tiles.search.candidates import silent
 from orbiflow.tiles.search.co_deformation import hands
 from orbiflow.tiles.search.finished_tiles import best_tiles
 from outlines import animal
@@ -19,7 +21,7 @@ HANDS = hands(SQUIRREL, QUICK)
 
 @pytest.fixture(scope="module", name="bent")
 def bent_fixture() -> list[EscherTile]:
-    fit = fit_bending(SQUIRREL, CLASSES["IH4"], QUICK, HANDS)
+    fit = fit_bending(SQUIRREL, CLASSES["IH4"], QUICK, HANDS, 1, silent, NEVER)
     return best_tiles(SQUIRREL, fit)
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.tiles import CLASSES, IsohedralClass, Tile, TileModel, certify
+from orbiflow.tiles import CLASSES, IsohedralClass, Tile, TileModel, certify, subdivided
 from orbiflow.tiles.search.tile_model import extract_tile
 from strategies import largest, random_field, random_points, random_tensor, seeds
 
@@ -152,7 +152,7 @@ def test_take_keeps_the_values(kind: IsohedralClass, seed: int) -> None:
 
 def test_boundary_is_even_on_every_edge() -> None:
     model = random_model(CLASSES["IH28"], 3, 2)
-    points = model.boundary(4).detach()
+    points = subdivided(model.prototile()[0], 4).detach()
     corners = model.template().detach()
     assert points.shape == (2, 20, 2)
     assert torch.equal(points[:, ::4], corners)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
-from orbiflow.tiles import CLASSES, Target, Tile, TileModel, certify, resampled
+from orbiflow.tiles import CLASSES, Target, Tile, TileModel, certify, resampled, subdivided
 from orbiflow.tiles.search.candidates import Prototiles
 from orbiflow.tiles.search.starts import outline_starts, template_starts, template_symmetries
 from orbiflow.tiles.search.tile_space import (
@@ -38,7 +38,7 @@ def exact_tile(name: str, seed: int) -> tuple[Array, Placements]:
         field.parameters_.copy_(0.04 * torch.randn_like(field.parameters_))
         model.log_scale.add_(0.3)
         model.stretch.normal_(std=0.1)
-        ring = model(model.boundary(pieces))[0].numpy()
+        ring = model(subdivided(model.prototile()[0], pieces))[0].numpy()
         turn = float(model.angle) if kind.stretch_dim == 1 else 0.0
     lengths = np.full((1, len(kind.template())), pieces)
     return ring, Placements(lengths, np.zeros(1, int), np.array([turn]), np.ones(1))

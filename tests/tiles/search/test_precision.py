@@ -5,7 +5,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orbiflow.tiles import CLASSES, TileModel, certify
+from orbiflow.tiles import CLASSES, TileModel, certify, subdivided
 from orbiflow.tiles.search.starts import template_starts
 from orbiflow.tiles.search.tile_model import extract_tile
 from strategies import random_tensor, seeds
@@ -67,6 +67,6 @@ def test_the_group_of_a_rounded_model_is_that_of_its_polygon(name: str) -> None:
 def test_a_rounded_model_still_maps_in_its_own_precision() -> None:
     model = started("IH6", 3, from_template=False).float()
     assert model.prototile()[0].dtype == torch.float32
-    assert model(model.boundary(2)).dtype == torch.float32
+    assert model(subdivided(model.prototile()[0], 2)).dtype == torch.float32
     assert model.take([0]).vertices is not None
     assert model.take([0]).vertices.dtype == torch.float64  # pyright: ignore[reportOptionalMemberAccess]

@@ -35,12 +35,7 @@ def corresponding(
     Both are counter-clockwise and lie over each other, the first with area about 1. The distance
     `near`, in square roots of the area, costs as much as a right angle between the directions;
     `stretch` is the cost of stretching or shrinking a step by a factor of e. `count` points are
-    matched, and points between them follow in proportion. Lengths increase by less than a round from
-    first to last.
-
-    >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    >>> corresponding(square, np.roll(square, 1, axis=0)).round(9) % 4
-    array([1., 2., 3., 0.])
+    matched; those between follow in proportion. Lengths increase by less than a round.
     """
     along = arc_lengths(own)
     points = resampled(own, count)

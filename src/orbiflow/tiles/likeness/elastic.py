@@ -307,9 +307,8 @@ class Elastic:
 class Condensed:
     """A body whose inner points follow its outline.
 
-    - `outline`: The stiffness matrix (n, n) of the outline.
-    - `follow`: The matrix (N - n, n) that takes the outline to the inner points.
-    - `inverse`: The inverse (N - n, N - n) of the inner points' own matrix.
+    `outline` is the stiffness matrix (n, n) of the outline, `follow` (N - n, n) takes the outline to
+    the inner points, and `inverse` is that of the inner points' own matrix (N - n, N - n).
     """
 
     outline: Array

@@ -20,7 +20,6 @@ Outlines correspond point by point: this compares a shape with the one that was 
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -62,8 +61,7 @@ class Fidelity:
     def damage(self) -> float:
         """The overall damage, about 0 for a tile of medium likeness; smaller is better.
 
-        This is `necks` plus the weighted logarithms of the other values, each relative to its usual
-        value, with `NEGLIGIBLE_SHARE` added.
+        `necks` plus the weighted logarithms of the other values, relative to usual ones.
         """
         values = (*self.pieces, self.notches, self.narrowed, self.cost)
         relative = [value / usual for value, usual in zip(values, USUAL_VALUES, strict=True)]
@@ -166,26 +164,18 @@ def faithfulness(silhouette: ArrayLike, shape: ArrayLike, *, mirror: bool = True
     z = complex_points(other)
     turns = np.exp(2j * np.pi * np.arange(TURNS) / TURNS).tolist()
     rough = [
-        _Overlay(overlap.iou(plane_points(turn * ring))[0], turn, ring)
+        (overlap.iou(plane_points(turn * ring))[0], turn, ring)
         for ring in ([z, np.conj(z[::-1])] if mirror else [z])
         for turn in turns
     ]
-    rough.sort(key=lambda overlay: -overlay.iou)
+    rough.sort(key=lambda overlay: -overlay[0])
     found: list[tuple[float, Complex]] = []
-    for overlay in rough[:REFINED_TURNS]:
-        factor, middle, _ = best_overlay(overlay.ring, overlap, overlay.turn)
-        z = bent_onto(body, plane_points(factor * overlay.ring + middle))[:, None]
+    for _, turn, ring in rough[:REFINED_TURNS]:
+        factor, middle, _ = best_overlay(ring, overlap, turn)
+        z = bent_onto(body, plane_points(factor * ring + middle))[:, None]
         found.append((float(body.cost(z)[0]), z[: body.size, 0]))
     cost, outline = min(found, key=lambda one: one[0])
     return fidelity(body.rest[: body.size], outline, cost)
-
-
-class _Overlay(NamedTuple):
-    """A ring (m,) of area 1 about the origin, rotated by `turn`, and its IoU with the silhouette."""
-
-    iou: float
-    turn: complex
-    ring: Complex
 
 
 def _ring(points: ArrayLike, what: str) -> Array:

@@ -146,11 +146,8 @@ class Pinned(Elastic):
 class PinnedCondensed(Condensed):
     """A pinned body whose inner points, and the parts' similar copies, follow its outline.
 
-    The outline's matrix is `outline` less `low` times its adjoint.
-
-    - `coupling`: The coupling (n, k) of the outline and the copies.
-    - `spread`: The matrix (N - n, k) that takes the copies to the inner points.
-    - `solve`: The inverse (k, k) of the copies' own matrix.
+    `coupling` (n, k) is that of the outline and the copies, `spread` (N - n, k) takes the copies to
+    the inner points, and `solve` (k, k) is the inverse of the copies' own matrix.
     """
 
     coupling: Complex

@@ -30,11 +30,6 @@ def mutual_iou(tiles: Sequence[Array], decisive: float = 0.9) -> Similarity:
 
     A better overlay is searched only where it can matter: for pairs whose IoU, with equal areas and
     centroids, is at most `MAX_IOU_GAIN` below `decisive`, with which it is compared.
-
-    >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    >>> turned = square @ [[0.98, 0.2], [-0.2, 0.98]] * 3 + 7
-    >>> round(mutual_iou([square, turned])(0, 1), 3)
-    1.0
     """
     rings: list[Array] = []
     for tile in tiles:
@@ -86,20 +81,8 @@ def diverse(
 
     This is maximal marginal relevance (Carbonell, Goldstein, 1998): the first candidate has the
     largest score, each next one the largest score minus `variety` times its largest similarity to a
-    chosen one. Candidates with a similarity above `twin` to a chosen one are left out, so there may be
-    fewer than `count`.
-
-    Args:
-        scores: The scores (n,), larger is better; of equal ones the earlier comes first.
-        count: The largest number of candidates, at least 1.
-        similarity: The similarity of a candidate and a chosen one, called once for each pair.
-        twin: The largest similarity, 0 to 1; with 1 nothing is left out.
-        variety: The weight of similarity, at least 0, in the unit of the scores.
-
-    Returns:
-        Indices of `scores`, in the order of choice.
-
-    Raises `OrbiflowError` for scores that are not finite numbers, and for arguments out of range.
+    chosen one. Candidates with a similarity above `twin` to a chosen one are left out. Returns
+    indices of `scores` (n,), in the order of choice; of equal ones the earlier comes first.
 
     >>> position = [0.0, 0.01, 0.5, 1.0]
     >>> diverse([0.9, 0.89, 0.8, 0.81], 3, lambda i, j: 1 - abs(position[i] - position[j]))

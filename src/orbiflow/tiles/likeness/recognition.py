@@ -129,9 +129,9 @@ def recognisability(tile: Shape, target: Shape) -> Recognisability:
 class _Features(NamedTuple):
     """Points on an outline.
 
-    - `lifted`: Position, direction and thickness (P, 5), each divided by its tolerance.
-    - `thickness`: The radius (P,) of the disk inscribed at each point.
-    - `before`, `after`: The indices (P,) of each point's neighbours on its ring.
+    `lifted` (P, 5) are position, direction and thickness, each divided by its tolerance, `thickness`
+    (P,) the radius of the disk inscribed at each point, `before` and `after` its neighbours on its
+    ring.
     """
 
     lifted: Array

@@ -205,7 +205,7 @@ def index_page(
     folders: Sequence[str],
     *,
     failures: Sequence[ClassFailure] = (),
-    figures: Sequence[Sequence[str]] = (),
+    figures: Sequence[tuple[str, ...]] = (),
 ) -> str:
     """Return the page of one search's tiles, best first, to be written beside their `folders`.
 
@@ -214,13 +214,8 @@ def index_page(
     name = PurePath(target.source).name
     extra = figures or [()] * len(results)
     tiles = [
-        {
-            "found": result,
-            "folder": folder,
-            "files": (*TILE_FILES, *more),
-            "measures": measures(result),
-        }
-        for result, folder, more in zip(results, folders, extra, strict=True)
+        {"found": tile, "folder": folder, "files": TILE_FILES + more, "measures": measures(tile)}
+        for tile, folder, more in zip(results, folders, extra, strict=True)
     ]
     return rendered(
         "orbiflow.tiles.pages",

@@ -31,12 +31,8 @@ def front_png(
     """Return a PNG of tiles by deformation (to the right) and overlap (upwards), as silhouettes.
 
     Chosen tiles are large and coloured by what they were found for, with a line to their place if
-    they had to make room; full colour means that no other beats them. Others are pale, and the
-    dashed steps are the border of what is beaten. All have a deformation. The height is seven tenths
-    of the width.
-
-    Raises:
-        OrbiflowError: If there are no tiles or the size is impossible.
+    they had to make room; full colour means that no other beats them. Others are pale, and the dashed
+    steps are the border of what is beaten. All have a deformation.
     """
     if not (chosen or others):
         raise OrbiflowError("a picture of a front needs at least one tile")

@@ -248,10 +248,9 @@ def fit_bending(
     kind: IsohedralClass,
     settings: LikenessSearch,
     both: Sequence[Hand],
-    *,
-    per_class: int = 1,
-    progress: OnProgress = silent,
-    cancel: Cancel = NEVER,
+    per_class: int,
+    progress: OnProgress,
+    cancel: Cancel,
 ) -> Fit:
     """Fit tiles of one class to a target by letting the silhouette bend (design point 15)."""
     enough = 1 if per_class == 1 else 3 * per_class

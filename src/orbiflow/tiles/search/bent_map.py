@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
@@ -46,11 +47,10 @@ def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bend
 def onto_polygon(
     mesh: Mesh, images: Array, polygon: Array, corners: Integers, vertices: Integers
 ) -> tuple[Mesh, Array]:
-    """Move the outline's images (of `images` (N, 2)) onto a polygon (Q, 2); return the mesh and images.
+    """Move the outline's images, of `images` (N, 2), onto a polygon (Q, 2); return mesh and images.
 
-    A vertex of the polygon that is none of the outline's points becomes one; points between two
-    vertices are laid onto their side in proportion. The points `corners` (K,) go to the `vertices`
-    (K,), both in order round.
+    Vertices of the polygon become points of the mesh; points between two vertices are laid onto their
+    side in proportion. The points `corners` (K,) go to the `vertices` (K,), both in order round.
     """
     n, outline = mesh.size, mesh.size + len(mesh.sides)
     knots = arc_lengths(np.roll(images[:n], -corners[0], axis=0))
@@ -148,17 +148,14 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
     """Return a map without folds from a silhouette (N, 2) to a tile (M, 2) over it, in normal form.
 
     Points of the outlines are matched in order, near ones with near ones (dynamic programming over
-    both outlines, from the two points that are nearest); the inside follows harmonically and
-    is untangled.
-
-    Raises:
-        OrbiflowError: if the inside cannot follow without folds.
+    both outlines, from the two points that are nearest); the inside follows harmonically and is
+    untangled. Raises `OrbiflowError` if it cannot follow without folds.
     """
     rest = orient(silhouette, counter_clockwise=True)
     ring = orient(polygon, counter_clockwise=True)
     mesh = triangulate(ring)
     tile, goal = resampled(ring, TILE), resampled(rest, SILHOUETTE)
-    first, start = np.unravel_index(_apart(tile, goal).argmin(), (TILE, SILHOUETTE))
+    first, start = np.unravel_index(cdist(tile, goal, "sqeuclidean").argmin(), (TILE, SILHOUETTE))
     steps = _matching(np.roll(tile, -first, axis=0), np.roll(goal, -start, axis=0))
     even = np.linspace(0, SILHOUETTE, TILE + 1)
     places = (1 - PROPORTION) * steps + PROPORTION * even
@@ -180,14 +177,9 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
         ) from error
 
 
-def _apart(first: Array, second: Array) -> Array:
-    """(N, M) squared distances."""
-    return ((first[:, None] - second[None]) ** 2).sum(axis=2)
-
-
 def _matching(tile: Array, goal: Array) -> Array:
     """(TILE + 1,) for each point of the tile, from 0 to SILHOUETTE, its point of the silhouette."""
-    cost = _apart(tile, np.concatenate([goal, goal[:1]]))
+    cost = cdist(tile, np.concatenate([goal, goal[:1]]), "sqeuclidean")
     cost = np.concatenate([cost, cost[:1]])
     pay = EVENNESS * (np.arange(STEPS + 1) - SILHOUETTE / TILE) ** 2
     best = np.full(SILHOUETTE + 1, np.inf)

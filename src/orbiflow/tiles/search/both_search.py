@@ -54,7 +54,7 @@ class BothSearch(SearchMethod):
         """Return the two searches."""
         return [(0.3, self.likeness), (0.7, self.overlap)]
 
-    def fit(self, goal: Goal, kind: IsohedralClass, **_: Any) -> Fit:  # noqa: ARG002
+    def fit(self, goal: Goal, kind: IsohedralClass, *_: Any, **__: Any) -> Fit:  # noqa: ARG002
         """Refuse: each of the `parts` has candidates of its own."""
         raise OrbiflowError("a search for both fits twice: take its likeness or its overlap")
 
@@ -84,12 +84,10 @@ class BothSearch(SearchMethod):
 def front_list(results: Sequence[EscherTile]) -> list[EscherTile]:
     """Return at most twelve tiles: those on the front, no two of them alike, then some behind it.
 
-    The tile of least deformation and that of largest IoU are chosen first, then the others on the
-    front, from each search in turn in the order of `results`, best first; what has a mutual IoU of
-    0.9 with an earlier one is left out. While there is room, the first of each search follows,
-    which it would show alone, and tiles that one on the front beats by at most 15% of their
-    deformation and .03 of IoU, nearest first. Tiles without a deformation (forced ones that cross
-    themselves) come last.
+    The tile of least deformation and that of largest IoU come first, then the others on the front,
+    from each search in turn. While there is room, the first of each search follows, which it would
+    show alone, and tiles that one on the front beats by at most 15% of their deformation and .03 of
+    IoU, nearest first. Tiles without a deformation (forced ones that cross themselves) come last.
     """
     measured = [k for k, result in enumerate(results) if result.deformation is not None]
     odd = [k for k, result in enumerate(results) if result.deformation is None]
@@ -115,12 +113,9 @@ def front_list(results: Sequence[EscherTile]) -> list[EscherTile]:
 
 
 def behind(cost: Array, overlap: Array) -> Array:
-    """(n,) how far each point is behind the nearest on the front that beats it; 0 on the front.
+    """Return (n,) how far each point is behind the nearest on the front that beats it; 0 on the front.
 
     The larger of the share of its cost which the other saves, and that of `WORTH` in overlap.
-
-    >>> behind(np.array([1.0, 1.25, 2.0, 1.3]), np.array([0.7, 0.68, 0.9, 0.68])).round(3)
-    array([0.   , 0.2  , 0.   , 0.231])
     """
     # row k: what beats point k
     beats = (cost <= cost[:, None]) & (overlap >= overlap[:, None])
@@ -135,8 +130,7 @@ def behind(cost: Array, overlap: Array) -> Array:
 def deformation(hand: Hand, ring: Array) -> float:
     """Return what it costs to bend a silhouette until its outline is a simple ring (M, 2) over it.
 
-    The forgiving energy in areas of the bent silhouette, and its displacement, at the best result
-    of `bent_onto`: an upper bound of the least cost, as the search's own cost of a tile is.
+    At the best result of `bent_onto`: an upper bound of the least cost, as the search's own is.
     """
     body = hand.fine
     z = bent_onto(body, orient(ring, counter_clockwise=True))

@@ -109,11 +109,10 @@ def simplest_tile(
 ) -> Tile:
     """Return the coarsest polygon along a boundary that is simple, with its group.
 
-    It is 5e-4 of the tile's size from the sampled curve, finer where parts of the boundary come
-    close to each other. The prototile's `vertices` (N, 2) and points that `moved` carries lie in
-    the group's own frame, from which `linear` (2, 2) and `offset` (2,) lead. If no sampling gives a
-    simple polygon, the candidate has folded: a `CertificationError`, unless `force` takes the
-    finest.
+    It is 5e-4 of the tile's size from the sampled curve, finer where parts of the boundary come close
+    to each other. The prototile's `vertices` (N, 2) and points that `moved` carries lie in the
+    group's own frame, from which `linear` (2, 2) and `offset` (2,) lead. A candidate that has folded
+    is a `CertificationError`, unless `force` takes its finest polygon.
     """
     tile = None
     for count in DENSE:

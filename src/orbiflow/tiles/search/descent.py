@@ -145,10 +145,6 @@ class Descent:
         self.record = [parameters[index] for parameters in self.record]
         self.pose_momentum = {name: m[index] for name, m in self.pose_momentum.items()}
 
-    def flow_model(self) -> TileModel:
-        """The candidates, each with the recorded fields as the segments of its flow."""
-        return self.model.with_fields(self.record)
-
 
 def between(ends: tuple[float, float], share: float) -> float:
     """Return the geometric interpolation between two ends."""
@@ -300,7 +296,7 @@ def fit_descent(
         descent.keep(simple[:survivors].tolist(), iou)
         best = float(iou.max())
     first = _best_first(target, goal, soft, descent)
-    model = descent.flow_model()
+    model = descent.model.with_fields(descent.record)  # a segment of the flow for each step
     if soft.weights is None and starts.iou.max() > first:
         model = _with_start(model, prototiles.take([int(starts.iou.argmax())]))
     if settings.polish and soft.weights is None:  # the exact overlap knows no emphasis

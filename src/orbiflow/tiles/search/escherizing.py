@@ -186,9 +186,7 @@ def fit_tile(
     """
     task = _task(Goal(target, emphasis, pins), method or LikenessSearch.for_effort("normal"))
     with one_thread():
-        return task.method.fit(
-            task.goal, isohedral_class(kind), per_class=per_class, progress=progress, cancel=cancel
-        )
+        return task.method.fit(task.goal, isohedral_class(kind), per_class, progress, cancel)
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,7 +342,7 @@ def _chosen_tiles(
     """Return the tiles of one fit that are shown, best first, no two of them alike."""
     goal, count = task.goal, task.method.shown(task.per_class)
     with one_thread():
-        found = method.fit(goal, kind, per_class=count, progress=progress, cancel=cancel)
+        found = method.fit(goal, kind, count, progress, cancel)
         tiles = best_tiles(goal.target, found, force=task.force, min_neck=method.least_neck(goal))
         chosen = [tiles[k] for k in _without_twins(tiles, count)]
         cancel.check()

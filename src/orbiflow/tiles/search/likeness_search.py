@@ -62,26 +62,20 @@ class LikenessSearch(Settings, SearchMethod):
     seed: Seed = 0
 
     def fit(
-        self,
-        goal: Goal,
-        kind: IsohedralClass,
-        *,
-        per_class: int = 1,
-        progress: OnProgress = silent,
-        cancel: Cancel = NEVER,
+        self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
     ) -> Fit:
         """Let the silhouette bend into tiles of the class."""
         from orbiflow.tiles.search.bending import fit_bending
 
-        told: dict[str, Any] = {"per_class": per_class, "progress": progress, "cancel": cancel}
-        return fit_bending(goal.target, kind, self, self.hands(goal), **told)
+        both = self.hands(goal)
+        return fit_bending(goal.target, kind, self, both, per_class, progress, cancel)
 
     def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:
         """Let the silhouette bend in haste."""
         from orbiflow.tiles.search.bending import fit_bending
 
         quick = replace(self, below=0, **SKETCH)
-        return fit_bending(goal.target, kind, quick, self.hands(goal), cancel=cancel)
+        return fit_bending(goal.target, kind, quick, self.hands(goal), 1, silent, cancel)
 
     def prepare(self, goal: Goal) -> None:
         """Triangulate the silhouette and its mirror image."""

@@ -10,7 +10,7 @@ from orbiflow.arguments import refusal
 from orbiflow.errors import CertificationError
 from orbiflow.runtime import NEVER, Cancel, one_thread
 from orbiflow.settings import Range, Settings
-from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
+from orbiflow.tiles.search.candidates import Fit, OnProgress
 from orbiflow.tiles.search.escherize_settings import Count, Seed
 from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS, Goal, SearchMethod
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass
@@ -114,26 +114,16 @@ class OverlapSearch(Settings, SearchMethod):
         return sum(steps for steps, _ in self.stages)
 
     def fit(
-        self,
-        goal: Goal,
-        kind: IsohedralClass,
-        *,
-        per_class: int = 1,
-        progress: OnProgress = silent,
-        cancel: Cancel = NEVER,
+        self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
     ) -> Fit:
         """Let flows carry near tiles closer to the silhouette."""
         from orbiflow.tiles.search.descent import fit_descent
 
         stages = tuple((steps, max(kept, 2 * per_class)) for steps, kept in self.stages)
+        own = replace(self, stages=stages)
         with one_thread():
             found = fit_descent(
-                goal.target,
-                kind,
-                replace(self, stages=stages),
-                emphasis=goal.emphasis,
-                progress=progress,
-                cancel=cancel,
+                goal.target, kind, own, emphasis=goal.emphasis, progress=progress, cancel=cancel
             )
         return found._replace(enough=1 if per_class == 1 else 2 * per_class)
 
@@ -222,15 +212,10 @@ class OccupancySearch(Settings, SearchMethod):
         method(self.method)
 
     def fit(
-        self,
-        goal: Goal,
-        kind: IsohedralClass,
-        *,
-        per_class: int = 1,  # noqa: ARG002 - all survivors are given
-        progress: OnProgress = silent,
-        cancel: Cancel = NEVER,
+        self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
     ) -> Fit:
         """Let flows carry templates onto the silhouette; each class has a seed of its own."""
+        del per_class  # all survivors are given
         from orbiflow.tiles.search.occupancy import fit_occupancy
         from orbiflow.tiles.search.starts import initial_poses
 

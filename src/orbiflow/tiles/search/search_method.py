@@ -9,9 +9,9 @@ from importlib import import_module
 from typing import Any, ClassVar, Self
 
 from orbiflow.arguments import as_choice
-from orbiflow.errors import CertificationError
+from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import NEVER, Cancel
-from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
+from orbiflow.tiles.search.candidates import Fit, OnProgress
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
@@ -60,17 +60,13 @@ class SearchMethod(ABC):
         Raises:
             OrbiflowError: for an unknown level or setting.
         """
+        if not cls.efforts:
+            raise OrbiflowError(f"{cls.__name__} has no levels of effort; give its settings")
         return cls(**{**cls.efforts[as_choice(effort, tuple(cls.efforts), "effort")], **changes})
 
     @abstractmethod
     def fit(
-        self,
-        goal: Goal,
-        kind: IsohedralClass,
-        *,
-        per_class: int = 1,
-        progress: OnProgress = silent,
-        cancel: Cancel = NEVER,
+        self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
     ) -> Fit:
         """Return candidates of one class, best first.
 
@@ -79,8 +75,8 @@ class SearchMethod(ABC):
                 with `takes_pins` are given pins.
             kind: The class.
             per_class: The number of certified tiles that are wanted.
-            progress: Called with the share of the work done and the best loss so far.
-            cancel: Checked before each step.
+            progress: To be called with the share of the work done and the best loss so far.
+            cancel: To be checked before each step.
 
         Raises:
             CertificationError: if no candidate is left.

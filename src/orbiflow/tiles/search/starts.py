@@ -104,9 +104,9 @@ def outline_starts(
 ) -> Starts:
     """Return the best start tiles of one class for a target, no two of them twins.
 
-    At each of the `resolutions`, points of the outline that divide `vertices`, so many placements
-    are `projected` onto tiles and the nearest `measured`: several for the sake of thin limbs, for
-    the fewer, the smoother the start. A seed changes `phase`, the place of the points in spacings.
+    At each of the `resolutions`, points of the outline that divide `vertices`, so many placements are
+    `projected` onto tiles and the nearest `measured`. A seed changes `phase`, the place of the points
+    in spacings.
     """
     kind = isohedral_class(kind)
     as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
@@ -158,9 +158,7 @@ def template_starts(
     pieces = vertices // len(corners)
     count = len(poses)
     area = kind.group().cell_volume / kind.group().order
-    mirrored = np.array([side for side, _, _ in poses])
-    angle = np.array([turn for _, turn, _ in poses])
-    pull = np.array([pull for _, _, pull in poses])
+    mirrored, angle, pull = (np.array(column) for column in zip(*poses, strict=True))
     scale = area**-0.5
     turned = np.array([rotation_matrix(a) for a in angle])
     turned[mirrored, :, 1] *= -1

@@ -21,7 +21,6 @@ from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.tiles.geometry import subdivided
 from orbiflow.tiles.search.candidates import CORNERS, VERTICES, Prototiles, simplest_tile
 from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS
 from orbiflow.tiles.silhouette import Bending, Frame
@@ -36,13 +35,12 @@ class TileModel(nn.Module):
 
     The flow commutes with the class's group in the group's own frame; the lattice freedom L and the
     similarity A come after it, composed and not mixed in: the paper's V_sym(A^-1 z) loses the glide
-    reflections as soon as A rotates (design point 6). A template of area 1 is the start.
+    reflections as soon as A rotates (design point 6). A template of area 1 is the start. Points are
+    (S, N, 2); arrays and lists are taken as tensors of the model's dtype.
 
-    Certificates outlive a change of precision: `.float()`, `.half()`, `.to(...)` round the parameters,
-    which only makes another tile, but `vertices`, whose identified edges must correspond, stay float64,
-    and the polygon with its group (`extract_tile`) is computed in float64.
-
-    Points are (S, N, 2) throughout; arrays and lists are taken as tensors of the model's dtype.
+    Certificates outlive a change of precision: `.float()`, `.half()`, `.to(...)` round the
+    parameters, which only makes another tile, but `vertices`, whose identified edges must correspond,
+    stay float64, and the polygon with its group (`extract_tile`) is computed in float64.
 
     Args:
         isohedral_class: The class of all S tiles, or its name.
@@ -53,9 +51,6 @@ class TileModel(nn.Module):
         steps, method: Steps and method of the integrator.
         dtype: The type of all parameters.
         prototiles: S start tiles with their poses, in place of the template, `angles` and `mirrored`.
-
-    Raises:
-        OrbiflowError: For arguments that cannot be used, by name.
     """
 
     mirror: Tensor
@@ -190,12 +185,6 @@ class TileModel(nn.Module):
             return template, corners.expand(len(template), -1)
         return self.vertices.to(self.angle.dtype), self.corners
 
-    def boundary(self, pieces: int) -> Tensor:
-        """Points (S, N pieces, 2) along the prototile, `pieces` evenly spaced on each side."""
-        as_whole(pieces, "pieces", 1)
-        vertices, _ = self.prototile()
-        return subdivided(vertices, pieces)
-
     def take(self, indices: Sequence[int] | int) -> TileModel:
         """A new model with the candidates at `indices` only, at the same parameters."""
         several = indices if isinstance(indices, Sequence | np.ndarray) else [indices]
@@ -296,10 +285,10 @@ MAX_STEPS = 1024  # integration steps of a segment beyond which a field counts a
 def converge(
     model: TileModel, points: Tensor, *, tolerance: float = 1e-7, force: bool = False
 ) -> tuple[Tensor, float]:
-    """Double the integration steps of a single candidate until the flow is accurate.
+    """Double the integration steps of a single candidate until the flow is accurate (design point 5).
 
-    Returns the points (1, N, 2) carried at the doubled steps, and the error estimate (design point
-    5). A field that is too steep is a `CertificationError`, unless `force` takes it at `MAX_STEPS`.
+    Returns the points (1, N, 2) carried at the doubled steps, and the error estimate. A field that is
+    too steep is a `CertificationError`, unless `force` takes it at `MAX_STEPS`.
     """
     coarse = model.flow(points)
     while True:

@@ -152,7 +152,7 @@ def _sums_along(steps: Complex) -> tuple[Complex, Complex]:
 class NearestTiles(NamedTuple):
     """C tiles, each the nearest to an outline under its placement.
 
-    A tile may cross itself, and `linear` may reverse orientation: then it is of no use.
+    A tile that crosses itself, or whose `linear` reverses orientation, is of no use.
     """
 
     vertices: Complex  # (C, n) x + iy, vertex i near point `start + i` of the outline

@@ -19,13 +19,10 @@ FLAT_AREA = 1e-12  # twice the area, in areas of the polygon, below which a tria
 
 
 class Mesh(NamedTuple):
-    """The triangles that fill a polygon.
+    """The triangles (M, 3), counter-clockwise, that fill a polygon of `size` n.
 
-    - `points`: The points (N, 2): the polygon's n vertices, then points on its sides, then inside.
-    - `triangles`: The indices (M, 3) of corners, counter-clockwise.
-    - `sides`: The side (k,) that each of the points n .. n + k lies on.
-    - `shares`: The position (k,) along that side, 0 to 1.
-    - `size`: The number n of the polygon's vertices.
+    `points` (N, 2) are the polygon's n vertices, then points on its `sides` (k,) at `shares` (k,) of
+    their length, 0 to 1, then those inside.
     """
 
     points: Array

@@ -36,17 +36,9 @@ _POSITION = re.compile(r"\[(\S+) (\S+)\]")
 def clean_ring(
     points: ArrayLike, where: str, error: type[OrbiflowError] = OrbiflowError
 ) -> tuple[Array, list[str]]:
-    """Check that `points` (N, 2) bound a region, and drop repeated vertices.
+    """Return a ring (N, 2) without repeated vertices, which bounds a region, and what was dropped.
 
-    Returns the ring and a note, in plain words, of what was dropped. Each message begins with
-    `where`, such as a file name.
-
-    Raises `error` when a coordinate is not a finite number, when fewer than 3 or more than 100,000
-    vertices are given, when no area is enclosed, or when the polygon crosses or touches itself.
-
-    >>> ring, notes = clean_ring([[0, 0], [1, 0], [1, 0], [0, 1], [0, 0]], "example")
-    >>> ring.tolist(), notes
-    ([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], ['dropped 1 repeated vertex'])
+    Raises `error`, in messages that begin with `where`, for what is no simple polygon with an area.
     """
     ring = _as_points(points, where, error)
     _check_coordinates(ring, where, error)
@@ -120,11 +112,7 @@ def _pair(point: Array) -> str:
 
 
 def percent(share: float) -> str:
-    """Return `share` (0 to 1) as text, never rounded to 0% or 100%.
-
-    >>> percent(0.9213), percent(0.0002), percent(0.9999)
-    ('92.1%', 'under 0.1%', 'over 99.9%')
-    """
+    """Return `share` (0 to 1) as text, never rounded to 0% or 100%."""
     if 0 < share < 0.001:
         return "under 0.1%"
     return "over 99.9%" if 0.999 < share < 1 else f"{share:.1%}"
@@ -147,15 +135,10 @@ def outer_ring(polygon: Polygon) -> Array:
 
 
 def outer_outline(geometry: BaseGeometry) -> tuple[Polygon, list[str]]:
-    """Return the largest component of `geometry`, its holes filled, with notes of what was left out.
+    """Return the largest component of a valid geometry, filled, and notes of what was left out.
 
-    Components are compared by their area with holes filled; a component that lies in another's
-    hole goes with that hole. `geometry` must be valid and hold at least one polygon.
-
-    >>> from shapely.geometry import MultiPolygon, box
-    >>> shape, notes = outer_outline(MultiPolygon([box(0, 0, 3, 3), box(5, 5, 6, 6)]))
-    >>> shape.area, notes
-    (9.0, ['kept the largest of 2 components (90.0% of the filled area)'])
+    Components are compared by their area with holes filled; one in another's hole goes with that
+    hole.
     """
     components = polygons_in(geometry)
     solid = polygons_in(shapely.unary_union([filled(part) for part in components]))
@@ -192,11 +175,10 @@ MIDDLE_MULTIPLE = 2
 
 
 class Samples(NamedTuple):
-    """A counter-clockwise outline of area 1, sampled three times.
+    """A counter-clockwise outline of area 1, sampled by (n, 2), (2 n, 2) and (k n, 2) points.
 
-    - `coarse`: Points (n, 2), evenly spaced.
-    - `middle`: Points (2 n, 2) that include most of the outline's corners; or `fine` itself.
-    - `fine`: Points (k n, 2) that include the outline's corners; every k-th is near one of `coarse`.
+    `coarse` ones are evenly spaced, `middle` ones include most of the outline's corners (or are
+    `fine` itself), `fine` ones all of them; every k-th of these is near one of `coarse`.
     """
 
     coarse: Array
@@ -210,9 +192,7 @@ def sampled(
     """Sample a counter-clockwise ring (M, 2) of area about 1, more densely if long or rich in corners.
 
     Points are shifted by `phase` coarse spacings; `multiples` are numbers of fine points for each
-    coarse one, in order of trial. If twice the coarse points make no simple polygon, or do not divide
-    the fine ones, `middle` is `fine`. Raises `OrbiflowError` if all cross themselves because there
-    are hairs.
+    coarse one, in order of trial. Raises `OrbiflowError` if all cross themselves: there are hairs.
     """
     longer = ring_length(ring) / SHORT_OUTLINE
     count = int(np.clip(6 * round(MIN_POINTS * longer / 6), MIN_POINTS, MAX_POINTS))
@@ -267,8 +247,7 @@ def important_vertices(ring: Array, tolerance: float) -> list[int]:
 def with_corners(ring: Array, corners: list[int], count: int, phase: float = 0.0) -> Array:
     """Return `count` points (count, 2), nearly evenly spaced, with the nearest one at each corner.
 
-    Point i stays within a spacing of where even spacing has it. Of corners that are nearest to the
-    same point, the first is kept.
+    Of corners that are nearest to the same point, the first is kept.
     """
     along = arc_lengths(ring)
     total = along[-1]

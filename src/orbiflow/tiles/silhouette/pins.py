@@ -76,7 +76,6 @@ class Pins:
             InputFileError: for masks that cannot be read or do not touch the silhouette.
             OrbiflowError: as for `at`.
         """
-        as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
         words = [str(one) for one in given]
         spots = [word for word in words if _SPOT.fullmatch(word)]
         files = [word for word in words if not _SPOT.fullmatch(word)]

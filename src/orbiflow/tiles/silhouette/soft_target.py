@@ -1,5 +1,7 @@
 """A target as an image of signed distances, for the soft occupancy of thousands of points."""
 
+from functools import cached_property
+
 import numpy as np
 import shapely
 import torch
@@ -50,7 +52,6 @@ class SoftTarget:
         if emphasis is not None:
             weights = emphasis.weight(np.stack([x, y], axis=-1))
             self.weights = torch.tensor(weights, dtype=torch.float32)[None, None]
-        self._integrals: tuple[Tensor, Tensor, float] | None = None
 
     def occupancy(self, points: Tensor, blur: float) -> Tensor:
         """Return the soft occupancy, 0 to 1, at points (..., 2): a sigmoid of distance over `blur`."""
@@ -69,8 +70,6 @@ class SoftTarget:
         The areas are weighted by the emphasis. By Green's theorem they are integrals over the rings
         of the weights' integral along x, accurate to a pixel of the image.
         """
-        if self._integrals is None:
-            self._integrals = self._integrate()
         whole, common, total = self._integrals
         sides = (rings.roll(-1, dims=1) - rings)[:, :, None]
         shares = (torch.arange(PIECES_PER_SIDE, dtype=rings.dtype)[:, None] + 0.5) / PIECES_PER_SIDE
@@ -81,7 +80,8 @@ class SoftTarget:
         )
         return shared / (area + total - shared)
 
-    def _integrate(self) -> tuple[Tensor, Tensor, float]:
+    @cached_property
+    def _integrals(self) -> tuple[Tensor, Tensor, float]:
         weights = torch.ones_like(self.image) if self.weights is None else self.weights
         pixel = 2 * self.reach / self.image.shape[-1]
         inside = (self.image > 0).to(weights.dtype) * weights
@@ -101,13 +101,8 @@ class SoftTarget:
 def signed_distance(points: Tensor, vertices: Tensor) -> Tensor:
     """Return the true distance to the boundary, positive inside (paper, equation of phi).
 
-    Args:
-        points: Points (..., N, 2).
-        vertices: Simple polygons (..., K, 2), in either orientation; the leading axes broadcast with
-            those of the points.
-
-    Returns:
-        Distances (..., N), whose gradients are unit vectors except on the boundary and the medial axis.
+    Of points (..., N, 2) to simple polygons `vertices` (..., K, 2), in either orientation; leading
+    axes broadcast. Gradients are unit vectors except on the boundary and the medial axis.
 
     >>> square = torch.tensor([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
     >>> signed_distance(torch.tensor([[1.0, 0.5], [3.0, 3.0]]), square).tolist()

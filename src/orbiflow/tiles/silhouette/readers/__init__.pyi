@@ -1,4 +1,4 @@
-from .outline import read_outline as read_outline
+from .files import read_outline as read_outline
 from .pictures import MAX_BYTES as MAX_BYTES
 from .pictures import Picture as Picture
 from .pictures import read_mask as read_mask

@@ -62,14 +62,10 @@ def read_image(
 ) -> Reading:
     """Read the outline of the shape in a PNG, JPEG or WebP image, in pixels with y down.
 
-    The shape is the opaque part where some of the image is transparent and some is opaque, else it
-    is told from the background by its luminance: the background is what most of the border is.
-    `threshold`, between 0 and 1, is the level that parts them. `invert=True` says that the shape is
-    the light (or the transparent) part, `False` that it is the dark (or the opaque) part. The
-    image is turned as its EXIF orientation asks, and coordinates are those of the turned image.
-
-    Raises `InputFileError` for a file over 64 MB, an image over 40 megapixels, one that cannot be
-    decoded, and one without a shape of its own; `OrbiflowError` for a threshold out of range.
+    The shape is the opaque part where some of the image is transparent and some is opaque, else it is
+    told from the background, which is what most of the border is, by its luminance. `threshold`,
+    between 0 and 1, is the level that parts them; with `invert` the shape is the light (or
+    transparent) part. Coordinates are those of the image turned as its EXIF orientation asks.
     """
     return _traced(path, open_image(path, _decode), threshold, invert)
 
@@ -85,10 +81,9 @@ def _traced(
 
 
 def open_image(path: Source, decode: Callable[[Any, Image.Image], _Decoded]) -> _Decoded:
-    """Return what `decode` makes of the image at `path`, which is opened within bounds.
+    """Return what `decode` makes of the image at `path`.
 
-    Raises `InputFileError` for a file over 64 MB, an image over 40 megapixels (before a pixel of it
-    is decoded), and one that is no image or that `decode` finds damaged.
+    Raises `InputFileError` for one that is too large, before a pixel of it is decoded, or damaged.
     """
     n_bytes = check_file(path)
     if n_bytes > MAX_BYTES:
@@ -147,10 +142,7 @@ def upright(image: Image.Image) -> tuple[Image.Image, list[str]]:
 
 
 def _reduced(band: Image.Image) -> tuple[Array, int, list[str]]:
-    """Return levels of `band` ("L" or "F"), 0 to 1, with at most 1500 pixels along a side.
-
-    Also how many pixels of `band`, along each axis, were averaged into one, and a note of it.
-    """
+    """Return levels 0 to 1 with at most `MAX_SIDE` pixels a side, how many became one, and a note."""
     reduced = -(-max(band.size) // MAX_SIDE)
     full_scale = 255.0 if band.mode == "L" else 1.0
     note = f"averaged {reduced} x {reduced} pixels into one before tracing"
@@ -340,8 +332,7 @@ def read_mask(path: Source) -> Picture:
     """Read a mask from a PNG, JPEG or WebP image, turned as its EXIF orientation asks.
 
     The level is the opacity where some of the mask is more transparent than the rest, else the
-    luminance. Raises `InputFileError` for a file over 64 MB or 40 megapixels, one that is no image
-    or is damaged, and a mask that is all of one level.
+    luminance.
     """
     return open_image(path, _decode_mask)
 

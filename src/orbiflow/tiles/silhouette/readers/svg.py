@@ -40,16 +40,11 @@ COLLINEAR_TOLERANCE = 1e-6
 
 
 def read_svg(path: Source) -> Reading:
-    """Read the outline of the silhouette in an SVG drawing, in user units with y down.
+    """Read the outline of the silhouette in an SVG drawing, in user units of the viewBox, with y down.
 
-    User units are those of the viewBox (of the root element), whatever width and height say. All
-    closed sub-paths of paths, rectangles, circles, ellipses, polygons and polylines count, painted
-    or not; the sub-paths of one element are filled by its `fill-rule`, so that holes are holes; the
-    elements are united, the largest component is kept and its holes are filled. Strokes, clips and
-    masks are passed over. Curves are flattened to within 1/2000 of the size of their shape.
-
-    Raises `InputFileError` for a file over 16 MB, XML that is not well formed or declares entities,
-    elements that cannot be understood, more than 200,000 points, and a drawing with no closed path.
+    All closed sub-paths of paths, rectangles, circles, ellipses, polygons and polylines count,
+    painted or not, filled by the `fill-rule` of their element. The elements are united, the largest
+    component is kept and its holes are filled. Strokes, clips and masks are passed over.
     """
     drawing = Drawing(path, parse_xml(path, read_bytes(path, MAX_BYTES)))
     drawing.collect()

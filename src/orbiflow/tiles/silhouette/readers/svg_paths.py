@@ -165,13 +165,6 @@ def fill(rings: list[Array], rule: str = "nonzero") -> BaseGeometry:
     """Return the region filled by closed `rings`, each (N, 2), under `rule` "nonzero" or "evenodd".
 
     Raises `TooTangled` for curves with more crossings than can be resolved.
-
-    >>> square = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
-    >>> inner = square / 2 + 1
-    >>> fill([square, inner]).area, fill([square, inner[::-1]]).area
-    (16.0, 12.0)
-    >>> fill([square, inner], "evenodd").area
-    12.0
     """
     rings = [ring for ring in rings if len(np.unique(ring, axis=0)) >= 3]
     if len(rings) == 1 and (single := Polygon(rings[0])).is_valid:

@@ -24,8 +24,7 @@ _SELECTOR = re.compile(r"\*|[\w-]*(?:[.#][\w-]+)?")
 def parse_xml(path: Source, data: bytes) -> Element:
     """Return the root element of the SVG document `data`, all names without their namespaces.
 
-    Raises `InputFileError` when it is not well formed, declares entities (which can blow up to any
-    size), nests too deeply or holds too many elements.
+    Refused are entities, which can blow up to any size, deep nesting and too many elements.
     """
     parser = expat.ParserCreate(namespace_separator="}")
     parser.buffer_text = True
@@ -152,9 +151,8 @@ PAINT = ("fill", "stroke", "stroke-width", "fill-opacity", "stroke-opacity", "co
 class DrawnShape:
     """The sub-paths of one element, in user units of the drawing, and how they are filled.
 
-    - `paint`: of `PAINT`, what the element or one around it says.
-    - `opacity`: of all the groups that it is in.
-    - `scale`: user units of the drawing for one of the element's own.
+    `paint` is what the element or one around it says of `PAINT`, `opacity` that of all the groups
+    that it is in, `scale` the number of the drawing's user units for one of its own.
     """
 
     paths: list[SubPath]

@@ -39,8 +39,6 @@ def trace(
 
     A pixel of `level` is `scale` pixels of the image wide, and the image is `size` (width, height).
     Pixels of a shape hold together along their sides, not their corners.
-
-    Raises `InputFileError` when the shape fills the image or is smaller than 30 pixels.
     """
     mask = level.values > level.cut
     shape, notes = _largest(mask)

@@ -107,8 +107,6 @@ def read_dat(path: Source) -> Reading:
 
     Blank lines are passed over; lines after those n are left unread, with a note. Source of the
     format: https://github.com/nagata-yuichi/EscherTiling.
-
-    Raises `InputFileError` naming the line that cannot be read.
     """
     try:
         text = read_bytes(path, MAX_BYTES).decode("utf-8-sig")
@@ -170,8 +168,6 @@ def read_json(path: Source) -> Reading:
     Taken are: a list of [x, y] pairs; an object with such a list under "polygon", "tile" or
     "outline", and optionally `"y_down": true`; the outer ring of a GeoJSON Polygon or of a Feature
     that holds one.
-
-    Raises `InputFileError` naming the vertex, counted from 0, that cannot be used.
     """
     data = read_bytes(path, MAX_BYTES)
     try:
