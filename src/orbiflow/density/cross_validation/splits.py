@@ -21,7 +21,7 @@ from orbiflow.density.cross_validation.operations import SCORES, UNIFORM, CrossV
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
 from orbiflow.density.inference import chart_of_observed
 from orbiflow.density.spaces import Space, space_class
-from orbiflow.density.tables import Table, TableRows, Unit, angle_unit, read_rows, read_table
+from orbiflow.density.tables import TableRows, Unit, angle_unit, read_rows, read_table
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import Note, Sink, one_blas_thread
 
@@ -30,28 +30,16 @@ MOST_BYTES = 256 * 2**20
 
 
 @dataclass(frozen=True, eq=False)
-class CvRows:
+class CvRows(TableRows):
     """The rows of a table that count.
 
-    - `table`: N rows, in the data's own units.
-    - `weights`: How much each counts, (N,); None if all count the same.
-    - `labels`: The group of each row, (N,); None if there are none.
     - `together`: A label for each row, (N,); rows of one label are on one side of every split.
     - `space`, `unit`: Those of the whole table, for its measure; no fit sees them.
     """
 
-    table: Table
-    weights: Array | None
-    labels: NDArray[np.str_] | None
     together: NDArray[Any] | None
     space: Space
     unit: Unit
-
-    @cached_property
-    def whole(self) -> NDArray[np.bool_]:
-        """Which rows lack nothing: the density of others is in another unit."""
-        found = np.logical_and.reduce(np.isfinite(self.table.values), axis=1)
-        return found if found.any() else np.ones_like(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,13 +121,13 @@ def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
             f"{asked.data}: {len(counts)} different rows; a cross-validation needs more than the "
             f"{LEAST_PLACES} that a density needs"
         )
-    labels = rows.labels()
-    together: NDArray[Any] | None = labels
-    if asked.density.repeats == "rounding" and labels is None:
+    together: NDArray[Any] | None = rows.labels
+    if asked.density.repeats == "rounding" and together is None:
         together = place.numpy()
     elif asked.density.repeats == "rounding":
         tell(Note("groups are kept together; equal rows of different groups may be on both sides"))
-    return CvRows(table, rows.weights, labels, together, space, unit)
+    read = (rows.path, table, rows.weights, rows.group, rows.header)
+    return CvRows(*read, together, space, unit)
 
 
 def _counting(rows: TableRows) -> TableRows:
@@ -148,7 +136,7 @@ def _counting(rows: TableRows) -> TableRows:
     if weights is None:
         return rows
     weighed(torch.zeros(len(weights), 1), weights)  # refuses what is no weight
-    return replace(rows, table=rows.table.only(weights > 0), weights=weights[weights > 0])
+    return rows.only(weights > 0)
 
 
 def splits_of(asked: CrossValidation, rows: CvRows) -> list[Split]:

@@ -234,9 +234,6 @@ class Density(Distribution):
         Args:
             sample_shape: A shape or a number of points.
             generator: The same state gives the same points. Default: torch's own generator.
-
-        Raises:
-            OrbiflowError: for what is no shape.
         """
         with torch.no_grad():
             return self.rsample(sample_shape, generator)

@@ -38,9 +38,6 @@ class AdaptiveKernels(Density, kind="kernels"):
         centers: The chart points (N, d) that the kernels are about.
         concentrations: Concentrations kappa > 0, (N, d) on flat spaces and (N, 1) on round ones.
         weights: Weights (N,) of sum 1.
-
-    Raises:
-        OrbiflowError: for wrong shapes or values.
     """
 
     stored = ("centers", "concentrations", "weights")

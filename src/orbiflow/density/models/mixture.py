@@ -31,9 +31,6 @@ class Mixture(Density, kind="mixture"):
         components: The densities: of any kind, also mixtures.
         weights: Their weights (P,): positive, of sum 1; kept on the CPU.
 
-    Raises:
-        OrbiflowError: for components on spaces of another group, or weights that do not fit.
-
     >>> from orbiflow.density import UniformDensity, VonMisesDensity, make_space
     >>> space = make_space("torus")
     >>> Mixture([VonMisesDensity(space), UniformDensity(space)], [0.75, 0.25])
