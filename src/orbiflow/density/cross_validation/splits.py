@@ -107,7 +107,10 @@ class Fit:
 def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
     """Return the rows of the table that count."""
     width = asked.where.width
-    rows = _counting(read_rows(asked.data, asked.rows, tell, width=width, group=asked.group))
+    rows = read_rows(asked.data, asked.rows, tell, width=width, group=asked.group)
+    if rows.weights is not None:
+        weighed(torch.zeros(len(rows.weights), 1), rows.weights)  # refuses what is no weight
+        rows = rows.only(rows.weights > 0)  # others count for nothing
     table = rows.table
     unit = angle_unit(asked.where.space, asked.where.unit, table, tell)
     space = space_class(asked.where.space).for_data(
@@ -128,15 +131,6 @@ def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
         tell(Note("groups are kept together; equal rows of different groups may be on both sides"))
     read = (rows.path, table, rows.weights, rows.group, rows.header)
     return CvRows(*read, together, space, unit)
-
-
-def _counting(rows: TableRows) -> TableRows:
-    """Return rows without those of weight 0, which count for nothing."""
-    weights = rows.weights
-    if weights is None:
-        return rows
-    weighed(torch.zeros(len(weights), 1), weights)  # refuses what is no weight
-    return rows.only(weights > 0)
 
 
 def splits_of(asked: CrossValidation, rows: CvRows) -> list[Split]:

@@ -136,7 +136,13 @@ def fit_mixture(
     owns = [None] * len(blocks) if row_weights is None else torch.split(row_weights, BLOCK)
     gaps = [None] * len(blocks) if bool(whole.all()) else torch.split(absent.to(images), BLOCK)
     every = list(zip(blocks, owns, gaps, strict=True))
-    mean = _spread_out(images[:, whole], components, generator, train[whole].weights)
+    seen = images[:, whole]
+
+    def away(row: int) -> Tensor:
+        return ((seen - seen[0, row]) ** 2).sum(dim=-1).amin(dim=0)
+
+    chosen = far_apart(away, seen.shape[1], components, generator, train[whole].weights)
+    mean = seen[0, chosen].clone()
     width = 1 if space.is_round else space.dim
     kappa = mean.new_full((components, width), 10.0)
     weights = mean.new_full((components,), 1 / components)
@@ -152,18 +158,6 @@ def fit_mixture(
             break
         last = score
     return AdaptiveKernels(space, _points(space, mean), kappa, weights)
-
-
-def _spread_out(
-    images: Tensor, count: int, generator: torch.Generator, row_weights: Tensor | None
-) -> Tensor:
-    """Return features (K, m) of points far from each other over their images (E, N, m): k-means++."""
-    own = images[0]
-
-    def away(row: int) -> Tensor:
-        return ((images - own[row]) ** 2).sum(dim=-1).amin(dim=0)
-
-    return own[far_apart(away, len(own), count, generator, row_weights)].clone()
 
 
 def _expectation(

@@ -322,11 +322,6 @@ class Split:
         """The angles kept, then those given."""
         return (*self.kept, *self.given)
 
-    def located(self, points: Tensor) -> Tensor:
-        """Return kept angles (N, r) and the given ones behind them: (N, r + g)."""
-        given = points.new_tensor(self.values).expand(len(points), -1)
-        return torch.cat([points, given], dim=1)
-
 
 class Restriction(NamedTuple):
     """A density of some angles, given others, as far as there is a closed form.
