@@ -108,7 +108,7 @@ def test_plots_for_papers(tmp_path: Path, orbiflow, fitted) -> None:
     assert 'width="255.1' in (folder / "latlon.svg").read_text()
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     for options, message in (
-        (("--width", "2mm"), "--width: a figure is 40 to 1000 mm wide"),
+        (("--width", "2mm"), "--width must be from 40 to 1000, got '2mm'"),
         (("--width", "90"), "--width: '90' has no unit"),
         (("--out", out, "--format", "png"), "--out ends in .pdf but --format is png"),
         (("--out", tmp_path / "plot.png"), "several pictures; give a folder, or a .pdf"),

@@ -27,6 +27,8 @@ SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 DATA = np.random.default_rng(0).normal([20.0, 40.0], 10.0, (60, 2))
 QUICK: dict[str, Any] = {"max_frequency": 1, "segments": 1, "iterations": 3}
 
+pytestmark = pytest.mark.usefixtures("quick_fits")
+
 
 @pytest.fixture(name="three_threads")
 def three_threads_fixture():

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from density.blends import flow_of
+from density.quick_fits import few_kernels
 from orbiflow.density import DensityEstimator, density_to_bytes, make_space, mean_of, weighed
 from orbiflow.density.fitting.chains import fit_chain_mixture, spread_chains
 from orbiflow.density.fitting.evidence import sparse_weights, stacked, stacking_weights
@@ -37,8 +38,10 @@ def repeated(seed: int, count: int) -> tuple[torch.Tensor, torch.Tensor, torch.T
 def test_kernels_of_weighted_rows_are_those_of_repeated_ones(seed: int) -> None:
     points, weights, rows = repeated(seed, 40)
     space = make_space("torus")
-    found = kernel_estimates(space, Rows(points, weights), repeats=False)
-    expected = kernel_estimates(space, Rows(rows), repeats=False)
+    with pytest.MonkeyPatch.context() as patch:
+        few_kernels(patch)
+        found = kernel_estimates(space, Rows(points, weights), repeats=False)
+        expected = kernel_estimates(space, Rows(rows), repeats=False)
     at = space.uniform(30, torch.Generator().manual_seed(seed))
     assert found.keys() == expected.keys()
     for name, part in found.items():
@@ -89,7 +92,7 @@ def test_chains_from_one_start_are_those_of_repeated_rows(seed: int, count: int)
     order = torch.randperm(2, generator=generator)
     start = spread_chains(space, Rows(points, weights), count, order, generator)
     weighted, plain = (
-        fit_chain_mixture(start, rows, rows, 40) for rows in (Rows(points, weights), Rows(repeats))
+        fit_chain_mixture(start, rows, rows, 15) for rows in (Rows(points, weights), Rows(repeats))
     )
     at = space.uniform(30, generator)
     assert torch.allclose(weighted.log_prob(at), plain.log_prob(at), atol=1e-6)
@@ -137,6 +140,7 @@ def test_a_flow_descends_on_the_weighted_likelihood() -> None:
     assert slope == pytest.approx(also, abs=1e-9)
 
 
+@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("options", [{}, {"components": "flow"}])
 def test_equal_weights_are_none(options: dict[str, object]) -> None:
     angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (310, 2))
@@ -149,6 +153,7 @@ def test_equal_weights_are_none(options: dict[str, object]) -> None:
     assert first.report_.effective is second.report_.effective is None
 
 
+@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("space", ["torus", "sphere", "klein-bottle", "projective-plane"])
 def test_a_fit_follows_its_weights(space: str) -> None:
     """Of two clusters, one weighs nine times the other; and rows of weight 0 are not there."""

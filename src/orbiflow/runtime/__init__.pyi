@@ -26,6 +26,7 @@ from .files import check_outside_runs as check_outside_runs
 from .files import is_list as is_list
 from .files import is_object as is_object
 from .files import make_folder as make_folder
+from .files import read_json as read_json
 from .files import stays_inside as stays_inside
 from .files import write_atomic as write_atomic
 from .files import write_set as write_set

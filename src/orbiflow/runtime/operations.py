@@ -175,6 +175,7 @@ class Operation:
     @property
     def schema(self) -> dict[str, Any]:
         """The JSON form as JSON Schema."""
+        required = [entry.name for entry in self.fields if entry.required]
         return {
             "$schema": SCHEMA,
             "title": self.name,
@@ -185,11 +186,7 @@ class Operation:
                 "operation": {"const": self.name},
                 **{entry.name: entry.schema for entry in self.fields},
             },
-            "required": [
-                "schema_version",
-                "operation",
-                *(entry.name for entry in self.fields if entry.required),
-            ],
+            "required": ["schema_version", "operation", *required],
             "additionalProperties": False,
         }
 

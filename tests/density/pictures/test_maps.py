@@ -174,9 +174,9 @@ def test_captions_say_what_is_seen(coast: Path) -> None:
 
 def test_the_scale_is_the_same_in_all_pictures_and_has_its_reason() -> None:
     narrow, broad = (peaked(ROUND[1], (80, 0), kappa) for kappa in (60.0, 1.0))
-    assert chosen_scale(narrow, "natural", "auto").log
-    assert not chosen_scale(broad, "natural", "auto").log
-    assert chosen_scale(broad, "natural", "log").log
+    assert chosen_scale(narrow, "natural", "auto")[0]
+    assert not chosen_scale(broad, "natural", "auto")[0]
+    assert chosen_scale(broad, "natural", "log")[0]
 
 
 def test_coastlines_are_drawn_and_cut(coast: Path) -> None:

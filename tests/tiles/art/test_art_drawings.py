@@ -225,7 +225,7 @@ def test_current_colour_is_ink(tmp_path: Path) -> None:
     <path d="M 300 400 L 500 300" fill="none" stroke="currentcolor" stroke-width="9"/>
     <path d="M 300 400 L 500 300 L 600 400" fill="currentColor" color="#203040"/>"""
     art = drawn("IH4", body, tmp_path)
-    assert [part.inked for part in art.motif.parts] == [True, True, False]
+    assert [INK in part.style for part in art.motif.parts] == [True, True, False]
     assert art.motif.parts[2].style.fill == "#203040"
     chosen = palette(art.settings.palette)
     inks = {layer.ink for layer in art_scene(art).layers} - {None}

@@ -12,7 +12,7 @@ from artworks import checkerboard, squirrel
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import rotation_matrix
 from orbiflow.tiles import CLASSES, ArtSettings, artwork, render_artwork
-from orbiflow.tiles.art.page import _Colours, _page, rectangle
+from orbiflow.tiles.art.page import _page, rectangle
 
 
 @pytest.mark.parametrize("how", ["aspect", "neighbour", "one"])
@@ -23,7 +23,7 @@ def test_two_by_two_is_the_same_plane(name: str, how) -> None:
     art = artwork(tile, settings, picture=None if how == "one" else checkerboard(tile))
     cell = render_artwork(art)
     page, size = art.page, (2 * art.page.width, 2 * art.page.height)
-    spread = _page(tile.tile, _Colours(tile.tile, how), page.linear, page.offset, size, ())
+    spread = _page(tile.tile, how, page.linear, page.offset, size, ())
     twice = render_artwork(replace(art, page=spread))
     apart = np.abs(np.tile(cell, (2, 2, 1)).astype(int) - twice)
     assert apart.max() <= 1

@@ -58,7 +58,7 @@ def test_neighbours_and_colours(name: str) -> None:
     tile = tile_of(name)
     copies = copies_meeting(tile, window_of(tile, (0, 0), (3, 3)))
     own, colours = edges(tile), colouring(tile)
-    beyond = copies.neighbours(own.across)
+    beyond = copies.neighbours(own.across).copy
     table = colours.colours(copies)
     known = {
         (int(c), *map(int, cell)): k
@@ -78,7 +78,7 @@ def test_an_empty_window_of_whole_tiles() -> None:
     tile = tile_of("IH5")
     found = copies_inside(tile, window_of(tile, (0, 0), (0.1, 0.1)))
     assert len(found) == 0
-    assert found.neighbours(edges(tile).across).shape == (0, 6)
+    assert found.neighbours(edges(tile).across).copy.shape == (0, 6)
 
 
 def test_too_many() -> None:

@@ -217,7 +217,7 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
     weighted, grouped = split.rows.weights is not None, split.rows.labels is not None
     density, space = asked.density, asked.where.space
     given: dict[str, Any] = {
-        "data": Path(split.name),
+        "data": Path("rows.npy"),
         "space": space,
         "fold": fit.fold,
         "columns": tuple(str(k + 1) for k in range(angles)),
@@ -232,7 +232,7 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
         "seed": density.seed,
     }
     call = runtime.find("density fold").call({k: v for k, v in given.items() if v is not None})
-    return batch.Item(fit.key, fit.name, call, split)
+    return batch.Item(fit.key, fit.name, call, split.read)
 
 
 MOST_LISTED = 200

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from orbiflow import runtime
-from orbiflow.density import comparing, fitting, inference, models, regions, tables
+from orbiflow.density import comparing, fitting, models, regions, tables
 from orbiflow.density.run_folder import write_file, written_files
 from orbiflow.density.tables import RowSettings, check_table_name
 from orbiflow.errors import literal
@@ -115,6 +115,8 @@ def score_rows(
     These are the weighted mean log density, in nats, of the rows that lack nothing, which rows they are
     in words, and notes.
     """
+    from orbiflow.density import inference
+
     space, values = density.space, rows.table.values
     points = inference.chart_of_observed(space, values) if may_lack else space.to_chart(values)
     known = ~points.isnan()
@@ -146,6 +148,8 @@ def _log_densities(
 ) -> Array:
     import numpy as np
     import torch
+
+    from orbiflow.density import inference
 
     if settings.table:
         progress(0.0, "making a table")
@@ -279,6 +283,8 @@ def marginal(
         columns: Angles to keep, by name or number, such as phi.
         out: Folder of the new model, made if need be.
     """
+    from orbiflow.density import inference
+
     if not columns:
         raise SettingError("{columns} names no column; give names or numbers, as in phi,psi")
 
@@ -318,6 +324,8 @@ def conditional(
         columns: Of the other angles, those to keep.
         out: Folder of the new model, made if need be.
     """
+    from orbiflow.density import inference
+
     if not given:
         raise SettingError("{given} says nothing; give what is known, as in psi=-45")
     pairs = [_angle(text) for text in given]

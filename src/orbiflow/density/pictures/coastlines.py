@@ -29,6 +29,7 @@ _SHAPES = {"LineString": 1, "MultiLineString": 2, "Polygon": 2, "MultiPolygon": 
 """Depth of the lists of positions in each kind of geometry that has lines."""
 
 _POINTS = ("Point", "MultiPoint")
+_COLLECTIONS = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
 _EDGE = 1e-4
 """Degrees from a pole or longitude 180 within which a polygon's edge is where the globe was cut."""
 
@@ -86,22 +87,13 @@ def _table(path: Path) -> list[Array]:
 def _geojson(path: Path) -> list[Array]:
     try:
         content = json.loads(path.read_bytes())
-        shapes = list(_geometries(path, content, 0))
+        return list(_lines(path, content, 0))
     except (ValueError, RecursionError) as error:  # ValueError: neither JSON nor UTF-8
         raise InputFileError(f"{path} is not GeoJSON: {error}"[:300]) from error
-    except OSError as error:
-        raise InputFileError(f"cannot read {path}: {error.strerror or error}") from error
-    lines: list[Array] = []
-    for kind, coordinates in shapes:
-        rings = kind.endswith("Polygon")
-        for positions in _flat(path, kind, coordinates, _SHAPES[kind]):
-            line = _positions(path, kind, positions)
-            lines += _without_cuts(line) if rings else [line]
-    return [line for line in lines if len(line) > 1]
 
 
-def _geometries(path: Path, item: Any, depth: int) -> Iterator[tuple[str, Any]]:
-    """Yield the kind and the coordinates of every geometry with lines."""
+def _lines(path: Path, item: Any, depth: int) -> Iterator[Array]:
+    """Yield the lines (M, 2), M > 1, of a feature, a geometry or a collection of them."""
     kind = item.get("type") if isinstance(item, dict) else None
     kind = kind if isinstance(kind, str) else None
     if kind == "Topology":
@@ -110,32 +102,33 @@ def _geometries(path: Path, item: Any, depth: int) -> Iterator[tuple[str, Any]]:
         )
     if depth > _MAX_DEPTH:
         raise InputFileError(f"{path} has collections more than {_MAX_DEPTH} deep")
-    if kind in ("FeatureCollection", "GeometryCollection"):
-        inner = item.get("features" if kind == "FeatureCollection" else "geometries")
+    if kind in _COLLECTIONS:
+        inner = item.get(_COLLECTIONS[kind])
         if not isinstance(inner, list):
             raise InputFileError(f"{path}: a {kind} without a list of them is not GeoJSON")
         for part in inner:
-            yield from _geometries(path, part, depth + 1)
+            yield from _lines(path, part, depth + 1)
     elif kind == "Feature":
         if item.get("geometry") is not None:
-            yield from _geometries(path, item["geometry"], depth + 1)
+            yield from _lines(path, item["geometry"], depth + 1)
     elif kind in _SHAPES:
-        yield kind, item.get("coordinates")
+        for positions in _flat(path, kind, item.get("coordinates"), _SHAPES[kind]):
+            line = _positions(path, kind, positions)
+            parts = _without_cuts(line) if kind.endswith("Polygon") else [line]
+            yield from (part for part in parts if len(part) > 1)
     elif kind not in _POINTS:
         raise InputFileError(
             f"{path} is not GeoJSON: expected a feature or a geometry, got {described(kind)}"
         )
 
 
-def _flat(path: Path, kind: str, items: Any, depth: int) -> Iterator[list[Any]]:
-    """Yield the lists of positions in lists `depth` - 1 deep."""
+def _flat(path: Path, kind: str, items: Any, depth: int) -> list[Any]:
+    """Return the lists of positions in lists `depth` - 1 deep."""
     if not isinstance(items, list):
         raise InputFileError(f"{path}: the coordinates of a {kind} must be lists {depth} deep")
     if depth == 1:
-        yield items
-        return
-    for item in items:
-        yield from _flat(path, kind, item, depth - 1)
+        return [items]
+    return [line for item in items for line in _flat(path, kind, item, depth - 1)]
 
 
 def _positions(path: Path, kind: str, positions: list[Any]) -> Array:

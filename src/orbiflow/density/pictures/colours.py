@@ -64,18 +64,11 @@ def density_on_map(density: Density, points: Tensor, measure: str, angle: float)
     return _averaged(density, points, measure, torch.tensor(angle / 2))
 
 
-class ChosenScale(NamedTuple):
-    """Whether colours are by logarithms, and why, in words for a caption."""
-
-    log: bool
-    reason: str
-
-
-def chosen_scale(density: Density, measure: str, scale: str) -> ChosenScale:
-    """Return the scale of colours, which is the same for all pictures of a density."""
+def chosen_scale(density: Density, measure: str, scale: str) -> tuple[bool, str]:
+    """Return whether colours are by logarithms, the same in all pictures of a density, and why."""
     if scale != "auto":
         log = scale == "log"
-        return ChosenScale(log, f"colours are {'logarithmic' if log else 'linear'}, as asked for")
+        return log, f"colours are {'logarithmic' if log else 'linear'}, as asked for"
     t = (torch.arange(_COARSE, dtype=torch.float64) + 0.5) / _COARSE
     values = density_on_grid(density, t, t, measure, pixel=0.5 / _COARSE).ravel()
     areas = density.space.log_area(midpoints(density.space, _COARSE)).exp().numpy()
@@ -84,7 +77,7 @@ def chosen_scale(density: Density, measure: str, scale: str) -> ChosenScale:
     # never more than what is true: 99.6 % are not all
     share, side = (int(100 * dark), "below") if log else (math.ceil(100 * (1 - dark)), "above")
     reason = f"the density is {side} a tenth of its peak on {share} % of the area"
-    return ChosenScale(log, f"colours are {'logarithmic' if log else 'linear'}, as {reason}")
+    return log, f"colours are {'logarithmic' if log else 'linear'}, as {reason}"
 
 
 def is_sharp(density: Density, *, pixel: float | None = None, angle: float | None = None) -> bool:

@@ -11,7 +11,6 @@ import torch
 from PIL import Image
 from torch import Tensor
 
-from orbiflow.arguments import as_whole
 from orbiflow.density.models import Density, FlowDensity
 from orbiflow.density.pictures.axes import INK, require_plane, space_title, view_of
 from orbiflow.density.pictures.frames import Room, colour_bar, make_frame, printed_room
@@ -23,17 +22,16 @@ from orbiflow.symmetry import CrystallographicGroup
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+CELLS = 3
+"""Number of cells along each side of the picture."""
+
 SPEED = "speed, sides of the square per unit time"
 SCREEN = Room(1.8, 3.8, 10.8, 2.7, 1.7, 1.5)
 """Room on a screen, with a caption below."""
 
 
 def flow_picture(
-    density: Density,
-    settings: PlotSettings | None = None,
-    *,
-    cells: int = 3,
-    sheet: Sheet | None = None,
+    density: Density, settings: PlotSettings | None = None, *, sheet: Sheet | None = None
 ) -> Picture:
     """Draw the time mean of a flow's vector fields, over the canonical square and its images.
 
@@ -43,19 +41,16 @@ def flow_picture(
     Args:
         density: A density on a two-dimensional space.
         settings: How it is drawn.
-        cells: Number of cells along each side of the picture, 1 to 9.
         sheet: The sheet. Default: that of the settings.
 
     Raises:
-        OrbiflowError: If the space has another dimension, the number of cells is not allowed, or a
-            centre does not fit.
+        OrbiflowError: If the space has another dimension, or a centre does not fit.
     """
     settings, space = settings or PlotSettings(), density.space
     sheet = sheet or settings.sheet
     require_plane(space)
-    as_whole(cells, "cells", 1, 9)
     view = view_of(space, center=None if space.is_round else settings.center)
-    low, high = 0.5 - cells / 2, 0.5 + cells / 2
+    low, high = 0.5 - CELLS / 2, 0.5 + CELLS / 2
     window = (low, low, high, high)
     printed = printed_room(sheet, 0.4, 0.6, 0.6, SPEED, ("0.00",))
     frame = make_frame(sheet, printed if sheet.printed else SCREEN)

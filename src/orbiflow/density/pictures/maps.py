@@ -63,8 +63,8 @@ class Map:
         pixels = pixels_of(self.projection)
         points = cast(RoundSpace, self.space).vectors_to_chart(to_vectors(pixels.latlon))
         values = density_on_map(density, points, settings.measure, pixels.angle)
-        chosen = chosen_scale(density, settings.measure, settings.scale)
-        shade = shading(values[pixels.within], pixels.areas[pixels.within], log=chosen.log)
+        log, reason = chosen_scale(density, settings.measure, settings.scale)
+        shade = shading(values[pixels.within], pixels.areas[pixels.within], log=log)
         logs = None
         if settings.regions:
             logs = pixels.table(log_natural(density, values, points, settings.measure), math.nan)
@@ -73,7 +73,7 @@ class Map:
             size = f"{math.degrees(pixels.angle):.2g}°"
             note = f"peaks narrower than {size} are averaged over it"
         places = pixels.table(shade.places(values), 0.0)
-        return Colouring(places, pixels.extent, shade, chosen.reason, note, logs, self.outline)
+        return Colouring(places, pixels.extent, shade, reason, note, logs, self.outline)
 
     def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> frames.Room:
         above = 0.8 if sheet.printed else 3.2

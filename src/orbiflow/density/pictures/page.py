@@ -66,8 +66,8 @@ def density_page(
     values = colours.density_on_grid(density, t, t, settings.measure, pixel=_SOFT / cells).ravel()
     # by area on the surface: vertices crowd at the cone points
     areas = space.log_area(grid.points).exp().numpy()
-    chosen = colours.chosen_scale(density, settings.measure, settings.scale)
-    shade = colours.shading(values, areas, log=chosen.log)
+    log, _ = colours.chosen_scale(density, settings.measure, settings.scale)
+    shade = colours.shading(values, areas, log=log)
     lines = (*_coordinate_lines(space), (1.6, _on_surface(space, coastlines)))
     notes = []
     data = {

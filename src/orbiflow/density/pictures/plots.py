@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import torch
 from numpy.typing import ArrayLike
@@ -56,9 +56,13 @@ class Plotted(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
+Given: TypeAlias = Density | DensityEstimator | str | Path
+"""A density, a fitted estimator, or the folder of `orbiflow density fit`."""
+
+
 @one_thread()
 def plot_density(
-    density: Density | DensityEstimator | str | Path,
+    density: Given,
     out: str | Path,
     settings: PlotSettings | None = None,
     *,
@@ -106,9 +110,10 @@ def plot_density(
     if single:
         path = write_atomic(out, pdf_pages(list(pictures.values())))
         return Plotted((path,), captions, notes)
-    contents: dict[str, str | bytes] = {
-        f"{name}.{form}": _content(name, picture) for name, picture in pictures.items()
-    }
+    files = {f"{name}.{form}": picture.file() for name, picture in pictures.items()}
+    if "flow.png" in files and not settings.sheet.printed:
+        files["flow.png"] = few_colours(files["flow.png"])
+    contents: dict[str, str | bytes] = {**files}
     if shown.space.dim == 2:
         told(0.75, f"drawing {PAGE}")
         lines = simplified(shown.coastlines, PAGE_POINTS)
@@ -152,23 +157,17 @@ def known_names(space: Space, columns: Sequence[str] | None) -> tuple[str, ...] 
     return tuple(columns)
 
 
-def _content(name: str, picture: Picture) -> bytes:
-    content = picture.file()
-    # on a screen the flow has few colours
-    few = name == "flow" and picture.sheet.format == "png" and not picture.sheet.printed
-    return few_colours(content) if few else content
-
-
 class _Shown:
     """A density and what is drawn with it; all that can be wrong is checked before the work."""
 
-    def __init__(
-        self,
-        given: Density | DensityEstimator | str | Path,
-        settings: PlotSettings,
-        data: ArrayLike | None,
-    ) -> None:
-        self.density, columns = _density_of(given)
+    def __init__(self, given: Given, settings: PlotSettings, data: ArrayLike | None) -> None:
+        columns: Sequence[str] | None = None  # those that the density was fitted to, if known
+        if isinstance(given, Density | DensityEstimator):
+            self.density = density_of(given, "this DensityEstimator")
+        else:
+            path = as_path(given, "the density")
+            self.density, extra = read_density(path / MODEL if path.is_dir() else path)
+            columns = extra.get("columns")
         self.space = space = self.density.space
         if settings.names is None:
             settings = settings.replace(names=known_names(space, columns))
@@ -210,17 +209,6 @@ class _Shown:
             plain = PlateCarree((0.0, self.map.center[1]))
             grounds["latlon"] = Map(space, plain, self.coastlines)
         return {**grounds, "square": square}
-
-
-def _density_of(
-    given: Density | DensityEstimator | str | Path,
-) -> tuple[Density, Sequence[str] | None]:
-    """Return the density, and the columns that it was fitted to, if they are known."""
-    if isinstance(given, Density | DensityEstimator):
-        return density_of(given, "this DensityEstimator"), None
-    path = as_path(given, "the density")
-    density, extra = read_density(path / MODEL if path.is_dir() else path)
-    return density, extra.get("columns")
 
 
 def _check_space(space: Space, settings: PlotSettings) -> None:

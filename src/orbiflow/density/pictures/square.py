@@ -80,15 +80,15 @@ class Square:
         x, y = (middles + low for low in self.view.low)
         values = density_on_grid(density, x, y, settings.measure)
         areas = self.space.log_area(midpoints(self.space, count)).exp().numpy()
-        chosen = chosen_scale(density, settings.measure, settings.scale)
-        shade = shading(values, areas.reshape(count, count), log=chosen.log)
+        log, reason = chosen_scale(density, settings.measure, settings.scale)
+        shade = shading(values, areas.reshape(count, count), log=log)
         logs = None
         if settings.regions:
             points = torch.stack(torch.meshgrid(x, y, indexing="ij"), dim=-1).reshape(-1, 2)
             logs = log_natural(density, values.ravel(), points, settings.measure)
             logs = logs.reshape(count, count).T
         note = average_note(count) if is_sharp(density, pixel=1 / count) else ""
-        return Colouring(shade.places(values).T, (0, 1, 0, 1), shade, chosen.reason, note, logs)
+        return Colouring(shade.places(values).T, (0, 1, 0, 1), shade, reason, note, logs)
 
     def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> frames.Room:
         """Return the room around a single picture and its colour bar."""

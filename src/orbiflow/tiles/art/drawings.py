@@ -13,11 +13,11 @@ from shapely.errors import GEOSException
 
 from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
-from orbiflow.drawing import plane_axes
+from orbiflow.drawing import plane_axes, rgb
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.art.raster import Grid, Paint
-from orbiflow.tiles.art.source import SAME_ASPECT, Picture, covered_area, read_picture
-from orbiflow.tiles.exporting import INK, Curve, Motif, Part, Style, curves_path
+from orbiflow.tiles.art.source import Picture, covered_area, read_picture
+from orbiflow.tiles.exporting import INK, Curve, Motif, Part, Style, curves_path, draw_paths
 from orbiflow.tiles.geometry import orient, polygons_in
 from orbiflow.tiles.silhouette import (
     MAX_BYTES,
@@ -73,12 +73,7 @@ def _onto(path: Path, drawing: Drawing, tile: EscherTile) -> tuple[Array, Array]
         return np.eye(2), np.zeros(2)
     low, high = np.array(drawing.box[:2]), np.array(drawing.box[2:])
     own, there = high - low, covered.high - covered.low
-    if abs(own[0] * there[1] / (own[1] * there[0]) - 1) > SAME_ASPECT:
-        raise InputFileError(
-            f"{path}: the drawing is {own[0]:.6g} x {own[1]:.6g} and {covered.name} is "
-            f"{there[0]:.6g} x {there[1]:.6g}; a drawing covers all of that and must have its aspect "
-            "within 1 %, so draw over a copy of it"
-        )
+    covered.require_aspect(path, "drawing", own.tolist())
     flip = np.array([1.0, 1.0 if tile.y_down else -1.0])
     scale = there / own * flip
     start = covered.low if tile.y_down else np.array([covered.low[0], covered.high[1]])
@@ -143,10 +138,9 @@ def _parts(shape: DrawnShape, drawing: Drawing, carry: _Carry) -> list[Part]:
 
 
 def _line(carry: _Carry, points: Array, path: SubPath) -> Curve:
-    closed = path.closed and len(points) > 2
-    if closed and np.allclose(points[0], points[-1]):
+    if path.closed and len(points) > 2 and np.allclose(points[0], points[-1]):
         points = points[:-1]
-    closed = closed and len(points) > 2
+    closed = path.closed and len(points) > 2
     return Curve.polyline(carry(points, closed=closed), closed=closed)
 
 
@@ -181,8 +175,7 @@ def _gradient(text: str, drawing: Drawing) -> tuple[str | None, float]:
         return None, 0.0
     stops = [drawing.styles.properties(child) for child in element if child.tag == "stop"]
     colours = [_colour(stop.get("stop-color", "#000000"), {}, drawing)[0] for stop in stops]
-    plain = [colour for colour in colours if colour not in (None, INK)]
-    known = [[int(str(colour)[i : i + 2], 16) for i in (1, 3, 5)] for colour in plain]
+    known = [rgb(colour) for colour in colours if colour not in (None, INK)]
     if not known:
         return None, 0.0
     red, green, blue = np.mean(known, axis=0).round().astype(int)
@@ -228,7 +221,7 @@ def paint_motif(paint: Paint, motif: Motif) -> None:
     """Draw a motif, antialiased, over a painting."""
     grid = paint.grid
     placed = motif.moved(grid.density * np.eye(2), -grid.density * grid.corner)
-    for inked, parts in groupby(placed.parts, key=lambda part: part.inked):
+    for inked, parts in groupby(placed.parts, key=lambda part: INK in part.style):
         canvas = _canvas(list(parts), grid)
         alpha = canvas[..., 3]
         if inked:
@@ -240,7 +233,6 @@ def paint_motif(paint: Paint, motif: Motif) -> None:
 def _canvas(parts: list[Part], grid: Grid) -> Array:
     """Return parts drawn as RGBA (height, width, 4), straight, 0 to 1."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.collections import PathCollection
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(grid.width / DOTS, grid.height / DOTS), dpi=DOTS)
@@ -252,16 +244,8 @@ def _canvas(parts: list[Part], grid: Grid) -> Array:
             "#000000" if colour == INK else colour
             for colour in (part.style.fill, part.style.stroke)
         )
-        collection = PathCollection(
-            [curves_path(part.curves)],
-            facecolors=fill or "none",
-            edgecolors=stroke or "none",
-            linewidths=part.style.width * 72 / DOTS if stroke else 0,
-            alpha=part.opacity if part.opacity < 1 else None,
-            joinstyle="round",
-            capstyle="round",
-        )
-        axes.add_collection(collection, autolim=False)
+        style = Style(fill, stroke, part.style.width * 72 / DOTS if stroke else 0)
+        draw_paths(axes, [curves_path(part.curves)], style, part.opacity)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba(), dtype=np.float32) / 255

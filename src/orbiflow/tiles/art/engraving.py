@@ -141,9 +141,7 @@ def eye(tile: EscherTile, given: tuple[float, ...], palette: Palette) -> Eye:
     radius = USUAL_EYE * size if len(given) < 3 else given[2] * abs(factor)
     radius = min(radius, room)
     up = -1.0 if tile.y_down else 1.0
-    glint = np.array([-0.3, 0.35 * up])
-    turn = factor / abs(factor)
-    spot = complex(*glint) * turn
+    spot = complex(-0.3, 0.35 * up) * (factor / abs(factor))
     light = middle + radius * np.array([spot.real, spot.imag]) * 0.9
     edge = Style(palette.paper, palette.outline, 0.2 * radius)
     parts = (

@@ -95,7 +95,7 @@ def artwork(
     if picture is not None or drawing is not None or settings.eyes:
         tile.require_map()
     page = art_page(tile, settings)
-    parts: tuple[Part, ...] = () if drawing is None else drawing.parts
+    parts = () if drawing is None else drawing.parts
     around = [eye(tile, given, palette(settings.palette)) for given in settings.eyes]
     if settings.strokes is not None:
         parts += engraved(tile, settings.strokes, around)
@@ -108,33 +108,28 @@ def artwork(
 def render_artwork(art: Artwork, *, cancel: Cancel | None = None) -> np.ndarray:
     """Render the picture (height, width, 3) in 8 bits, antialiased."""
     page, chosen, samples = art.page, palette(art.settings.palette), art.settings.samples
-    grid = raster_grid(art)
-    coloured = painted(art, grid).coloured(chosen, page.count)
-    return render_page(page, grid, coloured, chosen.paper, samples=samples, cancel=cancel)
+    paint = painted(art)
+    coloured = paint.coloured(chosen, page.count)
+    return render_page(page, paint.grid, coloured, chosen.paper, samples=samples, cancel=cancel)
 
 
-def raster_grid(art: Artwork) -> Grid:
-    """Return the grid of the tile's raster, as fine as the page needs."""
-    return Grid.over(art.page.tile.polygon, TEXELS_PER_PIXEL * art.page.scale, art.page.count)
-
-
-def picture_paint(art: Artwork, grid: Grid) -> Paint:
-    """Paint the tile's raster with the picture alone."""
-    paint = Paint(grid)
-    if art.picture is None:
-        return paint
-    paint.lay(*carried_picture(art.picture, art.tile, grid))
-    paint.bleed(grid.inside(art.page.tile.polygon))
+def picture_paint(art: Artwork) -> Paint:
+    """Paint the tile's raster, as fine as the page needs, with the picture alone."""
+    polygon = art.page.tile.polygon
+    paint = Paint(Grid.over(polygon, TEXELS_PER_PIXEL * art.page.scale, art.page.count))
+    if art.picture is not None:
+        paint.lay(*carried_picture(art.picture, art.tile, paint.grid))
+        paint.bleed(paint.grid.inside(polygon))
     return paint
 
 
-def painted(art: Artwork, grid: Grid) -> Paint:
+def painted(art: Artwork) -> Paint:
     """Paint the tile's raster with all that is on the tile."""
     polygon = art.page.tile.polygon
-    paint = picture_paint(art, grid)
+    paint = picture_paint(art)
     if art.motif.parts:
         paint_motif(paint, art.motif)
-        paint.bleed(grid.inside(polygon))
+        paint.bleed(paint.grid.inside(polygon))
     if art.outline > 0:
         # half of its width inside
         colour, width = palette(art.settings.palette).outline, art.outline / art.page.scale
@@ -198,8 +193,8 @@ def art_scene(art: Artwork) -> Scene:
 def _rasters(art: Artwork) -> tuple[Raster, ...]:
     if art.picture is None:
         return ()
-    grid = raster_grid(art)
-    values = picture_paint(art, grid).values
+    paint = picture_paint(art)
+    values, grid = paint.values, paint.grid
     alpha = 1 - values[..., 3:4]
     straight = values[..., :3] / np.maximum(alpha, 1e-6)
     both = np.concatenate([straight, alpha], axis=2)

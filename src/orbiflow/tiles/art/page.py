@@ -31,13 +31,17 @@ class ArtPage:
     offset: Array
     colours: NDArray[np.int64]  # the number (M,) of each copy's colour
     count: int  # the number of colours
-    tile_size: float  # the size of a tile in pixels
     notes: tuple[str, ...] = ()  # what the user should know
 
     @property
     def scale(self) -> float:
         """Pixels per unit."""
         return float(np.sqrt(abs(np.linalg.det(self.linear))))
+
+    @property
+    def tile_size(self) -> float:
+        """The size of a tile in pixels."""
+        return self.scale * longer_side(self.tile.polygon)
 
     @property
     def shown(self) -> float:
@@ -49,26 +53,13 @@ class ArtPage:
         return self.copies.images(self.tile.polygon) @ self.linear.T + self.offset
 
 
-class _Colours:
-    """A way to colour the copies of a tile, and the translations that keep the colours."""
-
-    def __init__(self, tile: Tile, how: str) -> None:
-        self.how, self.own, self.lattice = how, colouring(tile), tile.group.lattice
-        self.count = {"one": 1, "aspect": tile.group.order}.get(how, self.own.count)
-        if how == "neighbour":
-            a, b, c = self.own.sublattice
-            self.lattice = tile.group.lattice @ np.array([[a, b], [0.0, c]])
-
-    def of(self, copies: Copies) -> NDArray[np.int64]:
-        if self.how == "one":
-            return np.zeros(len(copies), dtype=np.int64)
-        return copies.cosets if self.how == "aspect" else self.own.colours(copies)
-
-
 def art_page(given: EscherTile, settings: ArtSettings) -> ArtPage:
     """Put the tile on a page of the settings' size, the same way up; or make the repeating cell."""
     tile = given.tile
-    colours = _Colours(tile, settings.colour)
+    lattice = tile.group.lattice
+    if settings.colour == "neighbour":  # the translations that keep the colours
+        a, b, c = colouring(tile).sublattice
+        lattice = lattice @ np.array([[a, b], [0.0, c]])
     flip = np.diag([1.0, 1.0 if given.y_down else -1.0])
     size = longer_side(tile.polygon)
     width, height = settings.size
@@ -78,8 +69,8 @@ def art_page(given: EscherTile, settings: ArtSettings) -> ArtPage:
     if not settings.repeat:
         linear = scale * flip
         offset = np.array([width, height]) / 2 - linear @ tile.center
-        return _page(tile, colours, linear, offset, (width, height), ())
-    found = rectangle(colours.lattice, scale, settings.tolerance, flipped=not given.y_down)
+        return _page(tile, settings.colour, linear, offset, (width, height), ())
+    found = rectangle(lattice, scale, settings.tolerance, flipped=not given.y_down)
     try:
         check_size(found.width, found.height)
     except OrbiflowError as error:
@@ -96,12 +87,12 @@ def art_page(given: EscherTile, settings: ArtSettings) -> ArtPage:
         note += f"; whole pixels stretch it by {share}"
     else:
         note += f"; it is stretched by {share} to be a rectangle"
-    return _page(tile, colours, found.linear, offset, (found.width, found.height), (note,))
+    return _page(tile, settings.colour, found.linear, offset, (found.width, found.height), (note,))
 
 
 def _page(
     tile: Tile,
-    colours: _Colours,
+    colour: str,
     linear: Array,
     offset: Array,
     size: tuple[int, int],
@@ -113,19 +104,13 @@ def _page(
     corners += np.sign(corners - 1) * 2.0
     there = (corners - offset) @ np.linalg.inv(linear).T
     copies = copies_meeting(tile, (*there.min(axis=0), *there.max(axis=0)))
-    scale = float(np.sqrt(abs(np.linalg.det(linear))))
-    return ArtPage(
-        width,
-        height,
-        tile,
-        copies,
-        linear,
-        offset,
-        colours.of(copies),
-        colours.count,
-        scale * longer_side(tile.polygon),
-        notes,
-    )
+    colours, count = np.zeros(len(copies), dtype=np.int64), 1
+    if colour == "aspect":
+        colours, count = copies.cosets, tile.group.order
+    elif colour == "neighbour":
+        own = colouring(tile)
+        colours, count = own.colours(copies), own.count
+    return ArtPage(width, height, tile, copies, linear, offset, colours, count, notes)
 
 
 REACH = 14  # greatest multiple of a basis vector that is tried
@@ -141,7 +126,7 @@ class Rectangle(NamedTuple):
     """A rectangular cell of whole pixels that repeats."""
 
     linear: (
-        Array  # the map (2, 2) from the lattice's units to pixels: a similarity, but for `strain`
+        Array  # the map (2, 2) from the lattice's units to pixels, a similarity but for `strain`
     )
     width: int  # with `height`: the size in pixels
     height: int
@@ -195,11 +180,8 @@ def _best_pair(lattice: Array, tolerance: float) -> tuple[Array, int] | None:
     sine = abs(dot) / (length[first][:, None] * length)
     # a shear by the angle's cotangent stretches one direction by about as much
     fits = (cells >= 1) & (cells <= LARGEST) & (sine <= min(2 * tolerance + EXACT, 0.5))
-    found = np.argwhere(fits)
-    if not len(found):
-        return None
     options = []
-    for i, j in found:
+    for i, j in np.argwhere(fits):
         pair = np.stack([vectors[first[i]], vectors[j]], axis=1)
         strain = _strain(_squared(pair))
         if strain <= tolerance + EXACT:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,7 +17,7 @@ from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.art.raster import Grid, polygon_sides, runs, triangle_sides
 from orbiflow.tiles.geometry import border
 from orbiflow.tiles.search import matched
-from orbiflow.tiles.silhouette import Bending, Frame, Target, deep_channel, open_image, upright
+from orbiflow.tiles.silhouette import Frame, Target, deep_channel, open_image, upright
 from orbiflow.tiles.tile import EscherTile, TileMap, TileSource
 
 
@@ -34,32 +35,25 @@ def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
     tile = EscherTile.of(source)
     if tile.no_map or (tile.bending is not None and tile.frame is not None):
         return tile
-    if tile.rank is not None and tile.silhouette is not None:  # out of a file
-        try:
-            target = _silhouette(tile.silhouette)
-        except OrbiflowError as error:
-            return _without_map(tile, tile.frame, str(error))
-    if target is None:
-        reason = "there is no map of the silhouette; give the search's target as well"
-        return _without_map(tile, tile.frame, reason)
-    frame = target.frame
+    frame, bending, known = tile.frame, None, tile.map or TileMap()
+    said: dict[str, Any] = {}
     try:
+        if tile.rank is not None and tile.silhouette is not None:  # out of a file
+            target = _silhouette(tile.silhouette)
+        if target is None:
+            raise OrbiflowError(
+                "there is no map of the silhouette; give the search's target as well"
+            )
+        frame = target.frame
         bending = matched(target.normal, frame.to_normal(tile.tile.polygon))
+        note = "the search left no map of the silhouette; its outline was matched with the tile's"
+        said["notes"] = (*tile.notes, note)
     except OrbiflowError as error:
-        return _without_map(tile, frame, str(error))
-    note = "the search left no map of the silhouette; its outline was matched with the tile's"
-    return _mapped(tile, frame, bending).changed(notes=(*tile.notes, note))
-
-
-def _without_map(tile: EscherTile, frame: Frame | None, reason: str) -> EscherTile:
-    size = np.sqrt(abs(tile.tile.signed_area))
-    frame = frame or Frame(size * np.diag([1.0, -1.0 if tile.y_down else 1.0]), np.zeros(2))
-    return _mapped(tile, frame, None).changed(no_map=reason)
-
-
-def _mapped(tile: EscherTile, frame: Frame, bending: Bending | None) -> EscherTile:
-    known = tile.map or TileMap()
-    return tile.changed(map_source=TileMap(known.settings, known.arrays, frame, bending))
+        said["no_map"] = str(error)
+    if frame is None:
+        size = np.sqrt(abs(tile.tile.signed_area))
+        frame = Frame(size * np.diag([1.0, -1.0 if tile.y_down else 1.0]), np.zeros(2))
+    return tile.changed(map_source=TileMap(known.settings, known.arrays, frame, bending), **said)
 
 
 def silhouette_outline(tile: EscherTile) -> Array:
@@ -84,6 +78,16 @@ class Covered(NamedTuple):
         if not self.y_down:
             found[..., 1] = 1 - found[..., 1]
         return found
+
+    def require_aspect(self, path: Path, what: str, size: Sequence[float]) -> None:
+        """Refuse a picture or drawing of this width and height unless its aspect is the same."""
+        (width, height), (wide, high) = size, self.high - self.low
+        if abs(width * high / (height * wide) - 1) > SAME_ASPECT:
+            raise InputFileError(
+                f"{path}: the {what} is {width:.6g} x {height:.6g} and {self.name} is "
+                f"{wide:.6g} x {high:.6g}; a {what} covers all of that and must have its aspect "
+                "within 1 %, so paint or draw over a copy of it"
+            )
 
 
 def covered_area(tile: EscherTile) -> Covered:
@@ -132,15 +136,10 @@ class Picture:
     covered: Covered  # the rectangle that it covers in the silhouette's coordinates
     notes: tuple[str, ...] = ()  # what was decided for the user
 
-    @property
-    def pixel(self) -> float:
-        """The side of a pixel in the silhouette's units."""
-        size = self.covered.high - self.covered.low
-        return float(np.sqrt(size.prod() / (self.image.width * self.image.height)))
-
     def reduced(self, pixel: float) -> Picture:
         """Return the picture averaged to pixels no smaller than `pixel` in the silhouette's units."""
-        share = self.pixel / pixel
+        area = (self.covered.high - self.covered.low).prod()
+        share = float(np.sqrt(area / (self.image.width * self.image.height))) / pixel
         if share >= 0.9:
             return self
         size = [max(1, round(side * share)) for side in self.image.size]
@@ -154,14 +153,9 @@ def read_picture(path: Path, tile: EscherTile) -> Picture:
     """Read a picture of a tile's silhouette from a file; it must have the silhouette's aspect."""
     image, notes = open_image(path, _decode)
     covered = covered_area(tile)
+    covered.require_aspect(path, "picture", image.size)
     wide, high = covered.high - covered.low
     width, height = image.size
-    if abs(width * high / (height * wide) - 1) > SAME_ASPECT:
-        raise InputFileError(
-            f"{path}: the picture is {width} x {height} pixels and {covered.name} is "
-            f"{wide:.6g} x {high:.6g}; a picture covers all of that and must have its aspect within "
-            "1 %, so paint over a copy of it"
-        )
     if (width, height) != (round(wide), round(high)):
         notes = (
             *notes,

@@ -1,5 +1,6 @@
 from .formats import INCH as INCH
 from .formats import curves_path as curves_path
+from .formats import draw_paths as draw_paths
 from .formats import write_dxf as write_dxf
 from .formats import write_json as write_json
 from .formats import write_pdf as write_pdf

@@ -17,12 +17,15 @@ from orbiflow.tiles.exporting.scene import (
     Layer,
     PlacedTile,
     Scene,
+    Style,
     Uses,
     clipped_line,
     clipped_region,
 )
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.path import Path as PlotPath
 
@@ -139,7 +142,6 @@ INCH = 25.4
 
 def drawn(scene: Scene, *, least_width: float = 0.0) -> Figure:
     """Return a figure of the page in real size; strokes are at least `least_width` mm wide."""
-    from matplotlib.collections import PathCollection
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
 
@@ -149,22 +151,27 @@ def drawn(scene: Scene, *, least_width: float = 0.0) -> Figure:
     axes = plane_axes(figure, (0.0, 0.0, scene.width, scene.height), y_down=True)
     axes.set_aspect("auto")  # which rounding would otherwise decide
     for layer in scene.layers:
-        width = max(layer.style.width, least_width) * 72 / INCH
-        collection = PathCollection(
-            _paths(scene, layer),
-            facecolors=layer.style.fill or "none",
-            edgecolors=layer.style.stroke or "none",
-            linewidths=width,
-            joinstyle="round",
-            capstyle="round",
-        )
-        axes.add_collection(collection, autolim=False)
+        style = layer.style._replace(width=max(layer.style.width, least_width) * 72 / INCH)
+        collection = draw_paths(axes, _paths(scene, layer), style)
         if layer.clipped:
             box = scene.clip
             window = Rectangle((box.left, box.top), box.width, box.height)
             window.set_transform(axes.transData)
             collection.set_clip_path(window)
     return figure
+
+
+def draw_paths(axes: Axes, paths: list[PlotPath], style: Style, opacity: float = 1.0) -> Artist:
+    """Draw paths on axes, with the stroke's width in points."""
+    from matplotlib.collections import PathCollection
+
+    collection = PathCollection(
+        paths, facecolors=style.fill or "none", edgecolors=style.stroke or "none",
+        linewidths=style.width, alpha=opacity if opacity < 1 else None,
+        joinstyle="round", capstyle="round",
+    )  # fmt: skip
+    axes.add_collection(collection, autolim=False)
+    return collection
 
 
 def _paths(scene: Scene, layer: Layer) -> list[PlotPath]:
@@ -200,19 +207,15 @@ def _path(points: Array, codes: Array) -> PlotPath:
 def _points_and_codes(curve: Curve) -> tuple[Array, Array]:
     from matplotlib.path import Path as PlotPath
 
-    move, line, cubic = (
-        np.uint8(code) for code in (PlotPath.MOVETO, PlotPath.LINETO, PlotPath.CURVE4)
-    )
     # of straight pieces only the end is kept
-    kept = np.repeat(~curve.straight, 3)
+    straight = np.repeat(curve.straight, 3)
+    kept = ~straight
     kept[2::3] = True
-    points = curve.pieces[:, 1:].reshape(-1, 2)[kept]
-    codes = np.where(np.repeat(curve.straight, 3), line, cubic)[kept]
-    points, codes = np.concatenate([curve.start[None], points]), np.concatenate([[move], codes])
-    if curve.closed:
-        points = np.concatenate([points, curve.start[None]])
-        codes = np.concatenate([codes, [np.uint8(PlotPath.CLOSEPOLY)]])
-    return points, codes
+    ends = [curve.start] if curve.closed else []
+    points = [curve.start, *curve.pieces[:, 1:].reshape(-1, 2)[kept], *ends]
+    codes = np.where(straight, PlotPath.LINETO, PlotPath.CURVE4)[kept]
+    closing = [PlotPath.CLOSEPOLY for _ in ends]
+    return np.array(points), np.array([PlotPath.MOVETO, *codes, *closing], dtype=np.uint8)
 
 
 def write_pdf(scene: Scene) -> bytes:

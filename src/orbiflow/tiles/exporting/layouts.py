@@ -12,7 +12,7 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import rotation_matrix
-from orbiflow.tiles.exporting.nesting import Placed, dense_arrangements, on_sheet
+from orbiflow.tiles.exporting.nesting import dense_arrangements, on_sheet
 from orbiflow.tiles.exporting.outlines import Outline, fitted, outline, turning
 from orbiflow.tiles.exporting.scene import (
     Box,
@@ -125,24 +125,14 @@ def _with_most_whole(tile: Tile, box: Box) -> Tile:
 
 def placed_tiles(copies: Copies, layout: Layout) -> tuple[PlacedTile, ...]:
     """Return what the JSON file says about each copy."""
-    own = layout.outline.edges
-    beyond = np.zeros((len(copies), 0), int) if own is None else copies.neighbours(own.across)
-    linear = copies.group.linear_parts
+    own, linear = layout.outline.edges, copies.group.linear_parts
+    beyond = [[]] * len(copies) if own is None else copies.neighbours(own.across).copy.tolist()
     rings = copies.images(layout.tile.polygon)
     low, high = rings.min(axis=1), rings.max(axis=1)
-    whole = ((low >= layout.box[:2]) & (high <= layout.box[2:])).all(axis=1)
-    return tuple(
-        PlacedTile(
-            int(coset),
-            linear[coset],
-            offset,
-            tuple(dict.fromkeys(k for k in near if k >= 0)),
-            bool(kept),
-        )
-        for coset, offset, near, kept in zip(
-            copies.cosets, copies.translations, beyond.tolist(), whole, strict=True
-        )
-    )
+    whole = ((low >= layout.box[:2]) & (high <= layout.box[2:])).all(axis=1).tolist()
+    near = [tuple(dict.fromkeys(k for k in row if k >= 0)) for row in beyond]
+    placed = zip(copies.cosets.tolist(), copies.translations, near, whole, strict=True)
+    return tuple(PlacedTile(k, linear[k], at, ks, kept) for k, at, ks, kept in placed)
 
 
 SYMBOL = "tile"
@@ -286,7 +276,7 @@ def pieces_scenes(layout: Layout, *, fine: bool = True) -> list[Scene]:
     ]
 
 
-def _shared_out(placed: Placed, layout: Layout, box: Box) -> list[Placed]:
+def _shared_out(placed: Uses, layout: Layout, box: Box) -> list[Uses]:
     settings, fit = layout.settings, len(placed)
     wanted = settings.copies or fit
     sheets = math.ceil(wanted / fit)
@@ -297,28 +287,23 @@ def _shared_out(placed: Placed, layout: Layout, box: Box) -> list[Placed]:
             f"{fit} piece{plural}, so that {sheets} sheets are needed; choose a larger area, or give "
             f"the bed to have {sheets} files"
         )
-    return [placed.first(min(fit, wanted - k * fit)) for k in range(sheets)]
+    counts = [min(fit, wanted - k * fit) for k in range(sheets)]
+    return [replace(placed, which=placed.which[:n], offsets=placed.offsets[:n]) for n in counts]
 
 
-def _scene(
-    layout: Layout, placed: Placed, curve: Curve, line: Array, box: Box, gap: float
-) -> Scene:
-    _require_clear(placed.rings(line), box, gap)
-    cuts = tuple(
-        curve.moved(linear, offset)
-        for linear, offset in zip(placed.linear, placed.offsets, strict=True)
-    )
+def _scene(layout: Layout, placed: Uses, curve: Curve, line: Array, box: Box, gap: float) -> Scene:
+    _require_clear(placed.images(line), box, gap)
+    pieces = [
+        PlacedTile(aspect, placed.linear[aspect], offset)
+        for aspect, offset in zip(placed.which.tolist(), placed.offsets, strict=True)
+    ]
+    cuts = tuple(curve.moved(piece.linear, piece.offset) for piece in pieces)
     return Scene(
         *layout.settings.page,
         (Layer("cut", "cut", line_style(layout), cuts),),
         window=box,
         prototile=layout.tile.polygon,
-        tiles=tuple(
-            PlacedTile(int(aspect), linear, offset)
-            for aspect, linear, offset in zip(
-                placed.aspects, placed.linear, placed.offsets, strict=True
-            )
-        ),
+        tiles=tuple(pieces),
     )
 
 

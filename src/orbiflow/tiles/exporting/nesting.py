@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 from orbiflow.arrays import Array
+from orbiflow.tiles.exporting.scene import Uses
 from orbiflow.tiles.tilings import Tile
 
 
@@ -116,17 +117,17 @@ PAIRS = 24  # places of the turned piece of a pair that are tried
 KEPT_LATTICES = 3  # number of best lattices that are then tightened exactly
 
 
-def lattice_starts(ring: Array, gap: float) -> list[Arrangement]:
-    """Return dense lattices of the piece, to the raster's precision."""
-    raster = _Raster(ring, gap)
-    found = raster.lattices(raster.same, 1)
-    still = np.eye(2)[None]
-    return [Arrangement(lattice, still, np.zeros((1, 2))) for _, lattice in found[:KEPT_LATTICES]]
+def raster_starts(ring: Array, gap: float) -> list[Arrangement]:
+    """Return dense lattices of the piece, and of pairs, to the raster's precision.
 
-
-def pair_starts(ring: Array, gap: float) -> list[Arrangement]:
-    """Return dense lattices of pairs, the piece and the piece turned by 180 degrees."""
+    A pair is the piece and the piece turned by 180 degrees.
+    """
     raster = _Raster(ring, gap)
+    still, center = np.eye(2), raster.center
+    single = [
+        Arrangement(lattice, still[None], np.zeros((1, 2)))
+        for _, lattice in raster.lattices(raster.same, 1)[:KEPT_LATTICES]
+    ]
     found = []
     for angle in np.arange(PAIRS) * 2 * np.pi / PAIRS:
         place = raster.first_outside(raster.turned, angle)
@@ -135,9 +136,8 @@ def pair_starts(ring: Array, gap: float) -> list[Arrangement]:
         pair = raster.same | there | there[::-1, ::-1]
         found += [(area, lattice, place) for area, lattice in raster.lattices(pair, 2)[:1]]
     found.sort(key=lambda item: item[0])
-    turns = np.stack([np.eye(2), -np.eye(2)])
-    center = raster.center
-    return [
+    turns = np.stack([still, -still])
+    return single + [
         # q = c - (p - c) + w in the raster's frame, whose origin is the piece's centre c
         Arrangement(lattice, turns, np.stack([np.zeros(2), 2 * center + place * raster.cell]))
         for _, lattice, place in found[:KEPT_LATTICES]
@@ -200,13 +200,10 @@ class _Raster:
 
 def _shifted(region: Mask, step: NDArray[np.int64]) -> Mask:
     """Return the region moved by whole cells; what comes from beyond the raster is free."""
-    moved = np.zeros_like(region)
-    rows, columns = region.shape
-    i, j = int(step[0]), int(step[1])
-    if abs(i) < rows and abs(j) < columns:
-        moved[max(i, 0) : rows + min(i, 0), max(j, 0) : columns + min(j, 0)] = region[
-            max(-i, 0) : rows + min(-i, 0), max(-j, 0) : columns + min(-j, 0)
-        ]
+    moved, steps = np.zeros_like(region), list(zip(step.tolist(), region.shape, strict=True))
+    if all(abs(by) < size for by, size in steps):
+        there = tuple(slice(max(by, 0), size + min(by, 0)) for by, size in steps)
+        moved[there] = region[tuple(slice(max(-by, 0), size + min(-by, 0)) for by, size in steps)]
     return moved
 
 
@@ -215,33 +212,13 @@ KEPT = 4  # number of densest arrangements that are tried on a sheet
 ANGLES = 36  # angles of an arrangement that are tried on a sheet
 
 
-@dataclass(frozen=True, eq=False)
-class Placed:
-    """N pieces on a sheet: a point p of the piece goes to linear[n] p + offsets[n]."""
-
-    linear: Array
-    offsets: Array
-    aspects: NDArray[np.int64]  # the number (N,) of each piece in the arrangement's cell
-
-    def __len__(self) -> int:
-        return len(self.linear)
-
-    def rings(self, ring: Array) -> Array:
-        """Return the images (N, M, 2) of a ring."""
-        return np.einsum("nij,mj->nmi", self.linear, ring) + self.offsets[:, None]
-
-    def first(self, count: int) -> Placed:
-        """Return the first `count` pieces."""
-        return Placed(self.linear[:count], self.offsets[:count], self.aspects[:count])
-
-
-def dense_arrangements(tile: Tile, ring: Array, gap: float, *, seed: int = 0) -> list[Arrangement]:
-    """Return arrangements of pieces cut along `ring` (M, 2), `gap` apart, densest first, by a seed."""
-    rng = np.random.default_rng(seed)
+def dense_arrangements(tile: Tile, ring: Array, gap: float) -> list[Arrangement]:
+    """Return arrangements of pieces cut along `ring` (M, 2), `gap` apart, densest first."""
+    rng = np.random.default_rng(0)
     coarse = _simplified(ring, gap)
     group = tile.group
     own = Arrangement(group.lattice, group.linear_parts, group.translations)
-    starts = [own, *lattice_starts(coarse, gap), *pair_starts(coarse, gap)]
+    starts = [own, *raster_starts(coarse, gap)]
     tight = sorted((tightened(start, coarse, gap) for start in starts), key=attrgetter("cell_area"))
     clear = [found for found in tight if found.clear(ring, gap)]
     improved = [_improved(found, coarse, gap, rng) for found in clear[:3]]
@@ -279,14 +256,12 @@ def _improved(start: Arrangement, ring: Array, gap: float, rng: np.random.Genera
     return best
 
 
-def on_sheet(
-    arrangements: Sequence[Arrangement], ring: Array, width: float, height: float
-) -> Placed:
+def on_sheet(arrangements: Sequence[Arrangement], ring: Array, width: float, height: float) -> Uses:
     """Fill a rectangle from the origin with as many pieces as fit, in rows from the top.
 
     Each arrangement is tried in several ways; among equally good ones the first is taken.
     """
-    best = Placed(np.zeros((0, 2, 2)), np.zeros((0, 2)), np.zeros(0, dtype=np.int64))
+    best = Uses("piece", np.eye(2)[None], np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
     turns = [(found, angle) for found in arrangements for angle in _angles(found, ring)]
     for arrangement, angle in turns:
         turned = arrangement.turned(angle)
@@ -310,7 +285,7 @@ def _angles(arrangement: Arrangement, ring: Array) -> list[float]:
 
 def _within(
     turned: Arrangement, low: Array, high: Array, shift: Array, width: float, height: float
-) -> Placed:
+) -> Uses:
     inverse = np.linalg.inv(turned.lattice)
     corners = np.array([[x, y] for x in (0, width) for y in (0, height)])
     steps = (corners - low.mean(axis=0)) @ inverse.T
@@ -327,4 +302,4 @@ def _within(
     order = np.lexsort((least[aspects, numbers, 0], np.round(least[aspects, numbers, 1], 3)))
     aspects, numbers = aspects[order], numbers[order]
     offsets = turned.offsets[aspects] + shift + moves[numbers]
-    return Placed(turned.linear[aspects], offsets, aspects)
+    return Uses("piece", turned.linear, aspects, offsets)

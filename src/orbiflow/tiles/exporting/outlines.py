@@ -58,16 +58,11 @@ def _run(run: Array, tolerance: float) -> list[tuple[Array, bool]]:
         if piece is not None:
             pieces.append((piece, False))
         elif last - first == 1:
-            pieces.append((_line(part[0], part[1]), True))
+            pieces.append((Curve.polyline(part).pieces[0], True))
         else:
             middle = first + worst
             todo += [(middle, last), (first, middle)]
     return pieces
-
-
-def _line(start: Array, end: Array) -> Array:
-    step = (end - start) / 3
-    return np.stack([start, start + step, end - step, end])
 
 
 def _tangents(run: Array) -> Array:
@@ -163,7 +158,6 @@ _SHARES = (0.6, 0.15, 0.04)  # of the tolerance; finer where curves would otherw
 class Outline:
     """The outline of a tile in curves."""
 
-    tile: Tile
     edges: Edges | None  # how it falls into edges; None if not known (`note` says why)
     curves: tuple[Curve, ...]  # one curve for each edge, end to end; or a single closed curve
     note: str = ""  # what the user should know, or ""
@@ -184,13 +178,13 @@ def outline(tile: Tile, tolerance: float) -> Outline:
         own = edges(tile)
     except OrbiflowError as error:
         plain = Curve.polyline(tile.polygon, closed=True)
-        return Outline(tile, None, (plain,), f"the outline is left as it is: {error}")
+        return Outline(None, (plain,), f"the outline is left as it is: {error}")
     for share in _SHARES:
         curves = _curves(own, share * tolerance)
         ring = Curve.joined(curves, closed=True).flattened(tolerance / 20)
         if shapely.Polygon(ring).is_valid:
-            return Outline(tile, own, curves)
-    return Outline(tile, own, tuple(Curve.polyline(own.points(k)) for k in range(len(own))))
+            return Outline(own, curves)
+    return Outline(own, tuple(Curve.polyline(own.points(k)) for k in range(len(own))))
 
 
 def _curves(own: Edges, tolerance: float) -> tuple[Curve, ...]:

@@ -139,11 +139,6 @@ class Part(NamedTuple):
     style: Style  # fill and stroke, which may be `INK`
     opacity: float = 1.0  # a number from 0 to 1
 
-    @property
-    def inked(self) -> bool:
-        """Whether it is drawn in ink."""
-        return INK in (self.style.fill, self.style.stroke)
-
     def moved(self, linear: Array, offset: Array) -> Part:
         """Return the image under a map p -> linear p + offset."""
         scale = float(np.sqrt(abs(np.linalg.det(linear))))

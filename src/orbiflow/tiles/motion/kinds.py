@@ -33,14 +33,10 @@ class Motion:
     """An outline that changes, and M copies of it, in pixels, y down; the progress runs from 0 to 1."""
 
     page: Page
-    outline: Callable[
-        [float], Array
-    ]  # (N, 2) at a progress, about a point of its own; N is the same
+    outline: Callable[[float], Array]  # (N, 2) at a progress, about its own point; N is the same
     places: Callable[[float], Places]  # of the copies at a progress; the first is the tile itself
     colours: NDArray[np.int64]  # the numbers (M,) of the palette's fills
-    births: (
-        Array  # the progress (M, 2) from which to which each copy grows; below 0 if always there
-    )
+    births: Array  # the progress (M, 2) in which each copy grows; below 0 if it is always there
     keys: tuple[float, ...]  # progress between which the outline moves in nearly straight lines
     what: str  # the motion in words, for titles
 
@@ -82,16 +78,9 @@ class Page:
 
     def window(self, linear: Array) -> Window:
         """Return the part of a plane that is seen if `linear` maps it to pixels about the middle."""
-        corners = np.array(
-            [self.middle, -self.middle, self.middle * (1, -1), self.middle * (-1, 1)]
-        )
+        corners = self.middle * np.array([[1, 1], [-1, -1], [1, -1], [-1, 1]])
         own = corners @ np.linalg.inv(linear).T
         return (*own.min(axis=0).tolist(), *own.max(axis=0).tolist())
-
-    def sees(self, low: Array, high: Array) -> Array:
-        """Return whether (M,) boxes with these corners (M, 2), in pixels, come into the picture."""
-        inside = (low <= 2 * self.middle) & (high >= 0)
-        return inside[:, 0] & inside[:, 1]
 
 
 def morph(tile: Tile, width: int, *, y_down: bool = False, steady: bool = False) -> Motion:
@@ -125,7 +114,7 @@ def morph(tile: Tile, width: int, *, y_down: bool = False, steady: bool = False)
         (lambda _: still) if steady else (lambda progress: places(progress, copies)),
         colouring(own).colours(copies),
         np.tile(ALWAYS, (len(copies), 1)),
-        (0.0, 1.0) if way.is_straight and steady else tuple(np.linspace(0, 1, 17).tolist()),
+        (0.0, 1.0) if way.weights is None and steady else tuple(np.linspace(0, 1, 17).tolist()),
         f"A tiling with straight edges becomes the tiling of {tile.isohedral_class}",
     )
 
@@ -174,9 +163,8 @@ def bend(given: EscherTile, width: int) -> Motion:
 
 def _still_places(tile: Tile, page: Page) -> tuple[Places, Array]:
     """Return the places of all copies in the picture, the nearest first, and their colours."""
-    low, high = page.window(page.linear)[:2], page.window(page.linear)[2:]
-    window = (*(page.center + low).tolist(), *(page.center + high).tolist())
-    copies = copies_meeting(tile, window)
+    window = np.array(page.window(page.linear)) + np.tile(page.center, 2)
+    copies = copies_meeting(tile, window.tolist())
     linear = page.linear @ tile.group.linear_parts @ np.linalg.inv(page.linear)
     moved = (tile.group.linear_parts @ page.center)[copies.cosets] + copies.translations
     offset = (moved - page.center) @ page.linear.T + page.middle
@@ -215,7 +203,8 @@ def _seen(
         rings = np.einsum("mij,nj->mni", by, outline(look)) + offset[:, None]
         # copies that come in between two looks are near at one of them
         room = 0.1 * np.ptp(outline(look), axis=0).max()
-        seen |= page.sees(rings.min(axis=1) - room, rings.max(axis=1) + room)
+        low, high = rings.min(axis=1) - room, rings.max(axis=1) + room
+        seen |= ((low <= 2 * page.middle) & (high >= 0)).all(axis=1)
     copies = copies.select(seen)
     far = np.linalg.norm(places(1.0, copies).offset - page.middle, axis=1)
     return copies.select(np.argsort(far, kind="stable"))
@@ -235,12 +224,11 @@ class BendingWay:
         inverse = np.linalg.inv(sides)
         linear = moved @ inverse
         # polar decomposition of 2 x 2 matrices that turn nothing over
-        self._angle = np.arctan2(
-            linear[:, 1, 0] - linear[:, 0, 1], linear[:, 0, 0] + linear[:, 1, 1]
-        )
+        (a, b), (c, d) = linear.transpose(1, 2, 0)
+        angle = np.arctan2(c - b, a + d)
         # within half a turn of their mean: beyond it a limb has turned the other way
-        mean = float(np.angle(np.exp(1j * self._angle).sum()))
-        self._angle = mean + np.angle(np.exp(1j * (self._angle - mean)))
+        mean = float(np.angle(np.exp(1j * angle).sum()))
+        self._angle = mean + np.angle(np.exp(1j * (angle - mean)))
         self._stretch = _rotations(-self._angle) @ linear
         # rows of a triangle's gradient: J = P @ gradient, P the three corners as columns
         gradient = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)

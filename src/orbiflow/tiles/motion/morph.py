@@ -232,22 +232,17 @@ class Morph:
 
     def __init__(self, own: OwnFrame) -> None:
         self.end, self.start = own, own.straight()
-        self._weights: _Weights | None = None
+        self.weights: _Weights | None = None  # None if every vertex moves along a straight line
         shares = np.linspace(0, 1, CHECKED + 1)
         if not all(shapely.Polygon(self._straight_way(float(s))).is_valid for s in shares):
-            self._weights = _Weights.of(own)
-            self.end = self._weights.own
-            self.start = replace(self.end.straight(), points=self._weights.points(0.0))
+            self.weights = _Weights.of(own)
+            self.end = self.weights.own
+            self.start = replace(self.end.straight(), points=self.weights.points(0.0))
             # how far the outline has moved, 0 to 1, at even shares of the weights' way
-            found = [self._weights.points(float(s)) for s in np.linspace(0, 1, EVEN + 1)]
+            found = [self.weights.points(float(s)) for s in np.linspace(0, 1, EVEN + 1)]
             steps = [np.sqrt(((b - a) ** 2).sum(axis=1).mean()) for a, b in pairwise(found)]
             far = np.concatenate([[0], np.cumsum(steps)])
             self._even = far / far[-1]
-
-    @property
-    def is_straight(self) -> bool:
-        """Whether every vertex moves along a straight line, in the own frame."""
-        return self._weights is None
 
     def at(self, share: float) -> OwnFrame:
         """Return the tile at 0 (the template) to 1 (the tile)."""
@@ -255,11 +250,11 @@ class Morph:
             return self.end
         if share <= 0:
             return self.start
-        if self._weights is None:
+        if self.weights is None:
             points = self._straight_way(share)
         else:
             s = float(np.interp(share, self._even, np.linspace(0, 1, len(self._even))))
-            points = self._weights.points(s)
+            points = self.weights.points(s)
         linear = (1 - share) * self.start.linear + share * self.end.linear
         return replace(self.end, points=points, linear=linear)
 

@@ -119,15 +119,11 @@ def picture(motion: Motion, palette: Palette, progress: float) -> Raster:
     window = (0.0, 0.0, float(page.width), float(page.height))
     raster = Raster(window, page.width, y_down=True, paper=palette.paper)
     width = max(1.0, OUTLINE * page.width)
-    for ring, colour, whole in rings:  # growing tiles lie below whole ones
-        if not whole:
+    growing = [[own] for own in rings if not own[2]]  # below whole tiles, whose lines are on top
+    for layer in (*growing, [own for own in rings if own[2]]):
+        for ring, colour, _ in layer:
             raster.fill([ring], palette.fill(colour))
-            raster.line(ring, palette.outline, width, closed=True)
-    for ring, colour, whole in rings:
-        if whole:
-            raster.fill([ring], palette.fill(colour))
-    for ring, _, whole in rings:
-        if whole:
+        for ring, _, _ in layer:
             raster.line(ring, palette.outline, width, closed=True)
     return raster
 
@@ -142,16 +138,8 @@ def write_gif(motion: Motion, palette: Palette, frames: list[Frame], told: Progr
     ends = [round(100 * end) for end in accumulate(frame.seconds for frame in frames)]
     lasting = np.maximum(np.diff([0, *ends]), 2) * 10
     buffer = io.BytesIO()
-    shown[0].save(
-        buffer,
-        "GIF",
-        save_all=True,
-        append_images=shown[1:],
-        duration=lasting.tolist(),
-        loop=0,
-        disposal=1,
-        optimize=False,
-    )
+    how = {"duration": lasting.tolist(), "loop": 0, "disposal": 1, "optimize": False}
+    shown[0].save(buffer, "GIF", save_all=True, append_images=shown[1:], **how)
     return buffer.getvalue()
 
 
@@ -178,11 +166,10 @@ def write_mp4(
         command += ["-pix_fmt", "rgb24", "-s", size, "-r", f"{fps:g}"]
         command += ["-i", "-", "-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18"]
         command += ["-movflags", "+faststart", str(out)]
+        shown = _shown(motion, palette, frames, told, lambda image: image)
         content = b"".join(
             image.tobytes() * max(1, round(frame.seconds * fps))
-            for image, frame in zip(
-                _shown(motion, palette, frames, told, lambda image: image), frames, strict=True
-            )
+            for image, frame in zip(shown, frames, strict=True)
         )
         done = subprocess.run(command, input=content, capture_output=True, check=False)
         if done.returncode or not out.is_file():
@@ -264,12 +251,10 @@ def _matrix(linear: Array) -> str:
 
 
 def _changing(motion: Motion, seconds: float) -> str:
-    outlines = [motion.outline(key) for key in motion.keys]
-    if all(np.array_equal(outlines[0], other) for other in outlines[1:]):
+    paths = [_path(motion.outline(key)) for key in motion.keys]
+    if len(set(paths)) == 1:
         return ""
-    return _animate(
-        "animate", 'attributeName="d"', motion.keys, [_path(r) for r in outlines], seconds
-    )
+    return _animate("animate", 'attributeName="d"', motion.keys, paths, seconds)
 
 
 def _copy(

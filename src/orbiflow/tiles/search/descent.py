@@ -266,21 +266,20 @@ def fit_descent(
     kind: IsohedralClass | str,
     settings: OverlapSearch | None = None,
     *,
-    soft: SoftTarget | None = None,
+    emphasis: Emphasis | None = None,
     progress: OnProgress = silent,
     cancel: Cancel = NEVER,
 ) -> Fit:
     """Fit tiles of one class to a target by Sobolev descent, all starts side by side.
 
-    `soft` is the target's soft edge, if it is at hand already; `progress` is told 1 - IoU as the
-    loss.
+    `progress` is told 1 - IoU as the loss.
     """
     kind = isohedral_class(kind)
     as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
     settings = as_instance(settings or OverlapSearch(), OverlapSearch, "settings")
     outline = shapely.Polygon(target.normal).exterior
     settings = settings.for_outline(outline.length)
-    soft = soft or SoftTarget(target)
+    soft = shared_soft_target(target, emphasis)
     starts = _starts(target, kind, settings, cancel)
     prototiles = starts.prototiles
     progress(0.1, float("nan"))

@@ -6,10 +6,15 @@ import re
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from orbiflow.settings import DefaultText, Group, Needs, OnlyWith, Parsed, Range, Repeated, Settings
-from orbiflow.tiles.search.search_method import Count, SearchMethod, Seed
+
+if TYPE_CHECKING:
+    from orbiflow.tiles.search.search_method import SearchMethod
+
+Count = Annotated[int, Range(1)]
+Seed = Annotated[int, Range(0, 2**32 - 1)]
 
 LIKENESS = Group("Search for likeness")
 OVERLAP = Group("Search for overlap")

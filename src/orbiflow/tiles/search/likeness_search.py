@@ -10,7 +10,8 @@ from orbiflow.runtime import NEVER, Cancel
 from orbiflow.settings import Range, Settings
 from orbiflow.tiles.likeness import least_neck
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
-from orbiflow.tiles.search.search_method import Count, Goal, SearchMethod, Seed
+from orbiflow.tiles.search.escherize_settings import Count, Seed
+from orbiflow.tiles.search.search_method import Goal, SearchMethod
 from orbiflow.tiles.tilings import IsohedralClass
 
 if TYPE_CHECKING:

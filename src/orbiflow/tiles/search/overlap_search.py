@@ -11,14 +11,8 @@ from orbiflow.errors import CertificationError
 from orbiflow.runtime import NEVER, Cancel, one_thread
 from orbiflow.settings import Range, Settings
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
-from orbiflow.tiles.search.search_method import (
-    MAX_FREQUENCY,
-    MAX_SEGMENTS,
-    Count,
-    Goal,
-    SearchMethod,
-    Seed,
-)
+from orbiflow.tiles.search.escherize_settings import Count, Seed
+from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS, Goal, SearchMethod
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass
 
 NotNegative = Annotated[float, Range(0)]
@@ -129,7 +123,7 @@ class OverlapSearch(Settings, SearchMethod):
         cancel: Cancel = NEVER,
     ) -> Fit:
         """Let flows carry near tiles closer to the silhouette."""
-        from orbiflow.tiles.search.descent import fit_descent, shared_soft_target
+        from orbiflow.tiles.search.descent import fit_descent
 
         stages = tuple((steps, max(kept, 2 * per_class)) for steps, kept in self.stages)
         with one_thread():
@@ -137,7 +131,7 @@ class OverlapSearch(Settings, SearchMethod):
                 goal.target,
                 kind,
                 replace(self, stages=stages),
-                soft=shared_soft_target(goal.target, goal.emphasis),
+                emphasis=goal.emphasis,
                 progress=progress,
                 cancel=cancel,
             )

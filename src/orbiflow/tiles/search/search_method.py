@@ -6,12 +6,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Annotated, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from orbiflow.arguments import as_choice
 from orbiflow.errors import CertificationError
 from orbiflow.runtime import NEVER, Cancel
-from orbiflow.settings import Range
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
@@ -19,9 +18,6 @@ from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 
 # The classes by how often they come near a silhouette at once, for the time that they take
 PREFERRED = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")
-
-Count = Annotated[int, Range(1)]
-Seed = Annotated[int, Range(0, 2**32 - 1)]
 
 MAX_FREQUENCY = 60  # largest Omega that a fit takes on; time and memory grow with its square
 MAX_SEGMENTS = 2000  # of a flow; the descent adds one a step

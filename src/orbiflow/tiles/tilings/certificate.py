@@ -92,10 +92,7 @@ class Certificate:
         return {**values, "reasons": list(self.reasons)}
 
     def require(self) -> None:
-        """Raise an error unless the tile is valid.
-
-        Raises `CertificationError` with the reasons, if the tile is not valid.
-        """
+        """Raise `CertificationError` with the reasons unless the tile is valid."""
         if not self.valid:
             raise CertificationError(
                 f"this tile does not tile the plane: {'; '.join(self.reasons)}"

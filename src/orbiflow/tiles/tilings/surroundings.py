@@ -13,7 +13,7 @@ import shapely
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from orbiflow.arguments import as_number, as_whole
+from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array, Integers, checked_window
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import Isometry
@@ -224,6 +224,8 @@ def segment_tree(around: Surroundings) -> shapely.STRtree:
 # points on the boundary at least, so that coarse polygons are seen as curves
 _BOUNDARY_SAMPLES = 200
 
+_TOUCHING = 1e-7  # the distance that counts as touching, in square roots of the tile's area
+
 
 class Neighbours(NamedTuple):
     """The other tiles that touch a prototile, as group elements, nearest first.
@@ -237,13 +239,12 @@ class Neighbours(NamedTuple):
     point: tuple[Placed, ...]
 
 
-def neighbours(tile: Tiles, prototile: int = 0, *, tolerance: float = 1e-7) -> Neighbours:
+def neighbours(tile: Tiles, prototile: int = 0) -> Neighbours:
     """Return the tiles that touch a prototile.
 
     Args:
         tile: A tile or a tiling, which need not be certified.
         prototile: The number of the prototile; each neighbour names the prototile that it is a copy of.
-        tolerance: The distance that counts as touching, in square roots of the tile's area.
 
     Raises `OrbiflowError` if polygon and group are of very different size.
 
@@ -254,10 +255,9 @@ def neighbours(tile: Tiles, prototile: int = 0, *, tolerance: float = 1e-7) -> N
     (5, 3)
     """
     tiling = as_tiling(tile)
-    tolerance = as_number(tolerance, "tolerance", 0)
     prototile = as_whole(prototile, "the prototile", 0, len(tiling.prototiles) - 1)
-    around = surroundings(tiling, prototile, tolerance)
-    near, shares = touching(around, tolerance)
+    around = surroundings(tiling, prototile, _TOUCHING)
+    near, shares = touching(around, _TOUCHING)
     return Neighbours(near.select(shares).elements(), near.select(~shares).elements())
 
 

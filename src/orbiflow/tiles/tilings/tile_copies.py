@@ -138,20 +138,17 @@ class Copies:
         """Return the copies where `keep` is true, or of these indices."""
         return Copies(self.tiling, self.aspects[keep], self.cells[keep])
 
-    def neighbours(self, elements: Sequence[Isometry], of: Sequence[int] | None = None) -> Integers:
-        """Return the index (M, E) of the copy across each element, -1 if it is not among them.
+    def neighbours(
+        self, elements: Sequence[Isometry], of: Sequence[int] | None = None
+    ) -> CopiesAcross:
+        """Return the copies across elements, by arithmetic of aspects and cells.
 
         The copy across an element of the copy g is g @ element; a plain isometry moves prototile 0.
         Each element leads from copies of the prototile `of` (E,), by default 0; others have none.
         """
-        return self.beyond(elements, of).copy
-
-    def beyond(self, elements: Sequence[Isometry], of: Sequence[int] | None = None) -> CopiesAcross:
-        """Return the `neighbours` and how those copies lie, by arithmetic of aspects and cells."""
         table = self.tiling.aspects
         copy = np.full((len(self), len(elements)), -1, dtype=np.int64)
         turn = np.zeros_like(copy)
-        codes = _CopyIndex(self)
         for number, element in enumerate(elements):
             source = 0 if of is None else of[number]
             mine = np.flatnonzero(self.prototiles == source)
@@ -161,35 +158,26 @@ class Copies:
                 for c in table.cosets[own]
             ]
             place = np.searchsorted(own, self.aspects[mine])
-            aspects = np.array([aspect for aspect, _, _ in found])[place]
-            steps = np.array([cell for _, cell, _ in found])[place]
-            copy[mine, number] = codes.find(aspects, self.cells[mine] + steps)
-            turn[mine, number] = np.array([by for _, _, by in found])[place]
+            aspects, steps, by = (np.array(part)[place] for part in zip(*found, strict=True))
+            copy[mine, number] = self._index(aspects, self.cells[mine] + steps)
+            turn[mine, number] = by
         return CopiesAcross(copy, turn)
 
-
-class _CopyIndex:
-    """An index of copies by aspect and cell."""
-
-    def __init__(self, copies: Copies) -> None:
-        self.low = copies.cells.min(axis=0, initial=0)
-        self.sizes = copies.cells.max(axis=0, initial=0) - self.low + 1
-        codes = self._codes(copies.aspects, copies.cells)
-        self.order = np.argsort(codes)
-        self.sorted = codes[self.order]
-
-    def _codes(self, aspects: Integers, cells: Integers) -> Integers:
-        steps = cells - self.low
-        return (aspects * self.sizes[0] + steps[:, 0]) * self.sizes[1] + steps[:, 1]
-
-    def find(self, aspects: Integers, cells: Integers) -> Integers:
-        if not len(self.sorted):
+    def _index(self, aspects: Integers, cells: Integers) -> Integers:
+        """Return the index (N,) of the copies of these aspects in these cells, -1 if there is none."""
+        if not len(self):
             return np.full(len(aspects), -1)
-        steps = cells - self.low
-        known = ((steps >= 0) & (steps < self.sizes)).all(axis=1)
-        codes = np.where(known, self._codes(aspects, cells), -1)
-        place = np.minimum(np.searchsorted(self.sorted, codes), len(self.sorted) - 1)
-        return np.where(self.sorted[place] == codes, self.order[place], -1)
+        low, high = self.cells.min(axis=0), self.cells.max(axis=0)
+        rows, columns = (int(n) for n in high - low + 1)
+
+        def number(aspects: Integers, cells: Integers) -> Integers:
+            return (aspects * rows + (cells - low)[:, 0]) * columns + (cells - low)[:, 1]
+
+        mine, wanted = number(self.aspects, self.cells), number(aspects, cells)
+        order = np.argsort(mine)
+        found = order[np.minimum(np.searchsorted(np.sort(mine), wanted), len(self) - 1)]
+        known = ((cells >= low) & (cells <= high)).all(axis=1) & (mine[found] == wanted)
+        return np.where(known, found, -1)
 
 
 def copies_inside(tile: Tiles, window: Sequence[float]) -> Copies:

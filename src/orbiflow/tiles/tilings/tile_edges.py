@@ -377,15 +377,12 @@ def _with_vertices(tiling: Tiling, k: int) -> Prototile:
 class Skeleton:
     """S edges of copies of prototiles.
 
-    - `edges`, `copies`: The tiling's edges, and the copies.
     - `copy`, `edge`: Edge `edge` of copy `copy`, (S,), in the direction of that copy's boundary.
     - `other`: The copy (S,) across it, -1 if it is not in the set.
     - `ends`: The numbers (S, 2) of its first and last vertex: edges that meet within the set share
       them. A vertex where copies only touch may have several numbers.
     """
 
-    edges: Edges
-    copies: Copies
     copy: Integers
     edge: Integers
     other: Integers
@@ -413,13 +410,13 @@ def skeleton(own: Edges, copies: Copies) -> Skeleton:
     >>> len(both), len(skeleton(edges(tile), both))
     (2, 11)
     """
-    beyond = copies.beyond(own.across, own.owners)
+    beyond = copies.neighbours(own.across, own.owners)
     mine = copies.prototiles[:, None] == np.array(own.owners)
     numbers = np.arange(len(copies))[:, None]
     copy, edge = np.nonzero(mine & ((beyond.copy < 0) | (beyond.copy > numbers)))
     vertices = _vertices(own, beyond)
     ends = np.stack([vertices[copy, edge], vertices[copy, np.array(own.following)[edge]]], axis=1)
-    return Skeleton(own, copies, copy, edge, beyond.copy[copy, edge], ends)
+    return Skeleton(copy, edge, beyond.copy[copy, edge], ends)
 
 
 def _vertices(own: Edges, beyond: CopiesAcross) -> Integers:
