@@ -32,8 +32,7 @@ from orbiflow.density import (
     make_space,
     midpoints,
 )
-from reproduction.density_fits import FIT_SETTINGS, TargetMeasure, drawn, weighted
-from reproduction.published import KL
+from reproduction.densities import FIT_SETTINGS, KL, TargetMeasure, drawn, weighted
 
 BARS = {"4-gaussian": 0.01, "6-gaussian": 0.02, "checkerboard": 0.08}
 AUTHORS = {

@@ -1,7 +1,6 @@
 """Test log-likelihoods on protein backbones (torus), earthquakes and wildfires (sphere).
 
-    python benchmarks/density_nll.py [--splits K] [--grouped] [--seconds S] [--quick] [DATA ...]
-        [--kernels]
+    python benchmarks/density_nll.py [--splits K] [--grouped] [--quick] [DATA ...]
 
 Random 80/10/10 splits (--grouped: equal locations stay together, since duplicates leak), mean negative
 log-likelihood in nats, per radian^2 or steradian, beside a von Mises or von Mises-Fisher kernel
@@ -9,8 +8,7 @@ density estimate whose width and uniform floor are tuned on the same validation 
 published rows of data/published.json (RFM: Riemannian flow matching; RDM: Riemannian diffusion
 model). Then the seconds for 100,000 query points, on the first split: exactly, by the kernels (timed
 on 5,000 and scaled) and from a table (with the root mean square error of its log densities). All are
-fitted as `density fit` does by default; --kernels: a flow with adaptive kernels, at most S seconds of
-refinement. The backbone angles are rounded; see `density_data.backbone`.
+fitted as `density fit` does by default. The backbone angles are rounded; see `density_data.backbone`.
 """
 
 from __future__ import annotations
@@ -50,19 +48,17 @@ def load(name: str) -> Data:
     return earth(name) if name in EARTH else backbone(name)
 
 
-def run(job: tuple[str, int, bool, float, int, bool]) -> Outcome:
+def run(job: tuple[str, int, bool]) -> Outcome:
     """One split."""
     torch.set_num_threads(1)
-    name, seed, grouped, seconds, detail, kernels = job
+    name, seed, grouped = job
     round_ = name in EARTH
     train, held, test = splits(load(name), seed + 1, grouped=grouped)[seed]
     kde = KernelDensity.tuned(train, held, round_=round_)
     begin = time.perf_counter()
-    share = len(held) / (len(train) + len(held))
-    options = {"max_frequency": detail, "kernels": True, "validation": share, "seconds": seconds}
-    if not kernels:
-        options = {"repeats": "rounding" if grouped else "places"}
-    estimator = DensityEstimator("sphere" if round_ else "torus", seed=seed, **options)  # type: ignore[arg-type]
+    estimator = DensityEstimator(
+        "sphere" if round_ else "torus", seed=seed, repeats="rounding" if grouped else "places"
+    )
     estimator.fit(np.concatenate([train, held]))
     fit = time.perf_counter() - begin
     rng = np.random.default_rng(seed)
@@ -112,16 +108,13 @@ def main() -> None:
     parser.add_argument("data", nargs="*", choices=(*TORI, *EARTH, []))
     parser.add_argument("--splits", type=int, default=5)
     parser.add_argument("--grouped", action="store_true")
-    parser.add_argument("--kernels", action="store_true", help="a flow with adaptive kernels")
-    parser.add_argument("--seconds", type=float, default=20.0, help="of refinement")
-    parser.add_argument("--max-frequency", type=int, default=8)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--quick", action="store_true", help="proline, one split, 10 s")
+    parser.add_argument("--quick", action="store_true", help="proline, one split")
     options = parser.parse_args()
     names = options.data or [*TORI, *EARTH]
-    count, seconds = options.splits, options.seconds
+    count = options.splits
     if options.quick:
-        names, count, seconds = ["proline"], 1, 10.0
+        names, count = ["proline"], 1
     for name in names:
         load(name)  # what is missing is said here, once
     figures = published("density_nll")
@@ -131,11 +124,7 @@ def main() -> None:
         "   kde s  table s   error     mass"
     )
     with ProcessPoolExecutor(options.workers) as pool:
-        jobs = [
-            (n, k, options.grouped, seconds, options.max_frequency, options.kernels)
-            for n in names
-            for k in range(count)
-        ]
+        jobs = [(n, k, options.grouped) for n in names for k in range(count)]
         found = pool.map(run, jobs)
         for name in names:
             rows = np.array([next(found) for _ in range(count)])

@@ -4,9 +4,9 @@
 
 Defined in docs/benchmark-unoriented.md. Mean negative log-likelihood of the test points in nats, per
 radian^2 of theta, phi on the Klein bottle (area 2 pi^2) or per steradian on the projective plane (area
-2 pi), over random 80/10/10 splits: of a flow alone, of that flow mixed with kernels (`kernels=True`),
-beside the uniform density, a kernel density summed over the identification and tuned on the validation
-points, and, for the two synthetic sets, the true density. The integral is the flow's.
+2 pi), over random 80/10/10 splits: of a flow alone, beside the uniform density, a kernel density summed
+over the identification and tuned on the validation points, and, for the two synthetic sets, the true
+density. The integral is the flow's.
 """
 
 from __future__ import annotations
@@ -22,22 +22,18 @@ from density_data import Data, splits
 from density_unoriented_data import AXES, KLEIN, known, load
 from density_unoriented_kde import Kernel, UnorientedKernelDensity, tuned
 
-from orbiflow.density import Density, DensityEstimator, Mixture
+from orbiflow.density import Density, DensityEstimator
 
 QUERIES, KERNEL_QUERIES = 100_000, 5_000
 """Points that evaluation is timed on; kernels are so slow that fewer are taken, and scaled up."""
 
 
 class Outcome(NamedTuple):
-    """Of one split: test NLLs, fit seconds, the flow's integral, and what the kernel came to.
-
-    `flow` is the flow's alone, `mixture` that of the flow mixed with kernels.
-    """
+    """Of one split: test NLLs, fit seconds, the flow's integral, and what the kernel came to."""
 
     flow: float
     kde: float
     truth: float
-    mixture: float
     flow_fit: float
     kde_fit: float
     mass: float
@@ -55,26 +51,19 @@ def run(name: str, data: Data, seed: int, seconds: float, detail: int) -> Outcom
     begin = time.perf_counter()
     estimator = DensityEstimator(
         "projective-plane" if axes else "klein-bottle",
+        components=("flow",),
         max_frequency=detail,
-        kernels=True,
         validation=len(held) / (len(train) + len(held)),
         seconds=seconds,
         seed=seed,
     ).fit(np.concatenate([train, held]))
     flow_fit = time.perf_counter() - begin
     truth = known(name)
-    mixture = estimator.density_
-    assert isinstance(mixture, Mixture)
-    part = mixture.flow_part
-    assert part is not None
-    flow = part[1]
-    with torch.no_grad():
-        alone = flow.log_prob(estimator.space_.to_chart(test), measure="natural")
+    flow = estimator.density_
     return Outcome(
-        -float(alone.mean()),
+        -estimator.score(test),
         -float(kde.score_samples(test).mean()),
         math.nan if truth is None else -float(truth.log_density(test).mean()),
-        -estimator.score(test),
         flow_fit,
         kde_fit,
         flow.mass(),
@@ -119,7 +108,7 @@ def main() -> None:
     )
     print(
         "data              N  uniform      kde               flow          flow - kde"
-        "       mixture     mixture - kde     true  kde fit  flow fit   100k: kde s  flow s     mass"
+        "     true  kde fit  flow fit   100k: kde s  flow s     mass"
     )
     for name in names:
         data = load(name)
@@ -132,7 +121,7 @@ def main() -> None:
             widths = ", ".join(f"{k:.0f}" for k in row.kernel.concentrations)
             print(
                 f"  kde {row.kde:.4f} (concentration {widths}; uniform share {row.kernel.share:g}), "
-                f"flow {row.flow:.4f}, mixture {row.mixture:.4f}, true {row.truth:.4f}",
+                f"flow {row.flow:.4f}, true {row.truth:.4f}",
                 flush=True,
             )
 
@@ -140,12 +129,11 @@ def main() -> None:
 def print_row(name: str, size: int, rows: list[Outcome]) -> None:
     """Means and standard deviations over the splits; the worst integral."""
     area = 2 * math.pi if name in AXES else 2 * math.pi**2
-    flow, kde, truth, mixture, flow_fit, kde_fit, mass = np.array([row[:7] for row in rows]).T
+    flow, kde, truth, flow_fit, kde_fit, mass = np.array([row[:6] for row in rows]).T
     worst = mass[abs(mass - 1).argmax()]
     scores = (f"{v.mean():9.4f} +- {v.std():.4f}" for v in (kde, flow, flow - kde))
-    mixed = (f"{v.mean():9.4f} +- {v.std():.4f}" for v in (mixture, mixture - kde))
     print(
-        f"{name:14}{size:6}{math.log(area):9.4f}{''.join(scores)}{''.join(mixed)}"
+        f"{name:14}{size:6}{math.log(area):9.4f}{''.join(scores)}"
         f"{truth.mean():9.4f}{kde_fit.mean():9.1f}{flow_fit.mean():10.1f}"
         f"{rows[0].queries[1]:14.2f}{rows[0].queries[0]:8.2f}{worst:9.5f}",
         flush=True,

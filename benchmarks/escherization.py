@@ -18,7 +18,7 @@ import numpy as np
 import torch
 from common import DATA, GOALS, goal, needed, published
 
-from orbiflow.tiles import CLASSES, EscherTile, OverlapSearch, Target, search_classes
+from orbiflow.tiles import CLASSES, EscherizeSettings, EscherTile, OverlapSearch, Target, escherize
 
 DISTORTED = {"octpus_94": "octpus", "penguin_60": "penguin2", "squirrel1_60": "squirrel"}
 
@@ -34,12 +34,14 @@ def target_of(name: str, distorted: bool) -> Target:
 def search(target: Target, effort: str, seed: int) -> tuple[list[EscherTile], float]:
     """Certified tiles of all classes, largest IoU first, and the seconds that they took."""
     begin = time.perf_counter()
-    results, failures = search_classes(
-        target, CLASSES, OverlapSearch.for_effort(effort, seed=seed), workers=os.cpu_count() or 1
+    method, own = (
+        OverlapSearch.for_effort(effort, seed=seed),
+        EscherizeSettings(workers=os.cpu_count()),
     )
-    assert not failures, failures
-    assert all(result.certificate.valid for result in results)
-    return sorted(results, key=lambda r: -r.metrics.iou), time.perf_counter() - begin
+    found = escherize(target, own, method=method)
+    assert not found.failures, found.failures
+    assert all(result.certificate.valid for result in found.tiles)
+    return sorted(found.tiles, key=lambda r: -r.metrics.iou), time.perf_counter() - begin
 
 
 def main() -> None:

@@ -36,14 +36,8 @@ os.environ.setdefault("KINETO_LOG_LEVEL", "99")  # the memory profiler chats oth
 import torch
 from torch import Tensor, nn
 
-from orbiflow.fields import (
-    FourierField,
-    VectorField,
-    periodic_operator,
-    rotation_operator,
-    transflection_operator,
-)
-from orbiflow.symmetry import CrystallographicGroup, Isometry, Line
+from orbiflow.fields import FourierField, VectorField, periodic_operator, summed_over_powers
+from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles import CLASSES, IsohedralClass
 
 POINTS = 5_000
@@ -80,28 +74,9 @@ class PerModeField(nn.Module):
 
 def nested(field: VectorField, row: IsohedralClass) -> VectorField:
     """The paper's operators around `field`, innermost last."""
-    for operator in reversed(row.paper_operators()):
-        g = operator.isometry
-        if g.determinant > 0:
-            field = rotation_operator(field, center_of(g), operator.terms)
-        else:
-            field = transflection_operator(field, *axis_of(g))
+    for isometry, terms in reversed(row.paper_operators()):
+        field = summed_over_powers(field, isometry, terms)
     return field
-
-
-def center_of(g: Isometry) -> list[float]:
-    """Fixed point of a rotation."""
-    eye = torch.eye(2, dtype=torch.float64)
-    linear, shift = torch.tensor(g.linear), torch.tensor(g.translation)
-    return torch.linalg.solve(eye - linear, shift).tolist()
-
-
-def axis_of(g: Isometry) -> tuple[Line, float]:
-    """Line and mu of a transflection."""
-    direction = torch.linalg.eigh(torch.tensor(g.linear)).eigenvectors[:, -1]
-    shift = torch.tensor(g.translation)
-    mu = float(shift @ direction)
-    return Line(((shift - mu * direction) / 2).tolist(), direction.tolist()), mu
 
 
 class Case(NamedTuple):

@@ -18,11 +18,11 @@ from orbiflow.tiles import (
     Target,
     TileMap,
     colouring,
-    overlay_png,
+    escherize,
+    overlay_raster,
     overview_png,
-    search_classes,
     tile_svg,
-    tiling_png,
+    tiling_raster,
     tiling_svg,
     write_gallery,
 )
@@ -38,7 +38,8 @@ def main() -> None:
     )
     given = parser.parse_args()
     target = Target.read(given.silhouette)
-    results, _ = search_classes(target, method=LikenessSearch.for_effort("fast"), workers=1)
+    found = escherize(target, method=LikenessSearch.for_effort("fast"))
+    results = found.tiles
     colours = [colouring(result.tile) for result in results]
     both = list(zip(results, colours, strict=True))
     print(f"{len(results)} tiles of {target.source}; CPU seconds for all of them")
@@ -46,13 +47,16 @@ def main() -> None:
     row("colouring", lambda: [colouring(result.tile) for result in results])
     row("tile.svg", lambda: [tile_svg(r.tile, y_down=y_down) for r in results])
     row("tiling.svg", lambda: [tiling_svg(r.tile, y_down=y_down, colours=c) for r, c in both])
-    row("tiling.png", lambda: [tiling_png(r.tile, y_down=y_down, colours=c) for r, c in both])
-    row("overlay.png", lambda: [overlay_png(r.tile, target.outline) for r in results])
+    row(
+        "tiling.png",
+        lambda: [tiling_raster(r.tile, y_down=y_down, colours=c).png() for r, c in both],
+    )
+    row("overlay.png", lambda: [overlay_raster(r.tile, target.outline).png() for r in results])
     row("model", lambda: [(r.map or TileMap()).to_bytes() for r in results])
     row("overview.png", lambda: overview_png(results, target, colours))
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
-        row("the whole folder", lambda: write_gallery(results, target, out, figures=given.figures))
+        row("the whole folder", lambda: write_gallery(found, out, figures=given.figures))
 
 
 def row(name: str, draw: Callable[[], object]) -> None:

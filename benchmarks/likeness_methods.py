@@ -15,7 +15,7 @@ import numpy as np
 from common import DATA, LikenessTile, Ring, aligned, goal, likeness_tiles, needed
 from PIL import Image, ImageDraw
 
-from orbiflow.tiles import OverlapSearch, Target, centroid, search_classes, signed_area
+from orbiflow.tiles import OverlapSearch, Target, centroid, escherize, signed_area
 
 METHODS = ("overlap", "likeness", "arap", "est", "trial")
 """Overlap: the flow that maximises IoU; likeness: the silhouette bends; the others' tiles are files."""
@@ -98,7 +98,7 @@ def _first(
     """The first tile of one method laid on the target, or nothing."""
     outline = np.asarray(target.normal)
     if method == "overlap":
-        results, _ = search_classes(target, method=OverlapSearch.for_effort(effort))
+        results = escherize(target, method=OverlapSearch.for_effort(effort)).tiles
         return results[0].normal_tile.polygon.tolist() if results else []
     if method == "likeness":
         tiles = kept(folder, name, effort, lambda: likeness_tiles(target, effort))

@@ -18,12 +18,13 @@ import numpy as np
 from common import GOALS, Ring
 from likeness_methods import silhouette
 
+from orbiflow.runtime import Event, Preview, TileFound
 from orbiflow.tiles import (
-    Event,
+    EscherizeSettings,
     LikenessSearch,
+    escherize,
     hair_share,
     narrowest_neck,
-    search_classes,
     slit_share,
 )
 
@@ -55,11 +56,12 @@ def main() -> None:
         first: list[float] = []
 
         def watch(event: Event, first: list[float] = first, began: float = began) -> None:
-            if not first and (event.preview is not None or event.outcome is not None):
+            if not first and isinstance(event, Preview | TileFound):
                 first.append(time.perf_counter() - began)
 
         settings = LikenessSearch.for_effort(options.effort)
-        results, _ = search_classes(target, method=settings, workers=options.workers, watch=watch)
+        own = EscherizeSettings(workers=options.workers)
+        results = escherize(target, own, method=settings, on_event=watch).tiles
         seconds = time.perf_counter() - began
         best = results[0]
         assert all(result.certificate.valid for result in results)

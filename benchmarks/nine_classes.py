@@ -17,10 +17,11 @@ from common import BUNDLED
 from orbiflow.tiles import (
     CLASSES,
     ClassFailure,
+    EscherizeSettings,
     EscherTile,
     OccupancySearch,
     Target,
-    search_classes,
+    escherize,
 )
 
 IMAGES = [
@@ -53,7 +54,9 @@ def main() -> None:
     for image in images:
         target = Target.read(image)
         begin = time.perf_counter()
-        results, failures = search_classes(target, CLASSES, settings, workers=options.workers)
+        own = EscherizeSettings(workers=options.workers)
+        found = escherize(target, own, method=settings)
+        results, failures = found.tiles, found.failures
         seconds = time.perf_counter() - begin
         print(f"\n{image.name}: {settings.iterations} iterations, {seconds:.0f} s wall")
         print(head + "  core s")

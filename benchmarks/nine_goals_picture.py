@@ -19,7 +19,7 @@ from common import goal
 from orbiflow.arrays import Window
 from orbiflow.drawing import blank_figure, fill_rings, plane_axes, png_bytes
 from orbiflow.runtime import write_atomic
-from orbiflow.tiles import EscherTile, OverlapSearch, Target, search_classes
+from orbiflow.tiles import EscherizeSettings, EscherTile, OverlapSearch, Target, escherize
 
 BEST = {
     "bat_60": ("bat", "IH6"),
@@ -46,10 +46,10 @@ def fitted(file: str, effort: str, seed: int) -> Found:
     name, isohedral = BEST[file]
     target = goal(file)
     settings = OverlapSearch.for_effort(effort, seed=seed)
-    results, failures = search_classes(target, [isohedral], settings)
-    assert not failures, failures
-    assert results[0].certificate.valid
-    return name, target, results[0]
+    found = escherize(target, EscherizeSettings(classes=(isohedral,)), method=settings)
+    assert not found.failures, found.failures
+    assert found.tiles[0].certificate.valid
+    return name, target, found.tiles[0]
 
 
 def window(found: Found) -> Window:

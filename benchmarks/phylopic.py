@@ -17,13 +17,13 @@ from common import DATA, needed
 from PIL import Image, ImageDraw, ImageFont
 
 from orbiflow.tiles import (
-    CLASSES,
+    EscherizeSettings,
     EscherTile,
     OverlapSearch,
     Target,
-    overlay_png,
-    search_classes,
-    tiling_png,
+    escherize,
+    overlay_raster,
+    tiling_raster,
 )
 
 PANEL = 420  # pixels
@@ -40,8 +40,8 @@ def sheet(found: list[tuple[str, Target, EscherTile]]) -> Image.Image:
         text = f"{name}  {best.name}  IoU {best.metrics.iou:.3f}"
         pen.text((x + 12, y + 8), text, fill="#1a1a1a", font=font)
         pictures = (
-            overlay_png(best.tile, target.outline, y_down=target.y_down, width_px=640),
-            tiling_png(best.tile, y_down=target.y_down, width_px=640),
+            overlay_raster(best.tile, target.outline, y_down=target.y_down, width_px=640).png(),
+            tiling_raster(best.tile, y_down=target.y_down, width_px=640).png(),
         )
         for j, data in enumerate(pictures):
             picture = Image.open(io.BytesIO(data)).convert("RGB")
@@ -66,7 +66,8 @@ def main() -> None:
     for path in files:
         target = Target.read(path)
         begin = time.perf_counter()
-        results, failures = search_classes(target, CLASSES, settings, workers=os.cpu_count() or 1)
+        search = escherize(target, EscherizeSettings(workers=os.cpu_count()), method=settings)
+        results, failures = search.tiles, search.failures
         seconds = time.perf_counter() - begin
         best = results[0]
         found.append((path.stem, target, best))

@@ -41,7 +41,7 @@ PRESENT = Renamed(
         "density cv --parts": "--components",
         "density fit --detail": "--max-frequency",
     },
-    keys={"parts": "components", "detail": "max_frequency", "shares": None},
+    keys={"parts": "components", "detail": "max_frequency", "shares": None, "kernels": None},
     added=frozenset({"weights"}),  # the shares, by the names of the components
     expected={
         "* density.safetensors": "saved as a mixture, in format 5",
@@ -115,7 +115,6 @@ FITS = {
     "torus1": "torus1.csv --space torus --unit radians --parts kernels,mixture,chains",
     "default": "backbone.csv --space torus --unit degrees",
     "flow": "backbone.csv --space torus --unit degrees --parts flow --detail 4 --segments 1",
-    "adaptive": "backbone.csv --space torus --unit degrees --kernels --detail 3 --segments 1",
     "torus3": "torus3.csv --space torus --unit turns --columns a,b,c --parts kernels,mixture "
     "--missing marginalise --weights w --seed 2",
     "torus4": "torus4.csv --space torus --unit degrees --columns a,b,c,d "
@@ -235,7 +234,7 @@ def inference() -> list[Case]:
         Case(
             "density-compare",
             (
-                f"density compare -m {backbone} -m ../fit-flow/model -m ../fit-adaptive/model "
+                f"density compare -m {backbone} -m ../fit-flow/model "
                 f"-d {query} --bootstrap 200 --out models.json",
                 f"density compare -d {IN}/torus4.csv -d {IN}/other4.csv --space torus --unit degrees "
                 "--columns a,b,c,d --group who --permutations 99 --bootstrap 200 --out sets.json",

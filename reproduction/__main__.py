@@ -12,57 +12,47 @@ from pathlib import Path
 import torch
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Cancel, ResultFolder
-from reproduction.exhibit import FAST, FULL, Exhibit, Shown
-from reproduction.page import write_page, written_files
-from reproduction.reproduction import EXHIBITS, reproduce
+from orbiflow.runtime import ResultFolder
+from reproduction.exhibit import FAST, FULL, Exhibit
+from reproduction.reproduction import EXHIBITS, reproduce, write_page, written_files
 
 
 def main(words: list[str] | None = None) -> int:
     """Draw the exhibits that are asked for; return the exit status: 0, or 2 for a user's mistake."""
-    options = _parser().parse_args(words)
-    torch.set_num_threads(1)  # many small operations; and workers may be forked
-    try:
-        shown = _reproduced(options)
-    except OrbiflowError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    for one in shown:
-        if one.findings is None:
-            print(f"{one.exhibit.label} failed: {one.failure}")
-    return 0
-
-
-def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m reproduction", description=__doc__)
     add = parser.add_argument
     add("-o", "--out", type=Path, default=Path("paper"), help="folder for the page (default paper)")
     add("--fast", action="store_true", help="a preview: less work in each exhibit")
     add("--only", help="exhibits, such as figure-9,table-3; default all")
-    add("--workers", type=int, help="number of processes; default one for each core")
-    return parser
+    add("--workers", type=int, default=os.cpu_count(), help="processes; default one for each core")
+    options = parser.parse_args(words)
+    torch.set_num_threads(1)  # many small operations; and workers may be forked
+    try:
+        _reproduce(options.out, options.fast, _chosen(options.only), options.workers)
+    except OrbiflowError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
 
 
-def _reproduced(options: argparse.Namespace) -> list[Shown]:
-    begin = time.perf_counter()
-    chosen = _chosen(options.only)
-    extent = FAST if options.fast else FULL
-    if options.workers is not None and options.workers < 1:
-        raise OrbiflowError(f"--workers must be at least 1, got {options.workers}")
-    folder = ResultFolder(options.out, written_files)
-    with folder.replaced() as staged:
+def _reproduce(out: Path, fast: bool, chosen: list[Exhibit], workers: int) -> None:
+    begin, extent = time.perf_counter(), FAST if fast else FULL
+    if workers < 1:
+        raise OrbiflowError(f"--workers must be at least 1, got {workers}")
+    with ResultFolder(out, written_files).replaced() as staged:
         shown = reproduce(
             chosen,
             extent,
             staged,
-            workers=options.workers or os.cpu_count() or 1,
+            workers=workers,
             progress=lambda share, what: print(f"{share:4.0%} {what}", flush=True),
-            cancel=Cancel(),
         )
         write_page(shown, extent, staged, time.perf_counter() - begin)
     seconds = time.perf_counter() - begin
-    print(f"written to {options.out} in {seconds:.0f} s; open {options.out / 'index.html'}")
-    return shown
+    print(f"written to {out} in {seconds:.0f} s; open {out / 'index.html'}")
+    for one in shown:
+        if one.findings is None:
+            print(f"{one.exhibit.label} failed: {one.failure}")
 
 
 def _chosen(only: str | None) -> list[Exhibit]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from orbiflow.drawing import CENTER_COLOURS, LINE_COLOUR, cell_ring, center_sign
+from orbiflow.drawing import cell_ring
 from orbiflow.symmetry import (
     CrystallographicGroup,
     Isometry,
@@ -15,7 +15,14 @@ from orbiflow.symmetry import (
     symmetry_elements,
     transflection,
 )
-from orbiflow.tiles import CLASSES, IsohedralClass, draw_template, draw_tiling, signed_area
+from orbiflow.tiles import (
+    CLASSES,
+    IsohedralClass,
+    draw_key,
+    draw_template,
+    draw_tiling,
+    signed_area,
+)
 from reproduction.drawing import (
     FAINT,
     INK,
@@ -29,11 +36,15 @@ from reproduction.drawing import (
     tiny,
 )
 from reproduction.exhibit import Exhibit, Extent, Findings, Table
-from reproduction.published import GROUPS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+
+# the paper's table of symmetry groups, as printed
+GROUPS = {
+    "IH1": "p1", "IH2": "pg", "IH3": "pg", "IH4": "p2", "IH5": "pgg", "IH6": "pgg", "IH7": "p3",
+    "IH21": "p6", "IH28": "p4",
+}  # fmt: skip
 
 
 def identification_error(kind: IsohedralClass) -> float:
@@ -202,7 +213,7 @@ def _draw_tilings(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findin
         glides = ("none", "one way", "two ways")[ways]
         rows.append((kind.name, kind.group_name, shown or "none", glides))
     headings = ("class", "group", "orbits of centres", "glide lines")
-    _key(figure)
+    draw_key(figure)
     canvas.add(
         figure,
         "Nine tilings by hexagons or pentagons, one for each class, with a lattice cell in "
@@ -221,21 +232,6 @@ def _draw_tilings(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findin
             Table("Orbits of rotation centres, and directions of glide lines.", headings, rows)
         ],
     )
-
-
-def _key(figure: Figure) -> None:
-    height = 0.035
-    aspect = figure.get_figwidth() / (figure.get_figheight() * height)
-    axes = panel(figure, (0, 0, 1, height), (0, 0, aspect, 1))
-    size, x = 0.95 * text_size(figure), 0.5
-    for order, colour in CENTER_COLOURS.items():
-        axes.fill(*(np.array([x, 0.5]) + center_sign(order, 0.27)).T, facecolor=colour)
-        axes.text(x + 0.5, 0.5, f"{order}-fold centre", va="center", fontsize=size, color=INK)
-        x += 5.0
-    axes.plot([x, x + 1.3], [0.5, 0.5], color=LINE_COLOUR, linewidth=1.4, linestyle=(0, (5, 3)))
-    axes.text(x + 1.6, 0.5, "glide line", va="center", fontsize=size, color=INK)
-    axes.plot([x + 5.2, x + 6.5], [0.5, 0.5], color="#111111", linewidth=1.8)
-    axes.text(x + 6.8, 0.5, "cell", va="center", fontsize=size, color=INK)
 
 
 TILINGS = Exhibit(

@@ -1,6 +1,9 @@
 """The comparison on the paper's nine goals: our searches, pictures of tiles, the table of overlaps."""
 
-from collections.abc import Iterable, Sequence
+import json
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -17,38 +20,58 @@ from orbiflow.tiles import (
     compare,
     escherize_class,
 )
-from reproduction.drawing import EDGE, GOAL, Canvas, label, panel, window_of
+from reproduction.drawing import EDGE, GOAL, Canvas, grid_box, label, panel_of
 from reproduction.exhibit import Exhibit, Extent, Findings, Table, Work
-from reproduction.published import Goal, goals
 
-# rows of the picture and their fills
-# largest overlap with the goal, or with the goal stretched to a square as in the paper; likeness
+
+class Goal(NamedTuple):
+    """One of the paper's nine goals.
+
+    - `name`: The name in words.
+    - `outline`: The outline (N, 2), y down.
+    - `tiles`: Polygons (N, 2) laid on the goal, by "est", "arap" (each method's first) and
+      "est_largest", "arap_largest" (the one of its first twenty that overlaps most).
+    - `printed`: The paper's table, by "iou" and "pixel_accuracy", then "paper" and "arap".
+    """
+
+    name: str
+    outline: Array
+    tiles: dict[str, Array]
+    printed: dict[str, dict[str, float]]
+
+    def target(self) -> Target:
+        """Return the goal at its true aspect."""
+        return Target.from_polygon(self.outline, y_down=True, source=self.name)
+
+    def squared(self) -> Target:
+        """Return the goal as the paper used it: each axis stretched to the side of a square."""
+        low, high = self.outline.min(axis=0), self.outline.max(axis=0)
+        outline = 200.0 * (self.outline - low) / (high - low)
+        return Target.from_polygon(outline, y_down=True, source=self.name)
+
+
+@cache
+def goals() -> dict[str, Goal]:
+    """Return the nine goals by name, in the order of the paper's table."""
+    file = Path(__file__).parent / "data" / "nine_goals.json"
+    found: dict[str, Goal] = {}
+    for name, row in json.loads(file.read_text("utf-8"))["goals"].items():
+        tiles = {key: np.array(row[key]["tile"]) for key in row if key.startswith(("est", "arap"))}
+        found[name] = Goal(name, np.array(row["outline"]), tiles, row["table"])
+    return found
+
+
+# What a search is for: overlap with the goal, or with the goal stretched to a square as in the paper;
+# or likeness
 Objective = Literal["overlap", "squared", "likeness"]
 
 # number of best classes of a quick search that are searched again with full effort
 SEARCHED_AGAIN = 2
 
 
-class GoalTile(NamedTuple):
-    """The best tile that was found for a goal.
-
-    - `isohedral_class`: The tile's class.
-    - `polygon`: The polygon (N, 2) in the goal's coordinates.
-    - `iou`, `dice`, `pixel_accuracy`: The overlap with the goal.
-    - `certified`: Whether it is proved to tile.
-    """
-
-    isohedral_class: str
-    polygon: Array
-    iou: float
-    dice: float
-    pixel_accuracy: float
-    certified: bool
-
-
 def goal_tile(
     name: str, objective: Objective, effort: str, classes: tuple[str, ...] | None
-) -> GoalTile | None:
+) -> EscherTile | None:
     """Return the best tile for a goal, or None if no class gives a certified one.
 
     A quick search tries all classes; the best two are searched again if more effort is asked for.
@@ -58,23 +81,18 @@ def goal_tile(
     found = _tiles(target, objective, "fast", classes or tuple(CLASSES))
     if effort != "fast" and objective != "squared":
         found += _tiles(target, objective, effort, [one.name for one in found[:SEARCHED_AGAIN]])
-        found.sort(key=lambda one: -_rank(one, objective))
-    if not found:
-        return None
-    best, own = found[0], found[0].metrics
-    measures = own.iou, own.dice, own.pixel_accuracy
-    return GoalTile(best.name, best.tile.polygon, *measures, best.certificate.valid)
+    return max(found, key=lambda one: _rank(one, objective), default=None)
 
 
-def goal_work(extent: Extent, objective: Objective) -> list[Work]:
-    """Return the search for the best tiles of all nine goals, as work."""
+def goal_work(extent: Extent, *objectives: Objective) -> list[Work]:
+    """Return the searches for the best tiles of all nine goals, as work, objective by objective."""
     costs = {"octopus": 3.0, "spider": 5.0}
-    share = 1.0 if extent.effort == "fast" else 4.0
+    share = 2.0 if extent.effort == "fast" else 8.0
+    given = extent.effort, extent.classes
     return [
-        Work(
-            goal_tile, (n, objective, extent.effort, extent.classes), 2 * share * costs.get(n, 1.0)
-        )
-        for n in goals()
+        Work(goal_tile, (name, objective, *given), share * costs.get(name, 1.0))
+        for objective in objectives
+        for name in goals()
     ]
 
 
@@ -92,12 +110,18 @@ def _rank(result: EscherTile, objective: Objective) -> float:
     return result.score if objective == "likeness" else result.metrics.iou
 
 
+def _by_goal(values: list[EscherTile | None]) -> list[dict[str, EscherTile | None]]:
+    """Return what was found for two objectives, by goal."""
+    return [dict(zip(goals(), part, strict=True)) for part in (values[:9], values[9:])]
+
+
+# rows of the picture: what they are called, and their fills
 ROWS = (
-    ("goal", "#3b4754", "goal"),
-    ("ARAP", "#b9a58c", "ARAP"),
-    ("EST", "#c9c2b4", "EST"),
-    ("overlap", "#8ab6d9", "here,\noverlap"),
-    ("likeness", "#5d97c9", "here,\nlikeness"),
+    ("goal", "#3b4754"),
+    ("ARAP", "#b9a58c"),
+    ("EST", "#c9c2b4"),
+    ("here,\noverlap", "#8ab6d9"),
+    ("here,\nlikeness", "#5d97c9"),
 )
 
 _CAPTION = (
@@ -110,8 +134,6 @@ HEADINGS = (
     "pixel accuracy", "EST, best IoU", "ARAP, best IoU",
 )  # fmt: skip
 
-_LEFT, _HEAD = 0.075, 0.022
-
 
 def impossible_rows() -> list[str]:
     """Return the goals whose printed "IoU" exceeds their pixel accuracy, in either column."""
@@ -120,27 +142,23 @@ def impossible_rows() -> list[str]:
 
 
 def _draw_tiles(canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings:
-    names = list(goals())
-    overlap, likeness = (dict(zip(names, part, strict=True)) for part in (values[:9], values[9:]))
-    height = 0.50
+    overlap, likeness = _by_goal(values)
+    height, left, head = 0.50, 0.075, 0.044
     figure = canvas.figure(height)
-    wide, tall = (1 - _LEFT) / len(names), (1 - _HEAD / height) / len(ROWS)
     for column, (name, goal) in enumerate(goals().items()):
-        rings = _rings(goal, overlap[name], likeness[name])
-        x = _LEFT + column * wide
-        label(figure, x + wide / 2, 1 - 0.6 * _HEAD / height, name)
-        for row, (kind, fill, _) in enumerate(ROWS):
-            box = (x + 0.003, (len(ROWS) - 1 - row) * tall + 0.006, wide - 0.006, tall - 0.012)
-            ring = rings[kind]
+        ours = [one and one.tile.polygon for one in (overlap[name], likeness[name])]
+        rings = (goal.outline, goal.tiles["arap"], goal.tiles["est"], *ours)
+        for row, (ring, (words, fill)) in enumerate(zip(rings, ROWS, strict=True)):
+            box = grid_box(row, column, len(ROWS), len(goals()), gap=0.006, left=left, top=head)
             shown = [goal.outline] if ring is None else [goal.outline, ring]
-            view = window_of(shown, box[2] / (box[3] * height), margin=0.03)
-            axes = panel(figure, box, view, y_down=True)
-            if ring is not None:
-                fill_rings(axes, [ring], fill, EDGE, 0.6)
+            axes = panel_of(figure, box, shown, 0.03, y_down=True)
+            fill_rings(axes, shown[1:], fill, EDGE, 0.6)
             if row:
                 fill_rings(axes, [goal.outline], "none", GOAL, 0.5)
-    for row, (_, _, words) in enumerate(ROWS):
-        label(figure, _LEFT / 2, (len(ROWS) - 0.5 - row) * tall, words, size=0.9)
+            else:
+                label(figure, box[0] + box[2] / 2, 1 - 0.6 * head, name)
+            if column == 0:
+                label(figure, left / 2, box[1] + box[3] / 2, words, size=0.9)
     canvas.add(
         figure,
         "Nine columns: bat, beetle, camel, dolphin, octopus, pegasus, penguin, spider, squirrel. "
@@ -149,8 +167,8 @@ def _draw_tiles(canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings:
         "Each method's first tile by its own measure, after the best similarity; red the goal. "
         "ARAP and EST: computed with Nagata and Imahori's program (MIT) on the same goals.",
     )
-    certified = sum(one is not None and one.certified for one in values)
-    ours = [one.iou for one in overlap.values() if one is not None]
+    certified = sum(one is not None and one.certificate.valid for one in values)
+    ours = [one.metrics.iou for one in overlap.values() if one is not None]
     est, arap = (_mean(key) for key in ("est_largest", "arap_largest"))
     mean = float(np.mean(ours)) if ours else float("nan")
     return Findings(
@@ -167,21 +185,9 @@ def _draw_tiles(canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings:
             "mean_iou_arap": arap,
             "mean_iou_est": est,
             "certified": certified,
-            "likeness_classes": {n: one.isohedral_class for n, one in likeness.items() if one},
+            "likeness_classes": {n: one.name for n, one in likeness.items() if one},
         },
     )  # fmt: skip
-
-
-def _rings(
-    goal: Goal, overlap: GoalTile | None, likeness: GoalTile | None
-) -> dict[str, Array | None]:
-    return {
-        "goal": goal.outline,
-        "ARAP": goal.tiles["arap"].polygon,
-        "EST": goal.tiles["est"].polygon,
-        "overlap": None if overlap is None else overlap.polygon,
-        "likeness": None if likeness is None else likeness.polygon,
-    }
 
 
 def _mean(tile: str, measure: str = "iou") -> float:
@@ -189,24 +195,23 @@ def _mean(tile: str, measure: str = "iou") -> float:
 
 
 def _metrics(goal: Goal, key: str) -> ShapeMetrics:
-    return compare(goal.tiles[key].polygon, goal.outline)
+    return compare(goal.tiles[key], goal.outline)
 
 
 def _draw_table(_canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings:
-    names = list(goals())
-    true, squared = (dict(zip(names, part, strict=True)) for part in (values[:9], values[9:]))
-    rows, printed = [], []
-    for name, goal in goals().items():
-        iou, accuracy = goal.printed["iou"], goal.printed["pixel_accuracy"]
-        best = [_metrics(goal, key) for key in ("est_largest", "arap_largest")]
-        printed.append(max(iou.values()))
-        own = [iou["paper"], iou["arap"], accuracy["paper"], accuracy["arap"]]
-        found = *_cells(squared[name]), *_cells(true[name])
-        rows.append((name, *_three(own), *found, *_three(one.iou for one in best)))
+    true, squared = _by_goal(values)
+    table = {
+        name: [
+            *(goal.printed[kind][who] for kind in MEASURES[::2] for who in ("paper", "arap")),
+            *(value for found in (squared, true) for value in _overlaps(found[name])),
+            *(_metrics(goal, key).iou for key in ("est_largest", "arap_largest")),
+        ]
+        for name, goal in goals().items()
+    }
+    means = np.nanmean(list(table.values()), axis=0).tolist()
+    rows = [_row(name, table[name], squared[name], true[name]) for name in table]
     impossible = impossible_rows()
-    means = _mean_row(names, true, squared)
-    dice = float(np.mean([one.dice for one in squared.values() if one is not None]))
-    paper = float(np.mean([goal.printed["iou"]["paper"] for goal in goals().values()]))
+    paper, dice = means[0], means[5]
     verdict = "agrees in part" if dice >= paper - 0.005 else "differs"
     return Findings(
         verdict,
@@ -223,40 +228,33 @@ def _draw_table(_canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings
             "mean_dice_squared": dice,
             "mean_printed": paper,
             "goals": {
-                n: {"squared": _numbers(squared[n]), "true_aspect": _numbers(true[n])} for n in names
+                n: {"squared": _numbers(squared[n]), "true_aspect": _numbers(true[n])} for n in table
             },
         },
-        tables=[Table(_CAPTION, HEADINGS, (*rows, means))],
+        tables=[Table(_CAPTION, HEADINGS, [*rows, _row("mean", means, None, None)])],
     )  # fmt: skip
 
 
-def _cells(tile: GoalTile | None) -> tuple[str, ...]:
-    if tile is None:
-        return ("–",) * 4
-    return (tile.isohedral_class, *_three([tile.iou, tile.dice, tile.pixel_accuracy]))
+MEASURES = ("iou", "dice", "pixel_accuracy")
 
 
-def _three(values: Iterable[float]) -> list[str]:
-    return [f"{value:.3f}" for value in values]
+def _overlaps(tile: EscherTile | None) -> list[float]:
+    return [getattr(tile.metrics, name) if tile else np.nan for name in MEASURES]
 
 
-def _numbers(tile: GoalTile | None) -> dict[str, Any] | None:
-    return None if tile is None else {k: v for k, v in tile._asdict().items() if k != "polygon"}
-
-
-def _mean_row(
-    names: list[str], true: dict[str, GoalTile | None], squared: dict[str, GoalTile | None]
+def _row(
+    name: str, numbers: Sequence[float], squared: EscherTile | None, true: EscherTile | None
 ) -> tuple[str, ...]:
-    printed = [
-        np.mean([goals()[n].printed[kind][who] for n in names])
-        for kind in ("iou", "pixel_accuracy")
-        for who in ("paper", "arap")
-    ]
-    cells = _three(float(mean) for mean in printed)
-    for tiles in (squared, true):
-        good = [[t.iou, t.dice, t.pixel_accuracy] for t in tiles.values() if t is not None]
-        cells += ["", *(_three(np.mean(good, axis=0)) if good else ["–"] * 3)]
-    return ("mean", *cells, *_three([_mean("est_largest"), _mean("arap_largest")]))
+    cells = [f"{number:.3f}" if np.isfinite(number) else "–" for number in numbers]
+    first, second = (tile.name if tile else "" for tile in (squared, true))
+    return (name, *cells[:4], first, *cells[4:7], second, *cells[7:])
+
+
+def _numbers(tile: EscherTile | None) -> dict[str, Any] | None:
+    if tile is None:
+        return None
+    measures = dict(zip(MEASURES, _overlaps(tile), strict=True))
+    return {"isohedral_class": tile.name, **measures, "certified": tile.certificate.valid}
 
 
 TILES = Exhibit(
@@ -265,7 +263,7 @@ TILES = Exhibit(
     "Nine target shapes; the tiles of ARAP (Nagata and Imahori, 2021); the tiles of the paper's "
     "method, which demonstrates comparable performance.",
     _draw_tiles,
-    lambda extent: goal_work(extent, "overlap") + goal_work(extent, "likeness"),
+    lambda extent: goal_work(extent, "overlap", "likeness"),
 )
 TABLE = Exhibit(
     "table-3",
@@ -274,5 +272,5 @@ TABLE = Exhibit(
     "0.818 (octopus) to 0.927 and 0.935 (penguin) under IoU. ARAP is ahead or level in all but "
     "one.",
     _draw_table,
-    lambda extent: goal_work(extent, "overlap") + goal_work(extent, "squared"),
+    lambda extent: goal_work(extent, "overlap", "squared"),
 )

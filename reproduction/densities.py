@@ -1,32 +1,46 @@
-"""Densities estimated on the four spaces: the table of divergences, and their pictures, flat."""
+"""Densities estimated on the four spaces: their targets, the table of divergences, their pictures.
+
+The targets are four and six Gaussians of variance 0.005 on the unit square, and the 5 x 5 checkerboard
+(paper, section 5.3). On the sphere they are also taken per round area: the same function times the
+area factor.
+"""
 
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING, Any
+import math
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density import (
     COLOURS,
     SPACES,
     Density,
+    FlowSettings,
     PlotSettings,
+    Space,
     density_on_grid,
     density_page,
+    density_to_bytes,
     draw_cells,
+    fit_density,
+    kl_by_quadrature,
     make_space,
     mean_field,
     midpoints,
+    read_density,
+    viewpoint,
 )
 from orbiflow.drawing import draw_flow, draw_magnitude
-from reproduction.density_fits import TARGETS, Fitted, fit_work, kl_of_uniform, target
 from reproduction.drawing import (
     INK,
     SAMPLES,
-    Box,
     Canvas,
     caption,
     draw_surface,
@@ -37,7 +51,6 @@ from reproduction.drawing import (
     tiny,
 )
 from reproduction.exhibit import Exhibit, Extent, Findings, Table, Work
-from reproduction.published import KL
 from reproduction.spaces import TITLES
 from reproduction.symmetrization import equivariance_error
 
@@ -49,7 +62,116 @@ NAMES = {
     "6-gaussian": "6 Gaussians",
     "checkerboard": "5 × 5 checkerboard",
 }
-ROUND = ("sphere", "projective-plane")
+TARGETS = tuple(NAMES)
+
+# the paper's table of KL divergences, as printed
+KL = {
+    "torus": {"4-gaussian": 0.03, "6-gaussian": 0.45, "checkerboard": 0.67},
+    "sphere": {"4-gaussian": 0.03, "6-gaussian": 0.47, "checkerboard": 0.56},
+}
+TargetMeasure = Literal["flat", "round"]
+
+_SMOOTH = {"max_frequency": 6, "segments": 8, "roughness": (1e-3, 1e-3)}
+_SHARP = {"max_frequency": 8, "segments": 6, "roughness": (1e-4, 1e-4)}
+# the `FlowSettings` that suit each target
+FIT_SETTINGS = {"4-gaussian": _SMOOTH, "6-gaussian": _SMOOTH, "checkerboard": _SHARP}
+
+
+def target(name: str, points: Tensor) -> Tensor:
+    """Return a target's density (N,) at points (N, 2), per area of the square, nearly normalised.
+
+    >>> target("checkerboard", torch.tensor([[0.1, 0.1], [0.3, 0.1]])).round(decimals=2).tolist()
+    [1.9199999570846558, 0.0]
+    """
+    if name == "checkerboard":
+        cells = (points * 5).floor().clamp(0, 4).sum(dim=-1)
+        return (cells % 2 == 0).to(points) * 25 / 13
+    if name == "4-gaussian":
+        means = torch.tensor([[x, y] for x in (0.25, 0.75) for y in (0.25, 0.75)])
+    else:
+        angle = torch.arange(6) * math.pi / 3
+        means = 0.5 + 0.3 * torch.stack([angle.cos(), angle.sin()], dim=-1)
+    squared = ((points[..., None, :] - means.to(points)) ** 2).sum(dim=-1)
+    return (-squared / 0.01).exp().mean(dim=-1) / (2 * math.pi * 0.005)
+
+
+def weighted(name: str, space: Space, points: Tensor, measure: TargetMeasure) -> Tensor:
+    """Return the target (N,) per area of the square, if it is given in `measure`."""
+    factor = space.log_area(points).exp() if measure == "round" else 1.0
+    return target(name, points) * factor
+
+
+def drawn(name: str, space: Space, measure: TargetMeasure, count: int, seed: int) -> Tensor:
+    """Draw samples (count, 2) of a target, by rejection."""
+    generator = torch.Generator().manual_seed(seed)
+    most = 1.1 * float(weighted(name, space, midpoints(space, 400), measure).max())
+    found: list[Tensor] = []
+    while sum(len(part) for part in found) < count:
+        points = torch.rand(4 * count, 2, dtype=torch.float64, generator=generator)
+        chance = torch.rand(4 * count, dtype=torch.float64, generator=generator)
+        found.append(points[chance * most < weighted(name, space, points, measure)])
+    return torch.cat(found)[:count]
+
+
+def kl_of_uniform(name: str, space: Space, grid: int = 400) -> float:
+    """Return the KL divergence of the square's uniform density from a target: that of no fit at all.
+
+    >>> from orbiflow.density import make_space
+    >>> round(kl_of_uniform("checkerboard", make_space("torus")), 3)  # log(25 / 13)
+    0.654
+    """
+    points = midpoints(space, grid)
+    return kl_by_quadrature(target(name, points), torch.zeros(len(points), dtype=torch.float64))
+
+
+class Fitted(NamedTuple):
+    """A density fitted to samples of a target.
+
+    - `space`, `target`, `measure`: What was fitted.
+    - `saved`: The density, as `density_to_bytes` returns it.
+    - `kl`: The divergence from the target in nats, by quadrature with doubled steps of the flow.
+    - `mass`: The density's integral over the square.
+    """
+
+    space: str
+    target: str
+    measure: TargetMeasure
+    saved: bytes
+    kl: float
+    mass: float
+
+    def density(self) -> Density:
+        """Return the density."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "density.safetensors"
+            path.write_bytes(self.saved)
+            return read_density(path)[0]
+
+
+def fitted(
+    space: str, target: str, measure: TargetMeasure, points: int, evaluations: int, grid: int
+) -> Fitted:
+    """Draw samples of a target, fit a density to them, and measure its divergence."""
+    there = make_space(space)
+    samples = drawn(target, there, measure, points, seed=0)
+    settings = FlowSettings(evaluations=evaluations, **FIT_SETTINGS[target])  # type: ignore[arg-type]
+    density, report = fit_density(there, samples, settings)
+    places = midpoints(there, grid)
+    with torch.no_grad():
+        part = density.flow_part
+        assert part is not None
+        values = part[1].with_steps(2 * part[1].flow.steps).log_prob(places)
+    kl = kl_by_quadrature(weighted(target, there, places, measure), values)
+    return Fitted(space, target, measure, density_to_bytes(density), kl, float(report.mass or 0.0))
+
+
+def fit_work(space: str, target: str, extent: Extent, measure: TargetMeasure = "flat") -> Work:
+    """Return a fit as work."""
+    arguments = (space, target, measure, extent.points, extent.evaluations, extent.grid)
+    return Work(fitted, arguments, 2 + extent.evaluations / 12)
+
+
+_box = functools.partial(grid_box, rows=2, columns=5, title=0.12, left=0.03)
 _HALF_WINDOW = (-0.5, -0.5, 1.5, 1.5)
 
 
@@ -59,30 +181,27 @@ def square_values(density: Density, count: int) -> Array:
     return density_on_grid(density, t, t, "square")
 
 
+def _fits(extent: Extent) -> list[tuple[str, TargetMeasure]]:
+    """Return the spaces and measures of the table; if there is time, more than the paper's."""
+    if extent.name == "fast":
+        return [(space, "flat") for space in KL]
+    return [*((space, "flat") for space in SPACES), ("sphere", "round")]
+
+
 def _needs_table(extent: Extent) -> list[Work]:
-    works = [fit_work(space, name, extent) for space in _table_spaces(extent) for name in TARGETS]
-    if extent.round_measure:
-        works += [fit_work("sphere", name, extent, "round") for name in TARGETS]
-    return works
-
-
-def _table_spaces(extent: Extent) -> tuple[str, ...]:
-    """Return the spaces of the paper's table; all four if there is time."""
-    return tuple(KL) if extent.name == "fast" else tuple(SPACES)
+    return [fit_work(s, name, extent, measure) for s, measure in _fits(extent) for name in TARGETS]
 
 
 def _draw_table(_canvas: Canvas, extent: Extent, values: list[Fitted]) -> Findings:
     found = {(one.space, one.target, one.measure): one for one in values}
     uniform = {name: kl_of_uniform(name, make_space("torus")) for name in TARGETS}
     rows = []
-    for space in _table_spaces(extent):
-        printed = KL.get(space, {})
+    for space, measure in _fits(extent):
+        printed = KL.get(space, {}) if measure == "flat" else {}
         cells = [f"{printed[name]:.2f}" if printed else "–" for name in TARGETS]
-        ours = [f"{found[space, name, 'flat'].kl:.4f}" for name in TARGETS]
-        rows.append((TITLES[space], *cells, *ours))
-    if extent.round_measure:
-        ours = [f"{found['sphere', name, 'round'].kl:.4f}" for name in TARGETS]
-        rows.append(("sphere, round area", "–", "–", "–", *ours))
+        ours = [f"{found[space, name, measure].kl:.4f}" for name in TARGETS]
+        title = TITLES[space] if measure == "flat" else f"{TITLES[space]}, round area"
+        rows.append((title, *cells, *ours))
     rows.append(("the even density", *(f"{uniform[name]:.3f}" for name in TARGETS), "", "", ""))
     heads = ("space", *(f"{who}, {NAMES[n]}" for who in ("paper", "here") for n in TARGETS))
     cells = [(space, name) for space in KL for name in TARGETS]
@@ -115,10 +234,6 @@ def _draw_table(_canvas: Canvas, extent: Extent, values: list[Fitted]) -> Findin
         },
         tables=[Table("KL divergence from the target, nats: the paper's, and ours.", heads, rows)],
     )  # fmt: skip
-
-
-def _needs_flat(name: str, extent: Extent) -> list[Work]:
-    return [fit_work(space, name, extent) for space in SPACES]
 
 
 def _draw_flat(name: str, canvas: Canvas, _extent: Extent, values: list[Fitted]) -> Findings:
@@ -166,10 +281,6 @@ def _draw_flat(name: str, canvas: Canvas, _extent: Extent, values: list[Fitted])
     )  # fmt: skip
 
 
-def _box(row: int, column: int) -> Box:
-    return grid_box(row, column, 2, 5, title=0.12, gap=0.012, left=0.03)
-
-
 def _image(axes: Axes, values: Array, top: float) -> None:
     square = {"origin": "lower", "extent": (0, 1, 0, 1), "interpolation": "bilinear"}
     axes.imshow(values.T, cmap=COLOURS, vmin=0, vmax=top, **square)
@@ -192,14 +303,14 @@ SIX_GAUSSIANS = Exhibit(
     "projective plane, black where probability is low; the flow fields clearly show the symmetry "
     "of each space.",
     functools.partial(_draw_flat, "6-gaussian"),
-    functools.partial(_needs_flat, "6-gaussian"),
+    lambda extent: [fit_work(space, "6-gaussian", extent) for space in SPACES],
 )
 CHECKERBOARD = Exhibit(
     "figure-12",
     "Density estimation: the checkerboard",
     "The same for a 5 × 5 checkerboard on the four spaces.",
     functools.partial(_draw_flat, "checkerboard"),
-    functools.partial(_needs_flat, "checkerboard"),
+    lambda extent: [fit_work(space, "checkerboard", extent) for space in SPACES],
 )
 
 EMBEDDED = ("torus", "sphere")
@@ -216,18 +327,18 @@ def _draw_surfaces(canvas: Canvas, extent: Extent, values: list[Any]) -> Finding
         density = one.density()
         # the chart of the sphere stretches the middle of the square
         finer = 1.0 if one.space == "torus" else 1.5
-        shown = square_values(density, round(finer * extent.resolution))
+        n = round(finer * extent.resolution)
+        shown = square_values(density, n)
         top = float(np.quantile(shown, 0.998))
         box = grid_box(row, column, 2, 3, title=0.02, gap=0.0, left=0.04, top=0.05)
         axes = figure.add_axes(box)
         colours = colormaps[COLOURS](np.clip(shown / top, 0, 1))[..., :3]
-        at = np.unravel_index(shown.argmax(), shown.shape)
-        front = (float(at[0] + 0.5) / len(shown), float(at[1] + 0.5) / len(shown))
-        turn = TORUS_TURN if one.space == "torus" else None
-        draw_surface(axes, density.space, colours, turn=turn, front=front)
+        highest = (torch.tensor(divmod(int(shown.argmax()), n), dtype=torch.float64) + 0.5) / n
+        seen = viewpoint(density.space, highest)
+        turn = TORUS_TURN if one.space == "torus" else (seen.yaw, seen.pitch)
+        draw_surface(axes, density.space, colours, turn)
         if row == 0:
-            higher = (box[0], box[1], box[2], box[3] + 0.01)
-            caption(figure, higher, NAMES[one.target], weight="bold")
+            caption(figure, box, NAMES[one.target], weight="bold")
         if column == 0:
             name = TITLES[one.space]
             label(figure, 0.02, box[1] + box[3] / 2, name, rotation=90, weight="bold")

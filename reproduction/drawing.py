@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,8 +13,8 @@ from numpy.typing import ArrayLike
 from PIL import Image
 
 from orbiflow.arrays import Array, Window
-from orbiflow.density import Space, immersion, viewpoint
-from orbiflow.drawing import DPI, PALETTES, blank_figure, fill_rings, plane_axes, png_bytes
+from orbiflow.density import Space, immersion
+from orbiflow.drawing import PALETTES, Sheet, fill_rings, plane_axes
 from orbiflow.runtime import write_atomic
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles import Tile, colouring, copies_meeting
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WIDTH = 1800  # the usual width of a picture in pixels
+SHEET = Sheet.screen(1800)
 
 
 class Picture(NamedTuple):
@@ -50,9 +51,9 @@ class Canvas:
         self.folder, self.name = folder, name
         self.pictures: list[Picture] = []
 
-    def figure(self, height: float, width: int = WIDTH) -> Figure:
-        """Return an empty figure `width` pixels wide and `height` times as high."""
-        return blank_figure(width, round(height * width))
+    def figure(self, height: float) -> Figure:
+        """Return an empty figure `height` times as high as it is wide."""
+        return SHEET.figure(height * SHEET.width)
 
     def add(
         self,
@@ -70,41 +71,18 @@ class Canvas:
         colours and a third of the bytes.
         """
         stem = f"{self.name}-{part}" if part else self.name
-        picture = png_bytes(figure)
-        write_atomic(self.folder / f"{stem}.png", picture if exact else _fewer_colours(picture))
-        write_atomic(self.folder / f"{stem}.pdf", pdf_bytes(figure))
+        image = Image.open(io.BytesIO(SHEET.file(figure))).convert("RGB")
+        if not exact:  # no dither: it would triple the bytes
+            image = image.quantize(256, dither=Image.Dither.NONE)
+        png = io.BytesIO()
+        image.save(png, "PNG", optimize=True)
+        write_atomic(self.folder / f"{stem}.png", png.getvalue())
+        write_atomic(self.folder / f"{stem}.pdf", replace(SHEET, format="pdf").file(figure))
         others = [("PDF", f"{stem}.pdf")]
         for file, text in (pages or {}).items():
             write_atomic(self.folder / f"{self.name}-{file}.html", text)
             others.append((file.replace("-", " "), f"{self.name}-{file}.html"))
-        size = (figure.get_size_inches() * DPI).round().astype(int)
-        self.pictures.append(
-            Picture(f"{stem}.png", alt, caption, int(size[0]), int(size[1]), tuple(others))
-        )
-
-
-def _fewer_colours(png: bytes) -> bytes:
-    image = Image.open(io.BytesIO(png)).convert("RGB")
-    buffer = io.BytesIO()
-    # no dither: it would triple the bytes
-    image.quantize(256, dither=Image.Dither.NONE).save(buffer, "PNG", optimize=True)
-    return buffer.getvalue()
-
-
-def pdf_bytes(figure: Figure) -> bytes:
-    """Return the figure as PDF in curves, with fonts that journals accept; always the same bytes."""
-    import matplotlib as mpl
-
-    buffer = io.BytesIO()
-    with mpl.rc_context({"pdf.fonttype": 42}):
-        figure.savefig(
-            buffer,
-            format="pdf",
-            dpi=DPI,
-            facecolor=figure.get_facecolor(),
-            metadata={"CreationDate": None, "Creator": "orbiflow"},
-        )
-    return buffer.getvalue()
+        self.pictures.append(Picture(f"{stem}.png", alt, caption, *image.size, tuple(others)))
 
 
 INK, FAINT = "#16202a", "#56626e"
@@ -152,6 +130,23 @@ def panel(
     return axes
 
 
+def panel_of(
+    figure: Figure, box: Box, rings: list[Array], margin: float = 0.05, *, y_down: bool = False
+) -> Axes:
+    """Return axes that show all `rings`, with a margin as a share of their size."""
+    points = np.concatenate(rings)
+    low, high = points.min(axis=0), points.max(axis=0)
+    aspect = aspect_of(figure, box)
+    half = (0.5 + margin) * (high - low)
+    half = np.maximum(half, half[::-1] * (aspect, 1 / aspect))
+    return panel(figure, box, around((low + high) / 2, *half), y_down=y_down)
+
+
+def aspect_of(figure: Figure, box: Box) -> float:
+    """Return a box's width over its height."""
+    return box[2] * figure.get_figwidth() / (box[3] * figure.get_figheight())
+
+
 def caption(
     figure: Figure, box: Box, title: str, *, weight: str = "normal", size: float = 1.0
 ) -> None:
@@ -195,9 +190,9 @@ def tiny(value: float) -> str:
 TILE, GOAL, EDGE = "#8ab6d9", "#c2410c", "#16202a"
 
 
-def draw_over(axes: Axes, ring: Array, goal: Array, *, width: float = 1.0) -> None:
-    """Draw a filled tile (N, 2) and the outline (M, 2) of what it is to look like."""
-    fill_rings(axes, [ring], TILE, EDGE, 0.7 * width)
+def draw_over(axes: Axes, tiles: list[Array], goal: Array, width: float) -> None:
+    """Draw a filled tile (N, 2), if there is one, and the outline (M, 2) of what it is to look like."""
+    fill_rings(axes, tiles, TILE, EDGE, 0.7 * width)
     fill_rings(axes, [goal], "none", GOAL, width)
 
 
@@ -211,32 +206,29 @@ def draw_tiling(axes: Axes, tile: Tile, window: Window) -> None:
         fill_rings(axes, list(rings[own == number]), fill, palette.outline, 0.5)
 
 
-def window_of(rings: list[Array], aspect: float, margin: float = 0.05) -> Window:
-    """Return the window with this width over height around all points of `rings`."""
-    points = np.concatenate(rings)
-    low, high = points.min(axis=0), points.max(axis=0)
-    half = (0.5 + margin) * (high - low)
-    half = np.maximum(half, half[::-1] * (aspect, 1 / aspect))
-    return around((low + high) / 2, float(half[0]), float(half[1]))
+def draw_heads(axes: Axes, side: Array, colour: str, count: int) -> None:
+    """Draw arrowheads in the middle of a polyline (N, 2), by its length."""
+    steps = np.linalg.norm(np.diff(side, axis=0), axis=1)
+    at = np.concatenate([[0], np.cumsum(steps)])
+    for k in range(count):
+        tip, back = (
+            np.array([np.interp(at[-1] / 2 + s, at, side[:, i]) for i in (0, 1)])
+            for s in (0.045 + 0.07 * k, -0.045 + 0.07 * k)
+        )
+        across = 0.5 * np.array([back[1] - tip[1], tip[0] - back[0]])
+        head = np.stack([tip, back + across, back - across])
+        axes.fill(*head.T, facecolor=colour, edgecolor="#ffffff", linewidth=0.6, zorder=6)
 
 
 LIGHT = np.array([-0.45, 0.55, 0.70])  # the direction of the light, from the left above the eye
 EYE = 6.0  # the distance of the eye, in radii of the surface
 
 
-def draw_surface(
-    axes: Axes,
-    space: Space,
-    colours: Array,
-    *,
-    turn: tuple[float, float] | None = None,
-    front: tuple[float, float] = (0.5, 0.5),
-) -> None:
+def draw_surface(axes: Axes, space: Space, colours: Array, turn: tuple[float, float]) -> None:
     """Draw a space's surface into axes without a frame: small faces, from the back to the front.
 
     The RGB `colours` (n, n, 3), 0 to 1, are those of the faces of the square's even grid, x first.
-    `turn` is the yaw and pitch of the eye in radians. By default the place `front` of the square is
-    seen.
+    `turn` is the yaw and pitch of the eye in radians.
     """
     from matplotlib.collections import PolyCollection
 
@@ -246,15 +238,10 @@ def draw_surface(
     points = immersion(space)(grid)
     points = points - (points.min(axis=0) + points.max(axis=0)) / 2
     radius = float(np.linalg.norm(points, axis=1).max())
-    if turn is None:
-        seen = viewpoint(space, torch.tensor(front, dtype=torch.float64))
-        turn = (seen.yaw, seen.pitch)
     seen_points = (points / radius) @ _camera(*turn).T
     corners = seen_points.reshape(n + 1, n + 1, 3)
-    faces = np.stack(
-        [corners[:-1, :-1], corners[1:, :-1], corners[1:, 1:], corners[:-1, 1:]], axis=2
-    )
-    faces = faces.reshape(-1, 4, 3)
+    around_face = corners[:-1, :-1], corners[1:, :-1], corners[1:, 1:], corners[:-1, 1:]
+    faces = np.stack(around_face, axis=2).reshape(-1, 4, 3)
     normals = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     sight = np.array([0, 0, EYE]) - faces.mean(axis=1)
@@ -263,15 +250,9 @@ def draw_surface(
     order = np.argsort(faces[..., 2].mean(axis=1))
     flat = faces[..., :2] * (EYE / (EYE - faces[..., 2:]))
     fills = np.clip(colours.reshape(-1, 3) * shade[:, None], 0, 1)
-    axes.add_collection(
-        PolyCollection(
-            list(flat[order]), facecolors=fills[order], edgecolors=fills[order], linewidths=0.35,
-            rasterized=True,
-        )
-    )  # fmt: skip
-    axes.set_xlim(-1.12, 1.12)
-    axes.set_ylim(-1.12, 1.12)
-    axes.set_aspect("equal")
+    inks = {"facecolors": fills[order], "edgecolors": fills[order]}
+    axes.add_collection(PolyCollection(list(flat[order]), linewidths=0.35, rasterized=True, **inks))
+    axes.set(xlim=(-1.12, 1.12), ylim=(-1.12, 1.12), aspect="equal")
     axes.set_axis_off()
 
 

@@ -8,46 +8,37 @@ from reproduction.drawing import Canvas, Picture
 
 
 class Extent(NamedTuple):
-    """How much work a reproduction is: all of it, or a preview.
+    """How much work a reproduction is: all of it, by default, or a preview.
 
-    - `name`: "full" or "fast".
     - `frequencies`: The values of Omega in the ablation, with the paper's 5.
     - `affine`, `iterations`: The steps of both phases of the paper's method.
     - `effort`: The effort of our own searches.
     - `classes`: The classes that our own searches try for each goal, None for all nine.
     - `points`: The number of points drawn from each target density.
     - `evaluations`: The number of evaluations of each density's likelihood and gradient.
-    - `round_measure`: Whether densities are also fitted with respect to the round area.
     - `grid`: The number of points along a side at which KL divergences are taken.
     - `resolution`: The number of cells along a side of surfaces in space.
     """
 
-    name: str
-    frequencies: tuple[int, ...]
-    affine: int
-    iterations: int
-    effort: str
-    classes: tuple[str, ...] | None
-    points: int
-    evaluations: int
-    round_measure: bool
-    grid: int
-    resolution: int
+    name: str = "full"
+    frequencies: tuple[int, ...] = (0, 1, 2, 3, 5, 10)
+    affine: int = 80
+    iterations: int = 200
+    effort: str = "normal"
+    classes: tuple[str, ...] | None = None
+    points: int = 65_536
+    evaluations: int = 150
+    grid: int = 200
+    resolution: int = 160
 
 
 # everything, in about ten minutes on two cores
-FULL = Extent(
-    name="full", frequencies=(0, 1, 2, 3, 5, 10), affine=80, iterations=200, effort="normal",
-    classes=None, points=65_536, evaluations=150, round_measure=True, grid=200, resolution=160,
-)  # fmt: skip
+FULL = Extent()
 # A preview of a minute: every exhibit, with less work in each
 FAST = Extent(
     name="fast", frequencies=(0, 2, 5), affine=30, iterations=30, effort="fast", classes=("IH6",),
-    points=2_048, evaluations=24, round_measure=False, grid=100, resolution=100,
+    points=2_048, evaluations=24, grid=100, resolution=100,
 )  # fmt: skip
-
-# whether what the paper states agrees with what we find
-Verdict = Literal["agrees", "agrees in part", "differs"]
 
 
 class Work(NamedTuple):
@@ -62,11 +53,6 @@ class Work(NamedTuple):
     arguments: tuple[Any, ...]
     cost: float = 1.0
 
-    @property
-    def key(self) -> tuple[str, tuple[Any, ...]]:
-        """A key that is equal for equal work."""
-        return f"{self.function.__module__}.{self.function.__qualname__}", self.arguments
-
 
 class Table(NamedTuple):
     """A table of texts; `caption` says what they are."""
@@ -80,14 +66,14 @@ class Table(NamedTuple):
 class Findings:
     """What drawing an exhibit found.
 
-    - `verdict`: Whether it agrees with the paper.
+    - `verdict`: Whether what the paper states agrees with what we find.
     - `found`: What we see and measure, in words.
     - `why`: Why it differs, or "".
     - `numbers`: The numbers for `paper.json`, by name.
     - `tables`: The tables below the pictures.
     """
 
-    verdict: Verdict
+    verdict: Literal["agrees", "agrees in part", "differs"]
     found: str
     why: str = ""
     numbers: Mapping[str, Any] = field(default_factory=dict)
@@ -121,15 +107,10 @@ class Exhibit:
         return self.name.replace("-", " ").title()
 
 
-@dataclass(frozen=True)
-class Shown:
-    """An exhibit as it was drawn: its pictures and findings, or the `failure`.
-
-    - `seconds`: The time that its drawing took, without the work that it needed.
-    """
+class Shown(NamedTuple):
+    """An exhibit as it was drawn: its pictures and findings, or the `failure`."""
 
     exhibit: Exhibit
     pictures: tuple[Picture, ...] = ()
     findings: Findings | None = None
     failure: str = ""
-    seconds: float = 0.0

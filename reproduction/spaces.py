@@ -6,14 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from orbiflow.arrays import Array
+from orbiflow.arrays import Array, Window
 from orbiflow.density import SPACES, Space, edge_pairs, make_space
-from orbiflow.drawing import mark_symmetry
+from orbiflow.drawing import mark_symmetry, rgb
 from orbiflow.symmetry import IDENTIFICATION_SPACES, CrystallographicGroup
 from reproduction.drawing import (
+    INK,
     Canvas,
     around,
+    aspect_of,
     caption,
+    draw_heads,
     draw_surface,
     grid_box,
     panel,
@@ -65,10 +68,10 @@ def _draw_spaces(canvas: Canvas, extent: Extent, _values: list[Any]) -> Findings
         caption(figure, box, TITLES[name], weight="bold", size=1.1)
         _draw_square(panel(figure, box, around((0.5, 0.5), 0.72, 0.72)), space.group)
         box = grid_box(1, column, 3, 4, gap=0.02)
-        window = around((1.0, 1.0), 2.0, 2.0 * box[3] * 0.8 / box[2])
-        _draw_cells(panel(figure, box, window), space.group)
+        window = around((1.0, 1.0), 2.0, 2.0 / aspect_of(figure, box))
+        _draw_cells(panel(figure, box, window), space.group, window)
         axes = figure.add_axes(grid_box(2, column, 3, 4, gap=0.0))
-        draw_surface(axes, space, _checked(space, extent.resolution), turn=TURNS[name])
+        draw_surface(axes, space, _checked(space, extent.resolution), TURNS[name])
         found[name] = chi, sided = euler_characteristic(space.group), orientable(space.group)
         rows.append((TITLES[name], space.group.name, str(chi), "yes" if sided else "no"))
     canvas.add(
@@ -103,30 +106,19 @@ def _draw_square(axes: Axes, group: CrystallographicGroup) -> None:
     for number, pair in enumerate(edge_pairs(group)):
         for edge in pair:
             axes.plot(*edge.T, color=EDGES[number], linewidth=3.2, solid_capstyle="round", zorder=4)
-            along = edge[1] - edge[0]
-            across = np.array([-along[1], along[0]])
-            for k in range(number + 1):
-                tip = edge[0] + (0.56 + 0.075 * (k - number / 2)) * along
-                back = tip - 0.11 * along
-                head = np.stack([tip, back + 0.055 * across, back - 0.055 * across])
-                edging = {"edgecolor": "#ffffff", "linewidth": 0.6, "zorder": 5}
-                axes.fill(*head.T, facecolor=EDGES[number], **edging)
-    axes.fill(*(0.39 + 0.05 * LETTER).T, facecolor="#16202a")
+            draw_heads(axes, edge, EDGES[number], number + 1)
+    axes.fill(*(0.39 + 0.05 * LETTER).T, facecolor=INK)
 
 
-def _draw_cells(axes: Axes, group: CrystallographicGroup) -> None:
-    middle = np.full(2, 0.5)
-    pairs = edge_pairs(group)
-    letter = 0.12 + 0.055 * LETTER
-    for g in group.elements_near(np.ones(2), 4.5, source=middle):
+def _draw_cells(axes: Axes, group: CrystallographicGroup, window: Window) -> None:
+    for g in group.elements_near(np.ones(2), 4.5, source=np.full(2, 0.5)):
         aspect = next(i for i, c in enumerate(group.cosets) if np.allclose(c.linear, g.linear))
         axes.fill(*g(CORNERS).T, facecolor=FILLS[aspect], edgecolor="none", zorder=1)
-        axes.fill(*g(letter).T, facecolor="#16202a", zorder=3)
-        for number, pair in enumerate(pairs):
+        axes.fill(*g(0.12 + 0.055 * LETTER).T, facecolor=INK, zorder=3)
+        for number, pair in enumerate(edge_pairs(group)):
             for edge in pair:
                 axes.plot(*g(edge).T, color=EDGES[number], linewidth=1.4, zorder=2)
-    (low_x, high_x), (low_y, high_y) = axes.get_xlim(), axes.get_ylim()
-    mark_symmetry(axes, group, (low_x, low_y, high_x, high_y), size=0.11)
+    mark_symmetry(axes, group, window, size=0.11)
 
 
 def _checked(space: Space, n: int) -> Array:
@@ -134,18 +126,13 @@ def _checked(space: Space, n: int) -> Array:
     t = (np.arange(n) + 0.5) / n
     x, y = np.meshgrid(t, t, indexing="ij")
     odd = ((8 * x).astype(int) + (8 * y).astype(int)) % 2 == 1
-    colours = np.where(odd[..., None], _rgb("#c9dcec"), _rgb("#f4ecdc"))
-    width = 1.6 / 100
+    colours = np.where(odd[..., None], rgb(FILLS[1]), rgb(FILLS[0]))
     for number, pair in enumerate(edge_pairs(space.group)):
         for edge in pair:
             axis = int(abs(edge[1] - edge[0])[1] < 0.5)  # which coordinate is constant
-            near = np.abs((y if axis else x) - edge[0][axis]) < width
-            colours[near] = _rgb(EDGES[number])
-    return colours
-
-
-def _rgb(colour: str) -> Array:
-    return np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)])
+            near = np.abs((y if axis else x) - edge[0][axis]) < 0.016
+            colours[near] = rgb(EDGES[number])
+    return colours / 255
 
 
 def _draw_symmetrization(_canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findings:

@@ -13,7 +13,7 @@ from orbiflow.drawing import fill_rings
 from orbiflow.fields import FourierField, VectorField, symmetrize
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup, identification_group
-from reproduction.drawing import INK, Canvas, around, grid_box, panel, tiny
+from reproduction.drawing import INK, Canvas, around, draw_heads, grid_box, panel, tiny
 from reproduction.exhibit import Exhibit, Extent, Findings
 from reproduction.symmetrization import random_field
 
@@ -28,22 +28,19 @@ _LARGER = CrystallographicGroup.generate(np.diag([2.7, 2.7]))
 
 
 class Deformed(NamedTuple):
-    """The square's sides (4, N, 2) after a flow: bottom, right, top, left, each from its lower end.
+    """The square after a flow.
 
+    - `sides`: Its sides (4, N, 2): bottom, right, top, left, each from its lower end.
+    - `ring`: The boundary (M, 2), counter-clockwise.
     - `mismatch`: The largest distance of a side from its partner moved by the lattice vector.
     - `overlap`, `gap`: The areas, in squares, that the square's copies cover twice, and not at all.
     """
 
     sides: Array
+    ring: Array
     mismatch: float
     overlap: float
     gap: float
-
-    @property
-    def ring(self) -> Array:
-        """Return the boundary (M, 2), counter-clockwise."""
-        bottom, right, top, left = self.sides
-        return np.concatenate([bottom[:-1], right[:-1], top[:0:-1], left[:0:-1]])
 
 
 def unconstrained_field(seed: int = 56) -> FourierField:
@@ -60,13 +57,13 @@ def deformed(field: VectorField) -> Deformed:
         sides = Flow(field, steps=32)(torch.tensor(square)).numpy()
     bottom, right, top, left = sides
     pairs = np.concatenate([right - left - [1, 0], top - bottom - [0, 1]])
-    found = Deformed(sides, float(np.linalg.norm(pairs, axis=1).max()), 0.0, 0.0)
-    copies = _shifted(shapely.make_valid(shapely.Polygon(found.ring)))
+    ring = np.concatenate([bottom[:-1], right[:-1], top[:0:-1], left[:0:-1]])
+    copies = _shifted(shapely.make_valid(shapely.Polygon(ring)))
     cell = shapely.box(0, 0, 1, 1)  # in the middle of copies enough
-    covered = shapely.union_all(copies)
-    gap = 1.0 - covered.intersection(cell).area
+    gap = 1.0 - shapely.union_all(copies).intersection(cell).area
     twice = sum(copy.intersection(cell).area for copy in copies) - (1.0 - gap)
-    return found._replace(overlap=max(0.0, twice), gap=max(0.0, gap))
+    mismatch = float(np.linalg.norm(pairs, axis=1).max())
+    return Deformed(sides, ring, mismatch, max(0.0, twice), max(0.0, gap))
 
 
 def _shifted(geometry: Any) -> list[Any]:
@@ -87,8 +84,7 @@ def _draw(canvas: Canvas, _extent: Extent, _values: list[object]) -> Findings:
     )
     for k, (one, title) in enumerate(panels):
         box = grid_box(0, k, 1, 3, title=0.09)
-        middle = one.ring.mean(axis=0)
-        axes = panel(figure, box, around(middle, 1.04, 0.95), title)
+        axes = panel(figure, box, around(one.ring.mean(axis=0), 1.04, 0.95), title)
         _draw_square(axes, one, copies=k > 0)
     canvas.add(
         figure,
@@ -120,50 +116,30 @@ def _draw(canvas: Canvas, _extent: Extent, _values: list[object]) -> Findings:
 def _draw_square(axes: Axes, found: Deformed, *, copies: bool) -> None:
     ring = found.ring
     if copies:
+        fill_rings(axes, [ring + shift for shift in SHIFTS], "#e9eef3", "#9aa7b4", 0.8)
+    fill_rings(axes, [ring], "#f4ecdc", "none", 0.0)
+    if copies:
         own = shapely.make_valid(shapely.Polygon(ring))
         others = _shifted(own)
-        fill_rings(axes, [ring + shift for shift in SHIFTS], "#e9eef3", "#9aa7b4", 0.8)
-        fill_rings(axes, [ring], "#f4ecdc", "none", 0.0)
         window = shapely.box(-1.5, -1.5, 2.5, 2.5)
-        _fill(axes, shapely.normalize(window - shapely.union_all(others)), BARE)
+        _fill(axes, window - shapely.union_all(others), BARE)
         twice = shapely.union_all([own & other for other in others if other != own])
-        _fill(axes, shapely.normalize(shapely.union_all(_shifted(twice))), TWICE)
-    else:
-        fill_rings(axes, [ring], "#f4ecdc", "none", 0.0)
-    for side, colour in zip(found.sides, (SIDES[1], SIDES[0], SIDES[1], SIDES[0]), strict=True):
+        _fill(axes, shapely.union_all(_shifted(twice)), TWICE)
+    for number, side in enumerate(found.sides):
+        upright = number % 2
+        colour = SIDES[0] if upright else SIDES[1]
         axes.plot(*side.T, color=colour, linewidth=3.2, solid_capstyle="round", zorder=5)
-        _arrow(axes, side, colour, heads=1 if colour == SIDES[0] else 2)
-    for corner in (found.sides[0, 0], found.sides[0, -1], found.sides[2, 0], found.sides[2, -1]):
-        axes.plot(*corner, "o", color=INK, markersize=4, zorder=7)
+        draw_heads(axes, side, colour, 1 if upright else 2)
+    axes.plot(*found.sides[::2, [0, -1]].reshape(4, 2).T, "o", color=INK, markersize=4, zorder=7)
 
 
-def _arrow(axes: Axes, side: Array, colour: str, *, heads: int) -> None:
-    """Draw arrowheads in the middle of a side, by its length."""
-    steps = np.linalg.norm(np.diff(side, axis=0), axis=1)
-    at = np.concatenate([[0], np.cumsum(steps)])
-    for k in range(heads):
-        tip, back = (
-            np.array([np.interp(at[-1] / 2 + s, at, side[:, i]) for i in (0, 1)])
-            for s in (0.045 + 0.07 * k, -0.045 + 0.07 * k)
-        )
-        across = 0.5 * np.array([back[1] - tip[1], tip[0] - back[0]])
-        head = np.stack([tip, back + across, back - across])
-        axes.fill(*head.T, facecolor=colour, edgecolor="#ffffff", linewidth=0.6, zorder=6)
+def _fill(axes: Axes, geometry: Any, colour: str) -> None:
+    from shapely.plotting import plot_polygon
 
-
-def _fill(axes: Axes, geometry: shapely.Geometry, colour: str) -> None:
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path
-
-    rings = [
-        Path(np.array(ring.coords), closed=True)
-        for part in getattr(geometry, "geoms", [geometry])
-        if part.geom_type == "Polygon"
-        for ring in (part.exterior, *part.interiors)
-    ]
-    if rings:  # holes run the other way round, so that they stay open
-        path = Path.make_compound_path(*rings)
-        axes.add_patch(PathPatch(path, facecolor=colour, edgecolor="none", zorder=3))
+    areas = [part for part in getattr(geometry, "geoms", [geometry]) if part.area > 0]
+    style = {"facecolor": colour, "edgecolor": "none", "zorder": 3}
+    if areas:
+        plot_polygon(shapely.MultiPolygon(areas), axes, add_points=False, **style)
 
 
 EXHIBIT = Exhibit(

@@ -4,27 +4,53 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from orbiflow.arrays import Array
+from orbiflow.runtime import NEVER, Cancel, Sink, ignore
 from orbiflow.tiles import (
     CLASSES,
+    ClassFailure,
+    Emphasis,
+    EscherizeSettings,
+    EscherTile,
     LikenessSearch,
     Overlap,
+    Pins,
+    SearchMethod,
     Target,
     Tile,
     TileModel,
+    escherize,
     plane_points,
     signed_area,
 )
 from orbiflow.tiles.search.bending import Bent, PlacedBent, bent_tiles, placed_best, prototile
 from orbiflow.tiles.search.co_deformation import Hand, hands
-from orbiflow.tiles.search.model import extract_tile
+from orbiflow.tiles.search.tile_model import extract_tile
 
 FOLDER = Path(__file__).parent.parent / "examples" / "silhouettes"
 ANIMALS = ("squirrel.dat", "nagata/spider_120.dat", "nagata/octpus_94.dat", "nagata/camel_60.dat")
+
+
+def searched(
+    target: Target,
+    classes: list[str],
+    method: SearchMethod,
+    *,
+    emphasis: Emphasis | None = None,
+    pins: Pins | None = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+    **settings: Any,
+) -> tuple[list[EscherTile], list[ClassFailure]]:
+    """The tiles and failures of a search by a method."""
+    own = EscherizeSettings(classes=tuple(classes), **settings)
+    goal: dict[str, Any] = {"emphasis": emphasis, "pins": pins}
+    found = escherize(target, own, method=method, **goal, on_event=on_event, cancel=cancel)
+    return list(found.tiles), list(found.failures)
 
 
 def disc(count: int) -> Array:

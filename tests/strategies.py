@@ -9,10 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 from hypothesis import strategies as st
-from torch import Tensor
+from torch import Tensor, nn
 
 from orbiflow.arrays import Array
-from orbiflow.fields import FourierField, VectorField
+from orbiflow.fields import FourierField, PeriodicFeatures, Symmetrized, VectorField
+from orbiflow.flows import Flow
 from orbiflow.symmetry import (
     IDENTIFICATION_SPACES,
     WALLPAPER_GROUPS,
@@ -279,3 +280,36 @@ def dyadic_rings(draw: st.DrawFn) -> Array:
     ring = rng.uniform(-3, 3, 2) + radii[:, None] * np.stack([np.cos(turns), np.sin(turns)], -1)
     ring = np.roll(np.round(ring * 2**20) / 2**20, draw(st.integers(0, count - 1)), axis=0)
     return ring if draw(st.booleans()) else ring[::-1].copy()
+
+
+@torch.no_grad()
+def error_estimate(flow: Flow, points: Tensor, *, inverse: bool = False) -> float:
+    """Largest distance between the results of a flow with its steps and with twice as many."""
+    fine = flow.with_steps(2 * flow.steps).carried(points, inverse=inverse)
+    return float((flow.carried(points, inverse=inverse) - fine).norm(dim=-1).max())
+
+
+@torch.inference_mode(False)  # its divergence is taken by autograd
+def neural_field(
+    group: CrystallographicGroup,
+    *,
+    hidden: tuple[int, ...] = (64, 64),
+    max_frequency: int = 1,
+    seed: int = 0,
+    dtype: torch.dtype = torch.float64,
+) -> Symmetrized:
+    """A multilayer perceptron on periodic features, symmetrized; its last layer starts at zero."""
+    features = PeriodicFeatures(group, max_frequency)
+    sizes = (features.size, *hidden, group.dim)
+    layers: list[nn.Module] = [features]
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        for i, (a, b) in enumerate(itertools.pairwise(sizes)):
+            layers.append(nn.Linear(a, b, dtype=dtype))
+            if i < len(sizes) - 2:
+                layers.append(nn.Tanh())
+    last = layers[-1]
+    assert isinstance(last, nn.Linear)  # by construction
+    nn.init.zeros_(last.weight)
+    nn.init.zeros_(last.bias)
+    return Symmetrized(nn.Sequential(*layers), group, periodic=True)

@@ -13,8 +13,8 @@ from awkward import NOT_SIMPLE, SQUARE, STRANGE, USELESS
 from orbiflow import tiles
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.symmetry import translation, wallpaper_group
-from orbiflow.tiles.search.model import extract_tile
 from orbiflow.tiles.search.starts import outline_starts, template_starts
+from orbiflow.tiles.search.tile_model import extract_tile
 
 Call = Callable[..., object]
 
@@ -47,7 +47,7 @@ polygon_functions: dict[str, Call] = {
     "Recogniser": lambda ring: tiles.Recogniser(ring)(ring),
     "prepared_region": tiles.prepared_region,
     "Overlap": tiles.Overlap,
-    "overlay_png": lambda ring: tiles.overlay_png(TILE, ring, width_px=200),
+    "overlay_raster": lambda ring: tiles.overlay_raster(TILE, ring, width_px=200).png(),
 }
 MEASURING = ("Target", "iou", "compare", "hausdorff", "Recogniser")
 
@@ -124,7 +124,7 @@ REFUSED: list[tuple[Call, Any, str]] = [
     (tiles.neighbours, SQUARE, "must be a Tile"),
     (tiles.colouring, SQUARE, "must be a Tile"),
     (lambda t: patch(t, (0, 0, 1, 1)), SQUARE, "must be a Tile"),
-    (tiles.tiling_png, SQUARE, "must be a Tile"),
+    (tiles.tiling_raster, SQUARE, "must be a Tile"),
     (lambda t: tiles.certify(TILE, tolerance=t), np.nan, "tolerance must be"),
     (lambda t: tiles.certify(TILE, tolerance=t), 0, "must be above 0, got 0"),
     (lambda t: tiles.certify(TILE, tolerance=t), "1e-9", "got '1e-9'"),

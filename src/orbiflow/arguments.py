@@ -16,7 +16,7 @@ import numbers as abstract
 import operator
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import EllipsisType, UnionType
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 Kind = TypeVar("Kind")
 Choice = TypeVar("Choice", bound=str)
+Number = TypeVar("Number", int, float)
 Shape = tuple[int | str | EllipsisType, ...]
 
 
@@ -134,14 +135,7 @@ def as_whole(value: Any, name: str, least: float | None = None, most: float | No
     Traceback (most recent call last):
     orbiflow.errors.SettingError: copies must be at least 1, got 0
     """
-    allowed = Range(least, most)
-    try:
-        result = None if _is_boolean(value) else operator.index(value)
-    except TypeError:
-        result = None
-    if result is None or result not in allowed:
-        raise refusal(name, number_wanted(allowed, result, whole=True), value)
-    return result
+    return _in_range(value, name, Range(least, most), operator.index, whole=True)
 
 
 def as_number(
@@ -159,14 +153,19 @@ def as_number(
     Traceback (most recent call last):
     orbiflow.errors.SettingError: dpi must be a finite number above 0, got nan
     """
-    allowed = Range(least, most, above, below)
+    return _in_range(value, name, Range(least, most, above, below), float)
+
+
+def _in_range(
+    value: Any, name: str, allowed: Range, made: Callable[[Any], Number], *, whole: bool = False
+) -> Number:
+    refused = isinstance(value, str | bytes) or _is_boolean(value)
     try:
-        given = not (isinstance(value, str | bytes) or _is_boolean(value))
-        result = float(value) if given else None
+        result = None if refused else made(value)
     except (TypeError, ValueError, OverflowError):
         result = None
     if result is None or result not in allowed:
-        raise refusal(name, number_wanted(allowed, result), value)
+        raise refusal(name, number_wanted(allowed, result, whole=whole), value)
     return result
 
 

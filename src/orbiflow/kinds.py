@@ -1,22 +1,21 @@
 """Kinds of values that a setting may have, compiled from the annotation of its field.
 
 A kind reads a value from Python, JSON or the command line (`read`), writes it as JSON (`plain`), and
-describes itself in words and as JSON Schema. Annotations may be built from `bool`,
-`int`, `float` (always finite), `str`, `Path`, `Literal`, tuples, unions of these and None, and
-`Annotated` with `Range`, `Unit`, `Parsed` and `Repeated`.
+describes itself in words and as JSON Schema. Annotations may be built from `bool`, `int`, `float`
+(always finite), `str`, `Path`, `Literal`, tuples, unions of one of these and None, and `Annotated` with
+`Range`, `Unit`, `Parsed` and `Repeated`.
 """
 
 from __future__ import annotations
 
 import types
 import typing
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import repeat
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, Literal, Union, cast
+from typing import Any, ClassVar, Literal, Union, cast
 
 from orbiflow.arguments import ANY, Range, described, meant, number_wanted, one_of, path_text
 from orbiflow.errors import OrbiflowError
@@ -72,27 +71,24 @@ class Refused(ValueError):
         self.hint = hint
 
 
-@dataclass(eq=False)
 class Kind:
-    """A kind of value.
+    """A kind of value."""
 
-    - `wanted`: What a value must be, in words.
-    - `schema`: The kind as JSON Schema.
-    - `limits`: Which values are allowed, where the help should say so.
-    - `unit`, `metavar`: Its unit, and what stands for it in the help.
-    - `choices`: The words that are allowed, if there are only some.
-    - `repeated`: Whether its option is repeated.
-    - `needs`: A field without whose value a text cannot be read.
-    """
-
-    wanted: str
-    schema: dict[str, Any]
-    limits: str = ""
-    unit: str = ""
-    metavar: str = "TEXT"
+    wanted = ""
+    """What a value must be, in words."""
+    schema: Mapping[str, Any]
+    """The kind as JSON Schema."""
+    limits = ""
+    """Which values are allowed, where the help should say so."""
+    unit = ""
+    metavar = "TEXT"
+    """What stands for it in the help."""
     choices: tuple[str, ...] = ()
-    repeated: bool = False
-    needs: str = ""
+    """The words that are allowed, if there are only some."""
+    repeated = False
+    """Whether its option is repeated."""
+    needs = ""
+    """A field without whose value a text cannot be read."""
 
     def read(self, value: Any, *, text: bool = False) -> Any:
         """Return a value from Python or JSON as it will be used; raise `Refused` otherwise.
@@ -113,8 +109,7 @@ class Kind:
 class TextKind(Kind):
     """Any text."""
 
-    def __init__(self) -> None:
-        super().__init__("text", {"type": "string"})
+    wanted, schema = "text", {"type": "string"}
 
     def read(self, value: Any, *, text: bool = False) -> str:  # noqa: ARG002
         if not isinstance(value, str):
@@ -125,9 +120,8 @@ class TextKind(Kind):
 class PathKind(Kind):
     """The path of a file or folder."""
 
-    def __init__(self) -> None:
-        schema = {"type": "string", "minLength": 1, "format": "path"}
-        super().__init__("a path", schema, metavar="PATH")
+    wanted, metavar = "a path", "PATH"
+    schema: ClassVar = {"type": "string", "minLength": 1, "format": "path"}
 
     def read(self, value: Any, *, text: bool = False) -> Path:  # noqa: ARG002
         path = path_text(value)
@@ -142,8 +136,7 @@ class PathKind(Kind):
 class FlagKind(Kind):
     """True or false."""
 
-    def __init__(self) -> None:
-        super().__init__("true or false", {"type": "boolean"})
+    wanted, schema = "true or false", {"type": "boolean"}
 
     def read(self, value: Any, *, text: bool = False) -> bool:
         known = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
@@ -157,14 +150,11 @@ class NumberKind(Kind):
     """A finite number in a range; a Boolean is not a number."""
 
     def __init__(self, allowed: Range, unit: str, *, whole: bool) -> None:
-        self.allowed, self.whole = allowed, whole
-        super().__init__(
-            number_wanted(allowed, whole=whole),
-            {"type": "integer" if whole else "number", **allowed.schema},
-            limits=" ".join(filter(None, (str(allowed), unit))),
-            unit=unit,
-            metavar="INT" if whole else "NUMBER",
-        )
+        self.allowed, self.whole, self.unit = allowed, whole, unit
+        self.wanted = number_wanted(allowed, whole=whole)
+        self.limits = " ".join(filter(None, (str(allowed), unit)))
+        self.metavar = "INT" if whole else "NUMBER"
+        self.schema = {"type": "integer" if whole else "number", **allowed.schema}
 
     def read(self, value: Any, *, text: bool = False) -> float:
         made, abstract = (int, Integral) if self.whole else (float, Real)
@@ -184,7 +174,7 @@ class ChoiceKind(Kind):
     """One of several words."""
 
     def __init__(self, choices: tuple[str, ...]) -> None:
-        super().__init__(one_of(choices), {"enum": list(choices)}, choices=choices)
+        self.choices, self.wanted, self.schema = choices, one_of(choices), {"enum": list(choices)}
 
     def read(self, value: Any, *, text: bool = False) -> str:  # noqa: ARG002
         if not isinstance(value, str) or value not in self.choices:
@@ -196,17 +186,13 @@ class ListKind(Kind):
     """A tuple of any length; a list in JSON."""
 
     def __init__(self, item: Kind, *, repeated: bool, may_be_empty: bool = True) -> None:
-        self.item, self.may_be_empty = item, may_be_empty
+        self.item, self.may_be_empty, self.repeated = item, may_be_empty, repeated
         entries = "" if may_be_empty else " of one or more entries"
-        least = {} if may_be_empty else {"minItems": 1}
+        self.wanted = f"a list{entries}, each {item.wanted}"
         limits = item.limits or ", ".join(item.choices)
-        super().__init__(
-            f"a list{entries}, each {item.wanted}",
-            {"type": "array", "items": item.schema, **least},
-            limits=f"each {limits}" if limits else "",
-            metavar=item.metavar if repeated else "TEXT",
-            repeated=repeated,
-        )
+        self.limits = f"each {limits}" if limits else ""
+        self.metavar = item.metavar if repeated else "TEXT"
+        self.schema = {"type": "array", "items": item.schema, "minItems": int(not may_be_empty)}
 
     def read(self, value: Any, *, text: bool = False) -> tuple[Any, ...]:
         parts: Sequence[Any] = [value] if text and self.repeated else _parts(value, text)
@@ -224,14 +210,11 @@ class TupleKind(Kind):
     """A tuple of a fixed length; a list in JSON."""
 
     def __init__(self, items: tuple[Kind, ...], unit: str) -> None:
-        self.items, size, limits = items, len(items), items[0].limits
+        self.items, self.unit, limits = items, unit, items[0].limits
+        self.wanted = f"{len(items)} values, each {items[0].wanted}"
+        self.limits = " ".join(filter(None, (f"each {limits}" if limits else "", unit)))
         schema = {"type": "array", "prefixItems": [item.schema for item in items]}
-        super().__init__(
-            f"{size} values, each {items[0].wanted}",
-            {**schema, "minItems": size, "maxItems": size},
-            limits=" ".join(filter(None, (f"each {limits}" if limits else "", unit))),
-            unit=unit,
-        )
+        self.schema = {**schema, "minItems": len(items), "maxItems": len(items)}
 
     def read(self, value: Any, *, text: bool = False) -> tuple[Any, ...]:
         parts = _parts(value, text)
@@ -243,40 +226,14 @@ class TupleKind(Kind):
         return [item.plain(part) for item, part in zip(self.items, value, strict=True)]
 
 
-class EitherKind(Kind):
-    """A value of the first of several kinds that takes it."""
-
-    def __init__(self, kinds: tuple[Kind, ...], unit: str) -> None:
-        self.kinds = kinds
-        super().__init__(
-            " or ".join(kind.wanted for kind in kinds),
-            {"anyOf": [kind.schema for kind in kinds]},
-            limits=" or ".join(kind.limits or ", ".join(kind.choices) for kind in kinds),
-            unit=unit,
-        )
-
-    def read(self, value: Any, *, text: bool = False) -> Any:
-        return self._first(value, text)[1]
-
-    def plain(self, value: Any) -> Any:
-        kind, value = self._first(value)
-        return kind.plain(value)
-
-    def _first(self, value: Any, text: bool = False) -> tuple[Kind, Any]:
-        for kind in self.kinds:
-            with suppress(Refused):
-                return kind, kind.read(value, text=text)
-        raise Refused
-
-
 class OptionalKind(Kind):
     """A value of a kind, or None."""
 
     def __init__(self, inner: Kind) -> None:
         for name in ("wanted", "limits", "unit", "metavar", "choices", "repeated", "needs"):
             setattr(self, name, getattr(inner, name))
-        self.schema = {"anyOf": [inner.schema, {"type": "null"}]}
         self.inner, self.finish = inner, inner.finish
+        self.schema = {"anyOf": [inner.schema, {"type": "null"}]}
 
     def read(self, value: Any, *, text: bool = False) -> Any:
         return None if value is None else self.inner.read(value, text=text)
@@ -290,16 +247,11 @@ class ParsedKind(Kind):
 
     def __init__(self, parsed: Parsed, inner: Kind) -> None:
         self.parsed, self.inner, self.plain = parsed, inner, inner.plain
+        self.wanted = ", ".join(filter(None, (parsed.wanted, inner.limits)))
+        self.limits = parsed.values or inner.limits
+        self.unit, self.metavar, self.needs = inner.unit, parsed.metavar, parsed.needs
         text = {"type": "string", "description": parsed.wanted}
-        is_text = inner.schema == {"type": "string"}
-        super().__init__(
-            ", ".join(filter(None, (parsed.wanted, inner.limits))),
-            text if is_text else {"anyOf": [inner.schema, text]},
-            limits=parsed.values or inner.limits,
-            unit=inner.unit,
-            metavar=parsed.metavar,
-            needs=parsed.needs,
-        )
+        self.schema = text if isinstance(inner, TextKind) else {"anyOf": [inner.schema, text]}
 
     def read(self, value: Any, *, text: bool = False) -> Any:  # noqa: ARG002
         if not isinstance(value, str):
@@ -345,17 +297,10 @@ def _plain_kind(annotation: Any, allowed: Range, unit: str, repeated: bool) -> K
         return ListKind(kind_of(arguments[0]), repeated=repeated)
     if origin is tuple:
         return TupleKind(tuple(map(kind_of, arguments)), unit)
-    if origin in (Union, types.UnionType):
-        # a range or a unit of the whole union is of its numbers
-        plain = [part for part in arguments if part is not type(None)]
-        kinds = [
-            _plain_kind(part, allowed, unit, repeated) if part in (int, float) or repeated
-            else kind_of(part)
-            for part in plain
-        ]  # fmt: skip
-        kind = kinds[0] if len(kinds) == 1 else EitherKind(tuple(kinds), unit)
-        if len(plain) == len(arguments):
-            return kind
+    if origin in (Union, types.UnionType) and len(arguments) == 2 and type(None) in arguments:
+        (part,) = (part for part in arguments if part is not type(None))
+        is_own = typing.get_origin(part) is typing.Annotated
+        kind = kind_of(part) if is_own else _plain_kind(part, allowed, unit, repeated)
         if isinstance(kind, ListKind):  # None is for nothing
             kind = ListKind(kind.item, repeated=kind.repeated, may_be_empty=False)
         return OptionalKind(kind)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from orbiflow.arguments import as_path, described
+from orbiflow.arguments import as_path
 from orbiflow.density import MODEL, REPORT, DensityEstimator, read_density, report_from_json
-from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, system_errors
-from orbiflow.runtime import is_list, is_object
+from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
+from orbiflow.runtime import is_list, read_json
 from orbiflow.tiles import (
     RESULT,
     TILE_MODEL,
@@ -22,9 +21,6 @@ from orbiflow.tiles import (
     read_result,
     save_tiles,
 )
-
-MOST_BYTES = 64 * 2**20
-"""The largest report that is read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +119,7 @@ def _estimator(path: Path) -> DensityEstimator:
     density, extra = read_density(file)
     report, settings = None, {}
     beside = file.with_name(REPORT)
-    document = _json(beside) if file.name == MODEL and beside.is_file() else {}
+    document = read_json(beside, "a report") if file.name == MODEL and beside.is_file() else {}
     try:
         if "settings" in document:  # a marginal or a conditional was not fitted
             report = report_from_json(document["report"])
@@ -138,22 +134,8 @@ def _settings(settings: dict[str, Any]) -> dict[str, Any]:
     settings = {
         {"parts": "components", "detail": "max_frequency"}.get(k, k): v for k, v in settings.items()
     }
-    own = ("components", "repeats", "missing", "max_frequency", "segments", "kernels", "seed")
+    own = ("components", "repeats", "missing", "max_frequency", "segments", "seed")
     return {name: settings[name] for name in own if name in settings}
-
-
-def _json(file: Path) -> dict[str, Any]:
-    with system_errors(InputFileError, f"{file}: cannot be read"):
-        if file.stat().st_size > MOST_BYTES:
-            raise InputFileError(f"{file}: too large for a report")
-        text = file.read_bytes()
-    try:
-        document = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputFileError(f"{file}: not JSON: {error}") from error
-    if not is_object(document):
-        raise InputFileError(f"{file}: not a report: {described(document)} instead of an object")
-    return document
 
 
 def _run(path: Path, uncertified: bool) -> LoadedRun:

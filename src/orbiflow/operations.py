@@ -20,7 +20,7 @@ OPERATIONS = {
     "density batch": "orbiflow.density.operations.fitting:batch",
 }
 
-WORK = {"density fold": "orbiflow.density.cross_validation.fold:fold"}
+WORK = {"density fold": "orbiflow.density.cross_validation.operations:fold"}
 """Operations that others give to workers, and that are no commands."""
 
 RUN_FOLDERS = {

@@ -40,7 +40,6 @@ import ast
 import dataclasses
 import inspect
 import itertools
-import types
 import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field
@@ -51,7 +50,7 @@ from typing import Any, ClassVar, Self, cast, dataclass_transform
 from orbiflow.arguments import Range as Range
 from orbiflow.arguments import described, meant, one_of, placeholder, refusal
 from orbiflow.errors import SettingError, literal
-from orbiflow.kinds import Kind, Refused, kind_of
+from orbiflow.kinds import FlagKind, Kind, OptionalKind, Refused, kind_of
 from orbiflow.kinds import Parsed as Parsed
 from orbiflow.kinds import Repeated as Repeated
 from orbiflow.kinds import Unit as Unit
@@ -224,13 +223,10 @@ class Field:
         is_annotated = typing.get_origin(self.annotation) is typing.Annotated
         return typing.get_args(self.annotation)[1:] if is_annotated else ()
 
-    @cached_property
-    def alternatives(self) -> set[Any]:
-        """The types of its values, None apart."""
-        annotation = typing.get_args(self.annotation)[0] if self.metadata else self.annotation
-        is_union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
-        parts = typing.get_args(annotation) if is_union else (annotation,)
-        return {part for part in parts if part is not type(None)}
+    def is_of(self, kind: type[Kind]) -> bool:
+        """Return whether its values are of a kind, None apart."""
+        own = self.kind.inner if isinstance(self.kind, OptionalKind) else self.kind
+        return isinstance(own, kind)
 
     @property
     def rules(self) -> tuple[Rule, ...]:
@@ -242,7 +238,7 @@ class Field:
         """What the command line calls it, always with a long name."""
         found, own = self.of_class(Option) or Option(), self.name.replace("_", "-")
         long = any(name.startswith("--") for name in found.names)
-        has_off = bool in self.alternatives and self.default is not False
+        has_off = self.is_of(FlagKind) and self.default is not False
         return Option(
             *(found.names if long else (f"--{own}", *found.names)),
             off=found.off or (f"--no-{own}" if has_off else ""),

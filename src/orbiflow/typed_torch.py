@@ -13,7 +13,7 @@ from torch.autograd import Function
 from torch.optim import Optimizer
 
 _torch: Any = torch
-special, linalg, fft, random = _torch.special, _torch.linalg, _torch.fft, _torch.random
+special, linalg, fft = _torch.special, _torch.linalg, _torch.fft
 unique, broadcast = _torch.unique, _torch.broadcast_tensors
 
 

@@ -5,9 +5,7 @@ The functions read text; the types are for fields of settings classes, where a p
 
 from __future__ import annotations
 
-import math
 import re
-from functools import partial
 from typing import Annotated
 
 from orbiflow.arguments import Range
@@ -26,30 +24,24 @@ LONGEST_SIDE = 20_000.0
 COLUMNS = {"single": 85.0, "double": 180.0}
 """Widths in mm of a journal's one and two columns, between those of the large publishers."""
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
+_NUMBER = r"\+?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
 _UNIT = r"[a-z\"'µ]*"
 
 
-def length(text: str, *, zero: bool = False) -> float:
-    """Return a length in mm.
-
-    Args:
-        text: A number and one of mm, cm, in, pt.
-        zero: Whether 0 is a length, too; it needs no unit.
+def length(text: str) -> float:
+    """Return a length in mm: a number and one of mm, cm, in, pt; 0 needs no unit.
 
     Raises:
-        OrbiflowError: If the unit is missing or unknown, or the length too small or too large.
+        OrbiflowError: If the unit is missing or unknown, or the length negative or too large.
 
-    >>> length("4 cm"), length("1in"), length("0", zero=True)
+    >>> length("4 cm"), length("1in"), length("0")
     (40.0, 25.4, 0.0)
     """
     found = re.fullmatch(rf"\s*({_NUMBER})\s*({_UNIT})\s*", text, flags=re.IGNORECASE)
     if not found:
         raise OrbiflowError(f"{text!r} is not a length; write a number and its unit, such as 40mm")
-    number, unit = float(found[1]), found[2].lower()
-    if zero and number == 0 and not unit:
-        return 0.0
-    return _checked(number * _unit(unit, found[1], text), text, zero=zero)
+    number, unit = found[1], found[2].lower()
+    return 0.0 if float(number) == 0 and not unit else _millimetres(number, unit, text, number)
 
 
 def size(text: str) -> tuple[float, float]:
@@ -67,15 +59,12 @@ def size(text: str) -> tuple[float, float]:
         raise OrbiflowError(
             f"{text!r} is not a width and a height; write both and their unit, such as 300x200mm"
         )
-    last = found[4].lower()
-    first = found[2].lower() or last
-    numbers = f"{found[1]}x{found[3]}"
-    width = float(found[1]) * _unit(first, numbers, text)
-    height = float(found[3]) * _unit(last, numbers, text)
-    return _checked(width, text, zero=False), _checked(height, text, zero=False)
+    width, first, height, last = found[1], found[2].lower(), found[3], found[4].lower()
+    both = f"{width}x{height}"
+    return _millimetres(width, first or last, text, both), _millimetres(height, last, text, both)
 
 
-def pixels(text: str, dpi: float, *, zero: bool = False) -> float:
+def pixels(text: str, dpi: float) -> float:
     """Return a number of pixels, or a length at `dpi` pixels an inch, in pixels.
 
     Raises:
@@ -85,9 +74,7 @@ def pixels(text: str, dpi: float, *, zero: bool = False) -> float:
     (400.0, 1.5, 300.0)
     """
     found = re.fullmatch(rf"\s*({_NUMBER})\s*(px)?\s*", text, flags=re.IGNORECASE)
-    if found is None:
-        return length(text, zero=zero) * dpi / MILLIMETRES["in"]
-    return _checked(float(found[1]), text, zero=zero)
+    return length(text) * dpi / MILLIMETRES["in"] if found is None else float(found[1])
 
 
 def pixel_size(text: str, dpi: float) -> tuple[int, int]:
@@ -108,7 +95,7 @@ def pixel_size(text: str, dpi: float) -> tuple[int, int]:
         )
     width, height = size(text)
     per = dpi / MILLIMETRES["in"]
-    return max(1, round(width * per)), max(1, round(height * per))
+    return round(width * per), round(height * per)
 
 
 def page_size(text: str) -> tuple[float, float]:
@@ -147,10 +134,7 @@ Length = Annotated[
 """A length above 0: text with a unit, or a number of mm."""
 
 LengthOrZero = Annotated[
-    float,
-    Parsed(partial(length, zero=True), "a length such as 2mm", "LENGTH"),
-    Range(0, LONGEST_SIDE),
-    Unit("mm"),
+    float, Parsed(length, "a length such as 2mm", "LENGTH"), Range(0, LONGEST_SIDE), Unit("mm")
 ]
 """A length of at least 0: text with a unit, or a number of mm."""
 
@@ -168,20 +152,15 @@ Colour = Annotated[str, Parsed(colour, "a colour such as #2a9d8f", "COLOUR")]
 """A colour as #rrggbb."""
 
 
-def _unit(unit: str, number: str, text: str) -> float:
+def _millimetres(number: str, unit: str, text: str, numbers: str) -> float:
+    """Return a number of a unit in mm; `numbers` are all of the text's, for the message."""
     if not unit:
-        raise OrbiflowError(f"{text!r} has no unit; write {number}mm, {number}cm or {number}in")
+        raise OrbiflowError(f"{text!r} has no unit; write {numbers}mm, {numbers}cm or {numbers}in")
     if unit not in MILLIMETRES:
         raise OrbiflowError(
             f"{text!r} has the unknown unit {unit!r}; use one of {', '.join(MILLIMETRES)}"
         )
-    return MILLIMETRES[unit]
-
-
-def _checked(value: float, text: str, *, zero: bool) -> float:
-    if not math.isfinite(value) or value > LONGEST:
+    value = float(number) * MILLIMETRES[unit]
+    if value > LONGEST:
         raise OrbiflowError(f"{text!r} is longer than 100 m; check number and unit")
-    if value < 0 or (value == 0 and not zero):
-        bound = "at least 0" if zero else "above 0"
-        raise OrbiflowError(f"{text!r} must be {bound}")
     return value

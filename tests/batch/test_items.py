@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.batch.folder import RESERVED
-from orbiflow.batch.items import FileSource, folder_names, listed
-from orbiflow.batch.journal import Entry, Journal
+from orbiflow.batch import Entry
+from orbiflow.batch.folder import RESERVED, Journal
+from orbiflow.batch.items import folder_names, listed, read_file
 from orbiflow.errors import InputFileError, OrbiflowError, OutputError
 from orbiflow.runtime import stays_inside
 
@@ -68,11 +68,11 @@ def test_what_is_listed(tmp_path: Path) -> None:
 def test_what_is_too_large_or_gone(tmp_path: Path) -> None:
     path = tmp_path / "cat.png"
     with pytest.raises(InputFileError, match="cannot be read"):
-        FileSource(path, 5).read()
+        read_file(path, 5)
     path.write_bytes(b"12345")
-    assert FileSource(path, 5).read() == b"12345"
+    assert read_file(path, 5) == b"12345"
     with pytest.raises(InputFileError, match="larger than"):
-        FileSource(path, 4).read()
+        read_file(path, 4)
 
 
 entries = st.lists(

@@ -85,7 +85,7 @@ def png_that_says(width: int, height: int) -> bytes:
         (("--size", "999999999x2"), "--size ... from 1 to 30000"),
         (("--size", "big"), "--size ... 'big' is not a width and a height"),
         (("--size", "300.5x200"), "write two whole numbers, such as 3000x2000"),
-        (("--tile-size", "0"), "--tile-size ... '0' must be above 0"),
+        (("--tile-size", "0"), "--tile-size ... from 8 to 60000, got '0'"),
         (("--tile-size", "1"), "--tile-size must be ... from 8"),
         (("--tile-size", "9", "--size", "9000x9000"), "the most is 20000: choose larger tiles"),
         (("--palette", "neon"), "unknown palette 'neon'; there are delft"),

@@ -16,7 +16,7 @@ import shapely
 from cli.conftest import call_main
 from orbiflow.density import DensityEstimator, density_to_bytes
 
-KERNELS = ("--components", "mixture")
+QUICK = ("--components", "mixture")
 
 
 def write(path: Path, header: str, rows: np.ndarray, labels: list[str] | None = None) -> Path:
@@ -44,7 +44,7 @@ def made_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write(made / "held.csv", "name,psi,phi", angles(2)[:, ::-1], [f"p{k % 30}" for k in range(120)])
     for name in ("good", "poor"):
         fit = ("density", "fit", made / f"{name}.csv", "--space", "torus", "--unit", "degrees")
-        assert call_main(lambda: ("", ""), *fit, *KERNELS, "--out", made / name).status == 0
+        assert call_main(lambda: ("", ""), *fit, *QUICK, "--out", made / name).status == 0
     return made
 
 
@@ -105,7 +105,7 @@ def test_rows_that_a_model_was_fitted_to_are_known(folder: Path, orbiflow: Any) 
 
 
 def test_data_sets_are_compared(folder: Path, orbiflow: Any) -> None:
-    flipped = write(folder / "b.csv", "psi,phi", angles(5)[:, ::-1])
+    flipped = write(folder / "b.csv", "psi,phi", angles(5, rows=60)[:, ::-1])
     how = ("--space", "torus", "--unit", "degrees", "--permutations", 99, "--bootstrap", 200)
     done = orbiflow("density", "compare", "-d", folder / "good.csv", "-d", flipped, *how)
     assert done.status == 0, done.err
@@ -203,7 +203,7 @@ def test_geojson_of_directions_and_thresholds_of_many_angles(tmp_path: Path, orb
         np.stack([rng.normal(0, 20, 90).clip(-80, 80), rng.normal(170, 30, 90)], axis=1),
     )
     fit = orbiflow(
-        "density", "fit", tmp_path / "d.csv", "--space", "sphere", *KERNELS, "--out", tmp_path / "m"
+        "density", "fit", tmp_path / "d.csv", "--space", "sphere", *QUICK, "--out", tmp_path / "m"
     )
     assert fit.status == 0, fit.err
     out = tmp_path / "r.geojson"
@@ -216,7 +216,7 @@ def test_geojson_of_directions_and_thresholds_of_many_angles(tmp_path: Path, orb
     assert feature["properties"]["held"] == 0.8
     write(tmp_path / "t.csv", "a,b,c", rng.normal(0, 1, (90, 3)))
     fit = orbiflow(
-        "density", "fit", tmp_path / "t.csv", "--space", "torus", *KERNELS, "--out", tmp_path / "t"
+        "density", "fit", tmp_path / "t.csv", "--space", "torus", *QUICK, "--out", tmp_path / "t"
     )
     assert fit.status == 0, fit.err
     done = orbiflow("density", "region", "-m", tmp_path / "t", "--out", tmp_path / "t.json")

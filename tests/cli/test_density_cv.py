@@ -13,7 +13,7 @@ import pytest
 
 from density.cross_validation.small_tables import lines_of, table_of
 
-QUICK = ("--space", "torus", "--components", "kernels", "--against", "uniform", "--folds", 2)
+QUICK = ("--space", "torus", "--components", "mixture", "--against", "uniform", "--folds", 2)
 
 
 def test_twice(tmp_path: Path, orbiflow: Any) -> None:
@@ -22,15 +22,15 @@ def test_twice(tmp_path: Path, orbiflow: Any) -> None:
     first = orbiflow(*command, "--workers", 1)
     assert first.status == 0, first.err
     assert "2 fits for one process" in first.out
-    assert "folds/kernels-1-01: held out -" in first.out
+    assert "folds/mixture-1-01: held out -" in first.out
     assert "mean log density at 40 rows in 10 groups, in nats:" in first.out
-    assert "kernels is better than uniform" in first.out
+    assert "mixture is better than uniform" in first.out
     assert f"2 of 2 done, in {first.out.split('2 of 2 done, in ')[1].split()[0]} s" in first.out
     assert f"look at {tmp_path / 'out' / 'index.html'}" in first.out
     second = orbiflow(*command, "--workers", 1)
     assert second.status == 0
     assert "2 fits: 2 are done already, 0 to do" in second.out
-    assert "kernels is better than uniform" in second.out
+    assert "mixture is better than uniform" in second.out
     assert "nothing was left to do" in second.out
 
 
@@ -64,8 +64,8 @@ def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
         (("--group", "protein", "--folds", "11"), "11 folds need as many groups, there are 10"),
         (("--group", "chain"), "no column 'chain'; it has phi, psi, protein"),
         (("--columns", "phi,chi"), "no column 'chi'"),
-        (("--against", "kernels,magic"), "--against must be of flow, kernels, mixture, chains"),
-        (("--against", "kernels"), "--components and --against are both kernels"),
+        (("--against", "mixture,magic"), "--against must be of flow, kernels, mixture, chains"),
+        (("--against", "mixture"), "--components and --against are both mixture"),
         (("--components", "mixture,chains", "--against", "chains+mixture"), "both mixture+chains"),
         (("--workers", "0"), "--workers must be at least 1"),
         (

@@ -8,7 +8,7 @@ import pytest
 
 from orbiflow.density import DensityEstimator, read_density
 
-SMALL = ["--components", "kernels"]
+SMALL = ["--components", "mixture"]
 
 
 def table(folder: Path, scale: float, *, first: str = "", count: int = 40) -> Path:
@@ -38,7 +38,7 @@ def test_units_are_said_or_asked_for(tmp_path: Path, orbiflow) -> None:
     report = json.loads((out / "report.json").read_text())
     assert report["space"]["unit"] == "degrees"
     assert report["columns"] == ["phi angle", "psi angle"]
-    assert report["report"]["components"][0]["name"] == "kernels"
+    assert report["report"]["components"][0]["name"] == "mixture"
 
 
 @pytest.mark.parametrize("space", ["torus", "klein-bottle"])
@@ -78,7 +78,6 @@ def test_parts_that_are_none(tmp_path: Path, orbiflow) -> None:
             ("--components", "trees"),
             "--components: entry 1: must be flow, kernels, mixture, chains",
         ),
-        (("--components", "kernels", "--kernels"), "--kernels and --components exclude each other"),
         (("--repeats", "noise"), "noise"),
     ):
         outcome = orbiflow(*fit, *options)

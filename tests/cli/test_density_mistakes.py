@@ -58,7 +58,10 @@ def table(path: Path, header: str, values: np.ndarray) -> None:
             "fit gaps.csv --space klein-bottle --missing marginalise",
             "--missing marginalise is for angles",
         ),
-        ("fit gaps.csv --space torus --missing marginalise --kernels", "give other --components"),
+        (
+            "fit gaps.csv --space torus --missing marginalise --components flow",
+            "give other --components",
+        ),
         ("fit gaps.csv --space torus", "(on tori --missing marginalise keeps them)"),
         (
             "fit nothing.csv --space torus",

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-FIT = ("density", "fit", "--components", "kernels")
+FIT = ("density", "fit", "--components", "mixture")
 
 
 def places(path: Path, header: str) -> Path:

@@ -11,7 +11,7 @@ import pytest
 from cli.conftest import Run
 from orbiflow.density import DensityEstimator, density_to_bytes
 
-KERNELS = ("--components", "kernels", "--unit", "degrees")
+QUICK = ("--components", "mixture", "--unit", "degrees")
 
 
 def table(path: Path, *, gaps: bool = False) -> Path:
@@ -30,7 +30,7 @@ def table(path: Path, *, gaps: bool = False) -> Path:
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("model")
     values = np.loadtxt(table(folder / "data.csv"), delimiter=",", skiprows=1)[:, :3]
-    fit = DensityEstimator("torus", unit="degrees", components="kernels").fit(values)
+    fit = DensityEstimator("torus", unit="degrees", components="mixture").fit(values)
     saved = density_to_bytes(fit.density_, columns=["phi", "psi", "chi"])
     (folder / "density.safetensors").write_bytes(saved)
     return folder
@@ -91,18 +91,7 @@ def test_mistakes(words: str, message: str, tmp_path: Path, model: Path, orbiflo
 
 def test_weights_and_missing_angles(tmp_path: Path, orbiflow: Run) -> None:
     data, model, out = table(tmp_path / "gaps.csv", gaps=True), tmp_path / "m", tmp_path / "s.csv"
-    fit = (
-        "density",
-        "fit",
-        data,
-        *KERNELS,
-        "--space",
-        "torus",
-        "--weights",
-        "count",
-        "--out",
-        model,
-    )
+    fit = ("density", "fit", data, *QUICK, "--space", "torus", "--weights", "count", "--out", model)
     done = orbiflow(*fit, "--missing", "marginalise")
     assert done.status == 0, done.err
     assert "2 of 59 rows lack some angles" in done.out
@@ -144,7 +133,7 @@ def test_weights_and_missing_angles(tmp_path: Path, orbiflow: Run) -> None:
 def test_mistakes_of_rows(options: str, message: str, tmp_path: Path, orbiflow: Run) -> None:
     data = table(tmp_path / "data.csv", gaps="sphere" in options)
     words = options.split() if "--space" in options else ["--space", "torus", *options.split()]
-    done = orbiflow(*("density", "fit", data, *KERNELS, "--out", tmp_path / "m", *words))
+    done = orbiflow(*("density", "fit", data, *QUICK, "--out", tmp_path / "m", *words))
     assert done.status == 2
     assert message in done.err
 

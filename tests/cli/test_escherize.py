@@ -20,8 +20,8 @@ from orbiflow import __version__
 from orbiflow.tiles import CLASSES, Fit, Target, TileModel, load_model, write_tile_folder
 from orbiflow.tiles.pages.run_folder import FIGURE_FILES
 from orbiflow.tiles.search import occupancy
-from orbiflow.tiles.search.certifying import best_tiles
-from orbiflow.tiles.search.model import extract_tile
+from orbiflow.tiles.search.finished_tiles import best_tiles
+from orbiflow.tiles.search.tile_model import extract_tile
 
 DOCS = Path(__file__).parents[2] / "docs"
 FILES = {"tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors"}

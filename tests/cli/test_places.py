@@ -15,7 +15,7 @@ import pytest
 from cli.conftest import Run, call_main
 from runtime.searches import boot_call
 
-KERNELS = ("--components", "kernels", "--space", "torus", "--unit", "degrees")
+QUICK = ("--components", "mixture", "--space", "torus", "--unit", "degrees")
 KEPT = "would replace what is read: choose another --out"
 OWN = "is a file of the run in"
 ALONE = "holds the files of one run alone, and the next run there would refuse others"
@@ -27,7 +27,7 @@ def made_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("made")
     angles = np.random.default_rng(0).normal([20.0, 60.0], 25.0, (40, 2))
     np.savetxt(folder / "data.csv", angles, "%.3f", ",", header="phi,psi", comments="")
-    fit = ("density", "fit", folder / "data.csv", *KERNELS, "--out", folder / "m")
+    fit = ("density", "fit", folder / "data.csv", *QUICK, "--out", folder / "m")
     marginal = ("density", "marginal", "-m", folder / "m", "--columns", "psi")
     for words in (fit, (*marginal, "--out", folder / "psi")):
         assert call_main(lambda: ("", ""), *words).status == 0
@@ -128,7 +128,7 @@ def test_other_places_are_fine(words: str, here: Path, orbiflow: Run) -> None:
 
 def test_the_next_run_is_not_refused(here: Path, orbiflow: Run) -> None:
     assert orbiflow("density", "plot", "-m", "m", "--out", "m").status == 0
-    done = orbiflow("density", "fit", "data.csv", *KERNELS, "--out", "m")
+    done = orbiflow("density", "fit", "data.csv", *QUICK, "--out", "m")
     assert done.status == 0, done.err
     assert json.loads((here / "m" / "report.json").read_text())["columns"] == ["phi", "psi"]
 

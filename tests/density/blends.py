@@ -22,6 +22,11 @@ from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 
 
+def identity_flow(space: Space) -> Flow:
+    """A flow on the space that is the identity, since a new field is zero."""
+    return Flow([SplineField(space.group, 1)], steps=1, warn=False)
+
+
 def random_chains(
     rng: np.random.Generator, space: Torus, count: int = 3, *, natural: bool = False
 ) -> VonMisesChains:

@@ -20,7 +20,6 @@ from orbiflow.density import (
     UniformDensity,
     VonMisesChains,
     VonMisesDensity,
-    blend_kernels,
     clear_rotation,
     density_to_bytes,
     fit_density,
@@ -66,8 +65,6 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
         "points must be real numbers",
     ),
     "nan": (lambda: a_density().log_prob(torch.full((2, 2), torch.nan)), "points must be finite"),
-    "to_base": (lambda: a_density().to_base(torch.rand(5)), r"got .*\(5,\)"),
-    "from_base": (lambda: a_density().from_base(torch.rand(5, 4)), r"got .*\(5, 4\)"),
     "measure": (
         lambda: a_density().log_prob(POINTS, measure=3),  # type: ignore[arg-type]
         "measure must be natural, square or uniform",
@@ -100,14 +97,6 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: Mixture([a_density(), None], [0.5, 0.5]),  # type: ignore[list-item]
         "components must be an? Density",
     ),
-    "blend_kernels": (
-        lambda: blend_kernels("density", POINTS, POINTS),  # type: ignore[arg-type]
-        "density must be an? Density",
-    ),
-    "blend_kernels' points": (
-        lambda: blend_kernels(a_density(), POINTS, POINTS[:, :1]),
-        r"held points must be points of shape \(N, 2\), got .*\(30, 1\)",
-    ),
     "fit: a name": (lambda: fit_density("torus", POINTS), "space must be an? Space"),  # type: ignore[arg-type]
     "fit: columns": (lambda: fit_density(sphere, torch.rand(30, 3)), r"\(N, 2\), got .*\(30, 3\)"),
     "fit: one row": (lambda: fit_density(sphere, torch.rand(2)), r"\(N, 2\), got .*\(2,\)"),
@@ -133,7 +122,6 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "roughness": (lambda: FlowSettings(roughness=1e-3), "roughness must be a list"),  # type: ignore[arg-type]
     "weights": (lambda: FlowSettings(roughness=("a",)), "roughness: entry 1: must be a number"),  # type: ignore[arg-type]
     "validation": (lambda: FlowSettings(validation="a"), "validation must be .*below 1"),  # type: ignore[arg-type]
-    "base": (lambda: FlowSettings(base=["uniform"]), "base must be"),  # type: ignore[arg-type]
     "dim": (lambda: Torus("2"), "dim must be a whole number from 1 to 64"),  # type: ignore[arg-type]
     "unit": (lambda: Torus(2, unit=None), "unit must be radians"),  # type: ignore[arg-type]
     "form": (lambda: Sphere(form=["latlon"]), "form must be latlon or vector"),  # type: ignore[arg-type]

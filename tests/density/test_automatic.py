@@ -9,6 +9,7 @@ import pytest
 import torch
 
 from density.blends import kernels_of
+from density.quick_fits import few_kernels, quick_search
 from orbiflow.density import (
     Density,
     DensityEstimator,
@@ -40,16 +41,19 @@ def smooth(name: str, count: int = 400, seed: int = 0) -> torch.Tensor:
 
 
 @pytest.mark.parametrize("name", SPACES)
-def test_a_fit_by_evidence(name: str, tmp_path: Path) -> None:
+def test_a_fit_by_evidence(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if name != "torus":
+        few_kernels(monkeypatch)
     space, said = make_space(name), []
     settings = DensitySettings(**QUICK)
     density, report = fit_automatic(
         space, smooth(name), settings, progress=lambda done, what: said.append((done, what))
     )
     assert isinstance(density, Mixture)
-    grid = midpoints(space, 160)
+    grid = midpoints(space, 80)
     with torch.no_grad():
-        assert float(density.log_prob(grid).exp().mean()) == pytest.approx(1, abs=5e-3)
+        values = density.log_prob(grid)
+        assert float(values.exp().mean()) == pytest.approx(1, abs=5e-3)
         held = float(density.log_prob(smooth(name, 2000, 1)).mean())
     assert report.mass == pytest.approx(1, abs=1e-3)
     assert report.weights is not None
@@ -68,11 +72,12 @@ def test_a_fit_by_evidence(name: str, tmp_path: Path) -> None:
     path.write_bytes(density_to_bytes(density))
     back, _ = read_density(path)
     with torch.no_grad():
-        assert torch.equal(back.log_prob(grid), density.log_prob(grid))
+        assert torch.equal(back.log_prob(grid), values)
     draws = [d.sample((50,), torch.Generator().manual_seed(0)) for d in (density, back)]
     assert torch.equal(*draws)
 
 
+@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("name", ["torus", "projective-plane"])
 def test_it_is_invariant_and_has_gradients(name: str) -> None:
     space = make_space(name)
@@ -84,6 +89,7 @@ def test_it_is_invariant_and_has_gradients(name: str) -> None:
     assert torch.autograd.gradcheck(density.log_prob, (points[:3].requires_grad_(),), atol=1e-4)
 
 
+@pytest.mark.usefixtures("quick_fits")
 def test_the_same_seed_gives_the_same_density() -> None:
     space, at = make_space("sphere"), smooth("sphere", 50, 9)
     settings = [DensitySettings(**QUICK, seed=seed) for seed in (1, 1, 2)]
@@ -95,6 +101,7 @@ def test_the_same_seed_gives_the_same_density() -> None:
     assert not torch.equal(one, other)
 
 
+@pytest.mark.usefixtures("quick_fits")
 def test_repeated_places_are_mass_unless_said_otherwise() -> None:
     rng = np.random.default_rng(0)
     space, points = make_space("torus"), smooth("torus", 300)
@@ -111,15 +118,20 @@ def test_repeated_places_are_mass_unless_said_otherwise() -> None:
 
 
 @pytest.mark.parametrize(("close", "spiky"), [(2, False), (60, True)])
-def test_spikes_are_of_places_and_not_of_accidents(close: int, spiky: bool) -> None:
+def test_spikes_are_of_places_and_not_of_accidents(
+    close: int, spiky: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few_kernels(monkeypatch)
     rng, space = np.random.default_rng(7), make_space("klein-bottle")
     rows = np.stack([rng.vonmises(0.3, 4.0, 400), rng.vonmises(1.0, 3.0, 400)], axis=1)
     rows[1:close:2] = rows[0:close:2] + 1e-4
-    density, _ = fit_automatic(space, space.to_chart(rows))
+    chosen = DensitySettings(components=("kernels", "mixture"))
+    density, _ = fit_automatic(space, space.to_chart(rows), chosen)
     narrow = kernels_of(density).concentrations.amax(dim=1) > 1e5
     assert (int(narrow.sum()) > 20) == spiky  # some follow the distance to the nearest row
 
 
+@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("part", COMPONENTS[1:])
 def test_each_part_alone(part: str) -> None:
     estimator = DensityEstimator("torus", components=part)
@@ -139,7 +151,9 @@ def test_a_flow_alone_is_a_flow() -> None:
 
 @pytest.fixture(scope="module", name="of_the_torus")
 def of_the_torus_fixture() -> Density:
-    return fit_automatic(Torus(2), smooth("torus", 120))[0]
+    with pytest.MonkeyPatch.context() as patch:
+        quick_search(patch)
+        return fit_automatic(Torus(2), smooth("torus", 120))[0]
 
 
 @pytest.mark.parametrize("count", [0, 1, 3, 100])
@@ -151,9 +165,10 @@ def test_any_number_of_samples(count: int, of_the_torus: Density) -> None:
     assert bool(((drawn >= 0) & (drawn <= 1)).all())
 
 
+@pytest.mark.usefixtures("quick_fits")
 def test_many_angles_have_chains_beside_kernels(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
-    angles = rng.vonmises(0, 4, (150, 5))
+    angles = rng.vonmises(0, 4, (100, 5))
     estimator = DensityEstimator("torus").fit(angles)
     assert isinstance(estimator.density_, Mixture)
     assert estimator.report_.mass is None
@@ -166,7 +181,8 @@ def test_many_angles_have_chains_beside_kernels(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("count", [10, 15, 30])
-def test_few_points(count: int) -> None:
+def test_few_points(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    few_kernels(monkeypatch)
     points = smooth("torus", count)
     density, report = fit_automatic(Torus(2), points)
     assert report.validation == count
@@ -195,6 +211,7 @@ def test_the_settings_know_the_same_components() -> None:
     assert get_args(Component) == COMPONENTS
 
 
+@pytest.mark.usefixtures("quick_fits")
 def test_parts_for_new_groups() -> None:
     """Rows of a group lie within a degree: narrow kernels are right for its rows, not for others."""
     rng, space = np.random.default_rng(3), make_space("torus")

@@ -9,13 +9,14 @@ import torch
 from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV
 
+from density.quick_fits import quick_search
 from orbiflow.density import DensityEstimator, Sphere, midpoints
 from orbiflow.errors import OrbiflowError
 
 
 def entropy(estimator: DensityEstimator) -> float:
     """By quadrature, in natural measure."""
-    grid = midpoints(estimator.space_, 160)
+    grid = midpoints(estimator.space_, 80)
     with torch.no_grad():
         square, natural = (
             estimator.density_.log_prob(grid, measure=m) for m in ("square", "natural")
@@ -31,6 +32,7 @@ DATA = {
 }
 
 
+@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("space", DATA)
 def test_the_estimator(space: str) -> None:
     estimator = DensityEstimator(space, max_frequency=2, segments=2, iterations=8)
@@ -50,6 +52,7 @@ def test_the_estimator(space: str) -> None:
     assert estimator.score(draws) == pytest.approx(-entropy(estimator), abs=0.3)
 
 
+@pytest.mark.usefixtures("quick_fits")
 def test_units_change_the_density_by_their_ratio() -> None:
     small: dict[str, Any] = {"max_frequency": 2, "segments": 2, "iterations": 5}
     radians = DensityEstimator("torus", **small).fit(DATA["torus"])
@@ -69,6 +72,7 @@ def test_parameters_of_the_estimator() -> None:
         DensityEstimator("moebius").fit(DATA["torus"])
 
 
+@pytest.mark.usefixtures("quick_fits")
 def test_a_grid_search() -> None:
     search = GridSearchCV(
         DensityEstimator("torus", segments=2, iterations=3), {"max_frequency": [1, 2]}, cv=2
@@ -79,7 +83,10 @@ def test_a_grid_search() -> None:
 
 @pytest.fixture(name="fitted", scope="module")
 def fitted_fixture() -> DensityEstimator:
-    return DensityEstimator("torus", max_frequency=1, segments=1, iterations=0).fit(DATA["torus"])
+    with pytest.MonkeyPatch.context() as patch:
+        quick_search(patch)
+        estimator = DensityEstimator("torus", max_frequency=1, segments=1, iterations=0)
+        return estimator.fit(DATA["torus"])
 
 
 def test_samples_are_new_at_every_call(fitted: DensityEstimator) -> None:

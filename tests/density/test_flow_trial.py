@@ -16,14 +16,16 @@ from orbiflow.density.fitting.evidence import (
     TriedFlow,
     candidates_of,
     judged,
+    stacked,
+    supported_weights,
     try_flow,
 )
 from orbiflow.density.fitting.families import KernelFamily
 from orbiflow.density.fitting.folds import Folds, folds_of
 from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence
+from orbiflow.density.fitting.rows import Gain
 from orbiflow.density.fitting.settings import Component
-from orbiflow.density.fitting.weights import Gain, stacked, supported_weights
 
 QUICK: dict[str, Any] = {
     "max_frequency": 2, "segments": 2, "iterations": 10, "roughness": (1e-3,)

@@ -7,24 +7,8 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from density.blends import kernels_of
-from orbiflow.density import (
-    AdaptiveKernels,
-    FlowDensity,
-    FlowSettings,
-    Mixture,
-    UniformDensity,
-    blend_kernels,
-    density_to_bytes,
-    fit_density,
-    make_space,
-    midpoints,
-    read_density,
-)
-from orbiflow.density.fitting.kernels import FLOOR, proportions
+from orbiflow.density import AdaptiveKernels, Mixture, UniformDensity, make_space, midpoints
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import SplineField
-from orbiflow.flows import Flow
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 names, seeds = st.sampled_from(SPACES), st.integers(0, 2**31)
@@ -81,51 +65,6 @@ def test_samples_follow_the_density(name: str) -> None:
     live = expected > 5
     chi = float(((counts - expected) ** 2 / expected)[live].sum())
     assert chi < int(live.sum()) + 5 * math.sqrt(2 * int(live.sum()))
-
-
-@pytest.mark.parametrize("name", SPACES)
-def test_a_mixture_beats_both_parts_on_clusters(name: str, tmp_path) -> None:
-    space, points = make_space(name), clustered(name)
-    train, held, test = points[:400], points[400:500], points[500:]
-    flow = FlowDensity(space, Flow([SplineField(space.group, 2)], steps=1))
-    mixed = blend_kernels(flow, train, held)
-    scores = [
-        float(part.log_prob(test).mean().detach()) for part in (mixed, flow, kernels_of(mixed))
-    ]
-    assert scores[0] > scores[1] + 1
-    assert scores[0] > scores[2] - 0.05
-    assert mixed.mass() == pytest.approx(1, abs=1e-3)
-    assert mixed.weight_of_kind["uniform"] >= 0.99 * FLOOR
-    again = mixed.sample((300,), torch.Generator().manual_seed(1))
-    assert torch.equal(again, mixed.sample((300,), torch.Generator().manual_seed(1)))
-    path = tmp_path / "mixed.safetensors"
-    path.write_bytes(density_to_bytes(mixed))
-    back, _ = read_density(path)
-    assert isinstance(back, Mixture)
-    with torch.no_grad():
-        assert torch.equal(back.log_prob(test), mixed.log_prob(test))
-
-
-def test_a_fit_with_kernels_says_its_shares() -> None:
-    settings_ = FlowSettings(max_frequency=2, segments=2, iterations=5, kernels=True)
-    density, report = fit_density(make_space("torus"), clustered("torus"), settings_)
-    assert isinstance(density, Mixture)
-    assert report.weights is not None
-    assert report.weights == density.weight_of_kind
-    assert sum(report.weights.values()) == pytest.approx(1)
-    assert any("mixture" in note for note in report.notes)
-
-
-@given(seeds)
-@settings(max_examples=20, deadline=None)
-def test_proportions_are_the_best(seed: int) -> None:
-    torch.manual_seed(seed)
-    parts = torch.randn(3, 200, dtype=torch.float64)
-    shares, score = proportions(parts, iterations=400)
-    for _ in range(20):
-        other = torch.distributions.Dirichlet(torch.ones(3, dtype=torch.float64)).sample()
-        assert score > float((parts + other.log()[:, None]).logsumexp(dim=0).mean()) - 1e-3
-    assert float(shares.sum()) == pytest.approx(1)
 
 
 def test_kernels_of_wrong_shape_are_refused() -> None:

@@ -42,8 +42,7 @@ def test_five_angles(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("settings", "named"),
     [
-        ({"kernels": True}, "kernels would"),
-        ({"base": "von-mises", "max_frequency": 16}, "max_frequency, base would"),
+        ({"segments": 2, "max_frequency": 16}, "max_frequency, segments would"),
         ({"iterations": 3}, "iterations would"),
     ],
 )

@@ -27,6 +27,8 @@ SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 DATA = np.random.default_rng(0).normal([20.0, 40.0], 10.0, (60, 2))
 QUICK: dict[str, Any] = {"max_frequency": 1, "segments": 1, "iterations": 3}
 
+pytestmark = pytest.mark.usefixtures("quick_fits")
+
 
 @pytest.fixture(name="three_threads")
 def three_threads_fixture():
@@ -87,13 +89,13 @@ MODES = {
 
 @lru_cache
 def fitted_without_a_mode(name: str) -> DensityEstimator:
-    return DensityEstimator(name, kernels=True, **QUICK).fit(DATA)
+    return DensityEstimator(name, components=("flow",), **QUICK).fit(DATA)
 
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("name", SPACES)
 def test_fits_do_not_depend_on_the_callers_mode(name: str, mode: str) -> None:
-    estimator = DensityEstimator(name, kernels=True, **QUICK)
+    estimator = DensityEstimator(name, components=("flow",), **QUICK)
     with MODES[mode]():
         estimator.fit(DATA)
     assert estimator.score(DATA) == fitted_without_a_mode(name).score(DATA)

@@ -92,9 +92,9 @@ def test_elsewhere_all_is_the_same(kind: int) -> None:
         torch.testing.assert_close(found.cpu(), expected, rtol=1e-9, atol=1e-9)
         torch.testing.assert_close(drawn.cpu(), density.sample(9, two))
         if density.flow_part is not None:
-            there = flow_of(moved).to_base(points.to(device))
+            there = flow_of(moved).flow.inverse(points.to(device))
             assert there.device == DEVICE
-            torch.testing.assert_close(there.cpu(), flow_of(density).to_base(points))
+            torch.testing.assert_close(there.cpu(), flow_of(density).flow.inverse(points))
         back = moved.to("cpu")
     assert torch.equal(back.log_prob(points), expected)
     assert torch.equal(density.log_prob(points), expected)

@@ -19,7 +19,8 @@ shapes, seeds = st.sampled_from(sorted(SHAPES)), st.integers(0, 2**31)
 @pytest.fixture(autouse=True)
 def eager(monkeypatch: pytest.MonkeyPatch) -> None:
     """All that is done for many points and terms is done for few."""
-    for name, value in (("FEW_POINTS", 16), ("FEW_PAIRS", 0), ("WORTH_TERMS", 5)):
+    few = {"FEWEST_PAIRS": 0, "FEW_POINTS": 16, "FEW_PAIRS": 0, "WORTH_TERMS": 5}
+    for name, value in few.items():
         monkeypatch.setattr(near_sums, name, value)
     for name in ("WORTH_FLAT", "WORTH_ROUND"):
         monkeypatch.setattr(near_sums, name, 60)
@@ -86,6 +87,14 @@ def test_the_sum_is_that_of_all_terms(shape: str, seed: int, floored: bool) -> N
     wide = 1.0 if shape == "three angles" else 1e-2
     rounding = 1e-15 * (expected.abs() + float(terms.kappa.max()) * wide)
     assert bool((off.abs() <= 4e-12 + rounding).all())
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_few_are_summed_at_once(shape: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    terms, features = drawn(shape, 5, 30, 40)
+    tiled = near_log_sum(terms, features)
+    monkeypatch.setattr(near_sums, "FEWEST_PAIRS", 30 * 40 + 1)
+    torch.testing.assert_close(near_log_sum(terms, features), tiled, rtol=1e-9, atol=1e-11)
 
 
 @pytest.mark.parametrize("shape", ["one angle", "two angles", "sphere"])

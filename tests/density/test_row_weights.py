@@ -11,12 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from density.blends import flow_of
+from density.quick_fits import few_kernels
 from orbiflow.density import DensityEstimator, density_to_bytes, make_space, mean_of, weighed
 from orbiflow.density.fitting.chains import fit_chain_mixture, spread_chains
+from orbiflow.density.fitting.evidence import sparse_weights, stacked, stacking_weights
 from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
 from orbiflow.density.fitting.likelihood import Objective, merged
-from orbiflow.density.fitting.rows import Rows, effective_rows
-from orbiflow.density.fitting.weights import gain_of, sparse_weights, stacked, stacking_weights
+from orbiflow.density.fitting.rows import Rows, effective_rows, gain_of
 from orbiflow.errors import OrbiflowError
 
 seeds = st.integers(0, 2**31)
@@ -37,8 +38,10 @@ def repeated(seed: int, count: int) -> tuple[torch.Tensor, torch.Tensor, torch.T
 def test_kernels_of_weighted_rows_are_those_of_repeated_ones(seed: int) -> None:
     points, weights, rows = repeated(seed, 40)
     space = make_space("torus")
-    found = kernel_estimates(space, Rows(points, weights), repeats=False)
-    expected = kernel_estimates(space, Rows(rows), repeats=False)
+    with pytest.MonkeyPatch.context() as patch:
+        few_kernels(patch)
+        found = kernel_estimates(space, Rows(points, weights), repeats=False)
+        expected = kernel_estimates(space, Rows(rows), repeats=False)
     at = space.uniform(30, torch.Generator().manual_seed(seed))
     assert found.keys() == expected.keys()
     for name, part in found.items():
@@ -89,7 +92,7 @@ def test_chains_from_one_start_are_those_of_repeated_rows(seed: int, count: int)
     order = torch.randperm(2, generator=generator)
     start = spread_chains(space, Rows(points, weights), count, order, generator)
     weighted, plain = (
-        fit_chain_mixture(start, rows, rows, 40) for rows in (Rows(points, weights), Rows(repeats))
+        fit_chain_mixture(start, rows, rows, 15) for rows in (Rows(points, weights), Rows(repeats))
     )
     at = space.uniform(30, generator)
     assert torch.allclose(weighted.log_prob(at), plain.log_prob(at), atol=1e-6)
@@ -114,10 +117,12 @@ def test_chains_start_at_rows_that_weigh_something(seed: int, count: int) -> Non
 @few
 def test_merged_points_carry_their_weights(seed: int, cells: int) -> None:
     points, weights, rows = repeated(seed, 80)
-    found, shares = merged(points, cells, 10**6, weights)
-    expected, counts = merged(rows, cells, 10**6)
-    assert torch.allclose(found, expected)
-    assert torch.allclose(shares, counts)
+    found = merged(Rows(points, weights), cells, 10**6)
+    expected = merged(Rows(rows), cells, 10**6)
+    assert found.weights is not None
+    assert expected.weights is not None
+    assert torch.allclose(found.points, expected.points)
+    assert torch.allclose(found.weights, expected.weights)
 
 
 def test_a_flow_descends_on_the_weighted_likelihood() -> None:
@@ -127,15 +132,16 @@ def test_a_flow_descends_on_the_weighted_likelihood() -> None:
     )
     density = estimator.fit(points.numpy() * 2 * math.pi, sample_weight=weights.numpy()).density_
     both = [
-        Objective(flow_of(density), part, own, kinetic=0.0, roughness=1e-3)
-        for part, own in ((points, weights / weights.sum()), (rows, None))
+        Objective(flow_of(density), own, roughness=1e-3)
+        for own in (Rows(points, weights / weights.sum()), Rows(rows))
     ]
     (loss, slope), (expected, also) = (one(one.get()) for one in both)
     assert loss == pytest.approx(expected, abs=1e-9)
     assert slope == pytest.approx(also, abs=1e-9)
 
 
-@pytest.mark.parametrize("options", [{}, {"components": "flow"}, {"kernels": True}])
+@pytest.mark.usefixtures("quick_fits")
+@pytest.mark.parametrize("options", [{}, {"components": "flow"}])
 def test_equal_weights_are_none(options: dict[str, object]) -> None:
     angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (310, 2))
     few_waves = {"max_frequency": 2, "segments": 1, "iterations": 3}
@@ -147,6 +153,7 @@ def test_equal_weights_are_none(options: dict[str, object]) -> None:
     assert first.report_.effective is second.report_.effective is None
 
 
+@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("space", ["torus", "sphere", "klein-bottle", "projective-plane"])
 def test_a_fit_follows_its_weights(space: str) -> None:
     """Of two clusters, one weighs nine times the other; and rows of weight 0 are not there."""

@@ -18,17 +18,16 @@ from orbiflow.density import (
     midpoints,
 )
 from orbiflow.density.fitting import group_numbers
-from orbiflow.density.fitting.folds import FOLDS, folds_of, repeats_of
-from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
-from orbiflow.density.fitting.rows import Rows
-from orbiflow.density.fitting.weights import (
+from orbiflow.density.fitting.evidence import (
     TOLERANCE,
-    gain_of,
     sparse_weights,
     stacked,
     stacking_weights,
     supported_weights,
 )
+from orbiflow.density.fitting.folds import FOLDS, folds_of, repeats_of
+from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
+from orbiflow.density.fitting.rows import Rows, gain_of
 from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")

@@ -26,6 +26,12 @@ from orbiflow.errors import OrbiflowError
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 
 
+@pytest.fixture(autouse=True)
+def _fewer_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For a hundred rows the widths of kernels need no half a million pairs."""
+    monkeypatch.setattr("orbiflow.density.comparing.two_samples.PAIRS", 20_000)
+
+
 def p_of(space: str, points: torch.Tensor, first: np.ndarray, labels: Any, seed: int) -> float:
     groups = Groups.of(labels, len(points))
     return mmd_test(make_space(space), points, first, groups, permutations=99, seed=seed).p
@@ -73,6 +79,7 @@ def test_whole_groups_are_drawn() -> None:
     assert chosen_rows(labels < 15, groups, 5000).tolist() == list(range(1000))
 
 
+@pytest.mark.usefixtures("quick_fits")
 def test_divergences_are_near_those_of_the_densities() -> None:
     rng = np.random.default_rng(0)
     kappa, shift, rows = 3.0, 1.2, 700
@@ -95,6 +102,7 @@ def test_divergences_are_near_those_of_the_densities() -> None:
         assert estimate.low < estimate.value < estimate.high
 
 
+@pytest.mark.usefixtures("quick_fits")
 def test_data_far_apart_and_few_rows() -> None:
     rng = np.random.default_rng(1)
     far = compare_samples(

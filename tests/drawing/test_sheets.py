@@ -161,11 +161,11 @@ def test_every_width_is_kept(width: float, form: Any) -> None:
 @pytest.mark.parametrize(
     ("width", "form", "message"),
     [
-        ("triple", "pdf", "width must be single, double or a number of mm, got 'triple'"),
-        (39.9, "pdf", "40 to 1000 mm wide, got 39.9"),
-        (float("nan"), "pdf", "40 to 1000 mm"),
-        (True, "pdf", "40 to 1000 mm"),
-        ("single", "eps", "format must be one of png, pdf, svg, got 'eps'"),
+        ("triple", "pdf", "width must be single or double, got 'triple'"),
+        (39.9, "pdf", "width must be from 40 to 1000, got 39.9"),
+        (float("nan"), "pdf", "a finite number from 40 to 1000, got nan"),
+        (True, "pdf", "a number from 40 to 1000, got True"),
+        ("single", "eps", "format must be png, pdf or svg, got 'eps'"),
     ],
 )
 def test_other_sheets_are_refused(width: Any, form: Any, message: str) -> None:

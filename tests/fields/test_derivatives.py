@@ -4,9 +4,9 @@ import pytest
 import torch
 from hypothesis import given
 
-from orbiflow.fields import divergence, jacobian, neural_field, prepared_with_divergence
+from orbiflow.fields import divergence, jacobian, prepared_with_divergence
 from orbiflow.symmetry import wallpaper_group
-from strategies import central_difference, random_field, random_tensor, seeds
+from strategies import central_difference, neural_field, random_field, random_tensor, seeds
 
 
 def curl_and_stretch(p):

@@ -8,17 +8,10 @@ import pytest
 import torch
 from torch import nn
 
-from orbiflow.fields import (
-    FourierField,
-    SplineField,
-    divergence,
-    jacobian,
-    neural_field,
-    symmetrize,
-)
+from orbiflow.fields import FourierField, SplineField, divergence, jacobian, symmetrize
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup, wallpaper_group
-from strategies import random_tensor
+from strategies import neural_field, random_tensor
 
 KINDS: dict[str, Callable[[CrystallographicGroup], nn.Module]] = {
     "fourier": lambda group: FourierField(group, 3),

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import PeriodicFeatures, neural_field
+from orbiflow.fields import PeriodicFeatures
 from orbiflow.symmetry import CrystallographicGroup, wallpaper_group
-from strategies import equivariance_error, groups, largest, random_tensor, seeds
+from strategies import equivariance_error, groups, largest, neural_field, random_tensor, seeds
 
 
 def disturbed(field, seed):

@@ -13,9 +13,9 @@ from torch.autograd import forward_ad
 from torch.func import functional_call, grad, hessian, jacfwd, jacrev, jvp, vjp, vmap
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import SplineField, divergence, jacobian, neural_field, symmetrize
+from orbiflow.fields import SplineField, divergence, jacobian, symmetrize
 from orbiflow.symmetry import CrystallographicGroup, identification_group, wallpaper_group
-from strategies import central_difference, groups, random_field, random_tensor, seeds
+from strategies import central_difference, groups, neural_field, random_field, random_tensor, seeds
 
 # of torch itself, the first time that forward mode is used
 pytestmark = pytest.mark.filterwarnings(

@@ -9,17 +9,10 @@ from hypothesis import given
 from torch import nn
 
 from orbiflow.errors import GroupError, OrbiflowError
-from orbiflow.fields import (
-    FourierField,
-    PeriodicFeatures,
-    SplineField,
-    jacobian,
-    neural_field,
-    symmetrize,
-)
+from orbiflow.fields import FourierField, PeriodicFeatures, SplineField, jacobian, symmetrize
 from orbiflow.flows import Flow
 from orbiflow.symmetry import IDENTIFICATION_SPACES, identification_group, wallpaper_group
-from strategies import groups, random_tensor
+from strategies import groups, neural_field, random_tensor
 
 P4 = wallpaper_group("p4")
 THREE = random_tensor(0, 4, 3)

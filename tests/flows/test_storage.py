@@ -17,10 +17,10 @@ from safetensors.torch import load, save
 from torch import Tensor, nn
 
 from orbiflow.errors import InputFileError, OrbiflowError, OutputError
-from orbiflow.fields import FourierField, SplineField, neural_field, symmetrize, time_dependent
+from orbiflow.fields import FourierField, SplineField, symmetrize
 from orbiflow.flows import METHODS, Flow, load_flow, save_flow
 from orbiflow.symmetry import CrystallographicGroup, identification_group, wallpaper_group
-from strategies import groups, random_tensor, seeds, space_group
+from strategies import groups, neural_field, random_tensor, seeds, space_group
 
 one_folder = settings(
     max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None
@@ -45,10 +45,9 @@ def shear(points: Tensor) -> Tensor:
     return points.flip(-1) / 4
 
 
-@time_dependent
-def turning(points: Tensor, time: Tensor) -> Tensor:
-    """One that depends on time."""
-    return torch.sin(points + time)
+def turning(points: Tensor) -> Tensor:
+    """Another one."""
+    return torch.sin(points)
 
 
 def filled(field: Any, seed: int) -> Any:

@@ -22,7 +22,7 @@ def seen() -> Iterator[list[int]]:
 
 
 @pytest.mark.parametrize(("count", "threads"), [(5, 1), (MULTITHREADED_COORDINATES, 3)])
-@pytest.mark.parametrize("apply", ["forward", "inverse", "forward_and_log_det", "trajectories"])
+@pytest.mark.parametrize("apply", ["forward", "inverse", "forward_and_log_det"])
 def test_how_many_threads_carry(seen: list[int], count: int, threads: int, apply: str) -> None:
     def field(points: Tensor) -> Tensor:
         seen.append(torch.get_num_threads())

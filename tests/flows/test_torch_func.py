@@ -11,10 +11,18 @@ from torch import Tensor
 from torch.func import functional_call, grad, hessian, jacfwd, jacrev, vmap
 
 from orbiflow.errors import CoarseStepsWarning
-from orbiflow.fields import SplineField, neural_field, symmetrize, time_dependent
+from orbiflow.fields import SplineField, symmetrize
 from orbiflow.flows import Flow
 from orbiflow.symmetry import identification_group, wallpaper_group
-from strategies import central_difference, gentle_field, groups, random_tensor, seeds, several
+from strategies import (
+    central_difference,
+    gentle_field,
+    groups,
+    neural_field,
+    random_tensor,
+    seeds,
+    several,
+)
 
 # of torch itself, the first time that forward mode is used
 pytestmark = pytest.mark.filterwarnings(
@@ -38,16 +46,16 @@ def network_flow() -> Flow:
     return Flow(field, steps=4)
 
 
-def timed_flow() -> Flow:
-    turning = time_dependent(lambda p, t: torch.sin(p.flip(-1) + t))
-    return Flow(symmetrize(turning, wallpaper_group("p4")), steps=4)
+def function_flow() -> Flow:
+    turning = symmetrize(lambda p: torch.sin(p.flip(-1)), wallpaper_group("p4"))
+    return Flow(turning, steps=4)
 
 
 FLOWS = {
     "fourier": lambda: Flow(several(wallpaper_group("p6"), 1), steps=4),
     "spline": spline_flow,
     "network": network_flow,
-    "in time": timed_flow,
+    "function": function_flow,
 }
 every_kind = pytest.mark.parametrize("kind", FLOWS)
 

@@ -12,12 +12,10 @@ from pathlib import Path
 import pytest
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Cancel, Cancelled
 from reproduction.__main__ import main
 from reproduction.drawing import Canvas
 from reproduction.exhibit import FAST, Exhibit, Extent, Findings, Shown, Table, Work
-from reproduction.page import paper_page, write_page, written_files
-from reproduction.reproduction import EXHIBITS, reproduce
+from reproduction.reproduction import EXHIBITS, paper_page, reproduce, write_page, written_files
 
 QUICK = ("figure-4", "table-1", "table-4")
 """Exhibits that need no work."""
@@ -34,7 +32,7 @@ def broken(_folder: str) -> int:
 
 
 def draw_sum(canvas: Canvas, _extent: Extent, values: list[int]) -> Findings:
-    figure = canvas.figure(0.2, 200)
+    figure = canvas.figure(0.02)
     figure.text(0.5, 0.5, str(sum(values)))
     canvas.add(figure, "a <number>", "its caption")
     table = Table("all", ("name", "value"), (("sum", str(sum(values))),))
@@ -81,14 +79,6 @@ def test_equal_work_is_done_once_and_failures_stay_apart(tmp_path: Path, workers
     assert found[2].failure == "the <work> cannot be done"
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(1.0)
-
-
-def test_work_that_is_told_to_stop_stops(tmp_path: Path) -> None:
-    cancel = Cancel()
-    cancel.cancel()
-    with pytest.raises(Cancelled):
-        reproduce([exhibit("figure-1", draw_sum)], FAST, tmp_path, cancel=cancel)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_page_shows_what_was_drawn_and_what_failed(tmp_path: Path) -> None:

@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 from orbiflow.drawing import PALETTES
 from orbiflow.kinds import (
     ChoiceKind,
-    EitherKind,
     FlagKind,
     Kind,
     ListKind,
@@ -75,7 +74,7 @@ class Sheet(Settings, group="Sheet"):
     middle: tuple[float, float] | None = None
     clip: Annotated[bool, Option(off="--whole"), NotWith("pins")] = False
     border: Annotated[bool, OnlyWith(clip=True)] = False
-    width: Literal["single", "double"] | Annotated[float, Range(1, 9)] | None = None
+    width: Annotated[float, Range(1, 9)] | None = None
 
 
 class Point(Settings):
@@ -112,8 +111,6 @@ def values_of(kind: Kind) -> st.SearchStrategy[Any]:
             return st.lists(values_of(item), min_size=1, max_size=3).map(tuple)
         case TupleKind(items=items):
             return st.tuples(*map(values_of, items))
-        case EitherKind(kinds=kinds):
-            return st.one_of(*map(values_of, kinds))
         case OptionalKind(inner=inner):
             return st.none() | values_of(inner)
         case ParsedKind(inner=inner):

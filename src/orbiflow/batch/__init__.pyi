@@ -5,9 +5,8 @@ from .executors import Parcel as Parcel
 from .executors import WorkSettings as WorkSettings
 from .folder import BatchFolder as BatchFolder
 from .items import Item as Item
-from .items import code_of as code_of
-from .journal import Entry as Entry
 from .overview import Column as Column
+from .overview import Entry as Entry
 from .overview import Kind as Kind
 from .overview import Summary as Summary
 from .overview import csv_bytes as csv_bytes

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
-import contextlib
 import ctypes
 import importlib
 import os
@@ -22,7 +21,7 @@ from typing import Any, Self, TypeAlias
 from orbiflow import __version__
 from orbiflow.batch.executors import Answer, Executor, Parcel, carry_out
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Cancel, Note, Sink, one_thread
+from orbiflow.runtime import Cancel, Note, Polled, Sink, one_thread
 
 Client: TypeAlias = Any
 Future: TypeAlias = Any
@@ -39,8 +38,6 @@ PATIENCE = 300.0
 
 TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
 KEPT_BYTES = 32 * 2**20  # the most that glibc itself would come to
-USUAL_MMAP_BYTES = 128 * 2**10
-TRIM_VARIABLE = "MALLOC_TRIM_THRESHOLD_"
 
 
 class DaskCluster(Executor):
@@ -277,24 +274,23 @@ def _serve(header: str, data: bytes) -> tuple[str, dict[str, bytes]]:
     """Carry out a parcel in a worker."""
     importlib.import_module("torch")  # what is not imported cannot be limited
 
-    with keeping_memory(), one_thread():
-        return carry_out(header, data, _Released())
+    keep_memory()
+    with one_thread():
+        return carry_out(header, data, _released())
 
 
-class _Released(Cancel):
-    """In a worker, a token that is cancelled once nobody waits for this thread's task any more."""
+def _released() -> Cancel:
+    """Return a token that is cancelled once nobody waits for this thread's task any more."""
+    from distributed import get_worker
 
-    def __init__(self) -> None:
-        super().__init__()
-        from distributed import get_worker
+    worker = get_worker()
+    key = worker.get_current_task()
 
-        self._worker = get_worker()
-        self._key = self._worker.get_current_task()
-
-    @property
-    def cancelled(self) -> bool:
-        task = self._worker.state.tasks.get(self._key)
+    def released() -> bool:
+        task = worker.state.tasks.get(key)
         return task is None or task.state == "cancelled"
+
+    return Polled(released)
 
 
 def _version_asker() -> Callable[[], str | None]:
@@ -310,33 +306,15 @@ def _version_asker() -> Callable[[], str | None]:
     return version
 
 
-@contextlib.contextmanager
-def keeping_memory() -> Generator[None]:
-    """Keep freed memory with this process in the block, where glibc was told not to.
+def keep_memory() -> None:
+    """Keep freed memory with this process, where glibc was told not to.
 
     Dask's nannies start workers with MALLOC_TRIM_THRESHOLD_=65536: glibc then hands every freed block
     of that size back to the system. A search frees such arrays all the time, and fetching the memory
     again cost as much as its own work (2.4 s instead of 1.3 s for one class).
     """
-    asked = os.environ.get(TRIM_VARIABLE, "")
-    set_option = getattr(_libc(), "mallopt", None) if asked.isdecimal() else None
-    if set_option is None or int(asked) >= KEPT_BYTES:
-        yield
-        return
-    set_option(TRIM_THRESHOLD, KEPT_BYTES)
-    set_option(MMAP_THRESHOLD, KEPT_BYTES)
-    try:
-        yield
-    finally:
-        set_option(TRIM_THRESHOLD, int(asked))
-        set_option(MMAP_THRESHOLD, USUAL_MMAP_BYTES)
-        trim = getattr(_libc(), "malloc_trim", None)
-        if trim is not None:
-            trim(0)
-
-
-def _libc() -> ctypes.CDLL | None:
-    try:
-        return ctypes.CDLL(None)
-    except (OSError, TypeError):
-        return None
+    if "MALLOC_TRIM_THRESHOLD_" in os.environ:
+        with suppress(OSError, TypeError, AttributeError):  # another library
+            set_option = ctypes.CDLL(None).mallopt
+            set_option(TRIM_THRESHOLD, KEPT_BYTES)
+            set_option(MMAP_THRESHOLD, KEPT_BYTES)

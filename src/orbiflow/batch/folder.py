@@ -1,20 +1,34 @@
-"""The folder of a batch: a folder for each result, an overview of all, the journal."""
+"""The folder of a batch: a folder for each result, an overview of all, the journal.
+
+The journal has a line of JSON for each item, added when its result has its place. It says what was done
+to which bytes, with which settings and version, so that a later batch knows what need not be done
+again. A line that was cut short is ignored.
+"""
 
 from __future__ import annotations
 
 import io
+import json
+import os
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, nullcontext, suppress
+from contextlib import AbstractContextManager, ExitStack, nullcontext, suppress
 from pathlib import Path, PurePosixPath
-from typing import Self
+from typing import Any, Self, cast, get_args
 
 from filelock import FileLock, Timeout
 
-from orbiflow.batch.journal import Entry, Journal
-from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Kind, Overview
+from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Entry, Kind, Overview, State
 from orbiflow.errors import OrbiflowError, OutputError, system_errors
-from orbiflow.runtime import LITTER, ResultFolder, make_folder, write_atomic, write_set
+from orbiflow.runtime import (
+    LITTER,
+    ResultFolder,
+    is_object,
+    make_folder,
+    stays_inside,
+    write_atomic,
+    write_set,
+)
 
 THUMBNAILS, LOCK = "thumbnails", ".batch.lock"
 RESERVED = (ContactSheet.journal, TABLE, PAGE, THUMBNAILS, LOCK)
@@ -26,6 +40,10 @@ THUMBNAIL = (360, 240)
 PAUSE, REST = 1.0, 20.0
 """The overview is written again after at least `PAUSE` seconds and `REST` times the seconds that it
 took, so that most of the time is for the work, however many results there are."""
+
+
+MOST_JOURNAL_BYTES = 2**30
+"""The largest size of a journal that is read."""
 
 
 class BatchFolder:
@@ -130,3 +148,63 @@ def _small(picture: bytes) -> bytes:
         small = ImageOps.fit(image.convert("RGB"), THUMBNAIL, Image.Resampling.BOX)
         small.quantize(64, dither=Image.Dither.NONE).save(out, "PNG", optimize=True)
     return out.getvalue()
+
+
+class Journal:
+    """The last entry of each item, from a file if it exists; a `with` block can add more."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.entries: dict[str, Entry] = {}
+        self._file: Any = None
+        if path.exists():
+            self._read()
+
+    def __enter__(self) -> Self:
+        """Write the last entries anew, and open the file for more."""
+        write_atomic(self.path, "".join(entry.line() for entry in self.entries.values()))
+        with self._writing():
+            self._file = self.path.open("ab")
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self._file.close()
+
+    def add(self, entry: Entry) -> None:
+        """Add an entry, which is on the disk when this returns."""
+        with self._writing():
+            self._file.write(entry.line().encode())
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        self.entries[entry.file] = entry
+
+    def _writing(self) -> AbstractContextManager[None]:
+        return system_errors(OutputError, f"cannot write {self.path}", "free the disk or its file")
+
+    def _read(self) -> None:
+        with self._writing():
+            if self.path.stat().st_size > MOST_JOURNAL_BYTES:
+                raise OutputError(f"{self.path} is too large to be a batch's; move it")
+            lines = self.path.read_bytes().splitlines()
+        for line in lines:
+            with suppress(ValueError, TypeError, RecursionError):  # cut short: to be done again
+                document = json.loads(line)
+                if is_object(document) and document.pop("kind", None) == "entry":
+                    entry = Entry(**document)
+                    if _is_sound(entry):
+                        self.entries[entry.file] = entry
+        if len(lines) > 1 and not self.entries:
+            raise OutputError(
+                f"{self.path} is no journal of a batch; move it or choose another --out"
+            )
+
+
+def _is_sound(entry: Entry) -> bool:
+    """Whether what is used of it is of the right type, and its results stay in the folder."""
+    return (
+        stays_inside(entry.name)
+        and entry.state in get_args(State)
+        and isinstance(cast(object, entry.file), str)
+        and is_object(entry.best)
+        and is_object(entry.settings)
+    )

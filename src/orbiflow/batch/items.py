@@ -5,11 +5,11 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path, PurePosixPath
-from typing import Any, Protocol
+from typing import Any
 
 from orbiflow.batch.overview import Kind
 from orbiflow.errors import InputFileError, system_errors
@@ -22,47 +22,16 @@ NO_RESULT = ("workers", "called")
 """Parameters of a call that do not change its result."""
 
 
-class Source(Protocol):
-    """Where the bytes of an item come from; both methods raise an `OrbiflowError` if they cannot."""
-
-    @property
-    def name(self) -> str:
-        """The name of the file that a worker makes of them; its ending says what it is."""
-        ...
-
-    def read(self) -> bytes:
-        """Return the bytes; called when somebody is free for them."""
-        ...
-
-    def code(self) -> str:
-        """Return what the same bytes are known by."""
-        ...
-
-
-@dataclass(frozen=True)
-class FileSource:
-    """A file of at most so many bytes."""
-
-    path: Path
-    most: int
-
-    @property
-    def name(self) -> str:
-        return self.path.name
-
-    def read(self) -> bytes:
-        system = system_errors(InputFileError, f"{self.name}: cannot be read", "check it")
-        with system, self.path.open("rb") as file:
-            data = file.read(self.most + 1)
-        if len(data) > self.most:
-            raise InputFileError(
-                f"{self.name}: larger than {self.most / 2**20:.0f} MB, the most that is read; simplify "
-                "it"
-            )
-        return data
-
-    def code(self) -> str:
-        return code_of(self.read())
+def read_file(path: Path, most: int) -> bytes:
+    """Return the content of a file of at most so many bytes."""
+    system = system_errors(InputFileError, f"{path.name}: cannot be read", "check it")
+    with system, path.open("rb") as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise InputFileError(
+            f"{path.name}: larger than {most / 2**20:.0f} MB, the most that is read; simplify it"
+        )
+    return data
 
 
 @dataclass(frozen=True)
@@ -72,12 +41,14 @@ class Item:
     - `key`: What the journal knows it by; for a file, its path in the folder of files.
     - `name`: The name of its folder among the results, with slashes.
     - `call`: The call; the file that it reads and the folder that it writes are set where it runs.
+    - `read`: Returns the bytes of the file, or raises an `OrbiflowError`; called when somebody is free
+      for them.
     """
 
     key: str
     name: str
     call: Call
-    source: Source
+    read: Callable[[], bytes]
 
     def settings(self, kind: Kind) -> dict[str, Any]:
         """Return what decides the result besides the bytes and their name, as JSON has it."""

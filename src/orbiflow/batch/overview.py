@@ -6,13 +6,42 @@ import csv
 import io
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
-
-from orbiflow.batch.journal import Entry
+from typing import Any, ClassVar, Literal, Protocol
 
 TABLE, PAGE = "batch.csv", "index.html"
+
+State = Literal["done", "nothing found", "failed"]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What came of an item.
+
+    - `file`: Its key: for a file, its path in the folder of files.
+    - `name`: The name of its folder among the results.
+    - `code`: What its bytes are known by.
+    - `settings`, `version`: The settings of the call, and the version of orbiflow.
+    - `reason`: Why there is no result, in words.
+    - `best`: Figures of the best result, by column of the table.
+    - `seconds`: How long a worker took.
+    """
+
+    file: str
+    name: str
+    code: str
+    settings: dict[str, Any]
+    version: str
+    state: State
+    reason: str = ""
+    best: dict[str, Any] = field(default_factory=dict[str, Any])
+    seconds: float | None = None
+
+    def line(self) -> str:
+        """Return its line in a journal."""
+        return json.dumps({"kind": "entry", **asdict(self)}, allow_nan=False) + "\n"
+
 
 Summary = Mapping[str, Any]
 """The summary of a call's `Finished`."""

@@ -5,17 +5,17 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from orbiflow import __version__
 from orbiflow.batch.executors import Answer, Parcel, WorkSettings, executor_for
 from orbiflow.batch.folder import RESERVED, BatchFolder
-from orbiflow.batch.items import FileSource, Item, code_of, folder_names, listed
-from orbiflow.batch.journal import Entry
-from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Kind
+from orbiflow.batch.items import Item, code_of, folder_names, listed, read_file
+from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Entry, Kind
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import (
     Call,
@@ -90,7 +90,9 @@ def run_files(
         given = {file: entry.name for file, entry in folder.journal.entries.items()}
         names = folder_names(files, given, RESERVED)
         items = [
-            Item(name, names[name], call_of(name), FileSource(source / name, kind.most_bytes))
+            Item(
+                name, names[name], call_of(name), partial(read_file, source / name, kind.most_bytes)
+            )
             for name in files
         ]
         left_out = f" or that --match {match} leaves out" if match else ""
@@ -131,15 +133,16 @@ def run_items(
 
 def _todo(items: Sequence[Item], settings: WorkSettings, folder: BatchFolder) -> Iterator[Item]:
     """What is new or changed, has other settings, or has lost its result."""
+    codes: dict[Callable[[], bytes], str] = {}
     for item in items:
         before = folder.journal.entries.get(item.key)
         if before is not None and not (settings.retry_failed and before.state != "done"):
-            try:
-                code = item.source.code()
-            except OrbiflowError:
-                code = ""
+            if item.read not in codes:  # items may share what they read
+                with suppress(OrbiflowError):
+                    codes[item.read] = code_of(item.read())
             there = before.state == "failed" or (folder.path / before.name).is_dir()
-            if there and before.same_work(code, item.settings(folder.kind), __version__):
+            work = codes.get(item.read, ""), item.settings(folder.kind), __version__
+            if there and work == (before.code, before.settings, before.version):
                 continue
         yield item
 
@@ -184,13 +187,13 @@ class _Batch:
         reads, writes = self.kind.reads, self.kind.writes
         for item in todo:
             try:
-                data = item.source.read()
+                data = item.read()
             except OrbiflowError as error:
                 known = (item.key, item.name, "", item.settings(self.kind), __version__)
                 self._finish(Entry(*known, "failed", str(error)), {}, None)
                 continue
             self.at_work[item.key] = item, code_of(data)
-            yield Parcel(item.key, item.call, reads, writes, item.source.name, data)
+            yield Parcel(item.key, item.call, reads, writes, item.call.flat[reads].name, data)
 
     def _keep(self, answer: Answer) -> None:
         entry = _entry(answer, *self.at_work.pop(answer.key), self.kind)

@@ -18,7 +18,7 @@ from rich.markup import escape
 from orbiflow import __version__
 from orbiflow.arguments import meant
 from orbiflow.errors import OrbiflowError, SettingError, literal
-from orbiflow.kinds import ListKind
+from orbiflow.kinds import FlagKind, ListKind, PathKind
 from orbiflow.operations import OPERATIONS
 from orbiflow.runtime import Cancel, Cancelled, Operation, find, use_one_thread
 from orbiflow.settings import Field, Hidden
@@ -132,8 +132,10 @@ def _argument(entry: Field, groups: dict[str, Group], named: Callable[[str], str
         negative=entry.option.off or (),
         required=entry.required,
         show_default=False,
-        allow_leading_hyphen=not entry.positional and not _is_flag(entry),
-        metavar=None if _is_flag(entry) else "|".join(entry.kind.choices) or entry.kind.metavar,
+        allow_leading_hyphen=not entry.positional and not entry.is_of(FlagKind),
+        metavar=None
+        if entry.is_of(FlagKind)
+        else "|".join(entry.kind.choices) or entry.kind.metavar,
         choices=entry.kind.choices or None,
         show_choices=False,
     )
@@ -147,10 +149,10 @@ def _argument(entry: Field, groups: dict[str, Group], named: Callable[[str], str
 
 def _hint(entry: Field) -> Any:
     """What cyclopts takes: words, which the field then reads."""
-    if _is_flag(entry):
+    if entry.is_of(FlagKind):
         hint: Any = bool
     else:
-        hint = Path if entry.alternatives == {Path} else str
+        hint = Path if entry.is_of(PathKind) else str
         if entry.kind.repeated or (entry.positional and isinstance(entry.kind, ListKind)):
             hint = list[hint]
     return hint if entry.required else hint | None
@@ -161,10 +163,6 @@ def _value(entry: Field, word: Any) -> Any:
         return word
     words = cast(list[Any], word) if isinstance(word, list) else [word]
     return entry.parse(list(map(str, words)))
-
-
-def _is_flag(entry: Field) -> bool:
-    return entry.alternatives == {bool}
 
 
 def _help(entry: Field, named: Callable[[str], str]) -> str:

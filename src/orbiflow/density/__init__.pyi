@@ -20,7 +20,6 @@ from .fitting.automatic import fit_automatic as fit_automatic
 from .fitting.flow import fit_density as fit_density
 from .fitting.folds import LEAST_PLACES as LEAST_PLACES
 from .fitting.folds import places as places
-from .fitting.kernels import blend_kernels as blend_kernels
 from .fitting.likelihood import Refinement as Refinement
 from .fitting.report import FitReport as FitReport
 from .fitting.report import Progress as Progress
@@ -96,7 +95,6 @@ from .spaces.catalogue import space_class as space_class
 from .spaces.flat import KleinBottle as KleinBottle
 from .spaces.flat import Torus as Torus
 from .spaces.patches import KleinCoordinates as KleinCoordinates
-from .spaces.patches import from_klein as from_klein
 from .spaces.patches import to_klein as to_klein
 from .spaces.round import ProjectivePlane as ProjectivePlane
 from .spaces.round import RoundSpace as RoundSpace

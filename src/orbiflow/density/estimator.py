@@ -25,11 +25,11 @@ from orbiflow.density.fitting import (
     weighed,
 )
 from orbiflow.density.inference import (
+    at_observed,
     axes_named,
     chart_of_observed,
     conditional,
     given_named,
-    log_prob_observed,
     marginal,
 )
 from orbiflow.density.models import MOST_DIM, Density, log_density_gradient
@@ -77,7 +77,7 @@ class DensityEstimator:
         missing: "refuse" rows that lack an angle (NaN), or, on tori, "marginalise": fit kernels and
             mixtures to them, and score them, by the density of the angles that they have.
         settings: Those of `DensitySettings`, by name: `components`, `repeats`, `max_frequency`,
-            `kernels`, `seconds`, `seed` and others. They are checked by `fit`.
+            `seconds`, `seed` and others. They are checked by `fit`.
 
     On tori of four or more angles there is no flow, and its settings must be left at their defaults.
 
@@ -143,16 +143,7 @@ class DensityEstimator:
         self.report_: FitReport
         if self.space_.dim > MOST_DIM:
             _refuse_flows(settings, self.space_)
-        if settings.flow_alone and self.missing != "refuse":
-            raise SettingError(
-                "{missing} marginalise needs kernels or mixtures, as flows cannot be fitted to rows "
-                "that lack angles; give other {components}, or leave {missing} out"
-            )
-        if settings.flow_alone and groups is not None:
-            raise SettingError(
-                "{groups} are held out where components are chosen, and a flow alone has no choice; "
-                "leave {groups} out, or give other {components}"
-            )
+        settings.check_rows(self.missing, None if groups is None else "groups")
         if settings.flow_alone:
             found = fit_density(
                 self.space_, points, settings.flow, weights=sample_weight, progress=progress
@@ -265,9 +256,7 @@ class DensityEstimator:
         density = self._fitted()
         with torch.no_grad():
             points = self._chart(np.asarray(X))
-            if bool(points.isnan().any()):
-                return log_prob_observed(density, points, measure=measure).numpy()
-            return density.log_prob(points, measure=measure).numpy()
+            return at_observed(density, points, measure=measure).numpy()
 
     def score_gradient(self, X: ArrayLike) -> Array:
         """Gradients (N, k) of the log density in natural measure, in the data's own coordinates.
@@ -369,7 +358,7 @@ class DensityEstimator:
 
 
 def _refuse_flows(settings: DensitySettings, space: Space) -> None:
-    given = [*settings.of_flow, *(["kernels"] if settings.kernels else [])]
+    given = list(settings.of_flow)
     if given:
         names = ", ".join(f"{{{name}}}" for name in given)
         raise SettingError(

@@ -147,17 +147,11 @@ def _tabulated(
     return kernels, log_total, max(error, float(twice.square().mean().sqrt()))
 
 
-@one_thread()
-@torch.no_grad()
 def log_prob_observed(density: Density, points: Tensor, *, measure: str = CHART) -> Tensor:
     """Return log densities (N,) at points (N, d) of a torus some of whose angles are missing (NaN).
 
     The density of a row is that of the angles that it has, integrated over the others, with respect to
     `measure` of those. Of a row that has none its logarithm is 0.
-
-    Raises:
-        OrbiflowError: for another space or shape, infinite angles, or a component that cannot be
-            integrated.
     """
     space = check_torus(
         as_instance(density, Density, "density").space, "densities at missing angles"
@@ -175,8 +169,12 @@ def observed_rows(values: Any, name: str, space: Space) -> Tensor:
     return rows
 
 
+@one_thread()
+@torch.no_grad()
 def at_observed(density: Density, points: Tensor, *, measure: str = CHART) -> Tensor:
-    """Return what `log_prob_observed` does, at float64 points (N, d) that are checked."""
+    """Return what `log_prob_observed` does, at points (N, d) of any space if none lacks anything."""
+    if not bool(points.isnan().any()):
+        return density.log_prob(points, measure=measure)
     found = torch.zeros(len(points), dtype=torch.float64)
     patterns, number = unique(~points.isnan(), dim=0, return_inverse=True)
     for k, pattern in enumerate(patterns):
@@ -279,9 +277,6 @@ def given_axes(given: Mapping[int, float], dim: int) -> tuple[tuple[int, ...], t
 def axes_named(wanted: Sequence[str | int], names: Sequence[str]) -> list[int]:
     """Return the numbers, from 0, of angles that are given by column names or by those numbers.
 
-    Raises:
-        OrbiflowError: for a name that no column has, or several.
-
     >>> axes_named(["psi", 0], ["phi", "psi"])
     [1, 0]
     """
@@ -305,12 +300,7 @@ def _named_axis(wanted: Any, names: Sequence[str]) -> int:
 def given_named(
     space: Space, given: Iterable[tuple[str | int, float]], names: Sequence[str]
 ) -> dict[int, float]:
-    """Return values in turns by numbers of angles, from values in the space's unit by columns.
-
-    Raises:
-        OrbiflowError: for another space, unknown columns, one that is given twice, or values that are
-            no finite numbers.
-    """
+    """Return values in turns by numbers of angles, from values in the space's unit by columns."""
     torus = check_torus(space, "conditional densities")
     found: dict[int, float] = {}
     for key, value in given:
@@ -322,11 +312,7 @@ def given_named(
 
 
 def chart_of_observed(space: Space, data: ArrayLike) -> Tensor:
-    """Return angles (N, k) in the space's unit, missing ones NaN, as points (N, k) of the torus.
-
-    Raises:
-        OrbiflowError: for another space or shape, or infinite angles.
-    """
+    """Return angles (N, k) in the space's unit, missing ones NaN, as points (N, k) of the torus."""
     torus = check_torus(space, "densities of rows that lack angles")
     values = observed_rows(data, "data", torus)
     return torus.project(torch.as_tensor(values / torus.period))

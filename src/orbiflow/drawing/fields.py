@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -69,24 +69,10 @@ _SAMPLES = 400
 """Points along the longer side at which a magnitude is evaluated."""
 
 
-class HasPolygon(Protocol):
-    """A tile, as far as a picture of a field needs to know it."""
-
-    @property
-    def polygon(self) -> Array:
-        """Its vertices (n, 2)."""
-        ...
-
-    @property
-    def center(self) -> Array:
-        """A point (2,) in its middle."""
-        ...
-
-
 def field_picture(
     velocity: Callable[[Any], Any],
     group: CrystallographicGroup,
-    tile: HasPolygon | None = None,
+    tile: Any = None,
     *,
     window: Window | None = None,
     sheet: Sheet | None = None,
@@ -101,7 +87,7 @@ def field_picture(
             float64 or of the module's dtype. For a NumPy field f give
             `lambda points: f(points.numpy())`.
         group: The group whose lattice cell is outlined, and whose centres and lines are marked.
-        tile: A tile to draw on top.
+        tile: A tile to draw on top: anything with a `polygon` (N, 2) and a `center` (2,).
         window: The window. Default: about four cells around the tile or the origin.
         sheet: The sheet. Default: a screen of 1200 pixels.
 

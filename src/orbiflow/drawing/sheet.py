@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from threading import Lock
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+from orbiflow.arguments import as_choice, as_number
 from orbiflow.errors import OrbiflowError
 from orbiflow.units import COLUMNS, length
 
@@ -83,20 +84,11 @@ class Sheet:
         Raises:
             OrbiflowError: If the word or the format is unknown, or the width below 40 or above 1000 mm.
         """
-        if format not in FORMATS:
-            raise OrbiflowError(f"format must be one of {', '.join(FORMATS)}, got {format!r}")
+        as_choice(format, FORMATS, "format")
         if isinstance(width, str):
-            if width not in COLUMNS:
-                raise OrbiflowError(
-                    f"width must be {', '.join(COLUMNS)} or a number of mm, got {width!r}"
-                )
-            width = COLUMNS[width]
-        if isinstance(width, bool) or not NARROWEST <= width <= WIDEST:
-            raise OrbiflowError(
-                f"a figure is {NARROWEST:g} to {WIDEST:g} mm wide, got {width!r}: narrower ones "
-                "have no room for texts that can be read"
-            )
-        return cls(float(width) / _INCH, TEXT, format, 600 if format == "png" else 300, True)
+            width = COLUMNS[as_choice(width, tuple(COLUMNS), "width")]
+        width = as_number(width, "width", NARROWEST, WIDEST)  # narrower ones have no room for texts
+        return cls(width / _INCH, TEXT, format, 600 if format == "png" else 300, True)
 
     @property
     def em(self) -> float:
@@ -217,7 +209,5 @@ def column_width(text: str) -> float:
     >>> column_width("double"), column_width("8.5cm")
     (180.0, 85.0)
     """
-    word = text.strip().lower()
-    width = COLUMNS[word] if word in COLUMNS else length(text)
-    Sheet.column(width)
-    return width
+    width = COLUMNS.get(text.strip().lower())
+    return length(text) if width is None else width

@@ -2,15 +2,12 @@ from .fourier import FourierField as FourierField
 from .invariants import InvariantField as InvariantField
 from .invariants import group_factor as group_factor
 from .invariants import steepness as steepness
-from .protocol import TimeDependentField as TimeDependentField
 from .protocol import VectorField as VectorField
 from .protocol import divergence as divergence
-from .protocol import is_time_dependent as is_time_dependent
 from .protocol import jacobian as jacobian
 from .protocol import lipschitz_bound as lipschitz_bound
 from .protocol import prepared as prepared
 from .protocol import prepared_with_divergence as prepared_with_divergence
-from .protocol import time_dependent as time_dependent
 from .protocol import transformed as transformed
 from .spline_field import SplineField as SplineField
 from .splines import padded as padded
@@ -18,9 +15,6 @@ from .splines import spline_sum as spline_sum
 from .splines import symbol as symbol
 from .symmetrization import PeriodicFeatures as PeriodicFeatures
 from .symmetrization import Symmetrized as Symmetrized
-from .symmetrization import neural_field as neural_field
 from .symmetrization import periodic_operator as periodic_operator
-from .symmetrization import rotation_operator as rotation_operator
 from .symmetrization import summed_over_powers as summed_over_powers
 from .symmetrization import symmetrize as symmetrize
-from .symmetrization import transflection_operator as transflection_operator

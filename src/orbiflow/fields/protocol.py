@@ -11,8 +11,6 @@ must do what is described here. `jacobian` returns dV_i / dp_j (..., d, d), `div
 | `bound()` | what depends only on the parameters is computed once for many evaluations |
 | `bound_with_divergence()` | V and its divergence come from shared work |
 | `lipschitz_bound()` | the accuracy of integration steps is judged without trying them |
-| `time_dependent` true | it is called as V(points, time), see `TimeDependentField` |
-| `with_divergence(points, time)`, if time-dependent | V and its divergence come from shared work |
 
 Built-in fields are evaluated by autograd functions with hand-written derivatives. Under `torch.func`
 ordinary operations compute the same sums: nested forward mode (`jacfwd` of `jacfwd`) through an
@@ -20,7 +18,7 @@ autograd function is silently wrong in torch 2.13, even if the function has its 
 """
 
 from collections.abc import Callable
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -32,52 +30,10 @@ VectorField = Callable[[Tensor], Tensor]
 """A map from points (..., d) to vectors (..., d)."""
 
 
-@runtime_checkable
-class TimeDependentField(Protocol):
-    """A field V(x, t): called with points (..., d) and a time, a tensor of shape ().
-
-    Mark a plain function by `time_dependent`.
-    """
-
-    time_dependent: bool
-
-    def __call__(self, points: Tensor, time: Tensor, /) -> Tensor: ...
-
-
-class _Marked:
-    time_dependent = True
-
-    def __init__(self, function: Callable[[Tensor, Tensor], Tensor]) -> None:
-        self._function = function
-        self.__name__ = getattr(function, "__name__", "")
-
-    def __call__(self, points: Tensor, time: Tensor, /) -> Tensor:
-        return self._function(points, time)
-
-
-def time_dependent(function: Callable[[Tensor, Tensor], Tensor]) -> TimeDependentField:
-    """Mark a plain function V(points, time) as a time-dependent field; also a decorator.
-
-    A torch module has an attribute `time_dependent = True` instead.
-
-    >>> import torch
-    >>> from orbiflow.flows import Flow
-    >>> turning = time_dependent(lambda p, t: torch.ones_like(p) * 2 * t)
-    >>> Flow(turning, steps=4, method="midpoint")(torch.zeros(2)).tolist()
-    [1.0, 1.0]
-    """
-    return _Marked(function)
-
-
-def is_time_dependent(field: object) -> bool:
-    """Return whether `field` is to be called as V(points, time)."""
-    return bool(getattr(field, "time_dependent", False))
-
-
 def jacobian(field: VectorField, points: Tensor) -> Tensor:
     """Return dV_i / dp_j at points (..., d), as (..., d, d): exact, d backward passes."""
     own: Any = getattr(field, "jacobian", None)
-    return own(points) if own else _by_autograd(field, points, field)[1]
+    return own(points) if own else _by_autograd(field, points)[1]
 
 
 def divergence(field: VectorField, points: Tensor) -> Tensor:
@@ -86,26 +42,23 @@ def divergence(field: VectorField, points: Tensor) -> Tensor:
     return own(points) if own else _trace(jacobian(field, points))
 
 
-def prepared(field: Callable[..., Tensor]) -> Callable[..., Tensor]:
-    """Return a function with the field's arguments, for many evaluations at fixed parameters."""
+def prepared(field: VectorField) -> VectorField:
+    """Return the field as a function for many evaluations at fixed parameters."""
     own: Any = getattr(field, "bound", None)
     return own() if own else field
 
 
-def prepared_with_divergence(field: Callable[..., Tensor]) -> Callable[..., tuple[Tensor, Tensor]]:
+def prepared_with_divergence(field: VectorField) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
     """Return, as `prepared` does, a function for V and its divergence, sharing work if possible."""
-    own: Any = field
-    timed = is_time_dependent(field)
-    if timed and hasattr(field, "with_divergence"):
-        return own.with_divergence
-    if not timed and hasattr(field, "bound_with_divergence"):
-        return own.bound_with_divergence()
-    in_closed_form = not timed and (hasattr(field, "divergence") or hasattr(field, "jacobian"))
+    own: Any = getattr(field, "bound_with_divergence", None)
+    if own:
+        return own()
+    in_closed_form = hasattr(field, "divergence") or hasattr(field, "jacobian")
 
-    def both(points: Tensor, *time: Tensor) -> tuple[Tensor, Tensor]:
+    def both(points: Tensor) -> tuple[Tensor, Tensor]:
         if in_closed_form:
             return field(points), divergence(field, points)
-        values, slopes = _by_autograd(lambda p: field(p, *time), points, field)
+        values, slopes = _by_autograd(field, points)
         return values, _trace(slopes)
 
     return both
@@ -121,16 +74,16 @@ def _trace(slopes: Tensor) -> Tensor:
     return slopes.diagonal(dim1=-2, dim2=-1).sum(dim=-1)
 
 
-def _by_autograd(function: VectorField, points: Tensor, owner: object) -> tuple[Tensor, Tensor]:
+def _by_autograd(field: VectorField, points: Tensor) -> tuple[Tensor, Tensor]:
     """Return V and its Jacobian, differentiable in the points and in what the field holds."""
     if transformed():
-        return _functionally(function, points)
-    keep = torch.is_grad_enabled() and _is_differentiable(function, points, owner)
+        return _functionally(field, points)
+    keep = torch.is_grad_enabled() and _is_differentiable(field, points)
     # inference mode would forbid derivatives even here
     with torch.inference_mode(False), torch.enable_grad():
         inputs = points.clone() if points.is_inference() else points
         inputs = inputs if inputs.requires_grad else inputs.detach().requires_grad_()
-        values = function(inputs)
+        values = field(inputs)
         if not values.requires_grad:  # a constant field
             return values, points.new_zeros(*points.shape, points.shape[-1])
         options: Any = {"create_graph": keep, "retain_graph": True, "materialize_grads": True}
@@ -139,21 +92,21 @@ def _by_autograd(function: VectorField, points: Tensor, owner: object) -> tuple[
     return values if keep else values.detach(), torch.stack(rows, dim=-2)
 
 
-def _functionally(function: VectorField, points: Tensor) -> tuple[Tensor, Tensor]:
+def _functionally(field: VectorField, points: Tensor) -> tuple[Tensor, Tensor]:
     """Return V and its Jacobian under `torch.func`, where requires_grad cannot be set."""
-    values, pull, *_ = torch.func.vjp(function, points)
+    values, pull, *_ = torch.func.vjp(field, points)
     units = torch.eye(points.shape[-1], dtype=points.dtype, device=points.device)
     rows = [pull(unit.expand(points.shape))[0] for unit in units]
     return values, torch.stack(rows, dim=-2)
 
 
-def _is_differentiable(function: VectorField, points: Tensor, owner: object) -> bool:
+def _is_differentiable(field: VectorField, points: Tensor) -> bool:
     if points.requires_grad:
         return True
-    if isinstance(owner, nn.Module) and any(p.requires_grad for p in owner.parameters()):
+    if isinstance(field, nn.Module) and any(p.requires_grad for p in field.parameters()):
         return True
     # a plain function may use parameters that show only in its values
-    return function(points).requires_grad
+    return field(points).requires_grad
 
 
 # torch uses these itself, but has neither public names nor types for them

@@ -8,7 +8,7 @@ that are periodic by themselves.
 import itertools
 import math
 from collections.abc import Callable
-from typing import Any
+from functools import partial
 
 import numpy as np
 import torch
@@ -16,17 +16,9 @@ from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields.protocol import VectorField, is_time_dependent, prepared_with_divergence
-from orbiflow.symmetry import (
-    CrystallographicGroup,
-    Isometry,
-    Line,
-    checked_group,
-    identity,
-    rotation,
-    transflection,
-)
-from orbiflow.typed_torch import linalg, random
+from orbiflow.fields.protocol import VectorField, prepared_with_divergence
+from orbiflow.symmetry import CrystallographicGroup, Isometry, checked_group, identity
+from orbiflow.typed_torch import linalg
 
 
 class Symmetrized(nn.Module):
@@ -36,40 +28,39 @@ class Symmetrized(nn.Module):
     """
 
     def __init__(
-        self, field: Callable[..., Tensor], group: CrystallographicGroup, *, periodic: bool = False
+        self, field: VectorField, group: CrystallographicGroup, *, periodic: bool = False
     ) -> None:
         super().__init__()
         self.field = field
         self.group = checked_group(group)
         self.periodic = periodic
-        self.time_dependent = is_time_dependent(field)
 
-    def forward(self, points: Tensor, *time: Tensor) -> Tensor:
-        """Return V at points (..., d), and at a time () if the field is time-dependent."""
+    def forward(self, points: Tensor) -> Tensor:
+        """Return V at points (..., d)."""
         images = self.group.images(points)
-        field = _at_time(self.field, time)
-        values = field(images) if self.periodic else blend(field, self.group.lattice, images)
+        values = (
+            self.field(images) if self.periodic else blend(self.field, self.group.lattice, images)
+        )
         return self._mean(values, points)
 
-    def with_divergence(self, points: Tensor, *time: Tensor) -> tuple[Tensor, Tensor]:
-        """Return V (..., d) and its divergence (...,): the mean of the given field's own at the images.
+    def divergence(self, points: Tensor) -> Tensor:
+        """Return the trace of the Jacobian at points (..., d), as (...,)."""
+        return self.bound_with_divergence()(points)[1]
+
+    def bound_with_divergence(self) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
+        """Return V and its divergence together: the mean of the given field's own at the images.
 
         Only the given field is differentiated, not the symmetrization: R^-1 J R has the trace of J.
         """
-        images = self.group.images(points)
-        joint = _at_time(prepared_with_divergence(self.field), time)
-        lattice = self.group.lattice
-        both = joint(images) if self.periodic else blend_with_divergence(joint, lattice, images)
-        values, divergence = both
-        return self._mean(values, points), divergence.mean(dim=0)
+        joint = prepared_with_divergence(self.field)
+        if not self.periodic:
+            joint = partial(blend_with_divergence, joint, self.group.lattice)
 
-    def divergence(self, points: Tensor, *time: Tensor) -> Tensor:
-        """Return the trace of the Jacobian at points (..., d), as (...,)."""
-        return self.with_divergence(points, *time)[1]
+        def both(points: Tensor) -> tuple[Tensor, Tensor]:
+            values, divergence = joint(self.group.images(points))
+            return self._mean(values, points), divergence.mean(dim=0)
 
-    def bound_with_divergence(self) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
-        """Return V and its divergence together, see `with_divergence`."""
-        return self.with_divergence
+        return both
 
     def _mean(self, values: Tensor, points: Tensor) -> Tensor:
         linear = torch.tensor(self.group.linear_parts, dtype=values.dtype, device=values.device)
@@ -81,20 +72,15 @@ class Symmetrized(nn.Module):
         return f"{self.group!r}, periodic={self.periodic}"
 
 
-def _at_time(field: Callable[..., Any], time: tuple[Tensor, ...]) -> Callable[[Tensor], Any]:
-    return (lambda points: field(points, *time)) if time else field
-
-
 def symmetrize(
-    field: Callable[..., Tensor], group: CrystallographicGroup, *, periodic: bool = False
+    field: VectorField, group: CrystallographicGroup, *, periodic: bool = False
 ) -> Symmetrized:
     """Make any field commute with `group`: V(g p) = R_g V(p).
 
     Args:
         field: Any callable from points (..., d) to vectors of the same shape: a torch module, a
-            function, a lambda, or a `TimeDependentField`. It need not be periodic: its translates
-            are blended smoothly over neighbouring cells (2^d evaluations). A field that already
-            commutes does not change.
+            function or a lambda. It need not be periodic: its translates are blended smoothly over
+            neighbouring cells (2^d evaluations). A field that already commutes does not change.
         group: A group of R^d.
         periodic: Whether `field` is known to be periodic under the group's lattice (for instance a
             network behind `PeriodicFeatures`), so that it need not be blended.
@@ -163,16 +149,6 @@ def periodic_operator(field: VectorField, lattice: ArrayLike) -> VectorField:
     return lambda points: field(points @ _inverse(lattice, points).mT) @ basis.to(points).mT
 
 
-def rotation_operator(field: VectorField, center: ArrayLike, order: int) -> VectorField:
-    """Return R_c^K(V) = sum over k = 1..K of R_o^-k o V o R_c^k (eq. R_c^K): a sum, not a mean."""
-    return summed_over_powers(field, rotation(center, order), order)
-
-
-def transflection_operator(field: VectorField, line: Line, mu: float) -> VectorField:
-    """Return G_l^mu(V) = V + M_l0 o V o T_l^mu o M_l (eq. G_l^mu): a sum, not a mean."""
-    return summed_over_powers(field, transflection(line, mu), 2)
-
-
 def summed_over_powers(field: VectorField, isometry: Isometry, terms: int) -> VectorField:
     """Return the sum over k < terms of g^-k o V o g^k for an isometry g: an operator of the paper."""
     powers = [identity(isometry.dim)]
@@ -220,33 +196,3 @@ class PeriodicFeatures(nn.Module):
         """Return features of shape (..., 2 M)."""
         phase = 2.0 * math.pi * points @ self.frequencies.to(points).mT
         return torch.cat([phase.cos(), phase.sin()], dim=-1)
-
-
-@torch.inference_mode(False)  # its divergence is taken by autograd
-def neural_field(
-    group: CrystallographicGroup,
-    *,
-    hidden: tuple[int, ...] = (64, 64),
-    max_frequency: int = 1,
-    seed: int = 0,
-    dtype: torch.dtype = torch.float64,
-) -> Symmetrized:
-    """Return a multilayer perceptron on periodic features, symmetrized over `group`.
-
-    The last layer starts at zero, so the flow starts at the identity. The same seed gives the same
-    weights; the global random state does not change.
-    """
-    features = PeriodicFeatures(group, max_frequency)
-    sizes = (features.size, *hidden, group.dim)
-    layers: list[nn.Module] = [features]
-    with random.fork_rng(devices=[]):
-        random.manual_seed(seed)
-        for i, (a, b) in enumerate(itertools.pairwise(sizes)):
-            layers.append(nn.Linear(a, b, dtype=dtype))
-            if i < len(sizes) - 2:
-                layers.append(nn.Tanh())
-    last = layers[-1]
-    assert isinstance(last, nn.Linear)  # by construction
-    nn.init.zeros_(last.weight)
-    nn.init.zeros_(last.bias)
-    return Symmetrized(nn.Sequential(*layers), group, periodic=True)

@@ -2,27 +2,18 @@
 
 import contextlib
 import copy
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from typing import Any, Self
 
-import torch
 from torch import Tensor, nn
 
 from orbiflow.arguments import is_a
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import (
-    TimeDependentField,
-    VectorField,
-    is_time_dependent,
-    prepared,
-    prepared_with_divergence,
-)
+from orbiflow.fields import VectorField, prepared, prepared_with_divergence
 from orbiflow.flows.integrators import RungeKutta, StepCheck
 from orbiflow.flows.integrators import method as runge_kutta
 from orbiflow.runtime import one_thread
-from orbiflow.typed_torch import linalg
 
-AnyField = VectorField | TimeDependentField
 State = tuple[Tensor, ...]
 
 # the number of coordinates from which several threads can be faster than one
@@ -32,22 +23,21 @@ MULTITHREADED_COORDINATES = 2**17
 class _FunctionSegment(nn.Module):
     """A module that holds a plain callable."""
 
-    def __init__(self, field: AnyField) -> None:
+    def __init__(self, field: VectorField) -> None:
         super().__init__()
         self.field = field
 
-    def forward(self, points: Tensor, *time: Tensor) -> Tensor:
-        return self.field(points, *time)
+    def forward(self, points: Tensor) -> Tensor:
+        return self.field(points)
 
 
 class Flow(nn.Module):
-    """The time-one map of dx/dt = V(x, t), or of several fields one after another.
+    """The time-one map of dx/dt = V(x), or of several fields one after another.
 
-    One stationary segment is the paper's model (section 2.1); more are more expressive (design point
-    5). A field may depend on time, see `orbiflow.fields.protocol`. Each segment lasts `duration`, and
-    its time begins at 0. If every field commutes with a group, so does the flow, up to rounding, for
-    any number of steps. Few points are moved on one thread; torch runs the backward passes of training
-    itself, so run those inside `orbiflow.runtime.one_thread`.
+    One segment is the paper's model (section 2.1); more are more expressive (design point 5), as a
+    field that changes with time would be. If every field commutes with a group, so does the flow, up to
+    rounding, for any number of steps. Few points are moved on one thread; torch runs the backward
+    passes of training itself, so run those inside `orbiflow.runtime.one_thread`.
 
     Args:
         fields: The vector fields, one per segment, from points (..., d) to vectors (..., d).
@@ -72,7 +62,7 @@ class Flow(nn.Module):
 
     def __init__(
         self,
-        fields: AnyField | Iterable[AnyField],
+        fields: VectorField | Iterable[VectorField],
         *,
         steps: int = 16,
         method: str = "rk4",
@@ -150,7 +140,7 @@ class Flow(nn.Module):
 
     def carried(self, points: Tensor, *, inverse: bool = False) -> Tensor:
         """Return `forward` or `inverse` without the check that the steps are fine enough."""
-        return self._last(points, (points,), inverse=inverse)[0]
+        return self._moved((points,), inverse=inverse)[0]
 
     def forward_and_log_det(self, points: Tensor) -> tuple[Tensor, Tensor]:
         """Return `forward` and the log-determinant (...,) of its Jacobian, from one integration.
@@ -169,23 +159,6 @@ class Flow(nn.Module):
         """Return log |det D forward| at points (..., d), as (...,)."""
         return self.forward_and_log_det(points)[1]
 
-    def trajectories(self, points: Tensor) -> Tensor:
-        """Return the paths: (T + 1, ..., d) with T = segments x steps, the points themselves first."""
-        self._check(points)
-        with _thread_limit(points):
-            states = self._walk((points,), inverse=False)
-            return torch.stack([points, *(state[0] for state in states)])
-
-    @torch.no_grad()
-    def error_estimate(self, points: Tensor, *, inverse: bool = False) -> float:
-        """Return the largest distance between the results with `steps` and with twice as many.
-
-        For a method of order p the error at `steps` is about 2^p / (2^p - 1) times this.
-        """
-        fine = self.with_steps(2 * self.steps).carried(points, inverse=inverse)
-        apart = self.carried(points, inverse=inverse) - fine
-        return float(linalg.vector_norm(apart, dim=-1).max())
-
     def _check(self, points: Tensor, *, inverse: bool = False) -> None:
         _check_points(points)
         if self._step_check is not None:
@@ -193,34 +166,22 @@ class Flow(nn.Module):
 
     def _with_log_det(self, points: Tensor, *, inverse: bool) -> tuple[Tensor, Tensor]:
         start = (points, points.new_zeros(points.shape[:-1]))
-        return self._last(points, start, inverse=inverse)  # pyright: ignore[reportReturnType]
+        return self._moved(start, inverse=inverse)  # pyright: ignore[reportReturnType]
 
-    def _last(self, points: Tensor, start: State, *, inverse: bool) -> State:
-        last = start
+    def _moved(self, state: State, *, inverse: bool) -> State:
+        """Return what becomes of points (..., d), and of their log-determinants if they are given."""
+        points, h = state[0], (-self.duration if inverse else self.duration) / self.steps
+        fields = self.fields()
         with _thread_limit(points):
             try:
-                for state in self._walk(start, inverse=inverse):
-                    last = state
+                for field in reversed(fields) if inverse else fields:
+                    slope = _slope(field, len(state) == 2)
+                    for _ in range(self.steps):
+                        state = self.integrator.step(slope, state, h)
             except RuntimeError as error:
                 self._explain(points, error)
                 raise
-        return last
-
-    def _walk(self, state: State, *, inverse: bool) -> Iterator[State]:
-        """Yield the state after every step: points (..., d), and the log-determinant if given one."""
-        size = len(state)
-        h = (-self.duration if inverse else self.duration) / self.steps
-        fields = self.fields()
-        for field in reversed(fields) if inverse else fields:
-            slope = _slope(field, size == 2)
-            if is_time_dependent(field):
-                # time is a part of the state, so that the tables for autonomous equations serve
-                one = state[0].new_ones(())
-                state = (*state, one * (self.duration if inverse else 0.0))
-            for _ in range(self.steps):
-                state = self.integrator.step(slope, state, h)
-                yield state[:size]
-            state = state[:size]
+        return state
 
     def _explain(self, points: Tensor, error: RuntimeError) -> None:
         """Explain torch's error if the dtypes of points and parameters differ."""
@@ -259,20 +220,18 @@ def _thread_limit(points: Tensor) -> contextlib.AbstractContextManager[None]:
     return one_thread() if small else contextlib.nullcontext()
 
 
-def _slope(field: Callable[..., Tensor], with_log_det: bool) -> Callable[[State], State]:
+def _slope(field: VectorField, with_log_det: bool) -> Callable[[State], State]:
     # fields prepare their weights once per segment, not once per stage
-    timed = is_time_dependent(field)
-    both = prepared_with_divergence(field) if with_log_det else None
-    plain = None if with_log_det else prepared(field)
+    evaluate: Any = prepared_with_divergence(field) if with_log_det else prepared(field)
 
     def slope(state: State) -> State:
-        points, *time = (state[0], state[-1]) if timed else (state[0],)
-        found: State = both(points, *time) if both is not None else (plain(points, *time),)  # pyright: ignore[reportOptionalCall]
+        points = state[0]
+        found: State = evaluate(points) if with_log_det else (evaluate(points),)
         if found[0].shape != points.shape:
             raise OrbiflowError(
                 "a field must give vectors of its points' shape: expected "
                 f"{tuple(points.shape)}, got {tuple(found[0].shape)}"
             )
-        return (*found, torch.ones_like(state[-1])) if timed else found
+        return found
 
     return slope

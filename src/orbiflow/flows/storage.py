@@ -163,7 +163,7 @@ class Reader:
 
 
 def is_perceptron(field: Any) -> bool:
-    """Return whether `field` is built like the network of `neural_field`."""
+    """Return whether `field` is a network of linear layers and tanh on `PeriodicFeatures`."""
     if type(field) is not nn.Sequential or len(field) < 2 or len(field) % 2:
         return False
     wanted = [PeriodicFeatures, *[nn.Linear, nn.Tanh] * (len(field) // 2)][: len(field)]

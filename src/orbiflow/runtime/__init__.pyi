@@ -1,4 +1,5 @@
 from .call_process import CallProcess as CallProcess
+from .events import NEVER as NEVER
 from .events import Cancel as Cancel
 from .events import Cancelled as Cancelled
 from .events import ClassFailed as ClassFailed
@@ -7,6 +8,7 @@ from .events import Failed as Failed
 from .events import Finished as Finished
 from .events import ItemDone as ItemDone
 from .events import Note as Note
+from .events import Polled as Polled
 from .events import Preview as Preview
 from .events import Progress as Progress
 from .events import Started as Started
@@ -24,6 +26,7 @@ from .files import check_outside_runs as check_outside_runs
 from .files import is_list as is_list
 from .files import is_object as is_object
 from .files import make_folder as make_folder
+from .files import read_json as read_json
 from .files import stays_inside as stays_inside
 from .files import write_atomic as write_atomic
 from .files import write_set as write_set

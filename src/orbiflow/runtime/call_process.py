@@ -15,13 +15,20 @@ import subprocess
 import sys
 import threading
 import traceback
-from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime.events import Cancel, Cancelled, Event, Failed, Finished, event_from_json
+from orbiflow.runtime.events import (
+    Cancel,
+    Cancelled,
+    Event,
+    Failed,
+    Finished,
+    Polled,
+    event_from_json,
+)
 from orbiflow.runtime.operations import Call, call_from_json
 from orbiflow.runtime.threads import one_thread_environment
 
@@ -41,7 +48,6 @@ class CallProcess:
     """
 
     def __init__(self, call: Call) -> None:
-        self.call = call
         self._lock = threading.Lock()
         # so that the process imports this very package
         package = str(Path(__file__).parents[2])
@@ -94,21 +100,16 @@ class CallProcess:
         with suppress(OSError):
             self._process.kill()
 
-    def wait(self, timeout: float | None = None) -> int:
-        """Return the exit code once the process has ended, or raise a `TimeoutError` after a time."""
-        try:
-            status = self._process.wait(timeout)
-        except subprocess.TimeoutExpired as error:
-            raise TimeoutError(f"the process still runs after {timeout:g} s") from error
+    def wait(self) -> int:
+        """Return the status of the process once it has ended.
+
+        It is 0 if it finished, 1 if it failed, and minus the signal that it died of.
+        """
+        status = self._process.wait()
         assert self._process.stdin is not None
         with self._lock, suppress(OSError):
             self._process.stdin.close()
         return status
-
-    @property
-    def exitcode(self) -> int | None:
-        """0 if it finished, 1 if it failed, minus the signal that it died of; None while it runs."""
-        return self._process.poll()
 
     def _send(self, data: bytes) -> None:
         assert self._process.stdin is not None
@@ -117,57 +118,43 @@ class CallProcess:
             self._process.stdin.flush()
 
 
-class _Listening(Cancel):
-    """A token that a word from the parent cancels, and its end."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        if os.name != "posix":  # pipes cannot be polled there, nor processes forked
-            threading.Thread(target=self._listen, daemon=True).start()
-
-    @property
-    def cancelled(self) -> bool:
-        if not self._told and os.name == "posix":
-            self._told = bool(select.select([0], [], [], 0)[0])
-        return self._told
-
-    def _listen(self) -> None:
-        os.read(0, 1)
-        self.cancel()
-
-
 def _main() -> int:
     """Run the call and tell its events; return the exit status."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
     events = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
-    last: deque[Event] = deque(maxlen=1)
 
     def tell(event: Event) -> None:
-        last.append(event)
         events.write(json.dumps(event.to_json(), allow_nan=False) + "\n")
         events.flush()
 
     try:
-        call = call_from_json(json.loads(_first_line()))
+        # a line and not a byte more: what follows must stay there to be noticed
+        with open(0, "rb", buffering=0, closefd=False) as words:
+            call = call_from_json(json.loads(words.readline()))
     except (OrbiflowError, ValueError, RecursionError) as error:
         tell(Failed(str(error), "mistake"))
         return 1
-    with suppress(BrokenPipeError, Cancelled, OrbiflowError):  # nobody listens, or it was told
-        try:
-            call.run(tell, _Listening())
-        except Exception as error:
-            if not isinstance(error, BrokenPipeError | Cancelled | OrbiflowError):
-                traceback.print_exc()
-    return 0 if last and isinstance(last[0], Finished) else 1
+    try:
+        call.run(tell, _token())
+    except Cancelled:
+        return 0
+    except (BrokenPipeError, OrbiflowError):  # nobody listens, or it was told
+        return 1
+    except Exception:
+        traceback.print_exc()
+        return 1
+    return 0
 
 
-def _first_line() -> bytes:
-    """Of the standard input, and not a byte more: what follows must stay there to be noticed."""
-    line = bytearray()
-    while (byte := os.read(0, 1)) not in (b"", b"\n"):
-        line += byte
-    return bytes(line)
+def _token() -> Cancel:
+    """Return a token that a word from the parent cancels, and its end."""
+    if os.name == "posix":
+        return Polled(lambda: bool(select.select([0], [], [], 0)[0]))
+    # pipes cannot be polled there, nor processes forked
+    cancel = Cancel()
+    threading.Thread(target=lambda: (os.read(0, 1), cancel.cancel()), daemon=True).start()
+    return cancel
 
 
 if __name__ == "__main__":

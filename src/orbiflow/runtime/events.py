@@ -15,6 +15,7 @@ import dataclasses
 import json
 import re
 import typing
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
@@ -250,3 +251,24 @@ class Cancel:
         """Raise `Cancelled` if the end was asked for; to be called between steps."""
         if self.cancelled:
             raise Cancelled
+
+
+class Polled(Cancel):
+    """A token that is also cancelled once `poll` returns true, or fails as the system does."""
+
+    def __init__(self, poll: Callable[[], bool]) -> None:
+        super().__init__()
+        self._poll = poll
+
+    @property
+    def cancelled(self) -> bool:
+        if not self._told:
+            try:
+                self._told = self._poll()
+            except OSError:
+                self._told = True
+        return self._told
+
+
+NEVER = Cancel()
+"""The default of functions that take a token: nobody cancels it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import secrets
 import shutil
@@ -11,7 +12,8 @@ from importlib import import_module
 from pathlib import Path, PurePosixPath
 from typing import Any, TypeGuard
 
-from orbiflow.errors import OutputError, system_errors
+from orbiflow.arguments import described
+from orbiflow.errors import InputFileError, OutputError, system_errors
 
 
 def write_atomic(path: str | os.PathLike[str], content: bytes | str) -> Path:
@@ -234,6 +236,29 @@ def _exchange_files(staged: Path, folder: Path) -> None:
         raise
     shutil.rmtree(aside, ignore_errors=True)
     staged.rmdir()
+
+
+MOST_JSON_BYTES = 256 * 2**20
+"""The largest file of JSON that is read."""
+
+
+def read_json(file: Path, what: str) -> dict[str, Any]:
+    """Return the JSON object in a file that is to hold `what`, such as "a report".
+
+    Raises:
+        InputFileError: If the file cannot be read, is too large, or holds none.
+    """
+    with system_errors(InputFileError, f"{file}: cannot be read"):
+        if file.stat().st_size > MOST_JSON_BYTES:
+            raise InputFileError(f"{file}: too large for {what}")
+        text = file.read_bytes()
+    try:
+        document: object = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputFileError(f"{file}: not JSON: {error}") from error
+    if not is_object(document):
+        raise InputFileError(f"{file}: not {what}: {described(document)} instead of an object")
+    return document
 
 
 def is_object(value: object) -> TypeGuard[dict[str, Any]]:

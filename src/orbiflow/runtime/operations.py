@@ -175,6 +175,7 @@ class Operation:
     @property
     def schema(self) -> dict[str, Any]:
         """The JSON form as JSON Schema."""
+        required = [entry.name for entry in self.fields if entry.required]
         return {
             "$schema": SCHEMA,
             "title": self.name,
@@ -185,11 +186,7 @@ class Operation:
                 "operation": {"const": self.name},
                 **{entry.name: entry.schema for entry in self.fields},
             },
-            "required": [
-                "schema_version",
-                "operation",
-                *(entry.name for entry in self.fields if entry.required),
-            ],
+            "required": ["schema_version", "operation", *required],
             "additionalProperties": False,
         }
 
@@ -208,7 +205,14 @@ class Call:
 
     def run(self, on_event: Sink = ignore, cancel: Cancel | None = None) -> Outcome:
         """Run the operation and tell its events."""
-        tell = _Teller(on_event)
+        broken = False  # whether the sink has failed: it is not told of that
+
+        def tell(event: Event) -> None:
+            nonlocal broken
+            broken = True
+            on_event(event)
+            broken = False
+
         tell(Started(self.operation.name))
         try:
             outcome = self.operation.function(
@@ -217,11 +221,11 @@ class Call:
         except Cancelled:
             tell(Finished("cancelled", {}))
             raise
-        except OrbiflowError as error:
-            tell.failed(Failed(str(error), "mistake"))
-            raise
         except Exception as error:
-            tell.failed(Failed(f"{type(error).__name__}: {error}", "error"))
+            known = isinstance(error, OrbiflowError)
+            message = str(error) if known else f"{type(error).__name__}: {error}"
+            if not broken:
+                tell(Failed(message, "mistake" if known else "error"))
             raise
         tell(Finished(outcome.state, outcome.summary))
         return outcome
@@ -333,20 +337,3 @@ def call_from_json(document: object) -> Call:
     if not isinstance(name, str):
         raise SettingError(f"{{operation}} must be a name, got {literal(described(name))}")
     return find(name).call(given)
-
-
-class _Teller:
-    """A sink that is not told of its own failure."""
-
-    def __init__(self, sink: Sink) -> None:
-        self.sink = sink
-        self.broken = False
-
-    def __call__(self, event: Event) -> None:
-        self.broken = True
-        self.sink(event)
-        self.broken = False
-
-    def failed(self, event: Event) -> None:
-        if not self.broken:
-            self(event)

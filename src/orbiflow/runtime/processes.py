@@ -17,7 +17,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime.events import Cancel, Cancelled
+from orbiflow.runtime.events import Cancel, Cancelled, Polled
 from orbiflow.runtime.threads import imported_torch, use_one_thread
 
 Function = Callable[[Any, Callable[[Any], None], Cancel], Any]
@@ -236,7 +236,7 @@ def _serve(channel: Connection, inherited: Iterable[Connection], function: Funct
     for other in inherited:
         other.close()
     use_one_thread()
-    cancel = _Asked(channel)
+    cancel = Polled(channel.poll)  # any word from its parent means stop, and its death
     with contextlib.suppress(EOFError, OSError, Cancelled):  # nobody listens any more
         while (order := channel.recv()) is not None:
             try:
@@ -256,23 +256,6 @@ def _portable(error: Exception) -> Exception:
     except Exception:
         return RuntimeError("\n".join([f"{type(error).__name__}: {error}", *error.__notes__]))
     return error
-
-
-class _Asked(Cancel):
-    """In a worker, a token that any word from its parent cancels, and its parent's death."""
-
-    def __init__(self, channel: Connection) -> None:
-        super().__init__()
-        self._channel = channel
-
-    @property
-    def cancelled(self) -> bool:
-        if not self._told:
-            try:
-                self._told = self._channel.poll()
-            except OSError:
-                self._told = True
-        return self._told
 
 
 def _send(channel: Connection, value: Any) -> None:

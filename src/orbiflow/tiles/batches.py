@@ -6,15 +6,13 @@ from pathlib import Path, PurePath
 from typing import Annotated, Any
 
 from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
-from orbiflow.runtime import Call, Cancel, Outcome, Sink, find, ignore, operation
+from orbiflow.runtime import NEVER, Call, Cancel, Outcome, Sink, find, ignore, operation
 from orbiflow.settings import Option
 from orbiflow.tiles.operations import ReadingSettings
 from orbiflow.tiles.search import SearchSettings
 
 # Endings of silhouettes that are no pictures: how these are read does not apply to them
 OUTLINES = (".svg", ".json", ".geojson", ".dat")
-
-NEVER = Cancel()
 
 
 @operation("batch", keeps_partial=True, starts_processes=True)
@@ -81,7 +79,7 @@ TILES = Kind(
     most_bytes=64 * 2**20,
     reads="image",
     writes="out",
-    modules=("orbiflow.tiles.pages.run_folder", "orbiflow.tiles.search.searching"),
+    modules=("orbiflow.tiles.pages.run_folder", "orbiflow.tiles.search.escherizing"),
     columns=(
         Column("class", "class"),
         Column("score", "score", ".3f"),

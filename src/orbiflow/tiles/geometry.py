@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from shapely.geometry import Polygon
+from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import is_tensor
@@ -162,6 +162,15 @@ def arc_lengths(ring: Array) -> Array:
     """
     sides = np.roll(ring, -1, axis=0) - ring
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(sides, axis=1))])
+
+
+def kept_vertices(line: Array, tolerance: float) -> list[int]:
+    """Return the points that Douglas and Peucker's simplification of a line (N, 2) keeps."""
+    simple = LineString(line).simplify(tolerance, preserve_topology=False)
+    kept: list[int] = [0]
+    for point in np.asarray(simple.coords)[1:]:  # bit for bit those of the line, and in order
+        kept.append(kept[-1] + int(np.flatnonzero((line[kept[-1] :] == point).all(axis=1))[0]))
+    return kept
 
 
 def border(triangles: Integers) -> Integers:

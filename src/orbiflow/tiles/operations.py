@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from orbiflow.runtime import (
+    NEVER,
     Cancel,
     Note,
     Outcome,
@@ -38,8 +39,6 @@ POOR = (
     "or more effort may do better"
 )
 """Said where nothing that was found looks like the silhouette."""
-
-NEVER = Cancel()
 
 
 class ReadingSettings(Settings, group="Reading the silhouette"):

@@ -15,14 +15,13 @@ import numpy as np
 from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.runtime import ResultFolder, is_list, is_object, make_folder, write_atomic
+from orbiflow.runtime import ResultFolder, is_list, is_object, make_folder, read_json, write_atomic
 from orbiflow.symmetry import CrystallographicGroup, Isometry, checked_lattice
 from orbiflow.tiles.likeness import Fidelity, Recognisability, ShapeMetrics, Thinnest
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import CLASSES, Tile, isohedral_class
 
 RESULT, TILE_MODEL = "result.json", "model.safetensors"
-MOST_BYTES = 256 * 2**20
 SCHEMA_VERSION = 1
 
 
@@ -87,21 +86,14 @@ def read_document(path: str | Path) -> tuple[Path, dict[str, Any]]:
     """Return the result.json at a path, or in a run's folder, and the object that it holds."""
     given = as_path(path, "the result")
     file = given / RESULT if given.is_dir() else given
-    try:
-        if file.stat().st_size > MOST_BYTES:
-            raise InputFileError(f"{file}: {file.stat().st_size:,} bytes is too large for a result")
-        document = json.loads(file.read_bytes())
-    except FileNotFoundError as error:
+    if not file.exists():
         if given.is_dir():
             what = f"{given} holds no {RESULT}; give the folder that orbiflow escherize wrote"
         else:
             what = f"{given}: no such file or folder; give what orbiflow escherize wrote"
-        raise InputFileError(what) from error
-    except OSError as error:
-        raise InputFileError(f"{file}: cannot be read: {error.strerror or error}") from error
-    except (ValueError, RecursionError) as error:
-        raise InputFileError(f"{file}: not JSON: {error}") from error
-    if not isinstance(document, dict) or "tiles" not in document:
+        raise InputFileError(what)
+    document = read_json(file, "a result of orbiflow escherize")
+    if "tiles" not in document:
         raise InputFileError(f"{file}: not a result of orbiflow escherize: it names no tiles")
     return file, document
 

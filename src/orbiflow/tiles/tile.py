@@ -9,7 +9,7 @@ from collections.abc import Generator
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -29,9 +29,6 @@ from orbiflow.tiles.silhouette import Bending, Frame
 from orbiflow.tiles.tilings import Certificate, Tile, certify
 
 if TYPE_CHECKING:
-    import torch
-    from numpy.typing import ArrayLike
-
     from orbiflow.tiles.art import ArtSettings, Artwork
     from orbiflow.tiles.exporting import Exported, ExportSettings
     from orbiflow.tiles.motion import AnimationSettings
@@ -325,12 +322,10 @@ class EscherTile:
             raise OrbiflowError(f"{self.name}: the flow that made this tile is not known")
         return as_model(self.map)
 
-    @overload
-    def forward(self, points: torch.Tensor) -> torch.Tensor: ...
-    @overload
-    def forward(self, points: ArrayLike) -> Array: ...
-    def forward(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
+    def forward(self, points: Any) -> Any:
         """Return where points (..., 2) of the silhouette go, in the input's coordinates.
+
+        Arrays and lists give an array, tensors a tensor.
 
         Raises:
             OrbiflowError: if there is no map.
@@ -338,11 +333,7 @@ class EscherTile:
         bending, frame = self.require_map()
         return frame.to_input(bending.forward(frame.to_normal(points)))
 
-    @overload
-    def inverse(self, points: torch.Tensor) -> torch.Tensor: ...
-    @overload
-    def inverse(self, points: ArrayLike) -> Array: ...
-    def inverse(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
+    def inverse(self, points: Any) -> Any:
         """Return where points (..., 2) of the tile come from; as `forward`."""
         bending, frame = self.require_map()
         return frame.to_input(bending.inverse(frame.to_normal(points)))
@@ -377,9 +368,9 @@ class EscherTile:
 
     def draw(self, *, width_px: int = 1600) -> bytes:
         """Return a PNG of the tiling."""
-        from orbiflow.tiles.pictures import tiling_png
+        from orbiflow.tiles.pictures import tiling_raster
 
-        return tiling_png(self.tile, y_down=self.y_down, width_px=width_px)
+        return tiling_raster(self.tile, y_down=self.y_down, width_px=width_px).png()
 
     def draw_art(
         self,

@@ -13,8 +13,8 @@ from orbiflow.runtime import Call, find
 
 QUICK: dict[str, Any] = {
     "space": "torus",
-    "components": ["kernels"],
-    "against": ["mixture"],
+    "components": ["mixture"],
+    "against": ["chains"],
     "folds": 3,
 }
 

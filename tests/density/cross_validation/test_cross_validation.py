@@ -47,7 +47,7 @@ def fold_call(**given: Any) -> Call:
     return find("density fold").call(given)
 
 
-ALL = [f"{name} 1.{fold}" for fold in (1, 2, 3) for name in ("kernels", "mixture")]
+ALL = [f"{name} 1.{fold}" for fold in (1, 2, 3) for name in ("mixture", "chains")]
 
 
 def test_each_row_is_scored_by_a_fit_to_the_other_folds(here: Here, tmp_path: Path) -> None:
@@ -59,7 +59,7 @@ def test_each_row_is_scored_by_a_fit_to_the_other_folds(here: Here, tmp_path: Pa
     data = np.array([[float(row["phi"]), float(row["psi"])] for row in rows])
     fold = np.array([int(row["fold"]) for row in rows])
     assert np.bincount(fold).tolist() == [0, 16, 16, 16]
-    for name in ("kernels", "mixture"):
+    for name in ("mixture", "chains"):
         expected = np.empty(len(rows))
         for k in (1, 2, 3):
             one = DensityEstimator(components=name).fit(data[fold != k])
@@ -127,17 +127,17 @@ def test_nothing_is_done_twice(here: Here, tmp_path: Path) -> None:
     assert again(workers=2, bootstrap=200, level=0.9) == []
     # another split is new, the first one stays
     assert again(times=2) == [key.replace("1.", "2.") for key in ALL]
-    assert again(against=["mixture", "chains"]) == [f"chains 1.{fold}" for fold in (1, 2, 3)]
+    assert again(against=["chains", "kernels"]) == [f"kernels 1.{fold}" for fold in (1, 2, 3)]
     data.write_text(data.read_text() + "\n# a comment\n")
     assert again() == []
     assert again(seed=1) == ALL
     assert again(folds=2) == [key for key in ALL if not key.endswith("3")]
-    (out / "folds" / "kernels-1-02" / "scores.csv").unlink()
-    with pytest.raises(OrbiflowError, match=r"kernels-1-02.scores\.csv: no such file"):
+    (out / "folds" / "mixture-1-02" / "scores.csv").unlink()
+    with pytest.raises(OrbiflowError, match=r"mixture-1-02.scores\.csv: no such file"):
         again(folds=2)
-    (out / "folds" / "kernels-1-02" / "report.json").unlink()
-    (out / "folds" / "kernels-1-02").rmdir()
-    assert again(folds=2) == ["kernels 1.2"]
+    (out / "folds" / "mixture-1-02" / "report.json").unlink()
+    (out / "folds" / "mixture-1-02").rmdir()
+    assert again(folds=2) == ["mixture 1.2"]
 
 
 def test_fits_of_other_settings_are_never_compared(here: Here, tmp_path: Path) -> None:
@@ -159,7 +159,7 @@ def test_stopping_keeps_what_was_finished(here: Here, tmp_path: Path) -> None:
     call, cancel = call_of(table_of(tmp_path)), Cancel()
 
     def stop(event: object) -> None:
-        if isinstance(event, ItemDone) and event.name == "folds/kernels-1-02":
+        if isinstance(event, ItemDone) and event.name == "folds/mixture-1-02":
             cancel.cancel()
 
     finished = run(call, stop, cancel)
@@ -242,7 +242,7 @@ def test_weights_and_rows_that_lack_angles(here: Here, tmp_path: Path) -> None:
     phi, psi = (column.astype(object) for column in angles(60).T)
     psi[::7] = ""
     data = write_table(tmp_path / "w.csv", {"phi": phi, "psi": psi, "weight": weights})
-    call = call_of(data, weights="weight", missing="marginalise")
+    call = call_of(data, weights="weight", missing="marginalise", against=["kernels"])
     run_call(call)
     rows = rows_of(call)
     assert all((row["fold"] == "") == (row["weight"] == "0") for row in rows)
@@ -284,7 +284,7 @@ def test_a_fold_that_fails_is_said_and_can_be_tried_again(here: Here, tmp_path: 
 def test_what_was_written_by_another_is_not_believed(here: Here, tmp_path: Path) -> None:
     call = call_of(table_of(tmp_path))
     run_call(call)
-    scores = call.flat["out"] / "folds" / "kernels-1-01" / "scores.csv"
+    scores = call.flat["out"] / "folds" / "mixture-1-01" / "scores.csv"
     text = scores.read_text()
     scores.write_text("\n".join(text.splitlines()[:-1]) + "\n")
     with pytest.raises(OrbiflowError, match="is not of the rows that were held out"):
@@ -335,7 +335,7 @@ def test_python_asks_for_the_same(here: Here, tmp_path: Path) -> None:
         ({"level": 1.0}, {"level"}),
         ({"against": ["kernel"]}, {"against"}),
         ({"against": [""]}, {"against"}),
-        ({"against": ["kernels"]}, {"components", "against"}),
+        ({"against": ["mixture"]}, {"components", "against"}),
         ({"components": []}, {"components"}),
         ({"workers": 2, "scheduler": "tcp://a:1"}, {"workers", "scheduler"}),
         ({"drop_missing": True, "missing": "marginalise"}, {"drop_missing", "missing"}),

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from density.blends import blended
+from density.blends import blended, identity_flow
 from orbiflow.density import (
     AdaptiveKernels,
     Mixture,
@@ -22,7 +22,6 @@ from orbiflow.density import (
     density_picture,
     make_space,
 )
-from orbiflow.density.models import identity_flow
 from orbiflow.density.pictures.figures import draw_density
 from orbiflow.density.pictures.maps import Map, chosen_map
 from orbiflow.density.pictures.overlays import MAX_COVER, uncrowded

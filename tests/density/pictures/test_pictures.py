@@ -10,7 +10,7 @@ import pytest
 import torch
 from PIL import Image
 
-from density.blends import blended
+from density.blends import blended, identity_flow
 from orbiflow.density import (
     AdaptiveKernels,
     FlowDensity,
@@ -29,7 +29,6 @@ from orbiflow.density import (
     samples_picture,
     to_vectors,
 )
-from orbiflow.density.models import identity_flow
 from orbiflow.density.pictures import square as density_square
 from orbiflow.density.pictures.axes import angle_axis, axis_label, view_of
 from orbiflow.density.pictures.colours import chosen_scale, density_at, is_sharp, shading

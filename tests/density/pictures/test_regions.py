@@ -10,7 +10,7 @@ import torch
 from matplotlib.contour import QuadContourSet
 from matplotlib.path import Path as MapPath
 
-from density.blends import blended
+from density.blends import blended, identity_flow
 from orbiflow.density import (
     AdaptiveKernels,
     Density,
@@ -26,7 +26,6 @@ from orbiflow.density import (
     plot_density,
     to_vectors,
 )
-from orbiflow.density.models import identity_flow
 from orbiflow.density.pictures.axes import view_of
 from orbiflow.density.pictures.projections import EqualEarth
 from orbiflow.errors import OrbiflowError

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.units import MILLIMETRES, length, size
+from orbiflow.kinds import Refused, kind_of
+from orbiflow.units import MILLIMETRES, Length, LengthOrZero, Size, length, size
 
 
 @given(st.floats(1e-3, 1e3), st.sampled_from(list(MILLIMETRES)))
@@ -32,9 +33,7 @@ def test_points_are_those_of_an_inch() -> None:
         ("40px", "unknown unit 'px'; use one of mm, cm, in, pt"),
         ("mm", "'mm' is not a length; write a number and its unit, such as 40mm"),
         ("", "is not a length"),
-        ("-3mm", "must be above 0"),
-        ("0mm", "must be above 0"),
-        ("0", "has no unit"),
+        ("-3mm", "is not a length"),
         ("1e9mm", "longer than 100 m"),
         ("1e999mm", "longer than 100 m"),
         ("nanmm", "is not a length"),
@@ -46,10 +45,11 @@ def test_no_lengths(text: str, message: str) -> None:
         length(text)
 
 
-def test_zero_where_it_is_one() -> None:
-    assert length("0", zero=True) == length("0.0 mm", zero=True) == 0
-    with pytest.raises(OrbiflowError, match="at least 0"):
-        length("-1mm", zero=True)
+@pytest.mark.parametrize("text", ["0", "0.0 mm"])
+def test_zero_where_it_is_one(text: str) -> None:
+    assert length(text) == kind_of(LengthOrZero).read(text) == 0
+    with pytest.raises(Refused, match="above 0"):
+        kind_of(Length).read(text)
 
 
 @pytest.mark.parametrize(
@@ -58,10 +58,15 @@ def test_zero_where_it_is_one() -> None:
         ("300x200", "has no unit; write 300x200mm"),
         ("300mm", "not a width and a height; write both and their unit, such as 300x200mm"),
         ("300x200x10mm", "not a width and a height"),
-        ("0x200mm", "above 0"),
+        ("-3x200mm", "not a width and a height"),
         ("300x200ft", "unknown unit 'ft'"),
     ],
 )
 def test_no_sizes(text: str, message: str) -> None:
     with pytest.raises(OrbiflowError, match=message):
         size(text)
+
+
+def test_no_size_is_without_area() -> None:
+    with pytest.raises(Refused, match="entry 1: must be above 0"):
+        kind_of(Size).read("0x200mm")

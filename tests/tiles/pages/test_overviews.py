@@ -16,6 +16,7 @@ from orbiflow.tiles import (
     EscherTile,
     LikenessSearch,
     OccupancySearch,
+    SearchResult,
     Target,
     escherize_class,
     folder_names,
@@ -86,7 +87,7 @@ def test_a_page_names_everything_and_refers_to_what_is_there(
     target: Target, bent: EscherTile, flowed: EscherTile, tmp_path: Path
 ) -> None:
     failed = [ClassFailure("IH21", "it <crosses> itself")]
-    write_gallery([bent, flowed, bent], target, tmp_path, failures=failed, figures=True)
+    write_gallery(SearchResult(target, [bent, flowed, bent], failed), tmp_path, figures=True)
     (tmp_path / "result.json").write_text("{}")
     page = Page((tmp_path / "index.html").read_text("utf-8"))
     assert ODD in page.words

@@ -20,7 +20,7 @@ from orbiflow.tiles import (
     colouring,
     copies_meeting,
     tiling_picture,
-    tiling_png,
+    tiling_raster,
     tiling_svg,
     tilings_png,
 )
@@ -34,7 +34,9 @@ def test_each_tile_has_its_colour(name: str) -> None:
     """In the middle of each tile the picture has the colour that the colouring says."""
     tiling = NAMED[name][0]
     window = (-1.3, -1.1, 1.2, 0.9)
-    picture = Image.open(io.BytesIO(tiling_png(tiling, window, width_px=500))).convert("RGB")
+    picture = Image.open(io.BytesIO(tiling_raster(tiling, window, width_px=500).png())).convert(
+        "RGB"
+    )
     copies = copies_meeting(tiling, window)
     colours = colouring(tiling).colours(copies)
     seen = 0

@@ -9,7 +9,7 @@ import pytest
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
-from orbiflow.runtime import Cancel
+from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles import (
     CLASSES,
     EscherizeSettings,
@@ -19,12 +19,12 @@ from orbiflow.tiles import (
     Target,
     escherize,
     report,
-    search_classes,
 )
 from orbiflow.tiles.search import BothSearch, Goal, SearchMethod
-from orbiflow.tiles.search.candidates import WAVES, Progress, StillTiles
+from orbiflow.tiles.search.candidates import WAVES, OnProgress, StillTiles, silent
 from orbiflow.tiles.search.starts import template_starts
 from orbiflow.tiles.tilings import IsohedralClass
+from outlines import searched
 
 BOOT = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])
 
@@ -43,14 +43,12 @@ class TemplateSearch(SearchMethod):
         kind: IsohedralClass,
         *,
         per_class: int = 1,
-        progress: Progress | None = None,
-        cancel: Cancel | None = None,
+        progress: OnProgress = silent,
+        cancel: Cancel = NEVER,
     ) -> Fit:
         starts = template_starts(kind, turns=self.turns, stretch=0.2, phase=self.seed / 10)
-        if cancel is not None:
-            cancel.check()
-        if progress is not None:
-            progress(1.0, float(goal.target.area))
+        cancel.check()
+        progress(1.0, float(goal.target.area))
         return Fit(StillTiles(kind, starts), len(starts), 0, per_class)
 
 
@@ -70,7 +68,7 @@ def test_a_method_of_one_s_own_is_searched_with(workers: int) -> None:
 def test_what_it_does_not_take_is_refused() -> None:
     pins = Pins.at(BOOT, [(0.2, 0.2)])
     with pytest.raises(OrbiflowError, match="pins"):
-        search_classes(BOOT, "IH4", TemplateSearch(), pins=pins)
+        searched(BOOT, ["IH4"], TemplateSearch(), pins=pins)
     with pytest.raises(OrbiflowError, match="fits twice"):
         BothSearch().fit(Goal(BOOT), CLASSES["IH4"])
 

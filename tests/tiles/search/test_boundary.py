@@ -8,9 +8,10 @@ import torch
 
 from orbiflow.errors import CertificationError
 from orbiflow.tiles import CLASSES, TileModel, certify
-from orbiflow.tiles.search import model
+from orbiflow.tiles.search import tile_model
 from orbiflow.tiles.search.candidates import DENSE, TOLERANCES
-from orbiflow.tiles.search.model import converge, extract_tile
+from orbiflow.tiles.search.tile_model import converge, extract_tile
+from strategies import error_estimate
 
 
 def bent(name: str, rms: float = 0.15, seed: int = 0) -> TileModel:
@@ -44,7 +45,7 @@ def test_converge_doubles_until_accurate() -> None:
         exact = model.flow.with_steps(16 * chosen)(points)
     assert (moved - exact).norm(dim=-1).max().item() <= 1e-7
     # no finer than need be: an eighth of the steps is too coarse
-    assert model.flow.with_steps(max(1, chosen // 8)).error_estimate(points) > 1e-7
+    assert error_estimate(model.flow.with_steps(max(1, chosen // 8)), points) > 1e-7
 
 
 def test_converge_gives_up_on_a_steep_field() -> None:
@@ -109,7 +110,7 @@ def test_a_crossing_boundary_is_refused_unless_forced() -> None:
 
 
 def test_force_takes_an_inaccurate_flow(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(model, "MAX_STEPS", 8)
+    monkeypatch.setattr(tile_model, "MAX_STEPS", 8)
     with pytest.raises(CertificationError, match="not accurate"):
         extract_tile(bent("IH3"))
     # edges match at any number of steps (design point 5)

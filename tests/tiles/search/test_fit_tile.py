@@ -19,8 +19,8 @@ from orbiflow.tiles import (
     fit_descent,
     fit_occupancy,
     fit_tile,
-    search_classes,
 )
+from outlines import searched
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 TARGET = Target.from_polygon(BOOT)
@@ -39,7 +39,7 @@ def test_the_two_steps_give_what_the_search_gives(method: str) -> None:
     found = fit_tile(TARGET, "IH4", settings)
     tiles = certified_tiles(TARGET, found)
     assert all(certify(tile.tile).valid for tile in tiles)
-    (best,), _ = search_classes(TARGET, "IH4", settings)
+    (best,), _ = searched(TARGET, ["IH4"], settings)
     assert np.array_equal(tiles[0].tile.polygon, best.tile.polygon)
 
 

@@ -8,8 +8,8 @@ import pytest
 from orbiflow.tiles import CLASSES, EscherTile, LikenessSearch
 from orbiflow.tiles.search.bending import fit_bending
 from orbiflow.tiles.search.both_search import behind, deformation, front_list, measured
-from orbiflow.tiles.search.certifying import best_tiles
 from orbiflow.tiles.search.co_deformation import hands
+from orbiflow.tiles.search.finished_tiles import best_tiles
 from outlines import animal
 
 SQUIRREL = animal("squirrel.dat")

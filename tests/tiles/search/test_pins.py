@@ -7,8 +7,8 @@ import pytest
 import shapely
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import Emphasis, EscherTile, LikenessSearch, OverlapSearch, Pins, search_classes
-from outlines import animal
+from orbiflow.tiles import Emphasis, EscherTile, LikenessSearch, OverlapSearch, Pins
+from outlines import animal, searched
 
 SQUIRREL = animal("squirrel.dat")
 HEAD = (230, 190, 140)
@@ -29,12 +29,12 @@ def head_misfit(result: EscherTile, pins: Pins) -> tuple[float, float]:
 
 @pytest.fixture(scope="module", name="free")
 def free_fixture() -> list[EscherTile]:
-    return search_classes(SQUIRREL, CLASSES, QUICK)[0]
+    return searched(SQUIRREL, CLASSES, QUICK)[0]
 
 
 @pytest.fixture(scope="module", name="pinned")
 def pinned_fixture() -> list[EscherTile]:
-    return search_classes(SQUIRREL, CLASSES, QUICK, pins=Pins.at(SQUIRREL, [HEAD]))[0]
+    return searched(SQUIRREL, CLASSES, QUICK, pins=Pins.at(SQUIRREL, [HEAD]))[0]
 
 
 def test_a_pinned_head_keeps_its_shape(free: list[EscherTile], pinned: list[EscherTile]) -> None:
@@ -67,7 +67,7 @@ def test_the_tile_itself_has_the_head(pinned: list[EscherTile]) -> None:
 
 def test_a_pinned_head_keeps_its_angle() -> None:
     pins = Pins.at(SQUIRREL, [HEAD], keep_angle=True)
-    held, _ = search_classes(SQUIRREL, CLASSES, QUICK, pins=pins)
+    held, _ = searched(SQUIRREL, CLASSES, QUICK, pins=pins)
     assert len(held) == 2
     assert max(abs(head_misfit(result, pins)[1]) for result in held) < np.radians(5)
     assert all(result.pinned is not None and result.pinned < 0.02 for result in held)
@@ -78,7 +78,7 @@ def test_a_head_that_would_turn_does_not(name: str) -> None:
     turns = []
     for keep in (False, True):
         pins = Pins.at(SQUIRREL, [HEAD], keep_angle=keep)
-        (result,) = search_classes(SQUIRREL, [name], replace(QUICK, starts=12), pins=pins)[0]
+        (result,) = searched(SQUIRREL, [name], replace(QUICK, starts=12), pins=pins)[0]
         turns.append(abs(head_misfit(result, pins)[1]))
     assert turns[0] > np.radians(5)
     assert turns[0] > 2 * turns[1]
@@ -87,9 +87,9 @@ def test_a_head_that_would_turn_does_not(name: str) -> None:
 def test_pins_need_a_search_where_something_bends() -> None:
     pins = Pins.at(SQUIRREL, [HEAD])
     with pytest.raises(OrbiflowError, match="pins belong to the search for likeness"):
-        search_classes(SQUIRREL, ["IH4"], OverlapSearch.for_effort("fast"), pins=pins)
+        searched(SQUIRREL, ["IH4"], OverlapSearch.for_effort("fast"), pins=pins)
     with pytest.raises(OrbiflowError, match="pins must be a Pins"):
-        search_classes(SQUIRREL, ["IH4"], QUICK, pins=HEAD)  # pyright: ignore[reportArgumentType]
+        searched(SQUIRREL, ["IH4"], QUICK, pins=HEAD)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize("strength", [1.001, 100.0])
@@ -107,5 +107,5 @@ def test_emphasis_of_any_strength_can_be_searched_with(
     low, high = target.normal.min(axis=0), target.normal.max(axis=0)
     emphasis = Emphasis(mask, (*low.tolist(), *high.tolist()), strength)
     hasty = LikenessSearch(placements=30, held=4, starts=1, finalists=1, rounds=6, multiples=(4,))
-    results, _ = search_classes(target, ["IH4"], hasty, emphasis=emphasis)
+    results, _ = searched(target, ["IH4"], hasty, emphasis=emphasis)
     assert all(result.certificate.valid for result in results)

@@ -14,14 +14,8 @@ import pytest
 import shapely
 from shapely import affinity
 
-from orbiflow.tiles import (
-    ClassFailure,
-    OccupancySearch,
-    SearchResult,
-    Target,
-    report,
-    search_classes,
-)
+from orbiflow.tiles import ClassFailure, OccupancySearch, SearchResult, Target, report
+from outlines import searched
 
 DOCS = Path(__file__).parents[3] / "docs"
 SCHEMA = json.loads((DOCS / "result.schema.json").read_text(encoding="utf-8"))
@@ -40,7 +34,7 @@ QUICK = OccupancySearch(
 def case(request: pytest.FixtureRequest) -> tuple[Target, dict[str, Any]]:
     """A target and its document as read back from JSON."""
     target = Target.from_polygon(BOOT, y_down=request.param)
-    results, failures = search_classes(target, CLASSES, QUICK)
+    results, failures = searched(target, CLASSES, QUICK)
     assert len(results) == 3
     failures = [*failures, ClassFailure("IH2", "the boundary crosses itself")]
     found = SearchResult(target, results, failures, method=QUICK, seconds=12.3456, workers=2)

@@ -12,7 +12,7 @@ from orbiflow.errors import CertificationError
 from orbiflow.tiles import CLASSES, EscherTile, Fit, Target, TileMap, TileModel, as_model, certify
 from orbiflow.tiles.result_file import tile_json
 from orbiflow.tiles.search.candidates import DENSE
-from orbiflow.tiles.search.certifying import best_tiles
+from orbiflow.tiles.search.finished_tiles import best_tiles
 from strategies import random_tensor
 
 KIND = CLASSES["IH21"]

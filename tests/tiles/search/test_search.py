@@ -1,6 +1,5 @@
 """Searches over classes, in this process and in others."""
 
-import math
 import multiprocessing
 import threading
 from dataclasses import replace
@@ -10,26 +9,26 @@ import pytest
 import torch
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Cancel, Cancelled
+from orbiflow.runtime import Cancel, Cancelled, ClassFailed, Event, Preview, Progress, TileFound
 from orbiflow.tiles import (
     CLASSES,
     BothSearch,
     ClassFailure,
+    EscherizeSettings,
     EscherTile,
-    Event,
     LikenessSearch,
     OccupancySearch,
     OverlapSearch,
     Target,
     TileModel,
+    escherize,
     escherize_class,
     isohedral_class,
-    search_classes,
 )
 from orbiflow.tiles.likeness import mutual_iou
 from orbiflow.tiles.search import occupancy
 from orbiflow.tiles.search.likeness_search import SKETCH
-from outlines import animal
+from outlines import animal, searched
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 QUICK = OccupancySearch(
@@ -51,18 +50,17 @@ def crossed(*_: object, **__: object) -> TileModel:
 
 def test_the_same_tiles_whatever_the_number_of_workers() -> None:
     events: list[Event] = []
-    here, none = search_classes(TARGET, ["ih4", "28", "IH4"], QUICK, watch=events.append)
+    here, none = searched(TARGET, ["ih4", "28", "IH4"], QUICK, on_event=events.append)
     assert none == []
     assert sorted(r.name for r in here) == ["IH28", "IH4"]
     assert here[0].metrics.iou > here[1].metrics.iou > 0.7
     for name in ("IH4", "IH28"):
-        own = [event for event in events if event.name == name]
-        shares = [event.share for event in own]
-        assert shares == sorted(shares)
-        assert shares[-1] == 1.0
-        assert isinstance(own[-1].outcome, EscherTile)
-        assert all(event.outcome is None and math.isfinite(event.loss) for event in own[:-1])
-    elsewhere, none = search_classes(TARGET, ["IH28", "IH4"], QUICK, workers=2)
+        *steps, last, outcome = of_class(events, name)
+        assert isinstance(outcome, TileFound)
+        assert isinstance(last, Progress)
+        assert last.class_share == 1.0
+        assert all(isinstance(event, Progress) and event.loss is not None for event in steps)
+    elsewhere, none = searched(TARGET, ["IH28", "IH4"], QUICK, workers=2)
     assert none == []
     for one, other in zip(here, elsewhere, strict=True):
         assert one.name == other.name
@@ -98,12 +96,13 @@ def test_a_fit_that_runs_away_is_a_failure(force: bool) -> None:
 def test_a_class_whose_finalists_all_fold(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(occupancy, "fit_occupancy", crossed)
     events: list[Event] = []
-    results, failures = search_classes(TARGET, ["IH21"], QUICK, watch=events.append)
+    results, failures = searched(TARGET, ["IH21"], QUICK, on_event=events.append)
     assert results == []
     assert [f.name for f in failures] == ["IH21"]
     assert "crosses itself" in failures[0].reason
-    assert events == [Event("IH21", 1.0, events[0].loss, failures[0])]
-    results, failures = search_classes(TARGET, ["IH21"], QUICK, force=True)
+    reason = failures[0].reason
+    assert events[1:] == [Progress(1.0, "fitting", "IH21", 1.0), ClassFailed("IH21", reason)]
+    results, failures = searched(TARGET, ["IH21"], QUICK, force=True)
     assert failures == []
     assert not results[0].certificate.valid
     assert "not simple" in results[0].certificate.reasons[0]
@@ -114,17 +113,26 @@ SHORT = replace(QUICK, iterations=2, affine_iterations=1, turns=1)
 both = pytest.mark.parametrize("workers", [1, 2])
 
 
+def is_outcome(event: Event) -> bool:
+    return isinstance(event, TileFound | ClassFailed)
+
+
+def of_class(events: list[Event], name: str) -> list[Event]:
+    """The steps of a class and its outcome."""
+    kinds = (Progress, TileFound, ClassFailed)
+    return [event for event in events if isinstance(event, kinds) and event.class_name == name]
+
+
 def checked(events: list[Event], names: list[str]) -> None:
-    """The order that `Event` promises."""
-    previews = [k for k, event in enumerate(events) if event.preview is not None]
-    assert previews in ([], [0])
+    """The order that `orbiflow.runtime.events` promises."""
+    assert events[0] == Progress(0.0, "fitting")
+    previews = [k for k, event in enumerate(events) if isinstance(event, Preview)]
+    assert previews in ([], [1])
     for name in names:
-        own = [event for event in events if event.name == name and event.preview is None]
-        shares = [event.share for event in own]
+        own = of_class(events, name)
+        assert [is_outcome(event) for event in own] == [False] * (len(own) - 1) + [True]
+        shares = [event.class_share or 0.0 for event in own if isinstance(event, Progress)]
         assert shares == sorted(shares)
-        assert [event.outcome is not None for event in own] == [False] * (len(own) - 1) + [True]
-        assert own[-1].outcome is not None
-        assert own[-1].outcome.name == name
 
 
 @both
@@ -136,10 +144,13 @@ def test_events_come_in_order_and_in_this_thread(workers: int) -> None:
         events.append(event)
         threads.add(threading.get_ident())
 
-    search_classes(TARGET, NAMES, QUICK, workers=workers, watch=watch)
+    searched(TARGET, NAMES, QUICK, workers=workers, on_event=watch)
     checked(events, NAMES)
     assert threads == {threading.get_ident()}
-    assert {event.share for event in events if event.outcome is not None} == {1.0}
+    for name in NAMES:
+        last = of_class(events, name)[-2]
+        assert isinstance(last, Progress)
+        assert last.class_share == 1.0
     assert len(events) > 2 * len(NAMES)
 
 
@@ -153,12 +164,12 @@ def test_what_watch_raises_ends_the_search(
 
     def watch(event: Event) -> None:
         told.append(event)
-        if (event.outcome is not None) == with_outcome:
+        if is_outcome(event) == with_outcome:
             raise error
 
     with pytest.raises(error):
-        search_classes(TARGET, NAMES, QUICK, workers=workers, watch=watch)
-    assert sum((event.outcome is not None) == with_outcome for event in told) == 1
+        searched(TARGET, NAMES, QUICK, workers=workers, on_event=watch)
+    assert sum(is_outcome(event) == with_outcome for event in told) == 1
     assert multiprocessing.active_children() == []
 
 
@@ -168,11 +179,11 @@ def test_cancelling_keeps_what_was_finished(workers: int) -> None:
 
     def watch(event: Event) -> None:
         events.append(event)
-        if event.outcome is not None:
+        if is_outcome(event):
             cancel.cancel()
 
-    results, failures = search_classes(
-        TARGET, NAMES, SHORT, workers=workers, watch=watch, cancel=cancel
+    results, failures = searched(
+        TARGET, NAMES, SHORT, workers=workers, on_event=watch, cancel=cancel
     )
     checked(events, NAMES)
     # what workers had in hand when they were told may have been finished, too
@@ -188,11 +199,12 @@ def test_a_fit_is_left_between_two_steps(workers: int) -> None:
 
     def watch(event: Event) -> None:
         events.append(event)
-        cancel.cancel()
+        if isinstance(event, Progress) and event.class_name:
+            cancel.cancel()
 
     endless = replace(QUICK, iterations=10**6, affine_iterations=1, turns=1)
-    results, failures = search_classes(
-        TARGET, NAMES, endless, workers=workers, watch=watch, cancel=cancel
+    results, failures = searched(
+        TARGET, NAMES, endless, workers=workers, on_event=watch, cancel=cancel
     )
     assert results == []
     assert failures == [ClassFailure(name, "interrupted") for name in NAMES]
@@ -205,48 +217,44 @@ def test_a_search_may_be_cancelled_before_it_begins(workers: int) -> None:
     cancel = Cancel()
     cancel.cancel()
     events: list[Event] = []
-    results, failures = search_classes(
-        TARGET, NAMES, QUICK, workers=workers, watch=events.append, cancel=cancel
+    results, failures = searched(
+        TARGET, NAMES, QUICK, workers=workers, on_event=events.append, cancel=cancel
     )
     assert results == []
     assert [f.name for f in failures] == NAMES
-    assert len(events) == len(NAMES)
+    assert len(events) == 1 + 2 * len(NAMES)
 
 
 def test_one_class_alone_is_cancelled_by_an_exception() -> None:
     cancel = Cancel()
     endless = replace(QUICK, iterations=10**6, affine_iterations=1, turns=1)
     with pytest.raises(Cancelled):
-        escherize_class(TARGET, "IH2", endless, watch=lambda _: cancel.cancel(), cancel=cancel)
+        escherize_class(TARGET, "IH2", endless, progress=lambda *_: cancel.cancel(), cancel=cancel)
 
 
 def test_one_class_may_be_given_by_its_name() -> None:
     for given in ("IH4", 4, isohedral_class("ih4")):
-        results, failures = search_classes(TARGET, given, QUICK)
-        assert [r.name for r in results] == ["IH4"]
-        assert not failures
+        assert escherize_class(TARGET, given, SHORT).name == "IH4"
     with pytest.raises(OrbiflowError, match="unknown isohedral class 'IH8'"):
-        search_classes(TARGET, "IH8", QUICK)
-    with pytest.raises(OrbiflowError, match='classes must be a name such as "IH4", or a list'):
-        search_classes(TARGET, 1.5, QUICK)  # pyright: ignore[reportArgumentType]
+        escherize_class(TARGET, "IH8", QUICK)
 
 
 def test_arguments_are_checked() -> None:
     with pytest.raises(OrbiflowError, match=r"unknown isohedral class 'IH8'; the nine are IH1, .*"):
-        search_classes(TARGET, ["IH4", "IH8"], QUICK)
-    with pytest.raises(OrbiflowError, match="no isohedral class was given"):
-        search_classes(TARGET, [], QUICK)
+        searched(TARGET, ["IH4", "IH8"], QUICK)
+    with pytest.raises(OrbiflowError, match="classes must be classes such as IH4,IH6, or all"):
+        searched(TARGET, [], QUICK)
     for workers in (0, -1):
         with pytest.raises(OrbiflowError, match=f"workers must be at least 1, got {workers}"):
-            search_classes(TARGET, ["IH4"], QUICK, workers=workers)
+            searched(TARGET, ["IH4"], QUICK, workers=workers)
 
 
 @pytest.mark.parametrize("wrong", ["fast", 3, {"placements": 5}])
 def test_settings_of_no_method_are_refused(wrong: object) -> None:
     with pytest.raises(OrbiflowError, match=r"the method must be a search such as .*, got"):
-        search_classes(TARGET, ["IH1"], wrong)  # pyright: ignore[reportArgumentType]
+        escherize(TARGET, method=wrong)  # pyright: ignore[reportArgumentType]
     with pytest.raises(OrbiflowError, match="the target must be a Target"):
-        search_classes("turtle.png", ["IH1"])  # pyright: ignore[reportArgumentType]
+        escherize("turtle.png")  # pyright: ignore[reportArgumentType]
 
 
 def test_of_both_objectives_one_may_fail() -> None:
@@ -264,18 +272,19 @@ def test_both_objectives_give_a_short_list_likeness_first() -> None:
     likeness = LikenessSearch(placements=40, held=8, starts=4, finalists=3, rounds=6)
     settings = BothSearch(likeness, BRIEF)
     events: list[Event] = []
-    results, failures = search_classes(SQUIRREL, ["IH4", "IH6"], settings, watch=events.append)
-    assert not failures
-    assert max(event.share for event in events) <= 1
+    own = EscherizeSettings(classes=("IH4", "IH6"))
+    search = escherize(SQUIRREL, own, method=settings, on_event=events.append)
+    results, found = search.tiles, search.found
+    assert not search.failures
+    shares = [event.share for event in events if isinstance(event, Progress)]
+    assert shares == sorted(shares)
+    assert shares[-1] <= 1
     objectives = [r.objective for r in results]
     assert objectives == sorted(objectives)  # alphabet is on our side
     assert set(objectives) == {"likeness", "overlap"}
     for kind in ("likeness", "overlap"):
         scores = [r.score for r in results if r.objective == kind]
         assert scores == sorted(scores, reverse=True)
-    found = [
-        tile for e in events if isinstance(e.outcome, EscherTile) for tile in e.outcome.family()
-    ]
     assert len(found) >= len(results)
     places = [(r.deformation or 0.0, r.metrics.iou) for r in found]
     for r in results:
@@ -297,7 +306,7 @@ def test_both_objectives_give_a_short_list_likeness_first() -> None:
     ids=["likeness", "overlap"],
 )
 def test_several_of_a_class_differ(settings: LikenessSearch | OverlapSearch) -> None:
-    results, _ = search_classes(SQUIRREL, ["IH4", "IH6"], settings, per_class=4)
+    results, _ = searched(SQUIRREL, ["IH4", "IH6"], settings, per_class=4)
     for name in ("IH4", "IH6"):
         own = [r for r in results if r.name == name]
         assert 1 <= len(own) <= 4

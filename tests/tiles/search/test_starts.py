@@ -9,6 +9,7 @@ import torch
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles import CLASSES, TileModel
 from orbiflow.tiles.search.starts import initial_poses, template_symmetries
+from orbiflow.tiles.search.tile_model import extract_tile
 
 # class: order of the rotations, whether there is a reflection
 SYMMETRIES = {
@@ -32,7 +33,7 @@ def placed(name: str, angle: float, mirrored: bool) -> tuple[np.ndarray, Crystal
         mirrored=torch.tensor([mirrored]),
         max_frequency=1,
     )
-    return model.place(model.template()).detach().numpy()[0], model.placed_group()
+    return model.place(model.template()).detach().numpy()[0], extract_tile(model)[0].group
 
 
 def same_group(a: CrystallographicGroup, b: CrystallographicGroup) -> bool:

@@ -25,7 +25,7 @@ from orbiflow.tiles import (
     certify,
     load_model,
 )
-from orbiflow.tiles.search.model import extract_tile
+from orbiflow.tiles.search.tile_model import extract_tile
 from orbiflow.tiles.tile import BENDING, FORMAT, MAX_BYTES
 from strategies import seeds
 
@@ -258,7 +258,7 @@ BAD_FILES: dict[str, tuple[Callable[[], bytes], str]] = {
     "frequency 61": (with_settings(max_frequency=61), "from 0 to 60, got 61"),
     "frequency -1": (with_settings(max_frequency=-1), "from 0 to 60, got -1"),
     "frequency 2.5": (with_settings(max_frequency=2.5), "whole number from 0 to 60, got 2.5"),
-    "frequency other": (with_settings(max_frequency=3), "should have shape"),
+    "frequency other": (with_settings(max_frequency=3), "must be real numbers of shape"),
     "segments huge": (with_settings(segments=10**9), "say 1000000000 segments"),
     "segments two": (with_settings(segments=2), "say 2 segments, its arrays hold 1"),
     "steps huge": (with_settings(steps=10**12), "from 1 to 1000000"),
@@ -278,12 +278,15 @@ BAD_FILES: dict[str, tuple[Callable[[], bytes], str]] = {
         ),
         "has no inverse",
     ),
-    "angle missing": (with_array("angle", None), "angle should have shape .* found nothing"),
-    "angle a vector": (with_array("angle", np.zeros(1)), "angle should have shape"),
-    "offset too long": (with_array("offset", np.zeros(3)), r"found shape \(3,\)"),
-    "field too long": (with_array(FIELD, np.zeros(7)), r"found shape \(7,\)"),
-    "angle NaN": (with_array("angle", np.array(np.nan)), "angle has NaN or infinite entries"),
-    "offset infinite": (with_array("offset", np.array([0.0, np.inf])), "offset has NaN or inf"),
+    "angle missing": (
+        with_array("angle", None),
+        "angle must be real numbers of shape .*, got 'nothing'",
+    ),
+    "angle a vector": (with_array("angle", np.zeros(1)), "angle must be real numbers of shape"),
+    "offset too long": (with_array("offset", np.zeros(3)), r"got an array of shape \(3,\)"),
+    "field too long": (with_array(FIELD, np.zeros(7)), r"got an array of shape \(7,\)"),
+    "angle NaN": (with_array("angle", np.array(np.nan)), "angle must be finite"),
+    "offset infinite": (with_array("offset", np.array([0.0, np.inf])), "offset must be finite"),
 }
 
 

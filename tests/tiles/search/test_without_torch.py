@@ -7,25 +7,26 @@ import sys
 
 SEARCH = """
 import sys
-from orbiflow.tiles import LikenessSearch, Target, search_classes
-from orbiflow.tiles.search import searching
+from orbiflow.tiles import EscherizeSettings, LikenessSearch, Target, escherize
+from orbiflow.tiles.search import escherizing
 
 boot = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])
 few = LikenessSearch(placements=10, held=3, starts=2, finalists=1, rounds=2)
-inside = searching._work_on
+inside = escherizing._outcome
 
 def work_on(*arguments):
     outcome = inside(*arguments)
     assert "torch" not in sys.modules
     return outcome
 
-searching._work_on = work_on
+escherizing._outcome = work_on
 if __name__ == "__main__":
-    tiles, failures = search_classes(boot, ["IH4", "IH6"], few, workers=WORKERS)
-    assert len(tiles) == 2 and not failures, failures
-    assert all(tile.certificate.valid for tile in tiles)
-    tiles[0].save(sys.argv[1])
-    assert tiles[0].load(sys.argv[1]).bending is not None
+    settings = EscherizeSettings(classes=("IH4", "IH6"), workers=WORKERS)
+    found = escherize(boot, settings, method=few)
+    assert len(found.tiles) == 2 and not found.failures, found.failures
+    assert all(tile.certificate.valid for tile in found.tiles)
+    found.tiles[0].save(sys.argv[1])
+    assert found.tiles[0].load(sys.argv[1]).bending is not None
     print([name for name in sys.modules if name.split(".")[0] == "torch"])
 """
 

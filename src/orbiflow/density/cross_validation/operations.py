@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+import json
+import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
+from orbiflow import batch, runtime
 from orbiflow.arguments import as_whole
-from orbiflow.batch import WorkSettings
+from orbiflow.density import operations, tables
 from orbiflow.density.fitting import COMPONENTS, ComponentSettings, DensitySettings
-from orbiflow.density.operations import check_marginalised
+from orbiflow.density.run_folder import write_files
 from orbiflow.density.tables import RowSettings, SpaceSettings
-from orbiflow.errors import SettingError, literal
-from orbiflow.runtime import Cancel, Outcome, Sink, ignore, operation
+from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.settings import DefaultText, Option, Range, Repeated, Settings
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+SCORES, REPORT = "scores.csv", "report.json"
+"""Files of one fit."""
 
 DEFAULT, UNIFORM = "default", "uniform"
 """Names of what a fit chooses by itself, and of the density that is the same everywhere."""
@@ -76,7 +85,9 @@ class CrossValidation:
             )
         if self.rows.missing == "marginalise":
             for components in self.settings.values():
-                check_marginalised(self.where, DensitySettings().replace(components=components))
+                operations.check_marginalised(
+                    self.where, DensitySettings().replace(components=components)
+                )
 
     @property
     def settings(self) -> dict[str, Components]:
@@ -95,7 +106,7 @@ class CrossValidation:
         )
 
 
-@operation("density cv", keeps_partial=True, starts_processes=True)
+@runtime.operation("density cv", keeps_partial=True, starts_processes=True)
 def cross_validate(
     data: Path,
     where: SpaceSettings,
@@ -103,12 +114,12 @@ def cross_validate(
     out: Annotated[Path, Option("-o")] = Path("cv"),
     cv: CvSettings = CvSettings(),
     rows: RowSettings = RowSettings(),
-    work: WorkSettings = WorkSettings(),
+    work: batch.WorkSettings = batch.WorkSettings(),
     *,
     group: str | None = None,
-    on_event: Sink = ignore,
-    cancel: Cancel = Cancel(),
-) -> Outcome:
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
     """Cross-validate: how well does a density foretell rows that its fit has not seen?
 
     Fits to all folds but one, for each in turn, here or on a Dask cluster, and scores the one held out,
@@ -155,3 +166,109 @@ def _setting_in(text: str) -> tuple[str, Components]:
         return DEFAULT, None
     pieces = [piece.strip() for piece in text.replace("+", ",").split(",")]
     return setting_of([piece for piece in pieces if piece], "against")
+
+
+@runtime.operation("density fold")
+@runtime.one_thread()
+def fold(
+    data: Path,
+    where: SpaceSettings,
+    density: ComponentSettings = ComponentSettings(),
+    out: Annotated[Path, Option("-o")] = Path("fold"),
+    rows: RowSettings = RowSettings(),
+    *,
+    fold: int,
+    held: str = "fold",
+    group: str | None = None,
+    on_event: runtime.Sink = runtime.ignore,
+    cancel: runtime.Cancel = runtime.Cancel(),
+) -> runtime.Outcome:
+    """Fit a density to all rows of a table but those of one fold, and score that fold.
+
+    Writes scores.csv, a line for each row held out, and report.json. Rows of the fold take no part in
+    the fit, nor in where the space is turned for it.
+
+    Args:
+        data: The table.
+        out: Folder for the results, made if need be.
+        fold: The fold that is held out.
+        held: Column that numbers the fold of each row.
+        group: Column that names what rows belong to.
+    """
+    import numpy as np
+
+    from orbiflow.density.estimator import DensityEstimator
+
+    begin = time.perf_counter()
+    width = len(rows.columns or ()) or None
+    read = tables.read_rows(data, rows, on_event, width=width, group=group)
+    table, weights, labels = read.table, read.weights, read.labels()
+    out_of_fit = _held(data, table, fold, held, rows.header)
+    estimator = DensityEstimator.with_settings(
+        where.space,
+        DensitySettings(**density.to_json()),
+        unit=tables.angle_unit(where.space, where.unit, table, on_event),
+        missing=rows.kept_missing,
+    )
+    folder = runtime.ResultFolder(out, written_files)
+    estimator.fit(
+        table.values[~out_of_fit],
+        sample_weight=None if weights is None else weights[~out_of_fit],
+        groups=None if labels is None else labels[~out_of_fit],
+        progress=runtime.progress_events(on_event, cancel),
+    )
+    scores = estimator.score_samples(table.values[out_of_fit])
+    if not np.isfinite(scores).all():
+        raise SettingError(
+            f"{(~np.isfinite(scores)).sum()} rows held out have no density: allow other "
+            "{components}"
+        )
+    cancel.check()
+    mean = operations.mean_of_whole(
+        scores, None if weights is None else weights[out_of_fit], read.whole[out_of_fit]
+    )
+    document = {
+        "space": {"name": estimator.space_.name, **estimator.space_.settings()},
+        "fold": fold,
+        "components": density.components,
+        "rows": int(out_of_fit.sum()),
+        "fitted": int((~out_of_fit).sum()),
+        "log_likelihood": mean,
+        "uniform": -math.log(estimator.space_.volume),
+        "report": estimator.report_.to_json(),
+        "seconds": time.perf_counter() - begin,
+    }
+    report = json.dumps(document, allow_nan=False, indent=1)
+    pairs = zip(table.lines[out_of_fit].tolist(), scores.tolist(), strict=True)
+    write_files(
+        folder, {SCORES: batch.csv_bytes(["row", "log_prob"], pairs), REPORT: report}, on_event
+    )
+    on_event(runtime.Note(f"mean log density {mean:.4f} nats at {out_of_fit.sum()} rows held out"))
+    names = ("rows", "fitted", "log_likelihood", "seconds")
+    return runtime.Outcome({"folder": str(out), **{name: document[name] for name in names}})
+
+
+def written_files(folder: Path) -> set[str]:
+    """Return the names of what an earlier fold wrote into the folder."""
+    return {SCORES, REPORT} if (folder / SCORES).is_file() else set()
+
+
+def _held(
+    data: Path, table: tables.Table, fold: int, name: str, header: bool | None
+) -> NDArray[Any]:
+    """Which rows (N,) are of the fold."""
+    import numpy as np
+
+    column = tables.read_table(data, columns=[name], width=1, has_header=header, drop_missing=True)
+    if not np.isin(table.lines, column.lines).all():
+        raise OrbiflowError(f"{data}: some rows lack their fold in {column.columns[0]!r}")
+    folds = column.values[np.isin(column.lines, table.lines), 0]
+    held = folds == fold
+    if not held.any() or held.all():
+        some = ", ".join(f"{one:g}" for one in np.unique(folds)[:20])
+        raise SettingError(
+            literal(f"{data}: {'all' if held.any() else 'none'} of its {len(held)} rows are of ")
+            + f"{{fold}} {fold} by "
+            + literal(f"{column.columns[0]!r}; give one of {some}")
+        )
+    return held

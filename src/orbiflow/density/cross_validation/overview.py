@@ -16,8 +16,7 @@ from orbiflow import __version__, batch, runtime
 from orbiflow.arrays import Array
 from orbiflow.batch import Entry
 from orbiflow.density.comparing import ModelComparison
-from orbiflow.density.cross_validation.fold import written_files
-from orbiflow.density.cross_validation.operations import UNIFORM, CrossValidation
+from orbiflow.density.cross_validation.operations import UNIFORM, CrossValidation, written_files
 from orbiflow.density.cross_validation.splits import (
     Fit,
     HeldOut,
@@ -170,7 +169,7 @@ FITS = batch.Kind(
     items="fits",
     reads="data",
     writes="out",
-    modules=("orbiflow.density.cross_validation.fold",),
+    modules=("orbiflow.density.estimator",),
     columns=(batch.Column("log_likelihood", "held out", ".4f"), batch.Column("rows", "rows", "d")),
     best=lambda summary: {name: summary[name] for name in FIGURES},
     picture=lambda _summary: None,
@@ -218,7 +217,7 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
     weighted, grouped = split.rows.weights is not None, split.rows.labels is not None
     density, space = asked.density, asked.where.space
     given: dict[str, Any] = {
-        "data": Path(split.name),
+        "data": Path("rows.npy"),
         "space": space,
         "fold": fit.fold,
         "columns": tuple(str(k + 1) for k in range(angles)),
@@ -226,14 +225,14 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
         "weights": str(angles + 1) if weighted else None,
         # a flow alone has no components to choose
         "group": str(angles + weighted + 1) if grouped and fit.components != ("flow",) else None,
-        "missing": "marginalise" if asked.rows.missing == "marginalise" else "refuse",
+        "missing": asked.rows.kept_missing,
         "unit": split.rows.unit if space in ("torus", "klein-bottle") else None,
         "components": fit.components,
         "repeats": density.repeats,
         "seed": density.seed,
     }
     call = runtime.find("density fold").call({k: v for k, v in given.items() if v is not None})
-    return batch.Item(fit.key, fit.name, call, split)
+    return batch.Item(fit.key, fit.name, call, split.read)
 
 
 MOST_LISTED = 200

@@ -15,10 +15,9 @@ import torch
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
-from orbiflow.batch import Entry, code_of
+from orbiflow.batch import Entry
 from orbiflow.density import comparing
-from orbiflow.density.cross_validation.fold import SCORES
-from orbiflow.density.cross_validation.operations import UNIFORM, CrossValidation
+from orbiflow.density.cross_validation.operations import SCORES, UNIFORM, CrossValidation
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
 from orbiflow.density.inference import chart_of_observed
 from orbiflow.density.spaces import Space, space_class
@@ -67,7 +66,6 @@ class Split:
 
     rows: CvRows
     fold: NDArray[np.int64]
-    name: str = "rows.npy"
 
     def read(self) -> bytes:
         """Return the bytes, made anew each time: many splits would be many tables."""
@@ -87,14 +85,6 @@ class Split:
         file = io.BytesIO()
         np.save(file, np.concatenate(parts, axis=1), allow_pickle=False)
         return file.getvalue()
-
-    def code(self) -> str:
-        """Return what the same rows in the same folds are known by."""
-        return self._code
-
-    @cached_property
-    def _code(self) -> str:
-        return code_of(self.read())
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@ from .flow import fit_density as fit_density
 from .folds import LEAST_PLACES as LEAST_PLACES
 from .folds import lightest_folds as lightest_folds
 from .folds import places as places
-from .kernels import blend_kernels as blend_kernels
 from .likelihood import Refinement as Refinement
 from .report import FitReport as FitReport
 from .report import Progress as Progress

@@ -18,6 +18,8 @@ from orbiflow.density.fitting.evidence import (
     candidates_of,
     flow_settings,
     judged,
+    stacked,
+    supported_weights,
     try_flow,
     without_idle,
 )
@@ -35,7 +37,6 @@ from orbiflow.density.fitting.report import (
     ComponentEvidence,
     FitReport,
     Progress,
-    mass_with,
     mean_nll,
     own_points,
     silent,
@@ -56,7 +57,6 @@ from orbiflow.density.fitting.rows import (
     weights_of,
 )
 from orbiflow.density.fitting.settings import COMPONENTS, DensitySettings
-from orbiflow.density.fitting.weights import stacked, supported_weights
 from orbiflow.density.models import MOST_DIM, Mixture
 from orbiflow.density.spaces import Space, Torus, whole_turn
 from orbiflow.errors import OrbiflowError
@@ -93,22 +93,10 @@ def fit_automatic(
     the density, in which kernels are about all rows and the others the mean of those of the folds. A
     flow, fitted without the first tenth, is blended in if that tenth says so.
 
-    Args:
-        space: any.
-        points: (N, d) in the chart, N >= 10 different ones.
-        settings: Default: `DensitySettings()`.
-        missing: "refuse" points that lack angles (NaN), or "marginalise": on tori a row counts by the
-            density of the angles that it has, and the components are kernels and mixtures.
-        weights: of the points (N,), at least 0; only their ratios count; default equal.
-        groups: a label (N,) a point: those of one are held out together, so that parts are chosen for
-            rows of new groups. Default: each point is by itself.
-        progress: told how far it is.
-
-    Returns:
-        The density, float64, and the report, with the evidence on each part.
-
-    Raises:
-        OrbiflowError: for points of another shape or too few, or parts that the space does not have.
+    Points (N, d) are in the chart; of `weights` (N,) only the ratios count. Points of one label of
+    `groups` (N,) are held out together, so that parts are chosen for rows of new groups. `missing` says
+    to "refuse" points that lack angles (NaN), or to "marginalise": on tori a row counts by the density
+    of the angles that it has, and the components are kernels and mixtures. The density is float64.
     """
     settings = DensitySettings() if settings is None else settings
     as_instance(settings, DensitySettings, "settings")
@@ -150,7 +138,7 @@ def fit_automatic(
     after = (
         *weights_note(folds.rows),
         *report.notes,
-        *_untried_note(space, folds, settings),
+        *_untried_note(folds, settings, flows),
         *found.notes(settings.repeats),
         *budget.notes(),
         *steps_note(report.steps, report.integration_error),
@@ -191,11 +179,11 @@ def _rows(
 
 def _families(
     space: Space, folds: Folds, settings: DensitySettings, found: Repeats
-) -> list[Family[Any]]:
+) -> list[Family]:
     rounding = settings.repeats == "rounding"
     narrowest = _narrowest(space, found.step) if rounding else NARROWEST
     starts = max(1, round(MEMBERS / folds.used)) if space.dim > MOST_DIM else 1
-    families: list[Family[Any]] = [
+    families: list[Family] = [
         KernelFamily(space, narrowest, repeats=not rounding),
         MixtureFamily(space, settings.seed, narrowest),
     ]
@@ -235,14 +223,13 @@ def _wants_flow(space: Space, folds: Folds, settings: DensitySettings) -> bool:
     return "flow" in settings.allowed and space.dim <= MOST_DIM and enough
 
 
-def _untried_note(space: Space, folds: Folds, settings: DensitySettings) -> list[str]:
+def _untried_note(folds: Folds, settings: DensitySettings, flows: bool) -> list[str]:
     """What to say where a flow was meant, and not only one of all parts, and none was tried."""
     meant = "flow" in settings.allowed and (settings.of_flow or settings.allowed != COMPONENTS)
-    note = (
-        f"no flow was tried: of fewer than {LEAST_FLOW_ROWS} rows, here {len(folds.rows)}, none has "
-        "gained anything"
-    )
-    return [note] if meant and not _wants_flow(space, folds, settings) else []
+    if flows or not meant:
+        return []
+    rows = f"of fewer than {LEAST_FLOW_ROWS} rows, here {len(folds.rows)}, none has gained anything"
+    return [f"no flow was tried: {rows}"]
 
 
 def _report(
@@ -273,7 +260,9 @@ def _report(
     some = folds.rows[:SCORED]
     mass = None
     if density.space.dim == 2:
-        mass = mass_with(tried.share, flow.mass) if flow and flow.mass is not None else 1.0
+        mass = 1.0
+        if flow and flow.mass is not None:
+            mass = tried.share * flow.mass + 1 - tried.share
     return FitReport(
         points=len(folds.rows),
         duplicates=found.rows,

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from orbiflow.density.fitting.rows import Rows
-from orbiflow.density.fitting.weights import gain_of
+from orbiflow.density.fitting.rows import Rows, gain_of
 from orbiflow.density.models import (
     SCALES,
     Factor,

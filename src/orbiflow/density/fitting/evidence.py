@@ -1,11 +1,14 @@
-"""What held-out rows say of families of densities and of a flow, and the mixture that they choose."""
+"""What held-out rows say of families of densities and of a flow, and the mixture that they choose.
+
+The weights of densities by what they give to rows that were held out: stacking.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
@@ -15,16 +18,9 @@ from orbiflow.density.fitting.flow import fit_density
 from orbiflow.density.fitting.folds import Folds
 from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence, FitReport, Progress
-from orbiflow.density.fitting.rows import Rows, log_prob_of_rows, mean_of
+from orbiflow.density.fitting.rows import Gain, Rows, gain_of, mean_of
 from orbiflow.density.fitting.settings import FlowSettings
-from orbiflow.density.fitting.weights import (
-    NEGLIGIBLE,
-    Gain,
-    gain_of,
-    sparse_weights,
-    stacked,
-    stacking_weights,
-)
+from orbiflow.density.inference import at_observed
 from orbiflow.density.models import MOST_DIM, Density, Mixture, UniformDensity, mixture_of
 from orbiflow.density.spaces import Space
 from orbiflow.typed_torch import listed
@@ -72,7 +68,7 @@ class Candidates:
 
 
 def candidates_of(
-    space: Space, families: list[Family[Any]], folds: Folds, say: Progress, budget: Budget
+    space: Space, families: list[Family], folds: Folds, say: Progress, budget: Budget
 ) -> Candidates:
     """Fit all families to all folds; after the first, only what may be of use."""
     blocks: list[dict[tuple[str, str], Tensor]] = []
@@ -88,8 +84,8 @@ def candidates_of(
             fitted[family.name].append(found)
             with torch.no_grad():
                 for name, part in found.items():
-                    block[family.name, name] = log_prob_of_rows(part, held.points)
-        block[FLOOR, FLOOR] = log_prob_of_rows(UniformDensity(space), held.points)
+                    block[family.name, name] = at_observed(part, held.points)
+        block[FLOOR, FLOOR] = at_observed(UniformDensity(space), held.points)
         blocks.append(block)
         weights.append(held.weights)
         if number == 0:
@@ -117,7 +113,7 @@ def _teller(number: int, used: int, say: Progress) -> Callable[[str], None]:
     return tell
 
 
-def _narrow(families: list[Family[Any]], block: dict[tuple[str, str], Tensor], held: Rows) -> None:
+def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: Rows) -> None:
     """Keep of each family what has most weight in the first fold, and the best alone."""
     keys = list(block)
     table = torch.stack([block[key] for key in keys])
@@ -164,7 +160,7 @@ def judged(candidates: Candidates, weights: Tensor) -> list[ComponentEvidence]:
 
 def assembled(
     space: Space,
-    families: list[Family[Any]],
+    families: list[Family],
     candidates: Candidates,
     weights: Tensor,
     rows: Rows,
@@ -228,42 +224,40 @@ def try_flow(
     rows speak for has streaks that are not in the data. The candidates beside it have `weights` (P,).
     """
 
-    def fitted(number: int) -> tuple[Density, FitReport]:
-        train = folds.train(number)
+    tables: list[Tensor] = []
+    held: list[Rows] = []
+
+    def tried(number: int) -> tuple[Density, FitReport, ComponentEvidence]:
+        train, rows = folds.train(number), folds.held(number)
         begin, end = ((0.0, FIRST), (FIRST, 1.0))[number]
-        return fit_density(
+        density, report = fit_density(
             space,
             train.points,
             chosen.replace(seconds=budget.seconds_left),
             weights=train.weights,
             progress=lambda done, what: told(begin + (end - begin) * done, f"flow: {what}"),
         )
+        start = sum(map(len, held))
+        columns = candidates.table[:, start : start + len(rows)]
+        with torch.no_grad():
+            own = density.log_prob(rows.points)
+        tables.append(torch.stack([stacked(columns, weights), own, columns[-1]]))
+        held.append(rows)
+        return density, report, _worth(tables, held)
 
-    density, report = fitted(0)
-    held = [folds.held(0)]
-    tables = [_beside(density, held[0], candidates.table[:, : len(held[0])], weights)]
-    worth = _worth(tables, held)
+    density, report, worth = tried(0)
     kept = _is_worth_it(worth)
     sure = Gain(worth.gain, worth.error).is_sure
     if kept and not sure and folds.used > 1 and not budget.is_spent:
-        held.append(folds.held(1))
-        columns = candidates.table[:, len(held[0]) : len(held[0]) + len(held[1])]
-        tables.append(_beside(fitted(1)[0], held[1], columns, weights))
-        worth = _worth(tables, held)
+        worth = tried(1)[2]
         kept = _is_worth_it(worth) and worth.gain >= LIKELY * worth.error
     if not kept:
         worth = replace(worth, share=0.0, gain=0.0, error=0.0)
     return TriedFlow(density if kept else None, worth.share, (worth,), report)
 
 
-def _beside(density: Density, held: Rows, columns: Tensor, weights: Tensor) -> Tensor:
-    """Log densities (3, N) at rows held out: of the other parts, the flow, and the uniform one."""
-    with torch.no_grad():
-        own = density.log_prob(held.points)
-    return torch.stack([stacked(columns, weights), own, columns[-1]])
-
-
 def _worth(tables: list[Tensor], held: list[Rows]) -> ComponentEvidence:
+    """Judge a flow by log densities (3, N) at rows held out: the others', its own, the uniform one."""
     others, own, uniform = torch.cat(tables, dim=1)
     known = [rows.weights for rows in held if rows.weights is not None]
     row_weights = torch.cat(known) if known else None
@@ -299,3 +293,76 @@ def flow_settings(space: Space, rows: int, seed: int) -> FlowSettings:
             max_frequency=6, segments=4, roughness=(1e-3, 1e-4), iterations=60, seed=seed
         )
     return FlowSettings(max_frequency=6, segments=4, roughness=(1e-3,), iterations=40, seed=seed)
+
+
+TOLERANCE = 1e-4
+"""Nats by which the weights may be worse than the best ones."""
+
+ITERATIONS, EVERY = 3_000, 25
+"""Maximum iterations of EM, and iterations between checks of convergence."""
+
+NEGLIGIBLE = 3e-3
+"""Weights below this are dropped."""
+
+
+def stacked(table: Tensor, weights: Tensor) -> Tensor:
+    """Return log densities (N,) of the mixture in proportions (P,), from a table (P, N)."""
+    return (table + weights.log()[:, None]).logsumexp(dim=0)
+
+
+def stacking_weights(table: Tensor, row_weights: Tensor | None = None) -> Tensor:
+    """Return proportions (P,) with the greatest mean log density of held-out rows, from a table (P, N).
+
+    The problem is concave; EM finds its only optimum (Smyth and Wolpert, Linearly combining density
+    estimators via stacking, 1999). The largest mean ratio of a density to the mixture, less 1, bounds
+    what is missing. Rows may be weighted (N,).
+
+    >>> table = torch.tensor([[0.0, 0.0], [-1.0, -1.0]])
+    >>> stacking_weights(table).round(decimals=2)
+    tensor([1., 0.])
+    """
+    relative = (table - table.amax(dim=0)).exp()
+    weights = torch.full_like(table[:, 0], 1 / len(table))
+    own = torch.ones_like(table[0]) if row_weights is None else row_weights.to(table)
+    shares = own / own.sum()
+    for iteration in range(ITERATIONS):
+        ratio = relative @ (shares / (weights @ relative))
+        if iteration % EVERY == 0 and float(ratio.max()) - 1 < TOLERANCE:
+            break
+        weights = weights * ratio
+        weights = weights / weights.sum()
+    return weights
+
+
+def supported_weights(table: Tensor, always: Tensor, row_weights: Tensor | None = None) -> Tensor:
+    """Return weights as `sparse_weights` does, without spikes that only a few rows support.
+
+    Two rows that happen to be close give kernels as narrow as that a weight of about two rows, and
+    pictures a spike at every row. So what is worse by itself than what is `always` there must gain
+    more than chance.
+    """
+    weights = sparse_weights(table, always, row_weights)
+    means = torch.tensor([mean_of(row, row_weights) for row in table])
+    spikes = ~always & (means < means[always].max())
+    if not bool((weights[spikes] > 0).any()):
+        return weights
+    rest = ~spikes
+    others = torch.zeros_like(weights)
+    others[rest] = sparse_weights(table[rest], always[rest], row_weights)
+    gain = gain_of(stacked(table, weights), stacked(table[rest], others[rest]), row_weights)
+    return weights if gain.is_sure else others
+
+
+def sparse_weights(table: Tensor, always: Tensor, row_weights: Tensor | None = None) -> Tensor:
+    """Return weights as `stacking_weights` does, without `NEGLIGIBLE` ones; `always` (P,) has some.
+
+    The least weight of what must be there is half a row's: nothing is impossible that as many rows
+    could not rule out.
+    """
+    weights = stacking_weights(table, row_weights)
+    kept = (weights >= NEGLIGIBLE) | always
+    found = torch.zeros_like(weights)
+    found[kept] = stacking_weights(table[kept], row_weights)
+    least = 0.5 / (table.shape[1] + 1)
+    found[always] = found[always].clamp_min(least)
+    return found / found.sum()

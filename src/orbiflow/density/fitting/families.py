@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import Any, cast
 
 import torch
 from torch import Tensor
@@ -18,15 +18,9 @@ from orbiflow.density.fitting.chains import (
     spread_chains,
 )
 from orbiflow.density.fitting.kernels import NARROWEST, fit_mixture, kernel_estimates
-from orbiflow.density.fitting.rows import Rows, is_whole, log_prob_of_rows, with_incomplete
-from orbiflow.density.fitting.weights import gain_of
-from orbiflow.density.models import (
-    AdaptiveKernels,
-    Density,
-    VonMisesChains,
-    VonMisesNetwork,
-    averaged_networks,
-)
+from orbiflow.density.fitting.rows import Rows, gain_of, is_whole, with_incomplete
+from orbiflow.density.inference import at_observed
+from orbiflow.density.models import Density, averaged_networks
 from orbiflow.density.spaces import Space, Torus
 
 SIZES = (1, 2, 4, 8, 16, 32, 64)
@@ -51,21 +45,17 @@ Say = Callable[[str], None]
 """A function that is called with what is being tried."""
 
 
-D = TypeVar("D", bound=Density)
-"""The class of the densities of a family."""
-
-
-class Family(ABC, Generic[D]):
+class Family(ABC):
     """Candidates of one class of densities, by their names."""
 
     name: str
 
     @abstractmethod
-    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, D]:
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
         """Return what is fitted to the training rows of a fold, to be judged by the rows held out."""
 
     @abstractmethod
-    def final(self, rows: Rows, folds: list[dict[str, D]], names: list[str]) -> list[D]:
+    def final(self, rows: Rows, folds: list[dict[str, Density]], names: list[str]) -> list[Density]:
         """Return what the density is made of, given all rows and what was fitted to each fold."""
 
     def keep(self, names: set[str]) -> None:
@@ -74,7 +64,7 @@ class Family(ABC, Generic[D]):
 
 
 @dataclass
-class KernelFamily(Family[AdaptiveKernels]):
+class KernelFamily(Family):
     """Kernel estimates, in the end about all rows."""
 
     space: Space
@@ -82,30 +72,28 @@ class KernelFamily(Family[AdaptiveKernels]):
     repeats: bool = True
     name = "kernels"
 
-    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, AdaptiveKernels]:
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
         del number, held
         say("kernels")
         return self._estimates(train)
 
-    def final(
-        self, rows: Rows, folds: list[dict[str, AdaptiveKernels]], names: list[str]
-    ) -> list[AdaptiveKernels]:
+    def final(self, rows: Rows, folds: list[dict[str, Density]], names: list[str]) -> list[Density]:
         del folds
         found = self._estimates(rows)
         return [found[name] for name in names]
 
-    def _estimates(self, rows: Rows) -> dict[str, AdaptiveKernels]:
+    def _estimates(self, rows: Rows) -> dict[str, Density]:
         known = is_whole(rows)
         whole = rows[known]
         found = kernel_estimates(self.space, whole, narrowest=self.narrowest, repeats=self.repeats)
         if len(whole) == len(rows):
-            return found
+            return dict(found)
         total = float(len(whole)) if whole.weights is None else float(whole.weights.sum())
         rest = rows[~known]
         return {name: with_incomplete(part, rest, total) for name, part in found.items()}
 
 
-class SizedFamily(Family[D]):
+class SizedFamily(Family):
     """Densities of several sizes, in the end the mean of those of all folds.
 
     By concavity the mean of densities scores at least the mean of their scores, and EM ends in another
@@ -114,7 +102,7 @@ class SizedFamily(Family[D]):
 
     sizes: tuple[int, ...] | None = None
 
-    def final(self, rows: Rows, folds: list[dict[str, D]], names: list[str]) -> list[D]:
+    def final(self, rows: Rows, folds: list[dict[str, Density]], names: list[str]) -> list[Density]:
         del rows
         parts = ([fold[name] for fold in folds if name in fold] for name in names)
         return [_mean(own) for own in parts]
@@ -124,7 +112,7 @@ class SizedFamily(Family[D]):
 
 
 @dataclass
-class MixtureFamily(SizedFamily[AdaptiveKernels]):
+class MixtureFamily(SizedFamily):
     """Mixtures of kernels."""
 
     space: Space
@@ -132,12 +120,12 @@ class MixtureFamily(SizedFamily[AdaptiveKernels]):
     narrowest: float = NARROWEST
     name = "mixture"
 
-    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, AdaptiveKernels]:
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
         train = train[:MOST_MIXED]
         whole = int(is_whole(train).sum())
         generator = torch.Generator().manual_seed(self.seed + number)
 
-        def fit(size: int) -> AdaptiveKernels:
+        def fit(size: int) -> Density:
             say(f"mixture of {size}")
             return fit_mixture(
                 self.space, train, size, narrowest=self.narrowest, generator=generator
@@ -149,7 +137,7 @@ class MixtureFamily(SizedFamily[AdaptiveKernels]):
 
 
 @dataclass
-class ChainFamily(SizedFamily[VonMisesChains]):
+class ChainFamily(SizedFamily):
     """Mixtures of von Mises chains on a torus.
 
     `starts` are fitted to each fold but the first; those after the first have their angles in random
@@ -161,12 +149,12 @@ class ChainFamily(SizedFamily[VonMisesChains]):
     starts: int = 1
     name = "chains"
 
-    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, VonMisesChains]:
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
         train = train[:MOST_CHAINED]
         generator = torch.Generator().manual_seed(self.seed + number)
         natural = torch.arange(self.space.dim)
 
-        def fit(size: int, turn: int = 0) -> VonMisesChains:
+        def fit(size: int, turn: int = 0) -> Density:
             say(f"chains of {size}" + (f", start {turn + 1}" if self.starts > 1 else ""))
             turned = number + turn > 0
             order = torch.randperm(self.space.dim, generator=generator) if turned else natural
@@ -183,7 +171,7 @@ class ChainFamily(SizedFamily[VonMisesChains]):
 
 
 @dataclass
-class NetworkFamily(Family[VonMisesNetwork]):
+class NetworkFamily(Family):
     """A Bayesian network on a torus of many angles: its arrows are those that the first fold says."""
 
     space: Torus
@@ -191,7 +179,7 @@ class NetworkFamily(Family[VonMisesNetwork]):
     name = "network"
     _shapes: list[Shape] = field(default_factory=list[Shape])
 
-    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, VonMisesNetwork]:
+    def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
         train = train[:MOST_CHAINED]
         generator = torch.Generator().manual_seed(self.seed + number)
         if not self._shapes:
@@ -201,27 +189,25 @@ class NetworkFamily(Family[VonMisesNetwork]):
         say("network")
         return {"network": fit_network(self.space, train, held, self._shapes, generator)}
 
-    def final(
-        self, rows: Rows, folds: list[dict[str, VonMisesNetwork]], names: list[str]
-    ) -> list[VonMisesNetwork]:
+    def final(self, rows: Rows, folds: list[dict[str, Density]], names: list[str]) -> list[Density]:
         del rows
-        return [averaged_networks([fold[name] for fold in folds]) for name in names]
+        return [averaged_networks([cast(Any, fold[name]) for fold in folds]) for name in names]
 
 
-def _mean(parts: list[D]) -> D:
+def _mean(parts: list[Density]) -> Density:
     mean = type(parts[0]).joined(parts, torch.ones(len(parts), dtype=torch.float64))
     assert mean is not None
     return mean
 
 
-def _grown(fit: Callable[[int], D], sizes: Iterable[int], held: Rows) -> dict[str, D]:
+def _grown(fit: Callable[[int], Density], sizes: Iterable[int], held: Rows) -> dict[str, Density]:
     """Return fits of growing size, until one is clearly worse on the held-out rows than the best."""
-    found: dict[str, D] = {}
+    found: dict[str, Density] = {}
     best: Tensor | None = None
     for size in sizes:
         part = found[str(size)] = fit(size)
         with torch.no_grad():
-            score = log_prob_of_rows(part, held.points)
+            score = at_observed(part, held.points)
         if best is not None:
             gain = gain_of(score, best, held.weights)
             if gain.nats < -CLEARLY * gain.error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,17 +13,14 @@ from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
 from orbiflow.arguments import as_instance
-from orbiflow.density.fitting.kernels import blend_kernels
 from orbiflow.density.fitting.likelihood import Budget, Refinement, merged, refine, training
 from orbiflow.density.fitting.report import (
     MASS_TOLERANCE,
     MOST_REPORTED,
     FitReport,
     Progress,
-    mass_with,
     mean_nll,
     own_points,
-    repeats_note,
     settle,
     sides,
     silent,
@@ -31,14 +29,21 @@ from orbiflow.density.fitting.report import (
 )
 from orbiflow.density.fitting.rows import Rows, effective_rows, weighed, weights_note
 from orbiflow.density.fitting.settings import FlowSettings
-from orbiflow.density.models import MOST_DIM, Density, FlowDensity, UniformDensity, VonMisesDensity
+from orbiflow.density.models import MOST_DIM, FlowDensity, UniformDensity
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import InvariantField, SplineField
 from orbiflow.flows import Flow
 
+DTYPE = torch.float32
+"""The dtype in which a flow is trained, about twice as fast; the result is float64."""
+
+SMOOTHNESS = 2.0
+"""Exponent s of the scaling (1 + |kappa|^2)^(-s/2) of the flow's parameters."""
+
 MOST_TRAINING_STEPS = 16
-"""Runge-Kutta steps a segment, to which they are doubled where the integrator has not converged."""
+"""Runge-Kutta steps a segment, to which they are doubled where the integrator has not converged: one
+at first."""
 
 MOST_HELD = 4096
 """Validation points that refinement is scored on, and at which the steps are checked."""
@@ -58,7 +63,7 @@ def refine_in_stages(
     say: Progress,
     budget: Budget,
 ) -> list[Refinement]:
-    """One stage for each roughness; the density's flow ends with the last one's parameters and steps.
+    """Refine once for each roughness; the density's flow ends with the last one's parameters and steps.
 
     A stage is scored at doubled steps. What is worse than before at twice as many again has gained
     from the integrator's errors alone: it is undone, and repeated at doubled steps.
@@ -67,19 +72,13 @@ def refine_in_stages(
     if not settings.iterations:
         return stages
     dtype = next(density.flow.parameters()).dtype
-    points, weights = (
-        part.to(dtype)
-        for part in merged(
-            train.points,
-            max(LEAST_CELLS, CELLS * settings.max_frequency),
-            crowd=math.ceil(CROWD * len(train) / MERGED),
-            row_weights=train.weights,
-        )
-    )
+    cells = max(LEAST_CELLS, CELLS * settings.max_frequency)
+    train = merged(train, cells, crowd=math.ceil(CROWD * len(train) / MERGED)).to(dtype)
     # never merged: means of cells would call overfitting to means of cells good
     held = validation[:MOST_HELD]
-    held = Rows(held.points.to(dtype), held.weights)
-    shares = None if held.weights is None else (held.weights / held.weights.sum()).to(dtype)
+    if held.weights is not None:
+        held = replace(held, weights=held.weights / held.weights.sum())
+    held = held.to(dtype)
     count = len(settings.roughness)
     while len(stages) < count and not budget.is_spent:
         number = len(stages)
@@ -91,12 +90,9 @@ def refine_in_stages(
         before = [p.detach().clone() for p in density.flow.parameters()]
         stage = refine(
             density,
-            points,
-            held.points,
-            weights=weights,
-            held_weights=shares,
+            train,
+            held,
             iterations=settings.iterations,
-            kinetic=settings.kinetic,
             roughness=settings.roughness[number],
             budget=budget,
             watch=watch,
@@ -139,27 +135,16 @@ def fit_density(
     *,
     weights: Any = None,
     progress: Progress | None = None,
-) -> tuple[Density, FitReport]:
+) -> tuple[FlowDensity, FitReport]:
     """Fit a flow of spline fields to canonical points by flow matching, then by likelihood.
 
-    Points that share a small cell are merged, so the time hardly grows with their number.
-
-    Args:
-        space: of three dimensions at most.
-        points: (N, d) in the chart, anything that NumPy takes, N >= 10 different ones.
-        settings: default `FlowSettings()`.
-        weights: of the points (N,), at least 0; only their ratios count; default equal.
-        progress: told how far it is.
-
-    Returns:
-        The density, float64, and the report.
-
-    Raises:
-        OrbiflowError: for a space of four and more dimensions, points of another shape or too few, or
-            weights that are none.
+    Points (N, d) are in the chart of a space of three dimensions at most; of `weights` (N,) only the
+    ratios count. Points that share a small cell are merged, so the time hardly grows with their number.
+    The density is float64.
     """
-    settings = FlowSettings() if settings is None else settings
-    as_instance(settings, FlowSettings, "settings")
+    settings = as_instance(
+        FlowSettings() if settings is None else settings, FlowSettings, "settings"
+    )
     if as_instance(space, Space, "space", "see `make_space`").dim > MOST_DIM:
         raise OrbiflowError(
             f"a flow has {MOST_DIM} dimensions at most, this {space.name} has {space.dim}: fit other "
@@ -171,35 +156,21 @@ def fit_density(
     order, out, duplicates = sides(rows.points, settings.validation, generator)
     train, validation = (rows[order[side]] for side in (~out, out))
     say(0.0, "matching")
-    flow = _start(space, train, settings, generator)
-    start_nll = mean_nll(
-        flow, validation.points.to(next(flow.flow.parameters()).dtype), validation.weights
-    )
+    density = _start(space, train, settings, generator)
+    start_nll = mean_nll(density, validation.points.to(DTYPE), validation.weights)
     budget = Budget(settings.evaluations, settings.seconds)
-    stages = refine_in_stages(flow, train, validation, settings, say, budget)
-    flow.flow.double()
-    error, mass = settle(flow, validation.points[:MOST_HELD], MOST_STEPS)
-    notes = [
-        *weights_note(rows),
-        *repeats_note(len(rows), duplicates),
-        *budget.notes(),
-        *steps_note(flow.flow.steps, error),
-    ]
-    found: dict[str, float] | None = None
-    density: Density = flow
-    if settings.kernels:
-        say(1.0, "kernels")
-        mixture = blend_kernels(
-            flow,
-            train.points,
-            validation.points,
-            row_weights=train.weights,
-            held_weights=validation.weights,
+    stages = refine_in_stages(density, train, validation, settings, say, budget)
+    density.flow.double()
+    error, mass = settle(density, validation.points[:MOST_HELD], MOST_STEPS)
+    notes = [*weights_note(rows)]
+    if duplicates:
+        notes.append(
+            f"{duplicates} of {len(rows)} points repeat another: they count as often as they come, and "
+            "equal points were kept on the same side of the validation split"
         )
-        density, found = mixture, mixture.weight_of_kind
-        mass = None if mass is None else mass_with(found["flow"], mass)
-        shares = ", ".join(f"{name} {weight:.1%}" for name, weight in found.items())
-        notes.append(f"the density is a mixture: {shares}")
+    notes += [*budget.notes(), *steps_note(density.flow.steps, error)]
+    if mass is not None and abs(mass - 1) > MASS_TOLERANCE:
+        notes.append(f"the density integrates to {mass:.4f} over the {space.name}, not to 1")
     train_nll, validation_nll = (
         mean_nll(density, some.points, some.weights)
         for some in (train[:MOST_REPORTED], validation[:MOST_REPORTED])
@@ -213,12 +184,11 @@ def fit_density(
         train_nll=train_nll,
         validation_nll=validation_nll,
         stages=tuple(stages),
-        steps=flow.flow.steps,
+        steps=density.flow.steps,
         mass=mass,
         integration_error=error,
-        weights=found,
         effective=None if rows.weights is None else effective_rows(rows.weights),
-        notes=(*notes, *_mass_note(space, mass)),
+        notes=tuple(notes),
     )
     return density, report
 
@@ -227,19 +197,16 @@ def _start(
     space: Space, train: Rows, settings: FlowSettings, generator: torch.Generator
 ) -> FlowDensity:
     """The closed-form start, by flow matching."""
-    base = UniformDensity(space) if settings.base == "uniform" else VonMisesDensity(space)
-    dtype = torch.float32 if settings.single else torch.float64
-    frequency = max_frequency(space, settings.max_frequency)
+    # the frequency index that reaches so many waves along a side of the square
+    frequency = round(settings.max_frequency * float(space.group.lattice.diagonal().max()))
     segments = [
-        SplineField(space.group, frequency, smoothness=settings.smoothness, dtype=dtype)
+        SplineField(space.group, frequency, smoothness=SMOOTHNESS, dtype=DTYPE)
         for _ in range(settings.segments)
     ]
     chosen = _matched(train, generator)
-    start, move = coupled(space, base.sample(len(chosen), generator), chosen)
-    match_flow(
-        segments, space, start.to(dtype), move.to(dtype), ridge=settings.ridge, generator=generator
-    )
-    return FlowDensity(space, Flow(segments, steps=settings.steps, warn=False), base)
+    start, move = coupled(space, UniformDensity(space).sample(len(chosen), generator), chosen)
+    match_flow(segments, space, start.to(DTYPE), move.to(DTYPE), generator=generator)
+    return FlowDensity(space, Flow(segments, steps=1, warn=False))
 
 
 def _matched(train: Rows, generator: torch.Generator) -> Tensor:
@@ -256,19 +223,11 @@ def _matched(train: Rows, generator: torch.Generator) -> Tensor:
     return train.points[rows[torch.randperm(count, generator=generator)]]
 
 
-def max_frequency(space: Space, detail: int) -> int:
-    """Frequency index that reaches `detail` waves along a side of the square."""
-    return round(detail * float(space.group.lattice.diagonal().max()))
-
-
-def _mass_note(space: Space, mass: float | None) -> list[str]:
-    if mass is None or abs(mass - 1) <= MASS_TOLERANCE:
-        return []
-    return [f"the density integrates to {mass:.4f} over the {space.name}, not to 1"]
-
-
 ORDER = 3
 """Of the derivatives that the ridge holds small: the displacements are smooth, their noise is not."""
+
+RIDGE = 1e-4
+"""Weight of E|V|^2 + E|grad^3 V|^2, lengths in wavelengths, beside the data's 1."""
 
 REPEATS = 2
 """Times at each geodesic and segment."""
@@ -302,7 +261,7 @@ def match_flow(
     start: Tensor,
     move: Tensor,
     *,
-    ridge: float = 1e-3,
+    ridge: float = RIDGE,
     iterations: int = 15,
     generator: torch.Generator | None = None,
 ) -> None:
@@ -311,8 +270,7 @@ def match_flow(
     Segment k of K regresses the displacements at points on the geodesics at times in [k / K, (k + 1) /
     K] (Lipman et al., Flow Matching for Generative Modeling, 2023). A segment of duration 1 carries
     what takes time 1 / K, hence the factor. At each geodesic and segment there are `REPEATS` times.
-    `ridge` is the weight of E|V|^2 + E|grad^3 V|^2, lengths in wavelengths, beside the data's 1,
-    `iterations` those of conjugate gradients at most.
+    `iterations` are those of conjugate gradients at most.
     """
     count = len(fields)
     for k, field in enumerate(fields):

@@ -1,4 +1,4 @@
-"""Kernel densities: estimates about the data, kernels beside a flow, and mixtures of few by EM."""
+"""Kernel densities: estimates about the data, and mixtures of few by EM."""
 
 from __future__ import annotations
 
@@ -11,107 +11,19 @@ import torch
 from scipy.spatial import KDTree
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_points
 from orbiflow.density.fitting.chains import PRIOR, PRIOR_RESULTANT, concentration, far_apart
 from orbiflow.density.fitting.folds import places
 from orbiflow.density.fitting.likelihood import training
-from orbiflow.density.fitting.rows import Rows, is_whole, mean_of
-from orbiflow.density.models import (
-    FAINT,
-    AdaptiveKernels,
-    Density,
-    Mixture,
-    UniformDensity,
-    kernel_rows,
-)
+from orbiflow.density.fitting.rows import Rows, is_whole
+from orbiflow.density.models import FAINT, AdaptiveKernels, kernel_rows
 from orbiflow.density.spaces import RoundSpace, Space, rectangle
-from orbiflow.errors import OrbiflowError
-from orbiflow.typed_torch import linalg, special, unique
-
-MOST_KERNELS, MOST_HELD = 20_000, 2_000
-"""The most centers, and the most held-out points that choose the widths."""
+from orbiflow.typed_torch import linalg, special
 
 NEIGHBOURS = (2, 4, 8, 16)
 SCALES = (0.1, 0.2, 0.4, 0.8, 1.6)
 ISOTROPY = (0.05, 0.3)
 NARROWEST, WIDEST = 1e7, 0.5
 """The largest and the least concentration: a deviation of 0.02 degrees, or nearly uniform."""
-
-FLOOR = 1e-3
-"""The least weight of the uniform density, so that no observation is impossible."""
-
-
-@training()
-def blend_kernels(
-    density: Density,
-    train: Tensor,
-    held: Tensor,
-    *,
-    row_weights: Tensor | None = None,
-    held_weights: Tensor | None = None,
-) -> Mixture:
-    """Blend a fitted density with adaptive kernels about the training points and a uniform floor.
-
-    Each kernel's variance is a share of the mean square distance to its nearest neighbours (Breiman,
-    Meisel, Purcell, 1977), on tori axis by axis. The share, the number of neighbours and the
-    proportions of flow, kernels and floor are those best on the held-out points.
-
-    Args:
-        density: Any density.
-        train: Canonical points (N, d) that the kernels are about.
-        held: Canonical points (M, d) that choose widths and proportions.
-        row_weights: Weights of the training points (N,); default: equal.
-        held_weights: Weights of the held-out points (M,); default: equal.
-
-    Raises:
-        OrbiflowError: for points of another shape, fewer than three different ones to train on, or none
-            held out.
-    """
-    space = as_instance(density, Density, "density").space
-    train = as_points(train, space.dim, "training points", flat=True).double()
-    held = as_points(held, space.dim, "held points", flat=True).double()
-    centers, place, counts = unique(train, dim=0, return_inverse=True, return_counts=True)
-    if row_weights is not None:
-        counts = row_weights.new_zeros(len(centers)).index_add_(0, place, row_weights)
-    if len(centers) > MOST_KERNELS:
-        chosen = torch.randperm(len(centers), generator=torch.Generator().manual_seed(0))
-        centers, counts = centers[chosen[:MOST_KERNELS]], counts[chosen[:MOST_KERNELS]]
-    if len(centers) <= min(NEIGHBOURS) or not len(held):
-        raise OrbiflowError(
-            f"kernels need {min(NEIGHBOURS) + 1} different points or more and some held out, got "
-            f"{len(centers)} and {len(held)}"
-        )
-    weights = counts.double() / counts.sum()
-    held = held[:MOST_HELD]
-    held_weights = None if held_weights is None else held_weights[:MOST_HELD]
-    uniform = UniformDensity(space)
-    with torch.no_grad():
-        others = [density.log_prob(held), uniform.log_prob(held)]
-    best, found = -math.inf, None
-    for _, kernels in _near_kernels(space, centers, weights, NARROWEST):
-        parts = torch.stack([others[0], kernels.log_prob(held), others[1]])
-        shares, score = proportions(parts, row_weights=held_weights)
-        if score > best:
-            best, found = score, Mixture([density, kernels, uniform], shares)
-    assert found is not None
-    return found
-
-
-def proportions(
-    parts: Tensor, *, iterations: int = 60, row_weights: Tensor | None = None
-) -> tuple[Tensor, float]:
-    """Return proportions (3,) that suit log densities `parts` (3, N) best, by EM, and their score.
-
-    The last is kept at `FLOOR` or more.
-    """
-    shares = torch.full_like(parts[:, 0], 1 / len(parts))
-    for _ in range(iterations):
-        joint = parts + shares.log()[:, None]
-        each = (joint - joint.logsumexp(dim=0)).exp()
-        shares = each.mean(dim=1) if row_weights is None else each @ row_weights / row_weights.sum()
-    shares[-1] = shares[-1].clamp_min(FLOOR)
-    shares = shares.clamp_min(1e-12) / shares.clamp_min(1e-12).sum()
-    return shares, mean_of((parts + shares.log()[:, None]).logsumexp(dim=0), row_weights)
 
 
 def _near_kernels(
@@ -131,7 +43,6 @@ def _near_kernels(
 def spreads(space: Space, centers: Tensor, neighbours: list[int]) -> list[Tensor]:
     """Return mean square distances to the nearest neighbours, per axis: (N, 1) or (N, d) each."""
     images = space.features(centers)
-    count = images.shape[1]
     tree = KDTree(images.reshape(-1, images.shape[-1]).numpy())
     _, nearest = tree.query(images[0].numpy(), k=neighbours[-1] + 1)
     near = images.reshape(-1, images.shape[-1])[torch.as_tensor(np.asarray(nearest)[:, 1:])]
@@ -140,7 +51,6 @@ def spreads(space: Space, centers: Tensor, neighbours: list[int]) -> list[Tensor
         square = square.sum(dim=-1, keepdim=True) / 2
     else:  # a chord's square is nearly the angle's
         square = square[..., : space.dim] + square[..., space.dim :]
-    assert square.shape[:2] == (count, neighbours[-1])
     return [square[:, :m].mean(dim=1) + 1e-12 for m in neighbours]
 
 
@@ -190,8 +100,8 @@ def even_kernels(
     return AdaptiveKernels(space, centers, centers.new_full((len(centers), width), kappa), weights)
 
 
-CONVERGED = 1e-4
-"""Nats that an iteration of EM must gain."""
+ITERATIONS, CONVERGED = 60, 1e-4
+"""The most iterations of EM, and nats that each must gain."""
 
 BLOCK = 4_096
 """Points worked on at a time."""
@@ -204,7 +114,7 @@ def fit_mixture(
     train: Rows,
     components: int,
     *,
-    iterations: int = 60,
+    iterations: int = ITERATIONS,
     narrowest: float = NARROWEST,
     generator: torch.Generator,
 ) -> AdaptiveKernels:

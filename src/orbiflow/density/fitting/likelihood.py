@@ -17,6 +17,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.arrays import Array
+from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.models import FlowDensity
 from orbiflow.fields import InvariantField
 from orbiflow.runtime import one_thread
@@ -67,29 +68,18 @@ class Objective:
 
     Args:
         density: A density whose flow has Fourier or spline fields.
-        points: Canonical training points (N, d).
-        weights: Weights (N,) of sum 1; default: equal.
-        kinetic: Weight of the flow's kinetic energy, E|V|^2 summed over segments.
+        rows: Canonical training points (N, d), whose weights, if they have any, have the sum 1.
         roughness: Weight of E|grad^3 V|^2 summed over segments, with lengths in wavelengths.
     """
 
-    def __init__(
-        self,
-        density: FlowDensity,
-        points: Tensor,
-        weights: Tensor | None = None,
-        *,
-        kinetic: float,
-        roughness: float,
-    ) -> None:
-        self.density, self.points = density, points
-        self.weights = _even(points) if weights is None else weights
+    def __init__(self, density: FlowDensity, rows: Rows, roughness: float) -> None:
+        self.density, self.rows = density, rows
         self.parameters = [p for p in density.flow.parameters() if p.requires_grad]
         self.fields = [f for f in density.flow.segments if isinstance(f, InvariantField)]
         self._weights: list[Tensor] = []
         for field in self.fields:  # of each coefficient's square, (P,)
             magnitude = torch.as_tensor(field.basis.magnitude).to(field.parameters_)
-            self._weights.append(kinetic + roughness * magnitude ** (2 * ORDER))
+            self._weights.append(roughness * magnitude ** (2 * ORDER))
         self.last = math.inf
 
     def get(self) -> Array:
@@ -100,62 +90,59 @@ class Objective:
     @torch.no_grad()
     def set(self, values: Array) -> None:
         """Put flat parameters back."""
-        flat = torch.as_tensor(values)
-        for parameter in self.parameters:
-            parameter.copy_(flat[: parameter.numel()].reshape(parameter.shape))
-            flat = flat[parameter.numel() :]
+        parts = torch.split(torch.as_tensor(values), [p.numel() for p in self.parameters])
+        for parameter, part in zip(self.parameters, parts, strict=True):
+            parameter.copy_(part.reshape(parameter.shape))
 
-    def penalty(self) -> Tensor:
-        """Return kinetic energy and roughness, which are exact as the basis is orthonormal."""
-        total = self.points.new_zeros(())
-        count = len(self.fields)
+    def roughness(self) -> Tensor:
+        """Return the penalty, which is exact as the basis is orthonormal."""
+        total = self.rows.points.new_zeros(())
         for field, weights in zip(self.fields, self._weights, strict=True):
             total = total + ((field.parameters_ * field.scale) ** 2 * weights).sum()
-        return total * count  # a segment of duration 1 stands for a time 1 / count
+        # a segment of duration 1 stands for a time 1 / count
+        return total * len(self.fields)
 
     def __call__(self, values: Array) -> tuple[float, Array]:
         """Return loss and gradient, or a barrier where the density is not finite."""
         self.set(values)
-        for parameter in self.parameters:
-            parameter.grad = None
-        nll = -(self.weights * self.density.log_prob(self.points)).sum()
-        loss = nll + self.penalty()
+        nll = _nll(self.density, self.rows)
+        loss = nll + self.roughness()
         if not bool(torch.isfinite(loss)):
             return 1e10, np.zeros(len(values))
-        torch.autograd.backward(loss)
-        gradient = torch.cat(
-            [
-                torch.zeros_like(p).reshape(-1) if p.grad is None else p.grad.reshape(-1)
-                for p in self.parameters
-            ]
-        )
+        gradients = torch.autograd.grad(loss, self.parameters)
         self.last = float(nll.detach())
-        return float(loss.detach()), gradient.double().cpu().numpy()
+        flat = torch.cat([gradient.reshape(-1) for gradient in gradients])
+        return float(loss.detach()), flat.double().cpu().numpy()
+
+
+def _nll(density: FlowDensity, rows: Rows) -> Tensor:
+    """Return the mean negative log density of rows whose weights have the sum 1."""
+    points, weights = rows.points, rows.weights
+    if weights is None:
+        weights = torch.full_like(points[:, 0], 1 / len(points))
+    return -(weights * density.log_prob(points)).sum()
 
 
 def refine(
     density: FlowDensity,
-    train: Tensor,
-    validation: Tensor,
+    train: Rows,
+    held: Rows,
     *,
-    weights: Tensor | None = None,
-    held_weights: Tensor | None = None,
-    iterations: int = 100,
-    kinetic: float = 0.0,
+    iterations: int,
     roughness: float = 0.0,
     budget: Budget | None = None,
     watch: Watch | None = None,
 ) -> Refinement:
-    """Descend on the negative log-likelihood, and leave the flow's parameters best on `validation`.
+    """Descend on the negative log-likelihood, and leave the flow's parameters best on `held`.
 
-    Canonical points (N, d) are in the parameters' dtype; weights have the sum 1, by default equal ones.
-    It ends after `iterations`, or `PATIENCE` of them that do not improve the validation score, or when
-    the `budget` is spent. `watch` is told every score.
+    Canonical points (N, d) are in the parameters' dtype; weights, if there are any, have the sum 1. It
+    ends after `iterations`, or `PATIENCE` of them that do not improve the held-out score, or when the
+    `budget` is spent. `watch` is told every score.
     """
-    budget = Budget() if budget is None else budget
+    budget = budget or Budget()
     began = time.monotonic()
-    objective = Objective(density, train, weights, kinetic=kinetic, roughness=roughness)
-    descent = _Descent(objective, validation, held_weights, watch)
+    objective = Objective(density, train, roughness)
+    descent = _Descent(objective, held, watch)
 
     def loss(values: Array) -> tuple[float, Array]:
         budget.spend()
@@ -191,16 +178,13 @@ def refine(
 class _Descent:
     """The iterates of a descent: every `EVERY`-th is scored, and so is the last."""
 
-    def __init__(
-        self, objective: Objective, validation: Tensor, weights: Tensor | None, watch: Watch | None
-    ) -> None:
-        self.objective, self.validation, self.watch = objective, validation, watch
-        self.weights = _even(validation) if weights is None else weights
+    def __init__(self, objective: Objective, held: Rows, watch: Watch | None) -> None:
+        self.objective, self.held, self.watch = objective, held, watch
         self.done, self.best = 0, 0
         self.latest = self.kept = objective.get()
-        self.nll = self._nll(objective.density, objective.points, objective.weights)
+        with torch.no_grad():
+            self.nll = float(_nll(objective.density, objective.rows))
         self.trains, self.scores = [self.nll], [self._score()]
-        self._scored = 0
 
     def after(self, xk: Array) -> None:
         """Take an iterate."""
@@ -213,7 +197,7 @@ class _Descent:
 
     def finish(self) -> None:
         """Leave the best iterate in place."""
-        if self._scored < self.done:
+        if self.done % EVERY:
             self._look()
         self.objective.set(self.kept)
 
@@ -221,69 +205,54 @@ class _Descent:
         self.objective.set(self.latest)
         self.trains.append(self.nll)
         self.scores.append(self._score())
-        self._scored = self.done
         if self.watch is not None:
             self.watch(self.done, self.trains[-1], self.scores[-1])
         if self.scores[-1] < self.scores[self.best] or not math.isfinite(self.scores[self.best]):
             self.best, self.kept = len(self.scores) - 1, self.latest
 
+    @torch.no_grad()
     def _score(self) -> float:
         # at doubled steps: what only exploits the integrator gains nothing here
         density = self.objective.density
-        finer = density.with_steps(2 * density.flow.steps)
-        return self._nll(finer, self.validation, self.weights)
-
-    @torch.no_grad()
-    def _nll(self, density: FlowDensity, points: Tensor, weights: Tensor) -> float:
-        return -float((weights * density.log_prob(points)).sum())
-
-
-def _even(points: Tensor) -> Tensor:
-    return torch.full_like(points[:, 0], 1 / len(points))
+        return float(_nll(density.with_steps(2 * density.flow.steps), self.held))
 
 
 LEVELS = 5
 """Halvings of the cells at most: a point is then known to 1/32 of a cell."""
 
 
-def merged(
-    points: Tensor, cells: int, crowd: int, row_weights: Tensor | None = None
-) -> tuple[Tensor, Tensor]:
+def merged(rows: Rows, cells: int, crowd: int) -> Rows:
     """Return means of the points in each cell of a grid, finer where points crowd, and their shares.
 
     A smooth log density summed over the points changes by half its curvature times their variance
     within a cell, which is below 1 / (6 cells^2). Where the density is sharp, points crowd: cells of
     more than `crowd` points are quartered, again and again.
 
-    Points (N, d) in [0, 1]^d, with `row_weights` (N,) or equal ones, and so many `cells` along a side
-    of the coarsest grid, become points (M, d) and weights (M,) of sum 1, M <= N, in the points' dtype.
+    Points (N, d) in [0, 1]^d become points (M, d), M <= N, with weights of sum 1; the coarsest grid has
+    so many `cells` along a side.
 
-    >>> merged(torch.tensor([[0.1], [0.2], [0.9]]), 2, crowd=2)[1]
+    >>> merged(Rows(torch.tensor([[0.1], [0.2], [0.9]])), 2, crowd=2).weights
     tensor([0.6667, 0.3333])
     """
-    group = torch.zeros(len(points), dtype=torch.long, device=points.device)
-    left = torch.arange(len(points), device=points.device)
-    groups = 0
+    points = rows.points
+    group = torch.zeros(len(points), dtype=torch.long)
+    left, groups = torch.arange(len(points)), 0
     for level in range(LEVELS + 1):
         side = cells << level
         cell = (points[left] * side).floor().clamp(0, side - 1).long()
-        label = (cell * side ** torch.arange(points.shape[1], device=left.device).flip(0)).sum(
-            dim=1
-        )
+        label = (cell * side ** torch.arange(points.shape[1]).flip(0)).sum(dim=1)
         _, where, counts = unique(label, return_inverse=True, return_counts=True)
         settled = (counts[where] <= crowd) | (level == LEVELS)
         group[left[settled]] = groups + where[settled]
         left, groups = left[~settled], groups + len(counts)
         if not len(left):
             break
-    _, where, counts = unique(group, return_inverse=True, return_counts=True)
-    if row_weights is not None:
-        points = points * row_weights[:, None]
-        counts = row_weights.new_zeros(len(counts)).index_add_(0, where, row_weights)
-        sums = points.new_zeros(len(counts), points.shape[1]).index_add_(0, where, points)
-        return sums / counts[:, None], (counts / counts.sum()).to(points)
-    sums = points.new_zeros(len(counts), points.shape[1]).index_add_(0, where, points)
-    return sums / counts[:, None], counts.to(points) / len(points)
+    numbers, where = unique(group, return_inverse=True)
+    weights = torch.ones_like(points[:, 0]) if rows.weights is None else rows.weights
+    total = weights.new_zeros(len(numbers)).index_add_(0, where, weights)
+    sums = points.new_zeros(len(numbers), points.shape[1])
+    sums.index_add_(0, where, points * weights[:, None])
+    return Rows(sums / total[:, None], (total / total.sum()).to(points))
 
 
 clock = time.monotonic

@@ -13,7 +13,8 @@ from torch import Tensor
 from orbiflow.arguments import as_instance, as_points
 from orbiflow.density.fitting.folds import LEAST_PLACES, Repeats, places
 from orbiflow.density.fitting.likelihood import Refinement
-from orbiflow.density.fitting.rows import log_prob_of_rows, mean_of
+from orbiflow.density.fitting.rows import mean_of
+from orbiflow.density.inference import at_observed
 from orbiflow.density.models import Density, FlowDensity
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
@@ -167,7 +168,7 @@ def sides(points: Tensor, share: float, generator: torch.Generator) -> tuple[Ten
 @torch.no_grad()
 def mean_nll(density: Density, points: Tensor, weights: Tensor | None = None) -> float:
     """Mean negative log density at `points` (N, d), weighted, per area of the square."""
-    return -mean_of(log_prob_of_rows(density, points), weights)
+    return -mean_of(at_observed(density, points), weights)
 
 
 def step_error(density: FlowDensity, points: Tensor) -> float:
@@ -192,20 +193,6 @@ def settle(density: FlowDensity, points: Tensor, most: int) -> tuple[float, floa
             if last or mass is None or abs(mass - 1) <= MASS_TOLERANCE / 2:
                 return error, mass
         density.flow, now = density.flow.with_steps(2 * density.flow.steps), finer
-
-
-def mass_with(weight: float, mass: float) -> float:
-    """Return the integral of a mixture in which a flow has this weight, and itself this integral."""
-    return weight * mass + 1 - weight
-
-
-def repeats_note(count: int, duplicates: int) -> list[str]:
-    """What to say of `duplicates` among `count` points."""
-    note = (
-        f"{duplicates} of {count} points repeat another: they count as often as they come, and "
-        "equal points were kept on the same side of the validation split"
-    )
-    return [note] if duplicates else []
 
 
 def steps_note(steps: int, error: float) -> list[str]:

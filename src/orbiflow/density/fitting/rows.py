@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -11,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
 from orbiflow.arguments import as_choice, as_instance, as_tensor, described
-from orbiflow.density.inference import at_observed, check_torus, observed_rows
-from orbiflow.density.models import AdaptiveKernels, Density
+from orbiflow.density.inference import check_torus, observed_rows
+from orbiflow.density.models import AdaptiveKernels
 from orbiflow.density.spaces import Space, row_count
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed, unique
@@ -38,6 +39,11 @@ class Rows:
         groups = None if self.groups is None else self.groups[chosen]
         return Rows(self.points[chosen], weights, groups)
 
+    def to(self, dtype: torch.dtype) -> Rows:
+        """Return the rows with points and weights in a dtype."""
+        weights = None if self.weights is None else self.weights.to(dtype)
+        return Rows(self.points.to(dtype), weights, self.groups)
+
     def mean(self, values: Tensor) -> float:
         """Return the mean of values (N,), weighted as the rows are."""
         return mean_of(values, self.weights)
@@ -61,6 +67,34 @@ def effective_rows(weights: Tensor) -> float:
     2.0
     """
     return float(weights.sum() ** 2 / weights.square().sum())
+
+
+SURE = 2.0
+"""Standard errors by which a gain must exceed 0 to be no accident."""
+
+
+class Gain(NamedTuple):
+    """A mean difference of log densities in nats, and its standard error over the rows."""
+
+    nats: float
+    error: float
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it is no accident of few rows."""
+        return self.nats >= SURE * self.error
+
+
+def gain_of(better: Tensor, worse: Tensor, row_weights: Tensor | None = None) -> Gain:
+    """Return the gain of one log density (N,) over another at the same rows, which may be weighted."""
+    difference = better - worse
+    if row_weights is not None:
+        mean = mean_of(difference, row_weights)
+        rows = effective_rows(row_weights)
+        variance = mean_of((difference - mean) ** 2, row_weights)
+        return Gain(mean, math.sqrt(variance / (rows - 1)) if rows > 1 else math.nan)
+    spread = float(difference.std()) if len(difference) > 1 else math.nan
+    return Gain(float(difference.mean()), spread / math.sqrt(len(difference)))
 
 
 def weights_of(weights: Any, rows: int) -> Tensor:
@@ -93,10 +127,6 @@ def weighed(points: Tensor, weights: Any, groups: Tensor | None = None) -> Rows:
     """Return the rows that have a weight, with weights of mean 1: only their ratios count.
 
     Rows of weight 0 are left out; equal weights are none.
-
-    Raises:
-        OrbiflowError: for another number of weights than points, negative or infinite ones, NaN, or
-            weights that are all 0.
     """
     if weights is None:
         return Rows(points, None, groups)
@@ -171,13 +201,6 @@ def missing_notes(rows: Rows, empty: int) -> list[str]:
         "1 row lacks all angles and was" if empty == 1 else f"{empty} rows lack all angles and were"
     )
     return [*([some] if lacking else []), *([f"{were} left out"] if empty else [])]
-
-
-def log_prob_of_rows(density: Density, points: Tensor) -> Tensor:
-    """Return log densities (N,) at points that may lack angles, of the angles that they have."""
-    if not bool(points.isnan().any()):
-        return density.log_prob(points)
-    return at_observed(density, points)
 
 
 def with_incomplete(kernels: AdaptiveKernels, rows: Rows, total: float) -> AdaptiveKernels:

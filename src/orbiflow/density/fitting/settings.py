@@ -9,7 +9,6 @@ from orbiflow.settings import (
     DefaultText,
     Group,
     Hidden,
-    NotWith,
     Range,
     SettingError,
     Settings,
@@ -79,24 +78,12 @@ class FlowOptions(Settings, group="Flow"):
     ] = None
     """Maximum number of iterations of L-BFGS in each stage; 0 keeps the closed-form start."""
 
-    smoothness: Annotated[float, Range(0, 8), Hidden()] = 2.0
-    """Exponent s of the scaling (1 + |kappa|^2)^(-s/2) of the flow's parameters."""
-
-    ridge: Annotated[float, Range(0), Hidden()] = 1e-4
-    """Weight of the ridge penalty of the closed-form start."""
-
-    kinetic: Annotated[float, Range(0), Hidden()] = 0.0
-    """Weight of the kinetic energy."""
-
     evaluations: Annotated[int, Range(0, 1_000_000_000), Hidden()] = 1000
     """Maximum number of evaluations of the likelihood and its gradient in all stages together. A stage
     of 100 iterations takes about 105."""
 
     validation: Annotated[float, Range(above=0, below=1), Hidden()] = 0.1
     """Share of the points held out for early stopping."""
-
-    base: Annotated[Literal["uniform", "von-mises"], Hidden()] = "uniform"
-    """Density that the flow moves; "von-mises" is the paper's."""
 
     seconds: Annotated[float | None, Range(0), Unit("s"), DefaultText("no limit")] = None
     """Maximum training time. A fit that it ends depends on the machine's speed, and its report says so;
@@ -111,16 +98,6 @@ class FlowSettings(FlowOptions, group="Flow"):
     roughness: tuple[Annotated[float, Range(0)], ...] = (1e-3, 1e-3, 1e-4)
     iterations: Annotated[int, Range(0, 100_000)] = 100
 
-    steps: Annotated[int, Range(1, 256)] = 1
-    """RK4 steps in each segment, at first; doubled where the integrator has not converged."""
-
-    kernels: bool = False
-    """Blend the flow with adaptive kernels about the training points, for data sharper than the flow's
-    waves; see `blend_kernels`."""
-
-    single: bool = True
-    """Train in float32, about twice as fast; the result is float64 in any case."""
-
     seed: Seed = 0
     """Seed of the split, the base points and the times."""
 
@@ -133,11 +110,6 @@ class FlowSettings(FlowOptions, group="Flow"):
 class DensitySettings(FlowOptions, ComponentSettings, group="Density"):
     """How a density is fitted."""
 
-    kernels: Annotated[
-        bool, FLOW, NotWith("components", because="{kernels} is a flow with kernels")
-    ] = False
-    """A flow with adaptive kernels, and nothing else."""
-
     def check(self) -> None:
         """Check that what is set of a flow has one."""
         for name in ("max_frequency", "segments"):
@@ -148,15 +120,26 @@ class DensitySettings(FlowOptions, ComponentSettings, group="Density"):
 
     @property
     def flow_alone(self) -> bool:
-        """Whether there is nothing to choose: a flow, with adaptive kernels or without."""
-        return self.kernels or self.components == ("flow",)
+        """Whether there is nothing to choose."""
+        return self.components == ("flow",)
+
+    def check_rows(self, missing: str, groups: str | None = None) -> None:
+        """Refuse what a flow alone cannot be fitted to; `groups` are known by their argument's name."""
+        if self.flow_alone and missing == "marginalise":
+            raise SettingError(
+                "{missing} marginalise is for kernels and mixtures: a flow cannot be fitted to rows "
+                "that lack angles; give other {components}"
+            )
+        if self.flow_alone and groups is not None:
+            raise SettingError(
+                f"{{{groups}}} serves to choose among {{components}}, and a flow alone has no choice; "
+                "leave it out"
+            )
 
     @property
     def flow(self) -> FlowSettings:
         """Settings of a flow that is fitted alone."""
-        return FlowSettings(
-            kernels=self.kernels, seconds=self.seconds, seed=self.seed, **self.of_flow
-        )
+        return FlowSettings(seconds=self.seconds, seed=self.seed, **self.of_flow)
 
     @property
     def of_flow(self) -> dict[str, Any]:

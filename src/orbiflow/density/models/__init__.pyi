@@ -1,7 +1,7 @@
-from .chain_integrals import SCALES as SCALES
-from .chain_integrals import waves as waves
+from .chains import SCALES as SCALES
 from .chains import VonMisesChains as VonMisesChains
 from .chains import chained as chained
+from .chains import waves as waves
 from .density import Density as Density
 from .density import Split as Split
 from .evaluation import CHECKED as CHECKED
@@ -15,7 +15,6 @@ from .flow import MOST_DIM as MOST_DIM
 from .flow import FlowDensity as FlowDensity
 from .flow import UniformDensity as UniformDensity
 from .flow import VonMisesDensity as VonMisesDensity
-from .flow import identity_flow as identity_flow
 from .kernels import AdaptiveKernels as AdaptiveKernels
 from .kernels import kernel_rows as kernel_rows
 from .mixture import Mixture as Mixture

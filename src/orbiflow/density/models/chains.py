@@ -1,9 +1,12 @@
-"""Mixtures of von Mises chains: the component for dependent angles on tori."""
+"""Mixtures of von Mises chains: the component for dependent angles on tori.
+
+Marginals are taken by quadrature over the angles that come before others.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -11,12 +14,31 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_tensor
-from orbiflow.density.models.chain_integrals import SCALES, chains_at, waves
 from orbiflow.density.models.density import Density, Restriction, Split, in_blocks
 from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
-from orbiflow.typed_torch import special
+from orbiflow.typed_torch import listed, special, unique
+
+SCALES = (1.0, 4.0, 16.0)
+"""A component's concentrations are divided by these, each with its own weight: heavy tails."""
+
+REACH = 7.0
+"""Deviations from its mean beyond which an angle has no nodes."""
+
+STEP = 0.9
+"""Deviations between nodes, with which the trapezoidal rule is off by exp(-2 pi^2 / STEP^2)."""
+
+FEWEST = 12
+"""The fewest nodes of an angle."""
+
+MOST, MOST_ALONE = 1024, 16_384
+"""The most nodes of several hidden angles of a chain together, and of one. Where several need more,
+the nodes are quasi-random."""
+
+TABLE = 2048
+"""Points of the distribution function whose inverse gives quasi-random nodes."""
+
 
 BLOCK = 256
 """Points at a time: few enough for the cache."""
@@ -127,7 +149,7 @@ class VonMisesChains(Density, kind="chains"):
         )
 
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
-        return chains_at(self, points, axes, seed)
+        return _chains_at(self, points, axes, seed)
 
     def restricted(self, split: Split, space: Torus) -> Restriction:
         """Keep the chains in which all that is given comes first and all that is hidden last."""
@@ -167,10 +189,7 @@ class VonMisesChains(Density, kind="chains"):
         if given:
             angle = torch.zeros(1, d, dtype=torch.float64)
             angle[0, given] = 2 * math.pi * torch.tensor(split.values, dtype=torch.float64)
-            known = torch.zeros(1 + 2 * d, dtype=torch.float64)
-            at = [0, *(1 + j for j in given), *(1 + d + j for j in given)]
-            known[at] = waves(angle)[0, at]
-            constant = means @ known
+            constant = means @ _known_part(angle, given)[0]
             residual = angle[0, given] - constant[:, given]
             kappa = self.concentrations[:, given, None] / torch.tensor(SCALES)
             logs = logs + (kappa * (residual.cos() - 1)[..., None] - special.i0e(kappa).log()).sum(
@@ -199,3 +218,174 @@ def chained(order: Tensor) -> Tensor:
     place = order.argsort(dim=-1)
     before = place[..., None, :] < place[..., :, None]
     return torch.cat([torch.ones_like(before[..., :1]), before, before], dim=-1)
+
+
+def waves(angle: Tensor) -> Tensor:
+    """Return 1, sin and cos of angles (N, d) in radians: (N, 1 + 2 d)."""
+    return torch.cat([torch.ones_like(angle[:, :1]), angle.sin(), angle.cos()], dim=1)
+
+
+BLOCK_ENTRIES = 2_000_000
+"""Entries of the table of points, components and nodes worked on at a time."""
+
+
+def _chains_at(chains: VonMisesChains, points: Tensor, observed: list[int], seed: int) -> Tensor:
+    """Return log densities (N,) of the `observed` angles alone, at points (N, len(observed)).
+
+    Angles before others that are not observed are integrated out at `_nodes`, spread about their means,
+    which makes a mixture that is normalised however many nodes there are.
+    """
+    angle = torch.zeros(len(points), chains.order.shape[1], dtype=torch.float64)
+    angle[:, observed] = 2 * math.pi * points.double()
+    orders, number = unique(chains.order, dim=0, return_inverse=True)
+    rows: list[list[int]] = listed(orders)
+    logs: list[Tensor] = []
+    for k, order in enumerate(rows):
+        # angles after the last that is observed integrate to 1
+        last = max(order.index(axis) for axis in observed)
+        logs.append(_ordered_at(chains, number == k, order[: last + 1], angle, observed, seed))
+    return log_sum_exp(torch.cat(logs, dim=1))
+
+
+def _ordered_at(
+    chains: VonMisesChains,
+    which: Tensor,
+    order: list[int],
+    angle: Tensor,
+    observed: list[int],
+    seed: int,
+) -> Tensor:
+    """Return log weight plus log density (N, C) of components (K,) of one order, at each scale."""
+    seen = [axis for axis in order if axis in observed]
+    hidden = [axis for axis in order if axis not in observed]
+    scale = torch.tensor(SCALES, dtype=torch.float64)
+    means = chains.means[which].repeat_interleave(len(SCALES), dim=0)
+    kappa = (chains.concentrations[which][:, None] / scale[:, None]).flatten(0, 1)
+    constant = chains.log_weights[which].flatten()
+    constant = constant - special.i0e(kappa[:, seen]).log().sum(dim=1)
+    found = angle.new_empty(len(angle), len(means))
+    for chosen, logs, offsets in _nodes(means, kappa, hidden, seen, seed):
+        parts = [
+            _walked(part, means[chosen], kappa[chosen], order, logs, offsets)
+            for part in torch.split(angle, max(1, BLOCK_ENTRIES // logs.numel()))
+        ]
+        found[:, chosen] = torch.cat(parts) + constant[chosen]
+    return found
+
+
+def _walked(
+    angle: Tensor,
+    means: Tensor,
+    kappa: Tensor,
+    order: list[int],
+    logs: Tensor,
+    offsets: dict[int, Tensor],
+) -> Tensor:
+    """Return logs (N, C) of the observed angles' factors without constants, summed over the nodes."""
+    d = angle.shape[1]
+    known = _known_part(angle, [axis for axis in order if axis not in offsets])
+    known = (known @ means.flatten(0, 1).mT).reshape(len(angle), len(means), d)
+    plain = torch.zeros_like(known[..., 0])  # what does not depend on the hidden angles
+    bent: Tensor | None = None
+    before: list[tuple[int, Tensor, Tensor]] = []
+    for axis in order:
+        mean = known[..., axis]
+        if before:
+            mean = mean[..., None]
+            for j, sin, cos in before:
+                slope = means[:, axis, [1 + j, 1 + d + j], None]
+                mean = mean + slope[:, 0] * sin + slope[:, 1] * cos
+        if axis in offsets:
+            drawn = (mean if before else mean[..., None]) + offsets[axis]
+            before.append((axis, drawn.sin(), drawn.cos()))
+        elif before:
+            fit = (angle[:, None, None, axis] - mean).cos_().sub_(1).mul_(kappa[:, axis, None])
+            bent = fit if bent is None else bent.add_(fit)
+        else:
+            plain = plain + kappa[:, axis] * ((angle[:, None, axis] - mean).cos() - 1)
+    return plain if bent is None else plain + log_sum_exp(bent + logs)
+
+
+def _known_part(angle: Tensor, known: list[int]) -> Tensor:
+    """Return the `waves` (N, 1 + 2 d) of angles (N, d), 0 for those that are not known."""
+    d = angle.shape[1]
+    seen = torch.zeros(1 + 2 * d, dtype=angle.dtype)
+    seen[[0, *(1 + j for j in known), *(1 + d + j for j in known)]] = 1
+    return waves(angle) * seen
+
+
+def _nodes(
+    means: Tensor, kappa: Tensor, hidden: list[int], observed: list[int], seed: int
+) -> Iterator[tuple[Tensor, Tensor, dict[int, Tensor]]]:
+    """Yield numbers of components, and log weights (C, Q) of sum 1 and offsets (C, Q) of their nodes.
+
+    Offsets are by axis; components that need as many come together.
+
+    The trapezoidal rule over each hidden angle, as fine as it and the angles after it are sharp: to
+    analytic functions it converges exponentially (Trefethen and Weideman, 2014). For means
+    (C, d, 1 + 2 d) and concentrations (C, d); observed axes before a hidden one have slopes of 0 there.
+    """
+    count, d = kappa.shape
+    if not hidden:
+        yield torch.arange(count), kappa.new_zeros(count, 1), {}
+        return
+    # concentrations (C, H) of the integrand in each hidden angle, which bends others
+    after = hidden + observed
+    slope = means[:, after][:, :, [1 + axis for axis in hidden]].square()
+    slope += means[:, after][:, :, [1 + d + axis for axis in hidden]].square()
+    sharp = kappa[:, hidden] + (kappa[:, after, None] * slope).sum(dim=1)
+    reach = (REACH / kappa[:, hidden].clamp_min(1e-12).sqrt()).clamp_max(math.pi)
+    sizes = (2 * reach * sharp.sqrt() / STEP).ceil().clamp_min(FEWEST)
+    sizes = FEWEST * torch.exp2((sizes / FEWEST).log2().ceil())  # few different ones
+    wanted, number = unique(sizes, dim=0, return_inverse=True)
+    for k, size in enumerate(listed(wanted)):
+        chosen = torch.nonzero(number == k)[:, 0]
+        size = [min(int(s), MOST_ALONE) for s in size]
+        fits = len(size) == 1 or math.prod(size) <= MOST
+        own = kappa[chosen][:, hidden]
+        rule = _trapezoidal(own, reach[chosen], size) if fits else _sobol(own, seed)
+        yield chosen, rule[0], dict(zip(hidden, rule[1], strict=True))
+
+
+def _trapezoidal(kappa: Tensor, reach: Tensor, sizes: list[int]) -> tuple[Tensor, list[Tensor]]:
+    """Return a product of rules: log weights (C, Q), and offsets (C, Q) for each axis."""
+    logs: list[Tensor] = []
+    offsets: list[Tensor] = []
+    for i, size in enumerate(sizes):
+        step = (torch.arange(size, dtype=kappa.dtype) + 0.5) / size * 2 - 1
+        offset = reach[:, i, None] * step
+        logs.append(torch.log_softmax(kappa[:, i, None] * (offset.cos() - 1), dim=1))
+        offsets.append(offset)
+    shape = (len(kappa), *sizes)
+
+    def spread(value: Tensor, i: int) -> Tensor:
+        own = [1] * len(sizes)
+        own[i] = sizes[i]
+        return value.reshape(len(kappa), *own).expand(shape).flatten(1)
+
+    total = torch.stack([spread(value, i) for i, value in enumerate(logs)]).sum(dim=0)
+    return total, [spread(value, i) for i, value in enumerate(offsets)]
+
+
+def _sobol(kappa: Tensor, seed: int) -> tuple[Tensor, list[Tensor]]:
+    """Return `MOST` quasi-random nodes of equal weights, by von Mises quantiles."""
+    count, axes = kappa.shape
+    engine = torch.quasirandom.SobolEngine(axes, scramble=True, seed=seed)
+    even = engine.draw(MOST, dtype=torch.float64)
+    logs = kappa.new_full((count, MOST), -math.log(MOST))
+    return logs, [quantiles(kappa[:, i], even[:, i]) for i in range(axes)]
+
+
+def quantiles(kappa: Tensor, even: Tensor) -> Tensor:
+    """Return von Mises quantiles (C, Q) of probabilities (Q,), by interpolation of a table."""
+    reach = (REACH / kappa.clamp_min(1e-12).sqrt()).clamp_max(math.pi)[:, None]
+    edge = torch.linspace(-1, 1, TABLE + 1, dtype=kappa.dtype) * reach
+    middle = (edge[:, 1:] + edge[:, :-1]) / 2
+    mass = torch.softmax(kappa[:, None] * (middle.cos() - 1), dim=1)
+    below = torch.cat([torch.zeros_like(mass[:, :1]), mass.cumsum(dim=1)], dim=1)
+    at = torch.searchsorted(below, even.expand(len(kappa), -1).contiguous(), right=True)
+    at = at.clamp(1, TABLE)
+    low = below.gather(1, at - 1)
+    part = ((even - low) / (below.gather(1, at) - low).clamp_min(1e-300)).clamp(0, 1)
+    start = edge.gather(1, at - 1)
+    return start + part * (edge.gather(1, at) - start)

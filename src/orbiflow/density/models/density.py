@@ -99,10 +99,8 @@ class Density(Distribution):
     def log_density(self, points: Tensor, beside: float = -math.inf) -> Tensor:
         """Return log densities (...,) per area of the sphere on round spaces, else of the square.
 
-        Args:
-            points: Chart points (..., d).
-            beside: Logarithm of a constant density that the caller will add. What is negligible
-                beside it may be left out.
+        `beside` is the logarithm of a constant density that the caller will add: what is negligible
+        beside it may be left out.
         """
         del beside
         values = self.log_chart(points)
@@ -141,15 +139,9 @@ class Density(Distribution):
     # Marginal and conditional densities on tori: see orbiflow.density.inference.
 
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
-        """Return log densities (N,) of some angles alone, at points (N, len(axes)) of these.
+        """Return log densities (N,) of some angles alone, at points (N, len(axes)) of these in turns.
 
-        Args:
-            points: The angles in turns.
-            axes: The numbers of the angles.
-            seed: Seed of quasi-random nodes, if there are any.
-
-        Raises:
-            OrbiflowError: if the other angles cannot be integrated out.
+        `seed` is that of quasi-random nodes, if there are any.
         """
         del points, axes, seed
         raise OrbiflowError(f"a {type(self).__name__} cannot be integrated over some of its angles")
@@ -270,14 +262,6 @@ class Density(Distribution):
         the user's units or per steradian.
         """
         return -self.log_prob(self.sample((count,), generator), measure=measure).mean()
-
-    @torch.no_grad()
-    def kl_to(
-        self, other: Distribution, count: int = 16384, *, generator: torch.Generator | None = None
-    ) -> Tensor:
-        """Return a Monte Carlo estimate of KL(self || other) from `count` samples of self."""
-        points = self.sample((count,), generator)
-        return (self.log_prob(points) - other.log_prob(points)).mean()
 
     def to(self, *wanted: Any) -> Self:
         """Return a copy elsewhere: `to("cuda")`, `to(torch.float32)`, `to("cuda", torch.float32)`.

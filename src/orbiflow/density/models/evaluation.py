@@ -36,9 +36,6 @@ def log_density_gradient(density: Density, data: ArrayLike) -> tuple[Array, Arra
 
     Exact: in closed form for kernels, by automatic differentiation for flows.
 
-    Raises:
-        OrbiflowError: for data that are not of the space.
-
     >>> from orbiflow.density import DensityEstimator
     >>> angles = np.random.default_rng(0).vonmises(0.0, 4.0, (100, 1))
     >>> estimator = DensityEstimator("torus", components="mixture").fit(angles)
@@ -65,11 +62,7 @@ def log_density_gradient(density: Density, data: ArrayLike) -> tuple[Array, Arra
 
 
 def midpoints(space: Space, resolution: int) -> Tensor:
-    """Return the midpoints (resolution^2, 2) of a grid on the canonical square, float64.
-
-    Raises:
-        OrbiflowError: if the space has another dimension than two, or for a resolution below 1.
-    """
+    """Return the midpoints (resolution^2, 2) of a grid on the canonical square, float64."""
     as_whole(resolution, "resolution", 1, 10**6)
     if space.dim != 2:
         raise OrbiflowError(f"a grid needs two dimensions, this {space.name} has {space.dim}")
@@ -78,15 +71,7 @@ def midpoints(space: Space, resolution: int) -> Tensor:
 
 
 def kl_by_quadrature(target: Tensor, log_density: Tensor) -> float:
-    """Return KL(p || p_hat) in nats from values on an even grid of the square.
-
-    Args:
-        target: The density p >= 0 (N,) on the square.
-        log_density: Values (N,) of log p_hat.
-
-    Raises:
-        OrbiflowError: for other shapes.
-    """
+    """Return KL(p || p_hat) in nats from values (N,) of p and log p_hat on an even grid."""
     target, log_density = as_tensor(target, "target"), as_tensor(log_density, "log_density")
     if target.dim() != 1 or target.shape != log_density.shape:
         raise OrbiflowError(
@@ -127,9 +112,6 @@ class TabulatedDensity:
     Attributes:
         error: The root mean square difference of log densities at samples of the density, in nats.
         largest: The largest difference at those samples and as many uniform points.
-
-    Raises:
-        OrbiflowError: for another dimension or a resolution out of range.
     """
 
     @one_thread()
@@ -200,9 +182,6 @@ class TabulatedDensity:
         """Return interpolated log densities (...,) at chart points (..., 2); see `error`.
 
         Differentiable once in the points.
-
-        Raises:
-            OrbiflowError: for points of another shape or that are not finite, or an unknown measure.
         """
         points = as_points(points, 2)
         flat = points.reshape(-1, 2).double()

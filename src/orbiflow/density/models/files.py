@@ -1,32 +1,24 @@
-"""Densities on disk: safetensors, never pickle."""
+"""Densities on disk: safetensors, never pickle. JSON headers and tensors make them again."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_instance
-from orbiflow.density.models.chains import VonMisesChains
-from orbiflow.density.models.density import Density
-from orbiflow.density.models.flow import FlowDensity, UniformDensity
-from orbiflow.density.models.headers import (
-    check_group,
-    density_from,
-    density_parts,
-    is_same_group,
-    within,
-)
-from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.models.mixture import Mixture
-from orbiflow.density.models.network import VonMisesNetwork
+from orbiflow.arguments import as_instance, as_number, as_whole
+from orbiflow.density.models.density import KINDS, Density
 from orbiflow.density.spaces import Space, make_space
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.runtime import read_tensors, tensor_bytes
-from orbiflow.symmetry import group_header
-from orbiflow.typed_torch import listed
+from orbiflow.fields import FourierField, InvariantField, SplineField
+from orbiflow.flows import Flow
+from orbiflow.runtime import is_list, read_tensors, tensor_bytes
+from orbiflow.symmetry import CrystallographicGroup, group_header
 
 FORMAT = "orbiflow-density/5"
 
@@ -39,14 +31,8 @@ def density_to_bytes(density: Density, **extra: Any) -> bytes:
     """Return a density as bytes that `read_density` makes the same again.
 
     Saved are densities whose class has a `kind`, on the four spaces as `make_space` makes them, and
-    flows of Fourier and spline fields on the space's own group. Parameters are written in float64.
-
-    Args:
-        density: The density.
-        extra: Further values for the reader, ready for JSON.
-
-    Raises:
-        OrbiflowError: naming the part that cannot be saved, rather than save another density.
+    flows of Fourier and spline fields on the space's own group; anything else is refused by the name of
+    the part. Parameters are written in float64. `extra` are further values for the reader, for JSON.
     """
     header, tensors = density_parts(as_instance(density, Density, "density"), "density")
     space = _checked_space(density.space)
@@ -79,12 +65,7 @@ def _checked_space(space: Space) -> Space:
 
 
 def read_density(path: str | Path) -> tuple[Density, dict[str, Any]]:
-    """Return a saved density, float64, and what was saved with it; files of version 0.1 as well.
-
-    Raises:
-        InputFileError: if the file is missing, too large, damaged or of another kind, or if it holds
-            a neural flow, as files of version 0.1 may.
-    """
+    """Return a saved density, float64, and what was saved with it; files of version 0.1 as well."""
     header, tensors = read_tensors(path, "a density")
     try:
         if header["format"] not in (FORMAT, *FORMATS_BEFORE):
@@ -100,6 +81,8 @@ def read_density(path: str | Path) -> tuple[Density, dict[str, Any]]:
 
 
 def _restored(header: dict[str, Any], tensors: dict[str, Tensor]) -> Density:
+    for module in ("mixture", "network"):  # afterwards all kinds are known; they import this file
+        import_module(f"orbiflow.density.models.{module}")
     options = dict(header["space"])
     space = make_space(str(options.pop("name")), **options)
     if header["format"] != FORMATS_BEFORE[0]:
@@ -118,21 +101,22 @@ def _of_version_0_1(space: Space, header: dict[str, Any], tensors: dict[str, Ten
 
     A density without a flow had one of weight 0, which is left out.
     """
-    weights: list[float] = listed(tensors["shares"]) if "shares" in tensors else [1.0]
-    components: list[Density] = []
-    if weights[0] > 0:
-        components.append(_flow_of_version_0_1(space, header, tensors))
-    if "shares" not in tensors:
-        return components[0]
-    kernels = [tensors[f"kernel_{name}"] for name in ("centers", "concentrations", "weights")]
-    components += [AdaptiveKernels(space, *kernels), UniformDensity(space)]
-    if header.get("chains") is not None:
-        own = within(tensors, "chains.")
-        components.append(VonMisesChains.from_header(space, header["chains"], own))
-    if header.get("network") is not None:
-        own = within(tensors, "network.")
-        components.append(VonMisesNetwork.from_header(space, header["network"], own))
-    return Mixture(components, tensors["shares"][tensors["shares"] > 0])
+    weights = tensors.get("shares")
+    if weights is None:
+        return _flow_of_version_0_1(space, header, tensors)
+    components = [_flow_of_version_0_1(space, header, tensors)] if weights[0] > 0 else []
+    names = ("centers", "concentrations", "weights")
+    kernels = {name: tensors[f"kernel_{name}"] for name in names}
+    count = {"kind": "kernels", "kernels": len(kernels["centers"])}
+    components += [
+        density_from(space, count, kernels),
+        density_from(space, {"kind": "uniform"}, {}),
+    ]
+    for kind in ("chains", "network"):
+        if header.get(kind) is not None:
+            own = {**header[kind], "kind": kind}
+            components.append(density_from(space, own, within(tensors, f"{kind}.")))
+    return cast(Any, KINDS["mixture"])(components, weights[weights > 0])
 
 
 def _flow_of_version_0_1(
@@ -149,4 +133,185 @@ def _flow_of_version_0_1(
             )
         # the field is zero, and the density that of its base
         return density_from(space, base, within(tensors, "base."))
-    return FlowDensity.from_header(space, {**header, "base": base}, tensors)
+    return density_from(space, {"kind": "flow", "flow": header["flow"], "base": base}, tensors)
+
+
+def density_parts(
+    density: Density, name: str, prefix: str = "", space: Space | None = None
+) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """Return a density's header and its tensors, whose names begin with `prefix`.
+
+    `name` is what it is in messages, such as "base"; a component must be on the whole's `space`.
+    """
+    kind = type(density).kind
+    if KINDS.get(kind) is not type(density):
+        raise OrbiflowError(
+            f"the {name} is a {type(density).__name__}, which a file does not hold: save a density of "
+            f"one of the kinds {', '.join(sorted(KINDS))}, or give the class a kind, "
+            f'class {type(density).__name__}(Density, kind="...")'
+        )
+    own = density.space
+    if space is not None and (space.name, space.settings()) != (own.name, own.settings()):
+        raise OrbiflowError(
+            f"the {name} is on {own!r}, the density on {space!r}: make both on one space"
+        )
+    tensors = {prefix + key: tensor for key, tensor in density.tensors().items()}
+    return {"kind": kind, **density.header()}, tensors
+
+
+def density_from(space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Density:
+    """Make the density of `density_parts` again, bit for bit."""
+    kind = header["kind"]
+    if kind not in KINDS:
+        raise OrbiflowError(
+            f"a density of the kind {kind!r} is not known here: import the module that defines it"
+        )
+    return KINDS[kind].from_header(space, header, tensors)
+
+
+def within(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
+    """Return the tensors whose names begin with `prefix`, without it."""
+    return {
+        name.removeprefix(prefix): tensor
+        for name, tensor in tensors.items()
+        if name.startswith(prefix)
+    }
+
+
+TOLERANCE = 1e-9
+"""Difference of matrices and translations up to which they are read as equal."""
+
+
+def is_same_group(one: CrystallographicGroup, other: CrystallographicGroup) -> bool:
+    """Return whether lattice *basis* and coset representatives agree.
+
+    Another basis of the same lattice numbers the frequencies otherwise: the same parameters would be
+    another field.
+    """
+    return (
+        one.lattice.shape == other.lattice.shape
+        and one.order == other.order
+        and np.allclose(one.lattice, other.lattice, rtol=0, atol=TOLERANCE)
+        and all(other.contains(coset, TOLERANCE) for coset in one.cosets)
+    )
+
+
+def check_group(header: Any, group: CrystallographicGroup) -> None:
+    """Check that `header`, from `group_header`, describes this group."""
+    try:
+        tables = [(np.array(header[n], float), np.array(v)) for n, v in group_header(group).items()]
+        same = all(
+            a.shape == b.shape and np.allclose(a, b, rtol=0, atol=TOLERANCE) for a, b in tables
+        )
+    except (KeyError, TypeError, ValueError, OverflowError):
+        same = False
+    if not same:
+        raise OrbiflowError(f"its group is not {group!r}, which its space has here")
+
+
+MAX_SEGMENTS, MAX_FREQUENCY, MAX_STEPS, MAX_DIM = 256, 128, 4096, 3
+FIELDS: dict[str, type[FourierField | SplineField]] = {
+    "fourier": FourierField,
+    "spline": SplineField,
+}
+FIELD_NAMES = {kind: name for name, kind in FIELDS.items()}
+
+
+def series_parts(flow: Flow, space: Space) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """Return a header ready for JSON and a float64 tensor "flow.k" for each segment of a flow."""
+    if type(flow) is not Flow:
+        raise OrbiflowError(
+            f"the flow is a {type(flow).__name__}: only flows of Fourier and spline fields are "
+            "saved in a density; save it with orbiflow.flows.save_flow"
+        )
+    if len(flow.segments) > MAX_SEGMENTS or flow.steps > MAX_STEPS or space.dim > MAX_DIM:
+        raise OrbiflowError(
+            f"the flow has {len(flow.segments)} segments of {flow.steps} steps in {space.dim} "
+            f"dimensions; saved are {MAX_SEGMENTS}, {MAX_STEPS} and {MAX_DIM} at most"
+        )
+    segments: list[dict[str, Any]] = []
+    tensors: dict[str, Tensor] = {}
+    for number, field in enumerate(flow.segments):
+        segments.append(_segment(number, field, space))
+        parameters = cast(InvariantField, field).parameters_
+        tensors[f"flow.{number}"] = parameters.detach().double().cpu()
+    header = {
+        "kind": "series",
+        "segments": segments,
+        "steps": flow.steps,
+        "method": flow.method,
+        "duration": flow.duration,
+    }
+    return header, tensors
+
+
+def _segment(number: int, field: Any, space: Space) -> dict[str, Any]:
+    name = f"segment {number + 1} of the flow"
+    if type(field) not in FIELD_NAMES:
+        raise OrbiflowError(
+            f"{name} is a {type(field).__name__}: only flows of Fourier and spline fields are saved "
+            "in a density; save it with orbiflow.flows.save_flow"
+        )
+    if field.parameters_.dim() != 1:
+        raise OrbiflowError(
+            f"{name} is a stack of {len(field.parameters_)} fields: a density has one field a segment"
+        )
+    if not is_same_group(field.group, space.group):
+        raise OrbiflowError(
+            f"{name} has the {field.group!r}, its space the {space.group!r}: parameters depend on "
+            "the basis of the lattice; make the field with the space's own group"
+        )
+    if field.max_frequency > MAX_FREQUENCY or not bool(torch.isfinite(field.parameters_).all()):
+        raise OrbiflowError(
+            f"{name} has the frequency {field.max_frequency}, saved are {MAX_FREQUENCY} at most, or "
+            "parameters that are not finite"
+        )
+    return {
+        "kind": FIELD_NAMES[type(field)],
+        "max_frequency": field.max_frequency,
+        "smoothness": float(field.smoothness),
+    }
+
+
+def series_from_header(
+    header: Mapping[str, Any], tensors: Mapping[str, Tensor], space: Space
+) -> Flow:
+    """Make the flow of `series_parts` again; headers of the first files of version 0.1 work as well."""
+    if space.dim > MAX_DIM:
+        raise ValueError(f"a flow of Fourier or spline fields has {MAX_DIM} dimensions at most")
+    if header["kind"] != "series":
+        header, tensors = _of_version_1(header, tensors["parameters"])
+    segments = header["segments"]
+    if not is_list(segments) or not 1 <= len(segments) <= MAX_SEGMENTS:
+        raise ValueError("no segments, or too many")
+    return Flow(
+        [_field(part, tensors[f"flow.{k}"], space) for k, part in enumerate(segments)],
+        steps=as_whole(header["steps"], "steps", 0, MAX_STEPS),
+        method=str(header["method"]),
+        duration=as_number(header["duration"], "duration"),
+        warn=False,  # the fit has settled them and said if it could not
+    )
+
+
+def _of_version_1(
+    header: Mapping[str, Any], stack: Tensor
+) -> tuple[Mapping[str, Any], Mapping[str, Tensor]]:
+    """Translate a header whose segments had one kind, and their parameters one tensor."""
+    if stack.dim() != 2 or not 1 <= len(stack) <= MAX_SEGMENTS:
+        raise ValueError(f"parameters of shape {tuple(stack.shape)}")
+    shared = {name: header[name] for name in ("kind", "max_frequency", "smoothness")}
+    tensors = {f"flow.{k}": row for k, row in enumerate(stack)}
+    return {**header, "segments": [shared] * len(stack)}, tensors
+
+
+def _field(header: Mapping[str, Any], row: Tensor, space: Space) -> InvariantField:
+    frequency = as_whole(header["max_frequency"], "max_frequency", 0, MAX_FREQUENCY)
+    smoothness = as_number(header["smoothness"], "smoothness")
+    if not bool(torch.isfinite(row).all()):
+        raise ValueError("parameters that are not finite")
+    field = FIELDS[header["kind"]](space.group, frequency, smoothness=smoothness)
+    if field.parameters_.shape != row.shape:
+        raise ValueError(f"parameters of shape {tuple(row.shape)} where {field.size} belong")
+    with torch.no_grad():
+        field.parameters_.copy_(row)
+    return field

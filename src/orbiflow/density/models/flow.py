@@ -14,7 +14,7 @@ from torch import Tensor
 from orbiflow.arguments import as_instance, is_a
 from orbiflow.density.models.density import Density, Restriction, Split, in_blocks
 from orbiflow.density.models.evaluation import midpoints
-from orbiflow.density.models.headers import (
+from orbiflow.density.models.files import (
     density_from,
     density_parts,
     series_from_header,
@@ -23,7 +23,6 @@ from orbiflow.density.models.headers import (
 )
 from orbiflow.density.spaces import CHART, Space, Torus, rectangle
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import linalg, special
@@ -98,18 +97,6 @@ class FlowDensity(Density, kind="flow"):
         return self.space.project(end)
 
     @one_thread()
-    def to_base(self, points: Tensor) -> Tensor:
-        """Return where data points (..., d) come from: canonical points distributed as the base."""
-        own = self._here(points).to(self.dtype)
-        return self.space.project(self.flow.inverse(self.space.project(own)))
-
-    @one_thread()
-    def from_base(self, points: Tensor) -> Tensor:
-        """Return where base points (..., d) are carried, as canonical points."""
-        own = self._here(points).to(self.dtype)
-        return self.space.project(self.flow(own))
-
-    @one_thread()
     @torch.no_grad()
     def mass(self, resolution: int = 64) -> float:
         """Return the integral over the square, by the midpoint rule on resolution^2 points.
@@ -118,9 +105,6 @@ class FlowDensity(Density, kind="flow"):
         the density is high, and each counts for the area that its surroundings are carried to: the
         Jacobian of the carrying, taken by automatic differentiation. What is off from 1 is the
         integrator's error: a plain grid of 512^2 misses 1 % of a density in sharp clusters.
-
-        Raises:
-            OrbiflowError: in more than two dimensions, where a grid is out of reach.
         """
         grid = midpoints(self.space, resolution).to(self._like())
         parts = [self._carried_mass(block) for block in torch.split(grid, CARRIED)]
@@ -145,13 +129,9 @@ class FlowDensity(Density, kind="flow"):
         return view
 
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
-        """Integrate the other angles by the trapezoidal rule.
+        """Integrate the other angles by the trapezoidal rule, which converges exponentially here.
 
-        It converges exponentially for periodic smooth functions; nodes are doubled until they change
-        nothing.
-
-        Raises:
-            OrbiflowError: if more than two angles would have to be integrated out.
+        Nodes are doubled until they change nothing.
         """
         del seed
         hidden = [axis for axis in range(self.space.dim) if axis not in axes]
@@ -212,16 +192,6 @@ class FlowDensity(Density, kind="flow"):
 
     def __repr__(self) -> str:
         return f"FlowDensity({self.space!r}, {type(self.base).__name__}, {self.flow})"
-
-
-def identity_flow(space: Space) -> Flow:
-    """Return a flow on the space that is the identity, since a new field is zero.
-
-    >>> from orbiflow.density import make_space
-    >>> len(identity_flow(make_space("torus")).segments)
-    1
-    """
-    return Flow([SplineField(space.group, 1)], steps=1, warn=False)
 
 
 def _nodes(count: int, axes: int, *, all_of_them: bool) -> Tensor:

@@ -82,13 +82,10 @@ class AdaptiveKernels(Density, kind="kernels"):
     def log_density(
         self, points: Tensor, beside: float = -math.inf, tolerance: float = TOLERANCE
     ) -> Tensor:
-        """Return log densities (...,) per area of the sphere on round spaces, else of the square.
+        """Return log densities (...,) as any density does.
 
-        Args:
-            points: Chart points (..., d).
-            beside: Logarithm of a constant density that will be added.
-            tolerance: The share of the sum of both that far kernels that are left out may add, at
-                most, and by which smooth ones that are interpolated may be off.
+        `tolerance` is the share of the sum of both that far kernels that are left out may add, at most,
+        and by which smooth ones that are interpolated may be off.
         """
         flat = points.reshape(-1, self.space.dim).double()
         features = self.space.features(flat)[0].mT

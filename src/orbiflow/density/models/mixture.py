@@ -12,8 +12,8 @@ from torch import Tensor
 
 from orbiflow.arguments import as_instance, as_tensor
 from orbiflow.density.models.density import Density, Restriction, Split
+from orbiflow.density.models.files import density_from, density_parts, within
 from orbiflow.density.models.flow import FlowDensity
-from orbiflow.density.models.headers import density_from, density_parts, within
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError

@@ -1,23 +1,29 @@
-"""Sums of many kernels at many points: tile by tile, without what is too far to count."""
+"""Sums of many kernels at many points: tile by tile, without what is too far to count.
+
+Sums of kernels that are smooth across a tile are read off few places.
+"""
 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.kernel_tiles import Chart, Tile
-from orbiflow.density.models.terms import Terms
-from orbiflow.typed_torch import applied
+from orbiflow.density.models.terms import BLOCK_ENTRIES, WIDE, Terms, lengths2
+from orbiflow.typed_torch import applied, broadcast, linalg
 
 TOLERANCE = 1e-12
 """The share of a sum that may be left out, and that interpolation may miss."""
 
 FEW_POINTS, FEW_PAIRS = 256, 200_000
 """Tiles with fewer points, or fewer points times terms, are not divided further."""
+
+FEWEST_PAIRS = 20_000
+"""Fewer points times terms are summed one by one at once: looking for tiles would take longer."""
 
 WORTH_FLAT, WORTH_ROUND = 500, 2_000
 """The fewest points of a tile for which smooth terms are interpolated, flat and round."""
@@ -48,10 +54,12 @@ def near_log_sum(
     what the caller adds to the sum, to which errors are relative as well; it is not in the result.
 
     Differentiable in the features: the gradient in closed form, as fast as the sum; higher
-    derivatives by autograd through the terms that count.
+    derivatives by autograd through all terms.
     """
+    if features.shape[1] * terms.size < FEWEST_PAIRS:
+        return terms.plain_log_sum(features)
     if not (features.requires_grad and torch.is_grad_enabled()):
-        return _Walk(features, terms, floor, tolerance).done()
+        return _Walk(features, terms, floor, tolerance).log_sum
     return applied(_NearLogSum, features, terms, floor, tolerance)
 
 
@@ -59,11 +67,9 @@ class _NearLogSum(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, features: Tensor, terms: Terms, floor: float, tolerance: float) -> Tensor:
         walk = _Walk(features, terms, floor, tolerance, slope=True)
-        values = walk.done()
-        assert walk.slope is not None
         ctx.save_for_backward(features, walk.slope)
-        ctx.rest = terms, floor, tolerance
-        return values
+        ctx.terms = terms
+        return walk.log_sum
 
     @staticmethod
     def backward(ctx: Any, *gradients: Any) -> Any:
@@ -72,7 +78,7 @@ class _NearLogSum(torch.autograd.Function):
             return gradients[0] * slope, None, None, None
         # second derivatives were asked for: let autograd have them
         view: Tensor = features.view_as(features)
-        plain = _Walk(view, *ctx.rest, by_autograd=True).done()
+        plain = ctx.terms.plain_log_sum(view)
         (found,) = torch.autograd.grad(plain, view, gradients[0], create_graph=True)
         return found, None, None, None
 
@@ -90,40 +96,23 @@ class _Part(NamedTuple):
 
 
 class _Walk:
-    """Sums as they grow, and their gradients in the features if they are wanted."""
+    """Logarithms (N,) of sums, and their gradients (m, N) in the features if they are wanted."""
 
     def __init__(
-        self,
-        features: Tensor,
-        terms: Terms,
-        floor: float,
-        tolerance: float,
-        *,
-        slope: bool = False,
-        by_autograd: bool = False,
+        self, features: Tensor, terms: Terms, floor: float, tolerance: float, *, slope: bool = False
     ) -> None:
-        self.features, self.terms, self.floor = features, terms, floor
+        self.floor = floor
         self.tolerance, self.each = math.log(tolerance), math.log(tolerance / terms.size)
-        self.by_autograd = by_autograd
         # the number of points of a tile from which on interpolation may pay
         self.worth = WORTH_ROUND if len(terms.centers) == 3 else WORTH_FLAT
-        if by_autograd or terms.factors > 2:
+        if terms.factors > 2:
             self.worth = math.inf
-        plain = features.detach()
-        self.log_sum = torch.full_like(plain[0], -math.inf)
-        self.slope = torch.zeros_like(plain) if slope else None
-        self.places: list[np.ndarray] = []
-        self.sums: list[Tensor] = []
-
-    def done(self) -> Tensor:
-        """Return the logarithms (N,) of the sums."""
-        stack = [_Part(np.arange(len(self.log_sum)), self.features.detach(), self.terms, 0)]
+        features = features.detach()
+        self.log_sum = torch.full_like(features[0], -math.inf)
+        self.slope = torch.zeros_like(features) if slope else None
+        stack = [_Part(np.arange(len(self.log_sum)), features, terms, 0)]
         while stack and len(self.log_sum):
             stack += self.step(stack.pop())
-        if not self.sums:
-            return self.log_sum
-        at = torch.as_tensor(np.concatenate(self.places))
-        return self.log_sum.index_copy(0, at, torch.cat(self.sums))
 
     def step(self, part: _Part) -> list[_Part]:
         """Treat a part, or return its halves."""
@@ -145,14 +134,8 @@ class _Walk:
                 for at in _halves(features, tile)
             ]
         spread = float(terms.peaks.max()) - bottom
-        at = torch.as_tensor(index)
-        if self.by_autograd:
-            self.places.append(index)
-            self.sums.append(terms.log_sum(self.features[:, at], tile.middle, spread))
-        elif self.slope is None:
-            self._add(at, terms.log_sum(features, tile.middle, spread), None)
-        else:
-            self._add(at, *terms.log_sum_and_slope(features, tile.middle, spread))
+        found = terms.log_sum(features, tile.middle, spread, slope=self.slope is not None)
+        self._add(torch.as_tensor(index), *found)
         return []
 
     def _add(self, at: Tensor, log_sum: Tensor, slope: Tensor | None) -> None:
@@ -193,3 +176,251 @@ def _halves(features: Tensor, tile: Tile) -> tuple[np.ndarray, np.ndarray]:
     along = features[int(tile.sides.argmax())].numpy()
     order = np.argpartition(along, len(along) // 2)
     return order[: len(along) // 2], order[len(along) // 2 :]
+
+
+NODES = 28
+"""Chebyshev points along a side of a tile."""
+
+ELLIPSES = (3.0, 5.0, 9.0)
+"""Sums of the half axes of the ellipses on which terms are bounded, in half sides of the tile."""
+
+TURNS = 9
+"""Points of half an ellipse at which terms are bounded; between them they are within `BETWEEN`."""
+
+BETWEEN = 1.5
+"""Logarithm of how much larger a term may be between those points."""
+
+ROUNDING = math.log(1e-15)
+"""Logarithm of the rounding error of interpolation, relative to the largest value in the tile."""
+
+POLE = 0.75
+"""The largest coordinate, complex ones included: the chart has poles at plus and minus i."""
+
+
+class Tile:
+    """A box around features (m, N), N > 0."""
+
+    def __init__(self, features: Tensor, factors: int) -> None:
+        low, high = features.amin(dim=1), features.amax(dim=1)
+        self.factors = factors
+        self.middle, self.sides = (low + high) / 2, high - low
+        self.radius = self._away2(features).amax(dim=1).sqrt()
+
+    def bounds(self, terms: Terms) -> tuple[Tensor, Tensor]:
+        """Return the least and largest logarithms (K,) of the terms in the tile.
+
+        They are bounds by the triangle inequality.
+        """
+        away, radius = self._away2(terms.centers).sqrt_(), self.radius[:, None]
+        nearest = (away - radius).clamp_min_(0).square_().mul_(terms.kappa)
+        farthest = away.add_(radius).square_().mul_(terms.kappa)
+        return (
+            torch.sub(terms.peaks, farthest.sum(dim=0), alpha=0.5),
+            torch.sub(terms.peaks, nearest.sum(dim=0), alpha=0.5),
+        )
+
+    def _away2(self, features: Tensor) -> Tensor:
+        """Return squares (F, N) of distances from the middle."""
+        return lengths2(features - self.middle[:, None], self.factors)
+
+    @property
+    def has_chart(self) -> bool:
+        """Whether it can have a `Chart`: two dimensions at most, less than a third of a turn."""
+        dims = 2 if len(self.middle) > 2 * self.factors else self.factors
+        return dims <= 2 and bool((self.radius < 0.85).all())
+
+
+class Chart:
+    """Stereographic coordinates u on a tile, the tangents of half the angles, (D, N).
+
+    D is F for circles and 2 for a sphere. Sums of terms that are analytic well beyond the tile are
+    polynomials of degree `NODES` - 1 in each of them.
+    """
+
+    def __init__(self, features: Tensor, tile: Tile) -> None:
+        self.factors, self._tile = tile.factors, tile
+        pole = tile.middle.reshape(-1, self.factors)
+        self._frame = _frame(pole / linalg.vector_norm(pole, dim=0))
+        self._local = self._turned(features)
+        u = torch.cat([local[1:] / (1 + local[:1]) for local in self._local])
+        low, high = u.amin(dim=1), u.amax(dim=1)
+        self.middle, self.half = (low + high) / 2, ((high - low) / 2).clamp_min(1e-9)
+        self._t = (u - self.middle[:, None]) / self.half[:, None]
+
+    def errors(self, terms: Terms, largest: Tensor) -> Tensor:
+        """Return logarithms (K,) of bounds on the interpolation error of each term.
+
+        Along an axis by 4 M rho^(1 - n) / (rho - 1), M the largest value on the ellipse of rho
+        (Trefethen, Approximation Theory and Approximation Practice, 2013, theorem 8.2), times the
+        Lebesgue constant of the other axis. The terms in the tile are below exp(`largest`), (K,).
+        """
+        centers = self._turned(terms.centers)
+        lebesgue = 1 + 2 / math.pi * math.log(NODES)
+        worst = None
+        for axis in range(len(self.middle)):
+            factor = axis if self.factors > 1 else 0
+            kappa, best = terms.kappa[factor], None
+            for rho in ELLIPSES:
+                cosine = self._ellipse(axis, rho, centers[factor])
+                if cosine is not None:
+                    scale = math.log(8 * lebesgue / (rho - 1)) - (NODES - 1) * math.log(rho)
+                    found = cosine.sub_(1).mul_(kappa).add_(scale + BETWEEN)
+                    best = found if best is None else torch.minimum(best, found)
+            if best is None:
+                return torch.full_like(largest, math.inf)
+            if self.factors > 1:
+                # terms are products: the other factor's largest value counts as it is
+                best += largest - terms.peaks + self._nearest2(terms, factor) / 2
+            worst = best if worst is None else torch.maximum(worst, best)
+        assert worst is not None
+        return torch.maximum(worst + terms.peaks, largest + ROUNDING)
+
+    def sum(self, terms: Terms, top: float, *, slope: bool) -> tuple[Tensor, Tensor | None]:
+        """Return the sum (N,) of terms at the tile's points over exp(top), and its gradient (m, N).
+
+        The gradient, None unless `slope`, is that of some continuation beyond the spheres.
+        """
+        nodes = _nodes()
+        sides = self.middle[:, None] + self.half[:, None] * nodes
+        flat = len(terms.kappa) == 2
+        table = self._product(terms, top, sides) if flat else self._dense(terms, top, sides)
+        weights, rates = zip(*(_lagrange(t, slope) for t in self._t), strict=True)
+        if len(weights) == 1:
+            values, rated = weights[0] @ table[:, 0], [rates[0] @ table[:, 0]] if slope else []
+        else:
+            first = weights[0] @ table
+            values = (first * weights[1]).sum(dim=1)
+            rated = [
+                *([((rates[0] @ table) * weights[1]).sum(dim=1)] if slope else []),
+                *([(first * rates[1]).sum(dim=1)] if slope else []),
+            ]
+        if not slope:
+            return values, None
+        return values, self._in_features(torch.stack(rated) / self.half[:, None])
+
+    def _in_features(self, slope: Tensor) -> Tensor:
+        """Return a gradient (D, N) in the coordinates as one in the features, (m, N)."""
+        found: list[Tensor] = []
+        parts = torch.split(slope, len(slope) // self.factors)
+        for frame, local, part in zip(self._frame, self._local, parts, strict=True):
+            below = 1 + local[:1]
+            across = part / below
+            along = -(across * local[1:] / below).sum(dim=0, keepdim=True)
+            found.append(frame.mT @ torch.cat([along, across]))
+        return torch.stack(found, dim=1).flatten(0, 1)
+
+    def _product(self, terms: Terms, top: float, sides: Tensor) -> Tensor:
+        """Return values (n, n) at the nodes of terms that are products over the two coordinates."""
+        first, second = (
+            _exponents(center, kappa, _sphere(side[None])).clamp_min_(-WIDE).exp_()
+            for center, kappa, side in zip(
+                self._turned(terms.centers), terms.kappa, sides, strict=True
+            )
+        )
+        return (first * (terms.peaks - top).exp()) @ second.mT
+
+    def _dense(self, terms: Terms, top: float, sides: Tensor) -> Tensor:
+        """Return values (n, n), or (n, 1) on a circle, at the nodes."""
+        grid = torch.stack(torch.meshgrid(*sides, indexing="ij")).flatten(1)
+        local, found = _sphere(grid), 0.0
+        block = max(1, BLOCK_ENTRIES // local.shape[1])
+        (centers,) = self._turned(terms.centers)
+        for at in torch.split(torch.arange(terms.size), block):
+            table = _exponents(centers[:, at], terms.kappa[0][at], local)
+            found = table.add_(terms.peaks[at] - top).clamp_min_(-WIDE).exp_().sum(dim=1) + found
+        assert isinstance(found, Tensor)
+        return found.reshape(NODES, -1)
+
+    def _nearest2(self, terms: Terms, factor: int) -> Tensor:
+        """Return kappa times the squared distance (K,) of centers to the tile in one factor."""
+        middle = self._tile.middle.reshape(-1, self.factors)[:, factor, None]
+        centers = terms.centers.reshape(-1, self.factors, terms.size)[:, factor]
+        away = ((centers - middle) ** 2).sum(dim=0).sqrt_().sub_(self._tile.radius[factor])
+        return away.clamp_min_(0).square_().mul_(terms.kappa[factor])
+
+    def _turned(self, features: Tensor) -> list[Tensor]:
+        """Return features of each factor (s, N) in its frame: along the pole, then across."""
+        split = features.reshape(-1, self.factors, features.shape[1]).unbind(dim=1)
+        return [frame @ part for frame, part in zip(self._frame, split, strict=True)]
+
+    def _ellipse(self, axis: int, rho: float, centers: Tensor) -> Tensor | None:
+        """Return the largest real part (K,) of cosines to centers (s, K) along an ellipse.
+
+        One coordinate runs along the ellipse, the other one is real. None if the ellipse comes near the
+        poles of the chart.
+        """
+        if float(self.middle[axis].abs() + self.half[axis] * (rho + 1 / rho) / 2) > POLE:
+            return None
+        u = self.middle[axis] + self.half[axis] * _ellipse(rho)
+        if self.factors > 1 or len(self.middle) == 1:
+            return (_sphere(u[None]).real.mT @ centers).amax(dim=0)
+        other = 1 - axis
+        across = self.middle[other] + self.half[other] * torch.tensor([-1.0, 0.0, 1.0])
+        pair = broadcast(u[:, None], across.to(u))
+        places = torch.stack(pair if axis == 0 else pair[::-1]).flatten(1)
+        return (_sphere(places).real.mT @ centers).amax(dim=0)
+
+
+def _sphere(u: Tensor) -> Tensor:
+    """Return unit vectors (D + 1, N) of stereographic coordinates (D, N), complex ones too."""
+    square = (u * u).sum(dim=0, keepdim=True)
+    return torch.cat([1 - square, 2 * u]) / (1 + square)
+
+
+@lru_cache(maxsize=len(ELLIPSES))
+def _ellipse(rho: float) -> Tensor:
+    """Return half of an ellipse (T,) about -1 and 1, complex."""
+    with torch.inference_mode(False):
+        angle = torch.linspace(0, math.pi, TURNS, dtype=torch.float64)
+        turned = torch.polar(torch.full_like(angle, rho), angle)
+        return (turned + 1 / turned) / 2
+
+
+def _exponents(centers: Tensor, kappa: Tensor, local: Tensor) -> Tensor:
+    """Return kappa (cos - 1), (n, K), of unit vectors (s, K) and (s, n)."""
+    # about the nodes' middle, see `Terms.log_sum`
+    middle = local.mean(dim=1, keepdim=True)
+    offset, near = centers - middle, local - middle
+    table = torch.addmm((offset**2).sum(dim=0) / -2, near.mT, offset)
+    return table.sub_((near**2).sum(dim=0)[:, None] / 2).mul_(kappa)
+
+
+def _frame(pole: Tensor) -> Tensor:
+    """Return frames (F, s, s): rows are the pole (s, F) of each factor and unit vectors across."""
+    if len(pole) == 2:
+        x, y = pole
+        return torch.stack([torch.stack([x, y], dim=1), torch.stack([-y, x], dim=1)], dim=1)
+    start = pole[:, 0]
+    across = torch.zeros_like(start)
+    across[start.abs().argmin()] = 1
+    first = linalg.cross(start, across)
+    first = first / linalg.vector_norm(first)
+    return torch.stack([start, first, linalg.cross(start, first)])[None]
+
+
+@lru_cache(maxsize=1)
+def _nodes() -> Tensor:
+    """Return the Chebyshev points (n,) of [-1, 1]."""
+    with torch.inference_mode(False):
+        return torch.cos(math.pi * (torch.arange(NODES, dtype=torch.float64) + 0.5) / NODES)
+
+
+@lru_cache(maxsize=1)
+def _transform() -> Tensor:
+    """Return the matrix (n, n) that makes Chebyshev coefficients from values at the nodes."""
+    angle = math.pi * (torch.arange(NODES, dtype=torch.float64) + 0.5) / NODES
+    with torch.inference_mode(False):
+        matrix = torch.cos(torch.arange(NODES, dtype=torch.float64)[:, None] * angle)
+        matrix[0] /= 2
+        return matrix * (2 / NODES)
+
+
+def _lagrange(t: Tensor, slope: bool) -> tuple[Tensor, Tensor | None]:
+    """Return weights (N, n) of values at the nodes for a polynomial's values and slopes at t (N,)."""
+    values, rates = [torch.ones_like(t), t], [torch.zeros_like(t), torch.ones_like(t)]
+    for _ in range(NODES - 2):
+        values.append(2 * t * values[-1] - values[-2])
+        if slope:
+            rates.append(2 * values[-2] + 2 * t * rates[-1] - rates[-2])
+    found = torch.stack(values, dim=1) @ _transform()
+    return found, torch.stack(rates, dim=1) @ _transform() if slope else None

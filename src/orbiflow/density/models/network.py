@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -12,10 +11,9 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance
-from orbiflow.density.models.chain_integrals import SCALES, quantiles, waves
-from orbiflow.density.models.chains import BLOCK, VonMisesChains
+from orbiflow.density.models.chains import BLOCK, SCALES, VonMisesChains, quantiles, waves
 from orbiflow.density.models.density import Density, Split, in_blocks
-from orbiflow.density.models.headers import within
+from orbiflow.density.models.files import within
 from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
@@ -144,12 +142,14 @@ class VonMisesNetwork(Density, kind="network"):
         even = {axis: draws[:, 2 * k : 2 * k + 2] for k, axis in enumerate(hidden)}
         same: list[bool] = listed((points == points[0]).all(dim=0))
         known = {axis: points[:1, k, None] for k, axis in enumerate(axes) if same[k]}
-        once = _Once.of(factors, known, even)
+        # what does not depend on the points is worked on once
+        given = dict[int, Callable[[Tensor], Tensor]]()
+        total, left = _taken(factors, known, even, given)
         found: list[Tensor] = []
         for block in torch.split(points, AT_ONCE // count):
             at = {axis: block[:, k, None] for k, axis in enumerate(axes) if not same[k]}
-            logs = once.weighted(at, even).expand(len(block), count)
-            found.append(log_sum_exp(logs) - math.log(count))
+            logs = total + _taken(left, {**known, **at}, even, given)[0]
+            found.append(log_sum_exp(logs.expand(len(block), count)) - math.log(count))
         return torch.cat(found)
 
     def is_costly(self, split: Split) -> bool:
@@ -246,79 +246,54 @@ def averaged_networks(networks: Sequence[VonMisesNetwork]) -> VonMisesNetwork:
     )
 
 
-@dataclass(frozen=True)
-class _Mixture:
-    """Of an angle given draws of its parents: logs of weights (Q, C), means (Q, C), kappa (C,)."""
+def _given_parents(
+    chains: VonMisesChains, axes: tuple[int, ...], at: dict[int, Tensor]
+) -> Callable[[Tensor], Tensor]:
+    """Return the log density (N, Q), given draws of the parents, at angles (N, 1) in turns."""
+    around = {**at, axes[-1]: torch.zeros(1, 1, dtype=torch.float64)}
+    logs = _along(lambda p: _log_parents(chains, p), axes, around)[0]
+    scale = torch.tensor(SCALES, dtype=torch.float64)
+    kappa = (chains.concentrations[:, -1, None] / scale).flatten()
+    logs = logs - log_sum_exp(logs)[:, None] - special.i0e(kappa).log()
+    wave = _along(lambda p: waves(2 * math.pi * p), axes, around)[0]
+    means = (wave @ chains.means[:, -1].mT).repeat_interleave(len(SCALES), dim=1)
 
-    logs: Tensor
-    means: Tensor
-    kappa: Tensor
-
-    @classmethod
-    def of(cls, chains: VonMisesChains, axes: tuple[int, ...], at: dict[int, Tensor]) -> _Mixture:
-        around = {**at, axes[-1]: torch.zeros(1, 1, dtype=torch.float64)}
-        logs = _along(lambda p: _log_parents(chains, p), axes, around)[0]
-        scale = torch.tensor(SCALES, dtype=torch.float64)
-        kappa = (chains.concentrations[:, -1, None] / scale).flatten()
-        logs = logs - log_sum_exp(logs)[:, None] - special.i0e(kappa).log()
-        wave = _along(lambda p: waves(2 * math.pi * p), axes, around)[0]
-        means = (wave @ chains.means[:, -1].mT).repeat_interleave(len(SCALES), dim=1)
-        return cls(logs, means, kappa)
-
-    def log_prob(self, angle: Tensor) -> Tensor:
-        """Return log densities (N, Q) at angles (N, 1) in turns; equal ones are evaluated once."""
-        own, place = unique(angle[:, 0], return_inverse=True)
-        rows = torch.split(2 * math.pi * own[:, None, None], max(1, ENTRIES // self.logs.numel()))
-        found = [
-            log_sum_exp((row - self.means).cos_().sub_(1).mul_(self.kappa).add_(self.logs))
-            for row in rows
-        ]
+    def log_prob(angle: Tensor) -> Tensor:
+        own, place = unique(angle[:, 0], return_inverse=True)  # equal ones are evaluated once
+        rows = torch.split(2 * math.pi * own[:, None, None], max(1, ENTRIES // logs.numel()))
+        found = [log_sum_exp((r - means).cos_().sub_(1).mul_(kappa).add_(logs)) for r in rows]
         return torch.cat(found)[place]
 
+    return log_prob
 
-@dataclass(frozen=True)
-class _Once:
-    """What does not depend on the points, and is worked on once, and the `factors` that do.
 
-    - `at`, `total`: Angles that are known (1, 1) or drawn (1, Q), and the log density of those known.
-    - `mixtures`: Those of angles whose parents are among them.
+def _taken(
+    factors: Sequence[Factor],
+    at: dict[int, Tensor],
+    even: dict[int, Tensor],
+    given: dict[int, Callable[[Tensor], Tensor]],
+) -> tuple[Tensor, list[Factor]]:
+    """Return the log density of the observed angles, and the factors that need angles not there yet.
+
+    Angles `at` are known (N, 1) or drawn (N, Q) by probabilities `even`, and more are drawn on the way.
+    `given` are the densities of angles whose parents were all there; those that can be made are added.
     """
-
-    factors: list[Factor]
-    at: dict[int, Tensor]
-    total: Tensor
-    mixtures: dict[int, _Mixture]
-
-    @classmethod
-    def of(cls, factors: list[Factor], known: dict[int, Tensor], even: dict[int, Tensor]) -> _Once:
-        at, mixtures = dict(known), dict[int, _Mixture]()
-        total = torch.zeros(1, 1, dtype=torch.float64)
-        left: list[Factor] = []
-        for axes, chains in factors:
-            axis = axes[-1]
-            fixed = all(parent in at for parent in axes[:-1])
-            if fixed and axis in even:
-                at[axis] = _drawn_at(chains, axes, at, even[axis])
-            elif fixed and axis in at:
-                total = total + _along(lambda p, c=chains: log_conditional(c, p), axes, at)
-            else:
-                left.append(Factor(axes, chains))
-                if fixed:
-                    mixtures[axis] = _Mixture.of(chains, axes, at)
-        return cls(left, at, total, mixtures)
-
-    def weighted(self, points: dict[int, Tensor], even: dict[int, Tensor]) -> Tensor:
-        """Return log densities of the observed angles given the draws, which broadcast to (N, Q)."""
-        at, total = {**self.at, **points}, self.total
-        for axes, chains in self.factors:
-            axis = axes[-1]
-            if axis in even:
-                at[axis] = _drawn_at(chains, axes, at, even[axis])
-            elif axis in self.mixtures:
-                total = total + self.mixtures[axis].log_prob(at[axis])
-            else:
-                total = total + _along(lambda p, c=chains: log_conditional(c, p), axes, at)
-        return total
+    total = torch.zeros(1, 1, dtype=torch.float64)
+    left: list[Factor] = []
+    for axes, chains in factors:
+        axis = axes[-1]
+        fixed = all(parent in at for parent in axes[:-1])
+        if axis in given:
+            total = total + given[axis](at[axis])
+        elif fixed and axis in even:
+            at[axis] = _drawn_at(chains, axes, at, even[axis])
+        elif fixed and axis in at:
+            total = total + _along(lambda p, c=chains: log_conditional(c, p), axes, at)
+        else:
+            left.append(Factor(axes, chains))
+            if fixed:
+                given[axis] = _given_parents(chains, axes, at)
+    return total, left
 
 
 def _along(

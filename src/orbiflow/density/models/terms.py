@@ -83,56 +83,50 @@ class Terms(NamedTuple):
         at = which.nonzero()[:, 0]
         return Terms(*(t.index_select(-1, at) for t in self))
 
-    def log_sum(self, features: Tensor, middle: Tensor, spread: float) -> Tensor:
-        """Return the logarithm (N,) of the sum at features (m, N), differentiable.
+    def log_sum(
+        self, features: Tensor, middle: Tensor, spread: float, *, slope: bool
+    ) -> tuple[Tensor, Tensor | None]:
+        """Return the logarithm (N,) of the sum at features (m, N), and its gradient (m, N) if wanted.
 
         Exponents are taken about features `middle` (m,) near them, where little cancels: at a
         concentration of 1e7 the cosine of the whole angle would lose half of all digits. `spread` is
         the logarithm of the ratio of the largest peak to the least sum.
         """
-        rows, bias, _, parts = self._about(features, middle)
-        top = float(self.peaks.max())
-        if spread > WIDE:
-            return torch.cat([log_sum_exp(torch.addmm(bias, part.mT, rows)) for part in parts])
-        bias = bias - top
-        sums = [
-            torch.addmm(bias, part.mT, rows).clamp_min_(-WIDE - 80).exp_().sum(dim=1)
-            for part in parts
-        ]
-        return (sums[0] if len(sums) == 1 else torch.cat(sums)).log() + top
-
-    def log_sum_and_slope(
-        self, features: Tensor, middle: Tensor, spread: float
-    ) -> tuple[Tensor, Tensor]:
-        """Return what `log_sum` does, and its gradient (m, N) in the features; not differentiable."""
         rows, bias, offset, parts = self._about(features, middle)
-        bias = bias - self.peaks.max()
+        top = self.peaks.max()
+        bias = bias - top
         values: list[Tensor] = []
         slopes: list[Tensor] = []
         for part in parts:
             table = torch.addmm(bias, part.mT, rows)
-            top = table.amax(dim=1, keepdim=True) if spread > WIDE else table.new_zeros(1, 1)
-            table.sub_(top).clamp_min_(-WIDE - 80).exp_()
+            high: Tensor | float = 0.0
+            if spread > WIDE:
+                high = table.amax(dim=1)
+                table.sub_(high[:, None])
+            table.clamp_min_(-WIDE - 80).exp_()
             total = table.sum(dim=1)
-            values.append(total.log() + top[:, 0])
-            slopes.append(rows @ table.mT / total)
+            values.append(total.log() + high)
+            if slope:
+                slopes.append(rows @ table.mT / total)
+        found = torch.cat(values) + top
+        if not slope:
+            return found, None
         linear, square = torch.split(torch.cat(slopes, dim=1), [len(middle), self.factors])
         repeated = square.repeat(len(middle) // self.factors, 1)
-        return torch.cat(values) + self.peaks.max(), linear + 2 * repeated * offset
+        return found, linear + 2 * repeated * offset
 
     def plain_log_sum(self, features: Tensor) -> Tensor:
         """Return the logarithm (N,) of the sum at features (m, N), term by term; differentiable.
 
         Nothing cancels and no result is needed in between: for devices where arithmetic is cheap.
         """
-        block = max(1, PLAIN_ENTRIES // self.size)
-        return torch.cat([self._plain(part) for part in torch.split(features, block, dim=1)])
-
-    def _plain(self, features: Tensor) -> Tensor:
-        table = self.peaks
-        for k, (x, center) in enumerate(zip(features, self.centers, strict=True)):
-            table = table - self.kappa[k % self.factors] / 2 * (x[:, None] - center) ** 2
-        return table.logsumexp(dim=1)
+        found: list[Tensor] = []
+        for part in torch.split(features, max(1, PLAIN_ENTRIES // self.size), dim=1):
+            table = self.peaks
+            for k, (x, center) in enumerate(zip(part, self.centers, strict=True)):
+                table = table - self.kappa[k % self.factors] / 2 * (x[:, None] - center) ** 2
+            found.append(table.logsumexp(dim=1))
+        return torch.cat(found)
 
     def _about(
         self, features: Tensor, middle: Tensor

@@ -15,7 +15,7 @@ from orbiflow.density import comparing, models, pictures, tables
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
 from orbiflow.density.run_folder import write_files, written_files
 from orbiflow.density.tables import RowSettings, SpaceSettings, TableSettings
-from orbiflow.settings import Group, Hidden, NotWith, Option, SettingError
+from orbiflow.settings import Group, Hidden, Option, SettingError
 
 if TYPE_CHECKING:
     from orbiflow.density.estimator import DensityEstimator
@@ -26,8 +26,7 @@ MOST_SCORED = 20_000
 fit's time at most; of 100,000 rows of six angles it would be two fifths."""
 
 REPORTED = (
-    "components", "repeats", "missing", "weights", "group", "max_frequency", "segments", "kernels",
-    "seed",
+    "components", "repeats", "missing", "weights", "group", "max_frequency", "segments", "seed",
 )  # fmt: skip
 """Settings that the report repeats."""
 
@@ -40,11 +39,7 @@ def fit(
     reading: RowSettings = RowSettings(),
     *,
     out: Annotated[Path, Option("--out", "-o")] = Path("density"),
-    group: Annotated[
-        str | None,
-        Group("Reading the table"),
-        NotWith("kernels", because="a flow has no components to choose"),
-    ] = None,
+    group: Annotated[str | None, Group("Reading the table")] = None,
     picture: Annotated[bool, Hidden()] = False,
     on_event: runtime.Sink = runtime.ignore,
     cancel: runtime.Cancel = runtime.Cancel(),
@@ -61,10 +56,7 @@ def fit(
         picture: Also draw a small picture, thumbnail.png.
     """
     begin = time.perf_counter()
-    if group is not None and settings.flow_alone:
-        raise SettingError(
-            "{group} serves to choose among {components}, and a flow alone has no choice; leave it out"
-        )
+    settings.check_rows("refuse", None if group is None else "group")
     if reading.missing == "marginalise":
         check_marginalised(where, settings)
 
@@ -76,9 +68,8 @@ def fit(
         unit = tables.angle_unit(where.space, where.unit, rows.table, on_event)
         folder = runtime.ResultFolder(out, written_files)
         runtime.check_output_folder(out, data)
-        missing = "marginalise" if reading.missing == "marginalise" else "refuse"
         estimator = DensityEstimator.with_settings(
-            where.space, settings, unit=unit, missing=missing
+            where.space, settings, unit=unit, missing=reading.kept_missing
         )
         progress = runtime.progress_events(on_event, cancel)
         estimator.fit(values, sample_weight=rows.weights, groups=labels, progress=progress)
@@ -113,11 +104,7 @@ def check_marginalised(where: SpaceSettings, settings: DensitySettings) -> None:
             f"{{missing}} marginalise is for angles on a torus: on the {where.space} no coordinate is "
             "known without the other; use {missing} drop"
         )
-    if settings.flow_alone:
-        raise SettingError(
-            "{missing} marginalise is for kernels and mixtures: a flow cannot be fitted to rows that "
-            "lack angles; give other {components}"
-        )
+    settings.check_rows("marginalise")
 
 
 def _document(

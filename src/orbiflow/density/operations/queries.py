@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from orbiflow import runtime
-from orbiflow.density import tables
+from orbiflow.density import comparing, fitting, models, regions, tables
 from orbiflow.density.run_folder import write_file, written_files
 from orbiflow.density.tables import RowSettings, check_table_name
 from orbiflow.errors import literal
 from orbiflow.settings import DefaultText, Needs, NotWith, Option, Range, SettingError, Settings
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from torch import Tensor
+
+    from orbiflow.arrays import Array
 
 Model = Annotated[Path, Option("--model", "-m")]
 Out = Annotated[Path, Option("--out", "-o")]
@@ -70,7 +78,6 @@ def score(
             )
 
     from orbiflow.density.operations.saved import check_fits, model_at, with_columns_of
-    from orbiflow.density.operations.scores import score_rows
 
     runtime.check_output_file(out, data, model)
     with runtime.one_thread():
@@ -86,6 +93,132 @@ def score(
     table = tables.append_columns(rows.table, data, columns)
     write_file(out, table, on_event, *notes, words)
     return runtime.Outcome({"file": str(out), "rows": len(rows.table.values), "mean": mean})
+
+
+BLOCK, BLOCK_GRADIENT = 2**18, 2**16
+"""Rows at a time: many cost less each, few leave room and tell how far it is."""
+
+SCORED = 0.3
+"""Share of the work that is done when gradients are still to be found."""
+
+
+def score_rows(
+    density: models.Density,
+    rows: tables.TableRows,
+    settings: ScoreSettings,
+    progress: fitting.Progress,
+    *,
+    may_lack: bool = False,
+) -> tuple[dict[str, Array], float, str, list[str]]:
+    """Return columns (N,) to add to the table, log densities first, and what is known of them.
+
+    These are the weighted mean log density, in nats, of the rows that lack nothing, which rows they are
+    in words, and notes.
+    """
+    from orbiflow.density import inference
+
+    space, values = density.space, rows.table.values
+    points = inference.chart_of_observed(space, values) if may_lack else space.to_chart(values)
+    known = ~points.isnan()
+    whole = known.all(dim=1).numpy()
+    name = "log_prob" if whole.all() else "log_prob_marginal"
+    notes: list[str] = []
+    columns = {name: _log_densities(density, points, settings, progress, notes)}
+    if settings.gradient:
+        columns |= _gradients(density, rows, progress)
+    if settings.region:
+        count = regions.samples_for((), settings.samples)
+        progress(1.0, f"drawing {count} samples")
+        natural = settings.measure == "natural"
+        scores = columns[name] if natural else comparing.scores_of(density, values)
+        columns["hdr"] = regions.DensityLevels(density, samples=count).hdr_of(scores)
+        notes.append(_region_note(count))
+    if not whole.all():
+        notes.append(_missing_note(known, name))
+    over = f"{len(whole)} rows" if whole.all() else f"the {whole.sum()} whole rows"
+    return columns, mean_of_whole(columns[name], rows.weights, whole), over, notes
+
+
+def _log_densities(
+    density: models.Density,
+    points: Tensor,
+    settings: ScoreSettings,
+    progress: fitting.Progress,
+    notes: list[str],
+) -> Array:
+    import numpy as np
+    import torch
+
+    from orbiflow.density import inference
+
+    if settings.table:
+        progress(0.0, "making a table")
+        source = models.TabulatedDensity(density)
+        notes.append(
+            f"read off a table: the error is {source.error:.1e} nats at the density's own points, "
+            f"{source.largest:.1e} at most among {models.CHECKED} of them and as many anywhere"
+        )
+        log_prob: Callable[..., Tensor] = source.log_prob
+    else:
+        log_prob = partial(inference.at_observed, density)
+    found: list[Array] = []
+    end = SCORED if settings.gradient else 1.0
+    for start in range(0, len(points), BLOCK):
+        with torch.no_grad():
+            scores = log_prob(points[start : start + BLOCK], measure=settings.measure)
+        found.append(scores.double().numpy())
+        progress(end * min(1.0, (start + BLOCK) / len(points)), "scoring")
+    return np.concatenate(found)
+
+
+def _gradients(
+    density: models.Density, rows: tables.TableRows, progress: fitting.Progress
+) -> dict[str, Array]:
+    """Return the gradient of the log density, a column (N,) for each of the data's coordinates."""
+    import numpy as np
+
+    values = rows.table.values
+    found: list[Array] = []
+    for start in range(0, len(values), BLOCK_GRADIENT):
+        found.append(
+            models.log_density_gradient(density, values[start : start + BLOCK_GRADIENT])[1]
+        )
+        share = min(1.0, (start + BLOCK_GRADIENT) / len(values))
+        progress(SCORED + (1 - SCORED) * share, "finding gradients")
+    names = [f"log_prob_by_{name}" for name in rows.table.columns]
+    return dict(zip(names, np.concatenate(found).T, strict=True))
+
+
+def mean_of_whole(scores: Array, weights: Array | None, whole: NDArray[Any]) -> float:
+    """Return the mean of the rows that lack nothing: densities of fewer angles are in another unit."""
+    import numpy as np
+    import torch
+
+    chosen = whole if whole.any() else np.ones_like(whole)
+    rows = fitting.weighed(
+        torch.tensor(scores[chosen, None]), None if weights is None else weights[chosen]
+    )
+    return fitting.mean_of(rows.points[:, 0], rows.weights)
+
+
+def _region_note(samples: int) -> str:
+    """Return how far `hdr` can be trusted, in words."""
+    low, high = regions.resolvable_masses(samples)
+    return (
+        "hdr: the mass of the smallest highest-density region that holds the row, by "
+        f"{samples} samples (--samples): ± {0.5 / math.sqrt(samples):.2g} at most; what is below "
+        f"{low:g} or above {high:.10g} they do not tell apart"
+    )
+
+
+def _missing_note(known: Tensor, name: str) -> str:
+    """Return in words how many rows lack angles, and what their log density is."""
+    lacking, empty = int((~known.all(dim=1)).sum()), int((~known.any(dim=1)).sum())
+    nothing = f"; {empty} of them have none, hence 0" if empty else ""
+    return (
+        f"{lacking} of {len(known)} rows lack some angles: {name} is the log density of those "
+        f"that they have{nothing}"
+    )
 
 
 class SampleSettings(Settings, group="Samples"):
@@ -150,10 +283,11 @@ def marginal(
         columns: Angles to keep, by name or number, such as phi.
         out: Folder of the new model, made if need be.
     """
+    from orbiflow.density import inference
+
     if not columns:
         raise SettingError("{columns} names no column; give names or numbers, as in phi,psi")
 
-    from orbiflow.density import inference
     from orbiflow.density.operations.saved import axes_of, model_at, names_of, write_derived
 
     runtime.check_output_folder(out, model, what="model")
@@ -190,11 +324,12 @@ def conditional(
         columns: Of the other angles, those to keep.
         out: Folder of the new model, made if need be.
     """
+    from orbiflow.density import inference
+
     if not given:
         raise SettingError("{given} says nothing; give what is known, as in psi=-45")
     pairs = [_angle(text) for text in given]
 
-    from orbiflow.density import inference
     from orbiflow.density.operations import saved
 
     runtime.check_output_folder(out, model, what="model")

@@ -71,9 +71,6 @@ class DensityLevels:
         density: A density or a fitted estimator.
         samples: Number of samples, 1000 to 10 million; `samples_for` says how many masses need.
         seed: Seed of the samples.
-
-    Raises:
-        OrbiflowError: If it is no density, or a number is out of range.
     """
 
     @one_thread()
@@ -162,9 +159,6 @@ def highest_density_region(
         mass: The mass, between 0 and 1.
         samples: Number of samples. Default: as many as the mass needs, see `samples_for`.
         seed: Seed of the samples.
-
-    Raises:
-        OrbiflowError: As `DensityLevels` and `samples_for`.
 
     >>> rng = np.random.default_rng(0)
     >>> angles = rng.vonmises([0.0, 1.0], 4.0, (200, 2))

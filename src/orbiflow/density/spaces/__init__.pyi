@@ -5,7 +5,6 @@ from .flat import KleinBottle as KleinBottle
 from .flat import Torus as Torus
 from .flat import whole_turn as whole_turn
 from .patches import KleinCoordinates as KleinCoordinates
-from .patches import from_klein as from_klein
 from .patches import to_klein as to_klein
 from .round import ProjectivePlane as ProjectivePlane
 from .round import RoundSpace as RoundSpace

@@ -94,13 +94,6 @@ def to_klein(patches: ArrayLike, *, unit: str = "radians") -> KleinCoordinates:
     return KleinCoordinates(angles * (turn / (2 * math.pi)), distances)
 
 
-def from_klein(angles: ArrayLike, *, unit: str = "radians") -> Array:
-    """Return the patches (N, 9) on the Klein bottle at angles (N, 2), theta and phi."""
-    turn = whole_turn(unit)
-    theta, phi = checked_table(angles, (2,), "theta and phi").T * (2 * math.pi / turn)
-    return klein_patch(theta, phi)
-
-
 def klein_patch(theta: ArrayLike, phi: ArrayLike) -> Array:
     """Return K(theta, phi) (..., 9), pixels row by row, of mean 0 and contrast norm 1.
 

@@ -175,6 +175,15 @@ class Space(ABC):
         return hash((type(self), self.dim))
 
     @cached_property
+    def sides(self) -> list[float]:
+        """The lengths of the sides of the lattice's rectangle, in sides of the square."""
+        lattice = self.group.lattice
+        sides = np.diag(lattice)
+        if not np.allclose(lattice, np.diag(sides)):
+            raise OrbiflowError(f"the lattice of this {self.name} is not rectangular")
+        return sides.tolist()
+
+    @cached_property
     def _near(self) -> tuple[Array, Array]:
         # an image of one point is within a diagonal of any other, and both of their cube's centre
         diagonal = math.sqrt(self.dim)
@@ -203,11 +212,7 @@ def check_measure(measure: str) -> None:
 
 def rectangle(space: Space) -> Tensor:
     """Return the lengths (d,) of the sides of the lattice's rectangle, in sides of the square."""
-    lattice = space.group.lattice
-    sides = np.diag(lattice)
-    if not np.allclose(lattice, np.diag(sides)):
-        raise OrbiflowError(f"the lattice of this {space.name} is not rectangular")
-    return torch.tensor(sides.copy())
+    return torch.tensor(space.sides)
 
 
 def row_count(count: int) -> str:

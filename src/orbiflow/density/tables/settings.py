@@ -74,6 +74,11 @@ class RowSettings(TableSettings, group="Reading the table"):
     weights: str | None = None
     """Column, by name or number, that says how much each row counts; only ratios matter."""
 
+    @property
+    def kept_missing(self) -> Literal["refuse", "marginalise"]:
+        """What a fit does with missing values that are left."""
+        return "marginalise" if self.missing == "marginalise" else "refuse"
+
     def check(self) -> None:
         """Check that rows that lack a value are treated in one way."""
         if self.drop_missing and self.missing == "marginalise":

@@ -43,7 +43,7 @@ def eye_numbers(text: str) -> tuple[float, ...]:
 
 def line_width(text: str, dpi: float) -> float:
     """Return the width of a line in pixels; 0 for "none"."""
-    return 0.0 if text.strip().lower() == "none" else pixels(text, dpi, zero=True)
+    return 0.0 if text.strip().lower() == "none" else pixels(text, dpi)
 
 
 class ArtSettings(Settings, group="Picture"):

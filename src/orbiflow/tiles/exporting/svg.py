@@ -196,7 +196,7 @@ def tiling_svg(
     so that no paper shines through between neighbours. For another size or palette see `export`.
 
     Args:
-        tile, window, colours, y_down: As for `tiling_png`.
+        tile, window, colours, y_down: As for `tiling_raster`.
         title: The file's title. Default: the class.
 
     Raises:

@@ -114,20 +114,20 @@ def dice(a: Shape, b: Shape) -> float:
     return share(2 * one.intersection(other).area / (one.area + other.area))
 
 
-def pixel_accuracy(a: Shape, b: Shape, window: Shape | None = None) -> float:
-    """Return the share of `window`, 0 to 1, where both or neither of `a` and `b` are present.
+def pixel_accuracy(a: Shape, b: Shape) -> float:
+    """Return the share of `default_window(b)` where both or neither of `a` and `b` are present.
 
     This is the limit, as pixels shrink, of the share of pixels classified alike. It depends on the
-    window: more background brings it nearer to 1. `window` is a shape or four numbers
-    (xmin, ymin, xmax, ymax); by default it is `default_window(b)`, where `b` is the target.
+    window: more background brings it nearer to 1; `b` is the target.
 
-    Raises `OrbiflowError` naming the argument that is not a valid polygon or box.
+    Raises `OrbiflowError` naming the argument that is not a valid polygon.
 
-    >>> pixel_accuracy([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 0], [2, 0], [2, 1], [0, 1]], (0, 0, 2, 2))
-    0.75
+    >>> square = [[0, 0], [5, 0], [5, 5], [0, 5]]
+    >>> round(pixel_accuracy([[0, 0], [5, 0], [5, 2], [0, 2]], square), 6)  # 15 of 36 differ
+    0.583333
     """
     one, target = as_region(a, "a"), as_region(b, "b")
-    view = default_window(target) if window is None else _window(window)
+    view = default_window(target)
     return share(1 - one.symmetric_difference(target).intersection(view).area / view.area)
 
 
@@ -162,24 +162,22 @@ def hausdorff(a: Shape, b: Shape) -> float:
     return max(forth, _directed(b_edges, a_edges, tolerance, at_least=forth))
 
 
-def compare(tile: Shape, target: Shape, window: Shape | None = None) -> ShapeMetrics:
+def compare(tile: Shape, target: Shape) -> ShapeMetrics:
     """Return all metrics of `tile` against `target`, both in one frame.
 
-    `window` is as in `pixel_accuracy`; `hausdorff` is in units of the square root of the target's
-    area. Raises `OrbiflowError` naming the argument that is not a valid polygon.
+    `hausdorff` is in units of the square root of the target's area. Raises `OrbiflowError` naming
+    the argument that is not a valid polygon.
 
     >>> square = [[0, 0], [4, 0], [4, 4], [0, 4]]
     >>> compare([[0, 0], [4, 0], [4, 1], [0, 1]], square).hausdorff
     0.75
     """
     own, goal = as_region(tile, "tile"), as_region(target, "target")
-    view = default_window(goal) if window is None else _window(window)
-    xmin, ymin, xmax, ymax = view.bounds
     return ShapeMetrics(
         iou=iou(own, goal),
         dice=dice(own, goal),
-        pixel_accuracy=pixel_accuracy(own, goal, view),
-        window=(xmin, ymin, xmax, ymax),
+        pixel_accuracy=pixel_accuracy(own, goal),
+        window=default_window(goal).bounds,
         hausdorff=hausdorff(own, goal) / float(np.sqrt(goal.area)),
     )
 
@@ -195,15 +193,6 @@ def _edges(region: Region) -> Array:
     rings = [ring for part in polygons_in(region) for ring in (part.exterior, *part.interiors)]
     coords = [shapely.get_coordinates(ring) for ring in rings]
     return np.concatenate([np.stack([xy[:-1], xy[1:]], axis=1) for xy in coords])
-
-
-def _window(window: Shape) -> Region:
-    if not isinstance(window, Polygon | MultiPolygon) and np.shape(window) == (4,):
-        bounds = np.asarray(window, dtype=np.float64)
-        if not np.isfinite(bounds).all():
-            raise OrbiflowError("window: (xmin, ymin, xmax, ymax) must be finite numbers")
-        return as_region(box(*bounds), "window")
-    return as_region(window, "window")
 
 
 def as_region(shape: Shape, name: str) -> Region:

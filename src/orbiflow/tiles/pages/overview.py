@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw
 
 from orbiflow.arrays import Window
 from orbiflow.drawing import Raster, font, rendered, window_of
-from orbiflow.tiles.pictures import bending_raster, overlay_raster, tiling_raster
+from orbiflow.tiles.pictures import comparison, tiling_raster
 from orbiflow.tiles.search import ClassFailure
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile
@@ -171,12 +171,9 @@ def _write_words(
 
 def _small(result: EscherTile, target: Target) -> Raster:
     """Draw a tile and its silhouette, without a legend."""
-    tile, y_down = result.tile, target.y_down
-    if result.bent is None or result.rest is None:
-        width = _fitting(window_of([tile.polygon, target.outline]))
-        return overlay_raster(tile, target.outline, width_px=width, y_down=y_down)
-    width = _fitting(window_of([result.rest, result.bent, tile.polygon]))
-    return bending_raster(tile, result.rest, result.bent, width_px=width, y_down=y_down, thick=3.5)
+    bent = [] if result.bent is None or result.rest is None else [result.rest, result.bent]
+    width = _fitting(window_of([result.tile.polygon, *(bent or [target.outline])]))
+    return comparison(result, target, width_px=width, thick=3.5)
 
 
 def _fitting(window: Window) -> int:

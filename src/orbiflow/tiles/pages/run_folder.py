@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from orbiflow.arguments import as_instance, as_path
@@ -24,15 +24,14 @@ from orbiflow.tiles.exporting import tile_svg, tiling_svg
 from orbiflow.tiles.pages.overview import TILE_FILES, index_page, overview_png
 from orbiflow.tiles.pictures import (
     bending_picture,
-    bending_png,
+    comparison,
     front_png,
     overlay_picture,
-    overlay_png,
     tiling_picture,
-    tiling_png,
+    tiling_raster,
 )
 from orbiflow.tiles.result_file import RESULT, folder_names
-from orbiflow.tiles.search import ClassFailure, SearchResult, report
+from orbiflow.tiles.search import SearchResult, report
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile, TileMap
 from orbiflow.tiles.tilings import Colouring, colouring
@@ -68,12 +67,6 @@ def write_tile_folder(
     if not result.certificate.valid:
         title += ", NOT CERTIFIED"
 
-    def overlay() -> bytes:
-        if result.bent is None or result.rest is None:
-            return overlay_png(tile, target.outline, y_down=y_down, label=label)
-        text = f"{label}  IoU {result.metrics.iou:.3f}"
-        return bending_png(tile, result.rest, result.bent, y_down=y_down, label=text)
-
     def overlay_for_print() -> Picture:
         if result.bent is None or result.rest is None:
             return overlay_picture(tile, target.outline, y_down=y_down)
@@ -90,8 +83,8 @@ def write_tile_folder(
     contents: dict[str, Callable[[], str | bytes]] = {
         "tile.svg": lambda: tile_svg(tile, y_down=y_down, title=title),
         "tiling.svg": lambda: tiling_svg(tile, y_down=y_down, title=title, colours=colours),
-        "tiling.png": lambda: tiling_png(tile, y_down=y_down, colours=colours),
-        "overlay.png": overlay,
+        "tiling.png": lambda: tiling_raster(tile, y_down=y_down, colours=colours).png(),
+        "overlay.png": lambda: comparison(result, target, label=label).png(),
         "tiling.pdf": lambda: tiling_picture(tile, y_down=y_down, colours=colours).file(),
         "overlay.pdf": lambda: overlay_for_print().file(),
         "field.png": lambda: field(Sheet.screen(1200)),
@@ -105,37 +98,33 @@ def write_tile_folder(
 OVERVIEW, INDEX, FRONT = "overview.png", "index.html", "front.png"
 
 
-def write_gallery(
-    results: Sequence[EscherTile],
-    target: Target,
-    out: Path,
-    *,
-    failures: Sequence[ClassFailure] = (),
-    figures: bool = False,
-    workers: int = 1,
-) -> None:
-    """Write each class's folder, `overview.png` and `index.html` for tiles, best first, one or more.
+def write_gallery(result: SearchResult, out: Path, *, figures: bool = False) -> None:
+    """Write each tile's folder, `overview.png`, `index.html` and, after a search for both, `front.png`.
 
-    So many `workers` draw `figures`; without figures, starting one would take longer than drawing.
+    As many processes as searched draw `figures`; without these, starting one would take longer than
+    drawing. There is at least one tile.
 
     Raises:
         OutputError: If a file cannot be written.
     """
-    names = folder_names([result.isohedral_class for result in results])
-    colours = [colouring(result.tile) for result in results]
+    tiles, target, failures = result.tiles, result.target, result.failures
+    names = folder_names([tile.isohedral_class for tile in tiles])
+    colours = [colouring(tile.tile) for tile in tiles]
     draw = functools.partial(_draw, target, figures)
-    items = list(zip(results, colours, (out / name for name in names), strict=True))
-    if workers == 1 or len(results) == 1 or not figures:
+    items = list(zip(tiles, colours, (out / name for name in names), strict=True))
+    if result.workers == 1 or len(tiles) == 1 or not figures:
         for item in items:
             draw(item)
     else:
-        with contextlib.closing(work(draw, items, workers)) as news:
+        with contextlib.closing(work(draw, items, result.workers)) as news:
             for _ in news:
                 pass
-    write_atomic(out / OVERVIEW, overview_png(results, target, colours, failures=failures))
-    extra = [figure_files(result) if figures else () for result in results]
-    page = index_page(results, target, names, failures=failures, figures=extra)
+    write_atomic(out / OVERVIEW, overview_png(tiles, target, colours, failures=failures))
+    extra = [figure_files(tile) if figures else () for tile in tiles]
+    page = index_page(tiles, target, names, failures=failures, figures=extra)
     write_atomic(out / INDEX, page)
+    if result.method.objective == "both":
+        _write_front(tiles, result.found, out)
 
 
 def _draw(
@@ -146,13 +135,13 @@ def _draw(
     write_tile_folder(tile, target, folder, colours=colours, figures=figures)
 
 
-def write_front(results: Sequence[EscherTile], found: Iterable[EscherTile], out: Path) -> None:
-    """Write `front.png`: the listed tiles among all that were found, by deformation and overlap."""
-    listed = {id(result.tile) for result in results}
-    known = [result for result in (*found, *results) if result.deformation is not None]
-    others = [result for result in known if id(result.tile) not in listed]
+def _write_front(tiles: Sequence[EscherTile], found: Sequence[EscherTile], out: Path) -> None:
+    """Write the listed tiles among all that were found, by deformation and overlap."""
+    listed = {id(tile.tile) for tile in tiles}
+    known = [tile for tile in (*found, *tiles) if tile.deformation is not None]
     if known:
-        chosen = [result for result in results if result.deformation is not None]
+        others = [tile for tile in known if id(tile.tile) not in listed]
+        chosen = [tile for tile in tiles if tile.deformation is not None]
         write_atomic(out / FRONT, front_png(chosen, others))
 
 
@@ -211,16 +200,7 @@ def write_run(
         on_event(Note("no flow made these tiles, so there is none to draw: the silhouette bent"))
     with folder.replaced() as staged:
         if tiles:
-            write_gallery(
-                tiles,
-                result.target,
-                staged,
-                failures=result.failures,
-                figures=figures,
-                workers=result.workers,
-            )
-            if result.method.objective == "both":
-                write_front(tiles, result.found or tiles, staged)
+            write_gallery(result, staged, figures=figures)
         write_atomic(staged / RESULT, json.dumps(report(result), allow_nan=False))
         files = [path.relative_to(staged) for path in staged.rglob("*") if path.is_file()]
     written = [folder.path / path for path in sorted(files)]

@@ -1,14 +1,12 @@
 from .front import front_png as front_png
 from .overlays import bending_picture as bending_picture
-from .overlays import bending_png as bending_png
 from .overlays import bending_raster as bending_raster
+from .overlays import comparison as comparison
 from .overlays import overlay_picture as overlay_picture
-from .overlays import overlay_png as overlay_png
 from .overlays import overlay_raster as overlay_raster
 from .tilings import ASPECT as ASPECT
 from .tilings import classes_png as classes_png
 from .tilings import default_window as default_window
 from .tilings import tiling_picture as tiling_picture
-from .tilings import tiling_png as tiling_png
 from .tilings import tiling_raster as tiling_raster
 from .tilings import tilings_png as tilings_png

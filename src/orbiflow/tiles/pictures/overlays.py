@@ -25,39 +25,49 @@ from orbiflow.drawing import (
     vector_picture,
 )
 from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.silhouette import Target
+from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Tile
 
 # Fills of the overlay: in both, in the target only, in the tile only
 COMMON, MISSING, ADDED = "#c9d3dc", "#d95f02", "#2b6cb0"
 
 
-def overlay_png(
+def overlay_raster(
     tile: Tile,
     target: ArrayLike | BaseGeometry,
     *,
     width_px: int = 1200,
     y_down: bool = False,
-    label: str = "",
-) -> bytes:
-    """Return a PNG of a tile over its target, with what is missing and what is added in two colours.
+    label: str | None = "",
+) -> Raster:
+    """Return a tile over its target, with what is missing and what is added in two colours.
 
     Args:
         tile: The tile.
         target: The outline (M, 2), or a shapely polygon, in the tile's coordinates.
         width_px: The width in pixels; the height follows.
         y_down: Whether the y axis points down, as in images.
-        label: The words in front of the legend. Default: the class.
+        label: The words in front of the legend. Default: the class. Without words (None) there is
+            no legend.
 
     Raises:
         OrbiflowError: If the target is empty or not an outline.
     """
     shape, goal = _clean(shapely.Polygon(tile.polygon)), _target(target)
-    common = shapely.intersection(shape, goal)
-    overlap = common.area / shapely.union(shape, goal).area
-    text = f"{label or tile.isohedral_class}  IoU {overlap:.3f}".strip()
-    raster = overlay_raster(tile, goal, width_px=width_px, y_down=y_down, text=text)
-    _legend(raster)
-    return raster.png()
+    common, text = shapely.intersection(shape, goal), ""
+    if label is not None:
+        overlap = common.area / shapely.union(shape, goal).area
+        text = f"{label or tile.isohedral_class}  IoU {overlap:.3f}".strip()
+    bounds = np.array(goal.bounds).reshape(2, 2)
+    raster = captioned([tile.polygon, bounds], width_px, y_down=y_down, text=text)
+    raster.fill_geometry(common, COMMON)
+    raster.fill_geometry(shapely.difference(goal, shape), MISSING)
+    raster.fill_geometry(shapely.difference(shape, goal), ADDED)
+    raster.line(tile.polygon, "#1a1a1a", max(1.0, 0.0028 * width_px), closed=True)
+    if text:
+        _legend(raster)
+    return raster
 
 
 def overlay_picture(
@@ -67,30 +77,11 @@ def overlay_picture(
     y_down: bool = False,
     sheet: Sheet | None = None,
 ) -> Picture:
-    """Return the picture of `overlay_png` for print, in curves; the caption has its legend."""
-    raster = overlay_raster(tile, target, width_px=1600, y_down=y_down)
+    """Return the picture of `overlay_raster` for print, in curves; the caption has its legend."""
+    raster = overlay_raster(tile, target, width_px=1600, y_down=y_down, label=None)
     title = f"Tile {tile.isohedral_class} over the silhouette".replace("  ", " ")
     caption = "Grey: in both. Orange: missing, in the silhouette alone. Blue: added."
     return vector_picture(raster, sheet or Sheet.column(), title=title, caption=caption)
-
-
-def overlay_raster(
-    tile: Tile,
-    target: ArrayLike | BaseGeometry,
-    *,
-    width_px: int,
-    y_down: bool = False,
-    text: str = "",
-) -> Raster:
-    """Return the picture of `overlay_png` without its legend; no strip if `text` is empty."""
-    shape, goal = _clean(shapely.Polygon(tile.polygon)), _target(target)
-    bounds = np.array(goal.bounds).reshape(2, 2)
-    raster = captioned([tile.polygon, bounds], width_px, y_down=y_down, text=text)
-    raster.fill_geometry(shapely.intersection(shape, goal), COMMON)
-    raster.fill_geometry(shapely.difference(goal, shape), MISSING)
-    raster.fill_geometry(shapely.difference(shape, goal), ADDED)
-    raster.line(tile.polygon, "#1a1a1a", max(1.0, 0.0028 * width_px), closed=True)
-    return raster
 
 
 def _legend(raster: Raster) -> None:
@@ -131,57 +122,27 @@ _STEPS = 11
 _LINE, _GHOST = 0.0042, 0.0022  # widths of lines, as shares of the picture's
 
 
-def bending_png(
+def bending_raster(
     tile: Tile,
     rest: Array,
     bent: Array,
     *,
     width_px: int = 1200,
     y_down: bool = False,
-    label: str = "",
-) -> bytes:
-    """Return a PNG of a tile with the bent silhouette's outline, coloured by how far points moved.
+    label: str | None = "",
+    thick: float = 1.0,
+) -> Raster:
+    """Return a tile with the bent silhouette's outline, coloured by how far points moved.
 
     The silhouette as it was is a faint dashed line; arrows lead from it to the tile where it bent.
 
     Args:
         tile: The tile in the input's coordinates, which is filled.
         rest, bent: The outlines (n, 2) of the silhouette as it was and bent, point by point.
-        width_px, y_down, label: As for `overlay_png`.
+        width_px, y_down, label: As for `overlay_raster`.
+        thick: How many times as wide lines are, for small pictures.
     """
-    text = label or tile.isohedral_class or " "
-    raster = bending_raster(tile, rest, bent, width_px=width_px, y_down=y_down, text=text)
-    _bending_legend(raster)
-    return raster.png()
-
-
-def bending_picture(
-    tile: Tile, rest: Array, bent: Array, *, y_down: bool = False, sheet: Sheet | None = None
-) -> Picture:
-    """Return the picture of `bending_png` for print, in curves; the caption has its legend."""
-    raster = bending_raster(tile, rest, bent, width_px=1600, y_down=y_down)
-    title = f"Silhouette bent into a tile {tile.isohedral_class}".strip()
-    caption = (
-        "Dashed: the silhouette as it was, with arrows to where it went. The tile's outline is "
-        "coloured by how far each point moved, from blue, little, to red, far."
-    )
-    return vector_picture(raster, sheet or Sheet.column(), title=title, caption=caption)
-
-
-def bending_raster(
-    tile: Tile,
-    rest: Array,
-    bent: Array,
-    *,
-    width_px: int,
-    y_down: bool = False,
-    text: str = "",
-    thick: float = 1.0,
-) -> Raster:
-    """Return the picture of `bending_png` without its legend, and without a strip if `text` is empty.
-
-    Lines are `thick` times as wide, for small pictures.
-    """
+    text = "" if label is None else label or tile.isohedral_class or " "
     raster = captioned([rest, bent, tile.polygon], width_px, y_down=y_down, text=text)
     raster.fill([tile.polygon], TILE)
     size = float(np.sqrt(abs(tile.signed_area)))
@@ -195,7 +156,42 @@ def bending_raster(
     steps = np.rint(values * (_STEPS - 1)).astype(int)
     for step, run in sorted(_runs(bent, steps), key=lambda item: item[0]):
         raster.line(run, RAMP[step], _LINE * unit)
+    if text:
+        _bending_legend(raster)
     return raster
+
+
+def comparison(
+    result: EscherTile,
+    target: Target,
+    *,
+    width_px: int = 1200,
+    label: str | None = None,
+    thick: float = 1.0,
+) -> Raster:
+    """Return how the silhouette bent into a tile, or the tile over it where it did not bend."""
+    tile, y_down = result.tile, target.y_down
+    if result.bent is None or result.rest is None:
+        outline = target.outline
+        return overlay_raster(tile, outline, width_px=width_px, y_down=y_down, label=label)
+    text = label and f"{label}  IoU {result.metrics.iou:.3f}"
+    rest, bent = result.rest, result.bent
+    return bending_raster(
+        tile, rest, bent, width_px=width_px, y_down=y_down, label=text, thick=thick
+    )
+
+
+def bending_picture(
+    tile: Tile, rest: Array, bent: Array, *, y_down: bool = False, sheet: Sheet | None = None
+) -> Picture:
+    """Return the picture of `bending_raster` for print, in curves; the caption has its legend."""
+    raster = bending_raster(tile, rest, bent, width_px=1600, y_down=y_down, label=None)
+    title = f"Silhouette bent into a tile {tile.isohedral_class}".strip()
+    caption = (
+        "Dashed: the silhouette as it was, with arrows to where it went. The tile's outline is "
+        "coloured by how far each point moved, from blue, little, to red, far."
+    )
+    return vector_picture(raster, sheet or Sheet.column(), title=title, caption=caption)
 
 
 def _ramp(stops: tuple[str, ...], count: int) -> tuple[str, ...]:

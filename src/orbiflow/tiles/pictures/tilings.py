@@ -69,20 +69,21 @@ def default_window(tile: Tiles) -> Window:
     return float(x - half), float(y - high), float(x + half), float(y + high)
 
 
-PIXELS_PER_POINT = 200 / 72  # pixels per point, where widths are given in points
+OUTLINE_PX = 0.8 * 200 / 72  # the usual width of outlines: 0.8 points at 200 dots per inch
 
 
-def tiling_png(
+def tiling_raster(
     tile: Tiles,
     window: Window | None = None,
     *,
     width_px: int = 1600,
     palette_name: str | Palette = DEFAULT_PALETTE,
     colours: Colouring | None = None,
-    outline_pt: float = 0.8,
+    outline_px: float = OUTLINE_PX,
     y_down: bool = False,
-) -> bytes:
-    """Return a PNG of the tiles that meet a window, edge to edge.
+    strip_px: int = 0,
+) -> Raster:
+    """Return the tiles that meet a window, edge to edge, as a picture; its `png()` is a PNG.
 
     Args:
         tile: A tile or a tiling.
@@ -90,38 +91,13 @@ def tiling_png(
         width_px: The width in pixels; the height follows from the window.
         palette_name: The palette of paper, fills and outlines.
         colours: Which tile has which colour. Default: `colouring(tile)`.
-        outline_pt: The outline's width in points of 1/72 inch at 200 dots per inch; 0 for none.
+        outline_px: The outline's width in pixels; 0 for none.
         y_down: Whether the tile's y axis points down, as in images.
+        strip_px: The height of a strip below, for words.
 
     Raises:
         OrbiflowError: If the palette is unknown, the size is impossible, or the window is empty or
             holds too many tiles.
-    """
-    return tiling_raster(
-        tile,
-        window,
-        width_px=width_px,
-        palette_name=palette_name,
-        colours=colours,
-        outline_px=outline_pt * PIXELS_PER_POINT,
-        y_down=y_down,
-    ).png()
-
-
-def tiling_raster(
-    tile: Tiles,
-    window: Window | None = None,
-    *,
-    width_px: int,
-    palette_name: str | Palette = DEFAULT_PALETTE,
-    colours: Colouring | None = None,
-    outline_px: float = 2.0,
-    y_down: bool = False,
-    strip_px: int = 0,
-) -> Raster:
-    """Return the picture of `tiling_png` as a raster that can be drawn on.
-
-    Below it is a strip of `strip_px` for words.
     """
     chosen, tiling = palette(palette_name), as_tiling(tile)
     colours = colours or colouring(tiling)
@@ -146,7 +122,7 @@ def tiling_picture(
     y_down: bool = False,
     sheet: Sheet | None = None,
 ) -> Picture:
-    """Return the picture of `tiling_png` for print, in curves."""
+    """Return the picture of `tiling_raster` for print, in curves."""
     raster = tiling_raster(
         tile, window, width_px=1600, palette_name=palette_name, colours=colours, y_down=y_down,
         outline_px=3.0,
@@ -244,7 +220,7 @@ def classes_png(*, width_px: int = 2400) -> bytes:
         _class_panel(
             figure, kind, (column / 3, 0.045 + 0.955 * (1 - (row + 1) / 3)), (1 / 3, 0.955 / 3)
         )
-    _key(figure, width_px)
+    draw_key(figure)
     return png_bytes(figure)
 
 
@@ -315,9 +291,10 @@ def draw_tiling(axes: Axes, kind: IsohedralClass, window: Window) -> None:
     mark_symmetry(axes, kind.group(), window, size=0.18)
 
 
-def _key(figure: Figure, width_px: int) -> None:
+def draw_key(figure: Figure) -> None:
+    """Draw what the marks of symmetry mean, in a strip at the bottom of a figure."""
     height = 0.045
-    aspect = width_px / (figure.get_figheight() * figure.dpi * height)
+    aspect = figure.get_figwidth() / (figure.get_figheight() * height)
     axes = plane_axes(figure, (0.0, 0.0, aspect, 1.0), box=(0.0, 0.0, 1.0, height))
     font, x = 0.95 * figure.get_figwidth(), 0.6
     for order, colour in CENTER_COLOURS.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array, Complex
 from orbiflow.errors import CertificationError
-from orbiflow.runtime import Cancel, one_blas_thread
+from orbiflow.runtime import NEVER, Cancel, one_blas_thread
 from orbiflow.tiles.geometry import best_similarity, plane_points, signed_area
 from orbiflow.tiles.likeness import (
     Elastic,
@@ -25,7 +26,7 @@ from orbiflow.tiles.likeness import (
     narrowest_neck,
     neck_factor,
 )
-from orbiflow.tiles.search.candidates import Fit, Progress, Prototiles, StillTiles, silent
+from orbiflow.tiles.search.candidates import Fit, OnProgress, Prototiles, StillTiles, silent
 from orbiflow.tiles.search.co_deformation import (
     FIRM,
     SOFT,
@@ -70,14 +71,12 @@ def bent_tiles(
     both: Sequence[Hand],
     kind: IsohedralClass,
     settings: LikenessSearch,
-    progress: Callable[[float], None] | None = None,
-    cancel: Cancel | None = None,
+    progress: OnProgress = silent,
+    cancel: Cancel = NEVER,
     *,
     wanted: int = 1,
 ) -> tuple[list[Bent], int]:
     """Return finalists, at best `wanted` of each hand and without twins, and how many crossed."""
-    told: Callable[[float], None] = progress or (lambda _share: None)
-    cancel = cancel or Cancel()
     found: list[Bent] = []
     dropped = done = 0
     sides = both[:1] if template_symmetries(kind)[1] else both
@@ -86,11 +85,11 @@ def bent_tiles(
     for hand, own in tasks:
         sound, crossed = _finalists(hand, FIRM, kind, own, cancel)
         if 2 * len(sound) < own.finalists:
-            told((done + 0.5 * own.starts) / work)
+            progress(0.9 * (done + 0.5 * own.starts) / work, math.nan)
             more, also = _finalists(hand, SOFT, kind, own, cancel)
             sound, crossed = sound + more, crossed + also
         found, dropped, done = found + sound, dropped + crossed, done + own.starts
-        told(done / work)
+        progress(0.9 * done / work, math.nan)
     found.sort(key=lambda bent: -bent.score(settings.min_neck))
 
     def twins(a: Bent, b: Bent) -> bool:
@@ -251,19 +250,14 @@ def fit_bending(
     both: Sequence[Hand],
     *,
     per_class: int = 1,
-    progress: Progress | None = None,
-    cancel: Cancel | None = None,
+    progress: OnProgress = silent,
+    cancel: Cancel = NEVER,
 ) -> Fit:
     """Fit tiles of one class to a target by letting the silhouette bend (design point 15)."""
-    told = progress or silent
     enough = 1 if per_class == 1 else 3 * per_class
     settings = replace(settings, min_neck=least_neck(target.normal, settings.min_neck))
-
-    def report(share: float) -> None:
-        told(0.9 * share, float("nan"))
-
     with one_blas_thread():  # many small systems
-        found, dropped = bent_tiles(both, kind, settings, report, cancel, wanted=enough)
+        found, dropped = bent_tiles(both, kind, settings, progress, cancel, wanted=enough)
     if not found:
         raise CertificationError("all tiles near the silhouette cross themselves")
     found = found[: enough + 1]  # one to spare, if one is not certified

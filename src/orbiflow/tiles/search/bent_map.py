@@ -8,16 +8,14 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-import scipy.sparse as sparse
 import shapely
 from numpy.typing import NDArray
-from scipy.sparse.linalg import spsolve
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import arc_lengths, orient, plane_points, points_along, resampled
 from orbiflow.tiles.search.bending import Bent
-from orbiflow.tiles.silhouette import Bending, Mesh, triangulate, unfolded
+from orbiflow.tiles.silhouette import Bending, Mesh, harmonic, triangulate, unfolded
 from orbiflow.tiles.tilings import Tile
 
 SAME = 1e-9  # distance along the outline, in outlines, below which points are one
@@ -172,7 +170,8 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
     place = (np.interp(turn, np.arange(TILE + 1), places) + start) % SILHOUETTE
     lengths = arc_lengths(rest)
     outline = points_along(rest, place / SILHOUETTE * lengths[-1])
-    points = _harmonic(mesh, outline)
+    moved = harmonic(mesh, outline - mesh.points[: len(outline)])
+    points = mesh.points + moved
     try:
         return Bending(unfolded(mesh, points), mesh.points, mesh.triangles)
     except OrbiflowError as error:
@@ -206,19 +205,3 @@ def _matching(tile: Array, goal: Array) -> Array:
         found[i] = place
         place -= taken[i, place]
     return found
-
-
-def _harmonic(mesh: Mesh, outline: Array) -> Array:
-    """(N, 2) the mesh's points moved: those inside by the mean of how their neighbours are."""
-    count, fixed = len(mesh.points), len(outline)
-    ends = np.concatenate([mesh.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
-    links = sparse.coo_array((np.ones(len(ends)), ends.T), shape=(count, count)).tocsr()
-    links = links + links.T
-    own, degrees = np.arange(count), np.asarray(links.sum(axis=1)).ravel()
-    degree = sparse.coo_array((degrees, (own, own)), shape=(count, count)).tocsr()
-    laplacian = sparse.csr_array(degree - links)
-    moved = outline - mesh.points[:fixed]
-    inner = spsolve(
-        sparse.csc_array(laplacian[fixed:, fixed:]), -(laplacian[fixed:, :fixed] @ moved)
-    )
-    return mesh.points + np.concatenate([moved, np.asarray(inner).reshape(-1, 2)])

@@ -14,14 +14,14 @@ import numpy as np
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Cancel
+from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles.geometry import orient
 from orbiflow.tiles.likeness import bent_onto, mutual_iou
 from orbiflow.tiles.search.candidates import Fit
 from orbiflow.tiles.search.co_deformation import Hand
 from orbiflow.tiles.search.likeness_search import LikenessSearch
-from orbiflow.tiles.search.method import Goal, SearchMethod
 from orbiflow.tiles.search.overlap_search import OverlapSearch
+from orbiflow.tiles.search.search_method import Goal, SearchMethod
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass
 
@@ -58,7 +58,7 @@ class BothSearch(SearchMethod):
         """Refuse: each of the `parts` has candidates of its own."""
         raise OrbiflowError("a search for both fits twice: take its likeness or its overlap")
 
-    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel | None = None) -> Fit:
+    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:
         """Return the sketch of the search for likeness."""
         return self.likeness.sketch(goal, kind, cancel)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import shapely
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError
-from orbiflow.tiles.geometry import plane_points, subdivided
+from orbiflow.tiles.geometry import kept_vertices, plane_points, subdivided
 from orbiflow.tiles.search.tile_space import NearestTiles
 from orbiflow.tiles.tile import TileMap
 from orbiflow.tiles.tilings import CLASSES, EdgeIdentification, IsohedralClass, Tile
 
 if TYPE_CHECKING:
     from orbiflow.tiles.search.bending import PlacedBent
-    from orbiflow.tiles.search.model import TileModel
+    from orbiflow.tiles.search.tile_model import TileModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,21 +180,13 @@ def _chosen_samples(kind: IsohedralClass, closed: list[Array], tolerance: float)
 
 
 def _simplified(curve: Array, tolerance: float) -> Array:
-    """Douglas-Peucker: which points of the curve (M, 2) to keep, the ends always."""
-    if tolerance == 0.0:
-        return np.ones(len(curve), dtype=bool)
-    kept = shapely.get_coordinates(
-        shapely.simplify(shapely.LineString(curve), tolerance, preserve_topology=False)
-    )
-    mask = np.zeros(len(curve), dtype=bool)
-    position = 0
-    for point in kept:  # vertices are kept bit for bit and in order
-        position += int(np.flatnonzero((curve[position:] == point).all(axis=1))[0])
-        mask[position] = True
+    """Return which points of a curve (M, 2) to keep."""
+    mask = np.full(len(curve), tolerance == 0.0)
+    mask[kept_vertices(curve, tolerance)] = True
     return mask
 
 
-Progress = Callable[[float, float], None]
+OnProgress = Callable[[float, float], None]
 """Called with the share of the work done and the best loss so far."""
 
 # Names under which the arrays of a map hold the start tile, if it is not the template
@@ -203,23 +195,6 @@ VERTICES, CORNERS = "prototile.outline", "prototile.corners"
 
 def silent(_share: float, _loss: float) -> None:
     """Report no progress."""
-
-
-class Candidates(Protocol):
-    """Tiles of one class, best first, in the target's normal form."""
-
-    @property
-    def size(self) -> int:
-        """The number of candidates."""
-        ...
-
-    def finished(self, index: int, *, force: bool = False) -> tuple[Tile, TileMap]:
-        """Return a candidate's polygon with its group, and its flow; it is simple unless forced."""
-        ...
-
-    def as_model(self) -> TileModel:
-        """Return the candidates as a torch module, to be trained further."""
-        ...
 
 
 class Fit(NamedTuple):
@@ -232,7 +207,7 @@ class Fit(NamedTuple):
     - `bent`: After a search for likeness, the bent silhouette of each finalist.
     """
 
-    candidates: Candidates
+    candidates: StillTiles | TileModel
     starts: int
     crossed: int
     enough: int
@@ -302,7 +277,7 @@ class StillTiles:
 
     def as_model(self) -> TileModel:
         """Return the candidates as a torch module, with a field of frequency 1 that is zero."""
-        from orbiflow.tiles.search.model import TileModel
+        from orbiflow.tiles.search.tile_model import TileModel
 
         own = self.prototiles
         return TileModel(self.kind, max_frequency=1, smoothness=0.0, steps=1, prototiles=own)

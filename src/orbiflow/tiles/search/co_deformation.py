@@ -25,7 +25,7 @@ import shapely
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array, Complex, Integers
-from orbiflow.runtime import Cancel
+from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles.geometry import plane_points, signed_area
 from orbiflow.tiles.likeness import Elastic, Pinned, Stiffness
 from orbiflow.tiles.search.likeness_search import LikenessSearch
@@ -192,13 +192,12 @@ def shifted(
     stages: Sequence[tuple[int, int]],
     *,
     share: float,
-    cancel: Cancel | None = None,
+    cancel: Cancel = NEVER,
 ) -> Drawn:
     """Move the corners of placements of shapes (N, C) until none of the `share` nearest is better.
 
     Each stage is the points by which corners move and how many of the best go on, no two the same.
     """
-    cancel = cancel or Cancel()
     drawn = _drawn(body, kind, placements, points)
     for step, keep in stages:
         drawn = _distinct(drawn, keep)

@@ -24,12 +24,12 @@ from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.fields import FourierField, group_factor, steepness
 from orbiflow.flows import METHODS, Flow
-from orbiflow.runtime import Cancel, one_thread
+from orbiflow.runtime import NEVER, Cancel, one_thread
 from orbiflow.tiles.likeness import Overlap, Recogniser, boundary_iou, prepared_region, rank_score
-from orbiflow.tiles.search.candidates import Fit, Progress, Prototiles, silent
-from orbiflow.tiles.search.model import TileModel
+from orbiflow.tiles.search.candidates import Fit, OnProgress, Prototiles, silent
 from orbiflow.tiles.search.overlap_search import OverlapSearch
 from orbiflow.tiles.search.starts import Starts, outline_starts, template_starts
+from orbiflow.tiles.search.tile_model import TileModel
 from orbiflow.tiles.silhouette import Emphasis, SoftTarget, Target
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 from orbiflow.typed_torch import linalg
@@ -161,10 +161,9 @@ STALL = 2e-5  # polishing stops when ten iterations together gain less IoU than 
 
 
 def polish(
-    model: TileModel, target: Target, iterations: int, *, cancel: Cancel | None = None
+    model: TileModel, target: Target, iterations: int, *, cancel: Cancel = NEVER
 ) -> TileModel:
     """Improve a single candidate's IoU: a last segment, if it gains, and its pose; float64."""
-    cancel = cancel or Cancel()
     work = _Polish(model, target)
     if work.best_iou == 0.0:  # crosses itself already
         return model
@@ -267,26 +266,23 @@ def fit_descent(
     kind: IsohedralClass | str,
     settings: OverlapSearch | None = None,
     *,
-    soft: SoftTarget | None = None,
-    progress: Progress | None = None,
-    cancel: Cancel | None = None,
+    emphasis: Emphasis | None = None,
+    progress: OnProgress = silent,
+    cancel: Cancel = NEVER,
 ) -> Fit:
     """Fit tiles of one class to a target by Sobolev descent, all starts side by side.
 
-    `soft` is the target's soft edge, if it is at hand already; `progress` is told 1 - IoU as the
-    loss.
+    `progress` is told 1 - IoU as the loss.
     """
     kind = isohedral_class(kind)
     as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
     settings = as_instance(settings or OverlapSearch(), OverlapSearch, "settings")
     outline = shapely.Polygon(target.normal).exterior
     settings = settings.for_outline(outline.length)
-    soft = soft or SoftTarget(target)
-    report = progress or silent
-    cancel = cancel or Cancel()
+    soft = shared_soft_target(target, emphasis)
     starts = _starts(target, kind, settings, cancel)
     prototiles = starts.prototiles
-    report(0.1, float("nan"))
+    progress(0.1, float("nan"))
     descent = Descent(kind, prototiles, settings)
     goal = prepared_region(target.normal)
     crossed = 0
@@ -296,7 +292,7 @@ def fit_descent(
             cancel.check()
             descent.step(soft)
             if k % 8 == 7:
-                report(0.1 + 0.8 * descent.done / settings.iterations, 1 - best)
+                progress(0.1 + 0.8 * descent.done / settings.iterations, 1 - best)
         iou = _overlaps(goal, soft, descent)
         crossed += int((iou < 0).sum())
         ranking = np.argsort(-iou, kind="stable")
@@ -308,7 +304,7 @@ def fit_descent(
     if soft.weights is None and starts.iou.max() > first:
         model = _with_start(model, prototiles.take([int(starts.iou.argmax())]))
     if settings.polish and soft.weights is None:  # the exact overlap knows no emphasis
-        report(0.92, 1 - best)
+        progress(0.92, 1 - best)
         model = _polished(target, model, settings, cancel)
     return Fit(model, len(prototiles), crossed, 1)
 

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from orbiflow.settings import DefaultText, Group, Needs, OnlyWith, Parsed, Range, Repeated, Settings
 
 if TYPE_CHECKING:
-    from orbiflow.tiles.search.method import SearchMethod
+    from orbiflow.tiles.search.search_method import SearchMethod
+
+Count = Annotated[int, Range(1)]
+Seed = Annotated[int, Range(0, 2**32 - 1)]
 
 LIKENESS = Group("Search for likeness")
 OVERLAP = Group("Search for overlap")
 OCCUPANCY = Group("Occupancy method")
-
-Count = Annotated[int, Range(1)]
 
 
 def class_names(text: str) -> tuple[str, ...] | None:
@@ -79,7 +80,7 @@ class SearchSettings(Settings, group="Search"):
     ] = None
     """Number of steps of the fit."""
 
-    seed: Annotated[int, Range(0, 2**32 - 1)] = 0
+    seed: Seed = 0
     """Seed of the random numbers: the same seed on the same machine gives the same tiles."""
 
     force: bool = False

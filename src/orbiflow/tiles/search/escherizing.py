@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import math
 import platform
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
 from typing import Any, cast
@@ -14,17 +16,37 @@ import numpy as np
 import shapely
 
 from orbiflow import __version__
-from orbiflow.arguments import as_instance
-from orbiflow.runtime import Cancel, ClassFailed, Note, Preview, Progress, Sink, TileFound, ignore
+from orbiflow.arguments import as_instance, described, is_a
+from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.runtime import (
+    NEVER,
+    Cancel,
+    Cancelled,
+    ClassFailed,
+    Note,
+    Preview,
+    Progress,
+    Sink,
+    TileFound,
+    ignore,
+    one_thread,
+    process_context,
+    work,
+)
+from orbiflow.tiles.likeness import diverse, mutual_iou
 from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
-from orbiflow.tiles.search.certifying import ClassFailure
+from orbiflow.tiles.search.both_search import ALIKE
+from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
+from orbiflow.tiles.search.finished_tiles import HOW, ClassFailure, best_tiles
 from orbiflow.tiles.search.likeness_search import LikenessSearch
-from orbiflow.tiles.search.method import SearchMethod
-from orbiflow.tiles.search.searching import INTERRUPTED, Event, class_list, search_classes
+from orbiflow.tiles.search.search_method import Goal, SearchMethod
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tilings import CLASSES
+from orbiflow.tiles.tilings import CLASSES, IsohedralClass, isohedral_class
+
+INTERRUPTED = "interrupted"  # the reason given for a class that was left undone
+Outcome = EscherTile | ClassFailure
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +87,7 @@ def escherize(
     emphasis: Emphasis | None = None,
     pins: Pins | None = None,
     on_event: Sink = ignore,
-    cancel: Cancel | None = None,
+    cancel: Cancel = NEVER,
 ) -> SearchResult:
     """Find tiles that look like a silhouette and tile the plane, and certify them.
 
@@ -79,7 +101,7 @@ def escherize(
         on_event: Called in this thread with each `Note`, `Progress`, `Preview`, `TileFound` and
             `ClassFailed`. What it raises ends the search.
         cancel: Ends the search early; what was found by then is returned, and the other classes are
-            `interrupted`.
+            `interrupted`. It is looked at before each step of every fit.
 
     Returns:
         The same seed gives the same tiles, whatever the number of workers.
@@ -88,64 +110,255 @@ def escherize(
         OrbiflowError: For an unknown class, a mask that cannot be read, or workers that die.
     """
     begin = time.perf_counter()
-    as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
+    as_instance(target, Target, "the target", HOW)
     settings = as_instance(settings or EscherizeSettings(), EscherizeSettings, "settings")
     if emphasis is None and settings.emphasis is not None:
         strength = {} if settings.strength is None else {"strength": settings.strength}
         emphasis = Emphasis.read(settings.emphasis, target, **strength)
     if pins is None and settings.pin is not None:
         pins = Pins.read(settings.pin, target, keep_angle=settings.pin_angle)
+    method = method or settings.search_method
+    task = _task(Goal(target, emphasis, pins), method, settings.per_class, settings.force)
     for source in (emphasis, pins):
         for note in source.notes if source else ():
             on_event(Note(note))
-    method = method or settings.search_method
-    names = class_list(CLASSES if settings.classes is None else settings.classes)
+    names = list(dict.fromkeys(isohedral_class(name).name for name in settings.classes or CLASSES))
     workers = min(settings.workers or 1, len(names))
-    relay = _Relay(names, on_event)
-    tiles, failures = search_classes(
-        target,
-        names,
-        method,
-        emphasis=emphasis,
-        pins=pins,
-        per_class=settings.per_class,
-        workers=workers,
-        force=settings.force,
-        watch=relay,
-        cancel=cancel,
-    )
-    seconds = time.perf_counter() - begin
+    record = _Record(names, on_event)
+    with contextlib.suppress(Cancelled):
+        _search(task, names, workers, record, cancel)
+    tiles, failures = record.finish()
+    tiles, seconds = method.short_list(tiles), time.perf_counter() - begin
     return SearchResult(
-        target, tiles, failures, relay.found, method, emphasis, pins, seconds, workers
+        target, tiles, failures, record.found, method, emphasis, pins, seconds, workers
     )
 
 
-class _Relay:
-    """The events of a search for those who watch; all tiles of all classes go into `found`."""
+def escherize_class(
+    target: Target,
+    kind: IsohedralClass | str | int,
+    method: SearchMethod,
+    *,
+    per_class: int = 1,
+    force: bool = False,
+    progress: OnProgress = silent,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Fit and certify one class in this process, on one thread, without a first look.
+
+    `progress` is called with the share of the work done, and the best loss so far.
+
+    Raises:
+        Cancelled: If it was told to stop.
+    """
+    task = _task(Goal(target), method, per_class, force)
+    return _outcome(task, isohedral_class(kind), progress, cancel)
+
+
+def fit_tile(
+    target: Target,
+    kind: IsohedralClass | str | int,
+    method: SearchMethod | None = None,
+    *,
+    emphasis: Emphasis | None = None,
+    pins: Pins | None = None,
+    per_class: int = 1,
+    progress: OnProgress = silent,
+    cancel: Cancel = NEVER,
+) -> Fit:
+    """Fit tiles of one class to a target, in this process; `certified_tiles` makes polygons of them.
+
+    `escherize` does both, for several classes. This is for those who look at, or go on with, what
+    was fitted: `Fit.model` is a `TileModel`, a torch module whose candidates may be trained on.
+    `progress` is called with the share of the work done, and the best loss so far.
+
+    Raises:
+        OrbiflowError: For an argument that cannot be used.
+        CertificationError: If no candidate is left.
+        Cancelled: If it was told to stop.
+
+    >>> boot = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])
+    >>> few = LikenessSearch(placements=10, held=3, finalists=1, rounds=2)
+    >>> from orbiflow.tiles import certified_tiles
+    >>> best, *_ = certified_tiles(boot, fit_tile(boot, "IH4", few))
+    >>> best.name, best.certificate.valid
+    ('IH4', True)
+    """
+    task = _task(Goal(target, emphasis, pins), method or LikenessSearch.for_effort("normal"))
+    with one_thread():
+        return task.method.fit(
+            task.goal, isohedral_class(kind), per_class=per_class, progress=progress, cancel=cancel
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """What is to be done for each class."""
+
+    goal: Goal
+    method: SearchMethod
+    per_class: int
+    force: bool
+
+
+def _task(goal: Goal, method: SearchMethod, per_class: int = 1, force: bool = False) -> _Task:
+    """Return the task, checked, with what its method needs imported."""
+    as_instance(goal.target, Target, "the target", HOW)
+    if not is_a(method, SearchMethod):
+        raise OrbiflowError(
+            f"the method must be a search such as LikenessSearch(), got {described(method)}; for a "
+            'level of effort: LikenessSearch.for_effort("fast")'
+        )
+    if goal.pins is not None:
+        as_instance(goal.pins, Pins, "pins", "Pins.read and Pins.at make one")
+        if not method.takes_pins:
+            raise OrbiflowError("pins belong to the search for likeness, where silhouettes bend")
+    method.load()
+    return _Task(goal, method, per_class, force)
+
+
+class _Record:
+    """What a search has found, and how far each class is, told as events."""
 
     def __init__(self, names: Sequence[str], on_event: Sink) -> None:
-        self.found: list[EscherTile] = []
         self.shares = dict.fromkeys(names, 0.0)
+        self.outcomes: dict[str, Outcome] = {}
+        self.preview: EscherTile | None = None
         self.on_event = on_event
         self.begin = time.perf_counter()
         on_event(Progress(0.0, "fitting"))
 
-    def __call__(self, event: Event) -> None:
-        name, outcome = event.name, event.outcome
-        if event.preview is not None:
-            seconds = time.perf_counter() - self.begin
-            self.on_event(Preview(name, event.preview.metrics.iou, seconds))
-            return
-        self.shares[name] = event.share
-        share = sum(self.shares.values()) / len(self.shares)
-        loss = event.loss if math.isfinite(event.loss) else None  # no NaN in JSON
-        self.on_event(Progress(share, "fitting", name, event.share, loss))
-        if isinstance(outcome, ClassFailure):
-            self.on_event(ClassFailed(name, outcome.reason))
-        elif outcome is not None:
-            self.found += outcome.family()
-            iou, certified = outcome.metrics.iou, outcome.certificate.valid
-            self.on_event(TileFound(name, iou, outcome.score, certified))
+    @property
+    def found(self) -> list[EscherTile]:
+        """All tiles of the classes that are finished."""
+        best = [found for found in self.outcomes.values() if isinstance(found, EscherTile)]
+        return [tile for first in best for tile in first.family()]
+
+    def first_look(self, tile: EscherTile) -> None:
+        """Keep a tile that the search is going to improve on."""
+        self.preview = tile
+        seconds = time.perf_counter() - self.begin
+        self.on_event(Preview(tile.name, tile.metrics.iou, seconds))
+
+    def progress(self, name: str, share: float, loss: float = math.nan) -> None:
+        """Tell how far a class is, which never falls."""
+        self.shares[name] = share = max(share, self.shares[name])
+        whole = sum(self.shares.values()) / len(self.shares)
+        known = loss if math.isfinite(loss) else None  # no NaN in JSON
+        self.on_event(Progress(whole, "fitting", name, share, known))
+
+    def outcome(self, found: Outcome, share: float = 1.0) -> None:
+        """Keep what a class gave, and then tell it."""
+        self.outcomes[found.name] = found
+        self.progress(found.name, share)
+        if isinstance(found, ClassFailure):
+            self.on_event(ClassFailed(found.name, found.reason))
+        else:
+            iou, certified = found.metrics.iou, found.certificate.valid
+            self.on_event(TileFound(found.name, iou, found.score, certified))
+
+    def finish(self) -> tuple[list[EscherTile], list[ClassFailure]]:
+        """Return tiles, best first, those for likeness before those for overlap; and failures."""
+        tiles, names = self.found, list(self.shares)
+        left = [name for name in names if name not in self.outcomes]
+        for name in left:
+            self.outcome(ClassFailure(name, INTERRUPTED), self.shares[name])
+        if self.preview and self.preview.name in left:
+            tiles.append(self.preview)
+        tiles.sort(key=lambda t: (t.objective != "likeness", -t.score, names.index(t.name)))
+        failures = [found for found in self.outcomes.values() if isinstance(found, ClassFailure)]
+        return tiles, failures
+
+
+def _search(
+    task: _Task, names: Sequence[str], workers: int, record: _Record, cancel: Cancel
+) -> None:
+    """Do the task for each class, here or in processes."""
+    # asked before torch is limited here: a limit makes no fork safe
+    preload = ("orbiflow.tiles.search.escherizing", *task.method.modules)
+    context = process_context(preload) if workers > 1 else None
+    with one_thread():
+        first = task.method.preview(task.goal, names, cancel)
+    if first is not None:
+        record.first_look(first)
+    if context is not None:
+        _search_in_processes(task, names, workers, context, record, cancel)
+        return
+    for name in names:
+        cancel.check()
+        progress = functools.partial(record.progress, name)
+        record.outcome(_outcome(task, isohedral_class(name), progress, cancel))
+
+
+def _search_in_processes(
+    task: _Task, names: Sequence[str], workers: int, context: Any, record: _Record, cancel: Cancel
+) -> None:
+    cancel.check()
+    if context.get_start_method() == "fork":
+        with one_thread():
+            task.method.prepare(task.goal)  # once, for all workers
+    # classes with more lattice freedom take longer
+    order = sorted(names, key=lambda name: -isohedral_class(name).stretch_dim)
+    function = functools.partial(_work_on, task)
+    with contextlib.closing(work(function, order, workers, context=context, cancel=cancel)) as news:
+        for one in news:
+            if one.done:
+                record.outcome(one.value)
+            else:
+                record.progress(order[one.index], *one.value)
+
+
+def _work_on(
+    task: _Task, name: str, tell: Callable[[tuple[float, float]], None], cancel: Cancel
+) -> Outcome:
+    """Do the task for a class in a worker process."""
+    return _outcome(task, isohedral_class(name), lambda share, loss: tell((share, loss)), cancel)
+
+
+def _outcome(task: _Task, kind: IsohedralClass, progress: OnProgress, cancel: Cancel) -> Outcome:
+    """Return the best certified tile of a class, which holds the others, or why there is none."""
+    begin = time.perf_counter()
+    chosen: list[EscherTile] = []
+    reasons: list[str] = []
+    done = 0.0
+    for share, method in task.method.parts():
+
+        def told(own: float, loss: float, done: float = done, share: float = share) -> None:
+            progress(done + share * own, loss)
+
+        try:
+            chosen += _chosen_tiles(task, kind, method, told, cancel)
+        except CertificationError as error:  # the other part may give one
+            reasons.append(str(error))
+        done += share
+    if not chosen:
+        return ClassFailure(kind.name, "; ".join(dict.fromkeys(reasons)))
+    seconds = time.perf_counter() - begin
+    best, *others = (tile.changed(seconds=seconds) for tile in chosen)
+    return best.changed(others=tuple(others))
+
+
+def _chosen_tiles(
+    task: _Task, kind: IsohedralClass, method: SearchMethod, progress: OnProgress, cancel: Cancel
+) -> Sequence[EscherTile]:
+    """Return the tiles of one fit that are shown, best first, no two of them alike."""
+    goal, count = task.goal, task.method.shown(task.per_class)
+    with one_thread():
+        found = method.fit(goal, kind, per_class=count, progress=progress, cancel=cancel)
+        tiles = best_tiles(goal.target, found, force=task.force, min_neck=method.least_neck(goal))
+        chosen = [tiles[k] for k in _without_twins(tiles, count)]
+        cancel.check()
+        return task.method.finish(chosen, goal)
+
+
+def _without_twins(tiles: Sequence[EscherTile], count: int) -> list[int]:
+    if count == 1 or len(tiles) == 1:
+        return [0]
+    sound = [k for k, tile in enumerate(tiles) if tile.certificate.simple]
+    alike = mutual_iou([tiles[k].normal_tile.polygon for k in sound], ALIKE)
+    below = float(np.nextafter(ALIKE, 0))
+    chosen = diverse([tiles[k].score for k in sound], count, alike, twin=below)
+    return [sound[k] for k in chosen] or [0]
 
 
 def report(result: SearchResult) -> dict[str, Any]:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from orbiflow.arguments import as_number, as_whole
-from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Cancel
+from orbiflow.runtime import NEVER, Cancel
+from orbiflow.settings import Range, Settings
 from orbiflow.tiles.likeness import least_neck
-from orbiflow.tiles.search.candidates import Fit, Progress
-from orbiflow.tiles.search.method import Goal, SearchMethod
+from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
+from orbiflow.tiles.search.escherize_settings import Count, Seed
+from orbiflow.tiles.search.search_method import Goal, SearchMethod
 from orbiflow.tiles.tilings import IsohedralClass
 
 if TYPE_CHECKING:
@@ -24,8 +24,7 @@ FAST = {"placements": 80, "held": 20, "starts": 8, "share": 0.15, "finalists": 2
 BEST = {"placements": 1500, "held": 300, "starts": 128, "share": 1.0, "finalists": 12, "rounds": 40}
 
 
-@dataclass(frozen=True)
-class LikenessSearch(SearchMethod):
+class LikenessSearch(Settings, SearchMethod):
     """The search for likeness; the defaults are effort "normal" without the levels below.
 
     - `placements`: ways to lay the outline along the template's edges that are tried, a class.
@@ -51,26 +50,16 @@ class LikenessSearch(SearchMethod):
         "best": {**BEST, "below": 2},
     }
 
-    placements: int = 300
-    held: int = 80
-    starts: int = 32
-    share: float = 0.3
-    finalists: int = 5
-    rounds: int = 20
-    below: int = 0
-    multiples: tuple[int, ...] = (4, 6)
-    min_neck: float = 0.01
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for name in ("placements", "held", "starts", "finalists", "rounds"):
-            as_whole(getattr(self, name), name, 1)
-        as_number(self.share, "share", None, 1, above=0)
-        as_whole(self.below, "below", 0, 2)
-        if not self.multiples or min(self.multiples) < 1:
-            raise OrbiflowError(f"multiples must be at least 1, got {self.multiples}")
-        as_number(self.min_neck, "min_neck", 0, 0.2)
-        as_whole(self.seed, "seed", 0, 2**32 - 1)
+    placements: Count = 300
+    held: Count = 80
+    starts: Count = 32
+    share: Annotated[float, Range(above=0, most=1)] = 0.3
+    finalists: Count = 5
+    rounds: Count = 20
+    below: Annotated[int, Range(0, 2)] = 0
+    multiples: tuple[Count, ...] = (4, 6)
+    min_neck: Annotated[float, Range(0, 0.2)] = 0.01
+    seed: Seed = 0
 
     def fit(
         self,
@@ -78,8 +67,8 @@ class LikenessSearch(SearchMethod):
         kind: IsohedralClass,
         *,
         per_class: int = 1,
-        progress: Progress | None = None,
-        cancel: Cancel | None = None,
+        progress: OnProgress = silent,
+        cancel: Cancel = NEVER,
     ) -> Fit:
         """Let the silhouette bend into tiles of the class."""
         from orbiflow.tiles.search.bending import fit_bending
@@ -87,7 +76,7 @@ class LikenessSearch(SearchMethod):
         told: dict[str, Any] = {"per_class": per_class, "progress": progress, "cancel": cancel}
         return fit_bending(goal.target, kind, self, self.hands(goal), **told)
 
-    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel | None = None) -> Fit:
+    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:
         """Let the silhouette bend in haste."""
         from orbiflow.tiles.search.bending import fit_bending
 

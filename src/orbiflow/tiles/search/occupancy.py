@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -15,12 +14,12 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from orbiflow.arguments import as_instance, as_whole
-from orbiflow.runtime import Cancel
-from orbiflow.tiles.search.candidates import Progress, silent
+from orbiflow.runtime import NEVER, Cancel
+from orbiflow.tiles.search.candidates import OnProgress, silent
 from orbiflow.tiles.search.descent import between
-from orbiflow.tiles.search.model import TileModel
 from orbiflow.tiles.search.overlap_search import OccupancySearch
 from orbiflow.tiles.search.starts import initial_poses, template_symmetries
+from orbiflow.tiles.search.tile_model import TileModel
 from orbiflow.tiles.silhouette import Target, signed_distance
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 from orbiflow.typed_torch import adam, linalg, listed
@@ -80,9 +79,9 @@ def fit_occupancy(
     target: Target,
     kind: IsohedralClass | str,
     settings: OccupancySearch | None = None,
-    progress: Progress | None = None,
+    progress: OnProgress = silent,
     *,
-    cancel: Cancel | None = None,
+    cancel: Cancel = NEVER,
 ) -> TileModel:
     """Fit tiles of one class to a target by the paper's method, all starts side by side.
 
@@ -93,7 +92,6 @@ def fit_occupancy(
     settings = as_instance(settings or OccupancySearch(), OccupancySearch, "settings")
     # the mean over the candidates is all that couples them: separate fits, one tensor
     samples = OccupancySamples(target, 16384, seed=settings.seed)
-    cancel = cancel or Cancel()
     angles, mirrored = initial_poses(kind, settings.turns)
     model = TileModel(
         kind,
@@ -107,17 +105,16 @@ def fit_occupancy(
         dtype=torch.float32,
     )
     model = _affine_phase(model, samples, settings, cancel)
-    first = replace(settings, iterations=max(1, settings.iterations // 3))
-    told = progress or silent
+    third = max(1, settings.iterations // 3)
 
     def report(share: float, loss: float) -> None:
-        told(share, loss)
+        progress(share, loss)
         cancel.check()
 
-    model = _flow_phase(model, samples, settings, 0, first.iterations, report)
+    model = _flow_phase(model, samples, settings, 0, third, report)
     if model.size > 1:
         model = _ranked(model, samples, settings.hardness[1], keep=(model.size + 1) // 2)
-    model = _flow_phase(model, samples, settings, first.iterations, settings.iterations, report)
+    model = _flow_phase(model, samples, settings, third, settings.iterations, report)
     return _ranked(model, samples, settings.hardness[1], keep=model.size)
 
 
@@ -166,7 +163,7 @@ def _flow_phase(
     settings: OccupancySearch,
     begin: int,
     end: int,
-    report: Progress,
+    report: OnProgress,
 ) -> TileModel:
     rate = settings.learning_rate
     optimizer = adam(

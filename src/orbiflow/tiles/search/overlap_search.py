@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from dataclasses import replace
+from typing import Annotated, Any, ClassVar, Literal
 
-from orbiflow.arguments import as_array, as_instance, as_number, as_whole
-from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.runtime import Cancel, one_thread
-from orbiflow.tiles.search.candidates import Fit, Progress
-from orbiflow.tiles.search.method import MAX_FREQUENCY, MAX_SEGMENTS, Goal, SearchMethod
+from orbiflow.arguments import refusal
+from orbiflow.errors import CertificationError
+from orbiflow.runtime import NEVER, Cancel, one_thread
+from orbiflow.settings import Range, Settings
+from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
+from orbiflow.tiles.search.escherize_settings import Count, Seed
+from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS, Goal, SearchMethod
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass
+
+NotNegative = Annotated[float, Range(0)]
+Positive = Annotated[float, Range(above=0)]
 
 POINTS = 60  # points of the outline that the preview looks at
 # Length of an outline, in square roots of its area, up to which the settings are as they are
 PLAIN = 8.0
-
-
 RAGGED = 3.5  # power of the length beyond, by which the number of starts grows
 MOST_TIMES = 6.0  # what a ragged outline may multiply the starts by
 
@@ -49,8 +52,7 @@ EFFORTS: Mapping[str, Mapping[str, Any]] = {
 """What each level changes."""
 
 
-@dataclass(frozen=True)
-class OverlapSearch(SearchMethod):
+class OverlapSearch(Settings, SearchMethod):
     """The search for overlap, by descent; the defaults are effort "normal".
 
     - `max_frequency`: Omega; 0 moves pose and lattice alone, and IH1 to IH3 along their glides.
@@ -77,55 +79,34 @@ class OverlapSearch(SearchMethod):
     modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.descent",)
     efforts: ClassVar[Mapping[str, Mapping[str, Any]]] = EFFORTS
 
-    max_frequency: int = 10
-    starts: str = "outline"
-    candidates: int = 48
-    resolutions: tuple[int, ...] = (40, 60, 80)
-    projected: int = 1000
-    measured: int = 200
-    turns: int = 12
-    stretch: float = 0.25
-    stages: tuple[tuple[int, int], ...] = ((20, 12), (30, 4), (25, 2))
-    boundary: int = 240
-    smoothness: tuple[float, float] = (2.0, 1.25)
-    momentum: float = 0.8
-    reach: tuple[float, float] = (0.02, 0.0005)
-    blur: tuple[float, float] = (0.05, 0.006)
+    max_frequency: Annotated[int, Range(0, MAX_FREQUENCY)] = 10
+    starts: Literal["outline", "template"] = "outline"
+    candidates: Count = 48
+    resolutions: tuple[Annotated[int, Range(24)], ...] = (40, 60, 80)
+    projected: Count = 1000
+    measured: Count = 200
+    turns: Count = 12
+    stretch: NotNegative = 0.25
+    stages: tuple[tuple[Count, Count], ...] = ((20, 12), (30, 4), (25, 2))
+    boundary: Annotated[int, Range(60)] = 240
+    smoothness: tuple[NotNegative, NotNegative] = (2.0, 1.25)
+    momentum: Annotated[float, Range(0, 1)] = 0.8
+    reach: tuple[Positive, Positive] = (0.02, 0.0005)
+    blur: tuple[Positive, Positive] = (0.05, 0.006)
     lattice: bool = True
-    polish: int = 20
-    finalists: int = 1
+    polish: Annotated[int, Range(0, 1000)] = 20
+    finalists: Count = 1
     min_neck: float = 0.0
-    seed: int = 0
+    seed: Seed = 0
 
-    def __post_init__(self) -> None:
-        for name in ("candidates", "projected", "measured", "turns", "finalists"):
-            as_whole(getattr(self, name), name, 1)
-        as_whole(self.max_frequency, "max_frequency", 0, MAX_FREQUENCY)
-        if self.starts not in ("outline", "template"):
-            raise OrbiflowError(f'starts must be "outline" or "template", got {self.starts!r}')
-        if as_whole(self.boundary, "boundary", 0) < 60 or self.boundary % 30:
-            raise OrbiflowError(f"boundary must be a multiple of 30 from 60, got {self.boundary}")
-        for points in as_array(self.resolutions, "resolutions", ("n",)):
-            if points < 24 or self.boundary % points:
-                raise OrbiflowError(
-                    f"resolutions must be at least 24 and divide boundary = {self.boundary}, "
-                    f"got {points:g}"
-                )
-        stages = as_array(self.stages, "stages", (...,))
-        pairs = stages.ndim == 2 and stages.shape[1] == 2
-        if not pairs or (stages < 1).any() or (stages % 1).any():
-            raise OrbiflowError(f"stages need steps and survivors of at least 1: {self.stages}")
-        if self.iterations >= MAX_SEGMENTS:
-            raise OrbiflowError(f"stages must have less than {MAX_SEGMENTS} steps in all")
-        for value in as_array(self.smoothness, "smoothness", (2,)):
-            as_number(value, "smoothness, first and last,", 0)
-        for name in ("reach", "blur"):
-            for value in as_array(getattr(self, name), name, (2,)):
-                as_number(value, f"{name}, first and last,", above=0)
-        as_number(self.momentum, "momentum", 0, 1)
-        as_number(self.stretch, "stretch", 0)
-        as_whole(self.polish, "polish", 0, 1000)
-        as_whole(self.seed, "seed", 0, 2**32 - 1)
+    def check(self) -> None:
+        if self.boundary % 30:
+            raise refusal("boundary", "a multiple of 30", self.boundary)
+        if any(self.boundary % points for points in self.resolutions):
+            divisors = f"numbers that divide boundary = {self.boundary}"
+            raise refusal("resolutions", divisors, self.resolutions)
+        if not 1 <= self.iterations < MAX_SEGMENTS:
+            raise refusal("stages", f"from 1 to {MAX_SEGMENTS - 1} steps in all", self.stages)
 
     @property
     def iterations(self) -> int:
@@ -138,11 +119,11 @@ class OverlapSearch(SearchMethod):
         kind: IsohedralClass,
         *,
         per_class: int = 1,
-        progress: Progress | None = None,
-        cancel: Cancel | None = None,
+        progress: OnProgress = silent,
+        cancel: Cancel = NEVER,
     ) -> Fit:
         """Let flows carry near tiles closer to the silhouette."""
-        from orbiflow.tiles.search.descent import fit_descent, shared_soft_target
+        from orbiflow.tiles.search.descent import fit_descent
 
         stages = tuple((steps, max(kept, 2 * per_class)) for steps, kept in self.stages)
         with one_thread():
@@ -150,16 +131,16 @@ class OverlapSearch(SearchMethod):
                 goal.target,
                 kind,
                 replace(self, stages=stages),
-                soft=shared_soft_target(goal.target, goal.emphasis),
+                emphasis=goal.emphasis,
                 progress=progress,
                 cancel=cancel,
             )
         return found._replace(enough=1 if per_class == 1 else 2 * per_class)
 
-    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel | None = None) -> Fit:
+    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:
         """Return the tiles nearest to the outline."""
-        from orbiflow.tiles.search.model import TileModel
         from orbiflow.tiles.search.starts import outline_starts
+        from orbiflow.tiles.search.tile_model import TileModel
 
         if self.starts != "outline":
             return super().sketch(goal, kind, cancel)
@@ -197,8 +178,7 @@ class OverlapSearch(SearchMethod):
         )
 
 
-@dataclass(frozen=True)
-class OccupancySearch(SearchMethod):
+class OccupancySearch(Settings, SearchMethod):
     """The paper's method, by occupancy; the defaults were measured on the paper's goals.
 
     - `max_frequency`: Omega; 0 leaves the flow the translations that commute with the group.
@@ -221,35 +201,25 @@ class OccupancySearch(SearchMethod):
     method_name: ClassVar[str] = "occupancy"
     modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.occupancy",)
 
-    max_frequency: int = 10
-    turns: int = 12
-    finalists: int = 4
-    affine_iterations: int = 80
-    iterations: int = 200
-    points: int = 800
-    hardness: tuple[float, float] = (8.0, 70.0)
-    penalty: tuple[float, float] = (1e-2, 1e-3)
-    smoothness: float = 2.0
-    segments: int = 1
-    steps: int = 4
+    max_frequency: Annotated[int, Range(0, MAX_FREQUENCY)] = 10
+    turns: Count = 12
+    finalists: Count = 4
+    affine_iterations: Annotated[int, Range(0)] = 80
+    iterations: Count = 200
+    points: Count = 800
+    hardness: tuple[Positive, Positive] = (8.0, 70.0)
+    penalty: tuple[Positive, Positive] = (1e-2, 1e-3)
+    smoothness: NotNegative = 2.0
+    segments: Count = 1
+    steps: Count = 4
     method: str = "midpoint"
-    learning_rate: float = 0.04
-    seed: int = 0
+    learning_rate: Positive = 0.04
+    seed: Seed = 0
 
-    def __post_init__(self) -> None:
-        from orbiflow.flows import method as integrator
+    def check(self) -> None:
+        from orbiflow.flows import method
 
-        for name in ("turns", "finalists", "iterations", "points", "segments", "steps"):
-            as_whole(getattr(self, name), name, 1)
-        as_whole(self.max_frequency, "max_frequency", 0, MAX_FREQUENCY)
-        integrator(as_instance(self.method, str, "method"))
-        as_whole(self.affine_iterations, "affine_iterations", 0)
-        as_number(self.smoothness, "smoothness", 0)
-        as_number(self.learning_rate, "learning_rate", above=0)
-        for name in ("hardness", "penalty"):
-            for value in as_array(getattr(self, name), name, (2,)):
-                as_number(value, f"{name}, first and last,", above=0)
-        as_whole(self.seed, "seed", 0, 2**32 - 1)
+        method(self.method)
 
     def fit(
         self,
@@ -257,8 +227,8 @@ class OccupancySearch(SearchMethod):
         kind: IsohedralClass,
         *,
         per_class: int = 1,  # noqa: ARG002 - all survivors are given
-        progress: Progress | None = None,
-        cancel: Cancel | None = None,
+        progress: OnProgress = silent,
+        cancel: Cancel = NEVER,
     ) -> Fit:
         """Let flows carry templates onto the silhouette; each class has a seed of its own."""
         from orbiflow.tiles.search.occupancy import fit_occupancy

@@ -16,7 +16,7 @@ from scipy.ndimage import gaussian_filter1d
 from orbiflow.arguments import as_instance, as_whole
 from orbiflow.arrays import Array, Complex
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Cancel
+from orbiflow.runtime import NEVER, Cancel
 from orbiflow.symmetry import (
     CrystallographicGroup,
     Isometry,
@@ -100,7 +100,7 @@ def outline_starts(
     measured: int = 200,
     vertices: int = 240,
     phase: float = 0.0,
-    cancel: Cancel | None = None,
+    cancel: Cancel = NEVER,
 ) -> Starts:
     """Return the best start tiles of one class for a target, no two of them twins.
 
@@ -113,7 +113,6 @@ def outline_starts(
     for points in resolutions:
         if vertices % as_whole(points, "a resolution", 24):
             raise OrbiflowError(f"resolutions must divide vertices = {vertices}, got {points}")
-    cancel = cancel or Cancel()
     parts: list[Prototiles] = []
     scores: list[Array] = []
     places: list[Array] = []

@@ -3,6 +3,7 @@ from .bending import unfolded as unfolded
 from .emphasis import Emphasis as Emphasis
 from .mesh import Locator as Locator
 from .mesh import Mesh as Mesh
+from .mesh import harmonic as harmonic
 from .mesh import local_thickness as local_thickness
 from .mesh import triangulate as triangulate
 from .outlines import Samples as Samples

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,10 +13,10 @@ from orbiflow.arguments import as_array, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import best_similarity, complex_points
-from orbiflow.tiles.silhouette.mesh import Locator, Mesh, doubled_areas
+from orbiflow.tiles.silhouette.mesh import Locator, Mesh, doubled_areas, harmonic
 
 if TYPE_CHECKING:
-    import torch
+    pass
 
 MAX_POINTS, MAX_TRIANGLES = 100_000, 200_000
 """Beyond these a mesh is refused: real ones have some thousands."""
@@ -70,11 +70,7 @@ class Bending:
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
-    @overload
-    def forward(self, points: torch.Tensor) -> torch.Tensor: ...
-    @overload
-    def forward(self, points: ArrayLike) -> Array: ...
-    def forward(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
+    def forward(self, points: Any) -> Any:
         """Return where points (..., 2) of the silhouette go, in the target's normal form.
 
         Arrays and lists give an array, tensors a tensor of their dtype and device, without a gradient;
@@ -82,11 +78,7 @@ class Bending:
         """
         return _mapped(points, self._forward)
 
-    @overload
-    def inverse(self, points: torch.Tensor) -> torch.Tensor: ...
-    @overload
-    def inverse(self, points: ArrayLike) -> Array: ...
-    def inverse(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
+    def inverse(self, points: Any) -> Any:
         """Return where points (..., 2) of the tile come from; as `forward`."""
         return _mapped(points, self._backward)
 
@@ -173,7 +165,8 @@ def unfolded(mesh: Mesh, points: Array) -> Array:
     """
     if not folded(mesh, points).any():
         return points
-    for start in (points, _spread(mesh, points)):  # the second is a start for tangled points
+    outline = points[: mesh.size + len(mesh.sides)]
+    for start in (points, harmonic(mesh, outline)):  # the second is a start for tangled points
         found = _untangled(_Distortion(mesh, start))
         if found is not None:
             return found
@@ -196,25 +189,6 @@ def _untangled(work: _Distortion) -> Array | None:
             return work.points(x)
         work.sharpen(smallest)
     return None
-
-
-def _spread(mesh: Mesh, points: Array) -> Array:
-    """Return inner points in the middle of their neighbours (Tutte, 1963)."""
-    import scipy.sparse
-    import scipy.sparse.linalg
-
-    fixed, count = mesh.size + len(mesh.sides), len(points)
-    i, j = (np.concatenate([mesh.triangles[:, k] for k in turn]) for turn in ((0, 1, 2), (1, 2, 0)))
-    ones = np.ones(2 * len(i))
-    pairs = (np.concatenate([i, j]), np.concatenate([j, i]))
-    touching: Any = scipy.sparse.csr_matrix((ones, pairs), shape=(count, count))
-    degree: Any = scipy.sparse.diags(np.asarray(touching.sum(axis=1)).ravel())
-    laplacian: Any = (degree - touching).tocsc()[fixed:]
-    spread = points.copy()
-    right = -(laplacian[:, :fixed] @ points[:fixed])
-    inner: Any = scipy.sparse.linalg.spsolve(laplacian[:, fixed:].tocsc(), right)
-    spread[fixed:] = inner
-    return spread
 
 
 class _Distortion:

@@ -109,17 +109,6 @@ class Emphasis:
         """
         return 1 + (self.strength - 1) * self.level(points)
 
-    def image(self, center: ArrayLike, reach: float, resolution: int) -> Array:
-        """Return weights at the pixel centres of a square, (resolution, resolution), row 0 at least y.
-
-        The grid of `SoftTarget`, and of `torch.nn.functional.grid_sample` without aligned corners:
-        pixel (i, j) lies at `center` + `reach` * ((2 j + 1) / resolution - 1,
-        (2 i + 1) / resolution - 1).
-        """
-        axis = reach * ((np.arange(resolution) + 0.5) / resolution * 2 - 1)
-        x0, y0 = (float(c) for c in np.asarray(center, dtype=np.float64))
-        return self.weight(np.stack(np.meshgrid(x0 + axis, y0 + axis), axis=-1))
-
     def report(self) -> dict[str, Any]:
         """Return what was read and decided, ready for JSON."""
         return {

@@ -3,7 +3,7 @@
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import shapely
@@ -184,15 +184,19 @@ def _pieces(corners: tuple[int, int, int], middles: list[int | None]) -> list[tu
     return [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
 
 
-class Located(NamedTuple):
-    """The location of P points in a mesh.
+def harmonic(mesh: Mesh, outline: Array) -> Array:
+    """Return values (N, 2) at all points, from those on the outline: inside the mean of neighbours."""
+    import scipy.sparse as sparse
+    import scipy.sparse.linalg as solvers
 
-    - `triangle`: A triangle (P,) that contains the point, or the nearest one.
-    - `nearest`: The triangle's nearest point (P, 2), which inside the mesh is the point itself.
-    """
-
-    triangle: Integers
-    nearest: Array
+    fixed, count = len(outline), len(mesh.points)
+    ends = np.concatenate([mesh.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
+    links: Any = sparse.csr_matrix((np.ones(len(ends)), ends.T), shape=(count, count))
+    links = links + links.T
+    degrees: Any = sparse.diags(np.asarray(links.sum(axis=1)).ravel())
+    laplacian: Any = (degrees - links).tocsc()[fixed:]
+    inner: Any = solvers.spsolve(laplacian[:, fixed:], -(laplacian[:, :fixed] @ outline))
+    return np.concatenate([outline, np.reshape(inner, (-1, 2))])
 
 
 class Locator:
@@ -201,8 +205,11 @@ class Locator:
     def __init__(self, points: Array, triangles: Integers) -> None:
         self._tree = shapely.STRtree(np.asarray(shapely.polygons(points[triangles])))
 
-    def locate(self, points: Array) -> Located:
-        """Return the triangle of each of the finite points (P, 2)."""
+    def locate(self, points: Array) -> tuple[Integers, Array]:
+        """Return the triangle (P,) that contains each finite point (P, 2), and its nearest point.
+
+        Outside the mesh the triangle is the nearest one; inside, the nearest point (P, 2) is the point.
+        """
         found = np.full(len(points), -1)
         where = np.asarray(shapely.points(points))
         index, triangle = self._tree.query(where, predicate="intersects")
@@ -213,7 +220,7 @@ class Locator:
             found[outside] = self._tree.nearest(where[outside])
             lines = shapely.shortest_line(self._tree.geometries[found[outside]], where[outside])
             nearest[outside] = shapely.get_coordinates(lines)[::2]
-        return Located(found, nearest)
+        return found, nearest
 
 
 PIECES_PER_SIDE = 3  # number of parts of each side of the outline: more make the medial axis finer

@@ -14,6 +14,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import (
     arc_lengths,
+    kept_vertices,
     points_along,
     polygons_in,
     resampled,
@@ -259,12 +260,7 @@ def important_vertices(ring: Array, tolerance: float) -> list[int]:
     half = int(np.argmax(np.linalg.norm(turned - turned[0], axis=1)))
     kept: list[int] = []
     for start, part in ((0, turned[: half + 1]), (half, np.vstack([turned[half:], turned[:1]]))):
-        line = shapely.LineString(part)
-        points = shapely.get_coordinates(line.simplify(tolerance, preserve_topology=False))
-        at = 0
-        for point in points[:-1]:  # kept vertices are bit-identical and in order
-            at += int(np.flatnonzero((part[at:] == point).all(axis=1))[0])
-            kept.append((start + at + first) % len(ring))
+        kept += [(start + at + first) % len(ring) for at in kept_vertices(part, tolerance)[:-1]]
     return sorted(kept)
 
 

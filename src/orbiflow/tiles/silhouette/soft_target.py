@@ -12,6 +12,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.silhouette.emphasis import Emphasis
 from orbiflow.tiles.silhouette.target import Target
 
+MARGIN = 0.5  # around the target's bounding box, in square roots of its area
 PIECES_PER_SIDE = 8  # the number of pieces of each side of a ring in integrals along it
 
 
@@ -21,24 +22,15 @@ class SoftTarget:
     Args:
         target: The silhouette.
         resolution: The number of pixels along a side.
-        margin: The margin around the target's bounding box, in square roots of its area.
         emphasis: The weights of the plane's points, if some matter more than others.
-        dtype: The dtype of the samples.
     """
 
     def __init__(
-        self,
-        target: Target,
-        *,
-        resolution: int = 512,
-        margin: float = 0.5,
-        emphasis: Emphasis | None = None,
-        dtype: torch.dtype = torch.float32,
+        self, target: Target, *, resolution: int = 512, emphasis: Emphasis | None = None
     ) -> None:
         as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
         resolution = as_whole(resolution, "resolution", 2)
-        margin = as_number(margin, "margin", 0)
-        low, high = target.normal.min(axis=0) - margin, target.normal.max(axis=0) + margin
+        low, high = target.normal.min(axis=0) - MARGIN, target.normal.max(axis=0) + MARGIN
         center, self.reach = (low + high) / 2, float((high - low).max() / 2)
         axis = self.reach * ((np.arange(resolution) + 0.5) / resolution * 2 - 1)
         x, y = np.meshgrid(float(center[0]) + axis, float(center[1]) + axis)
@@ -52,12 +44,12 @@ class SoftTarget:
             0.5 - np.asarray(distance_transform_edt(~inside)),
         )
         pixel = 2 * self.reach / resolution
-        self.center = torch.tensor(center, dtype=dtype)
-        self.image = torch.tensor(steps * pixel, dtype=dtype)[None, None]
+        self.center = torch.tensor(center, dtype=torch.float32)
+        self.image = torch.tensor(steps * pixel, dtype=torch.float32)[None, None]
         self.weights: Tensor | None = None
         if emphasis is not None:
-            image = emphasis.image(center, self.reach, resolution)
-            self.weights = torch.tensor(image, dtype=dtype)[None, None]
+            weights = emphasis.weight(np.stack([x, y], axis=-1))
+            self.weights = torch.tensor(weights, dtype=torch.float32)[None, None]
         self._integrals: tuple[Tensor, Tensor, float] | None = None
 
     def occupancy(self, points: Tensor, blur: float) -> Tensor:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Self, overload
+from typing import IO, TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -80,22 +80,14 @@ class Frame:
         """Whether the input's y axis points down: the frame turns the plane over."""
         return bool(np.linalg.det(self.linear) < 0)
 
-    @overload
-    def to_input(self, points: torch.Tensor) -> torch.Tensor: ...
-    @overload
-    def to_input(self, points: ArrayLike) -> Array: ...
-    def to_input(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
+    def to_input(self, points: Any) -> Any:
         """Return points (..., 2) of the normal form in the input's units; arrays, lists or tensors."""
         if is_tensor(points):
             points = _tensor(points)
             return points @ points.new_tensor(self.linear).T + points.new_tensor(self.offset)
         return as_array(points, "points", (..., 2), finite=False) @ self.linear.T + self.offset
 
-    @overload
-    def to_normal(self, points: torch.Tensor) -> torch.Tensor: ...
-    @overload
-    def to_normal(self, points: ArrayLike) -> Array: ...
-    def to_normal(self, points: torch.Tensor | ArrayLike) -> torch.Tensor | Array:
+    def to_normal(self, points: Any) -> Any:
         """Return points (..., 2) in the input's units, in the normal form; arrays, lists or tensors."""
         if is_tensor(points):
             points = _tensor(points)

@@ -236,10 +236,6 @@ def _geojson_ring(path: Source, content: dict[str, Any]) -> tuple[list[Any], lis
 
 
 def _check_pairs(path: Source, points: list[Any]) -> None:
-    if len(points) > MAX_VERTICES:
-        raise InputFileError(
-            f"{path}: {len(points)} vertices, at most {MAX_VERTICES} are read; simplify the outline"
-        )
     for i, pair in enumerate(points):
         if not is_list(pair) or len(pair) != 2 or not all(type(n) in (int, float) for n in pair):
             raise InputFileError(

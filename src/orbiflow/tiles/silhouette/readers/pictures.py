@@ -165,25 +165,29 @@ def _decode(path: Source, image: Image.Image) -> Picture:
     return Picture(channel, name, turned.size, reduced, (*notes, *averaging, *band_notes))
 
 
-def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, str, list[str]]:
-    """Return the channel that shows the shape: mode "L" (0 to 255) or "F" (0 to 1)."""
+def _bands(path: Source, image: Image.Image) -> tuple[Image.Image, Image.Image | None]:
+    """Return the luminance, mode "L" (0 to 255) or "F" (0 to 1), and the opacity, if there is one."""
     if image.mode.startswith(("I", "F")):
-        return deep_channel(path, image), "luminance", []
+        return deep_channel(path, image), None
     if not image.has_transparency_data:
-        return image.convert("L"), "luminance", []
+        return image.convert("L"), None
     rgba = image.convert("RGBA")
-    alpha = rgba.getchannel("A")
-    values = np.asarray(alpha)
-    low, high = int(values.min()), int(values.max())
+    return rgba.convert("RGB").convert("L"), rgba.getchannel("A")
+
+
+def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, str, list[str]]:
+    """Return the channel that shows the shape."""
+    luminance, alpha = _bands(path, image)
+    low, high = (255, 255) if alpha is None else np.asarray(alpha.getextrema()).tolist()
     if high == 0:
         raise InputFileError(f"{path}: the image is wholly transparent; there is no shape in it")
+    if alpha is None or low == 255:
+        return luminance, "luminance", []
     if low < 128 <= high:
         return alpha, "alpha", []
-    if low == 255:
-        return rgba.convert("L"), "luminance", []
-    white = Image.new("RGBA", rgba.size, "white")
+    white = Image.new("RGBA", image.size, "white")
     note = "laid the half-transparent image on white"
-    return Image.alpha_composite(white, rgba).convert("L"), "luminance", [note]
+    return Image.alpha_composite(white, image.convert("RGBA")).convert("L"), "luminance", [note]
 
 
 def deep_channel(path: Source, image: Image.Image) -> Image.Image:
@@ -344,7 +348,17 @@ def read_mask(path: Source) -> Picture:
 
 def _decode_mask(path: Source, image: Image.Image) -> Picture:
     turned, notes = upright(image)
-    band, band_notes = _emphasised_channel(path, turned)
+    band, alpha = _bands(path, turned)
+    if alpha is not None:
+        least, most = np.asarray(alpha.getextrema()).tolist()
+        if most < MIN_CONTRAST * 255:
+            raise InputFileError(
+                f"{path}: the mask is wholly transparent and emphasises nothing; paint what must "
+                "survive opaque"
+            )
+        if most - least >= MIN_CONTRAST * 255:
+            band = alpha
+            notes.append("took the mask's alpha channel: opaque is emphasised, whatever its colour")
     levels, reduced, _ = _reduced(band)
     low, high = float(levels.min()), float(levels.max())
     if high < MIN_CONTRAST:
@@ -354,24 +368,4 @@ def _decode_mask(path: Source, image: Image.Image) -> Picture:
             f"{path}: the mask is uniform, its levels are {low:.2f} to {high:.2f} of white, and "
             f"emphasises nothing above the rest; {_PAINT}"
         )
-    return Picture(levels, "mask", turned.size, reduced, (*notes, *band_notes))
-
-
-def _emphasised_channel(path: Source, image: Image.Image) -> tuple[Image.Image, list[str]]:
-    """Return the channel that emphasises: mode "L" (0 to 255) or "F" (0 to 1)."""
-    if image.mode.startswith(("I", "F")):
-        return deep_channel(path, image), []
-    if not image.has_transparency_data:
-        return image.convert("L"), []
-    rgba = image.convert("RGBA")
-    alpha = rgba.getchannel("A")
-    values = np.asarray(alpha)
-    low, high = int(values.min()), int(values.max())
-    if high - low >= MIN_CONTRAST * 255:
-        return alpha, ["took the mask's alpha channel: opaque is emphasised, whatever its colour"]
-    if high < MIN_CONTRAST * 255:
-        raise InputFileError(
-            f"{path}: the mask is wholly transparent and emphasises nothing; paint what must "
-            "survive opaque"
-        )
-    return rgba.convert("RGB").convert("L"), []
+    return Picture(levels, "mask", turned.size, reduced, tuple(notes))

@@ -23,7 +23,7 @@ from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles.geometry import subdivided
 from orbiflow.tiles.search.candidates import CORNERS, VERTICES, Prototiles, simplest_tile
-from orbiflow.tiles.search.method import MAX_FREQUENCY, MAX_SEGMENTS
+from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS
 from orbiflow.tiles.silhouette import Bending, Frame
 from orbiflow.tiles.tile import TileMap, naming_file
 from orbiflow.tiles.tilings import IsohedralClass, Tile
@@ -40,7 +40,7 @@ class TileModel(nn.Module):
 
     Certificates outlive a change of precision: `.float()`, `.half()`, `.to(...)` round the parameters,
     which only makes another tile, but `vertices`, whose identified edges must correspond, stay float64,
-    and the group's pose and the polygon (`extract_tile`) are computed in float64.
+    and the polygon with its group (`extract_tile`) is computed in float64.
 
     Points are (S, N, 2) throughout; arrays and lists are taken as tensors of the model's dtype.
 
@@ -143,16 +143,11 @@ class TileModel(nn.Module):
 
     def linear(self) -> Tensor:
         """The linear part of A o L, (S, 2, 2)."""
-        return self._linear(self.angle.dtype)
-
-    def _linear(self, dtype: torch.dtype) -> Tensor:
-        angle, log_scale, stretch = (
-            p.to(dtype) for p in (self.angle, self.log_scale, self.stretch)
-        )
-        c, s = angle.cos(), angle.sin()
-        sign = torch.where(self.mirror, -1.0, 1.0).to(dtype)
+        c, s = self.angle.cos(), self.angle.sin()
+        sign = torch.where(self.mirror, -1.0, 1.0).to(c)
         turn = torch.stack([torch.stack([c, -s * sign], -1), torch.stack([s, c * sign], -1)], -2)
-        return log_scale.exp()[:, None, None] * turn @ self.isohedral_class.stretch(stretch)
+        scale = self.log_scale.exp()[:, None, None]
+        return scale * turn @ self.isohedral_class.stretch(self.stretch)
 
     def place(self, points: Tensor) -> Tensor:
         """A o L at points (S, N, 2) of the group's frame."""
@@ -269,13 +264,6 @@ class TileModel(nn.Module):
         """Check that the model holds one candidate."""
         if self.size != 1:
             raise OrbiflowError(f"take one candidate first: this model holds {self.size}")
-
-    def placed_group(self) -> CrystallographicGroup:
-        """The group of a single candidate's tile, in the target's normal form."""
-        self.require_single()
-        linear: Array = self._linear(torch.float64).detach().cpu().numpy()[0]
-        offset: Array = self.offset.detach().double().cpu().numpy()[0]
-        return self.group.conjugate(linear, np.asarray(offset))
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Self:
         # what .float(), .half() and .to(...) go through: the start follows them to a device alone
@@ -406,7 +394,7 @@ def as_model(stored: TileMap) -> TileModel:
     with torch.no_grad():
         for name, parameter in model.named_parameters():
             shape = tuple(parameter.shape[1:])
-            parameter.copy_(torch.tensor(_checked(arrays.get(name), name, shape))[None])
+            parameter.copy_(torch.tensor(_checked(arrays, name, shape))[None])
     if VERTICES in arrays or CORNERS in arrays:
         vertices, corners = _prototile(arrays, len(model.template()[0]))
         model.vertices, model.corners = torch.tensor(vertices)[None], torch.tensor(corners)[None]
@@ -424,25 +412,14 @@ def load_model(path: str | Path) -> TileModel:
         return as_model(stored)
 
 
-def _checked(stored: Array | None, name: str, shape: tuple[int, ...]) -> Array:
-    if stored is None or stored.shape != shape:
-        found = "nothing" if stored is None else f"shape {stored.shape}"
-        raise OrbiflowError(f"the model's {name} should have shape {shape}, found {found}")
-    if not np.isfinite(stored).all():
-        raise OrbiflowError(f"the model's {name} has NaN or infinite entries")
-    return stored
+def _checked(arrays: dict[str, Array], name: str, shape: tuple[int | str, ...]) -> Array:
+    return as_array(arrays.get(name, "nothing"), f"the model's {name}", shape)
 
 
 def _prototile(arrays: dict[str, Array], count: int) -> tuple[Array, Array]:
-    vertices = np.asarray(arrays.get(VERTICES, np.zeros((0, 2))), dtype=np.float64)
+    vertices = _checked(arrays, VERTICES, ("N", 2))
     corners = np.asarray(arrays.get(CORNERS, np.zeros(0)))
-    if vertices.ndim != 2 or vertices.shape[1] != 2 or not count <= len(vertices) <= MAX_SIDES:
-        raise OrbiflowError(
-            f"the model's {VERTICES} should have shape (N, 2) with N from {count} to "
-            f"{MAX_SIDES}, found {vertices.shape}"
-        )
-    if not np.isfinite(vertices).all():
-        raise OrbiflowError(f"the model's {VERTICES} has NaN or infinite entries")
+    as_whole(len(vertices), f"the number of rows of the model's {VERTICES}", count, MAX_SIDES)
     if (
         corners.shape != (count,)
         or corners.dtype.kind != "i"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import shapely
 
@@ -15,9 +16,12 @@ from orbiflow.runtime import one_thread
 from orbiflow.tiles.likeness import Pinned, Recogniser, compare, iou, least_neck, narrowest_neck
 from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
-from orbiflow.tiles.search.candidates import Candidates, Fit
+from orbiflow.tiles.search.candidates import Fit, StillTiles
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile
+
+if TYPE_CHECKING:
+    from orbiflow.tiles.search.tile_model import TileModel
 
 # How a target is made, for messages
 HOW = "Target.read, Target.from_mask and Target.from_polygon make one"
@@ -104,7 +108,11 @@ def recogniser(target: Target) -> Recogniser:
 
 
 def certified_tiles(
-    target: Target, found: Fit | Candidates, *, force: bool = False, min_neck: float = 0.0
+    target: Target,
+    found: Fit | StillTiles | TileModel,
+    *,
+    force: bool = False,
+    min_neck: float = 0.0,
 ) -> list[EscherTile]:
     """Return polygons of what was fitted to a target, each proved to tile the plane, best first.
 

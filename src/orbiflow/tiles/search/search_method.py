@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, ClassVar, Self
 
-from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.runtime import Cancel
-from orbiflow.tiles.search.candidates import Fit, Progress
+from orbiflow.arguments import as_choice
+from orbiflow.errors import CertificationError
+from orbiflow.runtime import NEVER, Cancel
+from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 
 # The classes by how often they come near a silhouette at once, for the time that they take
 PREFERRED = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")
+
+MAX_FREQUENCY = 60  # largest Omega that a fit takes on; time and memory grow with its square
+MAX_SEGMENTS = 2000  # of a flow; the descent adds one a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +33,7 @@ class Goal:
 
 
 class SearchMethod(ABC):
-    """A way to search for tiles, with its settings: derive a frozen dataclass, and write `fit`.
+    """A way to search for tiles: derive a class of `Settings`, or a frozen dataclass, and write `fit`.
 
     A search asks its method for candidates of one class after another, in worker processes if there
     are several, and certifies what it gets. Everything but `fit` has a default.
@@ -56,13 +60,7 @@ class SearchMethod(ABC):
         Raises:
             OrbiflowError: for an unknown level or setting.
         """
-        if effort not in cls.efforts:
-            raise OrbiflowError(f"effort must be one of {', '.join(cls.efforts)}, got {effort!r}")
-        known = {field.name for field in fields(cls)}  # pyright: ignore[reportArgumentType]
-        unknown = [name for name in changes if name not in known]
-        if unknown:
-            raise OrbiflowError(f"unknown settings {', '.join(unknown)}")
-        return cls(**{**cls.efforts[effort], **changes})
+        return cls(**{**cls.efforts[as_choice(effort, tuple(cls.efforts), "effort")], **changes})
 
     @abstractmethod
     def fit(
@@ -71,8 +69,8 @@ class SearchMethod(ABC):
         kind: IsohedralClass,
         *,
         per_class: int = 1,
-        progress: Progress | None = None,
-        cancel: Cancel | None = None,
+        progress: OnProgress = silent,
+        cancel: Cancel = NEVER,
     ) -> Fit:
         """Return candidates of one class, best first.
 
@@ -90,10 +88,10 @@ class SearchMethod(ABC):
         """
 
     def preview(
-        self, goal: Goal, names: Sequence[str], cancel: Cancel | None = None
+        self, goal: Goal, names: Sequence[str], cancel: Cancel = NEVER
     ) -> EscherTile | None:
         """Return a certified tile of one of the classes in a moment, if the method can."""
-        from orbiflow.tiles.search.certifying import best_tiles
+        from orbiflow.tiles.search.finished_tiles import best_tiles
 
         kind = isohedral_class(next(name for name in PREFERRED if name in names))
         try:
@@ -101,7 +99,7 @@ class SearchMethod(ABC):
         except CertificationError:
             return None
 
-    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel | None = None) -> Fit:  # noqa: ARG002
+    def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:  # noqa: ARG002
         """Return candidates in a moment, for `preview`, or raise `CertificationError`."""
         raise CertificationError(f"{self.method_name} has no quick way to tiles of {kind.name}")
 
@@ -136,7 +134,3 @@ class SearchMethod(ABC):
     def short_list(self, tiles: Sequence[EscherTile]) -> list[EscherTile]:
         """Return which of all tiles the search gives, in order."""
         return list(tiles)
-
-
-MAX_FREQUENCY = 60  # largest Omega that a fit takes on; time and memory grow with its square
-MAX_SEGMENTS = 2000  # of a flow; the descent adds one a step
