@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from itertools import repeat
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Union, cast
+from typing import Any, Literal, Union, cast
 
 from orbiflow.arguments import ANY, Range, described, meant, number_wanted, one_of, path_text
 from orbiflow.errors import OrbiflowError
@@ -121,7 +121,7 @@ class PathKind(Kind):
     """The path of a file or folder."""
 
     wanted, metavar = "a path", "PATH"
-    schema: ClassVar = {"type": "string", "minLength": 1, "format": "path"}
+    schema: Mapping[str, Any] = {"type": "string", "minLength": 1, "format": "path"}
 
     def read(self, value: Any, *, text: bool = False) -> Path:  # noqa: ARG002
         path = path_text(value)

@@ -125,7 +125,7 @@ def test_a_kerf_wider_than_a_slit() -> None:
     assert shapely.Polygon(cut_ring(slit, 0.15, 0.0)).is_valid
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.floats(0.02, 1.0), st.just(0.0) | st.floats(1e-3, 0.35))
 def test_offset_there_and_back(kerf: float, clearance: float) -> None:
     shape = np.array([[0, 0], [30, 3], [33, 20], [18, 12], [5, 24], [8, 10.0]])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,12 +11,22 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import faithfulness, plane_points
+from orbiflow.tiles.likeness import bending_onto, faithful
 from outlines import animal, bent_squirrel, limb
 
 SQUIRREL = np.asarray(animal("squirrel.dat").normal)
 
 
-@settings(max_examples=4, deadline=None)  # two seconds each: both hands, every turn
+@pytest.fixture(autouse=True, scope="module")
+def _one_turn() -> Iterator[None]:
+    """Of all rotations and both hands the best is refined, from one correspondence."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(faithful, "REFINED_TURNS", 1)
+        patch.setattr(bending_onto, "STARTS", bending_onto.STARTS[1:2])
+        yield
+
+
+@settings(max_examples=4, deadline=None)  # half a second each: both hands, every turn
 @given(st.floats(0.1, 10), st.floats(-3.2, 3.2), st.booleans(), st.integers(0, len(SQUIRREL) - 1))
 def test_motions_mirrors_and_scale_cost_nothing(
     scale: float, turn: float, mirrored: bool, first: int

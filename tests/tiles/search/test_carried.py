@@ -136,7 +136,8 @@ def test_in_the_input_s_coordinates() -> None:
     assert torch.is_tensor(carried.forward(torch.tensor(points)))
 
 
-def test_no_map_says_why() -> None:
+def test_no_map_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("orbiflow.tiles.silhouette.bending.MAX_SHARPENINGS", 2)
     case = bent_squirrel("IH4")
     crossed = case.tile.polygon[::-1]  # against the outline's sense: nothing can follow
     tile = type(case.tile)(crossed, case.tile.group, case.tile.isohedral_class, case.tile.corners)

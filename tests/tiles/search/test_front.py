@@ -13,7 +13,7 @@ from orbiflow.tiles.search.finished_tiles import best_tiles
 from outlines import animal
 
 SQUIRREL = animal("squirrel.dat")
-QUICK = LikenessSearch(placements=60, held=10, starts=4, finalists=2, rounds=10, multiples=(4,))
+QUICK = LikenessSearch(placements=40, held=8, starts=4, finalists=2, rounds=8, multiples=(2,))
 HANDS = hands(SQUIRREL, QUICK)
 
 

@@ -1,5 +1,7 @@
 """The linear space of a class's tiles."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import shapely
@@ -26,6 +28,7 @@ GLIDES = [n for n, k in CLASSES.items() if any(not p.reversed for p in k.identif
 TURNING = [n for n in GLIDES if CLASSES[n].stretch_dim == 1]
 
 
+@cache
 def placements(name: str, count: int = 12) -> Placements:
     return best_placements(CLASSES[name], OUTLINE, count)
 

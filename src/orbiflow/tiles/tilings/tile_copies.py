@@ -168,7 +168,7 @@ class Copies:
         if not len(self):
             return np.full(len(aspects), -1)
         low, high = self.cells.min(axis=0), self.cells.max(axis=0)
-        rows, columns = (high - low + 1).tolist()
+        rows, columns = (int(n) for n in high - low + 1)
 
         def number(aspects: Integers, cells: Integers) -> Integers:
             return (aspects * rows + (cells - low)[:, 0]) * columns + (cells - low)[:, 1]
