@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from density.quick_fits import quick_search
 from orbiflow.density import DensityEstimator
 from orbiflow.errors import OrbiflowError
 
@@ -24,9 +25,11 @@ def fitted() -> DensityEstimator:
     rng = np.random.default_rng(0)
     first = rng.vonmises(0.5, 3.0, 150)
     angles = np.degrees(np.stack([first, first + rng.vonmises(0, 9.0, 150)], axis=1))
-    return DensityEstimator("torus", unit="degrees", components="kernels,chains").fit(
-        Frame(angles, ["phi", "psi"])
-    )
+    with pytest.MonkeyPatch.context() as patch:
+        quick_search(patch)
+        return DensityEstimator("torus", unit="degrees", components="kernels,chains").fit(
+            Frame(angles, ["phi", "psi"])
+        )
 
 
 def test_conditional_times_marginal_is_joint_per_degree(fitted: DensityEstimator) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+from density.quick_fits import few_kernels
 from orbiflow.density import DensitySettings, FlowSettings, Torus, fit_automatic, weighed
 from orbiflow.density.fitting import COMPONENTS
 from orbiflow.density.fitting.automatic import BEFORE_END
@@ -41,7 +42,9 @@ def evidence(weights: np.ndarray | None = None) -> tuple[Folds, Candidates, torc
     folds = folds_of(
         weighed(points, weights), together=False, generator=torch.Generator().manual_seed(0)
     )
-    candidates = candidates_of(SPACE, [KernelFamily(SPACE)], folds, lambda *_: None, Budget())
+    with pytest.MonkeyPatch.context() as patch:
+        few_kernels(patch)
+        candidates = candidates_of(SPACE, [KernelFamily(SPACE)], folds, lambda *_: None, Budget())
     return (
         folds,
         candidates,
@@ -70,7 +73,10 @@ def test_progress_goes_on_from_one_tenth_to_the_next(
 
 
 @pytest.mark.parametrize("parts", [COMPONENTS, COMPONENTS[1:], ("kernels",)])
-def test_no_step_of_a_fit_is_half_of_it(parts: tuple[Component, ...]) -> None:
+def test_no_step_of_a_fit_is_half_of_it(
+    parts: tuple[Component, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few_kernels(monkeypatch)
     rng, shares = np.random.default_rng(0), [0.0]
     points = SPACE.project(torch.tensor(0.1 * rng.normal(size=(700, 2))))
     settings = DensitySettings(components=parts, **(QUICK if "flow" in parts else {}))

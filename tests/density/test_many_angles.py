@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from density.quick_fits import few_kernels
 from orbiflow.density import DensityEstimator, Mixture, Torus, density_to_bytes, read_density
 from orbiflow.errors import InputFileError, OrbiflowError
 
@@ -18,7 +19,8 @@ def data(count: int = 400) -> np.ndarray:
     return np.degrees(x)
 
 
-def test_five_angles(tmp_path: Path) -> None:
+def test_five_angles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    few_kernels(monkeypatch)
     points = data()
     estimator = DensityEstimator("torus", unit="degrees").fit(points[:300])
     assert isinstance(estimator.density_, Mixture)

@@ -8,6 +8,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from density.quick_fits import few_kernels
 from orbiflow.density import (
     AdaptiveKernels,
     DensitySettings,
@@ -128,12 +129,13 @@ def test_the_gradient_of_a_mixture(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SPACES)
-def test_kernel_estimates_are_normalised(name: str) -> None:
+def test_kernel_estimates_are_normalised(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    few_kernels(monkeypatch)
     space = make_space(name)
     points = clustered(name, 60, 0)
     found = kernel_estimates(space, Rows(torch.cat([points, points[:5]])), narrowest=100.0)
     assert {"repeated", "near 2, 0.4, 1" if space.is_round else "near 2, 0.4, 0.3"} <= set(found)
-    grid = midpoints(space, 120)
+    grid = midpoints(space, 80)
     for part in found.values():
         assert float(part.log_prob(grid).exp().mean()) == pytest.approx(1, abs=5e-3)
     parts = [found["repeated"], *found.values()][:2]

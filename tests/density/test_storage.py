@@ -191,6 +191,7 @@ def test_a_file_with_a_neural_flow_is_refused_by_name() -> None:
 DATA = np.random.default_rng(1).normal(20, 10, (100, 2))
 
 
+@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("space", SPACES)
 def test_saved_and_read(space: str, tmp_path) -> None:
     estimator = DensityEstimator(space, max_frequency=2, segments=2, iterations=3).fit(DATA)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ from orbiflow.density import (
 from orbiflow.density.pictures.colours import chosen_scale, density_at, density_on_map
 from orbiflow.density.pictures.maps import Map, pixels_of
 from orbiflow.density.pictures.projections import EqualEarth, Lambert, PlateCarree
-from orbiflow.drawing import Sheet
+from orbiflow.drawing import Sheet, pdf_pages
 from orbiflow.drawing.sheet import NARROWEST
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
@@ -108,7 +109,7 @@ def test_kernels_are_summed_as_finely_as_a_picture_needs(space: RoundSpace) -> N
 @every_space
 @pytest.mark.parametrize("width", [NARROWEST, "single", "double"])
 def test_maps_have_room_and_letters_of_7_to_8_points(space: Any, width: Any) -> None:
-    density, sheet = peaked(space, (20, 30), 50.0), Sheet.column(width)
+    density, sheet = peaked(space, (20, 30), 50.0), replace(Sheet.column(width), dpi=100)
     asked: list[Any] = [{"projection": p} for p in ("lambert", "stereographic")]
     if space.name == "sphere":
         asked += [
@@ -117,12 +118,16 @@ def test_maps_have_room_and_letters_of_7_to_8_points(space: Any, width: Any) -> 
         asked += [{"projection": "lambert", "center": (-25, 130), "radius": 20}]
     else:
         asked += [{"projection": p} for p in ("schmidt", "wulff")]
-    for options in asked:
-        picture = map_picture(density, points(30), PlotSettings(**options), sheet=sheet)
+    pictures = [
+        map_picture(density, points(30), PlotSettings(**options), sheet=sheet) for options in asked
+    ]
+    for picture in pictures:
         check_inside(picture)
-        pdf = picture.file()
-        assert all(7 <= size <= 8 for size in letters(pdf))
-        page = pypdfium2.PdfDocument(pdf)[0]
+    pdf = pdf_pages(pictures)
+    assert all(7 <= size <= 8 for size in letters(pdf))
+    pages = list(pypdfium2.PdfDocument(pdf))
+    assert len(pages) == len(asked)
+    for page in pages:
         kinds = [pdfium.FPDFPageObj_GetType(item) for item in page.get_objects()]
         assert kinds.count(pdfium.FPDF_PAGEOBJ_IMAGE) <= 2  # the map and the bar: no cells to sew
         assert page.get_width() == pytest.approx(72 * sheet.width, abs=0.01)

@@ -97,6 +97,7 @@ def _coarse(monkeypatch):
     monkeypatch.setattr("orbiflow.density.pictures.page._FINE_CELLS", 20)
     monkeypatch.setattr("orbiflow.density.pictures.colours._COARSE", 24)
     monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 40)
+    monkeypatch.setattr("orbiflow.drawing.fields._STEPS", 2)
 
 
 @every_space
@@ -275,7 +276,8 @@ def test_densities_with_kernels_are_drawn_and_say_what_is_averaged(space):
     assert "narrower than" not in density_page(example(space), resolution=8)
 
 
-def test_a_flow_in_few_colours_is_small():
+def test_a_flow_in_few_colours_is_small(monkeypatch):
+    monkeypatch.setattr("orbiflow.drawing.fields._STEPS", 12)  # lines of the whole length
     png = few_colours(flow_png(example(SPACES[0])))
     assert len(png) < 600_000
     image = Image.open(io.BytesIO(png))

@@ -20,6 +20,7 @@ from orbiflow.density import (
     Sphere,
     Torus,
     UniformDensity,
+    VonMisesDensity,
     density_to_bytes,
     plot_density,
 )
@@ -38,6 +39,7 @@ def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orbiflow.density.pictures.maps._PIXELS", 900)
     monkeypatch.setattr("orbiflow.density.pictures.colours._COARSE", 12)
     monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 20)
+    monkeypatch.setattr("orbiflow.drawing.fields._STEPS", 2)
     monkeypatch.setattr("orbiflow.density.pictures.plots.SAMPLES", 50)
 
 
@@ -84,7 +86,7 @@ def test_one_pdf_has_a_page_a_figure(tmp_path: Path) -> None:
 def test_a_folder_may_be_called_like_a_pdf(tmp_path: Path) -> None:
     out = tmp_path / "plots.pdf"
     out.mkdir()
-    plot_density(example(), out)
+    plot_density(VonMisesDensity(Torus(2)), out)
     assert "density.png" in names(out)
 
 
@@ -96,7 +98,7 @@ def test_one_picture_is_no_place_for_several(tmp_path: Path, ending: str) -> Non
 
 
 def test_densities_from_wherever_they_are(tmp_path: Path) -> None:
-    density, model = example(), tmp_path / "model"
+    density, model = VonMisesDensity(Torus(2)), tmp_path / "model"
     model.mkdir()
     (model / MODEL).write_bytes(density_to_bytes(density, columns=["phi", "psi"]))
     settings = PlotSettings(format="pdf", names=("phi", "psi"))
@@ -110,7 +112,7 @@ def test_densities_from_wherever_they_are(tmp_path: Path) -> None:
 
 
 def test_a_fitted_estimator_is_drawn_and_another_refused(tmp_path: Path) -> None:
-    estimator = DensityEstimator("torus", max_frequency=1, segments=1, iterations=2)
+    estimator = DensityEstimator("torus", components="mixture")
     with pytest.raises(OrbiflowError, match=r"call fit\(data\) first"):
         plot_density(estimator, tmp_path / "a.pdf")
     plot_density(estimator.fit(DATA), tmp_path / "a.pdf")

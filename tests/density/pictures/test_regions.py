@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,13 @@ SPACES = ("torus", "klein-bottle", "sphere", "projective-plane")
 MEASURES = ("natural", "square", "uniform")
 
 
+@pytest.fixture(autouse=True)
+def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("orbiflow.density.pictures.square._FINE_GRID", 160)
+    monkeypatch.setattr("orbiflow.density.pictures.maps._PIXELS", 40_000)
+
+
+@functools.cache
 def broad(name: str) -> Mixture:
     """Some broad kernels."""
     space, rng = make_space(name), np.random.default_rng(5)
@@ -47,6 +55,7 @@ def broad(name: str) -> Mixture:
     return blended(space, identity_flow(space), UniformDensity(space), kernels, shares)
 
 
+@functools.cache
 def lines_of(density: Mixture, *masses: float) -> list[DensityRegion]:
     levels = DensityLevels(density, samples=4000)
     return [levels.highest(mass) for mass in masses]
