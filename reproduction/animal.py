@@ -13,7 +13,14 @@ import shapely
 import torch
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import draw_flow, draw_magnitude, fill_rings, mark_symmetry, outline_cell
+from orbiflow.drawing import (
+    draw_flow,
+    draw_magnitude,
+    fill_rings,
+    mark_symmetry,
+    outline_cell,
+    plane_axes,
+)
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.tiles import (
@@ -30,7 +37,6 @@ from orbiflow.tiles import (
 )
 from reproduction.drawing import (
     INK,
-    SAMPLES,
     Canvas,
     around,
     aspect_of,
@@ -39,7 +45,6 @@ from reproduction.drawing import (
     draw_tiling,
     grid_box,
     label,
-    panel,
     panel_of,
     tiny,
 )
@@ -231,13 +236,13 @@ def _draw_row(figure: Figure, row: int, outcome: Any, outline: Array) -> None:
     draw_over(axes, [tile.polygon], outline, 1.4)
     high = 1.75
     window = around(tile.center, high * aspect_of(figure, boxes[0]), high)
-    draw_tiling(panel(figure, boxes[1], window), tile, window)
+    draw_tiling(plane_axes(figure, window, box=boxes[1]), tile, window)
     field = placed_field(outcome.model())
     ring = np.concatenate([tile.polygon, tile.polygon[:1]])
     for box in boxes[2:]:
-        axes = panel(figure, box, window)
+        axes = plane_axes(figure, window, box=box)
         if box is boxes[2]:
-            draw_magnitude(axes, field, window, samples=SAMPLES)
+            draw_magnitude(axes, field, window)
         else:
             corners = np.array(window)[[[0, 2, 2, 0], [1, 1, 3, 3]]]
             axes.fill(*corners, facecolor="#1d2b3a", zorder=0)
@@ -292,15 +297,15 @@ def _draw_frequencies(canvas: Canvas, extent: Extent, values: list[Any]) -> Find
         "Blue: the tile of each class and frequency, fitted to the animal in red. Same start, "
         "loss and number of iterations in every panel.",
     )
-    ious = {w: [_iou(table[w, name]) for name in names] for w in omegas}
-    means = {w: float(np.nanmean(ious[w])) for w in omegas}
+    overlaps = {key: _iou(outcome) for key, outcome in table.items()}
+    means = {w: float(np.nanmean([overlaps[w, name] for name in names])) for w in omegas}
     lengths = {w: float(np.nanmean([_length(table[w, name]) for name in names])) for w in omegas}
     free = {name: FourierField(kind.group(), 0).size for name, kind in CLASSES.items()}
     moving = ", ".join(f"{name} {n}" for name, n in free.items() if n)
     straight = max(_straightness(table[omegas[0], name]) for name in names)
     rising = all(lengths[a] <= lengths[b] for a, b in pairwise(omegas))
     rows = (
-        *((name, *(f"{_iou(table[w, name]):.3f}" for w in omegas)) for name in names),
+        *((name, *(f"{overlaps[w, name]:.3f}" for w in omegas)) for name in names),
         ("mean IoU", *(f"{means[w]:.3f}" for w in omegas)),
         ("mean length of the outline", *(f"{lengths[w]:.2f}" for w in omegas)),
     )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from orbiflow.drawing import cell_ring
+from orbiflow.drawing import cell_ring, plane_axes
 from orbiflow.symmetry import (
     CrystallographicGroup,
     Isometry,
@@ -30,7 +30,6 @@ from reproduction.drawing import (
     around,
     caption,
     grid_box,
-    panel,
     same_orbit,
     text_size,
     tiny,
@@ -93,7 +92,7 @@ def _draw_templates(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Find
         box = grid_box(*divmod(number, 3), 3, 3, title=0.11, low=0.0)
         middle = (kind.template().min(axis=0) + kind.template().max(axis=0)) / 2
         half = 1.2
-        axes = panel(figure, box, around(middle, half / 0.72, half))
+        axes = plane_axes(figure, around(middle, half / 0.72, half), box=box)
         draw_template(axes, kind)
         _draw_angles(axes, kind, text_size(figure))
         caption(figure, box, kind.name, weight="bold", size=1.1)
@@ -202,7 +201,7 @@ def _draw_tilings(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Findin
         middle = (middle + cell_ring(group, middle)[:4].mean(axis=0)) / 2
         aspect = box[2] / (box[3] * 0.94)
         window = around(middle, 4.1 * aspect, 4.1)
-        draw_tiling(panel(figure, box, window), kind, window)
+        draw_tiling(plane_axes(figure, window, box=box), kind, window)
         caption(figure, box, f"{kind.name}  ({kind.group_name})", size=1.0)
         wrong += sum(not group.contains(g) for g in drawn_elements(group))
         orders = [center.order for center in center_orbits(group)]

@@ -37,16 +37,14 @@ from orbiflow.density import (
     read_density,
     viewpoint,
 )
-from orbiflow.drawing import draw_flow, draw_magnitude
+from orbiflow.drawing import draw_flow, draw_magnitude, plane_axes
 from reproduction.drawing import (
     INK,
-    SAMPLES,
     Canvas,
     caption,
     draw_surface,
     grid_box,
     label,
-    panel,
     text_size,
     tiny,
 )
@@ -249,9 +247,9 @@ def _draw_flat(name: str, canvas: Canvas, _extent: Extent, values: list[Fitted])
         caption(figure, box, TITLES[one.space], weight="bold")
         style = {"ha": "center", "va": "top", "fontsize": 0.85 * text_size(figure), "color": INK}
         axes.text(0.5, -0.025, f"KL {one.kl:.4f}", transform=axes.transAxes, **style)
-        axes = panel(figure, _box(1, column), _HALF_WINDOW)
+        axes = plane_axes(figure, _HALF_WINDOW, box=_box(1, column))
         field = functools.partial(mean_field, density)
-        draw_magnitude(axes, field, _HALF_WINDOW, samples=SAMPLES)
+        draw_magnitude(axes, field, _HALF_WINDOW)
         draw_flow(axes, field, density.space.group, _HALF_WINDOW)
         draw_cells(axes, density.space.group, _HALF_WINDOW)
         errors.append(equivariance_error(field, density.space.group.cosets))

@@ -86,7 +86,6 @@ class Canvas:
 
 
 INK, FAINT = "#16202a", "#56626e"
-SAMPLES = 200  # number of samples of a field's magnitude along a panel's side
 
 Box = tuple[float, float, float, float]
 """Left, bottom, width and height in shares of the figure."""
@@ -120,16 +119,6 @@ def text_size(figure: Figure) -> float:
     return 1.05 * figure.get_figwidth()
 
 
-def panel(
-    figure: Figure, box: Box, window: Window, title: str = "", *, y_down: bool = False
-) -> Axes:
-    """Return axes that show a window of the plane, with a title above."""
-    axes = plane_axes(figure, window, box=box, y_down=y_down)
-    if title:
-        caption(figure, box, title)
-    return axes
-
-
 def panel_of(
     figure: Figure, box: Box, rings: list[Array], margin: float = 0.05, *, y_down: bool = False
 ) -> Axes:
@@ -139,7 +128,8 @@ def panel_of(
     aspect = aspect_of(figure, box)
     half = (0.5 + margin) * (high - low)
     half = np.maximum(half, half[::-1] * (aspect, 1 / aspect))
-    return panel(figure, box, around((low + high) / 2, *half), y_down=y_down)
+    window = around((low + high) / 2, *half)
+    return plane_axes(figure, window, box=box, y_down=y_down)
 
 
 def aspect_of(figure: Figure, box: Box) -> float:
@@ -147,12 +137,9 @@ def aspect_of(figure: Figure, box: Box) -> float:
     return box[2] * figure.get_figwidth() / (box[3] * figure.get_figheight())
 
 
-def caption(
-    figure: Figure, box: Box, title: str, *, weight: str = "normal", size: float = 1.0
-) -> None:
-    """Write a title above a box."""
-    x, y = box[0] + box[2] / 2, box[1] + box[3] + 0.006
-    label(figure, x, y, title, size=size, va="bottom", weight=weight)
+def caption(figure: Figure, box: Box, title: str, **style: Any) -> None:
+    """Write a title above a box, in a style as `label`."""
+    label(figure, box[0] + box[2] / 2, box[1] + box[3] + 0.006, title, va="bottom", **style)
 
 
 def label(
@@ -238,8 +225,11 @@ def draw_surface(axes: Axes, space: Space, colours: Array, turn: tuple[float, fl
     points = immersion(space)(grid)
     points = points - (points.min(axis=0) + points.max(axis=0)) / 2
     radius = float(np.linalg.norm(points, axis=1).max())
-    seen_points = (points / radius) @ _camera(*turn).T
-    corners = seen_points.reshape(n + 1, n + 1, 3)
+    yaw, pitch = turn
+    toward = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
+    right = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+    seen = (points / radius) @ np.stack([right, np.cross(toward, right), toward]).T
+    corners = seen.reshape(n + 1, n + 1, 3)
     around_face = corners[:-1, :-1], corners[1:, :-1], corners[1:, 1:], corners[:-1, 1:]
     faces = np.stack(around_face, axis=2).reshape(-1, 4, 3)
     normals = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
@@ -254,10 +244,3 @@ def draw_surface(axes: Axes, space: Space, colours: Array, turn: tuple[float, fl
     axes.add_collection(PolyCollection(list(flat[order]), linewidths=0.35, rasterized=True, **inks))
     axes.set(xlim=(-1.12, 1.12), ylim=(-1.12, 1.12), aspect="equal")
     axes.set_axis_off()
-
-
-def _camera(yaw: float, pitch: float) -> Array:
-    """Return the directions right, up and towards the eye, as rows (3, 3)."""
-    toward = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
-    right = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
-    return np.stack([right, np.cross(toward, right), toward])

@@ -14,13 +14,13 @@ from markupsafe import Markup
 from orbiflow.drawing import rendered
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_blas_thread, one_thread, process_context, work, write_atomic
-from reproduction import animal, classes, comparison, densities, spaces, square, symmetrization
+from reproduction import animal, classes, comparison, densities, spaces, symmetrization
 from reproduction.drawing import Canvas, Picture
 from reproduction.exhibit import Draw, Exhibit, Extent, Findings, Shown, Work
 
 # all exhibits, in the order of the paper
 EXHIBITS: tuple[Exhibit, ...] = (
-    square.EXHIBIT,
+    spaces.SQUARE,
     classes.TEMPLATES,
     classes.GROUPS_TABLE,
     spaces.SPACES_FIGURE,

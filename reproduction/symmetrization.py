@@ -16,7 +16,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import CENTER_COLOURS, LINE_COLOUR, center_sign, evaluate
+from orbiflow.drawing import CENTER_COLOURS, LINE_COLOUR, center_sign, evaluate, plane_axes
 from orbiflow.fields import (
     FourierField,
     VectorField,
@@ -35,17 +35,7 @@ from orbiflow.symmetry import (
     translation,
 )
 from orbiflow.tiles import CLASSES, IsohedralClass, signed_area
-from reproduction.drawing import (
-    INK,
-    Canvas,
-    around,
-    caption,
-    grid_box,
-    label,
-    panel,
-    text_size,
-    tiny,
-)
+from reproduction.drawing import INK, Canvas, around, caption, grid_box, label, text_size, tiny
 from reproduction.exhibit import Exhibit, Extent, Findings, Table
 
 if TYPE_CHECKING:
@@ -249,7 +239,7 @@ def _draw_figure(canvas: Canvas, _extent: Extent, _values: list[Any]) -> Finding
     rows, after = [], []
     for k, kind in enumerate(KINDS):
         box = grid_box(0, k, 1, 3, title=0.10, low=0.10)
-        axes = panel(figure, box, around((0.0, 0.0), HALF, HALF))
+        axes = plane_axes(figure, around((0.0, 0.0), HALF, HALF), box=box)
         _draw_field(axes, kind)
         _draw_element(axes, kind, text_size(figure))
         caption(figure, box, kind.title, size=1.1)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from torch import Tensor, nn
 
 from orbiflow.arrays import Array
+from orbiflow.errors import SettingError
 from orbiflow.fields import FourierField, PeriodicFeatures, Symmetrized, VectorField
 from orbiflow.flows import Flow
 from orbiflow.symmetry import (
@@ -49,6 +50,13 @@ def random_tensor(
 ) -> Tensor:
     """`random_points` for torch."""
     return torch.tensor(random_points(seed, *shape, size=size), dtype=dtype)
+
+
+def names_in(error: SettingError) -> tuple[str, ...]:
+    """The settings that its message speaks of."""
+    names: list[str] = []
+    error.named(lambda name: names.append(name) or name)
+    return tuple(names)
 
 
 def largest(values: Tensor) -> float:

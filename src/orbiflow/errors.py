@@ -37,11 +37,6 @@ class SettingError(OrbiflowError):
         text = re.sub(r"(?<!\{)\{(\w+)\}(?!\})", lambda found: name(found[1]), self.template)
         return text.replace("{{", "{").replace("}}", "}")
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The settings that the message speaks of."""
-        return tuple(re.findall(r"(?<!\{)\{(\w+)\}(?!\})", self.template))
-
 
 def literal(text: str) -> str:
     """Return `text` as it must be written in the template of a `SettingError`."""

@@ -4,7 +4,7 @@ torch's compiled functions have no signatures and some of its Python functions n
 cannot replace this file: a partial stub package makes pyright lose the rest of torch's own types.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable
 from typing import Any
 
 import torch
@@ -17,13 +17,8 @@ special, linalg, fft = _torch.special, _torch.linalg, _torch.fft
 unique, broadcast = _torch.unique, _torch.broadcast_tensors
 
 
-def adam(
-    parameters: Iterable[Tensor] | Iterable[dict[str, Any]],
-    lr: float = 1e-3,
-    betas: tuple[float, float] = (0.9, 0.999),
-) -> Optimizer:
-    """Return `torch.optim.Adam`, whose own `step` has no types."""
-    return torch.optim.Adam(parameters, lr=lr, betas=betas)
+adam: Callable[..., Optimizer] = torch.optim.Adam
+"""The optimizer, whose own `step` has no types."""
 
 
 def applied(function: type[Function], *arguments: Any) -> Any:

@@ -1,6 +1,7 @@
 """Lengths, sizes and colours as people write them: 40mm, 4 cm, 1.5in, 300x200mm, #2a9d8f.
 
-The functions read text; the types are for fields of settings classes, where a plain number is in mm.
+The functions read text, and raise an `OrbiflowError` for what they cannot read. The types are for
+fields of settings classes, where a plain number is in mm.
 """
 
 from __future__ import annotations
@@ -47,9 +48,6 @@ def length(text: str) -> float:
 def size(text: str) -> tuple[float, float]:
     """Return width and height in mm of a text such as 300x200mm, 30cm x 200mm or 12x8 in.
 
-    Raises:
-        OrbiflowError: As `length`.
-
     >>> size("300x200mm"), size("1in × 5 cm")
     ((300.0, 200.0), (25.4, 50.0))
     """
@@ -67,9 +65,6 @@ def size(text: str) -> tuple[float, float]:
 def pixels(text: str, dpi: float) -> float:
     """Return a number of pixels, or a length at `dpi` pixels an inch, in pixels.
 
-    Raises:
-        OrbiflowError: As `length`.
-
     >>> pixels("400", 300), pixels("1.5px", 300), pixels("25.4mm", 300)
     (400.0, 1.5, 300.0)
     """
@@ -79,9 +74,6 @@ def pixels(text: str, dpi: float) -> float:
 
 def pixel_size(text: str, dpi: float) -> tuple[int, int]:
     """Return width and height of a picture in whole pixels, from 3000x2000 or 300x200mm.
-
-    Raises:
-        OrbiflowError: As `size`.
 
     >>> pixel_size("3000x2000", 300), pixel_size("1x2in", 100)
     ((3000, 2000), (100, 200))
@@ -100,9 +92,6 @@ def pixel_size(text: str, dpi: float) -> tuple[int, int]:
 
 def page_size(text: str) -> tuple[float, float]:
     """Return width and height of a page in mm; a journal's column is two thirds as high as wide.
-
-    Raises:
-        OrbiflowError: As `size`.
 
     >>> page_size("double"), page_size("3x2cm")
     ((180.0, 120.0), (30.0, 20.0))

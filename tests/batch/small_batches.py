@@ -6,10 +6,11 @@ import csv
 import json
 import os
 from collections.abc import Callable, Generator, Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from orbiflow.batch import Answer, Executor, Parcel
+from orbiflow.batch import Answer, Executor, Parcel, executors
 from orbiflow.batch.executors import carry_out
 from orbiflow.runtime import Call, Cancel, Event, Failed, Finished, Sink, find
 from runtime.searches import BOOT, run
@@ -38,7 +39,10 @@ def boot_parcels(count: int) -> list[Parcel]:
 
 
 class Here(Executor):
-    """An executor without processes; remembers the keys of what it has done."""
+    """An executor without processes; remembers the keys of what it has done.
+
+    The same work gives what it gave the first time, in whichever test that was.
+    """
 
     def __init__(self) -> None:
         self.done: list[str] = []
@@ -57,7 +61,13 @@ class Here(Executor):
             if cancel.cancelled:
                 return
             self.done.append(parcel.key)
-            yield Answer.from_worker(parcel.key, *carry_out(parcel.header(), parcel.data, cancel))
+            found = _carried_out(parcel.header(), parcel.data, executors.MOST_WRITTEN)
+            yield Answer.from_worker(parcel.key, *found)
+
+
+@cache
+def _carried_out(header: str, data: bytes, _most: int) -> tuple[str, dict[str, bytes]]:
+    return carry_out(header, data, Cancel())
 
 
 def run_call(call: Call, cancel: Cancel | None = None) -> tuple[dict[str, Any], list[Event]]:

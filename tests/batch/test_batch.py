@@ -16,6 +16,7 @@ from orbiflow.batch import folder as folder_module
 from orbiflow.errors import OrbiflowError, OutputError, SettingError
 from orbiflow.runtime import Call, Cancel, Finished, ItemDone, Note, find
 from runtime.searches import run
+from strategies import names_in
 
 
 @pytest.fixture(name="here")
@@ -205,7 +206,7 @@ def test_local_processes(call: Call) -> None:
 def test_mistakes(given: dict[str, Any], names: set[str]) -> None:
     with pytest.raises(SettingError) as caught:
         find("batch").call({"folder": "in", **given}).run()
-    assert set(caught.value.names) == names
+    assert set(names_in(caught.value)) == names
 
 
 @pytest.mark.parametrize("name", ["image", "pin", "pin_angle", "emphasis", "strength", "called"])

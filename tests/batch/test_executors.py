@@ -115,6 +115,7 @@ def test_what_kills_processes_fails_alone(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_what_kills_workers_fails_alone(monkeypatch: pytest.MonkeyPatch, cluster: Any) -> None:
     monkeypatch.setattr(dask_cluster, "_serve", deadly)
+    monkeypatch.setattr(cluster.scheduler, "allowed_failures", 0)
     events: list[Event] = []
     sent = parcels_of(b"a", b"deadly", b"b", b"c", b"d")
     found = answers(DaskCluster(cluster.scheduler_address), sent, events)

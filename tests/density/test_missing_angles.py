@@ -136,7 +136,7 @@ def test_mistakes_are_named() -> None:
     for options, message in (
         ({}, "missing"),
         ({"missing": "marginalise", "components": "chains"}, "chains cannot be fitted"),
-        ({"missing": "marginalise", "components": "flow"}, "missing marginalise needs kernels"),
+        ({"missing": "marginalise", "components": "flow"}, "missing marginalise is for kernels"),
         ({"missing": "guess"}, "missing must be refuse or marginalise"),
         ({"missing": "marginalise", "space": "klein-bottle"}, "missing or infinite"),
     ):

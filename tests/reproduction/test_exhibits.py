@@ -25,8 +25,7 @@ from reproduction.comparison import goal_tile, goals, impossible_rows
 from reproduction.densities import KL, TARGETS, drawn, fitted, kl_of_uniform, target, weighted
 from reproduction.exhibit import FAST, Extent, Findings
 from reproduction.reproduction import EXHIBITS, reproduce
-from reproduction.spaces import euler_characteristic, orientable
-from reproduction.square import deformed, unconstrained_field
+from reproduction.spaces import deformed, euler_characteristic, orientable, unconstrained_field
 from reproduction.symmetrization import KINDS, as_printed, equivariance_error, nested_error, pushed
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "silhouettes"

@@ -50,6 +50,14 @@ def boot_call(folder: Path, *classes: str, **more: Any) -> Call:
     )
 
 
+def likeness_call(folder: Path, *classes: str, **more: Any) -> Call:
+    """A search for likeness, which imports no torch: the cheapest in a new process."""
+    path = folder / "boot.json"
+    path.write_text(json.dumps(BOOT))
+    given = {"image": path, "out": folder / "out", "classes": classes, "effort": "fast"}
+    return find("escherize").call({**given, "workers": 1, **more})
+
+
 def run(call: Call, sink: Sink = ignore, cancel: Cancel | None = None) -> Finished:
     """Run a call and return its last event, cancelled or not."""
     last: list[Event] = []

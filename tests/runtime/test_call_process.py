@@ -11,14 +11,14 @@ from pathlib import Path
 import pytest
 
 from orbiflow.runtime import CallProcess, ClassFailed, Event, Failed, Finished, Progress, TileFound
-from runtime.searches import ENDLESS, boot_call, check_order
+from runtime.searches import ENDLESS, boot_call, check_order, likeness_call
 
 
 def test_a_search_in_a_process(tmp_path: Path) -> None:
-    with CallProcess(boot_call(tmp_path, "IH4", "IH6", workers=2)) as process:
+    with CallProcess(likeness_call(tmp_path, "IH3", "IH7", workers=2)) as process:
         events = list(process.events())
         assert process.wait() == 0
-    check_order(events, "IH4", "IH6")
+    check_order(events, "IH3", "IH7")
     assert isinstance(events[-1], Finished)
     assert events[-1].state == "done"
     assert (tmp_path / "out" / "overview.png").is_file()
@@ -29,15 +29,15 @@ def test_two_calls_are_started_from_threads(tmp_path: Path) -> None:
 
     def work(name: str) -> None:
         (tmp_path / name).mkdir()
-        with CallProcess(boot_call(tmp_path / name, name)) as process:
+        with CallProcess(likeness_call(tmp_path / name, name)) as process:
             found[name] = list(process.events())
 
-    threads = [threading.Thread(target=work, args=(name,)) for name in ("IH4", "IH6")]
+    threads = [threading.Thread(target=work, args=(name,)) for name in ("IH3", "IH7")]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    for name in ("IH4", "IH6"):
+    for name in ("IH3", "IH7"):
         check_order(found[name], name)
         assert isinstance(found[name][-1], Finished)
 
@@ -63,7 +63,7 @@ def test_cancelling_keeps_the_order_and_ends_the_process(workers: int, tmp_path:
 
 
 def test_a_mistake_is_the_last_event(tmp_path: Path) -> None:
-    call = boot_call(tmp_path, "IH8")
+    call = likeness_call(tmp_path, "IH8")
     with CallProcess(call) as process:
         events = list(process.events())
         assert process.wait() == 1

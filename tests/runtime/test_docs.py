@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 from pathlib import Path
 
 import pytest
+from PIL import Image, ImageDraw
 
 from orbiflow.runtime import Event, call_from_json
+from runtime.searches import BOOT
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
@@ -17,9 +18,12 @@ TEXT = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
 
 def test_the_snippet(tmp_path: Path, monkeypatch, capsys: pytest.CaptureFixture[str]) -> None:
     (snippet,) = re.findall(r"```python\n(.*?)```", TEXT, flags=re.DOTALL)
-    shutil.copy(ROOT / "examples" / "silhouettes" / "turtle.png", tmp_path)
+    turtle = Image.new("1", (260, 210), 1)  # a plainer one than in examples
+    ImageDraw.Draw(turtle).polygon(BOOT, fill=0)
+    turtle.save(tmp_path / "turtle.png")
     monkeypatch.chdir(tmp_path)
-    one_class = snippet.replace('effort="fast"', 'effort="fast", classes=("IH6",)')
+    one_class = snippet.replace('"effort": "fast"', '"effort": "fast", "classes": ["IH6"]')
+    assert one_class != snippet
     exec(compile(one_class, "operations.md", "exec"), {})
     assert capsys.readouterr().out == "a first tile: IH6\ndone out/turtle\n"
 

@@ -89,9 +89,6 @@ from .regions.settings import RegionSettings as RegionSettings
 from .regions.settings import resolvable_masses as resolvable_masses
 from .regions.settings import samples_for as samples_for
 from .run_folder import written_files as written_files
-from .spaces.catalogue import SPACES as SPACES
-from .spaces.catalogue import make_space as make_space
-from .spaces.catalogue import space_class as space_class
 from .spaces.flat import KleinBottle as KleinBottle
 from .spaces.flat import Torus as Torus
 from .spaces.patches import KleinCoordinates as KleinCoordinates
@@ -103,7 +100,10 @@ from .spaces.round import clear_rotation as clear_rotation
 from .spaces.round import to_latlon as to_latlon
 from .spaces.round import to_vectors as to_vectors
 from .spaces.space import MEASURES as MEASURES
+from .spaces.space import SPACES as SPACES
 from .spaces.space import Space as Space
+from .spaces.space import make_space as make_space
+from .spaces.space import space_class as space_class
 from .tables.files import append_columns as append_columns
 from .tables.files import column_names as column_names
 from .tables.files import is_identifier as is_identifier

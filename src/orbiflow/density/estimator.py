@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from orbiflow.arguments import as_instance, as_whole, refusal
 from orbiflow.arrays import Array
 from orbiflow.density.fitting import (
-    ComponentSettings,
     DensitySettings,
     FitReport,
     Progress,
@@ -167,22 +166,9 @@ class DensityEstimator:
             del self.feature_names_in_  # of an earlier fit
         return self
 
-    @classmethod
-    def with_settings(
-        cls, space: str | Space, settings: ComponentSettings, **others: Any
-    ) -> DensityEstimator:
-        """Return an estimator with the settings that were given; `others` are more parameters."""
-        given = {name: getattr(settings, name) for name in settings.fields_given}
-        return cls(space, **given, **others)
-
     def settings(self) -> DensitySettings:
-        """Return the settings of a fit.
-
-        Raises:
-            SettingError: If one is not allowed.
-        """
-        names = [entry.name for entry in fields_of(DensitySettings)]
-        return DensitySettings(**self._changed(names))
+        """Return the settings of a fit, which are checked here."""
+        return DensitySettings(**self._changed(entry.name for entry in fields_of(DensitySettings)))
 
     def marginal(self, *columns: str | int) -> DensityEstimator:
         """An estimator of some of the angles alone, by their columns' names or numbers from 0.
@@ -229,14 +215,8 @@ class DensityEstimator:
     ) -> DensityEstimator:
         """An estimator of a density that is there already, such as one that was read from a file.
 
-        Args:
-            density: any.
-            report: of its fit, if it is known; else there is no `report_`.
-            columns: of the data, if they are known; else there is no `feature_names_in_`.
-            params: of the constructor, for fits to come.
-
-        Raises:
-            OrbiflowError: for what is no density, or a parameter that there is not.
+        Without the report of its fit there is no `report_`, without columns no `feature_names_in_`;
+        `params` are those of the constructor, for fits to come.
         """
         as_instance(density, Density, "density")
         made = cls(density.space).set_params(**params)

@@ -132,7 +132,8 @@ def _tabulated(
     observed = list(split.observed)
 
     def log_function(points: Tensor, seed: int = 0) -> Tensor:
-        whole = split.located(points)
+        given = points.new_tensor(split.values).expand(len(points), -1)
+        whole = torch.cat([points, given], dim=1)
         logs = [log + own.log_marginal(whole, observed, seed) for log, own in left]
         return torch.stack(logs).logsumexp(dim=0)
 

@@ -1,5 +1,4 @@
 from .canvas import CENTER_COLOURS as CENTER_COLOURS
-from .canvas import DPI as DPI
 from .canvas import LINE_COLOUR as LINE_COLOUR
 from .canvas import blank_figure as blank_figure
 from .canvas import cell_ring as cell_ring

@@ -111,14 +111,10 @@ def field_picture(
     return Picture(figure, sheet, "Vector field", "Colour is the field's magnitude.")
 
 
-def draw_magnitude(
-    axes: Axes, velocity: Callable[[Any], Any], window: Window, *, samples: int | None = None
-) -> None:
-    """Colour a window by a field's magnitude, at 400 points along its longer side or `samples`."""
+def draw_magnitude(axes: Axes, velocity: Callable[[Any], Any], window: Window) -> None:
+    """Colour a window by a field's magnitude."""
     longer = max(window[2] - window[0], window[3] - window[1])
-    counts = [
-        max(2, round((samples or _SAMPLES) * (window[i + 2] - window[i]) / longer)) for i in (0, 1)
-    ]
+    counts = [max(2, round(_SAMPLES * (window[i + 2] - window[i]) / longer)) for i in (0, 1)]
     x, y = (np.linspace(window[i], window[i + 2], counts[i]) for i in (0, 1))
     points = np.stack(np.meshgrid(x, y), axis=-1)
     vectors = evaluate(velocity, points)

@@ -8,12 +8,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.fields.invariants import (
-    InvariantBasis,
-    InvariantField,
-    coefficient_bound,
-    sobolev_weights,
-)
+from orbiflow.fields.invariants import InvariantBasis, InvariantField, coefficient_bound
 from orbiflow.fields.series import differentiate, evaluate, weight_cotangent
 from orbiflow.symmetry import CrystallographicGroup
 
@@ -94,10 +89,6 @@ class FourierField(InvariantField):
     def _stacked(parameters: Tensor) -> Tensor:
         # not reshape(-1, P): P is 0 for Omega = 0 and a group without invariant vectors
         return parameters if parameters.dim() == 2 else parameters.unsqueeze(0)
-
-    def sobolev_weights(self, smoothness: float) -> Array:
-        """Return factors (P,) (1 + |kappa|^2 vol^(2/d))^(-smoothness / 2), which have no unit."""
-        return sobolev_weights(self.group, self.basis, smoothness)
 
     def weights(self) -> Tensor:
         """Return the Fourier weights in the tensor basis of `series`.

@@ -22,14 +22,11 @@ from orbiflow.typed_torch import applied
 BLOCK_BYTES = 2**21
 
 
-def trigonometric_table(u: Tensor, order: int, out: Tensor | None = None) -> Tensor:
-    """Return rows 1, cos 2 pi u, ..., cos 2 pi K u, sin 2 pi u, ..., sin 2 pi K u, K = `order`.
+def trigonometric_table(u: Tensor, order: int, out: Tensor) -> Tensor:
+    """Fill rows 1, cos 2 pi u, ..., cos 2 pi K u, sin 2 pi u, ..., sin 2 pi K u, K = `order`.
 
-    For fractional coordinates (..., N) they are (..., 2 K + 1, N), in `out` if it is given, and not
-    tracked by autograd.
+    For fractional coordinates (..., N) they are (..., 2 K + 1, N), and not tracked by autograd.
     """
-    if out is None:
-        out = u.new_empty(*u.shape[:-1], 2 * order + 1, u.shape[-1])
     out[..., 0, :] = 1.0
     angle = out[..., order + 1 :, :]
     torch.mul((u - u.round())[..., None, :], _frequencies(order, u)[:, None], out=angle)

@@ -15,7 +15,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
-from orbiflow.errors import OrbiflowError
+from orbiflow.arguments import as_whole
 from orbiflow.fields.protocol import VectorField, prepared_with_divergence
 from orbiflow.symmetry import CrystallographicGroup, Isometry, checked_group, identity
 from orbiflow.typed_torch import linalg
@@ -174,8 +174,7 @@ class PeriodicFeatures(nn.Module):
 
     def __init__(self, group: CrystallographicGroup, max_frequency: int = 1) -> None:
         super().__init__()
-        if max_frequency < 1:
-            raise OrbiflowError(f"max_frequency must be at least 1, got {max_frequency}")
+        as_whole(max_frequency, "max_frequency", 1)
         d = checked_group(group).dim
         if d <= 3:
             box = itertools.product(range(-max_frequency, max_frequency + 1), repeat=d)

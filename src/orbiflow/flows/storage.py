@@ -166,11 +166,9 @@ def is_perceptron(field: Any) -> bool:
     """Return whether `field` is a network of linear layers and tanh on `PeriodicFeatures`."""
     if type(field) is not nn.Sequential or len(field) < 2 or len(field) % 2:
         return False
-    wanted = [PeriodicFeatures, *[nn.Linear, nn.Tanh] * (len(field) // 2)][: len(field)]
-    layers: list[Any] = [layer for layer in field if isinstance(layer, nn.Linear)]
-    return all(type(m) is kind for m, kind in zip(field, wanted, strict=True)) and all(
-        layer.bias is not None for layer in layers
-    )
+    wanted = [PeriodicFeatures, *[nn.Linear, nn.Tanh] * (len(field) // 2)][:-1]
+    linear: list[Any] = [layer for layer in field if isinstance(layer, nn.Linear)]
+    return list(map(type, field)) == wanted and all(layer.bias is not None for layer in linear)
 
 
 def _own_name(field: Any, place: str) -> str:
@@ -227,9 +225,8 @@ def save_flow(flow: Flow, path: str | Path) -> Path:
         first = next(i for i, other in enumerate(fields) if other is field)
         same = {"kind": "same", "segment": first}
         segments.append(same if first < index else writer.header(field, f"segments.{index}"))
-    settings = {name: getattr(flow, name) for name in ("steps", "method", "duration")}
-    header = {"format": FORMAT, "groups": writer.groups, "segments": segments, **settings}
-    header["warn"] = flow.warns
+    header = {"format": FORMAT, "groups": writer.groups, "segments": segments, "warn": flow.warns}
+    header |= {name: getattr(flow, name) for name in ("steps", "method", "duration")}
     return write_atomic(path, tensor_bytes(header, tensors, "a flow"))
 
 
@@ -285,20 +282,8 @@ def _restored(
         duration=as_number(header["duration"], "duration"),
         warn=bool(header["warn"]),
     )
-    _fill(flow, tensors)
+    flow.load_state_dict(tensors)
     return flow
-
-
-def _fill(flow: Flow, tensors: Mapping[str, Tensor]) -> None:
-    expected = flow.state_dict()
-    for name in (*expected, *tensors):
-        if name not in tensors or name not in expected:
-            where = "its fields" if name in expected else "the file"
-            raise OrbiflowError(f"{name} is only in {where}")
-        given, wanted = tuple(tensors[name].shape), tuple(expected[name].shape)
-        if given != wanted:
-            raise OrbiflowError(f"{name} has shape {given}, expected {wanted}")
-    flow.load_state_dict(dict(tensors))
 
 
 def _check_finite(tensors: Mapping[str, Tensor]) -> None:

@@ -150,8 +150,11 @@ class DirichletDomain:
     def _sites(self) -> Array:
         return np.stack([g(self.site) for g in self._candidates])
 
-    def locate(self, points: Points) -> tuple[Points, Array]:
-        """Return the points wrapped to the lattice cell, and the nearest image of the site."""
+    def project(self, points: Points) -> Points:
+        """Return the points (..., d) of the domain in the orbits of `points` (..., d).
+
+        Differentiable almost everywhere for torch tensors.
+        """
         wrapped = self.group.wrap(points)
         own: Any = wrapped
         plain: Array = own.detach().cpu().numpy() if is_tensor(own) else own
@@ -161,16 +164,9 @@ class DirichletDomain:
             block = flat[start : start + 65536]
             squared = (self._sites**2).sum(axis=1) - 2.0 * block @ self._sites.T
             nearest[start : start + 65536] = squared.argmin(axis=1)
-        return wrapped, nearest.reshape(plain.shape[:-1])
-
-    def project(self, points: Points) -> Points:
-        """Return the points (..., d) of the domain in the orbits of `points` (..., d).
-
-        Differentiable almost everywhere for torch tensors.
-        """
-        wrapped, nearest = self.locate(points)
-        linear = np.stack([g.linear for g in self._candidates])[nearest]
-        shift = np.stack([g.translation for g in self._candidates])[nearest]
+        chosen = nearest.reshape(plain.shape[:-1])
+        linear = np.stack([g.linear for g in self._candidates])[chosen]
+        shift = np.stack([g.translation for g in self._candidates])[chosen]
         offset = wrapped - cast_like(shift, wrapped)
         # inverse of an isometry: transpose of the linear part
         return (offset[..., None, :] @ cast_like(linear, wrapped))[..., 0, :]

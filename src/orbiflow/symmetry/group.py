@@ -294,11 +294,9 @@ def _closure(basis: Array, generators: Sequence[Isometry], max_order: int) -> tu
     elements = _finite_closure(basis, generators, max_order)
     if elements is not None:
         return elements
-    number = len(generators) - 1
-    for i in range(number):
-        if _finite_closure(basis, generators[: i + 1], max_order) is None:
-            number = i
-            break
+    counts = range(1, len(generators) + 1)
+    too_many = (n for n in counts if _finite_closure(basis, generators[:n], max_order) is None)
+    number = next(too_many) - 1
     raise NotDiscreteError(
         f"the closure modulo the lattice has more than {max_order} elements; generator {number}, "
         f"{generators[number]!r}, is the first that exceeds this with those before it. "
@@ -381,19 +379,12 @@ def group_from_header(header: Mapping[str, Any], name: str = "") -> Crystallogra
     return CrystallographicGroup(closed.lattice, cosets, str(name)[:MAX_NAME])
 
 
+@dataclass(frozen=True)
 class _ExactGroup:
     """A cache key for a group, equal to another only if their numbers are bit-identical."""
 
-    def __init__(self, group: CrystallographicGroup) -> None:
-        self.group = group
-        tables = group.lattice, group.linear_parts, group.translations
-        self._key = tuple((table.shape, table.tobytes()) for table in tables)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _ExactGroup) and other._key == self._key
-
-    def __hash__(self) -> int:
-        return hash(self._key)
+    numbers: tuple[bytes, ...]
+    group: CrystallographicGroup = field(compare=False)
 
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -412,7 +403,8 @@ def cached_by_basis(maxsize: int) -> Callable[[Function], Function]:
 
         @wraps(function)
         def call(group: CrystallographicGroup, *arguments: Any) -> Any:
-            return cached(_ExactGroup(group), *arguments)
+            tables = group.lattice, group.linear_parts, group.translations
+            return cached(_ExactGroup(tuple(t.tobytes() for t in tables), group), *arguments)
 
         return cast(Any, call)
 

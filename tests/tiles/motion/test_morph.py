@@ -15,7 +15,7 @@ from orbiflow.tiles.motion.morph import Morph, Orbits, OwnFrame
 from swirled_tiles import is_sound, swirled, swirled_tile
 
 
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(swirled, st.lists(st.floats(0, 1), min_size=2, max_size=4))
 def test_every_frame_tiles(tile: Tile, shares: list[float]) -> None:
     assume(is_sound(tile))

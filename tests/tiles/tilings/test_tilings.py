@@ -46,7 +46,7 @@ def test_named_tilings_and_their_stabilisers(name: str) -> None:
     assert tuple(own.order for own in tiling.stabilisers) == orders
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(tilings)
 def test_certified(tiling: Tiling) -> None:
     certificate = certify(tiling)
@@ -57,7 +57,7 @@ def test_certified(tiling: Tiling) -> None:
     assert certificate.uncovered < 1e-11
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(tilings, seeds)
 def test_a_vertex_moved_by_a_millionth_is_refused(tiling: Tiling, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -78,7 +78,7 @@ def test_a_vertex_moved_by_a_millionth_is_refused(tiling: Tiling, seed: int) -> 
     assert max(found.area_error, found.edge_mismatch, found.total_overlap, found.uncovered) > 2e-8
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=16, deadline=None)
 @given(tilings, st.sampled_from([0.97, 1.02]))
 def test_a_prototile_of_another_size_is_refused(tiling: Tiling, scale: float) -> None:
     first, *others = tiling.prototiles
@@ -90,7 +90,7 @@ def test_a_prototile_of_another_size_is_refused(tiling: Tiling, scale: float) ->
     assert gap if scale < 1 else overlap
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=16, deadline=None)
 @given(tilings)
 def test_a_patch_covers_its_window_once(tiling: Tiling) -> None:
     """By shapely alone: areas of the pieces in a window add up to its own, as that of their union."""
@@ -116,7 +116,7 @@ def test_a_patch_covers_its_window_once(tiling: Tiling) -> None:
     assert len(inside) == sum(bool(box.contains(shape)) for shape in shapes)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=16, deadline=None)
 @given(tilings)
 def test_neighbours_and_colours_are_those_that_shapely_measures(tiling: Tiling) -> None:
     size = np.sqrt(tiling.tile_area)
@@ -145,7 +145,7 @@ def _is(element: Placed, prototile: int) -> bool:
     return element.prototile == prototile and element.is_close(identity(2), 1e-6)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=24, deadline=None)
 @given(st.data())
 def test_dirichlet_cells_have_the_stabiliser_of_their_point(data: st.DataObject) -> None:
     group = data.draw(wallpaper_groups())
@@ -171,7 +171,7 @@ def test_every_group_has_several_prototiles(name: str, data: st.DataObject) -> N
     assert np.isclose(total, tiling.group.cell_volume, rtol=1e-12)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(mirror_tiles())
 def test_mirror_tiles_have_their_mirror(tiling: Tiling) -> None:
     (own,) = tiling.stabilisers

@@ -268,8 +268,8 @@ def cross_fitted(
     shares = np.stack(
         [
             np.ones(len(own)),
-            math.log(2) - np.logaddexp(0.0, -tempered),
             (own > 0) + (own == 0) / 2,
+            math.log(2) - np.logaddexp(0.0, -tempered),
             own,
         ],
         axis=1,
@@ -281,17 +281,12 @@ def cross_fitted(
     drawn = drawn[(drawn[:, 0] > 0) & (drawn[:, 4] > 0)]
     found, spread = _figures(table.sum(axis=0)[None])[0], _figures(drawn)
     ends = np.quantile(spread, [(1 - level) / 2, (1 + level) / 2], axis=0)
-    made = [
-        Estimate(float(v), float(s), float(low), float(high))
-        for v, s, low, high in zip(found, spread.std(axis=0), *ends, strict=True)
-    ]
-    return Divergence(
-        accuracy=made[1], jensen_shannon=made[0], first_to_second=made[2], second_to_first=made[3]
-    )
+    figures = np.stack([found, spread.std(axis=0), *ends], axis=1).tolist()
+    return Divergence(*(Estimate(*row) for row in figures))
 
 
 def _figures(sums: Array) -> Array:
-    """Return Jensen-Shannon divergence, accuracy and both divergences (B, 4) from sums (B, 8)."""
+    """Return accuracy, Jensen-Shannon divergence and both divergences (B, 4) from sums (B, 8)."""
     one, other = sums[:, 1:4] / sums[:, :1], sums[:, 5:] / sums[:, 4:5]
     even = (one[:, :2] + other[:, :2]) / 2
     return np.concatenate([even, one[:, 2:], other[:, 2:]], axis=1)

@@ -197,53 +197,38 @@ def fold(
     """
     import numpy as np
 
-    from orbiflow.density.estimator import DensityEstimator
-
     begin = time.perf_counter()
     width = len(rows.columns or ()) or None
     read = tables.read_rows(data, rows, on_event, width=width, group=group)
-    table, weights, labels = read.table, read.weights, read.labels()
-    out_of_fit = _held(data, table, fold, held, rows.header)
-    estimator = DensityEstimator.with_settings(
-        where.space,
-        DensitySettings(**density.to_json()),
-        unit=tables.angle_unit(where.space, where.unit, table, on_event),
-        missing=rows.kept_missing,
-    )
+    out_of_fit = _held(data, read.table, fold, held, rows.header)
+    fitted, unseen = read.only(~out_of_fit), read.only(out_of_fit)
     folder = runtime.ResultFolder(out, written_files)
-    estimator.fit(
-        table.values[~out_of_fit],
-        sample_weight=None if weights is None else weights[~out_of_fit],
-        groups=None if labels is None else labels[~out_of_fit],
-        progress=runtime.progress_events(on_event, cancel),
-    )
-    scores = estimator.score_samples(table.values[out_of_fit])
+    estimator = operations.fit_rows(fitted, where, density, rows, on_event, cancel)
+    scores = estimator.score_samples(unseen.table.values)
     if not np.isfinite(scores).all():
         raise SettingError(
             f"{(~np.isfinite(scores)).sum()} rows held out have no density: allow other "
             "{components}"
         )
     cancel.check()
-    mean = operations.mean_of_whole(
-        scores, None if weights is None else weights[out_of_fit], read.whole[out_of_fit]
-    )
+    mean = operations.mean_of_whole(scores, unseen.weights, unseen.whole)
     document = {
         "space": {"name": estimator.space_.name, **estimator.space_.settings()},
         "fold": fold,
         "components": density.components,
-        "rows": int(out_of_fit.sum()),
-        "fitted": int((~out_of_fit).sum()),
+        "rows": len(scores),
+        "fitted": len(fitted.table.values),
         "log_likelihood": mean,
         "uniform": -math.log(estimator.space_.volume),
         "report": estimator.report_.to_json(),
         "seconds": time.perf_counter() - begin,
     }
     report = json.dumps(document, allow_nan=False, indent=1)
-    pairs = zip(table.lines[out_of_fit].tolist(), scores.tolist(), strict=True)
+    pairs = zip(unseen.table.lines.tolist(), scores.tolist(), strict=True)
     write_files(
         folder, {SCORES: batch.csv_bytes(["row", "log_prob"], pairs), REPORT: report}, on_event
     )
-    on_event(runtime.Note(f"mean log density {mean:.4f} nats at {out_of_fit.sum()} rows held out"))
+    on_event(runtime.Note(f"mean log density {mean:.4f} nats at {len(scores)} rows held out"))
     names = ("rows", "fitted", "log_likelihood", "seconds")
     return runtime.Outcome({"folder": str(out), **{name: document[name] for name in names}})
 

@@ -256,6 +256,7 @@ def cv_page(
     seconds = {(fit.split, fit.fold, fit.setting): entry.seconds for fit, entry in done}
     first = next(iter(asked.settings))
     made = None if isinstance(comparison, str) else comparison
+    scores, differences = _pictures(found, made, folds)
     text = rendered(
         "orbiflow.density.cross_validation",
         "page.html",
@@ -269,8 +270,8 @@ def cv_page(
         why=comparison,
         waiting=waiting,
         fits=waiting + len(done),
-        scores=_scores(found, made, folds),
-        differences=_differences(found, made, folds),
+        scores=scores,
+        differences=differences,
         folds=[
             {
                 "label": f"{split}.{fold}" if asked.cv.times > 1 else str(fold),
@@ -293,42 +294,31 @@ def _signed(value: float, sign: str = "-") -> str:
     return f"{value:{sign}.4f}".replace("-", "\N{MINUS SIGN}")
 
 
-def _scores(
-    found: HeldOut, made: ModelComparison | None, folds: FoldMeans
-) -> dict[str, Any] | None:
-    """Return a picture of the mean log densities."""
-    names = list(found.settings)
-    known = {score.name: score for score in made.scores} if made else {}
-    lines = [
-        Strip(
-            name,
-            [float(mean[k]) for _, _, mean in folds],
-            *((s.mean, s.mean - s.error, s.mean + s.error) if (s := known.get(name)) else ()),
-        )
-        for k, name in enumerate(names)
-        if len(names) == 2 or name != UNIFORM
-    ]
-    return strips(lines, "mean log density of a fold, nats") if folds else None
+Strip = tuple[str, Sequence[float], tuple[float, ...]]
+"""A name, dots for the folds, and the mean of all rows with its interval, if these are known."""
 
 
-def _differences(
+def _pictures(
     found: HeldOut, made: ModelComparison | None, folds: FoldMeans
-) -> dict[str, Any] | None:
-    """Return a picture of the differences between settings."""
-    names = list(found.settings)
-    lines = [
-        Strip(
-            f"{d.first} − {d.second}",
-            [float(mean[names.index(d.first)] - mean[names.index(d.second)]) for *_, mean in folds],
-            d.mean,
-            d.low,
-            d.high,
-        )
-        for d in (made.differences if made else ())
-        if len(names) == 2 or UNIFORM not in (d.first, d.second)  # far off, and in the table
-    ]
+) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
+    """Return pictures of the mean log densities, and of the differences between settings."""
+    if not folds:
+        return None, None
+    dots = {name: [float(mean[k]) for *_, mean in folds] for k, name in enumerate(found.settings)}
+    left_out = UNIFORM if len(dots) > 2 else None  # it is far off, and in the table
+    of_all = made.scores if made else ()
+    known = {one.name: (one.mean, one.mean - one.error, one.mean + one.error) for one in of_all}
+    scores = [(name, own, known.get(name, ())) for name, own in dots.items() if name != left_out]
+    differences: list[Strip] = []
+    for d in made.differences if made else ():
+        if left_out not in (d.first, d.second):
+            apart = [a - b for a, b in zip(dots[d.first], dots[d.second], strict=True)]
+            differences.append((f"{d.first} − {d.second}", apart, (d.mean, d.low, d.high)))
     label = "difference of a fold, nats a row"
-    return strips(lines, label, zero=True) if folds and lines else None
+    return (
+        strips(scores, "mean log density of a fold, nats"),
+        strips(differences, label, zero=True) if differences else None,
+    )
 
 
 WIDTH, NAMES, MARGIN, STEP = 720, 300, 24, 34
@@ -338,32 +328,19 @@ LETTER = 7.6
 """Largest width of a letter of a name, in pixels."""
 
 
-@dataclass(frozen=True)
-class Strip:
-    """A strip of the picture: dots for the folds, the mean of all rows and its interval."""
-
-    name: str
-    dots: Sequence[float]
-    mean: float | None = None
-    low: float | None = None
-    high: float | None = None
-
-
 def strips(lines: Sequence[Strip], label: str, *, zero: bool = False) -> dict[str, Any] | None:
     """Return what the template draws and where, in pixels; None if there is nothing to draw."""
-    values = [v for one in lines for v in (*one.dots, one.mean, one.low, one.high) if v is not None]
-    values = [v for v in values if math.isfinite(v)] + ([0.0] if zero else [])
+    values = [v for _, dots, known in lines for v in (*dots, *known) if math.isfinite(v)]
+    values += [0.0] if zero else []
     if not values:
         return None
     ticks = _ticks(min(values), max(values))
     low, high = min(ticks[0], *values), max(ticks[-1], *values)
-    names = min(NAMES, 30 + LETTER * max(len(one.name) for one in lines))
+    names = min(NAMES, 30 + LETTER * max(len(name) for name, *_ in lines))
     room = int((names - 20) / LETTER)
     decimals = max(0, -math.floor(math.log10(ticks[1] - ticks[0]) + 1e-9))
 
-    def place(value: float | None) -> float | None:
-        if value is None:
-            return None
+    def place(value: float) -> float:
         return names + (WIDTH - names - MARGIN) * (value - low) / (high - low)
 
     return {
@@ -372,19 +349,17 @@ def strips(lines: Sequence[Strip], label: str, *, zero: bool = False) -> dict[st
         "middle": (names + WIDTH - MARGIN) / 2,
         "foot": STEP * len(lines) + 8,
         "label": label,
-        "said": f"{label}: {', '.join(one.name for one in lines)}",
+        "said": f"{label}: {', '.join(name for name, *_ in lines)}",
         "ticks": [(place(t), f"{t:.{decimals}f}".replace("-", "\N{MINUS SIGN}")) for t in ticks],
         "zero": place(0.0) if zero else None,
         "strips": [
             {
-                "name": one.name if len(one.name) <= room else one.name[: room - 1] + "…",
+                "name": name if len(name) <= room else name[: room - 1] + "…",
                 "y": 4 + STEP * (k + 0.5),
-                "dots": [place(dot) for dot in one.dots if math.isfinite(dot)],
-                "mean": place(one.mean),
-                "low": place(one.low),
-                "high": place(one.high),
+                "dots": [place(dot) for dot in dots if math.isfinite(dot)],
+                "known": [place(value) for value in known],
             }
-            for k, one in enumerate(lines)
+            for k, (name, dots, known) in enumerate(lines)
         ],
     }
 

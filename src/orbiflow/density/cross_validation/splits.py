@@ -6,7 +6,6 @@ import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from orbiflow.density.cross_validation.operations import SCORES, UNIFORM, CrossV
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
 from orbiflow.density.inference import chart_of_observed
 from orbiflow.density.spaces import Space, space_class
-from orbiflow.density.tables import Table, TableRows, Unit, angle_unit, read_rows, read_table
+from orbiflow.density.tables import TableRows, Unit, angle_unit, read_rows, read_table
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import Note, Sink, one_blas_thread
 
@@ -30,28 +29,16 @@ MOST_BYTES = 256 * 2**20
 
 
 @dataclass(frozen=True, eq=False)
-class CvRows:
+class CvRows(TableRows):
     """The rows of a table that count.
 
-    - `table`: N rows, in the data's own units.
-    - `weights`: How much each counts, (N,); None if all count the same.
-    - `labels`: The group of each row, (N,); None if there are none.
     - `together`: A label for each row, (N,); rows of one label are on one side of every split.
     - `space`, `unit`: Those of the whole table, for its measure; no fit sees them.
     """
 
-    table: Table
-    weights: Array | None
-    labels: NDArray[np.str_] | None
     together: NDArray[Any] | None
     space: Space
     unit: Unit
-
-    @cached_property
-    def whole(self) -> NDArray[np.bool_]:
-        """Which rows lack nothing: the density of others is in another unit."""
-        found = np.logical_and.reduce(np.isfinite(self.table.values), axis=1)
-        return found if found.any() else np.ones_like(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +97,10 @@ class Fit:
 def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
     """Return the rows of the table that count."""
     width = asked.where.width
-    rows = _counting(read_rows(asked.data, asked.rows, tell, width=width, group=asked.group))
+    rows = read_rows(asked.data, asked.rows, tell, width=width, group=asked.group)
+    if rows.weights is not None:
+        weighed(torch.zeros(len(rows.weights), 1), rows.weights)  # refuses what is no weight
+        rows = rows.only(rows.weights > 0)  # others count for nothing
     table = rows.table
     unit = angle_unit(asked.where.space, asked.where.unit, table, tell)
     space = space_class(asked.where.space).for_data(
@@ -124,22 +114,13 @@ def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
             f"{asked.data}: {len(counts)} different rows; a cross-validation needs more than the "
             f"{LEAST_PLACES} that a density needs"
         )
-    labels = rows.labels()
-    together: NDArray[Any] | None = labels
-    if asked.density.repeats == "rounding" and labels is None:
+    together: NDArray[Any] | None = rows.labels
+    if asked.density.repeats == "rounding" and together is None:
         together = place.numpy()
     elif asked.density.repeats == "rounding":
         tell(Note("groups are kept together; equal rows of different groups may be on both sides"))
-    return CvRows(table, rows.weights, labels, together, space, unit)
-
-
-def _counting(rows: TableRows) -> TableRows:
-    """Return rows without those of weight 0, which count for nothing."""
-    weights = rows.weights
-    if weights is None:
-        return rows
-    weighed(torch.zeros(len(weights), 1), weights)  # refuses what is no weight
-    return replace(rows, table=rows.table.only(weights > 0), weights=weights[weights > 0])
+    read = (rows.path, table, rows.weights, rows.group, rows.header)
+    return CvRows(*read, together, space, unit)
 
 
 def splits_of(asked: CrossValidation, rows: CvRows) -> list[Split]:

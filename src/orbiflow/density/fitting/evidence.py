@@ -39,13 +39,12 @@ FLOOR = "uniform"
 class Candidates:
     """Log densities of all candidates at all rows that were held out.
 
-    - `families`, `names`: of each row of `table` (P, N); the last is the uniform floor.
+    - `keys`: family and name of each row of `table` (P, N); the last is the uniform floor.
     - `fitted`: of each family, what was fitted to each fold.
     - `row_weights`: of the rows (N,), None where all weigh the same.
     """
 
-    families: list[str]
-    names: list[str]
+    keys: list[tuple[str, str]]
     table: Tensor
     fitted: dict[str, list[dict[str, Density]]]
     row_weights: Tensor | None = None
@@ -53,11 +52,11 @@ class Candidates:
     @property
     def floor(self) -> Tensor:
         """A mask (P,) of the candidate that is the floor."""
-        return torch.tensor([family == FLOOR for family in self.families])
+        return torch.tensor([family == FLOOR for family, _ in self.keys])
 
     def of(self, *families: str) -> Tensor:
         """Return a mask (P,) of the floor and the candidates of these families."""
-        return torch.tensor([family in (FLOOR, *families) for family in self.families])
+        return torch.tensor([family in (FLOOR, *families) for family, _ in self.keys])
 
     def mixed(self, chosen: Tensor) -> Tensor:
         """Return the best weights (P,) of those of a mask (P,)."""
@@ -92,13 +91,8 @@ def candidates_of(
             _narrow(families, block, held)
     keys = [key for key in blocks[-1] if all(key in block for block in blocks)]
     table = torch.cat([torch.stack([block[key] for key in keys]) for block in blocks], dim=1)
-    return Candidates(
-        [family for family, _ in keys],
-        [name for _, name in keys],
-        table,
-        fitted,
-        None if weights[0] is None else torch.cat([own for own in weights if own is not None]),
-    )
+    known = [own for own in weights if own is not None]
+    return Candidates(keys, table, fitted, torch.cat(known) if known else None)
 
 
 def _teller(number: int, used: int, say: Progress) -> Callable[[str], None]:
@@ -133,7 +127,7 @@ def without_idle(candidates: Candidates, weights: Tensor) -> Tensor:
         if not idle:
             return weights
         worst = min(idle, key=lambda part: part.gain).name
-        rest = torch.tensor([family != worst for family in candidates.families]) & (
+        rest = torch.tensor([family != worst for family, _ in candidates.keys]) & (
             (weights > 0) | candidates.floor
         )
         weights = candidates.mixed(rest)
@@ -144,7 +138,7 @@ def judged(candidates: Candidates, weights: Tensor) -> list[ComponentEvidence]:
     table, own_weights = candidates.table, candidates.row_weights
     whole, uniform = stacked(table, weights), table[-1]
     found: list[ComponentEvidence] = []
-    names = [name for name in dict.fromkeys(candidates.families) if name != FLOOR]
+    names = dict.fromkeys(family for family, _ in candidates.keys if family != FLOOR)
     for name in names:
         own = candidates.of(name)
         alone = stacked(table, candidates.mixed(own))
@@ -172,9 +166,7 @@ def assembled(
     for family in families:
         chosen = [
             (name, float(weight))
-            for own, name, weight in zip(
-                candidates.families, candidates.names, weights, strict=True
-            )
+            for (own, name), weight in zip(candidates.keys, weights, strict=True)
             if own == family.name and weight > 0
         ]
         final = family.final(rows, candidates.fitted[family.name], [name for name, _ in chosen])

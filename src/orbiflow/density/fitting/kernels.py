@@ -71,7 +71,9 @@ def kernel_estimates(
     narrowest kernels, about the places of several points alone, if `repeats` are real.
     """
     rows = rows[:MOST_CENTERS]
-    train, own = rows.points, None if rows.weights is None else rows.weights / rows.weights.sum()
+    train, own = rows.points, torch.full((len(rows),), 1 / len(rows), dtype=torch.float64)
+    if rows.weights is not None:
+        own = rows.weights / rows.weights.sum()
     found: dict[str, AdaptiveKernels] = {}
     for kappa in np.geomspace(WIDEST, narrowest, LADDER):
         found[f"width {kappa**-0.5:.2g}"] = even_kernels(space, train, float(kappa), own)
@@ -80,7 +82,7 @@ def kernel_estimates(
         0, place, torch.arange(len(train)), "amin"
     )
     centers, weights = train[first], counts.double() / len(train)
-    if own is not None:
+    if rows.weights is not None:
         weights = torch.zeros_like(weights).index_add_(0, place, own)
     found |= dict(_near_kernels(space, centers, weights, narrowest))
     repeated = counts > 1
@@ -90,13 +92,9 @@ def kernel_estimates(
     return found
 
 
-def even_kernels(
-    space: Space, centers: Tensor, kappa: float, weights: Tensor | None = None
-) -> AdaptiveKernels:
-    """Return kernels of one concentration about centers (N, d); weights are equal by default."""
+def even_kernels(space: Space, centers: Tensor, kappa: float, weights: Tensor) -> AdaptiveKernels:
+    """Return kernels of one concentration about centers (N, d)."""
     width = 1 if space.is_round else space.dim
-    if weights is None:
-        weights = torch.full((len(centers),), 1 / len(centers), dtype=torch.float64)
     return AdaptiveKernels(space, centers, centers.new_full((len(centers), width), kappa), weights)
 
 
@@ -138,7 +136,13 @@ def fit_mixture(
     owns = [None] * len(blocks) if row_weights is None else torch.split(row_weights, BLOCK)
     gaps = [None] * len(blocks) if bool(whole.all()) else torch.split(absent.to(images), BLOCK)
     every = list(zip(blocks, owns, gaps, strict=True))
-    mean = _spread_out(images[:, whole], components, generator, train[whole].weights)
+    seen = images[:, whole]
+
+    def away(row: int) -> Tensor:
+        return ((seen - seen[0, row]) ** 2).sum(dim=-1).amin(dim=0)
+
+    chosen = far_apart(away, seen.shape[1], components, generator, train[whole].weights)
+    mean = seen[0, chosen].clone()
     width = 1 if space.is_round else space.dim
     kappa = mean.new_full((components, width), 10.0)
     weights = mean.new_full((components,), 1 / components)
@@ -154,18 +158,6 @@ def fit_mixture(
             break
         last = score
     return AdaptiveKernels(space, _points(space, mean), kappa, weights)
-
-
-def _spread_out(
-    images: Tensor, count: int, generator: torch.Generator, row_weights: Tensor | None
-) -> Tensor:
-    """Return features (K, m) of points far from each other over their images (E, N, m): k-means++."""
-    own = images[0]
-
-    def away(row: int) -> Tensor:
-        return ((images - own[row]) ** 2).sum(dim=-1).amin(dim=0)
-
-    return own[far_apart(away, len(own), count, generator, row_weights)].clone()
 
 
 def _expectation(

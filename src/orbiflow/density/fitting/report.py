@@ -73,10 +73,8 @@ class FitReport:
     uniform density; `stages`, `steps` and `integration_error` are the flow's, if it has a share.
 
     - `points`, `duplicates`: data points, and those that equal an earlier one.
-    - `train`, `validation`: points of each.
     - `train_nll`, `validation_nll`: mean negative log density at the end, of `MOST_REPORTED` points
-      at most.
-    - `start_nll`: on the validation points, of the closed-form start.
+      at most; `start_nll`: on the validation points, of the closed-form start.
     - `stages`: one for each roughness, without those that were undone.
     - `steps`: RK4 steps a segment, in the end.
     - `mass`: integral over the square, see `FlowDensity.mass`; None above two dimensions.
@@ -115,11 +113,7 @@ class FitReport:
 
 
 def report_from_json(document: Mapping[str, Any]) -> FitReport:
-    """A report from the object that `dataclasses.asdict` makes of it, infinite figures as None.
-
-    Raises:
-        OrbiflowError: for what is no such object.
-    """
+    """A report from the object that `FitReport.to_json` returns."""
     try:
         values: dict[str, Any] = dict(document) | {"notes": tuple(document["notes"])}
         stages = tuple(

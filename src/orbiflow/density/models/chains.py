@@ -59,9 +59,6 @@ class VonMisesChains(Density, kind="chains"):
         concentrations: Concentrations (K, d), at least 0; 0 is uniform.
         order: The numbers (K, d) of the angles from the first to the last of each chain; default
             0, 1, ..., d - 1.
-
-    Raises:
-        OrbiflowError: for another space, wrong shapes or values that make no distribution.
     """
 
     stored = ("log_weights", "means", "concentrations", "order")

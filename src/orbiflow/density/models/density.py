@@ -234,9 +234,6 @@ class Density(Distribution):
         Args:
             sample_shape: A shape or a number of points.
             generator: The same state gives the same points. Default: torch's own generator.
-
-        Raises:
-            OrbiflowError: for what is no shape.
         """
         with torch.no_grad():
             return self.rsample(sample_shape, generator)
@@ -324,11 +321,6 @@ class Split:
     def observed(self) -> tuple[int, ...]:
         """The angles kept, then those given."""
         return (*self.kept, *self.given)
-
-    def located(self, points: Tensor) -> Tensor:
-        """Return kept angles (N, r) and the given ones behind them: (N, r + g)."""
-        given = points.new_tensor(self.values).expand(len(points), -1)
-        return torch.cat([points, given], dim=1)
 
 
 class Restriction(NamedTuple):

@@ -38,9 +38,6 @@ class AdaptiveKernels(Density, kind="kernels"):
         centers: The chart points (N, d) that the kernels are about.
         concentrations: Concentrations kappa > 0, (N, d) on flat spaces and (N, 1) on round ones.
         weights: Weights (N,) of sum 1.
-
-    Raises:
-        OrbiflowError: for wrong shapes or values.
     """
 
     stored = ("centers", "concentrations", "weights")
@@ -100,16 +97,12 @@ class AdaptiveKernels(Density, kind="kernels"):
 
         Each has weights of sum 1; None if there are none.
         """
-        weight = float(self.weights[wide].sum())
-        found = [
-            AdaptiveKernels(
-                self.space, self.centers[w], self.concentrations[w], self.weights[w] / share
-            )
-            if share > 0
-            else None
-            for w, share in ((wide, weight), (~wide, float(self.weights[~wide].sum())))
-        ]
-        return found[0], found[1], weight
+        found: list[AdaptiveKernels | None] = []
+        shares = [float(self.weights[which].sum()) for which in (wide, ~wide)]
+        for which, share in zip((wide, ~wide), shares, strict=True):
+            own = self.centers[which], self.concentrations[which], self.weights[which] / share
+            found.append(AdaptiveKernels(self.space, *own) if share > 0 else None)
+        return found[0], found[1], shares[0]
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         seed = int(torch.randint(2**31, (), generator=generator))

@@ -31,9 +31,6 @@ class Mixture(Density, kind="mixture"):
         components: The densities: of any kind, also mixtures.
         weights: Their weights (P,): positive, of sum 1; kept on the CPU.
 
-    Raises:
-        OrbiflowError: for components on spaces of another group, or weights that do not fit.
-
     >>> from orbiflow.density import UniformDensity, VonMisesDensity, make_space
     >>> space = make_space("torus")
     >>> Mixture([VonMisesDensity(space), UniformDensity(space)], [0.75, 0.25])
@@ -90,10 +87,9 @@ class Mixture(Density, kind="mixture"):
 
     @property
     def kernel_part(self) -> tuple[float, AdaptiveKernels] | None:
-        parts: list[tuple[float, AdaptiveKernels]] = []
-        for one, weight in zip(self.components, listed(self.weights), strict=True):
-            if (own := one.kernel_part) is not None:
-                parts.append((weight * own[0], own[1]))
+        weighted = zip(self.components, listed(self.weights), strict=True)
+        found = ((weight, one.kernel_part) for one, weight in weighted)
+        parts = [(weight * own[0], own[1]) for weight, own in found if own is not None]
         if len(parts) < 2:
             return parts[0] if parts else None
         weights = torch.tensor([weight for weight, _ in parts], dtype=torch.float64)

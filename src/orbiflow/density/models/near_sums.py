@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import torch
@@ -83,18 +83,6 @@ class _NearLogSum(torch.autograd.Function):
         return found, None, None, None
 
 
-class _Part(NamedTuple):
-    """Points by their numbers (N,), their features (m, N), and the terms that count there.
-
-    - `idle`: How often in a row nothing was left out.
-    """
-
-    numbers: np.ndarray
-    features: Tensor
-    terms: Terms
-    idle: int
-
-
 class _Walk:
     """Logarithms (N,) of sums, and their gradients (m, N) in the features if they are wanted."""
 
@@ -110,33 +98,30 @@ class _Walk:
         features = features.detach()
         self.log_sum = torch.full_like(features[0], -math.inf)
         self.slope = torch.zeros_like(features) if slope else None
-        stack = [_Part(np.arange(len(self.log_sum)), features, terms, 0)]
-        while stack and len(self.log_sum):
-            stack += self.step(stack.pop())
+        if len(self.log_sum):
+            self._add_terms(torch.arange(len(self.log_sum)), features, terms, 0)
 
-    def step(self, part: _Part) -> list[_Part]:
-        """Treat a part, or return its halves."""
-        index, features, terms, idle = part
-        tile = Tile(features, terms.factors)
+    def _add_terms(self, at: Tensor, features: Tensor, terms: Terms, idle: int) -> None:
+        """Add terms at points, by their numbers (N,) and features (m, N), or in both halves of them.
+
+        Nothing has been left out `idle` times in a row.
+        """
+        tile, count, given = Tile(features, terms.factors), len(at), terms.size
         least, largest = tile.bounds(terms)
         bottom = max(self.floor, float(least.logsumexp(dim=0)))
         near = largest > bottom + self.each
         if not bool(near.all()):
             terms, least, largest = terms.only(near), least[near], largest[near]
-        terms = self._interpolated(part._replace(terms=terms), tile, least, largest, bottom)
+        terms = self._interpolated(at, features, terms, tile, least, largest, bottom)
         if not terms.size:
-            return []
-        count = len(index)
-        idle = 0 if terms.size < LESS * part.terms.size or count > self.worth else idle + 1
+            return
+        idle = 0 if terms.size < LESS * given or count > self.worth else idle + 1
         if count > FEW_POINTS and count * terms.size > FEW_PAIRS and idle <= IDLE:
-            return [
-                _Part(index[at], features[:, torch.as_tensor(at)], terms, idle)
-                for at in _halves(features, tile)
-            ]
+            for half in _halves(features, tile):
+                self._add_terms(at[half], features[:, half], terms, idle)
+            return
         spread = float(terms.peaks.max()) - bottom
-        found = terms.log_sum(features, tile.middle, spread, slope=self.slope is not None)
-        self._add(torch.as_tensor(index), *found)
-        return []
+        self._add(at, *terms.log_sum(features, tile.middle, spread, slope=self.slope is not None))
 
     def _add(self, at: Tensor, log_sum: Tensor, slope: Tensor | None) -> None:
         """Add to the sums at some points (N,) the logarithms of others, with their gradients (m, N)."""
@@ -148,16 +133,22 @@ class _Walk:
             self.slope[:, at] = self.slope[:, at] * old + slope * new
 
     def _interpolated(
-        self, part: _Part, tile: Tile, least: Tensor, largest: Tensor, bottom: float
+        self,
+        at: Tensor,
+        features: Tensor,
+        terms: Terms,
+        tile: Tile,
+        least: Tensor,
+        largest: Tensor,
+        bottom: float,
     ) -> Terms:
         """Add terms that are smooth across the tile to the sums, and return the others."""
-        terms = part.terms
-        if len(part.numbers) < self.worth or terms.size < WORTH_TERMS or not tile.has_chart:
+        if len(at) < self.worth or terms.size < WORTH_TERMS or not tile.has_chart:
             return terms
         wide = (terms.kappa * tile.radius[:, None] ** 2).amax(dim=0) < SMOOTH_AT_MOST
         if int(wide.sum()) < WORTH_TERMS:
             return terms
-        chart = Chart(part.features, tile)
+        chart = Chart(features, tile)
         allowed = (self.tolerance + least).clamp_min_(bottom + self.each)
         smooth = wide & (chart.errors(terms, largest) < allowed)
         if int(smooth.sum()) < WORTH_TERMS:
@@ -167,14 +158,14 @@ class _Walk:
         values.clamp_min_(LEAST)  # what is negligible beside others may come out below 0
         if slope is not None:
             slope = slope / values
-        self._add(torch.as_tensor(part.numbers), values.log() + top, slope)
+        self._add(at, values.log() + top, slope)
         return terms.only(~smooth)
 
 
-def _halves(features: Tensor, tile: Tile) -> tuple[np.ndarray, np.ndarray]:
+def _halves(features: Tensor, tile: Tile) -> tuple[Tensor, Tensor]:
     """Return the numbers of the points in both halves, across the tile's longest side."""
     along = features[int(tile.sides.argmax())].numpy()
-    order = np.argpartition(along, len(along) // 2)
+    order = torch.as_tensor(np.argpartition(along, len(along) // 2))
     return order[: len(along) // 2], order[len(along) // 2 :]
 
 
@@ -256,24 +247,21 @@ class Chart:
         """
         centers = self._turned(terms.centers)
         lebesgue = 1 + 2 / math.pi * math.log(NODES)
-        worst = None
+        worst = largest + ROUNDING
         for axis in range(len(self.middle)):
             factor = axis if self.factors > 1 else 0
-            kappa, best = terms.kappa[factor], None
+            best = torch.full_like(largest, math.inf)
             for rho in ELLIPSES:
                 cosine = self._ellipse(axis, rho, centers[factor])
                 if cosine is not None:
                     scale = math.log(8 * lebesgue / (rho - 1)) - (NODES - 1) * math.log(rho)
-                    found = cosine.sub_(1).mul_(kappa).add_(scale + BETWEEN)
-                    best = found if best is None else torch.minimum(best, found)
-            if best is None:
-                return torch.full_like(largest, math.inf)
+                    found = cosine.sub_(1).mul_(terms.kappa[factor]).add_(scale + BETWEEN)
+                    best = torch.minimum(best, found)
             if self.factors > 1:
                 # terms are products: the other factor's largest value counts as it is
                 best += largest - terms.peaks + self._nearest2(terms, factor) / 2
-            worst = best if worst is None else torch.maximum(worst, best)
-        assert worst is not None
-        return torch.maximum(worst + terms.peaks, largest + ROUNDING)
+            worst = torch.maximum(worst, best + terms.peaks)
+        return worst
 
     def sum(self, terms: Terms, top: float, *, slope: bool) -> tuple[Tensor, Tensor | None]:
         """Return the sum (N,) of terms at the tile's points over exp(top), and its gradient (m, N).
@@ -284,18 +272,15 @@ class Chart:
         sides = self.middle[:, None] + self.half[:, None] * nodes
         flat = len(terms.kappa) == 2
         table = self._product(terms, top, sides) if flat else self._dense(terms, top, sides)
-        weights, rates = zip(*(_lagrange(t, slope) for t in self._t), strict=True)
-        if len(weights) == 1:
-            values, rated = weights[0] @ table[:, 0], [rates[0] @ table[:, 0]] if slope else []
-        else:
-            first = weights[0] @ table
-            values = (first * weights[1]).sum(dim=1)
-            rated = [
-                *([((rates[0] @ table) * weights[1]).sum(dim=1)] if slope else []),
-                *([(first * rates[1]).sum(dim=1)] if slope else []),
-            ]
-        if not slope:
+        (along, rising), *second = (_lagrange(t, slope) for t in self._t)
+        across, turning = second[0] if second else (torch.ones_like(along[:, :1]), None)
+        rows = along @ table
+        values = (rows * across).sum(dim=1)
+        if rising is None:
             return values, None
+        rated = [((rising @ table) * across).sum(dim=1)]
+        if turning is not None:
+            rated.append((rows * turning).sum(dim=1))
         return values, self._in_features(torch.stack(rated) / self.half[:, None])
 
     def _in_features(self, slope: Tensor) -> Tensor:

@@ -52,9 +52,6 @@ class VonMisesNetwork(Density, kind="network"):
     Args:
         space: A `Torus`.
         factors: One for each angle, parents before their children.
-
-    Raises:
-        OrbiflowError: for another space, angles without a factor or with two, or parents after a child.
     """
 
     article = "a network"

@@ -84,28 +84,26 @@ def _check_what_is_compared(
     data: Sequence[Path], models: Sequence[Path], space: str | None, unit: str | None
 ) -> None:
     """Check that there are models and a table, or two tables and a space."""
-    if not models and len(data) != 2:
-        raise SettingError(
+    if models:
+        wrong = {
+            "{models} must be given twice or more, to be compared; or give two {data}": len(models)
+            < 2,
+            "{models} names one folder twice: give each once": len(set(models)) < len(models),
+            "models are compared at one {data}, rows that none was fitted to": len(data) != 1,
+            "{space} is that of the models: leave it out": space is not None,
+            "{unit} is that of the models: leave it out": unit is not None,
+        }
+    else:
+        wrong = {
             "give two {models} or more and one {data} to compare models, or two {data} and their "
-            "{space} to compare data"
-        )
-    if not models and space is None:
-        raise SettingError("two {data} need their {space}")
-    if not models and data[0].resolve() == data[1].resolve():
-        raise SettingError("{data} names one file twice: give two data sets")
-    if not models:
-        return
-    if len(models) < 2:
-        raise SettingError(
-            "{models} must be given twice or more, to be compared; or give two {data}"
-        )
-    if len(set(models)) < len(models):
-        raise SettingError("{models} names one folder twice: give each once")
-    if len(data) != 1:
-        raise SettingError("models are compared at one {data}, rows that none was fitted to")
-    for name, value in (("space", space), ("unit", unit)):
-        if value is not None:
-            raise SettingError(f"{{{name}}} is that of the models: leave it out")
+            "{space} to compare data": len(data) != 2,
+            "two {data} need their {space}": space is None,
+            "{data} names one file twice: give two data sets": data[0].resolve()
+            == data[-1].resolve(),
+        }
+    for message, is_wrong in wrong.items():
+        if is_wrong:
+            raise SettingError(message)
 
 
 @dataclass(frozen=True)
@@ -149,7 +147,7 @@ def _compare_models(
 
         scores[name] = comparing.scores_of(density, values, told)
         notes += _notes_on_known_rows(name, density, extra, values)
-    groups = next(iter(found.values())).labels()
+    groups = next(iter(found.values())).labels
     made = comparing.compare_scores(scores, settings, groups=groups)
     return replace(made, notes=(*notes, *made.notes))
 
@@ -169,7 +167,7 @@ def _compare_data(
     )
     groups = None
     if read.group is not None:
-        groups = {name: np.asarray(rows.labels()) for name, rows in found.items()}
+        groups = {name: np.asarray(rows.labels) for name, rows in found.items()}
     values = {name: rows.table.values for name, rows in found.items()}
     both = next(iter(found.values())).table
     if len({own.shape[1] for own in values.values()}) == 1:

@@ -59,27 +59,16 @@ def fit(
     settings.check_rows("refuse", None if group is None else "group")
     if reading.missing == "marginalise":
         check_marginalised(where, settings)
-
-    from orbiflow.density.estimator import DensityEstimator
-
     with runtime.one_thread():
         rows = tables.read_rows(data, reading, on_event, width=where.width, group=group)
-        labels, values = rows.labels(), rows.table.values
-        unit = tables.angle_unit(where.space, where.unit, rows.table, on_event)
+        values = rows.table.values
         folder = runtime.ResultFolder(out, written_files)
         runtime.check_output_folder(out, data)
-        estimator = DensityEstimator.with_settings(
-            where.space, settings, unit=unit, missing=reading.kept_missing
-        )
-        progress = runtime.progress_events(on_event, cancel)
-        estimator.fit(values, sample_weight=rows.weights, groups=labels, progress=progress)
+        estimator = fit_rows(rows, where, settings, reading, on_event, cancel)
         asked = {**settings.values(), **reading.values(), "group": group}
         document = _document(estimator, rows, asked, settings.seed)
         document["seconds"] = time.perf_counter() - begin
-        whole = values[rows.whole]
-        known = None
-        if len(whole):
-            known = comparing.RowSketch.of(estimator.space_, whole).to_json()
+        known = comparing.RowSketch.of(estimator.space_, values[rows.whole]).to_json()
         model = models.density_to_bytes(
             estimator.density_, columns=list(rows.table.columns), fitted_rows=known
         )
@@ -95,6 +84,25 @@ def fit(
     summary = {name: document[name] for name in ("log_likelihood", "seconds")}
     summary |= {"folder": str(out), "rows": len(values)}
     return runtime.Outcome({**summary, "picture": pictures.THUMBNAIL if picture else None})
+
+
+def fit_rows(
+    rows: TableRows,
+    where: SpaceSettings,
+    settings: ComponentSettings,
+    reading: RowSettings,
+    tell: runtime.Sink,
+    cancel: runtime.Cancel,
+) -> DensityEstimator:
+    """Fit a density to the rows of a table."""
+    from orbiflow.density.estimator import DensityEstimator
+
+    values, labels = rows.table.values, rows.labels
+    unit = tables.angle_unit(where.space, where.unit, rows.table, tell)
+    given = {name: getattr(settings, name) for name in settings.fields_given}
+    estimator = DensityEstimator(where.space, unit=unit, missing=reading.kept_missing, **given)
+    progress = runtime.progress_events(tell, cancel)
+    return estimator.fit(values, sample_weight=rows.weights, groups=labels, progress=progress)
 
 
 def check_marginalised(where: SpaceSettings, settings: DensitySettings) -> None:

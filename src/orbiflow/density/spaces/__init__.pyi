@@ -1,6 +1,3 @@
-from .catalogue import SPACES as SPACES
-from .catalogue import make_space as make_space
-from .catalogue import space_class as space_class
 from .flat import KleinBottle as KleinBottle
 from .flat import Torus as Torus
 from .flat import whole_turn as whole_turn
@@ -14,8 +11,11 @@ from .round import to_latlon as to_latlon
 from .round import to_vectors as to_vectors
 from .space import CHART as CHART
 from .space import MEASURES as MEASURES
+from .space import SPACES as SPACES
 from .space import Space as Space
 from .space import check_measure as check_measure
 from .space import checked_table as checked_table
+from .space import make_space as make_space
 from .space import rectangle as rectangle
 from .space import row_count as row_count
+from .space import space_class as space_class

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from abc import ABC, abstractmethod
 from functools import cached_property, lru_cache
@@ -12,7 +13,7 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_choice, as_tensor
+from orbiflow.arguments import as_choice, as_tensor, is_a
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup, DirichletDomain, identification_group
@@ -203,6 +204,33 @@ class Space(ABC):
     def __repr__(self) -> str:
         options = ", ".join(f"{k}={v!r}" for k, v in self.settings().items())
         return f"{type(self).__name__}({options})"
+
+
+SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
+"""Names of the four spaces."""
+
+
+def space_class(name: str) -> type[Space]:
+    """Return the class of a space, by its name."""
+    from orbiflow.density import spaces  # whose classes import this file
+
+    if not is_a(name, str) or name not in SPACES:
+        raise OrbiflowError(f"unknown space {name!r}; the four are {', '.join(SPACES)}")
+    four = (spaces.Torus, spaces.Sphere, spaces.KleinBottle, spaces.ProjectivePlane)
+    return dict(zip(SPACES, four, strict=True))[name]
+
+
+def make_space(name: str, **options: Any) -> Space:
+    """Return a space by its name, with the options of its class.
+
+    >>> make_space("torus", dim=2, unit="degrees")
+    Torus(dim=2, unit='degrees')
+    """
+    kind = space_class(name)
+    wrong = [key for key in options if key not in inspect.signature(kind).parameters]
+    if wrong:
+        raise OrbiflowError(f"the {name} has no option {', '.join(wrong)}")
+    return kind(**options)
 
 
 def check_measure(measure: str) -> None:

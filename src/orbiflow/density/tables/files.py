@@ -89,7 +89,8 @@ def append_columns(
         elif number in table.dropped:
             cells = ["nan" if end == " " else ""] * len(values)
         elif lines[done] == number:
-            cells = [_number_cell(column[done], table) for column in values]
+            numbers = (f"{column[done]:.10g}".replace(".", table.decimal) for column in values)
+            cells = [f'"{cell}"' if table.decimal == end else cell for cell in numbers]
             done += 1
         else:
             raise changed
@@ -112,11 +113,6 @@ def to_csv(columns: Sequence[str], values: ArrayLike) -> bytes:
     out.write((",".join(_name_cell(name, ",") for name in columns) + "\n").encode())
     np.savetxt(out, values, fmt="%.10g", delimiter=",")
     return out.getvalue()
-
-
-def _number_cell(value: float, table: Table) -> str:
-    cell = f"{value:.10g}".replace(".", table.decimal)
-    return f'"{cell}"' if table.decimal == table.delimiter else cell
 
 
 def _free_names(wanted: Iterable[str], taken: Sequence[str]) -> list[str]:

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -34,17 +35,24 @@ class TableRows:
 
     path: Path
     table: Table
-    weights: Array | None = None
-    group: str | None = None
-    header: bool | None = None
+    weights: Array | None
+    group: str | None
+    header: bool | None
+
+    def only(self, kept: NDArray[np.bool_]) -> TableRows:
+        """Return the rows of a mask (N,)."""
+        weights = None if self.weights is None else self.weights[kept]
+        return TableRows(self.path, self.table.only(kept), weights, self.group, self.header)
 
     @property
     def whole(self) -> NDArray[np.bool_]:
-        """Which rows (N,) lack no value."""
-        return np.logical_and.reduce(np.isfinite(self.table.values), axis=1)
+        """Which rows (N,) lack no value, or all, if none is whole: others have another unit."""
+        found = np.logical_and.reduce(np.isfinite(self.table.values), axis=1)
+        return found if found.any() else np.ones_like(found)
 
+    @cached_property
     def labels(self) -> NDArray[np.str_] | None:
-        """Return what each row belongs to, (N,), or None if no column says so."""
+        """What each row belongs to, (N,), or None if no column says so."""
         if self.group is None:
             return None
         return read_labels(self.path, self.group, self.table, has_header=self.header)

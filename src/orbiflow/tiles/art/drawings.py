@@ -48,9 +48,7 @@ def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
     check_file(path)
     drawing = Drawing(path, parse_xml(path, read_bytes(path, MAX_BYTES)))
     drawing.collect()
-    linear, offset = _onto(path, drawing, tile)
-    size = float(np.sqrt(abs(tile.tile.signed_area)))
-    carry = _Carry(tile, linear, offset, size)
+    carry = _Carry(tile, *_onto(path, drawing, tile))
     parts: list[Part] = []
     for shape in drawing.shapes:
         try:
@@ -83,11 +81,11 @@ def _onto(path: Path, drawing: Drawing, tile: EscherTile) -> tuple[Array, Array]
 class _Carry:
     """The map from the drawing to the tile, point by point."""
 
-    def __init__(self, tile: EscherTile, linear: Array, offset: Array, size: float) -> None:
-        self.tile, self.linear, self.offset, self.size = tile, linear, offset, size
+    def __init__(self, tile: EscherTile, linear: Array, offset: Array) -> None:
+        self.tile, self.linear, self.offset, self.count = tile, linear, offset, 0
+        self.size = float(np.sqrt(abs(tile.tile.signed_area)))
         self.scale = float(np.sqrt(abs(np.linalg.det(linear))))
-        self.tolerance = FLATNESS * size / self.scale
-        self.count = 0
+        self.tolerance = FLATNESS * self.size / self.scale
 
     def __call__(self, points: Array, *, closed: bool) -> Array:
         here = points @ self.linear.T + self.offset

@@ -156,24 +156,19 @@ def tiling_scene(layout: Layout) -> Scene:
     turned = np.einsum("aij,j->ai", copies.group.linear_parts, middle)
     offsets = copies.translations + turned[copies.cosets]
     chosen = palette(settings.palette)
+    box, layers, line = layout.box, list[Layer](), settings.stroke or "#000000"
+    colours = np.zeros(len(copies), dtype=np.int64)
     if settings.filled:
+        line = settings.stroke or chosen.outline
         colours = colouring(layout.tile).colours(copies)
-    else:
-        colours = np.zeros(len(copies), dtype=np.int64)
-    layers = []
+        layers.append(Layer("paper", "paper", Style(fill=chosen.paper), (rectangle(box),)))
     for colour in range(int(colours.max(initial=0)) + 1):
         own = colours == colour
         uses = Uses(SYMBOL, copies.group.linear_parts, copies.cosets[own], offsets[own])
         name = f"colour {colour + 1}" if settings.filled else "tiles"
-        style = Style(
-            chosen.fill(colour) if settings.filled else None,
-            settings.stroke or (chosen.outline if settings.filled else "#000000"),
-            settings.stroke_width or 0.25,
-        )
+        fill = chosen.fill(colour) if settings.filled else None
+        style = Style(fill, line, settings.stroke_width or 0.25)
         layers.append(Layer(name, "tiles", style, (uses,), clipped=settings.clip))
-    box = layout.box
-    if settings.filled:
-        layers.insert(0, Layer("paper", "paper", Style(fill=chosen.paper), (rectangle(box),)))
     return Scene(
         *settings.page,
         tuple(layers),
