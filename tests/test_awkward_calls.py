@@ -155,7 +155,6 @@ REFUSED: list[tuple[Call, Any, str]] = [
     (MODEL.inverse, whole[None], "points are torch.int64"),
     (MODEL.inverse, space, r"shape \(S, N, 2"),
     (MODEL, [[0.0, 0.0, 0.0]], r"shape \(..., N, 2\)"),
-    (MODEL.boundary, 0, "pieces must be at least 1"),
     (MODEL.take, [5], "from 0 to 0, got 5"),
     (MODEL.take, [], "choose at least one"),
     (Model.joined, [], "got none"),

@@ -13,7 +13,7 @@ from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import one_thread
-from orbiflow.tiles.likeness import Pinned, Recogniser, compare, iou, least_neck, narrowest_neck
+from orbiflow.tiles.likeness import Pinned, Recogniser, compare, iou, narrowest_neck
 from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
 from orbiflow.tiles.search.candidates import Fit, StillTiles
@@ -108,11 +108,7 @@ def recogniser(target: Target) -> Recogniser:
 
 
 def certified_tiles(
-    target: Target,
-    found: Fit | StillTiles | TileModel,
-    *,
-    force: bool = False,
-    min_neck: float = 0.0,
+    target: Target, found: Fit | StillTiles | TileModel, *, force: bool = False
 ) -> list[EscherTile]:
     """Return polygons of what was fitted to a target, each proved to tile the plane, best first.
 
@@ -120,7 +116,6 @@ def certified_tiles(
         target: The silhouette.
         found: What `fit_tile` gave, or candidates, such as a `TileModel` trained further or loaded.
         force: Give tiles that are not certified, too; their certificates say why.
-        min_neck: The narrowest neck that a tile's score forgives, a share of its size.
 
     Raises:
         OrbiflowError: for what holds no candidates.
@@ -134,4 +129,4 @@ def certified_tiles(
             )
         found = Fit(found, found.size, 0, found.size)
     with one_thread():
-        return best_tiles(target, found, force=force, min_neck=least_neck(target.normal, min_neck))
+        return best_tiles(target, found, force=force)
