@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from density.quick_fits import quick_search
 from orbiflow.density import DensityEstimator, Mixture
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
@@ -112,9 +113,11 @@ def test_the_published_evaluation_is_off_and_less_so_with_steps(module) -> None:
 
 @pytest.mark.parametrize("dim", [2, 4])
 def test_the_integral_is_seen_from_values(module, dim: int, monkeypatch) -> None:
+    quick_search(monkeypatch)
+    monkeypatch.setattr(module("density_integral"), "GRID", 128)
     integral = module("density_integral").integral
     rng = np.random.default_rng(4)
-    rows = rng.vonmises(rng.uniform(-3, 3, (3, dim))[rng.integers(3, size=400)], 20.0)
+    rows = rng.vonmises(rng.uniform(-3, 3, (3, dim))[rng.integers(3, size=240)], 20.0)
     rows[:40] = rows[40:80]  # so that there are narrow kernels
     density = (
         DensityEstimator("torus", components="kernels,mixture,chains", seed=0).fit(rows).density_
