@@ -115,6 +115,7 @@ def test_the_published_evaluation_is_off_and_less_so_with_steps(module) -> None:
 def test_the_integral_is_seen_from_values(module, dim: int, monkeypatch) -> None:
     quick_search(monkeypatch)
     monkeypatch.setattr(module("density_integral"), "GRID", 128)
+    monkeypatch.setattr(module("density_integral"), "LOOKED_AT", 20)
     integral = module("density_integral").integral
     rng = np.random.default_rng(4)
     rows = rng.vonmises(rng.uniform(-3, 3, (3, dim))[rng.integers(3, size=240)], 20.0)

@@ -22,10 +22,10 @@ def data(count: int = 400) -> np.ndarray:
 def test_five_angles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     few_kernels(monkeypatch)
     points = data()
-    estimator = DensityEstimator("torus", unit="degrees").fit(points[:300])
+    estimator = DensityEstimator("torus", unit="degrees").fit(points[:200])
     assert isinstance(estimator.density_, Mixture)
     assert "chains" in estimator.density_.weight_of_kind
-    assert estimator.score(points[300:]) > -5 * np.log(360) + 3
+    assert estimator.score(points[200:]) > -5 * np.log(360) + 3
     assert estimator.sample(7, random_state=1).shape == (7, 5)
     path = tmp_path / "density.safetensors"
     path.write_bytes(density_to_bytes(estimator.density_, columns=list("abcde")))

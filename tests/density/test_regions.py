@@ -93,7 +93,7 @@ def test_caps_on_the_sphere(lat: float, lon: float) -> None:
     assert outline.size == pytest.approx(2 * math.pi * own, rel=2e-3)
     assert outline.mass == pytest.approx(mass, abs=4 * math.hypot(region.error, outline.error))
     rng = np.random.default_rng(0)
-    vectors = rng.normal(size=(20_000, 3)) * 0.4 + make_vectors(lat, lon)
+    vectors = rng.normal(size=(8_000, 3)) * 0.4 + make_vectors(lat, lon)
     data = space.from_chart(
         make_space("sphere").to_chart(vectors / np.linalg.norm(vectors, axis=1)[:, None])
     )
@@ -155,7 +155,7 @@ def test_polygons_hold_what_the_region_holds_and_edges_are_glued(name: str) -> N
     levels = DensityLevels(density, seed=2)
     regions = [levels.highest(0.3), levels.highest(0.9), levels.above(-40.0)]
     drawn = outlines(levels, regions)
-    points = space.uniform(20_000, torch.Generator().manual_seed(1))
+    points = space.uniform(10_000, torch.Generator().manual_seed(1))
     data, flat = space.from_chart(points), drawn[0].window.from_chart(points)
     for outline in drawn:
         assert outline.notes == ()
@@ -192,6 +192,7 @@ def test_islands_between_the_nodes_are_found() -> None:
     assert any("too small to outline" in note for note in rough.notes)
 
 
+@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("dim", [1, 2, 4])
 def test_thresholds_in_any_dimension(dim: int) -> None:
     rng = np.random.default_rng(dim)
