@@ -163,7 +163,9 @@ SQUARE = Exhibit(
     _draw_flows,
 )
 
-TITLES = dict(zip(SPACES, ("torus", "sphere", "Klein bottle", "projective plane"), strict=True))
+TITLES: dict[str, str] = dict(
+    zip(SPACES, ("torus", "sphere", "Klein bottle", "projective plane"), strict=True)
+)
 EDGES = ("#c2410c", "#1d4e79")
 FILLS = ("#f4ecdc", "#c9dcec", "#f2cfa5", "#cfe3d4")  # of cells, by coset
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -171,7 +173,9 @@ LETTER = np.array(
     [[0, 0], [0, 5], [3, 5], [3, 4], [1, 4], [1, 3], [2.4, 3], [2.4, 2], [1, 2], [1, 0]]
 )
 # from where the surfaces are seen: yaw and pitch
-TURNS = dict(zip(SPACES, ((0.5, 0.75), (0.6, 0.35), (0.3, 0.75), (0.4, 0.5)), strict=True))
+TURNS: dict[str, tuple[float, float]] = dict(
+    zip(SPACES, ((0.5, 0.75), (0.6, 0.35), (0.3, 0.75), (0.4, 0.5)), strict=True)
+)
 
 
 def euler_characteristic(group: CrystallographicGroup) -> int:

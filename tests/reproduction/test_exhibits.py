@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,10 @@ import pytest
 import torch
 
 from orbiflow.density import SPACES, kl_by_quadrature, make_space, midpoints
+from orbiflow.drawing import Sheet
 from orbiflow.fields import symmetrize
 from orbiflow.symmetry import identification_group, rotation_matrix
-from orbiflow.tiles import CLASSES, EscherTile, Target, compare
+from orbiflow.tiles import CLASSES, EscherTile, OccupancySearch, Target, compare
 from reproduction.animal import Pulled, animal, animal_tile
 from reproduction.classes import (
     GROUPS,
@@ -31,9 +33,15 @@ from reproduction.symmetrization import KINDS, as_printed, equivariance_error, n
 EXAMPLES = Path(__file__).parents[2] / "examples" / "silhouettes"
 
 TINY = Extent(
-    name="tiny", frequencies=(0, 2), affine=4, iterations=3, effort="fast", classes=("IH6",),
-    points=300, evaluations=3, grid=30, resolution=16,
+    name="tiny", frequencies=(0, 2), affine=2, iterations=2, effort="fast", classes=("IH6",),
+    points=60, evaluations=1, grid=16, resolution=10,
 )  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("reproduction.drawing.SHEET", Sheet.screen(600))
+    monkeypatch.setattr("reproduction.drawing.SAMPLES", 50)
 
 
 def drawn_alone(name: str, folder: Path, extent: Extent = TINY) -> Findings:
@@ -187,7 +195,7 @@ def test_a_fitted_density_goes_there_and_back() -> None:
 
 
 def test_the_flow_brings_samples_to_their_side() -> None:
-    result = animal_tile("IH4", 3, 20, 25)
+    result = animal_tile("IH4", 3, 10, 15)
     assert isinstance(result, EscherTile)
     pulled = Pulled(result.model())
     assert pulled.wrong(pulled.full).mean() < pulled.wrong(pulled.affine).mean()
@@ -214,7 +222,9 @@ def test_exhibits_without_work(name: str, tmp_path: Path) -> None:
     assert (findings.why != "") == (name in ("figure-3", "table-2", "table-4"))
 
 
-def test_the_animal_and_the_frequencies(tmp_path: Path) -> None:
+def test_the_animal_and_the_frequencies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    few = partial(OccupancySearch, turns=2, finalists=1, points=100)
+    monkeypatch.setattr("reproduction.animal.OccupancySearch", few)
     findings = drawn_alone("figure-8", tmp_path)
     lengths = findings.numbers["mean_length"]
     assert lengths["0"] < lengths["2"]

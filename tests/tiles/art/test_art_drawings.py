@@ -115,7 +115,7 @@ def colours_at(art: Artwork, points: np.ndarray) -> np.ndarray:
 def test_vector_and_raster_agree(name: str, tmp_path: Path) -> None:
     art = drawn(name, BODY, tmp_path)
     made = render_artwork(art).astype(float)
-    rows, columns = np.mgrid[3:200:6, 3:300:6].reshape(2, -1)
+    rows, columns = np.mgrid[3:200:10, 3:300:10].reshape(2, -1)
     expected = colours_at(art, np.stack([columns, rows], axis=1) + 0.5)
     known = np.isfinite(expected).all(axis=1)
     assert known.mean() > 0.3

@@ -1,6 +1,7 @@
 """Placements, nearest tiles and start tiles."""
 
 import itertools
+from functools import cache
 
 import numpy as np
 import pytest
@@ -25,6 +26,11 @@ from orbiflow.tiles.search.tile_space import (
 BOOT = np.array([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]])
 TARGET = Target.from_polygon(BOOT)
 OUTLINE = resampled(TARGET.normal, 60) @ np.array([1, 1j])
+
+
+@cache
+def placements(name: str, keep: int) -> Placements:
+    return best_placements(CLASSES[name], OUTLINE, keep)
 
 
 def exact_tile(name: str, seed: int) -> tuple[Array, Placements]:
@@ -83,7 +89,7 @@ def test_a_tile_is_found_as_one(name: str) -> None:
 @given(st.sampled_from(list(CLASSES)), st.floats(0.1, 6), st.floats(0.2, 5), st.integers(0, 59))
 def test_gains_do_not_depend_on_the_pose(name: str, turn: float, scale: float, roll: int) -> None:
     moved = np.roll(OUTLINE, roll) * scale * np.exp(1j * turn) + 3
-    one, two = (best_placements(CLASSES[name], o, 5) for o in (OUTLINE, moved))
+    one, two = (placements(name, 60).take(np.arange(5)), best_placements(CLASSES[name], moved, 5))
     if name != "IH4":  # starts run in steps of two points there
         assert np.allclose(one.gains, two.gains, atol=1e-9)
 
@@ -91,7 +97,7 @@ def test_gains_do_not_depend_on_the_pose(name: str, turn: float, scale: float, r
 @pytest.mark.parametrize("name", CLASSES)
 def test_nearest_tiles_tile(name: str) -> None:
     kind = CLASSES[name]
-    found = best_placements(kind, OUTLINE, 60)
+    found = placements(name, 60)
     tiles = nearest_tiles(kind, OUTLINE, found)
     checked = 0
     for i, vertices in enumerate(tiles.vertices):
@@ -112,7 +118,7 @@ def test_nearest_tiles_tile(name: str) -> None:
 def test_no_tile_of_the_placement_is_nearer(name: str, seed: int) -> None:
     kind = CLASSES[name]
     rng = np.random.default_rng(seed)
-    found = best_placements(kind, OUTLINE, 3)
+    found = placements(name, 60).take(np.arange(3))
     tiles = nearest_tiles(kind, OUTLINE, found)
     noise = 0.05 * (rng.standard_normal(60) + 1j * rng.standard_normal(60))
     others = nearest_tiles(kind, OUTLINE + noise, found)
@@ -125,7 +131,7 @@ def test_no_tile_of_the_placement_is_nearer(name: str, seed: int) -> None:
 @pytest.mark.parametrize("name", CLASSES)
 def test_prototiles_are_placed_where_the_tiles_are(name: str, mirrored: bool) -> None:
     kind = CLASSES[name]
-    tiles = nearest_tiles(kind, OUTLINE, best_placements(kind, OUTLINE, 40))
+    tiles = nearest_tiles(kind, OUTLINE, placements(name, 60).take(np.arange(40)))
     tiles = tiles.take(np.flatnonzero(np.linalg.det(tiles.linear) > 0)[:5])
     prototiles = Prototiles.of(kind, tiles, 60, mirrored=mirrored)
     model = TileModel(kind, max_frequency=1, prototiles=prototiles)
@@ -152,7 +158,8 @@ def test_template_starts_are_centred(name: str) -> None:
 @pytest.mark.parametrize("name", CLASSES)
 def test_starts_are_simple_different_and_best_first(name: str) -> None:
     kind = CLASSES[name]
-    found = outline_starts(TARGET, kind, count=8, resolutions=(40, 60), projected=200, measured=40)
+    few = {"count": 8, "resolutions": (30, 48), "projected": 100, "measured": 20}
+    found = outline_starts(TARGET, kind, **few)
     assert 1 <= len(found.prototiles) <= 8
     assert (np.diff(found.iou) <= 0).all()
     model = TileModel(kind, max_frequency=1, prototiles=found.prototiles)
@@ -164,9 +171,7 @@ def test_starts_are_simple_different_and_best_first(name: str) -> None:
         assert polygon.is_valid
         iou = polygon.intersection(goal).area / polygon.union(goal).area
         assert iou == pytest.approx(value, abs=1e-9)
-    shifted = outline_starts(
-        TARGET, kind, count=8, resolutions=(40, 60), projected=200, measured=40, phase=0.5
-    )
+    shifted = outline_starts(TARGET, kind, **few, phase=0.5)
     assert shifted.iou.shape != found.iou.shape or not np.allclose(shifted.iou, found.iou)
 
 
