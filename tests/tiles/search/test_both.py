@@ -12,7 +12,9 @@ from PIL import Image
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Call, Event, Note, call_from_json
+from orbiflow.tiles.search import both_search
 from orbiflow.tiles.search.both_search import MOST
+from orbiflow.tiles.search.likeness_search import FAST
 from runtime.searches import boot_call, check_order, run
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -36,7 +38,11 @@ def both_call(folder: Path, **changes: object) -> Call:
     return call_from_json(document)
 
 
-def test_both_with_pins(tmp_path: Path) -> None:
+@pytest.mark.usefixtures("hasty_measure")
+def test_both_with_pins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, few in {"placements": 40, "held": 8, "starts": 4, "rounds": 6}.items():
+        monkeypatch.setitem(FAST, name, few)
+    monkeypatch.setattr(both_search, "CANDIDATES", 2)
     events: list[Event] = []
     finished = run(both_call(tmp_path), events.append)
     check_order(events, "IH4")

@@ -211,10 +211,11 @@ def test_entities_are_refused(tmp_path: Path, encoding: str) -> None:
         read_outline(path)
 
 
-def test_uses_that_multiply_are_refused(tmp_path: Path) -> None:
+def test_uses_that_multiply_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("orbiflow.tiles.silhouette.readers.svg_shapes.MAX_DRAWN", 1000)
     levels = "".join(f'<g id="l{i + 1}">' + f'<use href="#l{i}"/>' * 10 + "</g>" for i in range(12))
     start = time.perf_counter()
-    with pytest.raises(InputFileError, match="draws more than 10000 elements"):
+    with pytest.raises(InputFileError, match="draws more than 1000 elements"):
         read(tmp_path, f'<defs><path id="l0" d="{SQUARE}"/>{levels}</defs><use href="#l12"/>')
     assert time.perf_counter() - start < 15
 

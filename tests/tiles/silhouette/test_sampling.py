@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
@@ -35,6 +35,7 @@ def spacing(ring: Array, count: int) -> float:
 
 
 @pytest.mark.parametrize("name", THICK)
+@settings(max_examples=10)
 @given(phase=phases)
 def test_coarse_and_fine_points_go_together(name: str, phase: float) -> None:
     ring = RINGS[name]
@@ -51,6 +52,7 @@ def test_coarse_and_fine_points_go_together(name: str, phase: float) -> None:
 
 
 @pytest.mark.parametrize("name", THICK)
+@settings(max_examples=10)
 @given(phase=phases)
 def test_corners_stay_where_they_are(name: str, phase: float) -> None:
     ring = RINGS[name]
