@@ -135,7 +135,7 @@ def _argument(entry: Field, groups: dict[str, Group], named: Callable[[str], str
         allow_leading_hyphen=not entry.positional and not entry.is_of(FlagKind),
         metavar=None
         if entry.is_of(FlagKind)
-        else "|".join(entry.kind.choices) or entry.kind.metavar,
+        else _either(entry.kind.choices) or entry.kind.metavar,
         choices=entry.kind.choices or None,
         show_choices=False,
     )
@@ -145,6 +145,12 @@ def _argument(entry: Field, groups: dict[str, Group], named: Callable[[str], str
         default=Argument.empty if entry.required else None,
         annotation=Annotated[_hint(entry), parameter],
     )
+
+
+def _either(choices: Sequence[str]) -> str:
+    """The choices as the help has them; where a column may be too narrow, spaces let them wrap."""
+    joined = "|".join(choices)
+    return joined if len(joined) <= 24 else " | ".join(choices)
 
 
 def _hint(entry: Field) -> Any:
