@@ -29,7 +29,7 @@ from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 QUICK: dict[str, Any] = {
-    "max_frequency": 2, "segments": 2, "iterations": 10, "roughness": (1e-3,)
+    "max_frequency": 2, "segments": 2, "iterations": 5, "roughness": (1e-3,)
 }  # fmt: skip
 
 

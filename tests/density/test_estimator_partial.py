@@ -54,6 +54,7 @@ def test_columns_by_name_number_or_case(fitted: DensityEstimator) -> None:
     )
 
 
+@pytest.mark.usefixtures("quick_fits")
 def test_mistakes_are_named(fitted: DensityEstimator) -> None:
     with pytest.raises(OrbiflowError, match="no column 'chi'; there are phi, psi"):
         fitted.marginal("chi")

@@ -30,7 +30,7 @@ from orbiflow.flows import Flow
 SPACES = (Torus(2), Sphere(), KleinBottle(), ProjectivePlane())
 every = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
 seeds = st.integers(0, 2**31 - 1)
-QUICK = FlowSettings(max_frequency=3, segments=2, iterations=15)
+QUICK = FlowSettings(max_frequency=3, segments=2, iterations=8)
 
 
 def blob(space, count: int = 600, seed: int = 0) -> torch.Tensor:

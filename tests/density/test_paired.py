@@ -188,6 +188,7 @@ def test_mistakes(call: Any, message: str) -> None:
         call()
 
 
+@pytest.mark.usefixtures("quick_fits")
 def test_models_are_compared_in_one_measure() -> None:
     rng = np.random.default_rng(6)
     angles = rng.vonmises([0.0, 1.0], 4.0, (160, 2))
