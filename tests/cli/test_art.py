@@ -137,7 +137,7 @@ def test_a_picture_of_another_aspect(result: Path, tmp_path: Path, orbiflow) -> 
     Image.new("RGB", (300, 300)).save(path)
     outcome = orbiflow("art", result, "--picture", path, "-o", tmp_path / "out.png")
     assert outcome.status == 2
-    assert "the picture is 300 x 300 pixels and the silhouette's bounding box is" in outcome.err
+    assert "the picture is 300 x 300 and the silhouette's bounding box is" in outcome.err
     assert "within 1 %" in outcome.err
 
 

@@ -52,6 +52,7 @@ class Flow(nn.Module):
     Warns:
         CoarseStepsWarning: once, when called, if the steps are too coarse for the fields.
 
+    >>> import torch
     >>> from orbiflow.fields import FourierField
     >>> from orbiflow.symmetry import wallpaper_group
     >>> flow = Flow(FourierField(wallpaper_group("pgg"), 3), steps=8)
@@ -117,7 +118,7 @@ class Flow(nn.Module):
         This flow does not change. The view has the same `state_dict`; training it trains this flow.
         Both arguments are as in the constructor; the default method is this flow's.
 
-        >>> flow = Flow(torch.sin, steps=8)
+        >>> flow = Flow(lambda points: 0 * points, steps=8)
         >>> flow.with_steps(2 * flow.steps).steps, flow.steps
         (16, 8)
         """
