@@ -18,7 +18,7 @@ class Renamed:
       `"density sample -n"` for one command alone.
     - `values`: Arguments, and texts in JSON and CSV, to what they are now.
     - `keys`: Keys in JSON, columns in CSV and names of arrays to what they are now; None where the
-      key is gone.
+      key is gone. "settings.x" is x within settings alone.
     - `added`: Keys that version 0.1 did not have.
     - `files`: Names of files, without folders, to what they are now; None where the file is gone.
     - `expected`: `"CASE"` or `"CASE file"` to the reason why it differs on purpose; `*` stands for
@@ -41,7 +41,12 @@ PRESENT = Renamed(
         "density cv --parts": "--components",
         "density fit --detail": "--max-frequency",
     },
-    keys={"parts": "components", "detail": "max_frequency", "shares": None, "kernels": None},
+    keys={
+        "parts": "components",
+        "detail": "max_frequency",
+        "shares": None,
+        "settings.kernels": None,
+    },
     added=frozenset({"weights"}),  # the shares, by the names of the components
     expected={
         "* density.safetensors": "saved as a mixture, in format 5",

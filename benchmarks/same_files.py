@@ -167,8 +167,9 @@ def compare_values(a: Any, b: Any, where: str, found: Finding) -> None:
 
 
 def compare_dicts(a: dict[str, Any], b: dict[str, Any], where: str, found: Finding) -> None:
-    keys = found.renamed.keys
-    was = {name: value for key, value in a.items() if (name := keys.get(key, key))}
+    keys, inside = found.renamed.keys, where.rpartition(":")[2]
+    names = {key: keys.get(f"{inside}.{key}", keys.get(key, key)) for key in a}
+    was = {name: value for key, value in a.items() if (name := names[key])}
     now = {key: value for key, value in b.items() if key not in found.renamed.added or key in was}
     for key in [*was, *(key for key in now if key not in was)]:
         if key in IGNORED:
