@@ -19,7 +19,7 @@ from pathlib import Path
 import pytest
 
 from orbiflow.cli import app
-from orbiflow.operations import OPERATIONS
+from orbiflow.commands import OPERATIONS
 from orbiflow.runtime import Call, Outcome, find
 
 ROOT = Path(__file__).parents[1]

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from orbiflow.cli import app
-from orbiflow.operations import OPERATIONS
+from orbiflow.commands import OPERATIONS
 from orbiflow.runtime import Call, Operation, Outcome, find
 
 

@@ -13,8 +13,8 @@ import jsonschema
 import pytest
 
 from orbiflow.cli.reference import reference
+from orbiflow.commands import OPERATIONS
 from orbiflow.errors import OrbiflowError
-from orbiflow.operations import OPERATIONS
 from orbiflow.runtime import (
     Cancel,
     Cancelled,
@@ -162,7 +162,7 @@ def test_the_reference_page_is_up_to_date() -> None:
 
 def test_operations_are_known_without_numerical_libraries() -> None:
     code = (
-        "import sys; from orbiflow.operations import OPERATIONS\n"
+        "import sys; from orbiflow.commands import OPERATIONS\n"
         "from orbiflow.runtime import call_from_json, find\n"
         "[find(name).schema for name in OPERATIONS]\n"
         "call_from_json({'schema_version': 2, 'operation': 'export', 'result': 'x'})\n"

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from orbiflow.commands import OPERATIONS
 from orbiflow.drawing import PALETTES
 from orbiflow.kinds import (
     ChoiceKind,
@@ -26,7 +27,6 @@ from orbiflow.kinds import (
     Refused,
     TupleKind,
 )
-from orbiflow.operations import OPERATIONS
 from orbiflow.runtime import find
 from orbiflow.settings import (
     DefaultText,

@@ -17,9 +17,9 @@ from rich.markup import escape
 
 from orbiflow import __version__
 from orbiflow.arguments import meant
+from orbiflow.commands import OPERATIONS
 from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.kinds import FlagKind, ListKind, PathKind
-from orbiflow.operations import OPERATIONS
 from orbiflow.runtime import Cancel, Cancelled, Operation, find, use_one_thread
 from orbiflow.settings import Field, Hidden
 

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+from orbiflow.commands import OPERATIONS
 from orbiflow.errors import SettingError
-from orbiflow.operations import OPERATIONS
 from orbiflow.runtime import Operation, find
 from orbiflow.settings import Field, Hidden
 

@@ -15,6 +15,13 @@ from .comparing.resampling import cross_validation_folds as cross_validation_fol
 from .comparing.settings import ComparisonSettings as ComparisonSettings
 from .comparing.two_samples import TestResult as TestResult
 from .comparing.two_samples import mmd_test as mmd_test
+from .conditionals import at_observed as at_observed
+from .conditionals import axes_named as axes_named
+from .conditionals import chart_of_observed as chart_of_observed
+from .conditionals import conditional as conditional
+from .conditionals import given_named as given_named
+from .conditionals import log_prob_observed as log_prob_observed
+from .conditionals import marginal as marginal
 from .estimator import DensityEstimator as DensityEstimator
 from .fitting.automatic import fit_automatic as fit_automatic
 from .fitting.flow import fit_density as fit_density
@@ -29,13 +36,6 @@ from .fitting.rows import weighed as weighed
 from .fitting.settings import ComponentSettings as ComponentSettings
 from .fitting.settings import DensitySettings as DensitySettings
 from .fitting.settings import FlowSettings as FlowSettings
-from .inference import at_observed as at_observed
-from .inference import axes_named as axes_named
-from .inference import chart_of_observed as chart_of_observed
-from .inference import conditional as conditional
-from .inference import given_named as given_named
-from .inference import log_prob_observed as log_prob_observed
-from .inference import marginal as marginal
 from .models.chains import VonMisesChains as VonMisesChains
 from .models.density import Density as Density
 from .models.evaluation import CHECKED as CHECKED

@@ -297,7 +297,7 @@ def check_output_folder(out: Path, *reads: Path | None, what: str = "file") -> N
 
 def check_inputs_kept(out: Path, *reads: Path | None) -> None:
     """Check that a file that will be written is none that is read, by whatever name or link."""
-    from orbiflow.operations import RUN_FOLDERS
+    from orbiflow.commands import RUN_FOLDERS
 
     for read in filter(None, reads):
         files = [read / name for name in RUN_FOLDERS] if read.is_dir() else [read]
@@ -336,7 +336,7 @@ def check_outside_runs(out: Path, *reads: Path | None) -> None:
 
 def _files_of_run(folder: Path) -> set[str]:
     """The files of earlier runs in a folder; the file that is read, alone, is somebody's copy."""
-    from orbiflow.operations import RUN_FOLDERS
+    from orbiflow.commands import RUN_FOLDERS
 
     found: set[str] = set()
     for read, place in RUN_FOLDERS.items():

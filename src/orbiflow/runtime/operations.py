@@ -1,7 +1,7 @@
 """Operations: public functions from which a command line, a JSON form and a reference are derived.
 
 **To add an operation**, write a function in a light module (heavy libraries are imported inside it)
-and name it in `orbiflow.operations`::
+and name it in `orbiflow.commands`::
 
     @operation("export")
     def export(
@@ -264,7 +264,7 @@ def operation(
     """Make a function an operation: its arguments are checked and its events told.
 
     Args:
-        name: The name by which `orbiflow.operations` knows it.
+        name: The name by which `orbiflow.commands` knows it.
         keeps_partial: Whether it can be stopped and keeps what it has.
         starts_processes: Whether it forks, so that no thread may run beside it.
     """
@@ -304,12 +304,12 @@ def progress_events(tell: Sink, cancel: Cancel) -> Callable[[float, str], None]:
 
 @cache
 def find(name: str) -> Operation:
-    """Return the operation that `orbiflow.operations` has under a name, importing its module.
+    """Return the operation that `orbiflow.commands` has under a name, importing its module.
 
     Raises:
         SettingError: If there is none.
     """
-    from orbiflow.operations import OPERATIONS, WORK
+    from orbiflow.commands import OPERATIONS, WORK
 
     place = {**OPERATIONS, **WORK}.get(name)
     if place is None:

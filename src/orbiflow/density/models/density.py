@@ -136,7 +136,7 @@ class Density(Distribution):
         del resolution
         return 1.0
 
-    # Marginal and conditional densities on tori: see orbiflow.density.inference.
+    # Marginal and conditional densities on tori: see orbiflow.density.conditionals.
 
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
         """Return log densities (N,) of some angles alone, at points (N, len(axes)) of these in turns.

@@ -115,10 +115,10 @@ def score_rows(
     These are the weighted mean log density, in nats, of the rows that lack nothing, which rows they are
     in words, and notes.
     """
-    from orbiflow.density import inference
+    from orbiflow.density import conditionals
 
     space, values = density.space, rows.table.values
-    points = inference.chart_of_observed(space, values) if may_lack else space.to_chart(values)
+    points = conditionals.chart_of_observed(space, values) if may_lack else space.to_chart(values)
     known = ~points.isnan()
     whole = known.all(dim=1).numpy()
     name = "log_prob" if whole.all() else "log_prob_marginal"
@@ -149,7 +149,7 @@ def _log_densities(
     import numpy as np
     import torch
 
-    from orbiflow.density import inference
+    from orbiflow.density import conditionals
 
     if settings.table:
         progress(0.0, "making a table")
@@ -160,7 +160,7 @@ def _log_densities(
         )
         log_prob: Callable[..., Tensor] = source.log_prob
     else:
-        log_prob = partial(inference.at_observed, density)
+        log_prob = partial(conditionals.at_observed, density)
     found: list[Array] = []
     end = SCORED if settings.gradient else 1.0
     for start in range(0, len(points), BLOCK):
@@ -283,7 +283,7 @@ def marginal(
         columns: Angles to keep, by name or number, such as phi.
         out: Folder of the new model, made if need be.
     """
-    from orbiflow.density import inference
+    from orbiflow.density import conditionals
 
     if not columns:
         raise SettingError("{columns} names no column; give names or numbers, as in phi,psi")
@@ -297,7 +297,7 @@ def marginal(
         axes = axes_of(columns, names)
         folder = runtime.ResultFolder(out, written_files)
         on_event(runtime.Progress(0.0, "integrating"))
-        found = inference.marginal(density, axes)
+        found = conditionals.marginal(density, axes)
         kept = [names[axis] for axis in axes]
         origin = {"marginal": kept, "model": str(model)}
         return write_derived(found, kept, origin, folder, on_event, cancel)
@@ -324,7 +324,7 @@ def conditional(
         columns: Of the other angles, those to keep.
         out: Folder of the new model, made if need be.
     """
-    from orbiflow.density import inference
+    from orbiflow.density import conditionals
 
     if not given:
         raise SettingError("{given} says nothing; give what is known, as in psi=-45")
@@ -339,7 +339,7 @@ def conditional(
         known, turns, kept = saved.condition_of(density.space, names, pairs, columns, on_event)
         folder = runtime.ResultFolder(out, written_files)
         on_event(runtime.Progress(0.0, "integrating"))
-        found = inference.conditional(density, turns, kept)
+        found = conditionals.conditional(density, turns, kept)
         evidence = saved.evidence_of(density, turns)
         rare = "; few data lie there, or none" if evidence < -3 else ""
         words = ", ".join(f"{name} = {value:g}" for name, value in known.items())

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 
 from orbiflow.arrays import Array
-from orbiflow.density import inference, pictures
+from orbiflow.density import conditionals, pictures
 from orbiflow.density.models import Density, density_to_bytes, read_density
 from orbiflow.density.run_folder import write_files
 from orbiflow.density.spaces import Space, Torus
@@ -132,7 +132,7 @@ def axes_of(wanted: Sequence[str], names: Sequence[str]) -> list[int]:
     [1, 0]
     """
     lower = {name.casefold() for name in names}
-    return inference.axes_named(
+    return conditionals.axes_named(
         [
             int(one) - 1
             if one.casefold() not in lower and one.isdecimal() and 1 <= int(one) <= len(names)
@@ -157,7 +157,7 @@ def condition_of(
     """
     axes = axes_of([name for name, _ in pairs], names)
     values = list(zip(axes, (value for _, value in pairs), strict=True))
-    given = inference.given_named(space, values, names)
+    given = conditionals.given_named(space, values, names)
     known = {names[axis]: value for axis, value in values}
     kept = [axis for axis in range(len(names)) if axis not in given]
     if columns is not None:
@@ -178,7 +178,7 @@ def evidence_of(density: Density, given: dict[int, float]) -> float:
     """Return the log density of known angles, in turns, relative to the uniform one."""
     at = torch.full((1, density.space.dim), torch.nan, dtype=torch.float64)
     at[0, list(given)] = torch.tensor(list(given.values()), dtype=torch.float64)
-    return float(inference.log_prob_observed(density, at, measure="uniform"))
+    return float(conditionals.log_prob_observed(density, at, measure="uniform"))
 
 
 def write_derived(

@@ -24,10 +24,10 @@ from .overlap import Overlap as Overlap
 from .overlap import best_overlay as best_overlay
 from .overlap import boundary_iou as boundary_iou
 from .overlap import prepared_region as prepared_region
-from .pinned import Pinned as Pinned
 from .ranking import diverse as diverse
 from .ranking import mutual_iou as mutual_iou
 from .ranking import rank_score as rank_score
 from .recognition import Recognisability as Recognisability
 from .recognition import Recogniser as Recogniser
 from .recognition import recognisability as recognisability
+from .rigid_parts import Pinned as Pinned

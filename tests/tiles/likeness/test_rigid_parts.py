@@ -6,7 +6,7 @@ import pytest
 from orbiflow.arrays import Complex
 from orbiflow.tiles import plane_points, resampled
 from orbiflow.tiles.likeness import Elastic, Pinned
-from orbiflow.tiles.likeness.pinned import SHAPE_WEIGHT
+from orbiflow.tiles.likeness.rigid_parts import SHAPE_WEIGHT
 from outlines import animal
 
 RING = resampled(animal("squirrel.dat").normal, 60)
