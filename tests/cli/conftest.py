@@ -21,6 +21,13 @@ class Outcome:
 
 Run = Callable[..., Outcome]
 
+# Python's code for `orbiflow`; whether Ctrl-C is ignored is inherited from the shell, and must not
+# decide a test
+LAUNCH = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    "from orbiflow.cli.app import main; main()"
+)
+
 
 def call_main(capture: Callable[[], tuple[str, str]], *arguments: object) -> Outcome:
     """`orbiflow ARGUMENTS` in this process: importing torch again would take seconds."""

@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 
 from batch.small_batches import rows, write_boot
+from cli.conftest import LAUNCH
 from orbiflow.runtime import find
 from runtime.searches import ENDLESS
 
@@ -55,7 +56,7 @@ def test_a_folder_twice(tmp_path: Path, orbiflow) -> None:
 def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
     for name in ("one", "two", "three"):
         write_boot(tmp_path / "in" / f"{name}.json")
-    command = [sys.executable, "-u", "-m", "orbiflow", "batch", tmp_path / "in"]
+    command = [sys.executable, "-u", "-c", LAUNCH, "batch", tmp_path / "in"]
     endless = [str(ENDLESS) if word == "2" else word for word in QUICK]
     command += ["--out", tmp_path / "out", "--workers", "2", *endless]
     with subprocess.Popen(

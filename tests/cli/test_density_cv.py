@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from cli.conftest import LAUNCH
 from density.cross_validation.small_tables import lines_of, table_of
 
 QUICK = ("--space", "torus", "--components", "mixture", "--against", "uniform", "--folds", 2)
@@ -37,7 +38,7 @@ def test_twice(tmp_path: Path, orbiflow: Any) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
 def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
     data = table_of(tmp_path, 4000)
-    command = [sys.executable, "-u", "-m", "orbiflow", "density", "cv", data, "--space", "torus"]
+    command = [sys.executable, "-u", "-c", LAUNCH, "density", "cv", data, "--space", "torus"]
     with subprocess.Popen(
         [str(part) for part in (*command, "--out", tmp_path / "out", "--workers", "2")],
         stdout=subprocess.PIPE,

@@ -13,17 +13,13 @@ from pathlib import Path
 
 import pytest
 
+from cli.conftest import LAUNCH
 from orbiflow.cli.terminal import stopped_by_interrupt
 
 BOOT = [[60, 20], [210, 20], [230, 80], [170, 95], [160, 190], [100, 145], [45, 80]]
 NAMES = ["IH7", "IH1", "IH2", "IH4"]
 ENDLESS = 10**6  # steps of a fit: hours
 
-# whether Ctrl-C is ignored is inherited from the shell, and must not decide these tests
-LAUNCH = (
-    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-    "from orbiflow.cli.app import main; main()"
-)
 # the first class to be fitted is done after one step, the others never; both workers say so
 FIRST_IS_SHORT = (
     "import dataclasses\n"
