@@ -85,7 +85,8 @@ def test_a_cluster_gives_the_same_though_a_worker_is_killed(
         for answer in executor.answers(boot_parcels(4), [].append, Cancel()):
             found[answer.key] = answer
             if not killed:
-                at_work = [w for w in cluster.scheduler.workers.values() if w.processing]
+                workers = list(cluster.scheduler.workers.values())
+                at_work = [worker for worker in workers if worker.processing] or workers
                 killed += [
                     nanny
                     for nanny in cluster.workers.values()

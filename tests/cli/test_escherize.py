@@ -19,7 +19,7 @@ from PIL import Image, ImageDraw
 from orbiflow import __version__
 from orbiflow.tiles import CLASSES, Fit, Target, TileModel, load_model, write_tile_folder
 from orbiflow.tiles.pages.run_folder import FIGURE_FILES
-from orbiflow.tiles.search import occupancy
+from orbiflow.tiles.search import candidates, occupancy
 from orbiflow.tiles.search.finished_tiles import best_tiles
 from orbiflow.tiles.search.tile_model import extract_tile
 
@@ -178,7 +178,8 @@ def test_no_tile_is_status_one(tmp_path: Path, orbiflow, monkeypatch: pytest.Mon
     assert [entry["class"] for entry in document["failed"]] == ["IH21"]
 
 
-def test_a_forced_tile_is_marked(tmp_path: Path) -> None:
+def test_a_forced_tile_is_marked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(candidates, "TOLERANCES", (5e-3,))  # its thousands of vertices take long
     target = Target.from_polygon(BOOT, source="some/boot.json")
     result = best_tiles(target, Fit(crossed(), 1, 0, 1), force=True)[0]
     written = write_tile_folder(result, target, tmp_path / "IH21")
