@@ -35,8 +35,10 @@ def row(tile: Tile, across: int, cut, form) -> None:
     # a page with so many tiles by area
     side = across * SIDE * np.sqrt(abs(tile.signed_area)) / longer(tile)
     settings = ExportSettings(
-        format=form, cut=cut, tile_size=SIDE, area=(side, side), clip=cut == "none", dpi=100
+        format=form, cut=cut, tile_size=SIDE, area=(side, side), clip=cut == "none"
     )
+    if form == "png":
+        settings = settings.replace(dpi=100)
     start = time.perf_counter()
     made, _ = scenes(tile, settings)
     middle = time.perf_counter()

@@ -25,7 +25,10 @@ ROOT = Path(__file__).resolve().parents[1]
 WORKER = '''
 import sys, time
 import numpy as np
-from orbiflow.tilings import CLASSES, Tile, certify
+try:
+    from orbiflow.tiles import CLASSES, Tile, certify
+except ImportError:  # version 0.1
+    from orbiflow.tilings import CLASSES, Tile, certify
 
 def bent(kind, per_edge, rng):
     """A tile with random edges: one of each pair, or half of an edge with a centre, and its images."""

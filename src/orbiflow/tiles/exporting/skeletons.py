@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
+from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.exporting.layouts import Layout, chosen_copies, line_style, placed_tiles
 from orbiflow.tiles.exporting.scene import Curve, Layer, Scene, clipped_line, rectangle
@@ -152,11 +154,42 @@ def in_short_order(curves: list[Curve]) -> list[Curve]:
     The way leads from the upper left corner to the nearest end, and from each curve's other end to
     the nearest end of a curve that is left.
     """
-    ends = np.array([[curve.start, curve.end] for curve in curves]).reshape(-1, 2, 2)
-    left, place, ordered = ends.copy(), np.zeros(2), []
+    if not curves:
+        return []
+    nearest = _Nearest(np.array([[curve.start, curve.end] for curve in curves]))
+    place, ordered = np.zeros(2), []
     for _ in curves:
-        number, side = divmod(int(((left - place) ** 2).sum(axis=2).argmin()), 2)
-        left[number] = np.inf
+        number, side = nearest.take(place)
         ordered.append(curves[number].reversed() if side else curves[number])
-        place = ends[number, 1 - side]
+        place = nearest.ends[number, 1 - side]
     return ordered
+
+
+class _Nearest:
+    """The ends (n, 2, 2) of curves, with a tree that finds the nearest of those that are left."""
+
+    def __init__(self, ends: Array) -> None:
+        self.ends = ends
+        self.left = np.ones(len(ends), dtype=bool)
+        self._build_tree()
+
+    def _build_tree(self) -> None:
+        self.numbers = np.flatnonzero(self.left)
+        self.tree = KDTree(self.ends[self.numbers].reshape(-1, 2))
+        self.taken = 0
+
+    def take(self, place: Array) -> tuple[int, int]:
+        """Take the curve with the end nearest to `place`; return its number and which end it is."""
+        if 2 * self.taken > len(self.numbers):
+            self._build_tree()
+        size = 2 * len(self.numbers)
+        count = min(8, size)
+        while True:
+            _, found = self.tree.query(place, k=count)
+            for hit in np.atleast_1d(found).tolist():
+                number, side = int(self.numbers[hit // 2]), hit % 2
+                if self.left[number]:
+                    self.left[number] = False
+                    self.taken += 1
+                    return number, side
+            count = min(4 * count, size)
