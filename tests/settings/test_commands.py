@@ -148,7 +148,17 @@ def test_completion_knows_commands_and_choices() -> None:
     assert all(word in script for word in ("escherize", "--tile-size", "skeleton"))
 
 
-@pytest.mark.parametrize("line", ["export X --tile-size 40", "escherize --help", "density", ""])
+@pytest.mark.parametrize(
+    "line",
+    [
+        "export X --tile-size 40",
+        "density marginal -m X --columns ,",
+        "density conditional -m X --given chi",
+        "escherize --help",
+        "density",
+        "",
+    ],
+)
 def test_mistakes_and_help_need_no_numerical_library(line: str) -> None:
     code = (
         "import sys; from orbiflow.cli.app import run\n"

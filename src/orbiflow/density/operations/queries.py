@@ -283,11 +283,10 @@ def marginal(
         columns: Angles to keep, by name or number, such as phi.
         out: Folder of the new model, made if need be.
     """
-    from orbiflow.density import conditionals
-
     if not columns:
         raise SettingError("{columns} names no column; give names or numbers, as in phi,psi")
 
+    from orbiflow.density import conditionals
     from orbiflow.density.operations.saved import axes_of, model_at, names_of, write_derived
 
     runtime.check_output_folder(out, model, what="model")
@@ -324,12 +323,11 @@ def conditional(
         columns: Of the other angles, those to keep.
         out: Folder of the new model, made if need be.
     """
-    from orbiflow.density import conditionals
-
     if not given:
         raise SettingError("{given} says nothing; give what is known, as in psi=-45")
     pairs = [_angle(text) for text in given]
 
+    from orbiflow.density import conditionals
     from orbiflow.density.operations import saved
 
     runtime.check_output_folder(out, model, what="model")
