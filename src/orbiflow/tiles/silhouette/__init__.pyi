@@ -27,7 +27,7 @@ from .readers.svg_paths import TooTangled as TooTangled
 from .readers.svg_paths import fill as fill
 from .readers.svg_shapes import Drawing as Drawing
 from .readers.svg_shapes import DrawnShape as DrawnShape
-from .readers.svg_shapes import parse_xml as parse_xml
+from .readers.svg_xml import parse_xml as parse_xml
 from .soft_target import SoftTarget as SoftTarget
 from .soft_target import signed_distance as signed_distance
 from .target import Frame as Frame
