@@ -89,7 +89,7 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
     def tolerance(reach: Array) -> float:
         return max(float(np.ptp(reach, axis=0).max()) * FLATNESS, size * FLATNESS_FLOOR)
 
-    regions = Regions(drawing, tolerance)
+    regions = Regions(drawing, tolerance, MAX_POINTS)
     layers = [regions.layers(shape) for shape in drawing.shapes]
     notes: list[str] = []
     if not any(layers):

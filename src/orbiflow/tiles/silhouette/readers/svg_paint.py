@@ -1,6 +1,5 @@
-"""The colours of a drawing's fills and strokes, and the pens of its strokes."""
+"""The colours of a drawing's fills and strokes."""
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +10,6 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import Drawing, DrawnShape, as
 
 CURRENT = "currentColor"
 """The colour of what is drawn in `currentColor` where no colour is set."""
-
-MOST_DASHES = 1000  # lengths in one pattern
 
 
 class Brush(NamedTuple):
@@ -31,11 +28,10 @@ def brushes(drawing: Drawing, shape: DrawnShape) -> dict[str, Brush]:
     for kind in ("stroke", "fill") if "stroke" in order[:1] else ("fill", "stroke"):
         text = shape.paint.get(kind, "#000000" if kind == "fill" else "none")
         brush = _brush(text, drawing, shape.paint.get("color", CURRENT))
-        own = as_number(shape.paint.get(f"{kind}-opacity"), 1.0)
-        opacity = shape.opacity * min(max(own, 0.0), 1.0) * (brush.opacity if brush else 0.0)
-        if brush and opacity > 0 and (kind == "fill" or Pen.of(shape).width > 0):
-            found[kind] = Brush(brush.colour, opacity)
-    return found
+        if brush and (kind == "fill" or shape.pen.width > 0):
+            own = min(max(as_number(shape.paint.get(f"{kind}-opacity"), 1.0), 0.0), 1.0)
+            found[kind] = Brush(brush.colour, shape.opacity * brush.opacity * own)
+    return {kind: brush for kind, brush in found.items() if brush.opacity > 0}
 
 
 def _brush(text: str, drawing: Drawing, current: str) -> Brush | None:
@@ -76,35 +72,3 @@ def _gradient(text: str, drawing: Drawing) -> Brush | None:
         return None
     red, green, blue = np.mean([rgb(colour) for colour in colours], axis=0).round().astype(int)
     return Brush(f"#{red:02x}{green:02x}{blue:02x}", 1.0)
-
-
-@dataclass(frozen=True)
-class Pen:
-    """What a stroke is drawn with: lengths are in the pen's own units.
-
-    - `dashes`: The lengths of dashes and gaps in turn, an even number of them; none for a whole line.
-    """
-
-    width: float
-    cap: str
-    join: str
-    miter_limit: float
-    dashes: tuple[float, ...]
-    offset: float
-
-    @staticmethod
-    def of(shape: DrawnShape) -> "Pen":
-        """Return the pen of a shape's stroke."""
-        width = shape.number("stroke-width", 1.0)
-        text = shape.paint.get("stroke-dasharray", "none").replace(",", " ").split()
-        dashes = [as_number(word, -1.0, shape.diagonal) for word in text[:MOST_DASHES]]
-        if min(dashes, default=-1.0) < 0 or not sum(dashes) > 0:
-            dashes = []
-        return Pen(
-            width if width >= 0 else 1.0,
-            shape.paint.get("stroke-linecap", "butt"),
-            shape.paint.get("stroke-linejoin", "miter"),
-            as_number(shape.paint.get("stroke-miterlimit"), 4.0),
-            tuple(dashes * (1 + len(dashes) % 2)),
-            shape.number("stroke-dashoffset", 0.0),
-        )

@@ -198,6 +198,7 @@ def _unit(vector: Array) -> Array:
 # grow with the square of its length.
 MAX_OVERLAPS = 200_000
 MAX_OVERLAPS_EACH = 20
+MAX_OVERLAPS_WIDE = 20  # as many times more of strokes, which are mostly beside each other
 MAX_FACES = 50_000
 _SAMPLE = 400
 
@@ -234,14 +235,15 @@ def check_tangle(segments: Array, half: float = 0.0) -> None:
 
     `half` is half their width. Raises `TooTangled` if there are too many.
     """
-    low, high = segments.min(axis=1) - half, segments.max(axis=1) + half
     sample = np.random.default_rng(0).permutation(len(segments))[:_SAMPLE]
-    overlaps = sum(
-        np.count_nonzero(((low <= high[i]) & (high >= low[i])).all(axis=1)) for i in sample
-    )
-    most = MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(segments)
-    if overlaps / len(sample) * len(segments) > most:
-        raise TooTangled
+    for wider, most in ((0.0, 1), (half, MAX_OVERLAPS_WIDE)):
+        low, high = segments.min(axis=1) - wider, segments.max(axis=1) + wider
+        overlaps = sum(
+            np.count_nonzero(((low <= high[i]) & (high >= low[i])).all(axis=1)) for i in sample
+        )
+        most *= MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(segments)
+        if overlaps / len(sample) * len(segments) > most:
+            raise TooTangled
 
 
 def _winding(points: Array, ring: Array) -> Integers:

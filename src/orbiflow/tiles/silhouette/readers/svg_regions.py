@@ -16,7 +16,7 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import rgb
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.outlines import MAX_COORDINATE
-from orbiflow.tiles.silhouette.readers.svg_paint import Brush, Pen, brushes
+from orbiflow.tiles.silhouette.readers.svg_paint import Brush, brushes
 from orbiflow.tiles.silhouette.readers.svg_paths import (
     MAX_POINTS,
     SubPath,
@@ -24,11 +24,16 @@ from orbiflow.tiles.silhouette.readers.svg_paths import (
     check_tangle,
     fill,
 )
-from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, Drawing, DrawnShape
+from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, Drawing, DrawnShape, Pen
 
-CAPS = {"butt": "flat", "round": "round", "square": "square"}
+CAPS: dict[str, Literal["flat", "round", "square"]] = {
+    "butt": "flat",
+    "round": "round",
+    "square": "square",
+}
+WIGGLE = 1 / 500  # of half a pen's width: lines are simplified by as much
 SMOOTH = 0.999  # the cosine of half the turn above which a corner needs no mitre
-DOT = 1e-6  # of a pattern of dashes: the length that a dash has at least, to have a direction
+FINER = 8  # the paths of strokes are flattened as much finer, as a wide pen magnifies what is left
 
 
 class Layer(NamedTuple):
@@ -39,14 +44,18 @@ class Layer(NamedTuple):
 
 
 class Regions:
-    """The regions that a drawing's shapes cover, flattened to within `tolerance` of their paths."""
+    """The regions that a drawing's shapes cover.
 
-    def __init__(self, drawing: Drawing, tolerance: Callable[[Array], float]) -> None:
-        self.drawing, self.tolerance = drawing, tolerance
+    Paths are flattened to within `tolerance`, a function of points that span them, and come to `most`
+    points at most.
+    """
+
+    def __init__(self, drawing: Drawing, tolerance: Callable[[Array], float], most: int) -> None:
+        self.drawing, self.tolerance, self.most = drawing, tolerance, most
         self._clips: dict[Clip, BaseGeometry] = {}
         self._count = 0
 
-    def lines(self, shape: DrawnShape) -> list[tuple[Array, SubPath]]:
+    def lines(self, shape: DrawnShape, finer: float = 1.0) -> list[tuple[Array, SubPath]]:
         """Return each sub-path of a shape with its polyline (N, 2)."""
         if not shape.paths:
             return []
@@ -54,12 +63,12 @@ class Regions:
         if not (np.abs(reach) <= MAX_COORDINATE).all():  # NaN, too
             reason = f"a path reaches beyond {MAX_COORDINATE:g} user units; rescale the drawing"
             raise InputFileError(f"{self.drawing.path}: {reason}")
-        tolerance = self.tolerance(reach)
+        tolerance = self.tolerance(reach) / finer
         if not tolerance > 0:
             return []
         lines = [(path.flatten(tolerance), path) for path in shape.paths]
         self._count += sum(len(points) for points, _ in lines)
-        if self._count > MAX_POINTS:
+        if self._count > self.most:
             raise TooManyPoints
         return lines
 
@@ -70,9 +79,11 @@ class Regions:
 
     def stroke(self, shape: DrawnShape) -> BaseGeometry:
         """Return what the stroke of a shape covers, before clips."""
-        pen, linear, offset = Pen.of(shape), shape.matrix[:2, :2], shape.matrix[:2, 2]
+        pen, linear, offset = shape.pen, shape.matrix[:2, :2], shape.matrix[:2, 2]
         back = np.linalg.inv(linear).T
-        lines = [((points - offset) @ back, path.closed) for points, path in self.lines(shape)]
+        lines = [
+            ((points - offset) @ back, path.closed) for points, path in self.lines(shape, FINER)
+        ]
         region = stroked(lines, pen)
         return shapely.transform(region, lambda points: points @ linear.T + offset)
 
@@ -140,11 +151,13 @@ def stroked(lines: list[tuple[Array, bool]], pen: Pen) -> BaseGeometry:
     pieces = [piece for points, closed in lines for piece in _pieces(points, closed, pen)]
     if not pieces or not all(np.isfinite(points).all() for points, _ in pieces):
         return Polygon()
-    check_tangle(np.concatenate([np.stack([p[:-1], p[1:]], axis=1) for p, _ in pieces]), half)
-    cap: Literal["flat", "round", "square"] = CAPS.get(pen.cap, "flat")
+    cap = CAPS.get(pen.cap, "flat")
     join = "round" if pen.join == "round" else "bevel"
     strings = [shapely.LineString(points) for points, _ in pieces]
-    regions = [shapely.buffer(strings, half, cap_style=cap, join_style=join)]
+    simple = shapely.simplify(strings, WIGGLE * half)
+    runs = [shapely.get_coordinates(line) for line in simple]
+    check_tangle(np.concatenate([np.stack([p[:-1], p[1:]], axis=1) for p in runs]), half)
+    regions = [shapely.buffer(simple, half, cap_style=cap, join_style=join)]
     if pen.join not in ("round", "bevel"):
         regions += [_mitres(*piece, half, pen.miter_limit) for piece in pieces if len(piece[0]) > 2]
     return shapely.union_all(np.concatenate(regions))
@@ -157,26 +170,27 @@ def _pieces(points: Array, closed: bool, pen: Pen) -> list[tuple[Array, bool]]:
     points = points[np.r_[True, steps > 0]]
     if not pen.dashes:
         return [(points if len(points) > 1 else np.repeat(points, 2, axis=0), closed)]
-    along = np.r_[0.0, np.cumsum(steps[steps > 0])]
-    edges = np.r_[0.0, np.cumsum(pen.dashes)]
-    period, offset = edges[-1], pen.offset % edges[-1]
-    if not (along[-1] / period + 2) * len(pen.dashes) < MAX_POINTS:
+    along: Array = np.r_[0.0, np.cumsum(steps[steps > 0])]
+    edges: Array = np.r_[0.0, np.cumsum(pen.dashes)]
+    total, period = float(along[-1]), float(edges[-1])
+    if not (total / period + 2) * len(pen.dashes) < MAX_POINTS:
         raise TooManyPoints
-    turns = np.arange(np.ceil((along[-1] + offset) / period))[:, None] * period - offset
-    starts = np.maximum(turns + edges[:-1:2], 0.0).ravel()
-    ends = np.maximum(turns + edges[1::2], turns + edges[:-1:2] + DOT * period).ravel()
-    ends = np.minimum(ends, along[-1])
+    first = -(pen.offset % period)
+    turns: Array = np.arange(first, total, period)[:, None]
+    starts: Array = (turns + edges[:-1:2]).ravel()
+    ends: Array = (turns + edges[1::2]).ravel()
+    shown = (starts < total) & ((ends > 0) | (starts == ends) & (starts >= 0))
     return [
-        (_between(points, along, start, end), False)
-        for start, end in zip(starts, ends, strict=True)
-        if start < end
+        (_between(points, along, max(start, 0.0), min(end, total)), False)
+        for start, end in zip(starts[shown].tolist(), ends[shown].tolist(), strict=True)
     ]
 
 
 def _between(points: Array, along: Array, start: float, end: float) -> Array:
     """Return the part of a polyline (N, 2) between two arc lengths."""
-    at = np.r_[start, along[(along > start) & (along < end)], end]
-    return np.stack([np.interp(at, along, points[:, k]) for k in (0, 1)], axis=1)
+    at: Array = np.r_[start, along[(along > start) & (along < end)], end]
+    both: list[Array] = [np.interp(at, along, points[:, k]) for k in (0, 1)]
+    return np.stack(both, axis=1)
 
 
 def _mitres(points: Array, closed: bool, half: float, limit: float) -> Array:
@@ -192,4 +206,5 @@ def _mitres(points: Array, closed: bool, half: float, limit: float) -> Array:
     outward = -half * np.sign(first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0])[sharp, None]
     before, after = (outward * side[sharp][:, ::-1] * [-1, 1] for side in (first, last))
     corner, tip = points[1:-1][sharp], (before + after) / (1 + dot[sharp, None])
-    return shapely.polygons(np.stack([corner, corner + before, corner + tip, corner + after], 1))
+    tips = np.stack([corner, corner + before, corner + tip, corner + after], axis=1)
+    return np.asarray(shapely.polygons(tips))

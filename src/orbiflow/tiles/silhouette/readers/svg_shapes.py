@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -17,6 +18,7 @@ from orbiflow.tiles.silhouette.readers.svg_xml import MAX_DEPTH, StyleSheet
 PIXELS_PER_INCH = 96
 MAX_DRAWN = 10_000  # elements, those drawn again by <use>, clips, masks and markers counted again
 MAX_TRANSFORM = 2000  # characters
+MOST_DASHES = 1000  # lengths in one pattern
 MAX_NUMBER = 1e9  # the largest width or opacity that is believed
 MAX_TOKENS = 400_000  # commands and numbers in all path data; one with a fraction counts twice
 _GROUPS = {"svg", "g", "a", "switch"}
@@ -30,8 +32,10 @@ _SHAPES = {
     "polyline": (svgelements.Polyline, ("points",)),
 }
 _MARKED = {"path", "line", "polygon", "polyline"}
-_GEOMETRY = {"d", "points", "x", "y", "width", "height", "r", "rx", "ry", "cx", "cy"}
-_GEOMETRY |= {"x1", "y1", "x2", "y2"}
+_GEOMETRY = {
+    *("d", "points", "x", "y", "width", "height", "r", "rx", "ry", "cx", "cy"),
+    *("x1", "y1", "x2", "y2"),
+}
 _BAD_VALUE = (ValueError, TypeError, IndexError, AttributeError, ZeroDivisionError, OverflowError)
 _TOKEN = re.compile(r"[A-Za-z]|\.?\d+")
 _LENGTH = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?(px|pt|pc|mm|cm|in|%)?", re.IGNORECASE)
@@ -43,6 +47,21 @@ PAINT = (
     *("stroke-miterlimit", "stroke-dasharray", "stroke-dashoffset"),
     *("marker", "marker-start", "marker-mid", "marker-end"),
 )
+
+
+@dataclass(frozen=True)
+class Pen:
+    """What a stroke is drawn with: lengths are in the pen's own units.
+
+    - `dashes`: The lengths of dashes and gaps in turn, an even number of them; none for a whole line.
+    """
+
+    width: float
+    cap: str
+    join: str
+    miter_limit: float
+    dashes: tuple[float, ...]
+    offset: float
 
 
 @dataclass(frozen=True)
@@ -63,9 +82,36 @@ class DrawnShape:
     diagonal: float = 0.0
     clips: tuple["Clip", ...] = ()
 
-    def number(self, key: str, usual: float) -> float:
-        """Read a property as a length in units of the pen, or return the usual one."""
-        return as_number(self.paint.get(key), usual, self.diagonal)
+    @property
+    def scale(self) -> float:
+        """The mean size of a unit of the pen in the drawing's units."""
+        return float(abs(np.linalg.det(self.matrix[:2, :2])) ** 0.5)
+
+    @property
+    def is_plain_line(self) -> bool:
+        """Whether its stroke is one whole line everywhere as wide as the pen."""
+        most, least = np.linalg.svd(self.matrix[:2, :2])[1]
+        return not self.pen.dashes and not self.clips and most - least < 1e-3 * most
+
+    @cached_property
+    def pen(self) -> Pen:
+        """What its stroke is drawn with."""
+
+        def number(key: str, usual: float) -> float:
+            return as_number(self.paint.get(f"stroke-{key}"), usual, self.diagonal)
+
+        words = self.paint.get("stroke-dasharray", "none").replace(",", " ").split()
+        dashes = [as_number(word, -1.0, self.diagonal) for word in words[:MOST_DASHES]]
+        usable = min(dashes, default=-1.0) >= 0 and sum(dashes) > 0
+        width = number("width", 1.0)
+        return Pen(
+            width if width >= 0 else 1.0,
+            self.paint.get("stroke-linecap", "butt"),
+            self.paint.get("stroke-linejoin", "miter"),
+            number("miterlimit", 4.0),
+            tuple(dashes * (1 + len(dashes) % 2)) if usable else (),
+            number("dashoffset", 0.0),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +158,7 @@ class Drawing:
         self.styles = StyleSheet(self.path, self.root)
         self.by_id = {key: item for item in self.root.iter() if (key := item.get("id"))}
         self.box = self._box()
+        self._clips: dict[tuple[int, bytes], Clip] = {}
 
     def collect(self) -> None:
         """Find all shapes. Raises `InputFileError` for one that cannot be understood."""
@@ -175,6 +222,8 @@ class Drawing:
             return
         place = place.moved(self._transform(element, properties, place)).painted(properties)
         first = len(self.shapes)
+        if np.linalg.det(place.matrix) == 0:  # flat
+            return
         if element.tag == "svg":
             self._visit_viewport(element, self._window(element, place), place)
         elif element.tag in _GROUPS:
@@ -248,12 +297,15 @@ class Drawing:
             points = _mapped(np.linalg.inv(place.matrix), points)
             low, high = points.min(axis=0), points.max(axis=0)
             inner = inner.moved(np.array([*np.c_[np.diag(high - low), low], [0, 0, 1.0]]))
-        del self.shapes[first:]
-        inner = replace(inner, paint={}, opacity=1.0)
-        for child in source:
-            self._visit(child, inner.painted(properties))
-        kind = "clip" if source.tag == "clipPath" else properties.get("mask-type", "luminance")
-        self._cut(own, first, Clip(self.shapes[first:], kind))
+        key = id(source), inner.matrix.tobytes()
+        if key not in self._clips:
+            del self.shapes[first:]
+            inner = replace(inner, paint={}, opacity=1.0).painted(properties)
+            for child in source:
+                self._visit(child, inner)
+            kind = "clip" if source.tag == "clipPath" else properties.get("mask-type", "luminance")
+            self._clips[key] = Clip(self.shapes[first:], kind)
+        self._cut(own, first, self._clips[key])
 
     def _add_shape(self, element: Element, properties: dict[str, str], place: _Place) -> None:
         kind, needed = _SHAPES[element.tag]
@@ -293,7 +345,7 @@ class Drawing:
             marker = named[key]
             if marker is None or marker.tag != "marker":
                 continue
-            turn, scale = marker.get("orient", "0"), shape.number("stroke-width", 1.0)
+            turn, scale = marker.get("orient", "0"), shape.pen.width
             if not turn.startswith("auto"):
                 angle = np.radians(as_number(turn.removesuffix("deg"), 0.0))
             elif turn == "auto-start-reverse" and key == "start":

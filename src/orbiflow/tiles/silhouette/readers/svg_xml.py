@@ -100,6 +100,7 @@ class StyleSheet:
     def properties(self, element: Element) -> dict[str, str]:
         """Return attributes of `element` overridden by the rules that match it and by its own style."""
         properties = dict(element.attrib)
+        properties.pop("marker", None)  # a property of styles alone
         tag, names = element.tag, element.get("class", "").split()
         classes = [f"{before}.{name}" for before in ("", tag) for name in names]
         for selector in ("*", tag, *classes, f"#{element.get('id', '')}"):
