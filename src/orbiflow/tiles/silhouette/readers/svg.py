@@ -117,7 +117,8 @@ def _background(
     These are rectangles that cover the page, as long as something else is there.
     """
     every = [layer.region for own in layers for layer in own]
-    page = shapely.box(*(drawing.box or shapely.total_bounds(every)))
+    xmin, ymin, xmax, ymax = drawing.box or shapely.total_bounds(every)
+    page = shapely.box(xmin, ymin, xmax, ymax)
 
     def covers(own: list[Layer]) -> bool:  # but for 0.1% of the page
         region = own[0].region
@@ -140,8 +141,8 @@ def _overlay(layers: list[Layer], ground: str | None) -> tuple[BaseGeometry, lis
 
     def effect(layer: Layer) -> int:
         colour, opacity = layer.brush
-        both = [rgb(c if c[0] == "#" else PLAIN.colour) for c in (colour, paper)]
-        if np.abs(np.subtract(*both)).max() <= SAME_COLOUR:
+        own, under = (rgb(c if c[0] == "#" else PLAIN.colour) for c in (colour, paper))
+        if max(abs(a - b) for a, b in zip(own, under, strict=True)) <= SAME_COLOUR:
             return -1 if opacity >= COVERING else 0
         return 1 if opacity >= FAINT else 0
 

@@ -181,12 +181,12 @@ def corners(paths: list[SubPath], matrix: Array) -> Iterator[tuple[str, Array, f
         starts = [path.start, *(curve.end for curve in curves)]
         along = [curve.directions(start) for curve, start in zip(curves, starts, strict=False)]
         none = np.zeros(2)
-        before = [along[-1][1] if path.closed else none, *(last for _, last in along)]
-        after = [*(first for first, _ in along), along[0][0] if path.closed else none]
-        found += zip(starts, before, after, strict=True)
-    for k, (point, *sides) in enumerate(found):
+        into = [along[-1][1] if path.closed else none, *(last for _, last in along)]
+        out = [*(first for first, _ in along), along[0][0] if path.closed else none]
+        found += zip(starts, into, out, strict=True)
+    for k, (point, into, out) in enumerate(found):
         key = "start" if k == 0 else "end" if k == len(found) - 1 else "mid"
-        mean = sum(_unit(matrix[:, :2] @ side) for side in sides)
+        mean = _unit(matrix[:, :2] @ into) + _unit(matrix[:, :2] @ out)
         yield key, matrix[:, :2] @ point + matrix[:, 2], math.atan2(mean[1], mean[0])
 
 
