@@ -26,7 +26,7 @@ from orbiflow.tiles.silhouette.readers.svg_paths import (
     check_tangle,
     fill,
 )
-from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, Drawing, DrawnShape, Pen
+from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, Drawing, DrawnShape
 
 CAPS: dict[str, Literal["flat", "round", "square"]] = {
     "butt": "flat",
@@ -88,7 +88,7 @@ class Regions:
             ends = np.array([path.start, *(curve.end for curve in path.curves)])
             corners = np.isin(complex_points(points), complex_points(ends))
             lines.append(Line((points - offset) @ back, corners, path.closed))
-        region = stroked(lines, shape.pen)
+        region = stroked(lines, shape)
         return shapely.transform(region, lambda points: points @ linear.T + offset)
 
     def clipped(self, shape: DrawnShape, region: BaseGeometry) -> BaseGeometry:
@@ -118,15 +118,11 @@ class Regions:
 
         def effect(layer: Layer) -> int:
             colour, opacity = layer.brush
-            light = 1.0 if clip.kind == "alpha" else lightness(colour)
+            light = sum(rgb(colour)) / 765 if colour[0] == "#" else 0.0
+            light = 1.0 if clip.kind == "alpha" else light
             return 1 if light * opacity >= 0.5 else -1 if opacity > 0.5 else 0
 
         return painted([layer for shape in clip.shapes for layer in self.layers(shape)], effect)
-
-
-def lightness(colour: str) -> float:
-    """Return how light a colour is, from 0 to 1."""
-    return float(np.dot(rgb(colour), [0.2126, 0.7152, 0.0722])) / 255 if colour[0] == "#" else 0.0
 
 
 def painted(
@@ -157,40 +153,42 @@ class Line(NamedTuple):
     closed: bool
 
 
-def stroked(lines: list[Line], pen: Pen) -> BaseGeometry:
-    """Return the region that a pen covers along polylines."""
-    half = pen.width / 2
-    pieces = [piece for line in lines for piece in _pieces(line, pen)]
+def stroked(lines: list[Line], shape: DrawnShape) -> BaseGeometry:
+    """Return the region that a shape's pen covers along polylines."""
+    half, dashes = shape.width / 2, shape.dashes
+    offset, limit = shape.number("stroke-dashoffset", 0.0), shape.number("stroke-miterlimit", 4.0)
+    pieces = [piece for line in lines for piece in _pieces(line, dashes, offset)]
     if not pieces or not all(np.isfinite(piece.points).all() for piece in pieces):
         return Polygon()
-    cap = CAPS.get(pen.cap, "flat")
-    join = "round" if pen.join == "round" else "bevel"
+    cap = CAPS.get(shape.paint.get("stroke-linecap", "butt"), "flat")
+    corner = shape.paint.get("stroke-linejoin", "miter")
+    join = "round" if corner == "round" else "bevel"
     strings = [shapely.LineString(piece.points) for piece in pieces]
     simple = shapely.simplify(strings, WIGGLE * half)
     runs = [shapely.get_coordinates(line) for line in simple]
     check_tangle(np.concatenate([np.stack([p[:-1], p[1:]], axis=1) for p in runs]), half)
     regions = [shapely.buffer(simple, half, cap_style=cap, join_style=join)]
     if join == "bevel":
-        limit = 0.0 if pen.join == "bevel" else pen.miter_limit
+        limit *= corner != "bevel"
         regions += [_joins(piece, half, limit) for piece in pieces if len(piece.points) > 2]
     return shapely.union_all(np.concatenate(regions))
 
 
-def _pieces(line: Line, pen: Pen) -> list[Line]:
+def _pieces(line: Line, dashes: list[float], offset: float) -> list[Line]:
     """Return the dashes of a line; or its whole, ending where it began if it is closed."""
     points, corners, closed = line
     if closed:
         points, corners = np.vstack([points, points[:1]]), np.r_[corners, corners[:1]]
     steps = np.hypot(*np.diff(points, axis=0).T)
     points, corners = points[np.r_[True, steps > 0]], corners[np.r_[True, steps > 0]]
-    if not pen.dashes or len(points) == 1:
+    if not dashes or len(points) == 1:
         return [Line(points if len(points) > 1 else np.repeat(points, 2, axis=0), corners, closed)]
     along: Array = np.r_[0.0, np.cumsum(steps[steps > 0])]
-    edges: Array = np.r_[0.0, np.cumsum(pen.dashes)]
+    edges: Array = np.r_[0.0, np.cumsum(dashes)]
     total, period = float(along[-1]), float(edges[-1])
-    if not (total / period + 2) * len(pen.dashes) < MAX_POINTS:
+    if not (total / period + 2) * len(dashes) < MAX_POINTS:
         raise TooManyPoints
-    turns: Array = np.arange(-(pen.offset % period), total, period)[:, None]
+    turns: Array = np.arange(-(offset % period), total, period)[:, None]
     starts: Array = (turns + edges[:-1:2]).ravel()
     ends: Array = (turns + edges[1::2]).ravel()
     shown = (starts < total) & ((ends > 0) | (starts == ends) & (starts >= 0))
