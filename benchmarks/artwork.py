@@ -18,7 +18,7 @@ from PIL import Image
 
 from orbiflow.tiles import ArtSettings, EscherTile, artwork, read_result, render_artwork, with_map
 from orbiflow.tiles.art.making import png_of
-from orbiflow.tiles.art.source import Picture, covered_area
+from orbiflow.tiles.motifs.source import Picture, covered_area
 
 
 def main() -> None:

@@ -16,7 +16,7 @@ from artworks import EYE, size_of, squirrel, write_run
 from orbiflow.drawing import PALETTES
 from orbiflow.runtime import Cancel, Cancelled, Note, Written, find
 from orbiflow.tiles import Target
-from orbiflow.tiles.art.source import covered_area
+from orbiflow.tiles.motifs.source import covered_area
 
 
 @pytest.fixture(name="result", scope="module")

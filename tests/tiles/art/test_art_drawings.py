@@ -29,8 +29,8 @@ from orbiflow.tiles import (
     write_dxf,
     write_pdf,
 )
-from orbiflow.tiles.art.source import covered_area, silhouette_outline
-from orbiflow.tiles.exporting import INK, Part
+from orbiflow.tiles.motifs.source import covered_area, silhouette_outline
+from orbiflow.tiles.scene import INK, Part
 
 PAGE = ArtSettings(size=(300, 200), tile_size=130, outline=0.0, samples=4)
 

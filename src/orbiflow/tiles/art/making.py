@@ -14,20 +14,27 @@ from orbiflow.arguments import as_path
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
-from orbiflow.tiles.art.drawings import Over, paint_motif, read_over
-from orbiflow.tiles.art.engraving import engraved, eye
 from orbiflow.tiles.art.page import ArtPage, art_page
-from orbiflow.tiles.art.raster import Grid, Paint, render_page
+from orbiflow.tiles.art.rendering import render_page
 from orbiflow.tiles.art.settings import ArtSettings
-from orbiflow.tiles.art.source import Picture, carried_picture, with_map
-from orbiflow.tiles.exporting import (
+from orbiflow.tiles.motifs import (
+    Over,
+    Paint,
+    Picture,
+    carried_raster,
+    drawn_motif,
+    paint_motif,
+    picture_paint,
+    read_over,
+    with_map,
+)
+from orbiflow.tiles.scene import (
     INCH,
     Box,
     Curve,
     Layer,
     Motif,
     Part,
-    Raster,
     Scene,
     Style,
     Uses,
@@ -66,6 +73,11 @@ class Artwork:
         width = self.settings.outline
         return max(1.0, self.page.tile_size / TILE_PER_OUTLINE) if width is None else width
 
+    @property
+    def density(self) -> float:
+        """The texels of the tile's raster along its unit."""
+        return TEXELS_PER_PIXEL * self.page.scale
+
     def _repr_png_(self) -> bytes:
         """Return what a notebook shows."""
         return png_of(render_artwork(self), self.settings.dpi)
@@ -92,17 +104,12 @@ def artwork(
             lies outside it, there are too many tiles, or no rectangle repeats.
     """
     settings, tile = settings or ArtSettings(), with_map(tile)
-    if picture is not None or drawing is not None or settings.eyes:
+    if picture is not None:
         tile.require_map()
-    page = art_page(tile, settings)
-    parts = () if drawing is None else drawing.parts
-    around = [eye(tile, given, palette(settings.palette)) for given in settings.eyes]
-    if settings.strokes is not None:
-        parts += engraved(tile, settings.strokes, around)
-    parts += tuple(part for one in around for part in one.parts)
-    short = palette(settings.palette).shortage(page.count)
-    said = (*tile.notes, *notes, *page.notes, *short)
-    return Artwork(tile, settings, page, picture, Motif(parts), said)
+    page, chosen = art_page(tile, settings), palette(settings.palette)
+    motif = drawn_motif(tile, settings, chosen, drawing)
+    said = (*tile.notes, *notes, *page.notes, *chosen.shortage(page.count))
+    return Artwork(tile, settings, page, picture, motif, said)
 
 
 def render_artwork(art: Artwork, *, cancel: Cancel | None = None) -> np.ndarray:
@@ -113,20 +120,10 @@ def render_artwork(art: Artwork, *, cancel: Cancel | None = None) -> np.ndarray:
     return render_page(page, paint.grid, coloured, chosen.paper, samples=samples, cancel=cancel)
 
 
-def picture_paint(art: Artwork) -> Paint:
-    """Paint the tile's raster, as fine as the page needs, with the picture alone."""
-    polygon = art.page.tile.polygon
-    paint = Paint(Grid.over(polygon, TEXELS_PER_PIXEL * art.page.scale, art.page.count))
-    if art.picture is not None:
-        paint.lay(*carried_picture(art.picture, art.tile, paint.grid))
-        paint.bleed(paint.grid.inside(polygon))
-    return paint
-
-
 def painted(art: Artwork) -> Paint:
     """Paint the tile's raster with all that is on the tile."""
     polygon = art.page.tile.polygon
-    paint = picture_paint(art)
+    paint = picture_paint(art.picture, art.tile, art.density, art.page.count)
     if art.motif.parts:
         paint_motif(paint, art.motif)
         paint.bleed(paint.grid.inside(polygon))
@@ -150,7 +147,10 @@ def art_scene(art: Artwork) -> Scene:
     # relative to the tile's own middle, so that rounding transforms moves points least
     middle = tile.center
     symbol = Curve.polyline(tile.polygon - middle, closed=True)
-    motif = Motif(art.motif.parts, _rasters(art), TILE).moved(np.eye(2), -middle)
+    rasters = ()
+    if art.picture is not None:
+        rasters = (carried_raster(art.picture, art.tile, art.density, page.count),)
+    motif = Motif(art.motif.parts, rasters, TILE).moved(np.eye(2), -middle)
     copies = page.copies
     turned = linear @ tile.group.linear_parts
     places = copies.translations @ linear.T + offset + (turned @ middle)[copies.cosets]
@@ -188,21 +188,6 @@ def art_scene(art: Artwork) -> Scene:
         notes=notes,
         motifs=motifs if drawn else {},
     )
-
-
-def _rasters(art: Artwork) -> tuple[Raster, ...]:
-    if art.picture is None:
-        return ()
-    paint = picture_paint(art)
-    values, grid = paint.values, paint.grid
-    alpha = 1 - values[..., 3:4]
-    straight = values[..., :3] / np.maximum(alpha, 1e-6)
-    both = np.concatenate([straight, alpha], axis=2)
-    image = Image.fromarray((both * 255 + 0.5).clip(0, 255).astype(np.uint8), "RGBA")
-    buffer = io.BytesIO()
-    image.save(buffer, "PNG")
-    linear = np.eye(2) / grid.density
-    return (Raster(buffer.getvalue(), image.size, linear, grid.corner),)
 
 
 def write_artwork(art: Artwork, ending: str, *, cancel: Cancel | None = None) -> bytes | str:

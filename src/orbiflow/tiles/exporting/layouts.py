@@ -14,19 +14,10 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import rotation_matrix
 from orbiflow.tiles.exporting.nesting import dense_arrangements, on_sheet
 from orbiflow.tiles.exporting.outlines import Outline, fitted, outline, turning
-from orbiflow.tiles.exporting.scene import (
-    Box,
-    Curve,
-    Layer,
-    PlacedTile,
-    Scene,
-    Style,
-    Uses,
-    rectangle,
-)
 from orbiflow.tiles.exporting.settings import ExportSettings
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.likeness import Thinnest, narrowest_neck, narrowest_slit
+from orbiflow.tiles.scene import Box, Curve, Layer, PlacedTile, Scene, Style, Uses, rectangle
 from orbiflow.tiles.tilings import Copies, Tile, colouring, copies_inside, copies_meeting
 
 STRIP = 8.0  # height in mm of the strip at the page's foot that the calibration mark has for itself

@@ -10,7 +10,7 @@ import numpy as np
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.exporting.layouts import STRIP
-from orbiflow.tiles.exporting.scene import (
+from orbiflow.tiles.scene import (
     Box,
     Curve,
     Layer,

@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.exporting.layouts import Layout, chosen_copies, line_style, placed_tiles
-from orbiflow.tiles.exporting.scene import Curve, Layer, Scene, clipped_line, rectangle
+from orbiflow.tiles.scene import Curve, Layer, Scene, clipped_line, rectangle
 from orbiflow.tiles.tilings import skeleton
 
 

@@ -11,14 +11,12 @@ from orbiflow.arguments import as_path
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
-from orbiflow.tiles.exporting.formats import write_dxf, write_json, write_pdf, write_png
 from orbiflow.tiles.exporting.layouts import Layout, layout, pieces_scenes, place_on, tiling_scene
-from orbiflow.tiles.exporting.scene import Scene
 from orbiflow.tiles.exporting.settings import ExportSettings
 from orbiflow.tiles.exporting.sheets import calibrated, split
 from orbiflow.tiles.exporting.skeletons import skeleton_scene
-from orbiflow.tiles.exporting.svg import write_svg
 from orbiflow.tiles.likeness import narrowest_neck
+from orbiflow.tiles.scene import Scene, write_dxf, write_json, write_pdf, write_png, write_svg
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import Certificate, colouring
 

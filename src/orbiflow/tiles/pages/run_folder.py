@@ -20,7 +20,6 @@ from orbiflow.runtime import (
     work,
     write_atomic,
 )
-from orbiflow.tiles.exporting import tile_svg, tiling_svg
 from orbiflow.tiles.pages.overview import TILE_FILES, index_page, overview_png
 from orbiflow.tiles.pictures import (
     bending_picture,
@@ -31,6 +30,7 @@ from orbiflow.tiles.pictures import (
     tiling_raster,
 )
 from orbiflow.tiles.result_file import RESULT, folder_names
+from orbiflow.tiles.scene import tile_svg, tiling_svg
 from orbiflow.tiles.search import SearchResult, report
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile, TileMap

@@ -16,8 +16,8 @@ import numpy as np
 
 from orbiflow.arrays import Array, Window, checked_window
 from orbiflow.drawing import DEFAULT_PALETTE, palette
-from orbiflow.tiles.exporting.scene import Box, Curve, Layer, Motif, Scene, Style, Uses, rectangle
 from orbiflow.tiles.pictures import default_window
+from orbiflow.tiles.scene.scene import Box, Curve, Layer, Motif, Scene, Style, Uses, rectangle
 from orbiflow.tiles.tilings import Colouring, Tile, Tiles, as_tiling, colouring, patch
 
 _HEADER = """<?xml version="1.0" encoding="UTF-8"?>

@@ -12,7 +12,7 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.drawing import plane_axes
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.scene import (
+from orbiflow.tiles.scene.scene import (
     Curve,
     Layer,
     PlacedTile,

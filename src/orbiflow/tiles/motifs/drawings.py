@@ -15,10 +15,10 @@ from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
 from orbiflow.drawing import plane_axes, rgb
 from orbiflow.errors import InputFileError
-from orbiflow.tiles.art.raster import Grid, Paint
-from orbiflow.tiles.art.source import Picture, covered_area, read_picture
-from orbiflow.tiles.exporting import INK, Curve, Motif, Part, Style, curves_path, draw_paths
 from orbiflow.tiles.geometry import orient, polygons_in
+from orbiflow.tiles.motifs.raster import Grid, Paint
+from orbiflow.tiles.motifs.source import Picture, covered_area, read_picture
+from orbiflow.tiles.scene import INK, Curve, Motif, Part, Style, curves_path, draw_paths
 from orbiflow.tiles.silhouette import (
     MAX_BYTES,
     MAX_POINTS,

@@ -14,10 +14,6 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinat
 from orbiflow.arrays import Array
 from orbiflow.drawing import Palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.art.raster import Grid
-from orbiflow.tiles.art.settings import Strokes
-from orbiflow.tiles.art.source import silhouette_outline
-from orbiflow.tiles.exporting import INK, Curve, Part, Style
 from orbiflow.tiles.geometry import (
     arc_lengths,
     best_similarity,
@@ -25,6 +21,10 @@ from orbiflow.tiles.geometry import (
     resampled,
     signed_area,
 )
+from orbiflow.tiles.motifs.raster import Grid
+from orbiflow.tiles.motifs.settings import Strokes
+from orbiflow.tiles.motifs.source import silhouette_outline
+from orbiflow.tiles.scene import INK, Curve, Part, Style
 from orbiflow.tiles.tile import EscherTile
 
 GRID_DENSITY = 420.0  # cells of the raster along the square root of the area
