@@ -38,7 +38,7 @@ from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
 from orbiflow.tiles.search.both_search import ALIKE
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
-from orbiflow.tiles.search.finished_tiles import HOW, ClassFailure, best_tiles
+from orbiflow.tiles.search.finished_tiles import HOW, ClassFailure, best_tiles, rated
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.search_method import Goal, SearchMethod
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
@@ -54,7 +54,8 @@ class SearchResult:
     """What a search found.
 
     - `target`: The silhouette.
-    - `tiles`: Certified tiles, best first; after a search for both those for likeness come first.
+    - `tiles`: Certified tiles, best first, with their ratings; after a search for both those for
+      likeness come first.
     - `failures`: The classes that gave none, and why.
     - `found`: All tiles that were found, those that are not listed among them.
     - `method`: The method that was used, with its settings.
@@ -72,6 +73,9 @@ class SearchResult:
     pins: Pins | None = None
     seconds: float = 0.0
     workers: int = 1
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tiles", rated(self.tiles, self.target))
 
     @property
     def interrupted(self) -> frozenset[str]:
