@@ -76,8 +76,9 @@ def _traced(
     if threshold is not None and not (isinstance(threshold, Real) and 0 < threshold < 1):
         raise OrbiflowError(f"threshold must lie between 0 and 1, got {threshold}")
     level, notes = choose_shape(path, picture, threshold, invert)
-    outline, traced = trace(path, level, scale=picture.reduced, size=picture.size)
-    return Reading(outline, True, "image", picture.size, (*picture.notes, *notes, *traced))
+    outline, seen, traced = trace(path, level, scale=picture.reduced, size=picture.size)
+    notes = (*picture.notes, *notes, *traced)
+    return Reading(outline, True, "image", picture.size, notes, seen=seen)
 
 
 def open_image(path: Source, decode: Callable[[Any, Image.Image], _Decoded]) -> _Decoded:
