@@ -1,3 +1,6 @@
+from .layouts import MOTIF as MOTIF
+from .layouts import SYMBOL as SYMBOL
+from .layouts import tile_layers as tile_layers
 from .placing import edge_margin as edge_margin
 from .placing import inset as inset
 from .placing import longer_side as longer_side
