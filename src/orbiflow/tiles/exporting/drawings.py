@@ -8,13 +8,12 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.drawing import palette, rgb
+from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.exporting.layouts import Layout, line_style
 from orbiflow.tiles.motifs import Over, carried_raster, drawn_motif
 from orbiflow.tiles.scene import (
     INCH,
-    INK,
     Layer,
     Motif,
     Part,
@@ -27,6 +26,7 @@ from orbiflow.tiles.scene import (
     polylines,
     region_of,
 )
+from orbiflow.tiles.silhouette import lightness
 from orbiflow.tiles.tile import EscherTile
 
 BLACK, BLUE = "#000000", "#0000ff"
@@ -68,12 +68,7 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
     ink = ink if settings.coloured else None
     layers = [
         Layer(
-            name,
-            "drawing",
-            styles[name],
-            (Uses(name, linear, which, offsets),),
-            settings.clip,
-            ink,
+            name, "drawing", styles[name], (Uses(name, linear, which, offsets),), settings.clip, ink
         )
         for name, motif in motifs.items()
         if motif.parts or motif.rasters
@@ -84,17 +79,17 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
 def _burnt(motif: Motif, tile: shapely.Polygon, styles: dict[str, Style]) -> dict[str, Motif]:
     """Return the regions and pictures to engrave, and the lines to score.
 
-    What is lighter than middle grey erases what lies under it, as when it is seen on white.
+    What is lighter than middle grey erases what lies under it, as on white; faint colours do nothing.
     """
     dark: BaseGeometry = shapely.Polygon()
     lines: list[BaseGeometry] = []
-    for part in motif.parts:
+    for part in (part for part in motif.parts if part.opacity >= 0.5):
         fill, stroke, width = part.style
         if fill is not None:
             region = region_of(part)
-            dark = dark | region if _is_dark(fill) else dark - region
+            dark = dark | region if lightness(fill) < 0.5 else dark - region
             lines = [line - region for line in lines]
-        if stroke is not None and _is_dark(stroke):
+        if stroke is not None and lightness(stroke) < 0.5:
             lines.append(lines_of(part))
         elif stroke is not None:
             erased = lines_of(part).buffer(width / 2)
@@ -107,7 +102,3 @@ def _burnt(motif: Motif, tile: shapely.Polygon, styles: dict[str, Style]) -> dic
         "engrave": Motif(engraved, pictures),
         "score": Motif((Part(scored, styles["score"]),) if scored else ()),
     }
-
-
-def _is_dark(colour: str) -> bool:
-    return colour == INK or float(np.dot(rgb(colour), (0.299, 0.587, 0.114))) < 128
