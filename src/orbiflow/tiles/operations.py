@@ -234,6 +234,7 @@ def export(
     choice: TileChoice = TileChoice(),
     *,
     out: Annotated[Path | None, Option("-o"), DefaultText("named after the tile")] = None,
+    picture: Path | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
@@ -244,6 +245,7 @@ def export(
     Args:
         result: A search's folder, or its result.json.
         out: The file.
+        picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
     """
     settings = settings.for_file(out)
 
@@ -251,9 +253,9 @@ def export(
 
     tile = choice.read(result)
     out = out or Path(f"{tile.name}.{settings.format}")
-    check_output_file(out, result)
+    check_output_file(out, result, picture)
     done = exporting.export(
-        tile, out, settings, force=choice.force, on_event=on_event, cancel=cancel
+        tile, out, settings, picture=picture, force=choice.force, on_event=on_event, cancel=cancel
     )
     _tell(on_event, (*done.notes, _exported(done, settings, tile.isohedral_class)), *done.files)
     return Outcome(

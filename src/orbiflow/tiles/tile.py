@@ -391,12 +391,17 @@ class EscherTile:
         return draw_art(self, out, settings, picture=picture, target=target, force=force)
 
     def export(
-        self, out: str | Path, settings: ExportSettings | None = None, *, force: bool = False
+        self,
+        out: str | Path,
+        settings: ExportSettings | None = None,
+        *,
+        picture: str | Path | None = None,
+        force: bool = False,
     ) -> Exported:
         """Write the tiling, its lines or its pieces in real size; see `orbiflow.tiles.export`."""
         from orbiflow.tiles.exporting import export
 
-        return export(self, out, settings, force=force)
+        return export(self, out, settings, picture=picture, force=force)
 
     def solid(
         self,
