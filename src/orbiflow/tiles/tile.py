@@ -19,6 +19,7 @@ from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
 from orbiflow.runtime import read_arrays
 from orbiflow.tiles.likeness import (
     Fidelity,
+    Rating,
     Recognisability,
     ShapeMetrics,
     Thinnest,
@@ -26,7 +27,7 @@ from orbiflow.tiles.likeness import (
     rank_score,
 )
 from orbiflow.tiles.silhouette import Bending, Frame
-from orbiflow.tiles.tilings import Certificate, Tile, certify
+from orbiflow.tiles.tilings import Certificate, Tile, arrangement, certify
 
 if TYPE_CHECKING:
     from orbiflow.tiles.art import ArtSettings, Artwork
@@ -154,11 +155,12 @@ class EscherTile:
     - `bent_iou`: The IoU of the tile with the bent silhouette.
     - `pinned`: How far the worst pinned part is from similar to what it was; None without pins.
     - `known_score`: The score that a file states.
+    - `rating`: Its stars among the tiles of its run.
 
     How it was found:
 
     - `objective`: What the search was after, "likeness" or "overlap".
-    - `front`: After a search for both, whether no other tile beats this one in both.
+    - `front`: After a search for both, whether no other listed tile beats this one in both.
     - `starts`, `dropped`: The number of starts, and of those that gave no certified tile.
     - `seconds`: Computing time on one core.
     - `others`: More tiles of the class, if they were asked for.
@@ -185,6 +187,7 @@ class EscherTile:
     bent_iou: float | None = None
     pinned: float | None = None
     known_score: float | None = None
+    rating: Rating | None = None
     objective: str = "overlap"
     front: bool | None = None
     starts: int = 0
@@ -236,6 +239,11 @@ class EscherTile:
     def group_name(self) -> str:
         """The name of the wallpaper group, such as "p2"."""
         return self.tile.group.name
+
+    @cached_property
+    def arrangement(self) -> str:
+        """How its copies lie, in plain words; "" if it does not tile."""
+        return arrangement(self.tile) if self.certificate.valid else ""
 
     @cached_property
     def certificate(self) -> Certificate:
