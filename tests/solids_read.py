@@ -49,7 +49,7 @@ def _numbers(own: ElementTree.Element, tag: str, names: Any) -> Array:
     return np.array([[float(row.get(name, "")) for name in names] for row in rows])
 
 
-def section(body: Any, z: float) -> shapely.geometry.base.BaseGeometry:
+def section(body: Any, z: float) -> Any:
     """The cross-section of a body at a height, seen from above."""
     found: Any = shapely.Polygon()
     for ring in body.slice(z).to_polygons():  # holes run clockwise

@@ -24,6 +24,7 @@ from .readers.svg_paint import brushes as brushes
 from .readers.svg_paths import SubPath as SubPath
 from .readers.svg_paths import TooManyPoints as TooManyPoints
 from .readers.svg_paths import TooTangled as TooTangled
+from .readers.svg_paths import fill as fill
 from .readers.svg_regions import Regions as Regions
 from .readers.svg_shapes import Drawing as Drawing
 from .readers.svg_shapes import DrawnShape as DrawnShape
