@@ -193,9 +193,11 @@ def _remarks(result: SearchResult) -> list[str]:
         best = sum(tile.front is True for tile in tiles)
         near = "" if best == len(tiles) else f", {len(tiles) - best} near these"
         remarks.append(
-            f"{len(tiles)} of {len(found)} tiles are listed: {best} that no other beats in both "
-            f"deformation and overlap{near}"
+            f"{len(tiles)} of {len(found)} tiles are listed: {best} that no other of them beats in "
+            f"both deformation and overlap{near}"
         )
+    for name in sorted(result.interrupted & {tile.isohedral_class for tile in tiles}):
+        remarks.append(f"{name} has its first tile only: its search was interrupted")
     if tiles and tiles[0].rating and tiles[0].rating.word == "poor":
         remarks.append(POOR)
     return remarks

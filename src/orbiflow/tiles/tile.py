@@ -159,7 +159,7 @@ class EscherTile:
     How it was found:
 
     - `objective`: What the search was after, "likeness" or "overlap".
-    - `front`: After a search for both, whether no other tile beats this one in both.
+    - `front`: After a search for both, whether no other listed tile beats this one in both.
     - `starts`, `dropped`: The number of starts, and of those that gave no certified tile.
     - `seconds`: Computing time on one core.
     - `others`: More tiles of the class, if they were asked for.

@@ -180,7 +180,7 @@ def test_after_a_search_for_both_the_page_says_what_for(
 ) -> None:
     both = [replace(bent, front=True), replace(flowed, front=False)]
     page = Page(index_page(both, target, ["IH4", "IH6"]))
-    assert "found for likeness: no other beats it in both" in page.words
+    assert "found for likeness: no other here beats it in both" in page.words
     assert "found for overlap: near the best" in page.words
     assert {"href": "front.png"} in page.all("a")
     assert {"href": "front.png"} not in Page(index_page([bent], target, ["IH4"])).all("a")

@@ -1,4 +1,7 @@
-from .layouts import longer_side as longer_side
+from .placing import edge_margin as edge_margin
+from .placing import inset as inset
+from .placing import longer_side as longer_side
+from .placing import place_on_page as place_on_page
 from .settings import ExportSettings as ExportSettings
 from .writing import Exported as Exported
 from .writing import export as export

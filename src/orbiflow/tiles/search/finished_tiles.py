@@ -14,7 +14,7 @@ import shapely
 from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.runtime import one_thread
+from orbiflow.runtime import one_blas_thread, one_thread
 from orbiflow.tiles.geometry import ring_length, signed_area
 from orbiflow.tiles.likeness import (
     Pinned,
@@ -152,5 +152,5 @@ def certified_tiles(
                 found, Fit, "what was found", "fit_tile gives a Fit, load_model a TileModel"
             )
         found = Fit(found, found.size, 0, found.size)
-    with one_thread():
+    with one_thread(), one_blas_thread():
         return best_tiles(target, found, force=force)
