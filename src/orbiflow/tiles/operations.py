@@ -27,6 +27,7 @@ from orbiflow.tiles.art import ArtSettings
 from orbiflow.tiles.exporting import ExportSettings
 from orbiflow.tiles.motion import AnimationSettings
 from orbiflow.tiles.search import EscherizeSettings
+from orbiflow.tiles.solids import SolidSettings
 
 if TYPE_CHECKING:
     from orbiflow.tiles.exporting import Exported
@@ -324,6 +325,52 @@ def art(
             "tiles": page.shown,
             "class": tile.isohedral_class,
             "tile_size": page.tile_size,
+        }
+    )
+
+
+@operation("solid")
+def solid(
+    result: Path,
+    settings: SolidSettings = SolidSettings(),
+    choice: TileChoice = TileChoice(),
+    *,
+    out: Annotated[Path | None, Option("-o"), DefaultText("named after the tile")] = None,
+    picture: Path | None = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Make a solid to print in 3D: a tile, cookie cutter, stamp, mould or puzzle.
+
+    It lies as it is printed, without supports. Lengths are numbers with a unit: mm, cm, in or pt.
+
+    Args:
+        result: A search's folder, or its result.json.
+        out: The file, .stl or .3mf.
+        picture: An SVG drawing over the silhouette, in the same frame, for a stamp or mould.
+    """
+    settings = settings.for_file(out)
+
+    from orbiflow.tiles.solids import make_solid
+
+    tile = choice.read(result)
+    out = out or Path(f"{tile.name}-{settings.kind}.{settings.format}")
+    check_output_file(out, result, picture)
+    made = make_solid(tile, settings, picture=picture, force=choice.force)
+    cancel.check()
+    made.write(out, settings.format)
+    size = " x ".join(f"{side:.1f}" for side in made.size)
+    cubic = made.volume / 1000
+    note = f"written {out}: {settings.kind} of {tile.isohedral_class}, {size} mm, {cubic:.1f} cm³"
+    _tell(on_event, (*made.notes, note), out)
+    return Outcome(
+        {
+            "file": str(out),
+            "kind": settings.kind,
+            "class": tile.isohedral_class,
+            "parts": len(made.parts),
+            "size": made.size.tolist(),
+            "volume": made.volume,
         }
     )
 

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from orbiflow.tiles.motion import AnimationSettings
     from orbiflow.tiles.search import TileModel
     from orbiflow.tiles.silhouette import Target
+    from orbiflow.tiles.solids import Solid, SolidSettings
 
 FORMAT = "orbiflow-tile/1"
 MAX_BYTES = 64 * 2**20
@@ -396,6 +397,18 @@ class EscherTile:
         from orbiflow.tiles.exporting import export
 
         return export(self, out, settings, force=force)
+
+    def solid(
+        self,
+        settings: SolidSettings | None = None,
+        *,
+        picture: str | Path | None = None,
+        force: bool = False,
+    ) -> Solid:
+        """Return a solid to print, which can `write` itself; see `orbiflow.tiles.make_solid`."""
+        from orbiflow.tiles.solids import make_solid
+
+        return make_solid(self, settings, picture=picture, force=force)
 
     def animate(
         self, out: str | Path, settings: AnimationSettings | None = None, *, force: bool = False
