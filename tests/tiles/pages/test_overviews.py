@@ -30,7 +30,7 @@ from orbiflow.tiles import (
     write_gallery,
     written_files,
 )
-from orbiflow.tiles.pages.page import TRIED, measures
+from orbiflow.tiles.pages.page import MAKINGS, TRIED, measures
 from shell_lines import call_by_orbiflow
 
 BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]
@@ -130,7 +130,7 @@ def test_commands_of_a_page_can_be_copied_into_a_shell(
     refused = flowed.changed(tile=replace(flowed.tile, polygon=flowed.tile.polygon * (1.0, 1.1)))
     page = Page(index_page([bent, refused, bent], target, names, out=out))
     calls = [call_by_orbiflow(shlex.split(command)[1:]) for command in page.commands]
-    assert len(calls) == 3 * (5 + len(TRIED))
+    assert len(calls) == 3 * (len(MAKINGS) + len(TRIED))
     assert all(isinstance(call, Call) for call in calls)
     flat = [call.flat for call in calls if isinstance(call, Call)]
     assert {call["result"] for call in flat} == {Path(out)}

@@ -85,6 +85,8 @@ MAKINGS = {
     "Print": ("export", "--for print", ".pdf"),
     "Artwork, engraved": ("art", "--engrave", "-art.png"),
     "Animation": ("animate", "", ".gif"),
+    "A tile in 3D": ("solid", "", ".stl"),
+    "Cookie cutter": ("solid", "--kind cutter", "-cutter.stl"),
 }
 """What can be made of a tile: the command, its options, and the end of the file's name."""
 
