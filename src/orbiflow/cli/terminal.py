@@ -118,8 +118,14 @@ def _aligned(event: Table) -> TextTable:
         numbers = not words and all(cell[:1] in "0123456789+-" for cell in column)
         table.add_column(heading, justify="right" if numbers else "left", no_wrap=not words)
     for row in event.rows:
-        table.add_row(*map(escape, row))
+        table.add_row(*(escape(_writable(cell)) for cell in row))
     return table
+
+
+def _writable(text: str) -> str:
+    """Return the text with plain stars where the output's encoding has no others."""
+    plain = str.maketrans({"★": "*", "½": " 1/2"})
+    return text if output.encoding.startswith("utf") else text.translate(plain)
 
 
 @contextmanager

@@ -78,6 +78,7 @@ def escherize(
     figures: bool = False,
     verbose: bool = False,
     called: Annotated[str | None, Hidden()] = None,
+    shown_out: Annotated[str | None, Hidden()] = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
@@ -94,6 +95,7 @@ def escherize(
             field.pdf.
         verbose: Also show the scores and other figures of result.json.
         called: What the results call the silhouette. Default: its path.
+        shown_out: What the page's commands call the folder. Default: its path.
     """
     from orbiflow.tiles import pages, search, silhouette
 
@@ -109,7 +111,8 @@ def escherize(
     result = search.escherize(target, settings, on_event=on_event, cancel=cancel)
     for text in _remarks(result):
         on_event(Note(text))
-    written = pages.write_run(result, out, figures=figures, on_event=on_event)
+    shown = shown_out or str(out)
+    written = pages.write_run(result, out, figures=figures, shown_out=shown, on_event=on_event)
     tiles = result.tiles if written else ()
     summary = {
         "folder": str(out),
