@@ -20,7 +20,7 @@ from orbiflow.arguments import meant
 from orbiflow.commands import OPERATIONS
 from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.kinds import FlagKind, ListKind, PathKind
-from orbiflow.runtime import Cancel, Cancelled, Operation, find, use_one_thread
+from orbiflow.runtime import Cancelled, Operation, Polled, find, use_one_thread
 from orbiflow.settings import Field, Hidden
 
 HELP = "Turn a silhouette into a tile that looks like it and provably tiles the plane."
@@ -202,10 +202,11 @@ def _do(operation: Operation, given: dict[str, Any]) -> int:
     from orbiflow.cli.terminal import Terminal, stopped_by_interrupt
 
     use_one_thread()
-    # only what keeps a part has something to stop for
-    stopping = stopped_by_interrupt() if operation.keeps_partial else nullcontext(Cancel())
-    with stopping as cancel, Terminal() as terminal:
-        return call.run(terminal, cancel).exit_status
+    with Terminal() as terminal:
+        cancel = Polled(terminal.watch)
+        # only what keeps a part has something to stop for
+        with stopped_by_interrupt(cancel) if operation.keeps_partial else nullcontext():
+            return call.run(terminal, cancel).exit_status
 
 
 def _mistake(
