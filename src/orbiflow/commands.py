@@ -5,6 +5,7 @@ OPERATIONS = {
     "batch": "orbiflow.tiles.batches:batch",
     "export": "orbiflow.tiles.operations:export",
     "art": "orbiflow.tiles.operations:art",
+    "solid": "orbiflow.tiles.operations:solid",
     "animate": "orbiflow.tiles.operations:animate",
     "classes": "orbiflow.tiles.operations:classes",
     "density fit": "orbiflow.density.operations.fitting:fit",

@@ -72,11 +72,11 @@ def pixels(text: str, dpi: float) -> float:
     return length(text) * dpi / MILLIMETRES["in"] if found is None else float(found[1])
 
 
-def pixel_size(text: str, dpi: float) -> tuple[int, int]:
-    """Return width and height of a picture in whole pixels, from 3000x2000 or 300x200mm.
+def pixel_size(text: str, dpi: float) -> tuple[float, float]:
+    """Return width and height of a picture in pixels, which a length need not make whole.
 
     >>> pixel_size("3000x2000", 300), pixel_size("1x2in", 100)
-    ((3000, 2000), (100, 200))
+    ((3000, 2000), (100.0, 200.0))
     """
     whole = re.fullmatch(r"\s*(\d{1,9})\s*(?:px)?\s*[x×]\s*(\d{1,9})\s*(?:px)?\s*", text)
     if whole:
@@ -87,7 +87,7 @@ def pixel_size(text: str, dpi: float) -> tuple[int, int]:
         )
     width, height = size(text)
     per = dpi / MILLIMETRES["in"]
-    return round(width * per), round(height * per)
+    return width * per, height * per
 
 
 def page_size(text: str) -> tuple[float, float]:

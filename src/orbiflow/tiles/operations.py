@@ -27,6 +27,7 @@ from orbiflow.tiles.art import ArtSettings
 from orbiflow.tiles.exporting import ExportSettings
 from orbiflow.tiles.motion import AnimationSettings
 from orbiflow.tiles.search import EscherizeSettings
+from orbiflow.tiles.solids import SolidSettings
 
 if TYPE_CHECKING:
     from orbiflow.tiles.exporting import Exported
@@ -75,6 +76,7 @@ def escherize(
     reading: ReadingSettings = ReadingSettings(),
     *,
     figures: bool = False,
+    verbose: bool = False,
     called: Annotated[str | None, Hidden()] = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
@@ -90,6 +92,7 @@ def escherize(
         out: Folder for the results, made if need be.
         figures: Also write for print tiling.pdf and overlay.pdf, and of the flow field.png and
             field.pdf.
+        verbose: Also show the scores and other figures of result.json.
         called: What the results call the silhouette. Default: its path.
     """
     from orbiflow.tiles import pages, search, silhouette
@@ -117,6 +120,8 @@ def escherize(
     }
     if tiles:
         on_event(_table(tiles))
+        if verbose:
+            on_event(_figures(tiles))
     on_event(_closing(out, bool(written), bool(result.tiles), summary["seconds"]))
     if result.interrupted or cancel.cancelled:
         return Outcome(summary, "cancelled")
@@ -124,15 +129,34 @@ def escherize(
 
 
 def _table(tiles: Sequence[EscherTile]) -> Table:
-    """The tiles that were found, to look at."""
+    """The tiles that were found, in words that fit into 80 characters."""
     both = any(tile.front is not None for tile in tiles)
     title = "Tiles for likeness, then for overlap" if both else "Tiles, best first"
-    rows = [_cells(tile, both=both) for tile in tiles]
+    return _table_of(title, [_words(tile) for tile in tiles])
+
+
+def _figures(tiles: Sequence[EscherTile]) -> Table:
+    """The same tiles in figures."""
+    both = any(tile.front is not None for tile in tiles)
+    return _table_of("Figures", [_cells(tile, both=both) for tile in tiles])
+
+
+def _table_of(title: str, rows: Sequence[dict[str, str]]) -> Table:
     return Table(title, tuple(rows[0]), tuple(tuple(row.values()) for row in rows))
 
 
+def _words(tile: EscherTile) -> dict[str, str]:
+    """Return a row of words by the names of its columns."""
+    row = {"class": f"{tile.name} ({tile.group_name})"}
+    if tile.front is not None:
+        row |= {"for": tile.objective, "front": "yes" if tile.front else "near"}
+    rating, lies = tile.rating, tile.arrangement
+    row |= {"stars": str(rating or ""), "likeness": rating.word if rating else ""}
+    return {**row, "how its copies lie": lies or "NOT CERTIFIED: they do not tile"}
+
+
 def _cells(tile: EscherTile, *, both: bool) -> dict[str, str]:
-    """Return a row by the names of its columns, which fit into 80 characters."""
+    """Return a row of figures by the names of its columns, which fit into 80 characters."""
     mismatch, overlap = tile.certificate.edge_mismatch, f"{tile.metrics.iou:.4f}"
     edges = f"{mismatch:.0e}" if mismatch < float("inf") else "-"
     bent = "-" if tile.deformation is None else f"{tile.deformation:.3f}"
@@ -162,8 +186,6 @@ def _closing(out: Path, written: bool, found: bool, seconds: float) -> Note:
 
 def _remarks(result: SearchResult) -> list[str]:
     """What the user should know of a search's tiles."""
-    from orbiflow.tiles.pages import is_poor
-
     tiles, found, remarks = result.tiles, result.found, list[str]()
     if tiles and tiles[0].front is not None:
         best = sum(tile.front is True for tile in tiles)
@@ -174,7 +196,7 @@ def _remarks(result: SearchResult) -> list[str]:
         )
     for name in sorted(result.interrupted & {tile.isohedral_class for tile in tiles}):
         remarks.append(f"{name} has its first tile only: its search was interrupted")
-    if tiles and is_poor(tiles[0]):
+    if tiles and tiles[0].rating and tiles[0].rating.word == "poor":
         remarks.append(POOR)
     return remarks
 
@@ -187,6 +209,9 @@ def _measures(tile: EscherTile) -> dict[str, Any]:
         "objective": tile.objective,
         "deformation": tile.deformation,
         "front": tile.front,
+        "arrangement": tile.arrangement,
+        "stars": tile.rating and tile.rating.stars,
+        "word": tile.rating and tile.rating.word,
         "score": tile.score,
         "iou": tile.metrics.iou,
         "dice": tile.metrics.dice,
@@ -297,6 +322,52 @@ def art(
             "tiles": page.shown,
             "class": tile.isohedral_class,
             "tile_size": page.tile_size,
+        }
+    )
+
+
+@operation("solid")
+def solid(
+    result: Path,
+    settings: SolidSettings = SolidSettings(),
+    choice: TileChoice = TileChoice(),
+    *,
+    out: Annotated[Path | None, Option("-o"), DefaultText("named after the tile")] = None,
+    picture: Path | None = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Make a solid to print in 3D: a tile, cookie cutter, stamp, mould or puzzle.
+
+    It lies as it is printed, without supports. Lengths are numbers with a unit: mm, cm, in or pt.
+
+    Args:
+        result: A search's folder, or its result.json.
+        out: The file, .stl or .3mf.
+        picture: An SVG drawing over the silhouette, in the same frame, for a stamp or mould.
+    """
+    settings = settings.for_file(out)
+
+    from orbiflow.tiles.solids import make_solid
+
+    tile = choice.read(result)
+    out = out or Path(f"{tile.name}-{settings.kind}.{settings.format}")
+    check_output_file(out, result, picture)
+    made = make_solid(tile, settings, picture=picture, force=choice.force)
+    cancel.check()
+    made.write(out, settings.format)
+    size = " x ".join(f"{side:.1f}" for side in made.size)
+    cubic = made.volume / 1000
+    note = f"written {out}: {settings.kind} of {tile.isohedral_class}, {size} mm, {cubic:.1f} cm³"
+    _tell(on_event, (*made.notes, note), out)
+    return Outcome(
+        {
+            "file": str(out),
+            "kind": settings.kind,
+            "class": tile.isohedral_class,
+            "parts": len(made.parts),
+            "size": made.size.tolist(),
+            "volume": made.volume,
         }
     )
 

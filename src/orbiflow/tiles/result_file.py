@@ -17,7 +17,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import ResultFolder, is_list, is_object, make_folder, read_json, write_atomic
 from orbiflow.symmetry import CrystallographicGroup, Isometry, checked_lattice
-from orbiflow.tiles.likeness import Fidelity, Recognisability, ShapeMetrics, Thinnest
+from orbiflow.tiles.likeness import Fidelity, Rating, Recognisability, ShapeMetrics, Thinnest
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import CLASSES, Tile, isohedral_class
 
@@ -166,9 +166,11 @@ def group_json(group: CrystallographicGroup) -> dict[str, Any]:
 
 def tile_json(tile: EscherTile) -> dict[str, Any]:
     """Return one entry of `tiles`: polygon and group in the input's own coordinates."""
-    thin = tile.thinnest
+    thin, rating = tile.thinnest, tile.rating
     return {
         "class": tile.isohedral_class,
+        "arrangement": tile.arrangement,
+        "rating": rating and {"stars": rating.stars, "word": rating.word},
         "score": _or_none(tile.score),
         "objective": tile.objective,
         "front": tile.front,
@@ -218,6 +220,8 @@ def _measurements(entry: dict[str, Any]) -> dict[str, Any]:
     recognised = entry.get("recognisability")
     if recognised and recognised["score"] is not None:
         found["recognisability"] = Recognisability(**recognised)
+    if entry.get("rating"):
+        found["rating"] = Rating(entry["rating"]["stars"])
     thinnest, bent = entry.get("thinnest"), entry.get("bent")
     if thinnest is not None:
         ends = np.array(thinnest["ends"], dtype=np.float64)

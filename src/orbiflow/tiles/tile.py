@@ -19,6 +19,7 @@ from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
 from orbiflow.runtime import read_arrays
 from orbiflow.tiles.likeness import (
     Fidelity,
+    Rating,
     Recognisability,
     ShapeMetrics,
     Thinnest,
@@ -26,7 +27,7 @@ from orbiflow.tiles.likeness import (
     rank_score,
 )
 from orbiflow.tiles.silhouette import Bending, Frame
-from orbiflow.tiles.tilings import Certificate, Tile, certify
+from orbiflow.tiles.tilings import Certificate, Tile, arrangement, certify
 
 if TYPE_CHECKING:
     from orbiflow.tiles.art import ArtSettings, Artwork
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from orbiflow.tiles.motion import AnimationSettings
     from orbiflow.tiles.search import TileModel
     from orbiflow.tiles.silhouette import Target
+    from orbiflow.tiles.solids import Solid, SolidSettings
 
 FORMAT = "orbiflow-tile/1"
 MAX_BYTES = 64 * 2**20
@@ -153,6 +155,7 @@ class EscherTile:
     - `bent_iou`: The IoU of the tile with the bent silhouette.
     - `pinned`: How far the worst pinned part is from similar to what it was; None without pins.
     - `known_score`: The score that a file states.
+    - `rating`: Its stars among the tiles of its run.
 
     How it was found:
 
@@ -184,6 +187,7 @@ class EscherTile:
     bent_iou: float | None = None
     pinned: float | None = None
     known_score: float | None = None
+    rating: Rating | None = None
     objective: str = "overlap"
     front: bool | None = None
     starts: int = 0
@@ -235,6 +239,11 @@ class EscherTile:
     def group_name(self) -> str:
         """The name of the wallpaper group, such as "p2"."""
         return self.tile.group.name
+
+    @cached_property
+    def arrangement(self) -> str:
+        """How its copies lie, in plain words; "" if it does not tile."""
+        return arrangement(self.tile) if self.certificate.valid else ""
 
     @cached_property
     def certificate(self) -> Certificate:
@@ -388,6 +397,18 @@ class EscherTile:
         from orbiflow.tiles.exporting import export
 
         return export(self, out, settings, force=force)
+
+    def solid(
+        self,
+        settings: SolidSettings | None = None,
+        *,
+        picture: str | Path | None = None,
+        force: bool = False,
+    ) -> Solid:
+        """Return a solid to print, which can `write` itself; see `orbiflow.tiles.make_solid`."""
+        from orbiflow.tiles.solids import make_solid
+
+        return make_solid(self, settings, picture=picture, force=force)
 
     def animate(
         self, out: str | Path, settings: AnimationSettings | None = None, *, force: bool = False

@@ -16,12 +16,12 @@ from orbiflow.tiles import (
     EscherTile,
     LikenessSearch,
     OccupancySearch,
+    Rating,
     SearchResult,
     Target,
     escherize_class,
     folder_names,
     index_page,
-    is_poor,
     overview_png,
     write_gallery,
     written_files,
@@ -175,15 +175,8 @@ def test_what_was_decided_and_what_failed_is_on_the_sheets(
     assert overview_png([bent], target, failures=[ClassFailure("IH7", "no tile")]) != plain
 
 
-def test_scores_are_called_poor_where_the_words_say_so(
-    bent: EscherTile, flowed: EscherTile
-) -> None:
-    assert bent.fidelity is not None
-    said = set()
-    for cost in np.geomspace(1e-3, 1e3, 13):
-        scored = replace(bent, fidelity=replace(bent.fidelity, cost=float(cost)), thinnest=None)
-        poor = is_poor(scored)
-        assert poor == measures(scored)[0].words.startswith("a poor")
-        said.add(poor)
-    assert said == {False, True}
-    assert is_poor(flowed) == measures(flowed)[0].words.startswith("a poor")
+def test_a_sheet_shows_stars_and_how_tiles_lie(target: Target, bent: EscherTile) -> None:
+    sheets = {overview_png([bent.changed(rating=rating)], target) for rating in (
+        None, Rating(1.0), Rating(3.5), Rating(4.0)
+    )}  # fmt: skip
+    assert len(sheets) == 4

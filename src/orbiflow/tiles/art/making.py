@@ -159,7 +159,7 @@ def art_scene(art: Artwork) -> Scene:
     turned = turned / scale
     symbols = {TILE: symbol.moved(scale * np.eye(2), np.zeros(2))}
     motifs = {MOTIF: motif.moved(scale * np.eye(2), np.zeros(2))}
-    box = Box(0.0, 0.0, unit * page.width, unit * page.height)
+    box = Box(0.0, 0.0, unit * page.size[0], unit * page.size[1])
     layers = [Layer("paper", "paper", Style(fill=chosen.paper), (rectangle(box),))]
     drawn = bool(motif.parts or motif.rasters)
     for colour in sorted(set(page.colours.tolist())):

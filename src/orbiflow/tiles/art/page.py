@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.art.settings import ArtSettings, check_size
-from orbiflow.tiles.exporting import longer_side
+from orbiflow.tiles.exporting import edge_margin, longer_side, place_on_page
+from orbiflow.tiles.scene import INCH, Box
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Copies, Tile, colouring, copies_meeting
 
@@ -23,8 +24,7 @@ USUAL_TILES = 25  # number of tiles on a page if no size of a tile is given
 class ArtPage:
     """The tiles of a picture."""
 
-    width: int  # with `height`: the picture's size in pixels
-    height: int
+    size: tuple[float, float]  # the picture's size in pixels, not whole where it is a length
     tile: Tile  # the tile in its own units
     copies: Copies  # all copies that the picture shows, and some beyond
     linear: Array  # with `offset`: the map from the tile's units to pixels, y down
@@ -32,6 +32,16 @@ class ArtPage:
     colours: NDArray[np.int64]  # the number (M,) of each copy's colour
     count: int  # the number of colours
     notes: tuple[str, ...] = ()  # what the user should know
+
+    @property
+    def width(self) -> int:
+        """The number of pixels in a row."""
+        return round(self.size[0])
+
+    @property
+    def height(self) -> int:
+        """The number of rows."""
+        return round(self.size[1])
 
     @property
     def scale(self) -> float:
@@ -46,7 +56,19 @@ class ArtPage:
     @property
     def shown(self) -> float:
         """The number of tiles that the picture has room for, by area."""
-        return self.width * self.height / (self.scale**2 * abs(self.tile.signed_area))
+        return math.prod(self.size) / (self.scale**2 * abs(self.tile.signed_area))
+
+    def whole(self, margin: float) -> ArtPage:
+        """Return the page with those tiles alone that keep a distance in pixels from its edge."""
+        rings = self.rings()
+        low, high = rings.min(axis=1), rings.max(axis=1)
+        kept = ((low >= margin) & (high <= np.array(self.size) - margin)).all(axis=1)
+        if not kept.any():
+            raise OrbiflowError(
+                f"no tile is whole on a page of {self.width} x {self.height} pixels; choose a larger "
+                "page or smaller tiles"
+            )
+        return replace(self, copies=self.copies.select(kept), colours=self.colours[kept])
 
     def rings(self) -> Array:
         """Return the copies (M, N, 2) in pixels."""
@@ -60,16 +82,19 @@ def art_page(given: EscherTile, settings: ArtSettings) -> ArtPage:
     if settings.colour == "neighbour":  # the translations that keep the colours
         a, b, c = colouring(tile).sublattice
         lattice = lattice @ np.array([[a, b], [0.0, c]])
-    flip = np.diag([1.0, 1.0 if given.y_down else -1.0])
     size = longer_side(tile.polygon)
     width, height = settings.size
     scale = float(np.sqrt(width * height / USUAL_TILES / abs(tile.signed_area)))
     if settings.tile_size is not None:
         scale = settings.tile_size / size
     if not settings.repeat:
-        linear = scale * flip
-        offset = np.array([width, height]) / 2 - linear @ tile.center
-        return _page(tile, settings.colour, linear, offset, (width, height), ())
+        page, pixels = Box(0.0, 0.0, width, height), settings.dpi / INCH
+        margin = None if settings.clip else pixels * edge_margin(scale * size / pixels)
+        place = place_on_page(
+            tile, scale, page, given.y_down, rotate=settings.rotate, margin=margin
+        )
+        made = _page(tile, settings.colour, *place, (width, height), ())
+        return made if margin is None else made.whole(margin)
     found = rectangle(lattice, scale, settings.tolerance, flipped=not given.y_down)
     try:
         check_size(found.width, found.height)
@@ -95,7 +120,7 @@ def _page(
     colour: str,
     linear: Array,
     offset: Array,
-    size: tuple[int, int],
+    size: tuple[float, float],
     notes: tuple[str, ...],
 ) -> ArtPage:
     width, height = size
@@ -110,7 +135,7 @@ def _page(
     elif colour == "neighbour":
         own = colouring(tile)
         colours, count = own.colours(copies), own.count
-    return ArtPage(width, height, tile, copies, linear, offset, colours, count, notes)
+    return ArtPage(size, tile, copies, linear, offset, colours, count, notes)
 
 
 REACH = 14  # greatest multiple of a basis vector that is tried

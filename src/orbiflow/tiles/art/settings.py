@@ -10,6 +10,7 @@ from orbiflow.settings import (
     Hidden,
     NotWith,
     OnlyWith,
+    Option,
     Parsed,
     Range,
     SettingError,
@@ -32,7 +33,7 @@ class ArtSettings(MotifSettings, group="Picture"):
     """How a picture of a tiling is made; numbers of a length are pixels."""
 
     size: Annotated[
-        tuple[Annotated[int, Range(1, LONGEST)], Annotated[int, Range(1, LONGEST)]],
+        tuple[Annotated[float, Range(1, LONGEST)], Annotated[float, Range(1, LONGEST)]],
         Parsed(pixel_size, "a size such as 3000x2000 or 300x200mm", "SIZE", needs="dpi"),
         NotWith("repeat", because="the cell that repeats has its own size"),
         DefaultText("3000x2000"),
@@ -47,6 +48,14 @@ class ArtSettings(MotifSettings, group="Picture"):
         DefaultText("about 25 tiles on the page"),
     ] = None
     """Longer side of the tile's smallest rectangle: pixels, or a length such as 40mm."""
+
+    rotate: Annotated[
+        float, Range(-360, 360), Unit("degrees"), NotWith("repeat", because="it turns as it must")
+    ] = 0.0
+    """Turn the tiling on the page by this angle, counterclockwise."""
+
+    clip: Annotated[bool, Option("--clip", off="--whole"), NotWith("repeat")] = True
+    """Cut tiles at the page's edge, or leave out those that are not whole."""
 
     repeat: bool = False
     """Make the cell that repeats without seams, instead of a page."""
@@ -83,8 +92,9 @@ class ArtSettings(MotifSettings, group="Picture"):
         check_size(*self.size)
 
 
-def check_size(width: int, height: int) -> None:
-    """Check that a picture is not too large."""
+def check_size(*sides: float) -> None:
+    """Check that a picture of this width and height is not too large."""
+    width, height = map(round, sides)
     if max(width, height) > LONGEST or width * height > MOST_PIXELS:
         raise SettingError(
             f"a picture of {width} x {height} pixels is too large ({{size}}); at most "

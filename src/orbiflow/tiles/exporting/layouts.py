@@ -11,10 +11,16 @@ import shapely
 from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry import rotation_matrix
 from orbiflow.tiles.exporting.nesting import dense_arrangements, on_sheet
 from orbiflow.tiles.exporting.outlines import Outline, fitted, outline, turning
-from orbiflow.tiles.exporting.settings import ExportSettings
+from orbiflow.tiles.exporting.placing import (
+    edge_margin,
+    inset,
+    longer_side,
+    place_on_page,
+    rectangle_sides,
+)
+from orbiflow.tiles.exporting.settings import USUAL_WIDTH, ExportSettings
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.likeness import Thinnest, narrowest_neck, narrowest_slit
 from orbiflow.tiles.scene import Box, Curve, Layer, PlacedTile, Scene, Style, Uses, rectangle
@@ -33,21 +39,14 @@ class Layout:
     box: Box  # the part of the page that tiles may use
 
 
-# Places along each side of a lattice cell that are tried for a page with most whole tiles
-SHIFTS = 10
-# Number of tiles on a page beyond which a few more are not worth looking for
-MOST_TILES_TO_SHIFT = 1000
-
-
 def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
-    """Scale and turn the tile and put it in the middle, or nearby where that makes most tiles whole."""
+    """Scale and turn the tile and put it on the page."""
     width, height = settings.page
     box = Box(0.0, 0.0, width, height - (STRIP if settings.calibrate else 0.0))
     scale = settings.tile_size / longer_side(tile.polygon)
-    turn = rotation_matrix(-np.radians(settings.rotate))  # y points down on the page
-    linear = scale * turn @ np.diag([1.0, 1.0 if y_down else -1.0])
-    middle = np.array([(box.left + box.right) / 2, (box.top + box.bottom) / 2])
-    placed = tile.transformed(linear, middle - linear @ tile.center)
+    margin = None if settings.clip or settings.cut == "pieces" else edge_margin(settings.tile_size)
+    place = place_on_page(tile, scale, box, y_down, rotate=settings.rotate, margin=margin)
+    placed = tile.transformed(*place)
     if settings.cut != "pieces":
         need = np.ptp(placed.polygon, axis=0) + 2 * bleed(settings)
         if need[0] > box.width or need[1] > box.height:
@@ -58,60 +57,13 @@ def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
                 f"{height:g} mm: it needs {need[0]:.1f} x {need[1] + extra:.1f} mm{strip}; choose "
                 "a larger area or a smaller tile size"
             )
-        if not settings.clip:
-            placed = _with_most_whole(placed, inner_box(box, settings))
     return Layout(settings, placed, outline(placed, settings.deviation), box)
 
 
-def longer_side(ring: Array) -> float:
-    """Return the longer side of the smallest rectangle, however turned, around a ring."""
-    return rectangle_sides(ring)[1]
-
-
-def rectangle_sides(ring: Array) -> tuple[float, float]:
-    """Return the sides of the smallest rectangle by area around a ring, the shorter first.
-
-    Of the same area, as around a regular hexagon, the shortest: rounding does not choose.
-
-    >>> square = np.array([[0.0, 0.0], [1.0, 1.0], [0.0, 2.0], [-1.0, 1.0]])
-    >>> [round(side, 6) for side in rectangle_sides(square)]
-    [1.414214, 1.414214]
-    """
-    hull = shapely.get_coordinates(shapely.convex_hull(shapely.MultiPoint(ring)))
-    steps = np.diff(hull, axis=0)  # a smallest rectangle lies along one of the hull's sides
-    along = steps / np.linalg.norm(steps, axis=1)[:, None]
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    sides = np.sort(np.stack([np.ptp(hull @ way.T, axis=0) for way in (along, across)]), axis=0)
-    areas = sides.prod(axis=0)
-    smallest = np.flatnonzero(areas <= (1 + 1e-6) * areas.min())
-    best = smallest[sides[1, smallest].argmin()]
-    return float(sides[0, best]), float(sides[1, best])
-
-
 def bleed(settings: ExportSettings) -> float:
-    """Return how far in mm a line may reach beyond its tile's polygon."""
-    return settings.deviation + (settings.stroke_width or 0.25) / 2
-
-
-def inner_box(box: Box, settings: ExportSettings) -> Box:
-    """Return the box for polygons whose lines are to lie in `box`."""
-    margin = bleed(settings)
-    return Box(box.left + margin, box.top + margin, box.right - margin, box.bottom - margin)
-
-
-def _with_most_whole(tile: Tile, box: Box) -> Tile:
-    """Return the tile moved so that as many copies as possible are whole, or as it is."""
-    if box.width * box.height > MOST_TILES_TO_SHIFT * abs(tile.signed_area):
-        return tile
-    best, shift = len(copies_inside(tile, box)), np.zeros(2)
-    shares = np.arange(SHIFTS) / SHIFTS
-    grid = np.stack(np.meshgrid(shares, shares), axis=-1).reshape(-1, 2)
-    for step in grid @ tile.group.lattice.T:
-        moved = (box.left - step[0], box.top - step[1], box.right - step[0], box.bottom - step[1])
-        count = len(copies_inside(tile, moved))
-        if count > best:
-            best, shift = count, step
-    return tile.transformed(np.eye(2), shift)
+    """Return the room in mm for lines that reach beyond their tile's polygon."""
+    own = settings.deviation + (settings.stroke_width or USUAL_WIDTH) / 2
+    return max(own, edge_margin(settings.tile_size))
 
 
 def placed_tiles(copies: Copies, layout: Layout) -> tuple[PlacedTile, ...]:
@@ -134,7 +86,7 @@ def chosen_copies(layout: Layout) -> Copies:
     settings, box = layout.settings, layout.box
     if settings.clip:
         return copies_meeting(layout.tile, box)
-    return copies_inside(layout.tile, inner_box(box, settings))
+    return copies_inside(layout.tile, inset(box, bleed(settings)))
 
 
 def tiling_scene(layout: Layout) -> Scene:
@@ -158,7 +110,7 @@ def tiling_scene(layout: Layout) -> Scene:
         uses = Uses(SYMBOL, copies.group.linear_parts, copies.cosets[own], offsets[own])
         name = f"colour {colour + 1}" if settings.filled else "tiles"
         fill = chosen.fill(colour) if settings.filled else None
-        style = Style(fill, line, settings.stroke_width or 0.25)
+        style = Style(fill, line, settings.stroke_width or USUAL_WIDTH)
         layers.append(Layer(name, "tiles", style, (uses,), clipped=settings.clip))
     return Scene(
         *settings.page,

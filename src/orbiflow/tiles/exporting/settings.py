@@ -20,7 +20,13 @@ from orbiflow.settings import (
 from orbiflow.units import COLUMNS, Colour, Length, LengthOrZero, PageSize, Size
 
 PIECES = Group("Pieces")
+USUAL_WIDTH = 0.25  # width in mm of the lines around tiles
 PAGE = (300.0, 200.0)  # width and height of the page in mm where none is asked for
+
+
+def usual_tolerance(tile_size: float) -> float:
+    """Return the usual distance in mm of curves from the outline of a tile of this size."""
+    return max(0.05, tile_size / 800)
 
 
 class ExportSettings(FileSettings, group="Page and file"):
@@ -150,7 +156,7 @@ class ExportSettings(FileSettings, group="Page and file"):
     @property
     def deviation(self) -> float:
         """The tolerance in mm."""
-        return max(0.05, self.tile_size / 800) if self.tolerance is None else self.tolerance
+        return usual_tolerance(self.tile_size) if self.tolerance is None else self.tolerance
 
 
 _LINES = {"cut": "skeleton", "clip": False, "filled": False}

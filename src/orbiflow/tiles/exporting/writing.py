@@ -8,6 +8,7 @@ from pathlib import Path
 
 from orbiflow import __version__
 from orbiflow.arguments import as_path
+from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
@@ -97,7 +98,7 @@ def scenes(
         force=force, otherwise="so it is not exported; --force exports it, marked so"
     )
     placed = layout(given.tile, settings, y_down=given.y_down)
-    notes = (*_neck_notes(placed), *_colour_notes(given, settings))
+    notes = (*neck_notes(placed.tile.polygon, settings.warn_neck), *_colour_notes(given, settings))
     if placed.outline.note:
         notes = (placed.outline.note, *notes)
     made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
@@ -151,20 +152,17 @@ def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...
     return (f"its lines of {width:g} mm hardly show on a screen; a cutter follows them",)
 
 
-def _neck_notes(placed: Layout) -> list[str]:
-    limit = placed.settings.warn_neck
+def neck_notes(ring: Array, limit: float | None) -> list[str]:
+    """Say where a tile's outline in mm is thinner than a limit, if there is one."""
     if limit is None:
         return []
     try:
-        neck = narrowest_neck(placed.tile.polygon)
+        neck = narrowest_neck(ring)
     except OrbiflowError as error:  # a forced tile may cross itself
         return [f"its necks cannot be measured: {error}"]
     if neck.width >= limit:
         return []
-    return [
-        f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm "
-        f"{place_on(placed.tile.polygon, neck)}"
-    ]
+    return [f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm {place_on(ring, neck)}"]
 
 
 def write_scene(scene: Scene, settings: ExportSettings) -> str | bytes:

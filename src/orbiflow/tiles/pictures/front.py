@@ -53,9 +53,8 @@ def front_png(
         _silhouette(axes, tile, place, SIZE * width_px, colour, zorder=4, alpha=alpha)
         below = place - (0, 0.52 * SIZE * width_px)
         (x,), (y,) = _in(axes, [below])
-        axes.text(
-            x, y, tile.isohedral_class, ha="center", va="top", fontsize=6.5, color=INK, zorder=7
-        )
+        label = f"{tile.isohedral_class} {tile.rating or ''}"
+        axes.text(x, y, label, ha="center", va="top", fontsize=6.5, color=INK, zorder=7)
     return png_bytes(figure)
 
 

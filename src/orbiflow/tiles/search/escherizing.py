@@ -39,7 +39,7 @@ from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
 from orbiflow.tiles.search.both_search import ALIKE
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
-from orbiflow.tiles.search.finished_tiles import HOW, ClassFailure, best_tiles
+from orbiflow.tiles.search.finished_tiles import HOW, ClassFailure, best_tiles, rated
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.search_method import Goal, SearchMethod
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
@@ -55,7 +55,8 @@ class SearchResult:
     """What a search found.
 
     - `target`: The silhouette.
-    - `tiles`: Certified tiles, best first; after a search for both those for likeness come first.
+    - `tiles`: Certified tiles, best first, with their ratings; after a search for both those for
+      likeness come first.
     - `failures`: The classes that gave none, and why.
     - `found`: All tiles that were found, those that are not listed among them.
     - `method`: The method that was used, with its settings.
@@ -75,6 +76,9 @@ class SearchResult:
     seconds: float = 0.0
     workers: int = 1
     interrupted: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tiles", rated(self.tiles, self.target))
 
 
 def escherize(

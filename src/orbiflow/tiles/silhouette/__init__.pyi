@@ -20,14 +20,14 @@ from .readers.reading import check_file as check_file
 from .readers.reading import read_bytes as read_bytes
 from .readers.reading import read_head as read_head
 from .readers.svg import MAX_BYTES as MAX_BYTES
-from .readers.svg_paths import MAX_POINTS as MAX_POINTS
+from .readers.svg_paint import brushes as brushes
 from .readers.svg_paths import SubPath as SubPath
 from .readers.svg_paths import TooManyPoints as TooManyPoints
 from .readers.svg_paths import TooTangled as TooTangled
-from .readers.svg_paths import fill as fill
+from .readers.svg_regions import Regions as Regions
 from .readers.svg_shapes import Drawing as Drawing
 from .readers.svg_shapes import DrawnShape as DrawnShape
-from .readers.svg_shapes import parse_xml as parse_xml
+from .readers.svg_xml import parse_xml as parse_xml
 from .soft_target import SoftTarget as SoftTarget
 from .soft_target import signed_distance as signed_distance
 from .target import Frame as Frame

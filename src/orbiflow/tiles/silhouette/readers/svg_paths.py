@@ -1,6 +1,7 @@
 """Sub-paths of an SVG drawing and their flattening into polygons with a bounded error."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -32,6 +33,11 @@ class Bezier:
     def reach(self) -> Array:
         """Return control points: they span as much as the curve, but for a small factor."""
         return self.control
+
+    def directions(self, start: Array) -> tuple[Array, Array]:
+        """Return vectors along the curve at `start` and at its end."""
+        points = np.vstack([start, self.control])
+        return _first_nonzero(points[1:] - start), _first_nonzero(self.end - points[-2::-1])
 
     def flatten(self, start: Array, tolerance: float) -> Array:
         """Return points after `start`, on the curve, whose polyline is within `tolerance` of it."""
@@ -66,6 +72,12 @@ class EllipticArc:
         t = self.t0 + self.sweep / 2
         return np.stack([self.centre + np.cos(t) * self.u + np.sin(t) * self.v, self.end])
 
+    def directions(self, start: Array) -> tuple[Array, Array]:  # noqa: ARG002
+        """Return vectors along the arc at its start and at its end."""
+        t = np.array([[self.t0], [self.t0 + self.sweep]])
+        first, last = math.copysign(1, self.sweep) * (np.cos(t) * self.v - np.sin(t) * self.u)
+        return first, last
+
     def flatten(self, start: Array, tolerance: float) -> Array:  # noqa: ARG002
         """Return points after the first, on the arc, whose polyline is within `tolerance` of it."""
         radius = math.hypot(*self.u, *self.v)
@@ -75,6 +87,10 @@ class EllipticArc:
         points = self.centre + np.cos(t) * self.u + np.sin(t) * self.v
         points[-1] = self.end
         return points
+
+
+def _first_nonzero(vectors: Array) -> Array:
+    return vectors[vectors.any(axis=1).argmax()]
 
 
 def _steps(needed: float) -> int:
@@ -149,10 +165,40 @@ def _arc(arc: svgelements.Arc, points: Array) -> Bezier | EllipticArc:
     return EllipticArc(centre, u_end - centre, v_end - centre, t0, sweep, end)
 
 
+def polygon_path(points: Array) -> SubPath:
+    """Return the closed sub-path through the vertices (N, 2) of a polygon."""
+    return SubPath(points[0], [Bezier(point[None]) for point in points[1:]], True)
+
+
+def corners(paths: list[SubPath], matrix: Array) -> Iterator[tuple[str, Array, float]]:
+    """Yield where markers stand: "start", "mid" or "end", the point and the angle of the path there.
+
+    Points and directions are mapped by the affine `matrix` (2, 3).
+    """
+    found: list[tuple[Array, Array, Array]] = []
+    for path in paths:
+        curves = [*path.curves, *[Bezier(path.start[None])] * (path.closed and path.gap() > 0)]
+        starts = [path.start, *(curve.end for curve in curves)]
+        along = [curve.directions(start) for curve, start in zip(curves, starts, strict=False)]
+        none = np.zeros(2)
+        before = [along[-1][1] if path.closed else none, *(last for _, last in along)]
+        after = [*(first for first, _ in along), along[0][0] if path.closed else none]
+        found += zip(starts, before, after, strict=True)
+    for k, (point, *sides) in enumerate(found):
+        key = "start" if k == 0 else "end" if k == len(found) - 1 else "mid"
+        mean = sum(_unit(matrix[:, :2] @ side) for side in sides)
+        yield key, matrix[:, :2] @ point + matrix[:, 2], math.atan2(mean[1], mean[0])
+
+
+def _unit(vector: Array) -> Array:
+    return vector / (np.hypot(*vector) or 1.0)
+
+
 # Of pairs of segments whose boxes overlap, in all and for each segment: the crossings of a scribble
 # grow with the square of its length.
 MAX_OVERLAPS = 200_000
 MAX_OVERLAPS_EACH = 20
+MAX_OVERLAPS_WIDE = 20  # as many times more of strokes, which are mostly beside each other
 MAX_FACES = 50_000
 _SAMPLE = 400
 
@@ -171,7 +217,7 @@ def fill(rings: list[Array], rule: str = "nonzero") -> BaseGeometry:
         return single
     if not rings:
         return Polygon()
-    _check_tangle(rings)
+    check_tangle(np.concatenate([np.stack([r, np.roll(r, -1, axis=0)], axis=1) for r in rings]))
     lines = [shapely.LinearRing(ring) for ring in rings]
     faces = np.array(shapely.polygonize([shapely.unary_union(lines)]).geoms, dtype=object)
     if len(faces) > MAX_FACES:
@@ -184,16 +230,20 @@ def fill(rings: list[Array], rule: str = "nonzero") -> BaseGeometry:
     return shapely.union_all(faces[kept])
 
 
-def _check_tangle(rings: list[Array]) -> None:
-    """Estimate from a sample how many pairs of segments must be tested for a crossing."""
-    ends = np.concatenate([np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in rings])
-    low, high = ends.min(axis=1), ends.max(axis=1)
-    sample = np.random.default_rng(0).permutation(len(ends))[:_SAMPLE]
-    overlaps = sum(
-        np.count_nonzero(((low <= high[i]) & (high >= low[i])).all(axis=1)) for i in sample
-    )
-    if overlaps / len(sample) * len(ends) > MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(ends):
-        raise TooTangled
+def check_tangle(segments: Array, half: float = 0.0) -> None:
+    """Estimate from a sample how many pairs of segments (S, 2, 2) must be tested for a crossing.
+
+    `half` is half their width. Raises `TooTangled` if there are too many.
+    """
+    sample = np.random.default_rng(0).permutation(len(segments))[:_SAMPLE]
+    for wider, most in ((0.0, 1), (half, MAX_OVERLAPS_WIDE)):
+        low, high = segments.min(axis=1) - wider, segments.max(axis=1) + wider
+        overlaps = sum(
+            np.count_nonzero(((low <= high[i]) & (high >= low[i])).all(axis=1)) for i in sample
+        )
+        most *= MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(segments)
+        if overlaps / len(sample) * len(segments) > most:
+            raise TooTangled
 
 
 def _winding(points: Array, ring: Array) -> Integers:
