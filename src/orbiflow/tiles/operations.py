@@ -55,7 +55,7 @@ class ReadingSettings(Settings, group="Reading the silhouette"):
 class TileChoice(Settings):
     """Which tile of a result is taken."""
 
-    tile: str = "1"
+    tile: Annotated[str | None, DefaultText("1, or the tile whose folder is given")] = None
     """A class, such as IH4, or a rank; 1 is best."""
 
     force: bool = False
@@ -246,7 +246,7 @@ def export(
     Lengths are numbers with a unit: mm, cm, in or pt.
 
     Args:
-        result: A search's folder, or its result.json.
+        result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file.
         picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
     """
@@ -301,7 +301,7 @@ def art(
     Without a picture tiles are coloured by a palette, and --engrave draws inside them.
 
     Args:
-        result: A search's folder, or its result.json.
+        result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file, .png or .svg.
         picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
     """
@@ -347,7 +347,7 @@ def solid(
     It lies as it is printed, without supports. Lengths are numbers with a unit: mm, cm, in or pt.
 
     Args:
-        result: A search's folder, or its result.json.
+        result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file, .stl or .3mf.
         picture: An SVG drawing over the silhouette, in the same frame, for a stamp or mould.
     """
@@ -397,7 +397,7 @@ def animate(
     It loops, there and back. In a morph every picture is an exact tiling.
 
     Args:
-        result: A search's folder, or its result.json.
+        result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file: .gif, .svg, or .mp4, which needs ffmpeg.
     """
     settings = settings.for_file(out)
