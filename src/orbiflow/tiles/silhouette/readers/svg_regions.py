@@ -122,9 +122,13 @@ class Regions:
 
 def _shows(brush: Brush, kind: str) -> int:
     """Return whether paint on a mask shows what is masked (1), hides it (-1) or neither (0)."""
-    light = sum(rgb(brush.colour)) / 765 if brush.colour[0] == "#" else 0.0
-    opacity = brush.opacity * (1.0 if kind == "alpha" else light)
+    opacity = brush.opacity * (1.0 if kind == "alpha" else lightness(brush.colour))
     return 1 if opacity >= 0.5 else -1 if brush.opacity > 0.5 else 0
+
+
+def lightness(colour: str) -> float:
+    """Return how light a colour is, from 0 to 1."""
+    return float(np.dot(rgb(colour), [0.2126, 0.7152, 0.0722])) / 255 if colour[0] == "#" else 0.0
 
 
 def painted(layers: list[Layer], signs: list[int], grid: float | None = None) -> BaseGeometry:
