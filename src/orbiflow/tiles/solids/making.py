@@ -117,10 +117,7 @@ def _drawing(
     if over.picture is not None:
         raise InputFileError(f"{picture}: a {settings.kind} needs lines: draw it as SVG")
     motif = drawn_motif(tile, settings, palette("ink"), over.drawing)
-    old, new = (one - one[0] for one in (tile.tile.polygon, placed.tile.polygon))
-    linear = np.linalg.lstsq(old, new)[0].T
-    offset = placed.tile.polygon[0] - linear @ tile.tile.polygon[0]
-    drawing = raised(motif.moved(linear, offset), settings.nozzle)
+    drawing = raised(motif.moved(*placed.place), settings.nozzle)
     return drawing, (*tile.notes, *over.notes)
 
 
