@@ -61,7 +61,7 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
         styles = {"engrave": Style(BLACK), "score": line._replace(stroke=BLUE)}
         if settings.purpose == "plotter":
             styles = dict.fromkeys(styles, line)
-        motifs = _burnt(layout.motif, area, styles)
+        motifs = burnt(layout.motif, area, styles)
     linear = np.array([tile.linear for tile in scene.tiles])
     offsets = np.array([tile.offset for tile in scene.tiles])
     which, ink = np.arange(len(offsets)), palette(settings.palette).outline
@@ -76,7 +76,7 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
     return replace(scene, layers=(*layers, *scene.layers), motifs=motifs)
 
 
-def _burnt(motif: Motif, tile: shapely.Polygon, styles: dict[str, Style]) -> dict[str, Motif]:
+def burnt(motif: Motif, tile: shapely.Polygon, styles: dict[str, Style]) -> dict[str, Motif]:
     """Return the regions and pictures to engrave, and the lines to score.
 
     What is lighter than middle grey erases what lies under it, as on white; faint colours do nothing.
