@@ -30,6 +30,7 @@ from orbiflow.tiles.silhouette import lightness
 from orbiflow.tiles.tile import EscherTile
 
 BLACK, BLUE = "#000000", "#0000ff"
+MOST_PIXELS = 1e8  # the largest number of pixels of pictures on a page
 
 
 def drawn_on(layout: Layout, given: EscherTile, over: Over) -> Motif:
@@ -43,7 +44,8 @@ def drawn_on(layout: Layout, given: EscherTile, over: Over) -> Motif:
             raise OrbiflowError(
                 "a pen draws lines, and the picture is made of pixels; give a drawing in SVG"
             )
-        density = float(np.sqrt(abs(np.linalg.det(linear)))) * settings.dpi / INCH
+        density = min(settings.dpi / INCH, float(np.sqrt(MOST_PIXELS / np.prod(settings.page))))
+        density *= float(np.sqrt(abs(np.linalg.det(linear))))
         rasters = (carried_raster(over.picture, given, density),)
     return Motif(motif.parts, rasters).moved(*layout.place)
 
