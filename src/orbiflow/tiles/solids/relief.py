@@ -36,6 +36,6 @@ def _painted(part: Part, nozzle: float) -> Iterator[tuple[str, BaseGeometry]]:
 
 def _widened(polygon: shapely.Polygon, width: float) -> BaseGeometry:
     """Return a polygon that is nowhere so wide widened until it is so on the mean."""
-    if not polygon.buffer(-width / 2).is_empty:
+    if not polygon.buffer(-0.49 * width).is_empty:
         return polygon
     return polygon.buffer(max(width / 2 - polygon.area / polygon.length, 0.0))
