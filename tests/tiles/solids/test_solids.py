@@ -87,7 +87,9 @@ def test_the_volume_of_a_tile(tile: Tile) -> None:
 
 def test_a_slope_is_exact() -> None:
     square = shapely.box(0, 0, 10, 10)
-    body = stacked(Level(0, square), Level(0, square), Level(3, square.buffer(-2, join_style="mitre")))
+    body = stacked(
+        Level(0, square), Level(0, square), Level(3, square.buffer(-2, join_style="mitre"))
+    )
     assert body.volume() == pytest.approx(3 / 3 * (100 + 36 + 60))
     cone = stacked(Level(1, square.buffer(-4)), Level(2, square))
     assert cone.status().name == "NoError"
@@ -222,7 +224,7 @@ def test_notes_say_where_it_is_too_thin() -> None:
         ({"kind": "mould", "relief": 9}, "relief must be at most height"),
         ({"kind": "cutter", "chamfer": 1}, "chamfer applies only to kind"),
         ({"blade": 1}, "blade applies only to kind cutter"),
-        ({"engrave": True}, "strokes applies only to kind stamp or mould"),
+        ({"engrave": True}, "engrave applies only to kind stamp or mould"),
         ({"kind": "vase"}, "kind must be"),
     ],
 )
