@@ -89,7 +89,7 @@ def _print_ratings(ours: dict[str, list[Row]], lengths: dict[str, float]) -> Non
     )
     for label, (a, b) in pairs.items():
         places = [[words.index(rating.word) for rating in side] for side in (a, b)]
-        apart = abs(np.subtract(*places))
+        apart = abs(np.subtract(places[0], places[1]))
         rank = spearmanr([r.stars for r in a], [r.stars for r in b]).statistic
         print(f"{label:42}{rank:20.2f}{np.mean(apart == 0):11.2f}{np.mean(apart < 2):13.2f}")
     table = np.zeros((4, 4), dtype=int)

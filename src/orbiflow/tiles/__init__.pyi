@@ -55,8 +55,8 @@ from .motifs.source import with_map as with_map
 from .motion.settings import AnimationSettings as AnimationSettings
 from .motion.writers import animate as animate
 from .motion.writers import animation as animation
-from .pages.overview import index_page as index_page
 from .pages.overview import overview_png as overview_png
+from .pages.page import index_page as index_page
 from .pages.run_folder import FIELD_FILES as FIELD_FILES
 from .pages.run_folder import OVERVIEW as OVERVIEW
 from .pages.run_folder import figure_files as figure_files

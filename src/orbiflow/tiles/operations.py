@@ -55,7 +55,7 @@ class ReadingSettings(Settings, group="Reading the silhouette"):
 class TileChoice(Settings):
     """Which tile of a result is taken."""
 
-    tile: str = "1"
+    tile: Annotated[str | None, DefaultText("1, or the tile whose folder is given")] = None
     """A class, such as IH4, or a rank; 1 is best."""
 
     force: bool = False
@@ -78,6 +78,7 @@ def escherize(
     figures: bool = False,
     verbose: bool = False,
     called: Annotated[str | None, Hidden()] = None,
+    shown_out: Annotated[str | None, Hidden()] = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
@@ -94,6 +95,7 @@ def escherize(
             field.pdf.
         verbose: Also show the scores and other figures of result.json.
         called: What the results call the silhouette. Default: its path.
+        shown_out: What the page's commands call the folder. Default: its path.
     """
     from orbiflow.tiles import pages, search, silhouette
 
@@ -109,7 +111,8 @@ def escherize(
     result = search.escherize(target, settings, on_event=on_event, cancel=cancel)
     for text in _remarks(result):
         on_event(Note(text))
-    written = pages.write_run(result, out, figures=figures, on_event=on_event)
+    shown = shown_out or str(out)
+    written = pages.write_run(result, out, figures=figures, shown_out=shown, on_event=on_event)
     tiles = result.tiles if written else ()
     summary = {
         "folder": str(out),
@@ -234,6 +237,7 @@ def export(
     choice: TileChoice = TileChoice(),
     *,
     out: Annotated[Path | None, Option("-o"), DefaultText("named after the tile")] = None,
+    picture: Path | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
@@ -242,8 +246,9 @@ def export(
     Lengths are numbers with a unit: mm, cm, in or pt.
 
     Args:
-        result: A search's folder, or its result.json.
+        result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file.
+        picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
     """
     settings = settings.for_file(out)
 
@@ -251,9 +256,9 @@ def export(
 
     tile = choice.read(result)
     out = out or Path(f"{tile.name}.{settings.format}")
-    check_output_file(out, result)
+    check_output_file(out, result, picture)
     done = exporting.export(
-        tile, out, settings, force=choice.force, on_event=on_event, cancel=cancel
+        tile, out, settings, picture=picture, force=choice.force, on_event=on_event, cancel=cancel
     )
     _tell(on_event, (*done.notes, _exported(done, settings, tile.isohedral_class)), *done.files)
     return Outcome(
@@ -296,7 +301,7 @@ def art(
     Without a picture tiles are coloured by a palette, and --engrave draws inside them.
 
     Args:
-        result: A search's folder, or its result.json.
+        result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file, .png or .svg.
         picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
     """
@@ -342,7 +347,7 @@ def solid(
     It lies as it is printed, without supports. Lengths are numbers with a unit: mm, cm, in or pt.
 
     Args:
-        result: A search's folder, or its result.json.
+        result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file, .stl or .3mf.
         picture: An SVG drawing over the silhouette, in the same frame, for a stamp or mould.
     """
@@ -392,7 +397,7 @@ def animate(
     It loops, there and back. In a morph every picture is an exact tiling.
 
     Args:
-        result: A search's folder, or its result.json.
+        result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file: .gif, .svg, or .mp4, which needs ffmpeg.
     """
     settings = settings.for_file(out)

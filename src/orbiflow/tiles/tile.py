@@ -214,7 +214,7 @@ class EscherTile:
         return cls(as_instance(source, Tile, "the tile", "EscherTile.load(folder) gives one"))
 
     @staticmethod
-    def load(path: str | Path, which: str | int = 1) -> EscherTile:
+    def load(path: str | Path, which: str | int | None = None) -> EscherTile:
         """Return a tile of a run; see `read_result`."""
         from orbiflow.tiles.result_file import read_result
 
@@ -391,12 +391,17 @@ class EscherTile:
         return draw_art(self, out, settings, picture=picture, target=target, force=force)
 
     def export(
-        self, out: str | Path, settings: ExportSettings | None = None, *, force: bool = False
+        self,
+        out: str | Path,
+        settings: ExportSettings | None = None,
+        *,
+        picture: str | Path | None = None,
+        force: bool = False,
     ) -> Exported:
         """Write the tiling, its lines or its pieces in real size; see `orbiflow.tiles.export`."""
         from orbiflow.tiles.exporting import export
 
-        return export(self, out, settings, force=force)
+        return export(self, out, settings, picture=picture, force=force)
 
     def solid(
         self,
@@ -420,5 +425,5 @@ class EscherTile:
 
 
 TileSource: TypeAlias = EscherTile | Tile | str | Path
-"""What functions take for a tile. A text or path is a run's folder, or its result.json, whose best
-tile is meant; `EscherTile.load` gives the others."""
+"""What functions take for a tile. A text or path is a tile's own folder in a run; or the run's folder
+or result.json, whose best tile is meant; `EscherTile.load` gives the others."""

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy.stats import spearmanr
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import Fidelity, Rating
+from orbiflow.tiles import Fidelity, Rating, rank_score
 from orbiflow.tiles.likeness import likeness_ratings, overlap_ratings
 from orbiflow.tiles.likeness.rating import WORDS, rating_of_mark
 
@@ -53,6 +53,11 @@ def test_tiles_with_legs_have_stars_too() -> None:
     # and the best of a run is not always good
     assert likeness_ratings([0.001], 7.0)[0].word == "poor"
     assert likeness_ratings([0.99], 7.0)[0].stars == 5
+
+
+def test_a_blob_for_a_spider_is_poor() -> None:
+    words = [rating.word for rating in overlap_ratings([0.83, 0.66, 0.5, rank_score(0.64, 0.36)])]
+    assert words == ["excellent", "good", "fair", "poor"]
 
 
 def test_stars_agree_with_marks_as_the_docs_say() -> None:

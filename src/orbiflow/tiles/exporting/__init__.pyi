@@ -1,8 +1,11 @@
+from .layouts import MOTIF as MOTIF
+from .layouts import SYMBOL as SYMBOL
 from .layouts import Layout as Layout
 from .layouts import chosen_copies as chosen_copies
 from .layouts import cut_ring as cut_ring
 from .layouts import layout as layout
 from .layouts import place_on as place_on
+from .layouts import tile_layers as tile_layers
 from .placing import edge_margin as edge_margin
 from .placing import inset as inset
 from .placing import longer_side as longer_side

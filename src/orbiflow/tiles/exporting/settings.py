@@ -17,6 +17,7 @@ from orbiflow.settings import (
     SettingError,
     Unit,
 )
+from orbiflow.tiles.motifs import MotifSettings
 from orbiflow.units import COLUMNS, Colour, Length, LengthOrZero, PageSize, Size
 
 PIECES = Group("Pieces")
@@ -29,7 +30,7 @@ def usual_tolerance(tile_size: float) -> float:
     return max(0.05, tile_size / 800)
 
 
-class ExportSettings(FileSettings, group="Page and file"):
+class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     """How a tiling is drawn in real size; lengths in mm.
 
     >>> ExportSettings(purpose="laser", kerf=0.1, cut="pieces").stroke_width
@@ -125,12 +126,13 @@ class ExportSettings(FileSettings, group="Page and file"):
     """Width of lines."""
 
     def defaults(self) -> Mapping[str, Any]:
-        values = dict(PURPOSES[self.purpose]) if self.purpose else {}
+        values = {**super().defaults(), **PURPOSES.get(self.purpose or "", {})}
         if "cut" in self.fields_given and self.cut == "pieces":
             values.pop("clip", None)
         return values
 
     def check(self) -> None:
+        super().check()
         if self.tolerance is not None and self.tolerance > self.tile_size / 20:
             raise SettingError(
                 f"{{tolerance}} of {self.tolerance:g} mm would lose the shape of a tile of "
@@ -139,6 +141,11 @@ class ExportSettings(FileSettings, group="Page and file"):
         if "palette" in self.fields_given and not self.filled:
             what = f"{{purpose}} {self.purpose} fills nothing" if self.purpose else "no {filled}"
             raise SettingError(f"{{palette}} has no effect: {what}; leave {{palette}} out")
+
+    @property
+    def coloured(self) -> bool:
+        """Whether what lies on the tiles has its colours, rather than those of a machine's layers."""
+        return (self.cut == "none" and self.filled) or self.purpose in ("print", "paper", "web")
 
     @property
     def usual_format(self) -> str:

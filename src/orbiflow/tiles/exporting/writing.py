@@ -12,12 +12,22 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
+from orbiflow.tiles.exporting.drawings import drawn_on, with_drawing
 from orbiflow.tiles.exporting.layouts import Layout, layout, pieces_scenes, place_on, tiling_scene
 from orbiflow.tiles.exporting.settings import ExportSettings
 from orbiflow.tiles.exporting.sheets import calibrated, split
 from orbiflow.tiles.exporting.skeletons import skeleton_scene
 from orbiflow.tiles.likeness import narrowest_neck
-from orbiflow.tiles.scene import Scene, write_dxf, write_json, write_pdf, write_png, write_svg
+from orbiflow.tiles.motifs import Over, read_over, with_map
+from orbiflow.tiles.scene import (
+    Scene,
+    flattened,
+    write_dxf,
+    write_json,
+    write_pdf,
+    write_png,
+    write_svg,
+)
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import Certificate, colouring
 
@@ -53,6 +63,7 @@ def export(
     out: str | Path,
     settings: ExportSettings | None = None,
     *,
+    picture: str | Path | None = None,
     force: bool = False,
     on_event: Sink = ignore,
     cancel: Cancel | None = None,
@@ -64,6 +75,7 @@ def export(
         out: The file; with several sheets its name gets a number. Its ending decides the format, unless
             the settings give one.
         settings: How it is drawn.
+        picture: The file of a picture or drawing over the silhouette, for which the tile needs a map.
         force: Export a tile that is not certified; the file says so.
         on_event: Called with the `Progress`.
         cancel: Stops the work; nothing is then written.
@@ -77,7 +89,7 @@ def export(
     out, cancel = as_path(out, "the file to export to"), cancel or Cancel()
     settings = (settings or ExportSettings()).for_file(out)
     on_event(Progress(0.0, "laying out"))
-    found, notes = scenes(tile, settings, force=force)
+    found, notes = scenes(tile, settings, picture=picture, force=force)
     contents: list[str | bytes] = []  # all, before the first file
     for k, scene in enumerate(found):
         cancel.check()
@@ -90,7 +102,11 @@ def export(
 
 
 def scenes(
-    tile: TileSource, settings: ExportSettings, *, force: bool = False
+    tile: TileSource,
+    settings: ExportSettings,
+    *,
+    picture: str | Path | None = None,
+    force: bool = False,
 ) -> tuple[list[Scene], tuple[str, ...]]:
     """Return the sheets, and what the user should know. Raises as `export`."""
     given = EscherTile.of(tile)
@@ -101,6 +117,11 @@ def scenes(
     notes = (*neck_notes(placed.tile.polygon, settings.warn_neck), *_colour_notes(given, settings))
     if placed.outline.note:
         notes = (placed.outline.note, *notes)
+    if picture is not None or settings.strokes or settings.eyes:
+        given = with_map(given)
+        over = Over() if picture is None else read_over(picture, given)
+        placed = replace(placed, motif=drawn_on(placed, given, over))
+        notes = (*given.notes, *over.notes, *notes)
     made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
     if settings.calibrate:
         # the strip at the foot is the last sheet's; pieces have one on each
@@ -110,10 +131,17 @@ def scenes(
 
 
 def _made(placed: Layout, settings: ExportSettings) -> list[Scene]:
+    fine = settings.deviation / 4
     if settings.cut == "pieces":
-        return pieces_scenes(placed, fine=settings.file_format not in ("dxf", "json"))
-    scene = skeleton_scene(placed) if settings.cut == "skeleton" else tiling_scene(placed)
-    return [scene] if settings.bed is None else split(scene, settings.bed, settings.deviation / 4)
+        made = pieces_scenes(placed, fine=settings.file_format not in ("dxf", "json"))
+    else:
+        made = [skeleton_scene(placed) if settings.cut == "skeleton" else tiling_scene(placed)]
+    painted = settings.cut == "none" and settings.filled
+    made = [with_drawing(scene, placed) for scene in made]
+    if settings.cut != "pieces" and settings.bed is not None:
+        made = split(made[0], settings.bed, fine)
+    # a machine need not know copies
+    return made if painted else [flattened(scene, fine) for scene in made]
 
 
 def _described(

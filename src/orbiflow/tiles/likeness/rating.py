@@ -82,4 +82,4 @@ def likeness_ratings(scores: Sequence[float], length: float) -> list[Rating]:
 
 def overlap_ratings(scores: Sequence[float]) -> list[Rating]:
     """Return the ratings of tiles by their scores after a search for overlap, 0 to 1."""
-    return [rating_of_mark(10 * score) for score in scores]
+    return [rating_of_mark(10 * score - 1) for score in scores]

@@ -113,7 +113,7 @@ def _parts(shape: DrawnShape, regions: Regions, carry: _Carry) -> list[Part]:
         if kind == "fill":
             curves = _area(regions.clipped(shape, regions.fill(shape)), carry)
         elif shape.is_plain_line:
-            width = shape.pen.width * shape.scale * carry.scale
+            width = shape.width * shape.scale * carry.scale
             style = Style(None, colour, width)
             lines = regions.lines(shape)
             curves = [_line(carry, points, path) for points, path in lines if len(points) > 1]

@@ -26,6 +26,7 @@ from .readers.svg_paths import TooManyPoints as TooManyPoints
 from .readers.svg_paths import TooTangled as TooTangled
 from .readers.svg_paths import fill as fill
 from .readers.svg_regions import Regions as Regions
+from .readers.svg_regions import lightness as lightness
 from .readers.svg_shapes import Drawing as Drawing
 from .readers.svg_shapes import DrawnShape as DrawnShape
 from .readers.svg_xml import parse_xml as parse_xml

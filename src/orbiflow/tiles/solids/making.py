@@ -15,15 +15,7 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import write_atomic
-from orbiflow.tiles.exporting import (
-    ExportSettings,
-    Layout,
-    layout,
-    longer_side,
-    neck_notes,
-    place_on,
-    place_on_page,
-)
+from orbiflow.tiles.exporting import ExportSettings, Layout, layout, neck_notes, place_on
 from orbiflow.tiles.likeness import narrowest_slit
 from orbiflow.tiles.solids.files import write_3mf, write_stl
 from orbiflow.tiles.solids.relief import raised
@@ -125,9 +117,7 @@ def _drawing(
     if over.picture is not None:
         raise InputFileError(f"{picture}: a {settings.kind} needs lines: draw it as SVG")
     motif = drawn_motif(tile, settings, palette("ink"), over.drawing)
-    scale = settings.tile_size / longer_side(tile.tile.polygon)
-    place = place_on_page(tile.tile, scale, placed.box, tile.y_down)
-    drawing = raised(motif.moved(*place), settings.nozzle)
+    drawing = raised(motif.moved(*placed.place), settings.nozzle)
     return drawing, (*tile.notes, *over.notes)
 
 

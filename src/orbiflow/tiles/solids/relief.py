@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.drawing import rgb
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.scene import INK, Motif, Part
-from orbiflow.tiles.silhouette import fill
-
-FLATNESS = 0.01  # how far in mm straight sides may be from curves: no printer shows it
+from orbiflow.tiles.scene import Motif, Part, lines_of, region_of
+from orbiflow.tiles.silhouette import lightness
 
 
 def raised(motif: Motif, nozzle: float) -> BaseGeometry:
@@ -24,21 +20,18 @@ def raised(motif: Motif, nozzle: float) -> BaseGeometry:
     dark: BaseGeometry = shapely.Polygon()
     for part in motif.parts:
         for colour, region in _painted(part, nozzle) if part.opacity >= 0.5 else ():
-            light = colour != INK and np.mean(rgb(colour)) > 127
+            light = lightness(colour) >= 0.5
             dark = dark.difference(region) if light else dark.union(region)
     return shapely.union_all([_widened(polygon, nozzle) for polygon in polygons_in(dark)])
 
 
 def _painted(part: Part, nozzle: float) -> Iterator[tuple[str, BaseGeometry]]:
     """Yield the colours of a part, and where they are."""
-    lines = [curve.flattened(FLATNESS) for curve in part.curves]
-    if part.style.fill is not None:
-        yield part.style.fill, fill([line for line in lines if len(line) > 2])
-    if part.style.stroke is not None:
-        both = zip(lines, part.curves, strict=True)
-        paths = [shapely.LinearRing(a) if c.closed else shapely.LineString(a) for a, c in both]
-        wide = shapely.buffer(paths, max(part.style.width, nozzle) / 2)
-        yield part.style.stroke, shapely.union_all(wide)
+    fill, stroke, width = part.style
+    if fill is not None:
+        yield fill, region_of(part)
+    if stroke is not None:
+        yield stroke, lines_of(part).buffer(max(width, nozzle) / 2)
 
 
 def _widened(polygon: shapely.Polygon, width: float) -> BaseGeometry:

@@ -117,7 +117,8 @@ def _background(
     These are rectangles that cover the page, as long as something else is there.
     """
     every = [layer.region for own in layers for layer in own]
-    page = shapely.box(*(drawing.box or shapely.total_bounds(every)))
+    xmin, ymin, xmax, ymax = drawing.box or shapely.total_bounds(every)
+    page = shapely.box(xmin, ymin, xmax, ymax)
 
     def covers(own: list[Layer]) -> bool:  # but for 0.1% of the page
         region = own[0].region
@@ -137,34 +138,37 @@ def _background(
 def _overlay(layers: list[Layer], ground: str | None) -> tuple[BaseGeometry, list[str]]:
     """Return the region that is seen of layers on a ground, and notes."""
     paper = ground or PAPER
-
-    def effect(layer: Layer) -> int:
-        colour, opacity = layer.brush
-        both = [rgb(c if c[0] == "#" else PLAIN.colour) for c in (colour, paper)]
-        if np.abs(np.subtract(*both)).max() <= SAME_COLOUR:
-            return -1 if opacity >= COVERING else 0
-        return 1 if opacity >= FAINT else 0
-
     # Snapped to a grid: neighbours that all but share an edge would leave cracks between them.
     bounds = shapely.total_bounds([layer.region for layer in layers])
     size = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
     grid = max(OVERLAY_GRID * size, OVERLAY_GRID_FLOOR * float(np.abs(bounds).max()))
-    seen = painted(layers, effect, grid)
-    signs = [effect(layer) for layer in layers]
-    if min(signs) == 1:
-        return seen, []
-    every = painted(layers, lambda _: 1, grid)
+    opaque = [layer for layer in layers if layer.brush.opacity >= FAINT]
+    if not opaque:
+        return painted(layers, lambda _: 1, grid), ["took faint shapes, as there are no others"]
+    n = len(layers) - len(opaque)
+    notes = [f"left out {n} faint shape{'s' * (n > 1)}"] * (n > 0)
+    every = painted(opaque, lambda _: 1, grid)
+    if not any(_alike(layer.brush.colour, paper) for layer in opaque):
+        return every, notes
+
+    def effect(layer: Layer) -> int:
+        return -(layer.brush.opacity >= COVERING) if _alike(layer.brush.colour, paper) else 1
+
+    seen = painted(opaque, effect, grid)
     hidden = 1 - _solid(seen) / (_solid(every) or 1.0)
     if not seen.area > 0 or (ground is None and hidden > MOSTLY):
-        return every, [f"took faint shapes and those in {paper} too: they are most of the drawing"]
-    n = signs.count(0)
-    notes = [f"left out {n} faint shape{'s' * (n > 1)}"] * (n > 0)
-    if -1 in signs and hidden > NOTEWORTHY:
+        return every, [*notes, f"took shapes in {paper} too: they are most of the drawing"]
+    if hidden > NOTEWORTHY:
         notes.append(
             f"took shapes in {paper} for background, {percent(hidden)} of the whole; give them "
             "another colour if they belong to the shape"
         )
     return seen, notes
+
+
+def _alike(colour: str, other: str) -> bool:
+    both = (rgb(c if c[0] == "#" else PLAIN.colour) for c in (colour, other))
+    return max(abs(a - b) for a, b in zip(*both, strict=True)) <= SAME_COLOUR
 
 
 def _solid(region: BaseGeometry) -> float:

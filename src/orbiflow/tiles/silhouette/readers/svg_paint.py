@@ -28,7 +28,7 @@ def brushes(drawing: Drawing, shape: DrawnShape) -> dict[str, Brush]:
     for kind in ("stroke", "fill") if "stroke" in order[:1] else ("fill", "stroke"):
         text = shape.paint.get(kind, "#000000" if kind == "fill" else "none")
         brush = _brush(text, drawing, shape.paint.get("color", CURRENT))
-        if brush and (kind == "fill" or shape.pen.width > 0):
+        if brush and (kind == "fill" or shape.width > 0):
             own = min(max(as_number(shape.paint.get(f"{kind}-opacity"), 1.0), 0.0), 1.0)
             found[kind] = Brush(brush.colour, shape.opacity * brush.opacity * own)
     return {kind: brush for kind, brush in found.items() if brush.opacity > 0}

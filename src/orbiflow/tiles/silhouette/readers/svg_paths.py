@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from orbiflow.arrays import Array, Integers
 
 MAX_POINTS = 200_000
+DIRECTION = 1e-6  # of a curve's size: its chords at the ends stray by less
 
 
 class TooManyPoints(Exception):
@@ -33,11 +34,6 @@ class Bezier:
     def reach(self) -> Array:
         """Return control points: they span as much as the curve, but for a small factor."""
         return self.control
-
-    def directions(self, start: Array) -> tuple[Array, Array]:
-        """Return vectors along the curve at `start` and at its end."""
-        points = np.vstack([start, self.control])
-        return _first_nonzero(points[1:] - start), _first_nonzero(self.end - points[-2::-1])
 
     def flatten(self, start: Array, tolerance: float) -> Array:
         """Return points after `start`, on the curve, whose polyline is within `tolerance` of it."""
@@ -72,12 +68,6 @@ class EllipticArc:
         t = self.t0 + self.sweep / 2
         return np.stack([self.centre + np.cos(t) * self.u + np.sin(t) * self.v, self.end])
 
-    def directions(self, start: Array) -> tuple[Array, Array]:  # noqa: ARG002
-        """Return vectors along the arc at its start and at its end."""
-        t = np.array([[self.t0], [self.t0 + self.sweep]])
-        first, last = math.copysign(1, self.sweep) * (np.cos(t) * self.v - np.sin(t) * self.u)
-        return first, last
-
     def flatten(self, start: Array, tolerance: float) -> Array:  # noqa: ARG002
         """Return points after the first, on the arc, whose polyline is within `tolerance` of it."""
         radius = math.hypot(*self.u, *self.v)
@@ -87,10 +77,6 @@ class EllipticArc:
         points = self.centre + np.cos(t) * self.u + np.sin(t) * self.v
         points[-1] = self.end
         return points
-
-
-def _first_nonzero(vectors: Array) -> Array:
-    return vectors[vectors.any(axis=1).argmax()]
 
 
 def _steps(needed: float) -> int:
@@ -165,11 +151,6 @@ def _arc(arc: svgelements.Arc, points: Array) -> Bezier | EllipticArc:
     return EllipticArc(centre, u_end - centre, v_end - centre, t0, sweep, end)
 
 
-def polygon_path(points: Array) -> SubPath:
-    """Return the closed sub-path through the vertices (N, 2) of a polygon."""
-    return SubPath(points[0], [Bezier(point[None]) for point in points[1:]], True)
-
-
 def corners(paths: list[SubPath], matrix: Array) -> Iterator[tuple[str, Array, float]]:
     """Yield where markers stand: "start", "mid" or "end", the point and the angle of the path there.
 
@@ -177,21 +158,24 @@ def corners(paths: list[SubPath], matrix: Array) -> Iterator[tuple[str, Array, f
     """
     found: list[tuple[Array, Array, Array]] = []
     for path in paths:
-        curves = [*path.curves, *[Bezier(path.start[None])] * (path.closed and path.gap() > 0)]
-        starts = [path.start, *(curve.end for curve in curves)]
-        along = [curve.directions(start) for curve, start in zip(curves, starts, strict=False)]
-        none = np.zeros(2)
-        before = [along[-1][1] if path.closed else none, *(last for _, last in along)]
-        after = [*(first for first, _ in along), along[0][0] if path.closed else none]
-        found += zip(starts, before, after, strict=True)
+        close = [Bezier(path.start[None])] * (path.closed and path.gap() > 0)
+        last, into = path.start, [np.zeros(2)]
+        out: list[Array] = []
+        for curve in [*path.curves, *close]:
+            size = float(np.ptp([last, *curve.reach()], axis=0).max()) or 1.0
+            along = np.diff([last, *curve.flatten(last, DIRECTION * size)], axis=0)
+            out.append(along[along.any(axis=1).argmax()])
+            into.append(along[::-1][along[::-1].any(axis=1).argmax()])
+            found.append((last, into[-2], out[-1]))
+            last = curve.end
+        found.append((last, into[-1], out[0] * path.closed))
+        if path.closed:
+            found[-len(into)] = (path.start, into[-1], out[0])
     for k, (point, *sides) in enumerate(found):
         key = "start" if k == 0 else "end" if k == len(found) - 1 else "mid"
-        mean = sum(_unit(matrix[:, :2] @ side) for side in sides)
-        yield key, matrix[:, :2] @ point + matrix[:, 2], math.atan2(mean[1], mean[0])
-
-
-def _unit(vector: Array) -> Array:
-    return vector / (np.hypot(*vector) or 1.0)
+        before, after = (matrix[:, :2] @ side for side in sides)
+        x, y = before / (np.hypot(*before) or 1.0) + after / (np.hypot(*after) or 1.0)
+        yield key, matrix[:, :2] @ point + matrix[:, 2], math.atan2(y, x)
 
 
 # Of pairs of segments whose boxes overlap, in all and for each segment: the crossings of a scribble

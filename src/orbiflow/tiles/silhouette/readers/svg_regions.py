@@ -9,12 +9,14 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import rgb
 from orbiflow.errors import InputFileError
+from orbiflow.tiles.geometry import complex_points
 from orbiflow.tiles.silhouette.outlines import MAX_COORDINATE
 from orbiflow.tiles.silhouette.readers.svg_paint import Brush, brushes
 from orbiflow.tiles.silhouette.readers.svg_paths import (
@@ -24,7 +26,7 @@ from orbiflow.tiles.silhouette.readers.svg_paths import (
     check_tangle,
     fill,
 )
-from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, Drawing, DrawnShape, Pen
+from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, Drawing, DrawnShape
 
 CAPS: dict[str, Literal["flat", "round", "square"]] = {
     "butt": "flat",
@@ -79,12 +81,14 @@ class Regions:
 
     def stroke(self, shape: DrawnShape) -> BaseGeometry:
         """Return what the stroke of a shape covers, before clips."""
-        pen, linear, offset = shape.pen, shape.matrix[:2, :2], shape.matrix[:2, 2]
+        linear, offset = shape.matrix[:2, :2], shape.matrix[:2, 2]
         back = np.linalg.inv(linear).T
-        lines = [
-            ((points - offset) @ back, path.closed) for points, path in self.lines(shape, FINER)
-        ]
-        region = stroked(lines, pen)
+        lines: list[Line] = []
+        for points, path in self.lines(shape, FINER):
+            ends = np.array([path.start, *(curve.end for curve in path.curves)])
+            corners = np.isin(complex_points(points), complex_points(ends))
+            lines.append(Line((points - offset) @ back, corners, path.closed))
+        region = stroked(lines, shape)
         return shapely.transform(region, lambda points: points @ linear.T + offset)
 
     def clipped(self, shape: DrawnShape, region: BaseGeometry) -> BaseGeometry:
@@ -114,15 +118,11 @@ class Regions:
 
         def effect(layer: Layer) -> int:
             colour, opacity = layer.brush
-            light = 1.0 if clip.kind == "alpha" else lightness(colour)
+            light = sum(rgb(colour)) / 765 if colour[0] == "#" else 0.0
+            light = 1.0 if clip.kind == "alpha" else light
             return 1 if light * opacity >= 0.5 else -1 if opacity > 0.5 else 0
 
         return painted([layer for shape in clip.shapes for layer in self.layers(shape)], effect)
-
-
-def lightness(colour: str) -> float:
-    """Return how light a colour is, from 0 to 1."""
-    return float(np.dot(rgb(colour), [0.2126, 0.7152, 0.0722])) / 255 if colour[0] == "#" else 0.0
 
 
 def painted(
@@ -145,66 +145,86 @@ def painted(
     return found
 
 
-def stroked(lines: list[tuple[Array, bool]], pen: Pen) -> BaseGeometry:
-    """Return the region that a pen covers along polylines (N, 2), each with whether it is closed."""
-    half = pen.width / 2
-    pieces = [piece for points, closed in lines for piece in _pieces(points, closed, pen)]
-    if not pieces or not all(np.isfinite(points).all() for points, _ in pieces):
+class Line(NamedTuple):
+    """A polyline (N, 2), which of its vertices are corners, not on curves, and whether it is closed."""
+
+    points: Array
+    corners: NDArray[np.bool_]
+    closed: bool
+
+
+def stroked(lines: list[Line], shape: DrawnShape) -> BaseGeometry:
+    """Return the region that a shape's pen covers along polylines."""
+    half, dashes = shape.width / 2, shape.dashes
+    offset, limit = shape.number("stroke-dashoffset", 0.0), shape.number("stroke-miterlimit", 4.0)
+    pieces = [piece for line in lines for piece in _pieces(line, dashes, offset)]
+    if not pieces or not all(np.isfinite(piece.points).all() for piece in pieces):
         return Polygon()
-    cap = CAPS.get(pen.cap, "flat")
-    join = "round" if pen.join == "round" else "bevel"
-    strings = [shapely.LineString(points) for points, _ in pieces]
+    cap = CAPS.get(shape.paint.get("stroke-linecap", "butt"), "flat")
+    corner = shape.paint.get("stroke-linejoin", "miter")
+    join = "round" if corner == "round" else "bevel"
+    strings = [shapely.LineString(piece.points) for piece in pieces]
     simple = shapely.simplify(strings, WIGGLE * half)
     runs = [shapely.get_coordinates(line) for line in simple]
     check_tangle(np.concatenate([np.stack([p[:-1], p[1:]], axis=1) for p in runs]), half)
     regions = [shapely.buffer(simple, half, cap_style=cap, join_style=join)]
-    if pen.join not in ("round", "bevel"):
-        regions += [_mitres(*piece, half, pen.miter_limit) for piece in pieces if len(piece[0]) > 2]
+    if join == "bevel":
+        limit *= corner != "bevel"
+        regions += [_joins(piece, half, limit) for piece in pieces if len(piece.points) > 2]
     return shapely.union_all(np.concatenate(regions))
 
 
-def _pieces(points: Array, closed: bool, pen: Pen) -> list[tuple[Array, bool]]:
-    """Return the dashes of a polyline; or its whole, ending where it began if it is closed."""
-    points = np.vstack([points, points[:1]]) if closed else points
+def _pieces(line: Line, dashes: list[float], offset: float) -> list[Line]:
+    """Return the dashes of a line; or its whole, ending where it began if it is closed."""
+    points, corners, closed = line
+    if closed:
+        points, corners = np.vstack([points, points[:1]]), np.r_[corners, corners[:1]]
     steps = np.hypot(*np.diff(points, axis=0).T)
-    points = points[np.r_[True, steps > 0]]
-    if not pen.dashes:
-        return [(points if len(points) > 1 else np.repeat(points, 2, axis=0), closed)]
+    points, corners = points[np.r_[True, steps > 0]], corners[np.r_[True, steps > 0]]
+    if not dashes or len(points) == 1:
+        return [Line(points if len(points) > 1 else np.repeat(points, 2, axis=0), corners, closed)]
     along: Array = np.r_[0.0, np.cumsum(steps[steps > 0])]
-    edges: Array = np.r_[0.0, np.cumsum(pen.dashes)]
+    edges: Array = np.r_[0.0, np.cumsum(dashes)]
     total, period = float(along[-1]), float(edges[-1])
-    if not (total / period + 2) * len(pen.dashes) < MAX_POINTS:
+    if not (total / period + 2) * len(dashes) < MAX_POINTS:
         raise TooManyPoints
-    first = -(pen.offset % period)
-    turns: Array = np.arange(first, total, period)[:, None]
+    turns: Array = np.arange(-(offset % period), total, period)[:, None]
     starts: Array = (turns + edges[:-1:2]).ravel()
     ends: Array = (turns + edges[1::2]).ravel()
     shown = (starts < total) & ((ends > 0) | (starts == ends) & (starts >= 0))
-    return [
-        (_between(points, along, max(start, 0.0), min(end, total)), False)
-        for start, end in zip(starts[shown].tolist(), ends[shown].tolist(), strict=True)
-    ]
+    found: list[Line] = []
+    for start, end in zip(starts[shown].clip(0), ends[shown].clip(max=total), strict=True):
+        inner = (along > start) & (along < end)
+        at: Array = np.r_[start, along[inner], end]
+        both: list[Array] = [np.interp(at, along, points[:, k]) for k in (0, 1)]
+        found.append(Line(np.stack(both, axis=1), np.r_[True, corners[inner], True], False))
+    if closed and len(found) > 1 and (found[0].points[0] == found[-1].points[-1]).all():
+        last, first = found.pop(), found[0]  # one dash around the start
+        around = np.r_[last.corners[:-1], corners[:1], first.corners[1:]]
+        found[0] = Line(np.vstack([last.points, first.points[1:]]), around, False)
+    return found
 
 
-def _between(points: Array, along: Array, start: float, end: float) -> Array:
-    """Return the part of a polyline (N, 2) between two arc lengths."""
-    at: Array = np.r_[start, along[(along > start) & (along < end)], end]
-    both: list[Array] = [np.interp(at, along, points[:, k]) for k in (0, 1)]
-    return np.stack(both, axis=1)
-
-
-def _mitres(points: Array, closed: bool, half: float, limit: float) -> Array:
-    """Return polygons that sharpen the bevelled corners of a polyline (N, 2), within the limit."""
+def _joins(line: Line, half: float, limit: float) -> Array:
+    """Return what sharpens the bevelled corners of a line within a limit, and rounds its curves."""
+    points, corners, closed = line
     if closed:
-        points = np.vstack([points, points[1:2]])
+        points, corners = np.vstack([points, points[1:2]]), np.r_[corners, corners[1:2]]
     along = np.diff(points, axis=0)
     along /= np.hypot(*along.T)[:, None]
     first, last = along[:-1], along[1:]
     dot = (first * last).sum(axis=1)
     cosine = np.sqrt(np.maximum(1 + dot, 0) / 2)  # of half the turn
-    sharp = (cosine * limit >= 1) & (cosine < SMOOTH)
-    outward = -half * np.sign(first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0])[sharp, None]
-    before, after = (outward * side[sharp][:, ::-1] * [-1, 1] for side in (first, last))
-    corner, tip = points[1:-1][sharp], (before + after) / (1 + dot[sharp, None])
-    tips = np.stack([corner, corner + before, corner + tip, corner + after], axis=1)
-    return np.asarray(shapely.polygons(tips))
+    turn = np.arctan2(first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0], dot)
+    # from the centre of the pen to where its outer edge leaves one side and reaches the next
+    outward = -half * np.sign(turn)[:, None]
+    before, after = (outward * side[:, ::-1] * [-1, 1] for side in (first, last))
+    sharp = corners[1:-1] & (cosine < SMOOTH) & (cosine * limit >= 1)
+    at, tip = points[1:-1], (before + after)[sharp] / (1 + dot[sharp, None])
+    kites = np.stack([0 * tip, before[sharp], tip, after[sharp]], axis=1) + at[sharp, None]
+    bent = ~corners[1:-1] & (cosine < SMOOTH)
+    angles = turn[bent, None] * np.linspace(0, 1, 9)
+    around = np.stack([-before[bent][:, ::-1] * [1, -1], before[bent]], axis=1)
+    arcs = np.stack([np.sin(angles), np.cos(angles)], axis=2) @ around
+    fans = np.concatenate([at[bent, None], at[bent, None] + arcs], axis=1)
+    return np.r_[shapely.polygons(kites), shapely.polygons(fans)]

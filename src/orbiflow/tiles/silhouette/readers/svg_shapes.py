@@ -3,7 +3,6 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -12,7 +11,7 @@ import svgelements
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.reading import Source
-from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, corners, polygon_path, sub_paths
+from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, corners, sub_paths
 from orbiflow.tiles.silhouette.readers.svg_xml import MAX_DEPTH, StyleSheet
 
 PIXELS_PER_INCH = 96
@@ -50,21 +49,6 @@ PAINT = (
 
 
 @dataclass(frozen=True)
-class Pen:
-    """What a stroke is drawn with: lengths are in the pen's own units.
-
-    - `dashes`: The lengths of dashes and gaps in turn, an even number of them; none for a whole line.
-    """
-
-    width: float
-    cap: str
-    join: str
-    miter_limit: float
-    dashes: tuple[float, ...]
-    offset: float
-
-
-@dataclass(frozen=True)
 class DrawnShape:
     """One element's sub-paths in the drawing's user units, and how they are painted.
 
@@ -88,30 +72,27 @@ class DrawnShape:
         return float(abs(np.linalg.det(self.matrix[:2, :2])) ** 0.5)
 
     @property
+    def width(self) -> float:
+        """The width of its pen."""
+        width = self.number("stroke-width", 1.0)
+        return width if width >= 0 else 1.0
+
+    @property
+    def dashes(self) -> list[float]:
+        """The lengths of dashes and gaps in turn, an even number of them; none for a whole line."""
+        words = self.paint.get("stroke-dasharray", "none").replace(",", " ").split()
+        found = [as_number(word, -1.0, self.diagonal) for word in words[:MOST_DASHES]]
+        return found * (1 + len(found) % 2) if sum(found) > 0 and min(found) >= 0 else []
+
+    @property
     def is_plain_line(self) -> bool:
         """Whether its stroke is one whole line everywhere as wide as the pen."""
         most, least = np.linalg.svd(self.matrix[:2, :2])[1]
-        return not self.pen.dashes and not self.clips and most - least < 1e-3 * most
+        return not self.dashes and not self.clips and most - least < 1e-3 * most
 
-    @cached_property
-    def pen(self) -> Pen:
-        """What its stroke is drawn with."""
-
-        def number(key: str, usual: float) -> float:
-            return as_number(self.paint.get(f"stroke-{key}"), usual, self.diagonal)
-
-        words = self.paint.get("stroke-dasharray", "none").replace(",", " ").split()
-        dashes = [as_number(word, -1.0, self.diagonal) for word in words[:MOST_DASHES]]
-        usable = min(dashes, default=-1.0) >= 0 and sum(dashes) > 0
-        width = number("width", 1.0)
-        return Pen(
-            width if width >= 0 else 1.0,
-            self.paint.get("stroke-linecap", "butt"),
-            self.paint.get("stroke-linejoin", "miter"),
-            number("miterlimit", 4.0),
-            tuple(dashes * (1 + len(dashes) % 2)) if usable else (),
-            number("dashoffset", 0.0),
-        )
+    def number(self, key: str, usual: float) -> float:
+        """Read a property as a length in units of the pen, or return the usual one."""
+        return as_number(self.paint.get(key), usual, self.diagonal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,10 +248,12 @@ class Drawing:
         for child in element:
             self._visit(child, inner)
         if self.styles.properties(element).get("overflow") not in ("visible", "auto"):
-            x, y, width, height = window
-            frame = np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]])
-            edge = polygon_path(_mapped(place.matrix, frame))
-            self._cut(self.shapes[first:], first, Clip([DrawnShape([edge])]))
+            own = self.shapes[first:]
+            x, y, width, height = map(str, window)
+            edge = {"x": x, "y": y, "width": width, "height": height}
+            del self.shapes[first:]
+            self._add_shape(Element("rect"), edge, place)
+            self._cut(own, first, Clip(self.shapes[first:]))
 
     def _view(self, element: Element, window: Window) -> tuple[Array, tuple[float, float]]:
         """Return the map (3, 3) of a viewBox into a window, and what percentages refer to."""
@@ -345,7 +328,7 @@ class Drawing:
             marker = named[key]
             if marker is None or marker.tag != "marker":
                 continue
-            turn, scale = marker.get("orient", "0"), shape.pen.width
+            turn, scale = marker.get("orient", "0"), shape.width
             if not turn.startswith("auto"):
                 angle = np.radians(as_number(turn.removesuffix("deg"), 0.0))
             elif turn == "auto-start-reverse" and key == "start":
