@@ -118,11 +118,15 @@ class Regions:
 
         def effect(layer: Layer) -> int:
             colour, opacity = layer.brush
-            light = sum(rgb(colour)) / 765 if colour[0] == "#" else 0.0
-            light = 1.0 if clip.kind == "alpha" else light
+            light = 1.0 if clip.kind == "alpha" else lightness(colour)
             return 1 if light * opacity >= 0.5 else -1 if opacity > 0.5 else 0
 
         return painted([layer for shape in clip.shapes for layer in self.layers(shape)], effect)
+
+
+def lightness(colour: str) -> float:
+    """Return how light a colour is, from 0 to 1."""
+    return float(np.dot(rgb(colour), [0.2126, 0.7152, 0.0722])) / 255 if colour[0] == "#" else 0.0
 
 
 def painted(
