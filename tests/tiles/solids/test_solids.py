@@ -51,7 +51,7 @@ def apart(one: Any, other: Any) -> float:
 
 
 @given(tiles, st.sampled_from(get_args(Kind)))
-@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_every_solid_is_closed_in_both_files(tile: Tile, kind: Kind) -> None:
     own: dict[str, Any] = {"area": (90, 90)} if kind == "puzzle" else {}
     made = make_solid(tile, SolidSettings(kind=kind, tile_size=45, **own))
