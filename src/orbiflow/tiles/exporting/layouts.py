@@ -42,7 +42,8 @@ class Layout:
 def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
     """Scale and turn the tile and put it on the page."""
     width, height = settings.page
-    box = Box(0.0, 0.0, width, height - (STRIP if settings.calibrate else 0.0))
+    strip = STRIP if settings.calibrate else 0.0
+    box = inset(Box(0.0, 0.0, width, height - strip), settings.margin)
     scale = settings.tile_size / longer_side(tile.polygon)
     margin = None if settings.clip or settings.cut == "pieces" else edge_margin(settings.tile_size)
     place = place_on_page(tile, scale, box, y_down, rotate=settings.rotate, margin=margin)
@@ -50,12 +51,12 @@ def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
     if settings.cut != "pieces":
         need = np.ptp(placed.polygon, axis=0) + 2 * bleed(settings)
         if need[0] > box.width or need[1] > box.height:
-            extra = height - box.height
-            strip = f", {extra:g} mm of it for the calibration mark" if extra else ""
+            extra = f", {strip:g} mm of it for the calibration mark" if strip else ""
+            edge = f" with a margin of {settings.margin:g} mm" if settings.margin else ""
             raise OrbiflowError(
                 f"a tile of {settings.tile_size:g} mm does not fit on the page of {width:g} x "
-                f"{height:g} mm: it needs {need[0]:.1f} x {need[1] + extra:.1f} mm{strip}; choose "
-                "a larger area or a smaller tile size"
+                f"{height:g} mm{edge}: it needs {need[0]:.1f} x {need[1] + strip:.1f} mm{extra}; "
+                "choose a larger area or a smaller tile size"
             )
     return Layout(settings, placed, outline(placed, settings.deviation), box)
 
@@ -202,7 +203,7 @@ def pieces_scenes(layout: Layout, *, fine: bool = True) -> list[Scene]:
     arrangements = dense_arrangements(layout.tile, line, gap)
     edge = max(gap, LEAST_EDGE) / 2
     placed = on_sheet(arrangements, line, box.width - 2 * edge, box.height - 2 * edge)
-    placed = replace(placed, offsets=placed.offsets + edge)
+    placed = replace(placed, offsets=placed.offsets + (box.left + edge, box.top + edge))
     if not len(placed):
         short, long = rectangle_sides(line)
         raise OrbiflowError(
@@ -263,5 +264,5 @@ def _require_clear(rings: Array, box: Box, gap: float) -> None:
     tree = shapely.STRtree(polygons)
     first, second = tree.query(polygons, predicate="dwithin", distance=0.999 * gap)
     low, high = rings.min(axis=(0, 1)), rings.max(axis=(0, 1))
-    if (first != second).any() or (low < 0).any() or (high > (box.width, box.height)).any():
+    if (first != second).any() or (low < box[:2]).any() or (high > box[2:]).any():
         raise RuntimeError("the nesting broke its promise: pieces too close or off the sheet")

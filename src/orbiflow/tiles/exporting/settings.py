@@ -17,7 +17,7 @@ from orbiflow.settings import (
     SettingError,
     Unit,
 )
-from orbiflow.units import COLUMNS, Colour, Length, LengthOrZero, PageSize, Size
+from orbiflow.units import COLUMNS, PAGES, Colour, Length, LengthOrZero, PageSize, Size
 
 PIECES = Group("Pieces")
 USUAL_WIDTH = 0.25  # width in mm of the lines around tiles
@@ -37,7 +37,7 @@ class ExportSettings(FileSettings, group="Page and file"):
     """
 
     purpose: Annotated[
-        Literal["laser", "print", "paper", "web", "plotter"] | None, Option("--for")
+        Literal["laser", "print", "paper", "web", "plotter", "colouring"] | None, Option("--for")
     ] = None
     """Settings that suit a purpose; other options go before them."""
 
@@ -51,7 +51,11 @@ class ExportSettings(FileSettings, group="Page and file"):
     """Longer side of the tile's smallest rectangle."""
 
     area: Annotated[PageSize | None, DefaultText("300x200mm, or the bed for pieces")] = None
-    """Width and height of the page; also single or double, a journal's columns."""
+    """Width and height of the page, or its name: A4, A4-landscape, letter, mug, phone; single or
+    double, a journal's columns."""
+
+    margin: LengthOrZero = 0.0
+    """Width of the page's edge that stays empty."""
 
     cut: Literal["none", "skeleton", "pieces"] = "none"
     """With none, every tile is drawn; with skeleton, each shared edge once; with pieces, tiles
@@ -86,8 +90,8 @@ class ExportSettings(FileSettings, group="Page and file"):
     ] = None
     """Largest distance of curves from the tile's outline."""
 
-    warn_neck: Length | None = None
-    """Say where the tile is thinner than this, such as 2mm."""
+    warn_neck: Annotated[LengthOrZero, DefaultText("1.5mm for lasers, else 0")] = 0.0
+    """Say where the tile is thinner than this, such as 2mm; 0 says nothing."""
 
     palette: Annotated[
         PaletteName, OnlyWith(cut="none", because="only filled tiles have colours")
@@ -131,6 +135,12 @@ class ExportSettings(FileSettings, group="Page and file"):
         return values
 
     def check(self) -> None:
+        if 2 * self.margin >= min(self.page):
+            width, height = self.page
+            raise SettingError(
+                f"{{margin}} of {self.margin:g} mm leaves nothing of a page of {width:g} x {height:g} "
+                "mm; choose a smaller one"
+            )
         if self.tolerance is not None and self.tolerance > self.tile_size / 20:
             raise SettingError(
                 f"{{tolerance}} of {self.tolerance:g} mm would lose the shape of a tile of "
@@ -143,7 +153,7 @@ class ExportSettings(FileSettings, group="Page and file"):
     @property
     def usual_format(self) -> str:
         """What suits the purpose, else svg."""
-        return "pdf" if self.purpose in ("print", "paper") else "svg"
+        return "pdf" if self.purpose in ("print", "paper", "colouring") else "svg"
 
     @property
     def page(self) -> tuple[float, float]:
@@ -162,10 +172,20 @@ class ExportSettings(FileSettings, group="Page and file"):
 _LINES = {"cut": "skeleton", "clip": False, "filled": False}
 
 PURPOSES: Mapping[str, Mapping[str, Any]] = {
-    "laser": {**_LINES, "stroke": "#ff0000", "stroke_width": 0.01},
+    "laser": {**_LINES, "stroke": "#ff0000", "stroke_width": 0.01, "warn_neck": 1.5},
     "plotter": {**_LINES, "stroke": "#000000", "stroke_width": 0.3},
     "print": {"clip": True},
     "web": {"clip": True},
+    "colouring": {
+        **_LINES,
+        "area": PAGES["a4"],
+        "margin": 10.0,
+        "tile_size": 60.0,
+        "clip": True,
+        "border": True,
+        "stroke": "#000000",
+        "stroke_width": 0.8,
+    },
     "paper": {
         "clip": True,
         "area": (COLUMNS["single"], round(COLUMNS["single"] / 1.5)),

@@ -153,7 +153,7 @@ def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...
 
 def _neck_notes(placed: Layout) -> list[str]:
     limit = placed.settings.warn_neck
-    if limit is None:
+    if not limit:
         return []
     try:
         neck = narrowest_neck(placed.tile.polygon)
