@@ -17,7 +17,16 @@ from orbiflow.settings import (
     SettingError,
     Unit,
 )
-from orbiflow.units import COLUMNS, PAGES, Colour, Length, LengthOrZero, PageSize, Size
+from orbiflow.units import (
+    COLUMNS,
+    PAGES,
+    Colour,
+    Length,
+    LengthOrZero,
+    PageSize,
+    SignedLength,
+    Size,
+)
 
 PIECES = Group("Pieces")
 USUAL_WIDTH = 0.25  # width in mm of the lines around tiles
@@ -100,6 +109,13 @@ class ExportSettings(FileSettings, group="Page and file"):
 
     dpi: Annotated[float, Range(1, 10_000), OnlyWith(format=("png", None))] = 300.0
     """Dots per inch of a PNG."""
+
+    offset: Annotated[
+        SignedLength,
+        OnlyWith(cut="pieces", because="an edge that two tiles share is drawn only once"),
+        PIECES,
+    ] = 0.0
+    """Cut this far outside the tile: a quilt's seam allowance, a sticker's border; negative inside."""
 
     kerf: Annotated[
         LengthOrZero,

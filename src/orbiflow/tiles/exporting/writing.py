@@ -98,8 +98,8 @@ def scenes(
     )
     placed = layout(given.tile, settings, y_down=given.y_down)
     notes = (*_neck_notes(placed), *_colour_notes(given, settings))
-    if placed.outline.note:
-        notes = (placed.outline.note, *notes)
+    told = (placed.outline.note, placed.piece[1] if settings.cut == "pieces" else "")
+    notes = (*filter(None, told), *notes)
     made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
     if settings.calibrate:
         # the strip at the foot is the last sheet's; pieces have one on each
@@ -137,6 +137,7 @@ def _described(
         "tile_size": settings.tile_size,
         "kerf": settings.kerf,
         "clearance": settings.clearance,
+        "offset": settings.offset,
         "tolerance": settings.deviation,
     }
     return replace(scene, title=title, notes=tuple(notes), facts=facts)
@@ -163,7 +164,7 @@ def _neck_notes(placed: Layout) -> list[str]:
         return []
     return [
         f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm "
-        f"{place_on(placed.tile.polygon, neck)}"
+        f"{place_on(placed.tile.polygon, neck.place)}"
     ]
 
 
