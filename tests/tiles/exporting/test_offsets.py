@@ -1,4 +1,4 @@
-"""Offsets: seam allowances and borders at their distance, and what is said where the outline is lost."""
+"""Offsets: seam allowances and borders at their distance, and what is said of what is lost."""
 
 from __future__ import annotations
 

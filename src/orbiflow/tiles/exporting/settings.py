@@ -66,15 +66,15 @@ class ExportSettings(FileSettings, group="Page and file"):
     margin: LengthOrZero = 0.0
     """Width of the page's edge that stays empty."""
 
-    cut: Literal["none", "skeleton", "pieces"] = "none"
+    cut: Literal["none", "skeleton", "pieces", "jigsaw"] = "none"
     """With none, every tile is drawn; with skeleton, each shared edge once; with pieces, tiles
-    apart."""
+    apart; with jigsaw, a rectangle whose pieces at the border have no crumbs."""
 
     rotate: Annotated[
         float,
         Range(-360, 360),
         Unit("degrees"),
-        OnlyWith(cut=("none", "skeleton"), because="pieces are turned to fill the page"),
+        OnlyWith(cut=("none", "skeleton", "jigsaw"), because="pieces are turned to fill the page"),
     ] = 0.0
     """Turn the tiling on the page by this angle, counterclockwise."""
 
@@ -88,7 +88,10 @@ class ExportSettings(FileSettings, group="Page and file"):
     border: Annotated[bool, OnlyWith(cut="skeleton", clip=True)] = False
     """Cut the page's border, too."""
 
-    bed: Size | None = None
+    bed: Annotated[
+        Size | None,
+        OnlyWith(cut=("none", "skeleton", "pieces"), because="a jigsaw is cut from one sheet"),
+    ] = None
     """Size of the machine's bed; a larger page becomes several files."""
 
     calibrate: bool = False
@@ -124,8 +127,8 @@ class ExportSettings(FileSettings, group="Page and file"):
     ] = 0.0
     """Width that the tool burns away."""
 
-    clearance: Annotated[LengthOrZero, OnlyWith(cut="pieces"), PIECES] = 0.0
-    """Gap between pieces put together, for a puzzle."""
+    clearance: Annotated[LengthOrZero, OnlyWith(cut=("pieces", "jigsaw")), PIECES] = 0.0
+    """Gap between pieces put together, for a puzzle; around a jigsaw in its tray."""
 
     spacing: Annotated[LengthOrZero, PIECES] = 1.0
     """Gap between the cuts of different pieces."""
@@ -134,6 +137,9 @@ class ExportSettings(FileSettings, group="Page and file"):
         int | None, Range(1), OnlyWith(cut="pieces"), PIECES, DefaultText("what the page holds")
     ] = None
     """Number of pieces."""
+
+    tray: Annotated[Length | None, OnlyWith(cut="jigsaw"), PIECES] = None
+    """Add two sheets with a jigsaw's tray, a frame with a rim this wide and a base."""
 
     filled: Annotated[bool, Hidden()] = True
     """Fill tiles with colours of the palette."""
@@ -146,7 +152,7 @@ class ExportSettings(FileSettings, group="Page and file"):
 
     def defaults(self) -> Mapping[str, Any]:
         values = dict(PURPOSES[self.purpose]) if self.purpose else {}
-        if "cut" in self.fields_given and self.cut == "pieces":
+        if "cut" in self.fields_given and self.cut not in ("none", "skeleton"):
             values.pop("clip", None)
         return values
 

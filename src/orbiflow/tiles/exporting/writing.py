@@ -11,6 +11,7 @@ from orbiflow.arguments import as_path
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
+from orbiflow.tiles.exporting.jigsaws import jigsaw_scenes
 from orbiflow.tiles.exporting.layouts import Layout, layout, pieces_scenes, place_on, tiling_scene
 from orbiflow.tiles.exporting.settings import ExportSettings
 from orbiflow.tiles.exporting.sheets import calibrated, split
@@ -101,16 +102,23 @@ def scenes(
     told = (placed.outline.note, placed.piece[1] if settings.cut == "pieces" else "")
     notes = (*filter(None, told), *notes)
     made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
+    if settings.cut == "jigsaw":
+        facts = made[0].facts
+        pieces, whole = facts["pieces"], facts["whole_tiles"]
+        count = f"{pieces} pieces, {whole} whole tiles and {pieces - whole} at the border"
+        notes = (*notes, f"the jigsaw has {count}, the smallest {facts['smallest']:.2f} of a tile")
     if settings.calibrate:
-        # the strip at the foot is the last sheet's; pieces have one on each
-        first = 0 if settings.cut == "pieces" else len(made) - 1
-        made[first:] = [calibrated(scene) for scene in made[first:]]
+        # the strip at the foot is the last sheet's; pieces have one on each, a jigsaw's tray has none
+        marked = {"pieces": slice(None), "jigsaw": slice(1)}.get(settings.cut, slice(-1, None))
+        made[marked] = [calibrated(scene) for scene in made[marked]]
     return made, notes
 
 
 def _made(placed: Layout, settings: ExportSettings) -> list[Scene]:
     if settings.cut == "pieces":
         return pieces_scenes(placed, fine=settings.file_format not in ("dxf", "json"))
+    if settings.cut == "jigsaw":
+        return jigsaw_scenes(placed)
     scene = skeleton_scene(placed) if settings.cut == "skeleton" else tiling_scene(placed)
     return [scene] if settings.bed is None else split(scene, settings.bed, settings.deviation / 4)
 
@@ -129,6 +137,7 @@ def _described(
         "one unit is one millimetre."
     )
     facts = {
+        **scene.facts,
         "class": tile.isohedral_class or None,
         "group": tile.group.name or None,
         "rank": given.rank,
