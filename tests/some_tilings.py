@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -20,7 +21,7 @@ from orbiflow.symmetry import (
     symmetry_elements,
     wallpaper_group,
 )
-from orbiflow.tiles import Tiling, dirichlet_tiling, isohedral_class, orient
+from orbiflow.tiles import Placed, Tiling, dirichlet_tiling, isohedral_class, orient
 from strategies import lattices, seeds, wallpaper_groups
 
 Field: TypeAlias = Callable[[Array], Array]
@@ -83,6 +84,22 @@ def with_points(ring: Array, pieces: int) -> Array:
     return np.concatenate(
         [a + share * (b - a) for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)]
     )
+
+
+def shared_lengths(tiling: Tiling, placed: Sequence[Placed]) -> dict[tuple[int, int], float]:
+    """The lengths of boundary that pairs of tiles share, by areas that shapely measures.
+
+    A tile made wider by a little overlaps what it shares boundary with by that times the length.
+    """
+    little = 1e-8 * math.sqrt(tiling.tile_area)
+    shapes = [shapely.Polygon(g(tiling.prototiles[g.prototile].polygon)) for g in placed]
+    wide = [shape.buffer(little, join_style="mitre") for shape in shapes]
+    found: dict[tuple[int, int], float] = {}
+    for i, j in itertools.permutations(range(len(shapes)), 2):
+        length = wide[i].intersection(shapes[j]).area / little
+        if length > 20 * little:
+            found[i, j] = length
+    return found
 
 
 @st.composite

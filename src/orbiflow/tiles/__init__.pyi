@@ -45,6 +45,7 @@ from .likeness.overlap import Overlap as Overlap
 from .likeness.overlap import prepared_region as prepared_region
 from .likeness.ranking import diverse as diverse
 from .likeness.ranking import rank_score as rank_score
+from .likeness.rating import Rating as Rating
 from .likeness.recognition import Recognisability as Recognisability
 from .likeness.recognition import Recogniser as Recogniser
 from .likeness.recognition import recognisability as recognisability
@@ -54,9 +55,8 @@ from .motifs.source import with_map as with_map
 from .motion.settings import AnimationSettings as AnimationSettings
 from .motion.writers import animate as animate
 from .motion.writers import animation as animation
-from .pages.overview import index_page as index_page
-from .pages.overview import is_poor as is_poor
 from .pages.overview import overview_png as overview_png
+from .pages.page import index_page as index_page
 from .pages.run_folder import FIELD_FILES as FIELD_FILES
 from .pages.run_folder import OVERVIEW as OVERVIEW
 from .pages.run_folder import figure_files as figure_files
@@ -129,8 +129,14 @@ from .silhouette.soft_target import SoftTarget as SoftTarget
 from .silhouette.soft_target import signed_distance as signed_distance
 from .silhouette.target import Frame as Frame
 from .silhouette.target import Target as Target
+from .solids.files import write_3mf as write_3mf
+from .solids.files import write_stl as write_stl
+from .solids.making import Solid as Solid
+from .solids.making import make_solid as make_solid
+from .solids.settings import SolidSettings as SolidSettings
 from .tile import EscherTile as EscherTile
 from .tile import TileMap as TileMap
+from .tilings.arrangements import arrangement as arrangement
 from .tilings.certificate import Certificate as Certificate
 from .tilings.certificate import certify as certify
 from .tilings.colourings import Colouring as Colouring

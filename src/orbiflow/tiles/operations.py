@@ -27,6 +27,7 @@ from orbiflow.tiles.art import ArtSettings
 from orbiflow.tiles.exporting import ExportSettings
 from orbiflow.tiles.motion import AnimationSettings
 from orbiflow.tiles.search import EscherizeSettings
+from orbiflow.tiles.solids import SolidSettings
 
 if TYPE_CHECKING:
     from orbiflow.tiles.exporting import Exported
@@ -54,7 +55,7 @@ class ReadingSettings(Settings, group="Reading the silhouette"):
 class TileChoice(Settings):
     """Which tile of a result is taken."""
 
-    tile: str = "1"
+    tile: Annotated[str | None, DefaultText("1, or the tile whose folder is given")] = None
     """A class, such as IH4, or a rank; 1 is best."""
 
     force: bool = False
@@ -75,7 +76,9 @@ def escherize(
     reading: ReadingSettings = ReadingSettings(),
     *,
     figures: bool = False,
+    verbose: bool = False,
     called: Annotated[str | None, Hidden()] = None,
+    shown_out: Annotated[str | None, Hidden()] = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
@@ -90,7 +93,9 @@ def escherize(
         out: Folder for the results, made if need be.
         figures: Also write for print tiling.pdf and overlay.pdf, and of the flow field.png and
             field.pdf.
+        verbose: Also show the scores and other figures of result.json.
         called: What the results call the silhouette. Default: its path.
+        shown_out: What the page's commands call the folder. Default: its path.
     """
     from orbiflow.tiles import pages, search, silhouette
 
@@ -106,7 +111,8 @@ def escherize(
     result = search.escherize(target, settings, on_event=on_event, cancel=cancel)
     for text in _remarks(result):
         on_event(Note(text))
-    written = pages.write_run(result, out, figures=figures, on_event=on_event)
+    shown = shown_out or str(out)
+    written = pages.write_run(result, out, figures=figures, shown_out=shown, on_event=on_event)
     tiles = result.tiles if written else ()
     summary = {
         "folder": str(out),
@@ -117,6 +123,8 @@ def escherize(
     }
     if tiles:
         on_event(_table(tiles))
+        if verbose:
+            on_event(_figures(tiles))
     on_event(_closing(out, bool(written), bool(result.tiles), summary["seconds"]))
     if result.interrupted or cancel.cancelled:
         return Outcome(summary, "cancelled")
@@ -124,15 +132,34 @@ def escherize(
 
 
 def _table(tiles: Sequence[EscherTile]) -> Table:
-    """The tiles that were found, to look at."""
+    """The tiles that were found, in words that fit into 80 characters."""
     both = any(tile.front is not None for tile in tiles)
     title = "Tiles for likeness, then for overlap" if both else "Tiles, best first"
-    rows = [_cells(tile, both=both) for tile in tiles]
+    return _table_of(title, [_words(tile) for tile in tiles])
+
+
+def _figures(tiles: Sequence[EscherTile]) -> Table:
+    """The same tiles in figures."""
+    both = any(tile.front is not None for tile in tiles)
+    return _table_of("Figures", [_cells(tile, both=both) for tile in tiles])
+
+
+def _table_of(title: str, rows: Sequence[dict[str, str]]) -> Table:
     return Table(title, tuple(rows[0]), tuple(tuple(row.values()) for row in rows))
 
 
+def _words(tile: EscherTile) -> dict[str, str]:
+    """Return a row of words by the names of its columns."""
+    row = {"class": f"{tile.name} ({tile.group_name})"}
+    if tile.front is not None:
+        row |= {"for": tile.objective, "front": "yes" if tile.front else "near"}
+    rating, lies = tile.rating, tile.arrangement
+    row |= {"stars": str(rating or ""), "likeness": rating.word if rating else ""}
+    return {**row, "how its copies lie": lies or "NOT CERTIFIED: they do not tile"}
+
+
 def _cells(tile: EscherTile, *, both: bool) -> dict[str, str]:
-    """Return a row by the names of its columns, which fit into 80 characters."""
+    """Return a row of figures by the names of its columns, which fit into 80 characters."""
     mismatch, overlap = tile.certificate.edge_mismatch, f"{tile.metrics.iou:.4f}"
     edges = f"{mismatch:.0e}" if mismatch < float("inf") else "-"
     bent = "-" if tile.deformation is None else f"{tile.deformation:.3f}"
@@ -162,17 +189,17 @@ def _closing(out: Path, written: bool, found: bool, seconds: float) -> Note:
 
 def _remarks(result: SearchResult) -> list[str]:
     """What the user should know of a search's tiles."""
-    from orbiflow.tiles.pages import is_poor
-
     tiles, found, remarks = result.tiles, result.found, list[str]()
     if tiles and tiles[0].front is not None:
         best = sum(tile.front is True for tile in tiles)
         near = "" if best == len(tiles) else f", {len(tiles) - best} near these"
         remarks.append(
-            f"{len(tiles)} of {len(found)} tiles are listed: {best} that no other beats in both "
-            f"deformation and overlap{near}"
+            f"{len(tiles)} of {len(found)} tiles are listed: {best} that no other of them beats in "
+            f"both deformation and overlap{near}"
         )
-    if tiles and is_poor(tiles[0]):
+    for name in sorted(result.interrupted & {tile.isohedral_class for tile in tiles}):
+        remarks.append(f"{name} has its first tile only: its search was interrupted")
+    if tiles and tiles[0].rating and tiles[0].rating.word == "poor":
         remarks.append(POOR)
     return remarks
 
@@ -185,6 +212,9 @@ def _measures(tile: EscherTile) -> dict[str, Any]:
         "objective": tile.objective,
         "deformation": tile.deformation,
         "front": tile.front,
+        "arrangement": tile.arrangement,
+        "stars": tile.rating and tile.rating.stars,
+        "word": tile.rating and tile.rating.word,
         "score": tile.score,
         "iou": tile.metrics.iou,
         "dice": tile.metrics.dice,
@@ -207,6 +237,7 @@ def export(
     choice: TileChoice = TileChoice(),
     *,
     out: Annotated[Path | None, Option("-o"), DefaultText("named after the tile")] = None,
+    picture: Path | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
@@ -215,8 +246,9 @@ def export(
     Lengths are numbers with a unit: mm, cm, in or pt.
 
     Args:
-        result: A search's folder, or its result.json.
+        result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file.
+        picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
     """
     settings = settings.for_file(out)
 
@@ -224,9 +256,9 @@ def export(
 
     tile = choice.read(result)
     out = out or Path(f"{tile.name}.{settings.format}")
-    check_output_file(out, result)
+    check_output_file(out, result, picture)
     done = exporting.export(
-        tile, out, settings, force=choice.force, on_event=on_event, cancel=cancel
+        tile, out, settings, picture=picture, force=choice.force, on_event=on_event, cancel=cancel
     )
     _tell(on_event, (*done.notes, _exported(done, settings, tile.isohedral_class)), *done.files)
     return Outcome(
@@ -274,7 +306,7 @@ def art(
     Without a picture tiles are coloured by a palette, and --engrave draws inside them.
 
     Args:
-        result: A search's folder, or its result.json.
+        result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file, .png or .svg.
         picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
     """
@@ -304,6 +336,52 @@ def art(
     )
 
 
+@operation("solid")
+def solid(
+    result: Path,
+    settings: SolidSettings = SolidSettings(),
+    choice: TileChoice = TileChoice(),
+    *,
+    out: Annotated[Path | None, Option("-o"), DefaultText("named after the tile")] = None,
+    picture: Path | None = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Make a solid to print in 3D: a tile, cookie cutter, stamp, mould or puzzle.
+
+    It lies as it is printed, without supports. Lengths are numbers with a unit: mm, cm, in or pt.
+
+    Args:
+        result: A search's folder, its result.json, or the folder of a tile in it.
+        out: The file, .stl or .3mf.
+        picture: An SVG drawing over the silhouette, in the same frame, for a stamp or mould.
+    """
+    settings = settings.for_file(out)
+
+    from orbiflow.tiles.solids import make_solid
+
+    tile = choice.read(result)
+    out = out or Path(f"{tile.name}-{settings.kind}.{settings.format}")
+    check_output_file(out, result, picture)
+    made = make_solid(tile, settings, picture=picture, force=choice.force)
+    cancel.check()
+    made.write(out, settings.format)
+    size = " x ".join(f"{side:.1f}" for side in made.size)
+    cubic = made.volume / 1000
+    note = f"written {out}: {settings.kind} of {tile.isohedral_class}, {size} mm, {cubic:.1f} cm³"
+    _tell(on_event, (*made.notes, note), out)
+    return Outcome(
+        {
+            "file": str(out),
+            "kind": settings.kind,
+            "class": tile.isohedral_class,
+            "parts": len(made.parts),
+            "size": made.size.tolist(),
+            "volume": made.volume,
+        }
+    )
+
+
 @operation("animate")
 def animate(
     result: Path,
@@ -324,7 +402,7 @@ def animate(
     It loops, there and back. In a morph every picture is an exact tiling.
 
     Args:
-        result: A search's folder, or its result.json.
+        result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file: .gif, .svg, or .mp4, which needs ffmpeg.
     """
     settings = settings.for_file(out)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pypdfium2
 import pytest
 import shapely
 from PIL import Image
@@ -168,12 +169,16 @@ def test_a_picture_in_an_svg_is_one_image() -> None:
     assert (image == (0xC0, 0x20, 0x40, 255)).all()
 
 
-def test_other_formats_refuse_artwork(tmp_path: Path) -> None:
-    scene = art_scene(drawn("IH4", BODY, tmp_path))
-    with pytest.raises(OrbiflowError, match="hold artwork"):
-        write_pdf(scene)
-    with pytest.raises(OrbiflowError, match="hold artwork"):
-        write_dxf(scene, tolerance=0.1)
+def test_other_formats_hold_artwork_unless_it_is_pixels(tmp_path: Path) -> None:
+    art = drawn("IH4", BODY, tmp_path)
+    scene, pixels = art_scene(art), np.asarray(render_artwork(art), dtype=float)
+    page = pypdfium2.PdfDocument(write_pdf(scene))[0]
+    shown = page.render(scale=art.page.width / page.get_width()).to_pil().convert("RGB")
+    assert np.abs(np.asarray(shown.resize(pixels.shape[1::-1])) - pixels).mean() < 3
+    assert write_dxf(scene, tolerance=0.1).startswith("  0\nSECTION")
+    tile = squirrel("IH4")
+    with pytest.raises(OrbiflowError, match="made of pixels; choose SVG or PDF"):
+        write_dxf(art_scene(artwork(tile, PAGE, picture=flat(tile, "#c02040"))), tolerance=0.1)
 
 
 def test_gradients_and_what_is_left_out(tmp_path: Path) -> None:

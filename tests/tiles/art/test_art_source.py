@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 
 from artworks import EYE, squirrel, write_run
 from orbiflow.errors import InputFileError, OrbiflowError
@@ -72,7 +73,11 @@ def test_matched_maps_have_no_fold_and_keep_the_outlines(name: str) -> None:
         areas = signed_area(corners)
         assert (areas > 0).all()
     whole = signed_area(bending.rest[bending.triangles]).sum()
-    assert whole == pytest.approx(1, abs=0.03)
+    assert whole == pytest.approx(1, abs=1e-12)
+    ring = np.asarray(target.normal)
+    dense = np.concatenate([ring + t * (np.roll(ring, -1, axis=0) - ring) for t in (0, 0.3, 0.8)])
+    for there, end in ((bending.forward(dense), polygon), (bending.inverse(polygon), ring)):
+        assert shapely.distance(shapely.points(there), shapely.LinearRing(end)).max() < 1e-9
     np.testing.assert_allclose(
         bending.inverse(bending.forward(target.normal)), target.normal, atol=0.06
     )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
 import shapely
@@ -27,7 +25,16 @@ from orbiflow.tiles import (
     neighbours,
     patch,
 )
-from some_tilings import NAMED, SQUARE, dirichlet_tilings, fixing, mirror_tiles, sites, tilings
+from some_tilings import (
+    NAMED,
+    SQUARE,
+    dirichlet_tilings,
+    fixing,
+    mirror_tiles,
+    shared_lengths,
+    sites,
+    tilings,
+)
 from strategies import seeds, wallpaper_groups
 
 
@@ -124,21 +131,15 @@ def test_neighbours_and_colours_are_those_that_shapely_measures(tiling: Tiling) 
     elements = patch(tiling, window_of(tiling, 1.0))
     shapes = [shapely.Polygon(g(tiling.prototiles[g.prototile].polygon)) for g in elements]
     colours = [chosen.colour(g) for g in elements]
-    shared = {
-        (i, j): shapes[i].buffer(1e-6 * size).intersection(shapes[j].exterior).length
-        for i, j in itertools.permutations(range(len(shapes)), 2)
-        if shapes[i].distance(shapes[j]) < 1e-7 * size
-    }
-    for (i, j), length in shared.items():
-        if length > 1e-4 * size:
-            assert colours[i] != colours[j]
+    shared = shared_lengths(tiling, elements)
+    assert all(colours[i] != colours[j] for i, j in shared)
     assert colouring(tiling).colours(copies_meeting(tiling, window_of(tiling))).max() < chosen.count
     for k in range(len(tiling.prototiles)):
         itself = next(i for i, g in enumerate(elements) if _is(g, k))
         near = neighbours(tiling, k)
-        edge = sum(length > 1e-4 * size for (i, _), length in shared.items() if i == itself)
-        assert len(near.edge) == edge
-        assert len(near.edge) + len(near.point) == sum(i == itself for i, _ in shared)
+        assert len(near.edge) == sum(i == itself for i, _ in shared)
+        touching = sum(shape.distance(shapes[itself]) < 1e-7 * size for shape in shapes) - 1
+        assert len(near.edge) + len(near.point) == touching
 
 
 def _is(element: Placed, prototile: int) -> bool:

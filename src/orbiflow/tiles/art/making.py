@@ -17,6 +17,7 @@ from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
 from orbiflow.tiles.art.page import ArtPage, art_page
 from orbiflow.tiles.art.rendering import render_page
 from orbiflow.tiles.art.settings import ArtSettings
+from orbiflow.tiles.exporting import MOTIF, SYMBOL, tile_layers
 from orbiflow.tiles.motifs import (
     Over,
     Paint,
@@ -135,9 +136,6 @@ def painted(art: Artwork) -> Paint:
     return paint
 
 
-TILE, MOTIF = "tile", "motif"
-
-
 def art_scene(art: Artwork) -> Scene:
     """Return the page in millimetres, as `render_artwork` draws it, with pixels carried already."""
     page, chosen = art.page, palette(art.settings.palette)
@@ -150,33 +148,21 @@ def art_scene(art: Artwork) -> Scene:
     rasters = ()
     if art.picture is not None:
         rasters = (carried_raster(art.picture, art.tile, art.density, page.count),)
-    motif = Motif(art.motif.parts, rasters, TILE).moved(np.eye(2), -middle)
+    motif = Motif(art.motif.parts, rasters, SYMBOL).moved(np.eye(2), -middle)
     copies = page.copies
     turned = linear @ tile.group.linear_parts
     places = copies.translations @ linear.T + offset + (turned @ middle)[copies.cosets]
     # symbols in mm, for which the writer's decimals are meant
     scale = unit * page.scale
     turned = turned / scale
-    symbols = {TILE: symbol.moved(scale * np.eye(2), np.zeros(2))}
+    symbols = {SYMBOL: symbol.moved(scale * np.eye(2), np.zeros(2))}
     motifs = {MOTIF: motif.moved(scale * np.eye(2), np.zeros(2))}
     box = Box(0.0, 0.0, unit * page.size[0], unit * page.size[1])
     layers = [Layer("paper", "paper", Style(fill=chosen.paper), (rectangle(box),))]
     drawn = bool(motif.parts or motif.rasters)
-    for colour in sorted(set(page.colours.tolist())):
-        own = page.colours == colour
-        fill, name = chosen.fill(colour), f"colour {colour + 1}"
-        # a hairline in the tile's own colour closes the seams that viewers leave between neighbours
-        style = Style(fill, fill, 0.3 * unit)
-        uses = Uses(TILE, turned, copies.cosets[own], places[own])
-        layers.append(Layer(name, "tiles", style, (uses,), clipped=True))
-        if drawn:
-            uses = Uses(MOTIF, turned, copies.cosets[own], places[own])
-            name, ink = f"drawing on {name}", chosen.ink(colour)
-            layers.append(Layer(name, "tiles", Style(), (uses,), clipped=True, ink=ink))
-    if art.outline > 0:
-        style = Style(None, chosen.outline, unit * art.outline)
-        uses = Uses(TILE, turned, copies.cosets, places)
-        layers.append(Layer("outlines", "tiles", style, (uses,), clipped=True))
+    line = Style(None, chosen.outline, unit * art.outline)
+    uses, seam = Uses(SYMBOL, turned, copies.cosets, places), 0.3 * unit
+    layers += tile_layers(uses, page.colours, chosen, line, clipped=True, seam=seam, drawn=drawn)
     notes = (f"Artwork of {tile.isohedral_class or 'a tile'}, made with orbiflow {__version__}.",)
     return Scene(
         box.width,

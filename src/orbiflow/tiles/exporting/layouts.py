@@ -10,8 +10,8 @@ from operator import itemgetter
 import numpy as np
 import shapely
 
-from orbiflow.arrays import Array
-from orbiflow.drawing import palette
+from orbiflow.arrays import Array, Integers
+from orbiflow.drawing import Palette, palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.exporting.nesting import dense_arrangements, on_sheet
 from orbiflow.tiles.exporting.outlines import Outline, fitted, outline, turning
@@ -25,7 +25,7 @@ from orbiflow.tiles.exporting.placing import (
 from orbiflow.tiles.exporting.settings import USUAL_WIDTH, ExportSettings
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.likeness import narrowest_neck, narrowest_slit
-from orbiflow.tiles.scene import Box, Curve, Layer, PlacedTile, Scene, Style, Uses, rectangle
+from orbiflow.tiles.scene import Box, Curve, Layer, Motif, PlacedTile, Scene, Style, Uses, rectangle
 from orbiflow.tiles.tilings import Copies, Tile, colouring, copies_inside, copies_meeting
 
 STRIP = 8.0  # height in mm of the strip at the page's foot that the calibration mark has for itself
@@ -39,6 +39,8 @@ class Layout:
     tile: Tile  # the tile in mm on the page, y down
     outline: Outline  # the tile's curves
     box: Box  # the part of the page that tiles may use
+    place: tuple[Array, Array]  # the map, linear part and offset, from the tile's own units
+    motif: Motif | None = None  # what lies on the tile, in mm on the page
 
     @property
     def fine(self) -> float:
@@ -72,7 +74,7 @@ def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
                 f"{height:g} mm{edge}: it needs {need[0]:.1f} x {need[1] + strip:.1f} mm{extra}; "
                 "choose a larger area or a smaller tile size"
             )
-    return Layout(settings, placed, outline(placed, settings.deviation), box)
+    return Layout(settings, placed, outline(placed, settings.deviation), box, place)
 
 
 def bleed(settings: ExportSettings) -> float:
@@ -93,9 +95,6 @@ def placed_tiles(copies: Copies, layout: Layout) -> tuple[PlacedTile, ...]:
     return tuple(PlacedTile(k, linear[k], at, ks, kept) for k, at, ks, kept in placed)
 
 
-SYMBOL = "tile"
-
-
 def chosen_copies(layout: Layout) -> Copies:
     """Return the copies on the page: those that meet it if it clips, else the whole ones."""
     settings, box = layout.settings, layout.box
@@ -104,29 +103,66 @@ def chosen_copies(layout: Layout) -> Copies:
     return copies_inside(layout.tile, inset(box, bleed(settings)))
 
 
+SYMBOL, MOTIF = "tile", "motif"
+
+
+def tile_layers(
+    copies: Uses,
+    colours: Integers,
+    chosen: Palette | None,
+    line: Style,
+    *,
+    clipped: bool,
+    seam: float | None = None,
+    drawn: bool = False,
+) -> list[Layer]:
+    """Return a layer of tiles for each of their colours; with a motif on them, if `drawn`.
+
+    Lines are drawn around each tile; or above all, if hairlines `seam` mm wide close the seams that
+    viewers leave between neighbours.
+    """
+    layers = list[Layer]()
+    for colour in sorted(set(colours.tolist())):
+        own = colours == colour
+        uses = replace(copies, which=copies.which[own], offsets=copies.offsets[own])
+        if chosen is None:
+            return [Layer("tiles", "tiles", line, (uses,), clipped)]
+        fill, name, ink = chosen.fill(colour), f"colour {colour + 1}", chosen.ink(colour)
+        style = line._replace(fill=fill) if seam is None else Style(fill, fill, seam)
+        layers.append(Layer(name, "tiles", style, (uses,), clipped))
+        if drawn:
+            motifs = (replace(uses, symbol=MOTIF),)
+            layers.append(Layer(f"drawing on {name}", "drawing", Style(), motifs, clipped, ink))
+    if seam is not None and line.width > 0:
+        layers.append(Layer("outlines", "tiles", line, (copies,), clipped))
+    return layers
+
+
+SEAM = 0.025  # width in mm of hairlines between filled tiles
+
+
 def tiling_scene(layout: Layout) -> Scene:
     """Return a scene with the tile as a symbol, a use of it for each copy, a layer for each colour."""
-    settings = layout.settings
+    settings, box = layout.settings, layout.box
     copies = chosen_copies(layout)
     # relative to the symbol's own middle, so that rounding a transform moves no point by much
     middle = layout.tile.center
     symbol = layout.outline.closed.moved(np.eye(2), -middle)
     turned = np.einsum("aij,j->ai", copies.group.linear_parts, middle)
     offsets = copies.translations + turned[copies.cosets]
-    chosen = palette(settings.palette)
-    box, layers, line = layout.box, list[Layer](), settings.stroke or "#000000"
-    colours = np.zeros(len(copies), dtype=np.int64)
+    uses = Uses(SYMBOL, copies.group.linear_parts, copies.cosets, offsets)
+    motifs, layers, chosen = dict[str, Motif](), list[Layer](), None
+    colours, line = np.zeros(len(copies), dtype=np.int64), settings.stroke or "#000000"
     if settings.filled:
+        chosen = palette(settings.palette)
         line = settings.stroke or chosen.outline
         colours = colouring(layout.tile).colours(copies)
         layers.append(Layer("paper", "paper", Style(fill=chosen.paper), (rectangle(box),)))
-    for colour in range(int(colours.max(initial=0)) + 1):
-        own = colours == colour
-        uses = Uses(SYMBOL, copies.group.linear_parts, copies.cosets[own], offsets[own])
-        name = f"colour {colour + 1}" if settings.filled else "tiles"
-        fill = chosen.fill(colour) if settings.filled else None
-        style = Style(fill, line, settings.stroke_width or USUAL_WIDTH)
-        layers.append(Layer(name, "tiles", style, (uses,), clipped=settings.clip))
+        if layout.motif is not None:
+            motifs[MOTIF] = replace(layout.motif.moved(np.eye(2), -middle), within=SYMBOL)
+    style = Style(None, line, settings.stroke_width or USUAL_WIDTH)
+    seam, clip = SEAM if motifs else None, settings.clip
+    layers += tile_layers(uses, colours, chosen, style, clipped=clip, seam=seam, drawn=bool(motifs))
     return Scene(
         *settings.page,
         tuple(layers),
@@ -134,6 +170,7 @@ def tiling_scene(layout: Layout) -> Scene:
         window=box,
         prototile=layout.tile.polygon,
         tiles=placed_tiles(copies, layout),
+        motifs=motifs,
     )
 
 

@@ -17,6 +17,7 @@ from orbiflow.settings import (
     SettingError,
     Unit,
 )
+from orbiflow.tiles.motifs import MotifSettings
 from orbiflow.units import (
     COLUMNS,
     PAGES,
@@ -38,7 +39,7 @@ def usual_tolerance(tile_size: float) -> float:
     return max(0.05, tile_size / 800)
 
 
-class ExportSettings(FileSettings, group="Page and file"):
+class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     """How a tiling is drawn in real size; lengths in mm.
 
     >>> ExportSettings(purpose="laser", kerf=0.1, cut="pieces").stroke_width
@@ -151,12 +152,13 @@ class ExportSettings(FileSettings, group="Page and file"):
     """Width of lines."""
 
     def defaults(self) -> Mapping[str, Any]:
-        values = dict(PURPOSES[self.purpose]) if self.purpose else {}
+        values = {**super().defaults(), **PURPOSES.get(self.purpose or "", {})}
         if "cut" in self.fields_given and self.cut not in ("none", "skeleton"):
             values.pop("clip", None)
         return values
 
     def check(self) -> None:
+        super().check()
         if 2 * self.margin >= min(self.page):
             width, height = self.page
             raise SettingError(
@@ -171,6 +173,11 @@ class ExportSettings(FileSettings, group="Page and file"):
         if "palette" in self.fields_given and not self.filled:
             what = f"{{purpose}} {self.purpose} fills nothing" if self.purpose else "no {filled}"
             raise SettingError(f"{{palette}} has no effect: {what}; leave {{palette}} out")
+
+    @property
+    def coloured(self) -> bool:
+        """Whether what lies on the tiles has its colours, rather than those of a machine's layers."""
+        return (self.cut == "none" and self.filled) or self.purpose in ("print", "paper", "web")
 
     @property
     def usual_format(self) -> str:

@@ -122,12 +122,14 @@ def _part(
     items: list[Curve | Uses] = []
     for item in layer.items:
         if isinstance(item, Uses):
-            images = item.images(scene.symbols[item.symbol].pieces.reshape(-1, 2))
+            images = item.images(scene.points(item.symbol))
             low, high = images.min(axis=1), images.max(axis=1)
             near = (high > window[:2]).all(axis=1) & (low < window[2:]).all(axis=1)
             items.append(
                 Uses(item.symbol, item.linear, item.which[near], item.offsets[near] + back)
             )
+        elif not isinstance(item, Curve):
+            raise TypeError("motifs are flattened after a page is split")
         elif layer.role == "paper":
             items += [part.moved(still, back) for part in clipped_region(item, seams, tolerance)]
         else:

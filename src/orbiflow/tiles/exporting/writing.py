@@ -8,16 +8,27 @@ from pathlib import Path
 
 from orbiflow import __version__
 from orbiflow.arguments import as_path
+from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
+from orbiflow.tiles.exporting.drawings import drawn_on, with_drawing
 from orbiflow.tiles.exporting.jigsaws import jigsaw_scenes
 from orbiflow.tiles.exporting.layouts import Layout, layout, pieces_scenes, place_on, tiling_scene
 from orbiflow.tiles.exporting.settings import ExportSettings
 from orbiflow.tiles.exporting.sheets import calibrated, split
 from orbiflow.tiles.exporting.skeletons import skeleton_scene
 from orbiflow.tiles.likeness import narrowest_neck
-from orbiflow.tiles.scene import Scene, write_dxf, write_json, write_pdf, write_png, write_svg
+from orbiflow.tiles.motifs import Over, read_over, with_map
+from orbiflow.tiles.scene import (
+    Scene,
+    flattened,
+    write_dxf,
+    write_json,
+    write_pdf,
+    write_png,
+    write_svg,
+)
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import Certificate, colouring
 
@@ -53,6 +64,7 @@ def export(
     out: str | Path,
     settings: ExportSettings | None = None,
     *,
+    picture: str | Path | None = None,
     force: bool = False,
     on_event: Sink = ignore,
     cancel: Cancel | None = None,
@@ -64,6 +76,7 @@ def export(
         out: The file; with several sheets its name gets a number. Its ending decides the format, unless
             the settings give one.
         settings: How it is drawn.
+        picture: The file of a picture or drawing over the silhouette, for which the tile needs a map.
         force: Export a tile that is not certified; the file says so.
         on_event: Called with the `Progress`.
         cancel: Stops the work; nothing is then written.
@@ -77,7 +90,7 @@ def export(
     out, cancel = as_path(out, "the file to export to"), cancel or Cancel()
     settings = (settings or ExportSettings()).for_file(out)
     on_event(Progress(0.0, "laying out"))
-    found, notes = scenes(tile, settings, force=force)
+    found, notes = scenes(tile, settings, picture=picture, force=force)
     contents: list[str | bytes] = []  # all, before the first file
     for k, scene in enumerate(found):
         cancel.check()
@@ -90,7 +103,11 @@ def export(
 
 
 def scenes(
-    tile: TileSource, settings: ExportSettings, *, force: bool = False
+    tile: TileSource,
+    settings: ExportSettings,
+    *,
+    picture: str | Path | None = None,
+    force: bool = False,
 ) -> tuple[list[Scene], tuple[str, ...]]:
     """Return the sheets, and what the user should know. Raises as `export`."""
     given = EscherTile.of(tile)
@@ -98,9 +115,14 @@ def scenes(
         force=force, otherwise="so it is not exported; --force exports it, marked so"
     )
     placed = layout(given.tile, settings, y_down=given.y_down)
-    notes = (*_neck_notes(placed), *_colour_notes(given, settings))
+    notes = (*neck_notes(placed.tile.polygon, settings.warn_neck), *_colour_notes(given, settings))
     told = (placed.outline.note, placed.piece[1] if settings.cut == "pieces" else "")
     notes = (*filter(None, told), *notes)
+    if picture is not None or settings.strokes or settings.eyes:
+        given = with_map(given)
+        over = Over() if picture is None else read_over(picture, given)
+        placed = replace(placed, motif=drawn_on(placed, given, over))
+        notes = (*given.notes, *over.notes, *notes)
     made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
     if settings.cut == "jigsaw":
         facts = made[0].facts
@@ -115,12 +137,19 @@ def scenes(
 
 
 def _made(placed: Layout, settings: ExportSettings) -> list[Scene]:
+    fine = settings.deviation / 4
     if settings.cut == "pieces":
-        return pieces_scenes(placed, fine=settings.file_format not in ("dxf", "json"))
-    if settings.cut == "jigsaw":
-        return jigsaw_scenes(placed)
-    scene = skeleton_scene(placed) if settings.cut == "skeleton" else tiling_scene(placed)
-    return [scene] if settings.bed is None else split(scene, settings.bed, settings.deviation / 4)
+        made = pieces_scenes(placed, fine=settings.file_format not in ("dxf", "json"))
+    elif settings.cut == "jigsaw":
+        made = jigsaw_scenes(placed)
+    else:
+        made = [skeleton_scene(placed) if settings.cut == "skeleton" else tiling_scene(placed)]
+    painted = settings.cut == "none" and settings.filled
+    made = [with_drawing(scene, placed) for scene in made]
+    if settings.cut in ("none", "skeleton") and settings.bed is not None:
+        made = split(made[0], settings.bed, fine)
+    # a machine need not know copies
+    return made if painted else [flattened(scene, fine) for scene in made]
 
 
 def _described(
@@ -161,20 +190,18 @@ def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...
     return (f"its lines of {width:g} mm hardly show on a screen; a cutter follows them",)
 
 
-def _neck_notes(placed: Layout) -> list[str]:
-    limit = placed.settings.warn_neck
+def neck_notes(ring: Array, limit: float) -> list[str]:
+    """Say where a tile's outline in mm is thinner than a limit; 0 says nothing."""
     if not limit:
         return []
     try:
-        neck = narrowest_neck(placed.tile.polygon)
+        neck = narrowest_neck(ring)
     except OrbiflowError as error:  # a forced tile may cross itself
         return [f"its necks cannot be measured: {error}"]
     if neck.width >= limit:
         return []
-    return [
-        f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm "
-        f"{place_on(placed.tile.polygon, neck.place)}"
-    ]
+    place = place_on(ring, neck.place)
+    return [f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm {place}"]
 
 
 def write_scene(scene: Scene, settings: ExportSettings) -> str | bytes:

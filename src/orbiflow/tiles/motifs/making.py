@@ -17,9 +17,16 @@ from orbiflow.tiles.tile import EscherTile
 
 
 def drawn_motif(
-    tile: EscherTile, settings: MotifSettings, palette: Palette, drawing: Motif | None = None
+    tile: EscherTile,
+    settings: MotifSettings,
+    palette: Palette,
+    drawing: Motif | None = None,
+    *,
+    hairlines: bool = False,
 ) -> Motif:
     """Return what is drawn on a tile, in its units: a drawing, engraved lines, then eyes.
+
+    Engraved lines are regions that swell and taper, or `hairlines` along their middle.
 
     Raises:
         OrbiflowError: If there is a drawing or an eye but no map of the silhouette, or an eye lies
@@ -30,7 +37,7 @@ def drawn_motif(
     parts = () if drawing is None else drawing.parts
     around = [eye(tile, given, palette) for given in settings.eyes]
     if settings.strokes is not None:
-        parts += engraved(tile, settings.strokes, around)
+        parts += engraved(tile, settings.strokes, around, hairlines=hairlines)
     return Motif(parts + tuple(part for one in around for part in one.parts))
 
 

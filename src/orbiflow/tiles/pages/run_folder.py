@@ -20,7 +20,8 @@ from orbiflow.runtime import (
     work,
     write_atomic,
 )
-from orbiflow.tiles.pages.overview import TILE_FILES, index_page, overview_png
+from orbiflow.tiles.pages.overview import overview_png
+from orbiflow.tiles.pages.page import TILE_FILES, index_page
 from orbiflow.tiles.pictures import (
     bending_picture,
     comparison,
@@ -95,14 +96,17 @@ def write_tile_folder(
     return [write_atomic(folder / name, contents[name]()) for name in names]
 
 
-OVERVIEW, INDEX, FRONT = "overview.png", "index.html", "front.png"
+OVERVIEW, INDEX, FRONT, READ = "overview.png", "index.html", "front.png", "read.png"
 
 
-def write_gallery(result: SearchResult, out: Path, *, figures: bool = False) -> None:
+def write_gallery(
+    result: SearchResult, out: Path, *, figures: bool = False, shown_out: str = ""
+) -> None:
     """Write each tile's folder, `overview.png`, `index.html` and, after a search for both, `front.png`.
 
     As many processes as searched draw `figures`; without these, starting one would take longer than
-    drawing. There is at least one tile.
+    drawing. There is at least one tile. `shown_out` is what the page's commands call the folder, by
+    default its path.
 
     Raises:
         OutputError: If a file cannot be written.
@@ -121,7 +125,17 @@ def write_gallery(result: SearchResult, out: Path, *, figures: bool = False) -> 
                 pass
     write_atomic(out / OVERVIEW, overview_png(tiles, target, colours, failures=failures))
     extra = [figure_files(tile) if figures else () for tile in tiles]
-    page = index_page(tiles, target, names, failures=failures, figures=extra)
+    read, shown = (out / READ).is_file(), shown_out or str(out)
+    page = index_page(
+        tiles,
+        target,
+        names,
+        out=shown,
+        read=read,
+        colours=colours,
+        failures=failures,
+        figures=extra,
+    )
     write_atomic(out / INDEX, page)
     if result.method.objective == "both":
         _write_front(tiles, result.found, out)
@@ -170,7 +184,12 @@ def result_folder(out: str | Path) -> ResultFolder:
 
 
 def write_run(
-    result: SearchResult, out: str | Path, *, figures: bool = False, on_event: Sink = ignore
+    result: SearchResult,
+    out: str | Path,
+    *,
+    figures: bool = False,
+    shown_out: str = "",
+    on_event: Sink = ignore,
 ) -> list[Path]:
     """Write what a search found as a result folder: a folder a class, overviews, `result.json`.
 
@@ -181,6 +200,7 @@ def write_run(
         result: What the search found.
         out: The folder, which every command on a RESULT takes.
         figures: Write the figures for print, too, in as many processes as the search had.
+        shown_out: What the page's commands call the folder. Default: its path.
         on_event: Called with each `Note` and `Written`.
 
     Returns:
@@ -200,7 +220,8 @@ def write_run(
         on_event(Note("no flow made these tiles, so there is none to draw: the silhouette bent"))
     with folder.replaced() as staged:
         if tiles:
-            write_gallery(result, staged, figures=figures)
+            shown = shown_out or str(out)
+            write_gallery(result, staged, figures=figures, shown_out=shown)
         write_atomic(staged / RESULT, json.dumps(report(result), allow_nan=False))
         files = [path.relative_to(staged) for path in staged.rglob("*") if path.is_file()]
     written = [folder.path / path for path in sorted(files)]

@@ -1,3 +1,9 @@
+from .flattening import boundary as boundary
+from .flattening import cut_off as cut_off
+from .flattening import flattened as flattened
+from .flattening import lines_of as lines_of
+from .flattening import polylines as polylines
+from .flattening import region_of as region_of
 from .formats import INCH as INCH
 from .formats import curves_path as curves_path
 from .formats import draw_paths as draw_paths

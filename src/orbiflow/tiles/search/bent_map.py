@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from itertools import pairwise
 
 import numpy as np
@@ -25,23 +26,31 @@ SAME = 1e-9  # distance along the outline, in outlines, below which points are o
 def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bending:
     """Return the map that a bent silhouette and its similarity z -> factor z + shift make.
 
-    Its outline is laid onto the tile; an `OrbiflowError` if the inside cannot follow without folds.
+    Its outline is laid onto the tile, the points between those that were bent as well; an
+    `OrbiflowError` if the inside cannot follow without folds.
     """
     hand = bent.hand
     flip = np.array([1.0, -1.0]) if hand.mirrored else np.ones(2)
     z = factor * bent.points + shift
     placement, n = bent.placement, hand.fine.size
     first = np.cumsum(placement.lengths[0]) - placement.lengths[0]
+    # how far along the outline each vertex of the mesh lies: all are points of it
+    knots = arc_lengths(hand.outline)
+    line = shapely.LinearRing(hand.outline)
+    along = shapely.line_locate_point(line, shapely.points(hand.fine.mesh.points[:n]))
+    places = np.append((along - along[0]) % knots[-1], knots[-1])
+    own = np.interp((knots - along[0]) % knots[-1], places, np.arange(n + 1))
+    mesh, images = divided(hand.fine.mesh, _unknown(hand.fine.mesh, own), plane_points(z))
     mesh, images = onto_polygon(
-        hand.fine.mesh,
-        plane_points(z),
-        tile.polygon * flip,
-        (first + placement.starts[0]) % n,
-        np.array(tile.corners),
+        mesh, images, tile.polygon * flip, (first + placement.starts[0]) % n, np.array(tile.corners)
     )
+    outline = points_along(
+        hand.outline, along[0] + np.interp(shares(mesh), np.arange(n + 1), places)
+    )
+    rest = with_outline(mesh, mesh.points, outline)
     images = unfolded(mesh, images)
     triangles = mesh.triangles[:, ::-1] if hand.mirrored else mesh.triangles
-    return Bending(mesh.points * flip, images * flip, triangles)
+    return Bending(rest * flip, images * flip, triangles)
 
 
 def onto_polygon(
@@ -60,18 +69,17 @@ def onto_polygon(
         raise OrbiflowError("the corners of the outline and the polygon do not correspond")
     places = _places(np.roll(images[:n], -corners[0], axis=0), polygon, knots, own, goal)
 
-    share: Array = (np.concatenate([np.arange(n), mesh.sides + mesh.shares]) - corners[0]) % n
-    known = np.interp(share, np.arange(n + 1), knots)
-    order = np.argsort(known)
-    places, fresh = _snapped(places, known[order], knots[-1])
+    known = np.interp((shares(mesh) - corners[0]) % n, np.arange(n + 1), knots)
+    places, fresh = _snapped(places, np.sort(known), knots[-1])
     closed = np.append(places, knots[-1])
     along = np.concatenate([known, places[fresh]])
     laid = np.stack(
         [np.interp(along, closed, np.append(column, column[0])) for column in polygon.T], axis=-1
     )
     at = np.interp(places[fresh], knots, np.arange(n + 1)) + corners[0]
-    divided = _with_points(mesh, at % n, order, np.searchsorted(known[order], places[fresh]))
-    return divided, np.concatenate([laid, images[outline:]])
+    mesh, images = divided(mesh, at % n, np.concatenate([laid[:outline], images[outline:]]))
+    images[: len(laid)] = laid
+    return mesh, images
 
 
 def _places(ring: Array, polygon: Array, knots: Array, own: Integers, goal: Integers) -> Array:
@@ -106,35 +114,66 @@ def _snapped(places: Array, known: Array, total: float) -> tuple[Array, NDArray[
     return np.where(fresh, places, near), fresh
 
 
-def _with_points(mesh: Mesh, at: Array, order: Integers, slots: Integers) -> Mesh:
-    """The mesh with points on the outline at `at` (m,), in vertices from the first.
+def with_outline(mesh: Mesh, points: Array, outline: Array) -> Array:
+    """Return a map's points (N, 2) with those of the outline moved a little, to `outline` (O, 2).
 
-    Point j lies between `order[slots[j] - 1]` and `order[slots[j]]`, after those before it there.
+    All stay in place where the inside cannot follow without folds: behind hairs.
     """
-    if not len(at):
-        return mesh
-    n, outline = mesh.size, mesh.size + len(mesh.sides)
-    side = np.minimum(np.floor(at).astype(np.int64), n - 1)
-    start, end = mesh.points[side], mesh.points[(side + 1) % n]
-    points = start + (at - side)[:, None] * (end - start)
-    triangles = np.where(mesh.triangles >= outline, mesh.triangles + len(at), mesh.triangles)
-    owner = {(t[k - 1], t[k]): (i, k) for i, t in enumerate(triangles.tolist()) for k in range(3)}
-    rows = triangles.tolist()
+    with contextlib.suppress(OrbiflowError):
+        return unfolded(mesh, np.concatenate([outline, points[len(outline) :]]))
+    return points
+
+
+def shares(mesh: Mesh) -> Array:
+    """Return where (O,) the points of a mesh's outline lie on it, in vertices from the first."""
+    return np.concatenate([np.arange(mesh.size), mesh.sides + mesh.shares])
+
+
+def _unknown(mesh: Mesh, at: Array) -> Array:
+    """Return the places (m,) on the outline, in vertices from the first, that are no points of it."""
+    found = np.sort(at % mesh.size)
+    found = found[_snapped(found, np.append(np.sort(shares(mesh)), mesh.size), 1.0)[1]]
+    return found[np.diff(found, prepend=-1.0) > SAME]
+
+
+def divided(mesh: Mesh, at: Array, images: Array) -> tuple[Mesh, Array]:
+    """Return a mesh with new points on its outline, and its `images` (N, 2) extended linearly.
+
+    The points lie at `at` (m,), in vertices from the first. Where several divide the side of one
+    triangle, each gets a point behind it, so that triangles can follow an outline that winds.
+    """
+    known = shares(mesh)
+    order, outline, count = np.argsort(known), len(known), len(mesh.points) + len(at)
+    slots = np.searchsorted(known[order], at)
+    start, end = order[slots - 1], order[slots % outline]
+    part = ((at - known[start]) / ((known[end] - known[start]) % mesh.size))[:, None]
+    rows = np.where(mesh.triangles >= outline, mesh.triangles + len(at), mesh.triangles).tolist()
+    owner = {(t[k - 1], t[k]): (i, k) for i, t in enumerate(rows) for k in range(3)}
+    behind: list[tuple[int, int]] = []
     for slot in np.unique(slots):
-        a, b = int(order[slot - 1]), int(order[slot % len(order)])
+        a, b = int(order[slot - 1]), int(order[slot % outline])
         i, k = owner[a, b]
         apex = rows[i][k - 2]
-        chain = [a, *(outline + np.flatnonzero(slots == slot)).tolist(), b]
-        pieces = [[u, v, apex] for u, v in pairwise(chain)]
-        rows[i] = pieces[0]
-        rows += pieces[1:]
-    return Mesh(
-        np.concatenate([mesh.points[:outline], points, mesh.points[outline:]]),
-        np.array(rows, dtype=np.int64),
-        np.concatenate([mesh.sides, side]),
-        np.concatenate([mesh.shares, at - side]),
-        n,
-    )
+        own = np.flatnonzero(slots == slot)
+        fresh = (outline + own[np.argsort(at[own])]).tolist()
+        second = [*range(count + len(behind), count + len(behind) + len(own))]
+        behind += [(point, apex) for point in fresh] if len(own) > 1 else []
+        chain, inner = [a, *fresh, b], [a, *(second if len(own) > 1 else fresh), b]
+        rows[i] = []
+        for (u, v), (p, q) in zip(pairwise(chain), pairwise(inner), strict=True):
+            rows += [t for t in ([u, v, q], [u, q, p], [p, q, apex]) if len({*t}) == 3]
+
+    def extended(values: Array) -> Array:
+        new = (1 - part) * values[start] + part * values[end]
+        found = np.concatenate([values[:outline], new, values[outline:]])
+        return np.concatenate(
+            [found, found[np.array(behind, dtype=int).reshape(-1, 2)].mean(axis=1)]
+        )
+
+    side = np.minimum(np.floor(at).astype(np.int64), mesh.size - 1)
+    sides, at_side = np.concatenate([mesh.sides, side]), np.concatenate([mesh.shares, at - side])
+    triangles = np.array([t for t in rows if t], dtype=np.int64)
+    return Mesh(extended(mesh.points), triangles, sides, at_side, mesh.size), extended(images)
 
 
 TILE, SILHOUETTE = 240, 480  # points along the two outlines that are matched
@@ -159,22 +198,26 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
     steps = _matching(np.roll(tile, -first, axis=0), np.roll(goal, -start, axis=0))
     even = np.linspace(0, SILHOUETTE, TILE + 1)
     places = (1 - PROPORTION) * steps + PROPORTION * even
-    # how far round the polygon each point of the mesh on its outline lies
-    knots = arc_lengths(ring)
-    vertex = np.concatenate([np.arange(mesh.size), mesh.sides + mesh.shares])
-    share: Array = np.interp(vertex, np.arange(len(knots)), knots) / knots[-1]
-    turn = (share * TILE - first) % TILE
-    place = (np.interp(turn, np.arange(TILE + 1), places) + start) % SILHOUETTE
-    lengths = arc_lengths(rest)
-    outline = points_along(rest, place / SILHOUETTE * lengths[-1])
-    moved = harmonic(mesh, outline - mesh.points[: len(outline)])
-    points = mesh.points + moved
+    # what matches: how far round the polygon, in vertices, and how far round the silhouette
+    knots, lengths = arc_lengths(ring), arc_lengths(rest)
+    turns, numbers = np.arange(TILE + 1), np.arange(len(knots))
+
+    def outline(mesh: Mesh) -> Array:
+        turn = np.interp(shares(mesh), numbers, knots) / knots[-1] * TILE
+        place = np.interp((turn - first) % TILE, turns, places) + start
+        return points_along(rest, place / SILHOUETTE * lengths[-1])
+
+    moved = mesh.points + harmonic(mesh, outline(mesh) - mesh.points[: len(shares(mesh))])
     try:
-        return Bending(unfolded(mesh, points), mesh.points, mesh.triangles)
+        moved = unfolded(mesh, moved)
     except OrbiflowError as error:
         raise OrbiflowError(
             "the silhouette cannot be carried to this tile without folds: they differ too much"
         ) from error
+    turn = np.interp((lengths / lengths[-1] * SILHOUETTE - start) % SILHOUETTE, places, turns)
+    at = np.interp((turn + first) % TILE / TILE * knots[-1], knots, numbers)
+    mesh, moved = divided(mesh, _unknown(mesh, at), moved)
+    return Bending(with_outline(mesh, moved, outline(mesh)), mesh.points, mesh.triangles)
 
 
 def _matching(tile: Array, goal: Array) -> Array:

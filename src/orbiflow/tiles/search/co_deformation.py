@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.runtime import NEVER, Cancel
-from orbiflow.tiles.geometry import plane_points, signed_area
+from orbiflow.tiles.geometry import plane_points, reverse, signed_area
 from orbiflow.tiles.likeness import Elastic, Pinned, Stiffness
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.tile_space import Placements, TileSpace
@@ -117,6 +117,7 @@ class Hand:
     """A silhouette or its mirror image."""
 
     mirrored: bool  # whether the latter
+    outline: Array  # (N, 2) its outline, counter-clockwise
     samples: Samples  # points of its outline, coarse to fine
     made: Callable[[str, Stiffness], Elastic]  # the body of a level of points and a stiffness
 
@@ -142,11 +143,12 @@ def hands(
 ) -> tuple[Hand, Hand]:
     """The silhouette and its mirror image in the x axis, ready to be bent."""
     phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
-    samples = sampled(np.asarray(target.normal), phase, settings.multiples)
+    outline = np.asarray(target.normal)
+    samples = sampled(outline, phase, settings.multiples)
     # read backwards from the same first point: every k-th fine point stays beside a coarse one
-    mirror = Samples(*(np.roll(part[::-1], 1, axis=0) * (1.0, -1.0) for part in samples))
+    mirror = Samples(*(reverse(part) * (1.0, -1.0) for part in samples))
 
-    def hand(points: Samples, mirrored: bool) -> Hand:
+    def hand(outline: Array, points: Samples, mirrored: bool) -> Hand:
         meshes = {name: triangulate(ring) for name, ring in points._asdict().items()}
 
         @cache  # of a level and stiffness, when it is first asked for
@@ -160,9 +162,9 @@ def hands(
             parts, angle = pins.parts(own, mesh.triangles), pins.keep_angle
             return Pinned(ring, parts, stiffness, keep_angle=angle, stiff=stiff, mesh=mesh)
 
-        return Hand(mirrored, points, made)
+        return Hand(mirrored, outline, points, made)
 
-    return hand(samples, False), hand(mirror, True)
+    return hand(outline, samples, False), hand(reverse(outline) * (1.0, -1.0), mirror, True)
 
 
 # Strength of the springs by which neighbours are compared: nearly tiles, yet one matrix for all

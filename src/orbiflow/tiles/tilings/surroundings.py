@@ -17,7 +17,6 @@ from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array, Integers, checked_window
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import Isometry
-from orbiflow.tiles.geometry import subdivided
 from orbiflow.tiles.tilings.tile_copies import (
     Copies,
     Placed,
@@ -221,18 +220,19 @@ def segment_tree(around: Surroundings) -> shapely.STRtree:
     return shapely.STRtree(np.asarray(shapely.linestrings(ends)))
 
 
-# points on the boundary at least, so that coarse polygons are seen as curves
-_BOUNDARY_SAMPLES = 200
+_TOUCHING = 1e-7
+"""The distance that counts as touching, and the length above which boundary is shared.
 
-_TOUCHING = 1e-7  # the distance that counts as touching, in square roots of the tile's area
+In square roots of the tile's area: a hundred times what a certificate allows edges to be apart.
+"""
 
 
 class Neighbours(NamedTuple):
     """The other tiles that touch a prototile, as group elements, nearest first.
 
     Args:
-        edge: The tiles that share a piece of boundary of positive length.
-        point: The tiles that touch only at points.
+        edge: The tiles that share boundary, longer than 1e-7 of the side of a square of a tile's area.
+        point: The other tiles that touch.
     """
 
     edge: tuple[Placed, ...]
@@ -268,16 +268,33 @@ def touching(around: Surroundings, tolerance: float) -> tuple[Surroundings, NDAr
     outline = shapely.linearrings(around.ring)
     shapely.prepare(outline)
     near = around.select(np.asarray(shapely.dwithin(outline, around.rings, tolerance)))
-    shares: NDArray[np.bool_] = np.zeros(len(near), dtype=bool)
-    if len(near):
-        # interior points of the segments, midpoints among them: never the corners
-        count = len(near.ring)
-        pieces = 2 * math.ceil(_BOUNDARY_SAMPLES / (2 * count)) + 1
-        pieces = pieces if count < _BOUNDARY_SAMPLES else 1
-        points = shapely.points(subdivided(near.ring, pieces, phase=0.5))
-        _, hits = segment_tree(near).query(points, predicate="dwithin", distance=tolerance)
-        shares[near.owner[hits]] = True
-    return near, shares
+    return near, _shared_lengths(near, tolerance) > tolerance
+
+
+def _shared_lengths(around: Surroundings, tolerance: float) -> Array:
+    """Return the length (M,) of boundary that each tile shares with the prototile.
+
+    Two sides share where each lies beside the other, if they are within `tolerance` of each other
+    along all of that: sides that only meet at an angle share nothing.
+    """
+    if not len(around):
+        return np.zeros(0)
+    ring, ahead = around.ring, np.roll(around.ring, -1, axis=0)
+    low, high = np.minimum(ring, ahead) - tolerance, np.maximum(ring, ahead) + tolerance
+    boxes = np.asarray(shapely.box(*low.T, *high.T))
+    own, other = segment_tree(around).query(boxes)
+    lengths = np.linalg.norm(ahead - ring, axis=1)
+    along = ((ahead - ring) / lengths[:, None])[own]
+    ends = np.stack([around.points[other], around.ahead[other]], axis=1) - ring[own, None]
+    place = np.einsum("pei,pi->pe", ends, along)
+    height = ends[..., 1] * along[:, None, 0] - ends[..., 0] * along[:, None, 1]
+    # from where to where along the prototile's side the other lies, and how far it is there
+    part = np.sort(np.clip(place, 0.0, lengths[own, None]), axis=1)
+    run = place[:, 1] - place[:, 0]
+    slope = np.divide(height[:, 1] - height[:, 0], run, out=np.zeros(len(run)), where=run != 0)
+    apart = np.abs(height[:, :1] + slope[:, None] * (part - place[:, :1])).max(axis=1)
+    shared = np.where(apart <= tolerance, part[:, 1] - part[:, 0], 0.0)
+    return np.bincount(around.owner[other], shared, minlength=len(around))
 
 
 def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:
