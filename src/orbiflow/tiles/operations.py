@@ -262,7 +262,12 @@ def export(
 
 def _exported(done: Exported, settings: ExportSettings, name: str) -> str:
     width, height = settings.page
-    what = {"none": "tiles", "skeleton": "tiles in outline", "pieces": "pieces"}[settings.cut]
+    words = {
+        "skeleton": "tiles in outline",
+        "pieces": "pieces",
+        "jigsaw": "tiles and parts of them",
+    }
+    what = words.get(settings.cut, "tiles")
     files = str(done.files[0])
     if len(done.files) > 1:
         files = f"{len(done.files)} sheets, {done.files[0]} to {done.files[-1].name}"
