@@ -45,7 +45,7 @@ _DAMAGED = (
 )
 # channels that say by themselves where the shape is: their high part and their low part
 _PARTS = {"alpha": ("opaque", "transparent"), "mask": ("marked", "unmarked")}
-_PLAIN = "cut it out, photograph it on a plain ground of another colour, or set threshold"
+_PLAIN = "cut it out, photograph it on a plain ground of another colour, or set a threshold"
 _FAINT = (
     "the shape differs little from what is around it and may be read wrong: look at what was read, "
     f"and if need be {_PLAIN}"
