@@ -1,8 +1,8 @@
 from .bending import Bending as Bending
 from .bending import unfolded as unfolded
-from .doubts import doubts as doubts
-from .doubts import holes_filled as holes_filled
-from .doubts import parts_left_out as parts_left_out
+from .checks import doubts as doubts
+from .checks import holes_filled as holes_filled
+from .checks import parts_left_out as parts_left_out
 from .emphasis import Emphasis as Emphasis
 from .mesh import Locator as Locator
 from .mesh import Mesh as Mesh
