@@ -87,7 +87,9 @@ def test_the_volume_of_a_tile(tile: Tile) -> None:
 
 def test_a_slope_is_exact() -> None:
     square = shapely.box(0, 0, 10, 10)
-    body = stacked(Level(0, square), Level(0, square), Level(3, square.buffer(-2, join_style="mitre")))
+    body = stacked(
+        Level(0, square), Level(0, square), Level(3, square.buffer(-2, join_style="mitre"))
+    )
     assert body.volume() == pytest.approx(3 / 3 * (100 + 36 + 60))
     cone = stacked(Level(1, square.buffer(-4)), Level(2, square))
     assert cone.status().name == "NoError"
