@@ -230,8 +230,8 @@ def test_a_silhouette_is_escherized_first(name: str, tmp_path: Path, orbiflow) -
     ("place", "tile", "message"),
     [
         ("", None, "holds the runs boot, shoe: give one, such as {}/boot"),
-        ("boot/IH4", "IH6", "is the folder of one tile, and tile IH6 is another"),
-        ("boot/IH4", "1", "for that one give {}/boot"),
+        ("boot/IH4", "IH6", "is one tile's folder, and tile IH6 another"),
+        ("boot/IH4", "1", "give {}/boot for that"),
         ("boot/mine", None, "tells of IH6, IH4, IH6-2, not of mine"),
     ],
 )
