@@ -30,6 +30,7 @@ from orbiflow.tiles.silhouette import lightness
 from orbiflow.tiles.tile import EscherTile
 
 BLACK, BLUE = "#000000", "#0000ff"
+MOST_PIXELS = 1e8  # the largest number of pixels of pictures on a page
 
 
 def drawn_on(layout: Layout, given: EscherTile, over: Over) -> Motif:
@@ -43,7 +44,8 @@ def drawn_on(layout: Layout, given: EscherTile, over: Over) -> Motif:
             raise OrbiflowError(
                 "a pen draws lines, and the picture is made of pixels; give a drawing in SVG"
             )
-        density = float(np.sqrt(abs(np.linalg.det(linear)))) * settings.dpi / INCH
+        density = min(settings.dpi / INCH, float(np.sqrt(MOST_PIXELS / np.prod(settings.page))))
+        density *= float(np.sqrt(abs(np.linalg.det(linear))))
         rasters = (carried_raster(over.picture, given, density),)
     return Motif(motif.parts, rasters).moved(*layout.place)
 
@@ -61,7 +63,7 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
         styles = {"engrave": Style(BLACK), "score": line._replace(stroke=BLUE)}
         if settings.purpose == "plotter":
             styles = dict.fromkeys(styles, line)
-        motifs = _burnt(layout.motif, area, styles)
+        motifs = burnt(layout.motif, area, styles)
     linear = np.array([tile.linear for tile in scene.tiles])
     offsets = np.array([tile.offset for tile in scene.tiles])
     which, ink = np.arange(len(offsets)), palette(settings.palette).outline
@@ -76,7 +78,7 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
     return replace(scene, layers=(*layers, *scene.layers), motifs=motifs)
 
 
-def _burnt(motif: Motif, tile: shapely.Polygon, styles: dict[str, Style]) -> dict[str, Motif]:
+def burnt(motif: Motif, tile: shapely.Polygon, styles: dict[str, Style]) -> dict[str, Motif]:
     """Return the regions and pictures to engrave, and the lines to score.
 
     What is lighter than middle grey erases what lies under it, as on white; faint colours do nothing.

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from orbiflow import __version__
 from orbiflow.arguments import as_path
-from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
@@ -113,8 +112,22 @@ def scenes(
     certificate = given.require_certified(
         force=force, otherwise="so it is not exported; --force exports it, marked so"
     )
+    placed, notes = laid_out(given, settings, picture)
+    notes = (*notes, *_colour_notes(given, settings))
+    made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
+    if settings.calibrate:
+        # the strip at the foot is the last sheet's; pieces have one on each
+        first = 0 if settings.cut == "pieces" else len(made) - 1
+        made[first:] = [calibrated(scene) for scene in made[first:]]
+    return made, notes
+
+
+def laid_out(
+    given: EscherTile, settings: ExportSettings, picture: str | Path | None = None
+) -> tuple[Layout, tuple[str, ...]]:
+    """Return a tile in its place with what lies on it, and what the user should know."""
     placed = layout(given.tile, settings, y_down=given.y_down)
-    notes = (*neck_notes(placed.tile.polygon, settings.warn_neck), *_colour_notes(given, settings))
+    notes = _neck_notes(placed)
     if placed.outline.note:
         notes = (placed.outline.note, *notes)
     if picture is not None or settings.strokes or settings.eyes:
@@ -122,12 +135,7 @@ def scenes(
         over = Over() if picture is None else read_over(picture, given)
         placed = replace(placed, motif=drawn_on(placed, given, over))
         notes = (*given.notes, *over.notes, *notes)
-    made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
-    if settings.calibrate:
-        # the strip at the foot is the last sheet's; pieces have one on each
-        first = 0 if settings.cut == "pieces" else len(made) - 1
-        made[first:] = [calibrated(scene) for scene in made[first:]]
-    return made, notes
+    return placed, notes
 
 
 def _made(placed: Layout, settings: ExportSettings) -> list[Scene]:
@@ -180,17 +188,17 @@ def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...
     return (f"its lines of {width:g} mm hardly show on a screen; a cutter follows them",)
 
 
-def neck_notes(ring: Array, limit: float | None) -> list[str]:
-    """Say where a tile's outline in mm is thinner than a limit, if there is one."""
+def _neck_notes(placed: Layout) -> tuple[str, ...]:
+    limit, ring = placed.settings.warn_neck, placed.tile.polygon
     if limit is None:
-        return []
+        return ()
     try:
         neck = narrowest_neck(ring)
     except OrbiflowError as error:  # a forced tile may cross itself
-        return [f"its necks cannot be measured: {error}"]
+        return (f"its necks cannot be measured: {error}",)
     if neck.width >= limit:
-        return []
-    return [f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm {place_on(ring, neck)}"]
+        return ()
+    return (f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm {place_on(ring, neck)}",)
 
 
 def write_scene(scene: Scene, settings: ExportSettings) -> str | bytes:
