@@ -162,7 +162,7 @@ def test_exit_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_completion_knows_commands_and_choices() -> None:
-    script = app.app_for([app.COMPLETION]).generate_completion(shell="bash")
+    script = app.app_for(["--install-completion"]).generate_completion(shell="bash")
     assert all(word in script for word in ("escherize", "--tile-size", "skeleton"))
 
 
@@ -170,6 +170,7 @@ def test_completion_knows_commands_and_choices() -> None:
     "line",
     [
         "export X --tile-size 40",
+        "solid X --kind tile --chamfer 9mm",
         "density marginal -m X --columns ,",
         "density conditional -m X --given chi",
         "escherize --help",
