@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.layouts import Layout, line_style
+from orbiflow.tiles.exporting.layouts import BLUE, Layout, line_style
 from orbiflow.tiles.motifs import Over, carried_raster, drawn_motif
 from orbiflow.tiles.scene import (
     INCH,
@@ -29,7 +29,7 @@ from orbiflow.tiles.scene import (
 from orbiflow.tiles.silhouette import lightness
 from orbiflow.tiles.tile import EscherTile
 
-BLACK, BLUE = "#000000", "#0000ff"
+BLACK = "#000000"
 MOST_PIXELS = 1e8  # the largest number of pixels of pictures on a page
 
 
