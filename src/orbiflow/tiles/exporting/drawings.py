@@ -53,7 +53,7 @@ def drawn_on(layout: Layout, given: EscherTile, over: Over) -> Motif:
 def with_drawing(scene: Scene, layout: Layout) -> Scene:
     """Lay the layout's motif on each tile of a scene, in layers under the lines to cut."""
     settings, area = layout.settings, shapely.Polygon(layout.outline.closed.flattened(0.01))
-    if layout.motif is None or scene.motifs:
+    if layout.motif is None or scene.motifs or not scene.tiles:
         return scene
     if settings.coloured:
         motifs = {"drawing": cut_off(layout.motif, area, whole_strokes=False)}
@@ -61,17 +61,15 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
     else:
         line = line_style(layout)
         styles = {"engrave": Style(BLACK), "score": line._replace(stroke=BLUE)}
-        if settings.purpose == "plotter":
+        if settings.purpose in ("plotter", "colouring"):
             styles = dict.fromkeys(styles, line)
         motifs = burnt(layout.motif, area, styles)
     linear = np.array([tile.linear for tile in scene.tiles])
     offsets = np.array([tile.offset for tile in scene.tiles])
     which, ink = np.arange(len(offsets)), palette(settings.palette).outline
-    ink = ink if settings.coloured else None
+    ink, clip = ink if settings.coloured else None, settings.clip or settings.cut == "jigsaw"
     layers = [
-        Layer(
-            name, "drawing", styles[name], (Uses(name, linear, which, offsets),), settings.clip, ink
-        )
+        Layer(name, "drawing", styles[name], (Uses(name, linear, which, offsets),), clip, ink)
         for name, motif in motifs.items()
         if motif.parts or motif.rasters
     ]

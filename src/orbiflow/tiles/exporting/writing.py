@@ -12,6 +12,7 @@ from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
 from orbiflow.tiles.exporting.drawings import drawn_on, with_drawing
+from orbiflow.tiles.exporting.jigsaws import jigsaw_scenes
 from orbiflow.tiles.exporting.layouts import Layout, layout, pieces_scenes, place_on, tiling_scene
 from orbiflow.tiles.exporting.settings import ExportSettings
 from orbiflow.tiles.exporting.sheets import calibrated, split
@@ -115,10 +116,15 @@ def scenes(
     placed, notes = laid_out(given, settings, picture)
     notes = (*notes, *_colour_notes(given, settings))
     made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
+    if settings.cut == "jigsaw":
+        facts = made[0].facts
+        pieces, whole = facts["pieces"], facts["whole_tiles"]
+        count = f"{pieces} pieces, {whole} whole tiles and {pieces - whole} at the border"
+        notes = (*notes, f"the jigsaw has {count}, the smallest {facts['smallest']:.2f} of a tile")
     if settings.calibrate:
-        # the strip at the foot is the last sheet's; pieces have one on each
-        first = 0 if settings.cut == "pieces" else len(made) - 1
-        made[first:] = [calibrated(scene) for scene in made[first:]]
+        # the strip at the foot is the last sheet's; pieces have one on each, a jigsaw's tray has none
+        marked = {"pieces": slice(None), "jigsaw": slice(1)}.get(settings.cut, slice(-1, None))
+        made[marked] = [calibrated(scene) for scene in made[marked]]
     return made, notes
 
 
@@ -127,9 +133,8 @@ def laid_out(
 ) -> tuple[Layout, tuple[str, ...]]:
     """Return a tile in its place with what lies on it, and what the user should know."""
     placed = layout(given.tile, settings, y_down=given.y_down)
-    notes = _neck_notes(placed)
-    if placed.outline.note:
-        notes = (placed.outline.note, *notes)
+    told = (placed.outline.note, placed.piece[1] if settings.cut == "pieces" else "")
+    notes = (*filter(None, told), *_neck_notes(placed))
     if picture is not None or settings.strokes or settings.eyes:
         given = with_map(given)
         over = Over() if picture is None else read_over(picture, given)
@@ -142,11 +147,13 @@ def _made(placed: Layout, settings: ExportSettings) -> list[Scene]:
     fine = settings.deviation / 4
     if settings.cut == "pieces":
         made = pieces_scenes(placed, fine=settings.file_format not in ("dxf", "json"))
+    elif settings.cut == "jigsaw":
+        made = jigsaw_scenes(placed)
     else:
         made = [skeleton_scene(placed) if settings.cut == "skeleton" else tiling_scene(placed)]
     painted = settings.cut == "none" and settings.filled
     made = [with_drawing(scene, placed) for scene in made]
-    if settings.cut != "pieces" and settings.bed is not None:
+    if settings.cut in ("none", "skeleton") and settings.bed is not None:
         made = split(made[0], settings.bed, fine)
     # a machine need not know copies
     return made if painted else [flattened(scene, fine) for scene in made]
@@ -166,6 +173,7 @@ def _described(
         "one unit is one millimetre."
     )
     facts = {
+        **scene.facts,
         "class": tile.isohedral_class or None,
         "group": tile.group.name or None,
         "rank": given.rank,
@@ -174,6 +182,7 @@ def _described(
         "tile_size": settings.tile_size,
         "kerf": settings.kerf,
         "clearance": settings.clearance,
+        "offset": settings.offset,
         "tolerance": settings.deviation,
     }
     return replace(scene, title=title, notes=tuple(notes), facts=facts)
@@ -190,7 +199,7 @@ def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...
 
 def _neck_notes(placed: Layout) -> tuple[str, ...]:
     limit, ring = placed.settings.warn_neck, placed.tile.polygon
-    if limit is None:
+    if not limit:
         return ()
     try:
         neck = narrowest_neck(ring)
@@ -198,7 +207,8 @@ def _neck_notes(placed: Layout) -> tuple[str, ...]:
         return (f"its necks cannot be measured: {error}",)
     if neck.width >= limit:
         return ()
-    return (f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm {place_on(ring, neck)}",)
+    place = place_on(ring, neck.place)
+    return (f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm {place}",)
 
 
 def write_scene(scene: Scene, settings: ExportSettings) -> str | bytes:

@@ -125,7 +125,7 @@ def _gap_notes(plan: Plan) -> tuple[str, ...]:
     thin = ", too thin to print" if slit.width < settings.nozzle else ""
     return (
         f"the walls of both sides are one in a gap of the tile: {slit.width:.2f} mm wide "
-        f"{place_on(ring, slit)}{thin}",
+        f"{place_on(ring, slit.place)}{thin}",
     )
 
 
