@@ -170,6 +170,7 @@ def test_completion_knows_commands_and_choices() -> None:
     "line",
     [
         "export X --tile-size 40",
+        "solid X --kind tile --chamfer 9mm",
         "density marginal -m X --columns ,",
         "density conditional -m X --given chi",
         "escherize --help",

@@ -111,8 +111,7 @@ def escherize(
     result = search.escherize(target, settings, on_event=on_event, cancel=cancel)
     for text in _remarks(result):
         on_event(Note(text))
-    shown = shown_out or str(out)
-    written = pages.write_run(result, out, figures=figures, shown_out=shown, on_event=on_event)
+    written = pages.write_run(result, out, figures=figures, shown_out=shown_out, on_event=on_event)
     tiles = result.tiles if written else ()
     summary = {
         "folder": str(out),
@@ -122,34 +121,27 @@ def escherize(
         "failed": [{"class": f.name, "reason": f.reason} for f in result.failures],
     }
     if tiles:
-        on_event(_table(tiles))
+        on_event(_table(_title(tiles), [_words(tile) for tile in tiles]))
         if verbose:
-            on_event(_figures(tiles))
+            on_event(_table("Figures", [_figures(tile) for tile in tiles]))
     on_event(_closing(out, bool(written), bool(result.tiles), summary["seconds"]))
     if result.interrupted or cancel.cancelled:
         return Outcome(summary, "cancelled")
     return Outcome(summary, "done" if result.tiles else "nothing found")
 
 
-def _table(tiles: Sequence[EscherTile]) -> Table:
-    """The tiles that were found, in words that fit into 80 characters."""
+def _title(tiles: Sequence[EscherTile]) -> str:
     both = any(tile.front is not None for tile in tiles)
-    title = "Tiles for likeness, then for overlap" if both else "Tiles, best first"
-    return _table_of(title, [_words(tile) for tile in tiles])
+    return "Tiles for likeness, then for overlap" if both else "Tiles, best first"
 
 
-def _figures(tiles: Sequence[EscherTile]) -> Table:
-    """The same tiles in figures."""
-    both = any(tile.front is not None for tile in tiles)
-    return _table_of("Figures", [_cells(tile, both=both) for tile in tiles])
-
-
-def _table_of(title: str, rows: Sequence[dict[str, str]]) -> Table:
+def _table(title: str, rows: Sequence[dict[str, str]]) -> Table:
+    """A table of rows by the names of their columns."""
     return Table(title, tuple(rows[0]), tuple(tuple(row.values()) for row in rows))
 
 
 def _words(tile: EscherTile) -> dict[str, str]:
-    """Return a row of words by the names of its columns."""
+    """What is said of a tile, in 80 characters."""
     row = {"class": f"{tile.name} ({tile.group_name})"}
     if tile.front is not None:
         row |= {"for": tile.objective, "front": "yes" if tile.front else "near"}
@@ -158,22 +150,19 @@ def _words(tile: EscherTile) -> dict[str, str]:
     return {**row, "how its copies lie": lies or "NOT CERTIFIED: they do not tile"}
 
 
-def _cells(tile: EscherTile, *, both: bool) -> dict[str, str]:
-    """Return a row of figures by the names of its columns, which fit into 80 characters."""
-    mismatch, overlap = tile.certificate.edge_mismatch, f"{tile.metrics.iou:.4f}"
-    edges = f"{mismatch:.0e}" if mismatch < float("inf") else "-"
-    bent = "-" if tile.deformation is None else f"{tile.deformation:.3f}"
-    certified = "yes" if tile.certificate.valid else "NO"
-    if both:
-        front = "yes" if tile.front else "near"
-        middle = {"for": tile.objective, "deformation": bent, "overlap": overlap, "front": front}
-        middle["certified"] = certified
-    else:
-        same = f"{tile.recognisability.score:.3f}"
-        middle = {"score": f"{tile.score:.3f}", "bent": bent, "IoU": overlap, "recognised": same}
-        middle |= {"certified": certified, "edges": edges}
-    name = f"{tile.name} ({tile.group_name})"
-    return {"class": name, **middle, "s": f"{tile.seconds:.1f}"}
+def _figures(tile: EscherTile) -> dict[str, str]:
+    """The same in figures."""
+    mismatch, bent = tile.certificate.edge_mismatch, tile.deformation
+    return {
+        "class": f"{tile.name} ({tile.group_name})",
+        "score": f"{tile.score:.3f}",
+        "bent": "-" if bent is None else f"{bent:.3f}",
+        "IoU": f"{tile.metrics.iou:.4f}",
+        "recognised": f"{tile.recognisability.score:.3f}",
+        "certified": "yes" if tile.certificate.valid else "NO",
+        "edges": f"{mismatch:.0e}" if mismatch < float("inf") else "-",
+        "s": f"{tile.seconds:.1f}",
+    }
 
 
 def _closing(out: Path, written: bool, found: bool, seconds: float) -> Note:
@@ -273,7 +262,12 @@ def export(
 
 def _exported(done: Exported, settings: ExportSettings, name: str) -> str:
     width, height = settings.page
-    what = {"none": "tiles", "skeleton": "tiles in outline", "pieces": "pieces"}[settings.cut]
+    words = {
+        "skeleton": "tiles in outline",
+        "pieces": "pieces",
+        "jigsaw": "tiles and parts of them",
+    }
+    what = words.get(settings.cut, "tiles")
     files = str(done.files[0])
     if len(done.files) > 1:
         files = f"{len(done.files)} sheets, {done.files[0]} to {done.files[-1].name}"

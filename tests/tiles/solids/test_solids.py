@@ -27,7 +27,7 @@ from orbiflow.tiles import (
 )
 from orbiflow.tiles.exporting import longer_side
 from orbiflow.tiles.scene import Curve, Motif, Part, Style
-from orbiflow.tiles.solids.relief import raised
+from orbiflow.tiles.solids.making import raised
 from orbiflow.tiles.solids.stacking import Level, stacked
 from solids_read import read_3mf, read_stl, section
 
@@ -51,7 +51,7 @@ def apart(one: Any, other: Any) -> float:
 
 
 @given(tiles, st.sampled_from(get_args(Kind)))
-@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_every_solid_is_closed_in_both_files(tile: Tile, kind: Kind) -> None:
     own: dict[str, Any] = {"area": (90, 90)} if kind == "puzzle" else {}
     made = make_solid(tile, SolidSettings(kind=kind, tile_size=45, **own))
@@ -87,7 +87,9 @@ def test_the_volume_of_a_tile(tile: Tile) -> None:
 
 def test_a_slope_is_exact() -> None:
     square = shapely.box(0, 0, 10, 10)
-    body = stacked(Level(0, square), Level(0, square), Level(3, square.buffer(-2, join_style="mitre")))
+    body = stacked(
+        Level(0, square), Level(0, square), Level(3, square.buffer(-2, join_style="mitre"))
+    )
     assert body.volume() == pytest.approx(3 / 3 * (100 + 36 + 60))
     cone = stacked(Level(1, square.buffer(-4)), Level(2, square))
     assert cone.status().name == "NoError"
@@ -196,9 +198,6 @@ def test_what_is_raised() -> None:
     eye = disc(5, "#202020"), disc(3, "#fff0e0"), disc(1, "#000000"), disc(9, "#000000", 0.3)
     areas = sorted(part.area for part in polygons_in(raised(Motif((*eye, line)), 0.4)))
     assert areas == pytest.approx([np.pi, 10 * 0.4 + np.pi * 0.2**2, 16 * np.pi], rel=0.01)
-    bar = Curve.polyline([[0, 0], [9, 0], [9, 0.1], [0, 0.1]], closed=True)
-    found = raised(Motif((Part((bar,), Style("#000000")),)), 0.4)
-    assert found.area == pytest.approx(9 * 0.4, rel=0.05)
 
 
 def test_notes_say_where_it_is_too_thin() -> None:
@@ -222,7 +221,7 @@ def test_notes_say_where_it_is_too_thin() -> None:
         ({"kind": "mould", "relief": 9}, "relief must be at most height"),
         ({"kind": "cutter", "chamfer": 1}, "chamfer applies only to kind"),
         ({"blade": 1}, "blade applies only to kind cutter"),
-        ({"engrave": True}, "strokes applies only to kind stamp or mould"),
+        ({"engrave": True}, "engrave applies only to kind stamp or mould"),
         ({"kind": "vase"}, "kind must be"),
     ],
 )

@@ -30,6 +30,7 @@ from orbiflow.tiles.silhouette import lightness
 from orbiflow.tiles.tile import EscherTile
 
 BLACK, BLUE = "#000000", "#0000ff"
+MOST_PIXELS = 1e8  # the largest number of pixels of pictures on a page
 
 
 def drawn_on(layout: Layout, given: EscherTile, over: Over) -> Motif:
@@ -43,7 +44,8 @@ def drawn_on(layout: Layout, given: EscherTile, over: Over) -> Motif:
             raise OrbiflowError(
                 "a pen draws lines, and the picture is made of pixels; give a drawing in SVG"
             )
-        density = float(np.sqrt(abs(np.linalg.det(linear)))) * settings.dpi / INCH
+        density = min(settings.dpi / INCH, float(np.sqrt(MOST_PIXELS / np.prod(settings.page))))
+        density *= float(np.sqrt(abs(np.linalg.det(linear))))
         rasters = (carried_raster(over.picture, given, density),)
     return Motif(motif.parts, rasters).moved(*layout.place)
 
@@ -51,7 +53,7 @@ def drawn_on(layout: Layout, given: EscherTile, over: Over) -> Motif:
 def with_drawing(scene: Scene, layout: Layout) -> Scene:
     """Lay the layout's motif on each tile of a scene, in layers under the lines to cut."""
     settings, area = layout.settings, shapely.Polygon(layout.outline.closed.flattened(0.01))
-    if layout.motif is None or scene.motifs:
+    if layout.motif is None or scene.motifs or not scene.tiles:
         return scene
     if settings.coloured:
         motifs = {"drawing": cut_off(layout.motif, area, whole_strokes=False)}
@@ -59,24 +61,22 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
     else:
         line = line_style(layout)
         styles = {"engrave": Style(BLACK), "score": line._replace(stroke=BLUE)}
-        if settings.purpose == "plotter":
+        if settings.purpose in ("plotter", "colouring"):
             styles = dict.fromkeys(styles, line)
-        motifs = _burnt(layout.motif, area, styles)
+        motifs = burnt(layout.motif, area, styles)
     linear = np.array([tile.linear for tile in scene.tiles])
     offsets = np.array([tile.offset for tile in scene.tiles])
     which, ink = np.arange(len(offsets)), palette(settings.palette).outline
-    ink = ink if settings.coloured else None
+    ink, clip = ink if settings.coloured else None, settings.clip or settings.cut == "jigsaw"
     layers = [
-        Layer(
-            name, "drawing", styles[name], (Uses(name, linear, which, offsets),), settings.clip, ink
-        )
+        Layer(name, "drawing", styles[name], (Uses(name, linear, which, offsets),), clip, ink)
         for name, motif in motifs.items()
         if motif.parts or motif.rasters
     ]
     return replace(scene, layers=(*layers, *scene.layers), motifs=motifs)
 
 
-def _burnt(motif: Motif, tile: shapely.Polygon, styles: dict[str, Style]) -> dict[str, Motif]:
+def burnt(motif: Motif, tile: shapely.Polygon, styles: dict[str, Style]) -> dict[str, Motif]:
     """Return the regions and pictures to engrave, and the lines to score.
 
     What is lighter than middle grey erases what lies under it, as on white; faint colours do nothing.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
+from operator import itemgetter
 
 import numpy as np
 import shapely
@@ -22,7 +24,7 @@ from orbiflow.tiles.exporting.placing import (
 )
 from orbiflow.tiles.exporting.settings import USUAL_WIDTH, ExportSettings
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.likeness import Thinnest, narrowest_neck, narrowest_slit
+from orbiflow.tiles.likeness import narrowest_neck, narrowest_slit
 from orbiflow.tiles.scene import Box, Curve, Layer, Motif, PlacedTile, Scene, Style, Uses, rectangle
 from orbiflow.tiles.tilings import Copies, Tile, colouring, copies_inside, copies_meeting
 
@@ -40,11 +42,24 @@ class Layout:
     place: tuple[Array, Array]  # the map, linear part and offset, from the tile's own units
     motif: Motif | None = None  # what lies on the tile, in mm on the page
 
+    @property
+    def fine(self) -> float:
+        """The tolerance in mm of what is flattened or fitted again, a part of the whole."""
+        return self.settings.deviation / 4
+
+    @cached_property
+    def piece(self) -> tuple[Array, str]:
+        """The outline (M, 2) of a piece with its offset, and what the user should know of it."""
+        # flattening and fitting again share what the outline's fit left of the tolerance
+        ring = self.outline.closed.flattened(self.fine / 2)
+        return offset_ring(ring, self.settings.offset, self.fine / 2)
+
 
 def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
     """Scale and turn the tile and put it on the page."""
     width, height = settings.page
-    box = Box(0.0, 0.0, width, height - (STRIP if settings.calibrate else 0.0))
+    strip = STRIP if settings.calibrate else 0.0
+    box = inset(Box(0.0, 0.0, width, height - strip), settings.margin)
     scale = settings.tile_size / longer_side(tile.polygon)
     margin = None if settings.clip or settings.cut == "pieces" else edge_margin(settings.tile_size)
     place = place_on_page(tile, scale, box, y_down, rotate=settings.rotate, margin=margin)
@@ -52,12 +67,12 @@ def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
     if settings.cut != "pieces":
         need = np.ptp(placed.polygon, axis=0) + 2 * bleed(settings)
         if need[0] > box.width or need[1] > box.height:
-            extra = height - box.height
-            strip = f", {extra:g} mm of it for the calibration mark" if extra else ""
+            extra = f", {strip:g} mm of it for the calibration mark" if strip else ""
+            edge = f" with a margin of {settings.margin:g} mm" if settings.margin else ""
             raise OrbiflowError(
                 f"a tile of {settings.tile_size:g} mm does not fit on the page of {width:g} x "
-                f"{height:g} mm: it needs {need[0]:.1f} x {need[1] + extra:.1f} mm{strip}; choose "
-                "a larger area or a smaller tile size"
+                f"{height:g} mm{edge}: it needs {need[0]:.1f} x {need[1] + strip:.1f} mm{extra}; "
+                "choose a larger area or a smaller tile size"
             )
     return Layout(settings, placed, outline(placed, settings.deviation), box, place)
 
@@ -159,7 +174,7 @@ def tiling_scene(layout: Layout) -> Scene:
     )
 
 
-RED = "#ff0000"
+RED, BLUE = "#ff0000", "#0000ff"
 
 
 def line_style(layout: Layout) -> Style:
@@ -185,13 +200,13 @@ def cut_ring(ring: Array, kerf: float, clearance: float) -> Array:
         what = "kerf" if kerf >= clearance else "clearance"
         raise OrbiflowError(
             f"the {what} of {max(kerf, clearance):g} mm is wider than the piece's neck: it is "
-            f"{neck.width:.2f} mm wide {place_on(ring, neck)}; choose a larger tile size"
+            f"{neck.width:.2f} mm wide {place_on(ring, neck.place)}; choose a larger tile size"
         )
     slit = narrowest_slit(ring)
     if slit is not None and slit.width + clearance <= kerf:
         raise OrbiflowError(
             f"the kerf of {kerf:g} mm is wider than a slit of the piece: it is {slit.width:.2f} mm "
-            f"wide {place_on(ring, slit)}, and would be burned away; choose a larger tile size"
+            f"wide {place_on(ring, slit.place)}, and would be burned away; choose a larger tile size"
         )
     return _offset_ring(ring, (kerf - clearance) / 2)
 
@@ -212,14 +227,59 @@ def _offset_ring(ring: Array, distance: float) -> Array:
     return points[steps > 1e-9]
 
 
-def place_on(ring: Array, found: Thinnest) -> str:
-    """Return in words where on a piece a neck or slit is.
+def offset_ring(ring: Array, distance: float, tolerance: float) -> tuple[Array, str]:
+    """Return the line (M, 2) at a distance outside a ring (N, 2), inside if negative, and a note.
+
+    Every point of it is at that distance, within the tolerance, from the ring: corners are rounded on
+    the side to which the line moves. The note says where gaps close or limbs vanish.
+
+    >>> bar = np.array([[0.0, 0.0], [20, 0], [20, 4], [0, 4]])
+    >>> shapely.Polygon(offset_ring(bar, 1.0, 1e-3)[0]).bounds
+    (-1.0, -1.0, 21.0, 5.0)
+    """
+    if not distance:
+        return ring, ""
+    piece, reach = shapely.Polygon(ring), abs(distance)
+    sides = max(8, math.ceil(np.pi / 4 / math.acos(max(0.0, 1 - tolerance / reach))))
+    parts = polygons_in(piece.buffer(distance, quad_segs=sides))
+    if len(parts) != 1:
+        neck = narrowest_neck(ring)
+        what = f"would fall into {len(parts)} parts" if parts else "vanishes"
+        raise OrbiflowError(
+            f"with an offset of {distance:g} mm the piece {what}: it is {neck.width:.2f} mm wide "
+            f"{place_on(ring, neck.place)}; choose a smaller offset or a larger tile size"
+        )
+    moved = shapely.Polygon(parts[0].exterior)
+    back = moved.buffer(-distance, quad_segs=sides)
+    # what does not come back, but for corners, is a gap that closes or a limb that vanishes
+    lost = polygons_in(piece.difference(back) if distance < 0 else back.difference(piece))
+    ends = [_farthest(part, back) for part in lost]
+    deep = sorted((end for end in ends if end[0] > reach), key=itemgetter(0))
+    note = ""
+    if deep:
+        what = ("limb vanishes", "limbs vanish") if distance < 0 else ("gap closes", "gaps close")
+        note = (
+            f"with an offset of {distance:g} mm, {len(deep)} {what[len(deep) > 1]} where the outline "
+            f"is less than {2 * reach:g} mm across, the largest {place_on(ring, deep[-1][1])}"
+        )
+    return shapely.get_coordinates(moved.exterior)[:-1], note
+
+
+def _farthest(part: shapely.Polygon, other: shapely.Polygon) -> tuple[float, Array]:
+    """Return how far a part reaches from the boundary of another polygon, and where."""
+    points = shapely.get_coordinates(part)
+    distance = np.asarray(shapely.distance(shapely.points(points), other.boundary))
+    return float(distance.max()), points[distance.argmax()]
+
+
+def place_on(ring: Array, place: Array) -> str:
+    """Return in words where on a piece a point (2,) is.
 
     >>> ring = np.array([[10.0, 10.0], [30.0, 10.0], [30.0, 14.0], [10.0, 14.0]])
-    >>> place_on(ring, narrowest_neck(ring)).split(" from ")[1]
+    >>> place_on(ring, narrowest_neck(ring).place).split(" from ")[1]
     'its left and 2.0 mm'
     """
-    x, y = found.place - ring.min(axis=0)
+    x, y = place - ring.min(axis=0)
     return f"{x:.1f} mm from its left and {y:.1f} mm from its top"
 
 
@@ -229,17 +289,16 @@ LEAST_EDGE = 0.1  # twice the least distance in mm of cuts from the sheet's edge
 
 def pieces_scenes(layout: Layout, *, fine: bool = True) -> list[Scene]:
     """Return a scene for each sheet, several where a bed does not hold all; smooth cuts if `fine`."""
-    settings, box = layout.settings, layout.box
-    flat = settings.deviation / 4
-    # flattening and fitting again share what the outline's fit left of the tolerance
-    ring = cut_ring(layout.outline.closed.flattened(flat / 2), settings.kerf, settings.clearance)
+    settings, box, flat = layout.settings, layout.box, layout.fine
+    ring = cut_ring(layout.piece[0], settings.kerf, settings.clearance)
     curve = _closed_fit(ring, flat) if fine else Curve.polyline(ring, closed=True)
     line = curve.flattened(flat / 4)
     gap = max(settings.spacing, LEAST_GAP)
     arrangements = dense_arrangements(layout.tile, line, gap)
     edge = max(gap, LEAST_EDGE) / 2
     placed = on_sheet(arrangements, line, box.width - 2 * edge, box.height - 2 * edge)
-    placed = replace(placed, offsets=placed.offsets + edge)
+    corner = np.array([box.left + edge, box.top + edge])
+    placed = replace(placed, offsets=placed.offsets + corner)
     if not len(placed):
         short, long = rectangle_sides(line)
         raise OrbiflowError(
@@ -272,14 +331,21 @@ def _scene(layout: Layout, placed: Uses, curve: Curve, line: Array, box: Box, ga
         PlacedTile(aspect, placed.linear[aspect], offset)
         for aspect, offset in zip(placed.which.tolist(), placed.offsets, strict=True)
     ]
-    cuts = tuple(curve.moved(piece.linear, piece.offset) for piece in pieces)
+    layers = [Layer("cut", "cut", line_style(layout), _moved(curve, pieces))]
+    if layout.settings.offset > 0:
+        seams = _moved(layout.outline.closed, pieces)
+        layers.insert(0, Layer("seam", "mark", Style(None, BLUE, 0.1), seams))
     return Scene(
         *layout.settings.page,
-        (Layer("cut", "cut", line_style(layout), cuts),),
+        tuple(layers),
         window=box,
         prototile=layout.tile.polygon,
         tiles=tuple(pieces),
     )
+
+
+def _moved(curve: Curve, pieces: list[PlacedTile]) -> tuple[Curve, ...]:
+    return tuple(curve.moved(piece.linear, piece.offset) for piece in pieces)
 
 
 def _closed_fit(ring: Array, tolerance: float) -> Curve:
@@ -300,5 +366,5 @@ def _require_clear(rings: Array, box: Box, gap: float) -> None:
     tree = shapely.STRtree(polygons)
     first, second = tree.query(polygons, predicate="dwithin", distance=0.999 * gap)
     low, high = rings.min(axis=(0, 1)), rings.max(axis=(0, 1))
-    if (first != second).any() or (low < 0).any() or (high > (box.width, box.height)).any():
+    if (first != second).any() or (low < box[:2]).any() or (high > box[2:]).any():
         raise RuntimeError("the nesting broke its promise: pieces too close or off the sheet")

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.layouts import STRIP
+from orbiflow.tiles.exporting.layouts import BLUE, STRIP
 from orbiflow.tiles.scene import (
     Box,
     Curve,
@@ -27,7 +27,7 @@ ARM = 4.0  # half the width of a cross, in mm
 
 MOST_SHEETS = 400
 
-BLUE = Style(None, "#0000ff", 0.1)
+MARK = Style(None, BLUE, 0.1)
 
 
 def split(scene: Scene, bed: tuple[float, float], tolerance: float) -> list[Scene]:
@@ -102,7 +102,7 @@ def _sheet(
         if page.left + ARM < x < page.right - ARM and page.top + ARM < y < page.bottom - ARM
         for dx, dy in ((ARM, 0.0), (0.0, ARM))
     ]
-    layers.append(Layer("registration", "mark", BLUE, tuple(marks)))
+    layers.append(Layer("registration", "mark", MARK, tuple(marks)))
     return replace(
         scene,
         width=page.width,
@@ -166,5 +166,5 @@ def calibrated(scene: Scene) -> Scene:
     lines = [[[left, y], [left + 100, y]]]
     lines += [[[x, y - 2.5], [x, y + 2.5]] for x in (left, left + 50, left + 100)]
     marks = tuple(Curve.polyline(line) for line in lines)
-    layer = Layer("calibration 100 mm", "mark", BLUE, marks)
+    layer = Layer("calibration 100 mm", "mark", MARK, marks)
     return replace(scene, layers=(*scene.layers, layer))

@@ -8,11 +8,11 @@ from pathlib import Path
 
 from orbiflow import __version__
 from orbiflow.arguments import as_path
-from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
 from orbiflow.tiles.exporting.drawings import drawn_on, with_drawing
+from orbiflow.tiles.exporting.jigsaws import jigsaw_scenes
 from orbiflow.tiles.exporting.layouts import Layout, layout, pieces_scenes, place_on, tiling_scene
 from orbiflow.tiles.exporting.settings import ExportSettings
 from orbiflow.tiles.exporting.sheets import calibrated, split
@@ -113,32 +113,47 @@ def scenes(
     certificate = given.require_certified(
         force=force, otherwise="so it is not exported; --force exports it, marked so"
     )
+    placed, notes = laid_out(given, settings, picture)
+    notes = (*notes, *_colour_notes(given, settings))
+    made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
+    if settings.cut == "jigsaw":
+        facts = made[0].facts
+        pieces, whole = facts["pieces"], facts["whole_tiles"]
+        count = f"{pieces} pieces, {whole} whole tiles and {pieces - whole} at the border"
+        notes = (*notes, f"the jigsaw has {count}, the smallest {facts['smallest']:.2f} of a tile")
+    if settings.calibrate:
+        # the strip at the foot is the last sheet's; pieces have one on each, a jigsaw's tray has none
+        marked = {"pieces": slice(None), "jigsaw": slice(1)}.get(settings.cut, slice(-1, None))
+        made[marked] = [calibrated(scene) for scene in made[marked]]
+    return made, notes
+
+
+def laid_out(
+    given: EscherTile, settings: ExportSettings, picture: str | Path | None = None
+) -> tuple[Layout, tuple[str, ...]]:
+    """Return a tile in its place with what lies on it, and what the user should know."""
     placed = layout(given.tile, settings, y_down=given.y_down)
-    notes = (*neck_notes(placed.tile.polygon, settings.warn_neck), *_colour_notes(given, settings))
-    if placed.outline.note:
-        notes = (placed.outline.note, *notes)
+    told = (placed.outline.note, placed.piece[1] if settings.cut == "pieces" else "")
+    notes = (*filter(None, told), *_neck_notes(placed))
     if picture is not None or settings.strokes or settings.eyes:
         given = with_map(given)
         over = Over() if picture is None else read_over(picture, given)
         placed = replace(placed, motif=drawn_on(placed, given, over))
         notes = (*given.notes, *over.notes, *notes)
-    made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
-    if settings.calibrate:
-        # the strip at the foot is the last sheet's; pieces have one on each
-        first = 0 if settings.cut == "pieces" else len(made) - 1
-        made[first:] = [calibrated(scene) for scene in made[first:]]
-    return made, notes
+    return placed, notes
 
 
 def _made(placed: Layout, settings: ExportSettings) -> list[Scene]:
     fine = settings.deviation / 4
     if settings.cut == "pieces":
         made = pieces_scenes(placed, fine=settings.file_format not in ("dxf", "json"))
+    elif settings.cut == "jigsaw":
+        made = jigsaw_scenes(placed)
     else:
         made = [skeleton_scene(placed) if settings.cut == "skeleton" else tiling_scene(placed)]
     painted = settings.cut == "none" and settings.filled
     made = [with_drawing(scene, placed) for scene in made]
-    if settings.cut != "pieces" and settings.bed is not None:
+    if settings.cut in ("none", "skeleton") and settings.bed is not None:
         made = split(made[0], settings.bed, fine)
     # a machine need not know copies
     return made if painted else [flattened(scene, fine) for scene in made]
@@ -158,6 +173,7 @@ def _described(
         "one unit is one millimetre."
     )
     facts = {
+        **scene.facts,
         "class": tile.isohedral_class or None,
         "group": tile.group.name or None,
         "rank": given.rank,
@@ -166,6 +182,7 @@ def _described(
         "tile_size": settings.tile_size,
         "kerf": settings.kerf,
         "clearance": settings.clearance,
+        "offset": settings.offset,
         "tolerance": settings.deviation,
     }
     return replace(scene, title=title, notes=tuple(notes), facts=facts)
@@ -180,17 +197,18 @@ def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...
     return (f"its lines of {width:g} mm hardly show on a screen; a cutter follows them",)
 
 
-def neck_notes(ring: Array, limit: float | None) -> list[str]:
-    """Say where a tile's outline in mm is thinner than a limit, if there is one."""
-    if limit is None:
-        return []
+def _neck_notes(placed: Layout) -> tuple[str, ...]:
+    limit, ring = placed.settings.warn_neck, placed.tile.polygon
+    if not limit:
+        return ()
     try:
         neck = narrowest_neck(ring)
     except OrbiflowError as error:  # a forced tile may cross itself
-        return [f"its necks cannot be measured: {error}"]
+        return (f"its necks cannot be measured: {error}",)
     if neck.width >= limit:
-        return []
-    return [f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm {place_on(ring, neck)}"]
+        return ()
+    place = place_on(ring, neck.place)
+    return (f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm {place}",)
 
 
 def write_scene(scene: Scene, settings: ExportSettings) -> str | bytes:

@@ -100,13 +100,12 @@ OVERVIEW, INDEX, FRONT, READ = "overview.png", "index.html", "front.png", "read.
 
 
 def write_gallery(
-    result: SearchResult, out: Path, *, figures: bool = False, shown_out: str = ""
+    result: SearchResult, out: Path, *, figures: bool = False, shown_out: str = "."
 ) -> None:
     """Write each tile's folder, `overview.png`, `index.html` and, after a search for both, `front.png`.
 
     As many processes as searched draw `figures`; without these, starting one would take longer than
-    drawing. There is at least one tile. `shown_out` is what the page's commands call the folder, by
-    default its path.
+    drawing. There is at least one tile. `shown_out` is what the page's commands call the folder.
 
     Raises:
         OutputError: If a file cannot be written.
@@ -125,17 +124,8 @@ def write_gallery(
                 pass
     write_atomic(out / OVERVIEW, overview_png(tiles, target, colours, failures=failures))
     extra = [figure_files(tile) if figures else () for tile in tiles]
-    read, shown = (out / READ).is_file(), shown_out or str(out)
-    page = index_page(
-        tiles,
-        target,
-        names,
-        out=shown,
-        read=read,
-        colours=colours,
-        failures=failures,
-        figures=extra,
-    )
+    read, more = (out / READ).is_file(), {"failures": failures, "figures": extra}
+    page = index_page(tiles, target, names, out=shown_out, read=read, colours=colours, **more)
     write_atomic(out / INDEX, page)
     if result.method.objective == "both":
         _write_front(tiles, result.found, out)
@@ -188,7 +178,7 @@ def write_run(
     out: str | Path,
     *,
     figures: bool = False,
-    shown_out: str = "",
+    shown_out: str | None = None,
     on_event: Sink = ignore,
 ) -> list[Path]:
     """Write what a search found as a result folder: a folder a class, overviews, `result.json`.
@@ -220,8 +210,7 @@ def write_run(
         on_event(Note("no flow made these tiles, so there is none to draw: the silhouette bent"))
     with folder.replaced() as staged:
         if tiles:
-            shown = shown_out or str(out)
-            write_gallery(result, staged, figures=figures, shown_out=shown)
+            write_gallery(result, staged, figures=figures, shown_out=shown_out or str(out))
         write_atomic(staged / RESULT, json.dumps(report(result), allow_nan=False))
         files = [path.relative_to(staged) for path in staged.rglob("*") if path.is_file()]
     written = [folder.path / path for path in sorted(files)]

@@ -49,9 +49,8 @@ def _items(
                 placed = cut_off(placed, window)
             yield from placed.rasters
             for part in placed.parts:
-                fill, stroke, width = part.style
-                colours = (layer.ink if colour == INK else colour for colour in (fill, stroke))
-                yield part._replace(style=Style(*colours, width))
+                fill, stroke = (layer.ink if c == INK else c for c in part.style[:2])
+                yield part._replace(style=part.style._replace(fill=fill, stroke=stroke))
 
 
 def cut_off(motif: Motif, area: shapely.Polygon, *, whole_strokes: bool = True) -> Motif:
@@ -117,6 +116,8 @@ def polylines(lines: BaseGeometry) -> tuple[Curve, ...]:
 
 def _masked(raster: Raster, area: shapely.Polygon) -> Raster:
     """Return a picture that is transparent outside an area."""
+    if area.covers(shapely.Polygon(raster.corners)):
+        return raster
     ring = shapely.get_coordinates(area.exterior) - raster.offset
     image, mask = Image.open(io.BytesIO(raster.png)), Image.new("L", raster.size)
     pixels = ring @ np.linalg.inv(raster.linear).T - 0.5

@@ -19,6 +19,7 @@ from orbiflow.tiles.solids.settings import SolidSettings
 from orbiflow.tiles.solids.stacking import Level, stacked
 
 FLATNESS = 0.01  # how far in mm straight sides may be from the tile's curves: no printer shows it
+MOST_PIECES = 400  # of a puzzle, so that its file stays below some 100 MB
 APART = 3.0  # distance in mm of a puzzle's parts on the bed
 
 
@@ -113,7 +114,8 @@ def _mould(plan: Plan) -> Manifold:
 def _puzzle(plan: Plan) -> dict[str, Manifold]:
     """Return a tray and its pieces, in it or beside it on the bed."""
     settings, copies = plan.settings, chosen_copies(plan.layout)
-    fit, wanted = len(copies), settings.copies or max(len(copies), 1)
+    fit = min(len(copies), MOST_PIECES)
+    wanted = settings.copies or max(fit, 1)
     if wanted > fit:
         raise OrbiflowError(
             f"a tray of {settings.area[0]:g} x {settings.area[1]:g} mm holds {fit} pieces of "
