@@ -53,7 +53,8 @@ def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     command += ["--out", folder / "new" / "out", "--classes", "IH4,ih6", "--workers", 2, *FEW]
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
+    # a slow machine has lines of progress, and nothing else
+    assert all("% after " in line for line in done.stderr.splitlines()), done.stderr
     for name in ("IH4", "IH6"):
         assert f"{name}: IoU" in done.stdout
     assert "dark on light" in done.stdout
