@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import time
 from collections.abc import Sequence
@@ -94,9 +95,10 @@ def escherize(
     pages.result_folder(out)
     masks = [Path(pin) for pin in settings.pin or ()]
     check_output_folder(out, image, settings.emphasis, *masks)
-    picture = pages.show_reading(target, image, out, on_event)
+    picture = pages.read_png(target, image)
+    show = functools.partial(pages.show_reading, target, picture, out, on_event)
     settings = settings.replace(workers=settings.workers or os.cpu_count() or 1)
-    result = search.escherize(target, settings, on_event=on_event, cancel=cancel)
+    result = search.escherize(target, settings, on_checked=show, on_event=on_event, cancel=cancel)
     for text in _remarks(result):
         on_event(Note(text))
     written = pages.write_run(

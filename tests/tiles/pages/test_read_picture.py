@@ -63,7 +63,8 @@ def test_a_polygon_is_drawn_upright(tmp_path: Path) -> None:
 
 def test_it_is_told_at_once_and_the_next_run_may_replace_it(picture: Path, tmp_path: Path) -> None:
     events: list[Event] = []
-    show_reading(Target.read(picture), picture, tmp_path / "out", events.append)
+    target = Target.read(picture)
+    show_reading(target, read_png(target, picture), tmp_path / "out", events.append)
     notes = [event for event in events if isinstance(event, Note)]
     assert any(str(tmp_path / "out" / "read.png") in note.text for note in notes)
     assert any(note.warning and "left out" in note.text for note in notes)
@@ -74,7 +75,7 @@ def test_another_read_png_is_not_replaced(picture: Path, tmp_path: Path) -> None
     (tmp_path / "out").mkdir()
     Image.new("L", (9, 9)).save(tmp_path / "out" / "read.png")
     with pytest.raises(OutputError, match=r"read\.png, which is of no earlier run"):
-        show_reading(Target.read(picture), picture, tmp_path / "out")
+        show_reading(Target.read(picture), b"", tmp_path / "out")
 
 
 def test_a_failed_search_leaves_the_earlier_run(
@@ -85,11 +86,11 @@ def test_a_failed_search_leaves_the_earlier_run(
     (out / "result.json").write_text('{"schema_version": 2, "tiles": []}')
     (out / "read.png").write_bytes(b"earlier")
 
-    def fail(*_: object, **__: object) -> None:
+    def fail(*_: object) -> None:
         assert (out / "read-next.png").is_file()  # before the search
         raise RuntimeError
 
-    monkeypatch.setattr("orbiflow.tiles.search.escherize", fail)
+    monkeypatch.setattr("orbiflow.tiles.search.escherizing._search", fail)
     with pytest.raises(RuntimeError):
         operations.escherize(picture, out)
     assert (out / "read.png").read_bytes() == b"earlier"

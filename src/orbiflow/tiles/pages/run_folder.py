@@ -22,7 +22,7 @@ from orbiflow.runtime import (
 )
 from orbiflow.tiles.pages.overview import overview_png
 from orbiflow.tiles.pages.page import TILE_FILES, index_page
-from orbiflow.tiles.pages.read_picture import is_read_png, read_png
+from orbiflow.tiles.pages.read_picture import is_read_png
 from orbiflow.tiles.pictures import (
     bending_picture,
     comparison,
@@ -176,18 +176,15 @@ def result_folder(out: str | Path) -> ResultFolder:
     return ResultFolder(as_path(out, "the folder to write into"), written_files)
 
 
-def show_reading(target: Target, source: Path, out: Path, on_event: Sink = ignore) -> bytes:
+def show_reading(target: Target, picture: bytes, out: Path, on_event: Sink = ignore) -> None:
     """Write `read.png` into the folder at once and tell what was read and what may be wrong with it.
 
     Beside an earlier run it is `read-next.png`, until this run replaces that one.
 
-    Returns:
-        The picture, for `write_run`.
-
     Raises:
         OutputError: If the folder holds what orbiflow did not write, or cannot be written.
     """
-    folder, picture = result_folder(out), read_png(target, source)
+    folder = result_folder(out)
     is_beside_a_run = (folder.path / RESULT).is_file()
     path = make_folder(folder.path) / (READ_NEXT if is_beside_a_run else READ)
     write_atomic(path, picture)
@@ -196,7 +193,6 @@ def show_reading(target: Target, source: Path, out: Path, on_event: Sink = ignor
     on_event(Note(f"what was read is drawn in {path}"))
     for doubt in doubts(target):
         on_event(Note(doubt, warning=True))
-    return picture
 
 
 def write_run(
@@ -216,7 +212,7 @@ def write_run(
     Args:
         result: What the search found.
         out: The folder, which every command on a RESULT takes.
-        picture: What was read, as `show_reading` returned it.
+        picture: What was read, as `read_png` draws it.
         figures: Write the figures for print, too, in as many processes as the search had.
         shown_out: What the page's commands call the folder. Default: its path.
         on_event: Called with each `Note` and `Written`.
