@@ -17,9 +17,12 @@ from typing import Any
 
 import numpy as np
 from common import ROOT, Ring
+from scipy.stats import spearmanr
 
-from orbiflow.tiles import Fidelity
+from orbiflow.tiles import Fidelity, Rating
+from orbiflow.tiles.likeness import likeness_ratings
 from orbiflow.tiles.likeness.elastic import POSE_WEIGHT
+from orbiflow.tiles.likeness.rating import WORDS
 
 Row = dict[str, Any]
 
@@ -48,6 +51,54 @@ def within(values: list[Ring]) -> Ring:
     return np.concatenate([value - value.mean() for value in values])
 
 
+def _foretold(ours: dict[str, list[Row]], lengths: dict[str, float], name: str) -> list[Rating]:
+    """Ratings of a silhouette's tiles, their weights fitted to the marks of the others."""
+
+    def terms(silhouette: str) -> Ring:
+        odds = np.array([-_fidelity(row).damage / 4 for row in ours[silhouette]])
+        whole = np.ones((len(odds), 1)) * (1, odds.max(), np.log(lengths[silhouette]))
+        return np.column_stack([whole, odds.max() - odds])
+
+    others = [other for other in ours if other != name]
+    marks = [np.mean(row["marks"]) for other in others for row in ours[other]]
+    known = np.concatenate([terms(other) for other in others])
+    weights = np.linalg.lstsq(known, np.array(marks), rcond=None)[0]
+    return [Rating.of_mark(mark) for mark in terms(name) @ weights]
+
+
+def _print_ratings(ours: dict[str, list[Row]], lengths: dict[str, float]) -> None:
+    marks = np.array([row["marks"] for rows in ours.values() for row in rows])
+    said = [Rating.of_mark(mark) for mark in marks.mean(axis=1)]
+    rated = [
+        rating
+        for name, rows in ours.items()
+        for rating in likeness_ratings([_fidelity(row).score for row in rows], lengths[name])
+    ]
+    first, second = ([Rating.of_mark(mark) for mark in own] for own in marks.T)
+    pairs = {
+        "stars, and the judges' mean": (rated, said),
+        "with weights fitted to other silhouettes": (
+            [rating for name in ours for rating in _foretold(ours, lengths, name)],
+            said,
+        ),
+        "the judges with each other": (first, second),
+    }
+    words = list(WORDS.values())
+    print(
+        "\nall silhouettes together                  correlation of ranks  same word  or the next"
+    )
+    for label, (a, b) in pairs.items():
+        places = [[words.index(rating.word) for rating in side] for side in (a, b)]
+        apart = abs(np.subtract(places[0], places[1]))
+        rank = spearmanr([r.stars for r in a], [r.stars for r in b]).statistic
+        print(f"{label:42}{rank:20.2f}{np.mean(apart == 0):11.2f}{np.mean(apart < 2):13.2f}")
+    table = np.zeros((4, 4), dtype=int)
+    np.add.at(table, tuple([words.index(r.word) for r in side] for side in (rated, said)), 1)
+    print("\nour word, and the judges'" + "".join(f"{word:>11}" for word in words))
+    for word, row in zip(words, table, strict=True):
+        print(f"{word:26}" + "".join(f"{count:11}" for count in row))
+
+
 def main() -> None:
     """Print the tables."""
     document = json.loads((ROOT / "benchmarks" / "data" / "likeness_marks.json").read_text())
@@ -69,6 +120,7 @@ def main() -> None:
         first = np.mean([marks[name][np.argmin(own[name])] for name in own])
         print(f"{label:20}{correlation:10.2f}{first:24.2f}")
 
+    _print_ratings(ours, document["lengths"])
     print("\nARAP's first tile: its mark, and that of the tile that we would put first")
     for name, rows in tiles.items():
         for row in (row for row in rows if row["method"] == "arap"):

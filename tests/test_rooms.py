@@ -14,7 +14,7 @@ import pytest
 HOME = Path(__file__).parents[1] / "src" / "orbiflow"
 
 TILES = ["geometry", "tilings", "silhouette", "likeness", "tile", "result_file"]
-TILES += ["search", "pictures", "exporting"]
+TILES += ["search", "pictures", "scene", "motifs", "exporting", "solids"]
 TILES += ["art", "motion", "pages"]
 DENSITY = ["spaces", "models", "conditionals", "fitting"]
 DENSITY += ["estimator", "comparing", "regions", "tables", "pictures", "run_folder", "operations"]

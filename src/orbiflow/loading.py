@@ -16,7 +16,6 @@ from orbiflow.tiles import (
     TILE_MODEL,
     EscherTile,
     TileMap,
-    folder_names,
     read_document,
     read_result,
     save_tiles,
@@ -148,25 +147,16 @@ def _run(path: Path, uncertified: bool) -> LoadedRun:
 
 
 def _tile_folder(folder: Path, uncertified: bool) -> EscherTile | TileMap:
-    result = folder.resolve().parent / RESULT
-    if not result.is_file():
+    if not (folder.resolve().parent / RESULT).is_file():
         return TileMap.read(folder / TILE_MODEL)
-    file, document = read_document(result)
-    try:
-        names = folder_names([str(entry["class"]) for entry in document["tiles"]])
-    except (KeyError, TypeError) as error:
-        raise InputFileError(f"{file}: not a result of orbiflow escherize: {error}") from error
-    name = folder.resolve().name
-    if name not in names:
-        raise InputFileError(f"{file} tells of {', '.join(names)}, not of {name}")
-    return _tile(file, names.index(name) + 1, uncertified)
+    return _tile(folder, None, uncertified)
 
 
-def _tile(file: Path, rank: int, uncertified: bool) -> EscherTile:
-    tile = read_result(file, rank)
+def _tile(path: Path, rank: int | None, uncertified: bool) -> EscherTile:
+    tile = read_result(path, rank)
     if not tile.certificate.valid and not uncertified:
         raise CertificationError(
-            f"{file}: tile {rank}, {tile.name}, does not tile the plane: "
+            f"{path}: tile {tile.rank}, {tile.name}, does not tile the plane: "
             f"{'; '.join(tile.certificate.reasons)}; load(..., uncertified=True) gives it all the same"
         )
     return tile

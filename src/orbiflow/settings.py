@@ -399,18 +399,13 @@ class FileSettings(Settings):
 
 @cache
 def fields_of(cls: type[Settings]) -> tuple[Field, ...]:
-    """Return the fields of a settings class, in the order in which they were written."""
-    hints = typing.get_type_hints(cls, include_extras=True)
-    return tuple(
-        Field(
-            entry.name,
-            hints[entry.name],
-            entry.default,
-            _doc_finder(cls, entry.name),
-            cls.default_group,
-        )
+    """Return the fields of a settings class as they were written, those under a `Group` last."""
+    hints, group = typing.get_type_hints(cls, include_extras=True), cls.default_group
+    fields = (
+        Field(entry.name, hints[entry.name], entry.default, _doc_finder(cls, entry.name), group)
         for entry in dataclasses.fields(cast(Any, cls))
     )
+    return tuple(sorted(fields, key=lambda entry: entry.of_class(Group) is not None))
 
 
 def check_names(given: Iterable[str], known: Iterable[Field], what: str) -> None:

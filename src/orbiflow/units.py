@@ -25,6 +25,23 @@ LONGEST_SIDE = 20_000.0
 COLUMNS = {"single": 85.0, "double": 180.0}
 """Widths in mm of a journal's one and two columns, between those of the large publishers."""
 
+PAGES = {
+    **{f"a{n}": size for n, size in enumerate([(420, 594), (297, 420), (210, 297), (148, 210)], 2)},
+    "letter": (215.9, 279.4),
+    "legal": (215.9, 355.6),
+    "tabloid": (279.4, 431.8),
+    "mug": (228.6, 88.9),  # print files of mugs of 11 oz: 9 x 3.5 in
+    "phone": (
+        90.0,
+        180.0,
+    ),  # the largest telephones, some 80 x 165, and what wraps around their edges
+    **{name: (width, round(width / 1.5, 1)) for name, width in COLUMNS.items()},
+}
+"""Width and height in mm of pages that have a name; those of paper are upright."""
+
+POSTS = {"square": (1080, 1080), "story": (1080, 1920)}
+"""Width and height in pixels of posts and clips, 1:1 and 9:16, as the large networks show them."""
+
 _NUMBER = r"\+?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
 _UNIT = r"[a-z\"'µ]*"
 
@@ -43,6 +60,16 @@ def length(text: str) -> float:
         raise OrbiflowError(f"{text!r} is not a length; write a number and its unit, such as 40mm")
     number, unit = found[1], found[2].lower()
     return 0.0 if float(number) == 0 and not unit else _millimetres(number, unit, text, number)
+
+
+def signed_length(text: str) -> float:
+    """Return a length in mm that may be negative.
+
+    >>> signed_length("-2mm"), signed_length("0.25in")
+    (-2.0, 6.35)
+    """
+    text = text.strip()
+    return -length(text[1:]) if text.startswith("-") else length(text)
 
 
 def size(text: str) -> tuple[float, float]:
@@ -72,12 +99,14 @@ def pixels(text: str, dpi: float) -> float:
     return length(text) * dpi / MILLIMETRES["in"] if found is None else float(found[1])
 
 
-def pixel_size(text: str, dpi: float) -> tuple[int, int]:
-    """Return width and height of a picture in whole pixels, from 3000x2000 or 300x200mm.
+def pixel_size(text: str, dpi: float) -> tuple[float, float]:
+    """Return width and height of a picture in pixels, which a length need not make whole.
 
-    >>> pixel_size("3000x2000", 300), pixel_size("1x2in", 100)
-    ((3000, 2000), (100, 200))
+    >>> pixel_size("3000x2000", 300), pixel_size("1x2in", 100), pixel_size("story", 300)
+    ((3000, 2000), (100.0, 200.0), (1080, 1920))
     """
+    if (name := text.strip().lower()) in POSTS:
+        return POSTS[name]
     whole = re.fullmatch(r"\s*(\d{1,9})\s*(?:px)?\s*[x×]\s*(\d{1,9})\s*(?:px)?\s*", text)
     if whole:
         return int(whole[1]), int(whole[2])
@@ -85,19 +114,32 @@ def pixel_size(text: str, dpi: float) -> tuple[int, int]:
         raise OrbiflowError(
             f"{text!r} is not a size in pixels; write two whole numbers, such as 3000x2000"
         )
-    width, height = size(text)
+    width, height = page_size(text, also=tuple(POSTS))
     per = dpi / MILLIMETRES["in"]
-    return round(width * per), round(height * per)
+    return width * per, height * per
 
 
-def page_size(text: str) -> tuple[float, float]:
-    """Return width and height of a page in mm; a journal's column is two thirds as high as wide.
+def page_size(text: str, *, also: tuple[str, ...] = ()) -> tuple[float, float]:
+    """Return width and height of a page in mm: two lengths, or one of `PAGES`, perhaps turned.
 
-    >>> page_size("double"), page_size("3x2cm")
-    ((180.0, 120.0), (30.0, 20.0))
+    What cannot be read is answered with the names of all pages, and those that are known `also`.
+
+    >>> page_size("3x2cm"), page_size("A4"), page_size("letter-landscape")
+    ((30.0, 20.0), (210, 297), (279.4, 215.9))
     """
-    width = COLUMNS.get(text.strip().lower())
-    return size(text) if width is None else (width, round(width / 1.5, 1))
+    name, _, way = text.strip().lower().partition("-")
+    if name in PAGES and way in ("", "portrait", "landscape"):
+        page = PAGES[name]
+        if not way:
+            return page
+        short, long = sorted(page)
+        return (long, short) if way == "landscape" else (short, long)
+    if not re.search(r"\d.*[x×]", text, flags=re.IGNORECASE):
+        raise OrbiflowError(
+            f"{text!r} is not a page; write a size such as 300x200mm, or one of {', '.join((*also, *PAGES))}, "
+            "with -landscape or -portrait to turn it"
+        )
+    return size(text)
 
 
 def colour(text: str) -> str:
@@ -127,15 +169,23 @@ LengthOrZero = Annotated[
 ]
 """A length of at least 0: text with a unit, or a number of mm."""
 
+SignedLength = Annotated[
+    float,
+    Parsed(signed_length, "a length such as 2mm or -1mm", "LENGTH"),
+    Range(-LONGEST_SIDE, LONGEST_SIDE),
+    Unit("mm"),
+]
+"""A length that may be negative: text with a unit, or a number of mm."""
+
 Size = Annotated[tuple[_Side, _Side], Parsed(size, "a size such as 300x200mm", "SIZE"), Unit("mm")]
 """A width and a height: text with a unit, or two numbers of mm."""
 
 PageSize = Annotated[
     tuple[_Side, _Side],
-    Parsed(page_size, "a size such as 300x200mm, single or double", "SIZE"),
+    Parsed(page_size, "a size such as 300x200mm, or a page such as A4 or A4-landscape", "SIZE"),
     Unit("mm"),
 ]
-"""A width and a height, or a journal's single or double column."""
+"""A width and a height, or a page's name."""
 
 Colour = Annotated[str, Parsed(colour, "a colour such as #2a9d8f", "COLOUR")]
 """A colour as #rrggbb."""

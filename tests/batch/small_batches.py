@@ -5,12 +5,13 @@ from __future__ import annotations
 import csv
 import json
 import os
+import time
 from collections.abc import Callable, Generator, Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from orbiflow.batch import Answer, Executor, Parcel, executors
+from orbiflow.batch import Answer, Executor, Parcel, dask_cluster, executors
 from orbiflow.batch.executors import carry_out
 from orbiflow.runtime import Call, Cancel, Event, Failed, Finished, Sink, find
 from runtime.searches import BOOT, run
@@ -109,6 +110,14 @@ def deadly(header: str, data: bytes) -> tuple[str, dict[str, bytes]]:
         os._exit(3)
     ended = Finished("done", {"name": json.loads(header)["name"]})
     return json.dumps(ended.to_json()), {"file": data}
+
+
+def endless(_header: str, _data: bytes) -> tuple[str, dict[str, bytes]]:
+    """Work that ends once nobody waits for it any more."""
+    cancel = dask_cluster._released()
+    while not cancel.cancelled:
+        time.sleep(0.02)
+    return "", {}
 
 
 def state_of(answer: Answer) -> str:

@@ -20,6 +20,7 @@ from batch.small_batches import (
     boot_parcels,
     deadly,
     deadly_locally,
+    endless,
     state_of,
     without_seconds,
 )
@@ -28,7 +29,7 @@ from orbiflow.batch import Answer, Executor, LocalProcesses, Parcel, dask_cluste
 from orbiflow.batch.dask_cluster import DaskCluster
 from orbiflow.batch.executors import carry_out
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Cancel, Event, Failed, Finished, Note, find
+from orbiflow.runtime import Cancel, Event, Failed, Finished, Note, Polled, find
 
 DEADLY = find("escherize").call({"image": "any.png"})
 
@@ -163,6 +164,26 @@ def test_stopping_a_cluster_leaves_nothing_on_it(
     assert not [
         c for c in cluster.scheduler.clients.values() if c.client_key.startswith("orbiflow")
     ]
+
+
+def test_stopping_a_cluster_at_work_prints_no_traceback(
+    monkeypatch: pytest.MonkeyPatch, cluster: Any
+) -> None:
+    monkeypatch.setattr(dask_cluster, "_serve", endless)
+
+    def all_at_work() -> bool:
+        return all(worker.processing for worker in cluster.scheduler.workers.values())
+
+    printed: list[str] = []
+    with DaskCluster(cluster.scheduler_address) as executor:
+        assert executor._client
+        loop = executor._client.loop.asyncio_loop
+        loop.set_exception_handler(lambda _, context: printed.append(context["message"]))
+        parcels = parcels_of(b"a", b"b")
+        assert not list(executor.answers(parcels, [].append, Polled(all_at_work)))
+    gc.collect()  # of tasks whose exceptions nobody has seen
+    loop.set_exception_handler(None)
+    assert printed == []
 
 
 def test_another_version_on_the_workers(monkeypatch: pytest.MonkeyPatch, cluster: Any) -> None:

@@ -38,7 +38,7 @@ def test_a_folder_twice(tmp_path: Path, orbiflow) -> None:
     first = orbiflow(*command)
     assert first.status == 0, first.err
     assert "1 silhouettes for one process" in first.out
-    assert "boot: IH4, score" in first.out
+    assert "boot: IH4, fair, stars 2.5, score" in first.out
     assert f"look at {tmp_path / 'out' / 'index.html'}" in first.out
     second = orbiflow(*command)
     assert second.status == 0
@@ -150,4 +150,4 @@ def test_options_of_a_search_are_those_of_escherize() -> None:
 
     of_one = {"--emphasis", "--strength", "--pin", "--pin-angle"}
     own, other = options("batch"), options("escherize")
-    assert {names[0] for names in other - own} == {*of_one, "--called"}
+    assert {names[0] for names in other - own} == {*of_one, "--called", "--shown-out", "--verbose"}

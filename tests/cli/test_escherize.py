@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import subprocess
 import sys
@@ -15,9 +16,12 @@ import pytest
 import shapely
 import torch
 from PIL import Image, ImageDraw
+from rich.console import Console
 
 from orbiflow import __version__
-from orbiflow.tiles import CLASSES, Fit, Target, TileModel, load_model, write_tile_folder
+from orbiflow.cli import terminal
+from orbiflow.runtime import Table
+from orbiflow.tiles import CLASSES, Fit, Rating, Target, TileModel, load_model, write_tile_folder
 from orbiflow.tiles.pages.run_folder import FIGURE_FILES
 from orbiflow.tiles.search import candidates, occupancy
 from orbiflow.tiles.search.finished_tiles import best_tiles
@@ -158,8 +162,24 @@ def test_a_run_on_a_polygon_with_y_up(tmp_path: Path, orbiflow) -> None:
         image.load()
         assert min(image.size) >= 400
     # a run without figures takes the place of one with them
-    assert orbiflow("escherize", path, "-o", tmp_path / "o", *options[:4], *FEW).status == 0
+    again = orbiflow("escherize", path, "-o", tmp_path / "o", *options[:4], "--verbose", *FEW)
+    assert again.status == 0
+    assert "★" in outcome.out
+    assert entry["arrangement"] == "four around a point"
+    assert entry["arrangement"] in outcome.out
+    assert entry["rating"]["word"] in outcome.out
+    assert "recognised" not in outcome.out
+    assert f"{entry['score']:.3f}" in again.out
     assert {p.name for p in (tmp_path / "o" / "IH28").iterdir()} == FILES
+
+
+def test_stars_are_written_in_any_encoding(monkeypatch: pytest.MonkeyPatch) -> None:
+    for encoding, stars in (("utf-8", "★★★½"), ("cp1252", "*** 1/2"), ("ascii", "*** 1/2")):
+        file = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+        monkeypatch.setattr(terminal, "output", Console(file=file, width=80))
+        terminal.Terminal()(Table("Tiles", ("class", "stars"), (("IH4", str(Rating(3.5))),)))
+        file.seek(0)
+        assert stars in file.read()
 
 
 def test_no_tile_is_status_one(tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch) -> None:

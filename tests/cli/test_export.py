@@ -5,39 +5,20 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pypdfium2
 import pytest
 
-from exported import tile_of
+from exported import boot_run, entry
 from orbiflow.runtime import Finished, Written, find
-from orbiflow.tiles.result_file import group_json
-
-
-def entry(name: str) -> dict[str, Any]:
-    tile = tile_of(name)
-    return {
-        "class": name,
-        "polygon": np.concatenate([tile.polygon, tile.polygon[:1]]).tolist(),
-        "corners": list(tile.corners),
-        "group": group_json(tile.group),
-    }
 
 
 @pytest.fixture(name="result", scope="module")
 def result_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("runs") / "boot"
-    folder.mkdir()
-    document = {
-        "schema_version": 1,
-        "input": {"source": "pictures/boot.png", "y_down": True},
-        "tiles": [entry("IH6"), entry("IH4"), entry("IH6")],
-    }
-    (folder / "result.json").write_text(json.dumps(document))
-    return folder
+    return boot_run(tmp_path_factory.mktemp("runs") / "boot")
 
 
 @pytest.mark.parametrize("form", ["svg", "pdf", "dxf", "png", "json"])
@@ -200,6 +181,67 @@ def test_no_such_result(tmp_path: Path, orbiflow) -> None:
     outcome = orbiflow("export", tmp_path / "none", "--out", tmp_path / "a.svg")
     assert outcome.status == 2
     assert "no such file or folder; give what orbiflow escherize wrote" in outcome.err
+
+
+@pytest.fixture(name="runs")
+def runs_fixture(result: Path, tmp_path: Path) -> Path:
+    """A folder of two runs with the folders of their tiles."""
+    for name in ("boot", "shoe"):
+        shutil.copytree(result, tmp_path / name)
+        for tile in ("IH6", "IH4", "IH6-2", "mine"):
+            (tmp_path / name / tile).mkdir()
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("place", "tile"),
+    [("boot/IH6-2", None), ("boot/IH6-2", "3"), ("boot/IH4", "IH4"), ("boot/../boot/IH6", "1")],
+)
+def test_the_folder_of_a_tile(place: str, tile: str | None, runs: Path, orbiflow) -> None:
+    own, whole = runs / "own.json", runs / "whole.json"
+    choice = () if tile is None else ("--tile", tile)
+    assert orbiflow("export", runs / place, *choice, "--out", own).status == 0
+    rank = {"IH6": 1, "IH4": 2, "IH6-2": 3}[Path(place).name]
+    assert orbiflow("export", runs / "boot", "--tile", rank, "--out", whole).status == 0
+    assert own.read_bytes() == whole.read_bytes()
+
+
+SILHOUETTES = {
+    "picture.png": b"\x89PNG\r\n\x1a\n",
+    "picture.JPG": b"\xff\xd8",
+    "picture.svg": b"<svg/>",
+    "polygon.json": b"[[0, 0], [1, 0], [0, 1]]",
+    "polygon.dat": b"3\n0 0\n1 0\n0 1\n",
+    "outline.geojson": b'{"type": "Polygon", "coordinates": []}',
+}
+
+
+@pytest.mark.parametrize("name", SILHOUETTES)
+def test_a_silhouette_is_escherized_first(name: str, tmp_path: Path, orbiflow) -> None:
+    file = tmp_path / name
+    file.write_bytes(SILHOUETTES[name])
+    outcome = orbiflow("export", file, "--out", tmp_path / "a.svg")
+    assert outcome.status == 2
+    assert f"find its tiles first: orbiflow escherize {file}" in outcome.err
+    assert ("a picture, and not a result" in outcome.err) == name.startswith("picture")
+
+
+@pytest.mark.parametrize(
+    ("place", "tile", "message"),
+    [
+        ("", None, "holds the runs boot, shoe: give one, such as {}/boot"),
+        ("boot/IH4", "IH6", "is one tile's folder, and tile IH6 another"),
+        ("boot/IH4", "1", "give {}/boot for that"),
+        ("boot/mine", None, "tells of IH6, IH4, IH6-2, not of mine"),
+    ],
+)
+def test_folders_in_which_no_tile_is_meant(
+    place: str, tile: str | None, message: str, runs: Path, orbiflow
+) -> None:
+    choice = () if tile is None else ("--tile", tile)
+    outcome = orbiflow("export", runs / place, *choice, "--out", runs / "a.svg")
+    assert outcome.status == 2
+    assert message.format(runs) in outcome.err
 
 
 @pytest.mark.parametrize("where", ["", "none/a.svg"])

@@ -15,6 +15,7 @@ import pytest
 
 from cli.conftest import LAUNCH
 from orbiflow.cli.terminal import stopped_by_interrupt
+from orbiflow.runtime import Cancel
 
 BOOT = [[60, 20], [210, 20], [230, 80], [170, 95], [160, 190], [100, 145], [45, 80]]
 NAMES = ["IH7", "IH1", "IH2", "IH4"]
@@ -112,7 +113,8 @@ def test_a_second_one_ends_at_once(tmp_path: Path) -> None:
 def test_the_token_of_ctrl_c() -> None:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        with stopped_by_interrupt() as cancel:
+        cancel = Cancel()
+        with stopped_by_interrupt(cancel):
             assert not cancel.cancelled
             signal.raise_signal(signal.SIGINT)
             assert cancel.cancelled
@@ -126,7 +128,8 @@ def test_the_token_of_ctrl_c() -> None:
 def test_a_shell_that_ignores_ctrl_c_is_obeyed() -> None:
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        with stopped_by_interrupt() as cancel:
+        cancel = Cancel()
+        with stopped_by_interrupt(cancel):
             signal.raise_signal(signal.SIGINT)
             assert not cancel.cancelled
     finally:

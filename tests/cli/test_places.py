@@ -87,9 +87,12 @@ def here_fixture(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         ("export r --out r/k.svg", ALONE),
         ("export r/result.json --out r/k.svg", ALONE),
         ("export r --out r/IH4/tiling.svg", OWN),
+        ("export r/IH4 --out r/IH4/k.svg", ALONE),
+        ("animate r/IH4 --out r/IH4/tiling.svg", OWN),
         ("art r --out r/overview.png", OWN),
         ("art r --picture picture.svg --out picture.svg", KEPT),
         ("animate r --out r/turtle.gif", ALONE),
+        ("solid r --kind stamp --picture picture.svg --format stl --out picture.svg", KEPT),
         ("escherize r/IH4/tile.svg --classes IH4 --out r", "would replace the file that it reads"),
     ],
 )
@@ -111,6 +114,7 @@ def test_what_is_read_stays(words: str, message: str, here: Path, orbiflow: Run)
         "density score data.csv -m m --out scores.csv",  # beside the data
         "density score psi/density.csv -m psi --out scores.csv",
         "export r --out k.svg",
+        "export r/IH4 --out k.svg",
         "export copy/result.json --out copy/k.svg",  # no run's folder: it holds other files
         "density sample -m copy/density.safetensors --out copy/s.csv",
         "density plot -m m --out m",  # documented

@@ -16,6 +16,7 @@ from orbiflow.runtime import (
     Event,
     Failed,
     Finished,
+    Note,
     Preview,
     Progress,
     TileFound,
@@ -129,10 +130,16 @@ def test_a_first_look_alone_is_kept_unless_there_is_more(tmp_path: Path) -> None
         finished = run(call, sink, cancel)
         check_order(events, "IH4", "IH6")
         assert finished.state == "cancelled"
+        texts = [event.text for event in events if isinstance(event, Note)]
+        assert "IH6 has its first tile only: its search was interrupted" in texts
         return finished
 
-    assert [tile["class"] for tile in cancelled().summary["tiles"]] == ["IH6"]
+    summary = cancelled().summary
+    assert [tile["class"] for tile in summary["tiles"]] == ["IH6"]
+    assert summary["failed"] == [{"class": "IH4", "reason": "interrupted"}]
     out = tmp_path / "out"
+    document = json.loads((out / "result.json").read_text())
+    assert [entry["class"] for entry in document["tiles"] + document["failed"]] == ["IH6", "IH4"]
     assert {p.name for p in out.iterdir()} == {"IH6", "index.html", "overview.png", "result.json"}
     assert run(find("escherize").call({**given, "classes": ["IH4"]})).state == "done"
     finished = cancelled()

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from orbiflow.cli import app
-from orbiflow.commands import OPERATIONS
+from orbiflow.commands import OPERATIONS, SUMMARIES
 from orbiflow.runtime import Call, Operation, Outcome, find
 
 
@@ -51,7 +51,7 @@ def test_words_become_settings(name: str, called: list[dict[str, Any]]) -> None:
 MISTAKES = {
     "export": ("RESULT", "missing"),
     "export X --tile-size 40": ("--tile-size", "no unit"),
-    "export X --cut nome": ("--cut", "none, skeleton or pieces"),
+    "export X --cut nome": ("--cut", "none, skeleton, pieces or jigsaw"),
     "export X --for lazer": ("--for", "did you mean laser"),
     "export X --cutt none": ("--cutt", "--cut"),
     "export X --dpi": ("--dpi", "needs a value"),
@@ -123,6 +123,24 @@ def test_help_names_every_option(
             assert all(name in text for name in names)
 
 
+def test_a_list_of_commands_imports_none_and_says_what_they_say() -> None:
+    said = {name: " ".join(find(name).doc.split("\n\n")[0].split()) for name in OPERATIONS}
+    assert said == SUMMARIES
+    code = (
+        "import sys; from orbiflow.cli.app import run\n"
+        "run(['--help']), run(['density', '--help'])\n"
+        "print([name for name in sys.modules if 'operations' in name], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.splitlines()[-1] == "['orbiflow.runtime.operations']"
+
+
+@pytest.mark.parametrize("words", [["--help", "export"], ["density", "--help", "plot"]])
+def test_help_may_be_asked_for_first(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.run(words) == 0
+    assert "--out" in capsys.readouterr().out
+
+
 def test_alone_it_prints_its_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.run([]) == 0
     text = capsys.readouterr().out
@@ -144,7 +162,7 @@ def test_exit_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_completion_knows_commands_and_choices() -> None:
-    script = app.app_for([]).generate_completion(shell="bash")
+    script = app.app_for(["--install-completion"]).generate_completion(shell="bash")
     assert all(word in script for word in ("escherize", "--tile-size", "skeleton"))
 
 
@@ -152,6 +170,7 @@ def test_completion_knows_commands_and_choices() -> None:
     "line",
     [
         "export X --tile-size 40",
+        "solid X --kind tile --chamfer 9mm",
         "density marginal -m X --columns ,",
         "density conditional -m X --given chi",
         "escherize --help",

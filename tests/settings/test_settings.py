@@ -94,6 +94,11 @@ EVERY_FIELD = {
 WORD = st.text("abcxyz{}0 ", min_size=1).map(str.strip).filter(bool)
 
 
+def test_fields_under_a_heading_of_their_own_come_last() -> None:
+    assert list(FIELDS)[:2] == ["cut", "size"]
+    assert list(FIELDS)[-2:] == ["width", "kerf"]
+
+
 def values_of(kind: Kind) -> st.SearchStrategy[Any]:
     """Values that a kind takes, as Python has them."""
     match kind:

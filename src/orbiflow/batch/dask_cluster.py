@@ -229,11 +229,13 @@ class _Out:
     def recall(self) -> None:
         """Give up the rest; their workers stop at the next step."""
         left, self.sent = self.sent, []
-        for one in left:
-            one.result.cancel()
         with suppress(Exception):  # the scheduler may have gone
             if left:
                 self.client.cancel([one.future for one in left], force=True)
+        # that ends them; if they were cancelled first, asyncio would print a traceback of each
+        concurrent.futures.wait([one.result for one in left], LOOK)
+        for one in left:
+            one.result.cancel()
 
 
 async def _fetched(client: Client, future: Future) -> Any:

@@ -18,7 +18,7 @@ from orbiflow.runtime import Call
 LONGEST_NAME = 80
 """The number of characters that the name of a result's folder may have."""
 
-NO_RESULT = ("workers", "called")
+NO_RESULT = ("workers", "called", "shown_out", "verbose")
 """Parameters of a call that do not change its result."""
 
 

@@ -69,7 +69,7 @@ def run_files(
     out: Path,
     kind: Kind,
     title: str,
-    call_of: Callable[[str], Call],
+    call_of: Callable[[str, str], Call],
     match: str | None,
     settings: WorkSettings,
     tell: Sink,
@@ -77,10 +77,10 @@ def run_files(
 ) -> Outcome:
     """Make a call for every file of a folder, and put its result into a folder as it comes.
 
-    `call_of` returns the call for a file's name; `match` is a pattern of names, None for all that can
-    be read. The outcome's summary has `folder`, `table` and `page`; the number of `files`, and how many
-    of them are `done`, gave `nothing`, `failed` or are `left`; how many were `kept` from before;
-    `seconds`.
+    `call_of` returns the call for a file's name and the name of its results' folder; `match` is a
+    pattern of names, None for all that can be read. The outcome's summary has `folder`, `table` and
+    `page`; the number of `files`, and how many of them are `done`, gave `nothing`, `failed` or are
+    `left`; how many were `kept` from before; `seconds`.
     """
     begin = time.perf_counter()
     if match is not None and not match.strip():
@@ -91,9 +91,9 @@ def run_files(
         names = folder_names(files, given, RESERVED)
         items = [
             Item(
-                name, names[name], call_of(name), partial(read_file, source / name, kind.most_bytes)
+                file, name, call_of(file, name), partial(read_file, source / file, kind.most_bytes)
             )
-            for name in files
+            for file, name in ((file, names[file]) for file in files)
         ]
         left_out = f" or that --match {match} leaves out" if match else ""
         gone = f"of files that are not in {source}{left_out}"

@@ -17,10 +17,10 @@ from rich.markup import escape
 
 from orbiflow import __version__
 from orbiflow.arguments import meant
-from orbiflow.commands import OPERATIONS
+from orbiflow.commands import OPERATIONS, SUMMARIES
 from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.kinds import FlagKind, ListKind, PathKind
-from orbiflow.runtime import Cancel, Cancelled, Operation, find, use_one_thread
+from orbiflow.runtime import Cancelled, Operation, Polled, find, use_one_thread
 from orbiflow.settings import Field, Hidden
 
 HELP = "Turn a silhouette into a tile that looks like it and provably tiles the plane."
@@ -63,7 +63,7 @@ def _to_standard_error(text: str) -> None:
 
 
 def app_for(words: Sequence[str]) -> App:
-    """Return the application with the one command that is asked for, or else with all."""
+    """Return the application with the one command that is asked for, or else with a list of all."""
     app = App(
         name="orbiflow",
         help=HELP,
@@ -81,12 +81,14 @@ def app_for(words: Sequence[str]) -> App:
     for name, text in GROUPS.items():
         app.command(App(name=name, help=text, help_epilogue=""))
     asked = _operation(words)
-    for place, operation in enumerate([asked] if asked else map(find, OPERATIONS)):
-        *group, command = operation.name.split()
+    whole = asked is not None or "--install-completion" in words  # a list needs no options
+    for place, name in enumerate([asked.name] if asked else OPERATIONS):
+        *group, command = name.split()
         home = app[group[0]] if group else app
         home.command(
-            _command(operation),
+            _command(find(name)) if whole else lambda: None,
             name=command,
+            help=None if whole else SUMMARIES[name],
             help_epilogue="",
             sort_key=place,
             group_arguments=ARGUMENTS,
@@ -98,7 +100,8 @@ def app_for(words: Sequence[str]) -> App:
 
 
 def _operation(words: Sequence[str]) -> Operation | None:
-    names = (" ".join(words[:count]) for count in (1, 2))
+    given = [word for word in words if word[:1] != "-"]
+    names = (" ".join(given[:count]) for count in (1, 2))
     return next((find(name) for name in names if name in OPERATIONS), None)
 
 
@@ -202,10 +205,11 @@ def _do(operation: Operation, given: dict[str, Any]) -> int:
     from orbiflow.cli.terminal import Terminal, stopped_by_interrupt
 
     use_one_thread()
-    # only what keeps a part has something to stop for
-    stopping = stopped_by_interrupt() if operation.keeps_partial else nullcontext(Cancel())
-    with stopping as cancel, Terminal() as terminal:
-        return call.run(terminal, cancel).exit_status
+    with Terminal() as terminal:
+        cancel = Polled(terminal.watch)
+        # only what keeps a part has something to stop for
+        with stopped_by_interrupt(cancel) if operation.keeps_partial else nullcontext():
+            return call.run(terminal, cancel).exit_status
 
 
 def _mistake(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Generator
+import time
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
 from rich.console import Console
@@ -30,11 +31,16 @@ from orbiflow.runtime import (
 
 output, errors = Console(), Console(stderr=True)
 
+EVERY = 10.0  # seconds between lines of progress on the standard error where there can be no bar
+
 
 class Terminal:
     """A sink of events. Use it in a `with` block: the bar must not outlive an error."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self.clock, self.told = clock, clock()
+        self.first: tuple[float, float] | None = None  # the time and share of the first progress
+        self.last = Progress(1.0, "")
         self.forks = False
         self.best = (0.0, "")
         self.bar: Bar | None = None
@@ -52,6 +58,7 @@ class Terminal:
                 self.forks = find(event.operation).starts_processes
             case Progress():
                 self._show_progress(event)
+                self.watch()
             case Note():
                 self._end_bar()  # notes come before the work and after it
                 _say(event.text, errors if event.warning else output)
@@ -77,10 +84,36 @@ class Terminal:
             case _:
                 pass  # the rest is for programs
 
+    def watch(self) -> bool:
+        """Tell how far the work is if the last line is old; return False: it is no reason to stop.
+
+        The work calls it where it looks whether it is to stop: no thread may run beside it.
+        """
+        now = self.clock()
+        if now - self.told >= EVERY and self.last.share < 1 and not output.is_terminal:
+            self.told = now
+            _say(self._line(now), errors)
+        return False
+
+    def _line(self, now: float) -> str:
+        """What is done, of which class, and how much is left."""
+        begin, before = self.first or (now, 0.0)
+        event, passed = self.last, now - begin
+        line = f"{event.share:.0%} after {_duration(passed)}: {event.what}"
+        if event.class_name:
+            line += f" {event.class_name}, {event.class_share or 0:.0%} of it"
+        if (done := event.share - before) > 0:
+            line += f"; about {_duration(passed * (1 - event.share) / done)} left"
+        return line
+
     def _found(self, event: Preview | TileFound) -> None:
         self.best = max(self.best, (event.iou, event.class_name))
 
     def _show_progress(self, event: Progress) -> None:
+        self.last = event
+        if self.first is None:
+            self.told = self.clock()
+            self.first = self.told, event.share
         if self.bar is None:
             columns = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
             # no thread that refreshes: workers are forked from a process with one thread
@@ -104,6 +137,10 @@ class Terminal:
             self.bar = None
 
 
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+
+
 def _say(text: str, console: Console = output) -> None:
     # a path broken over two lines cannot be copied
     console.print(f"  {text}", highlight=False, soft_wrap=True, markup=False)
@@ -118,30 +155,34 @@ def _aligned(event: Table) -> TextTable:
         numbers = not words and all(cell[:1] in "0123456789+-" for cell in column)
         table.add_column(heading, justify="right" if numbers else "left", no_wrap=not words)
     for row in event.rows:
-        table.add_row(*map(escape, row))
+        table.add_row(*(escape(_writable(cell)) for cell in row))
     return table
 
 
+def _writable(text: str) -> str:
+    """Return the text with plain stars where the output's encoding has no others."""
+    plain = str.maketrans({"★": "*", "½": " 1/2"})
+    return text if output.encoding.startswith("utf") else text.translate(plain)
+
+
 @contextmanager
-def stopped_by_interrupt() -> Generator[Cancel]:
-    """Yield a token that the first Ctrl-C cancels; a second raises `KeyboardInterrupt`.
+def stopped_by_interrupt(cancel: Cancel) -> Generator[None]:
+    """Let the first Ctrl-C in this block cancel a token; a second raises `KeyboardInterrupt`.
 
     A shell may have told this process to ignore Ctrl-C, as with `nohup` or `&` in a script: then it
     stays ignored.
     """
-    cancel = Cancel()
 
     def interrupted(_number: int, _frame: object) -> None:
-        if cancel.cancelled:
-            raise KeyboardInterrupt
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         cancel.cancel()
 
     ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     if ignored or threading.current_thread() is not threading.main_thread():
-        yield cancel
+        yield
         return
     before = signal.signal(signal.SIGINT, interrupted)
     try:
-        yield cancel
+        yield
     finally:
         signal.signal(signal.SIGINT, before)

@@ -17,6 +17,7 @@ from .palettes import PALETTES as PALETTES
 from .palettes import Palette as Palette
 from .palettes import PaletteName as PaletteName
 from .palettes import palette as palette
+from .raster import STRIP as STRIP
 from .raster import Raster as Raster
 from .raster import arrow as arrow
 from .raster import caption as caption

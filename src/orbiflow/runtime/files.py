@@ -315,11 +315,8 @@ def check_outside_runs(out: Path, *reads: Path | None) -> None:
     # a link is replaced, not followed
     target = _real(out.parent) / out.name
     for read in filter(None, reads):
-        folder = read if read.is_dir() else read.parent
-        known = _files_of_run(folder)
-        if not known or (folder != read and read.name not in known):
-            continue  # it is no run that is read
-        if _real(folder) not in target.parents:
+        folder, known = _run_around(read)
+        if not known or _real(folder) not in target.parents:
             continue
         name = target.relative_to(_real(folder)).as_posix()
         if name in known:
@@ -332,6 +329,16 @@ def check_outside_runs(out: Path, *reads: Path | None) -> None:
                 f"cannot write {out}: {folder}, which is read, holds the files of one run alone, and "
                 "the next run there would refuse others: choose another --out"
             )
+
+
+def _run_around(read: Path) -> tuple[Path, set[str]]:
+    """The folder of the run that is read, or to which what is read belongs, and its files, if any."""
+    if read.is_dir() and (known := _files_of_run(read)):
+        return read, known
+    whole = _real(read) if read.is_dir() else read
+    known = _files_of_run(whole.parent)
+    is_part = any(name == whole.name or name.startswith(f"{whole.name}/") for name in known)
+    return whole.parent, known if is_part else set()
 
 
 def _files_of_run(folder: Path) -> set[str]:

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
 from orbiflow.runtime import NEVER, Call, Cancel, Outcome, Sink, find, ignore, operation
 from orbiflow.settings import Option
-from orbiflow.tiles.operations import ReadingSettings
 from orbiflow.tiles.search import SearchSettings
+from orbiflow.tiles.silhouette import ReadingSettings
 
 # Endings of silhouettes that are no pictures: how these are read does not apply to them
 OUTLINES = (".svg", ".json", ".geojson", ".dat")
@@ -44,19 +44,20 @@ def batch(
     """
     given = {**settings.to_json(), "figures": figures}
 
-    def call_of(name: str) -> Call:
+    def call_of(name: str, results: str) -> Call:
         is_outline = PurePath(name).suffix.lower() in OUTLINES
-        own = {} if is_outline else reading.to_json()
+        own = {"smooth": reading.smooth} if is_outline else reading.to_json()
         # each silhouette has one process: many at a time make better use of the cores
-        fixed = {"image": name, "out": "out", "called": name, "workers": 1}
-        return find("escherize").call({**given, **own, **fixed})
+        fixed = {"image": name, "out": "out", "workers": 1}
+        words = {"called": name, "shown_out": str(out / results)}
+        return find("escherize").call({**given, **own, **fixed, **words})
 
     title = f"Tiles of {folder.name or 'a folder'}"
     return run_files(folder, out, TILES, title, call_of, match, work, on_event, cancel)
 
 
 def _best(summary: Summary) -> dict[str, Any]:
-    names = ("class", "score", "iou", "deformation", "recognised", "certified")
+    names = ("class", "word", "stars", "score", "iou", "deformation", "recognised", "certified")
     tiles = summary["tiles"]
     return {name: tiles[0][name] for name in names} if tiles else {}
 
@@ -82,6 +83,8 @@ TILES = Kind(
     modules=("orbiflow.tiles.pages.run_folder", "orbiflow.tiles.search.escherizing"),
     columns=(
         Column("class", "class"),
+        Column("word", "likeness"),
+        Column("stars", "stars", "g"),
         Column("score", "score", ".3f"),
         Column("iou", "IoU", ".3f"),
         Column("deformation", "bent", ".3f", falling=False),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,11 +21,13 @@ from orbiflow.runtime import (
     ignore,
     operation,
 )
-from orbiflow.settings import DefaultText, Ending, Hidden, Option, Range, Settings
+from orbiflow.settings import DefaultText, Ending, Hidden, Option, Settings
 from orbiflow.tiles.art import ArtSettings
 from orbiflow.tiles.exporting import ExportSettings
 from orbiflow.tiles.motion import AnimationSettings
 from orbiflow.tiles.search import EscherizeSettings
+from orbiflow.tiles.silhouette import ReadingSettings
+from orbiflow.tiles.solids import SolidSettings
 
 if TYPE_CHECKING:
     from orbiflow.tiles.exporting import Exported
@@ -41,20 +42,10 @@ POOR = (
 """Said where nothing that was found looks like the silhouette."""
 
 
-class ReadingSettings(Settings, group="Reading the silhouette"):
-    """How a silhouette is read."""
-
-    threshold: Annotated[float | None, Range(0, 1), DefaultText("found automatically")] = None
-    """Level between shape and background."""
-
-    invert: Annotated[bool | None, DefaultText("found automatically")] = None
-    """Whether the shape is the light part."""
-
-
 class TileChoice(Settings):
     """Which tile of a result is taken."""
 
-    tile: str = "1"
+    tile: Annotated[str | None, DefaultText("1, or the tile whose folder is given")] = None
     """A class, such as IH4, or a rank; 1 is best."""
 
     force: bool = False
@@ -75,38 +66,42 @@ def escherize(
     reading: ReadingSettings = ReadingSettings(),
     *,
     figures: bool = False,
+    verbose: bool = False,
     called: Annotated[str | None, Hidden()] = None,
+    shown_out: Annotated[str | None, Hidden()] = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
     """Find tiles that look like a silhouette and tile the plane, and prove it.
 
-    Writes result.json, overview.png and index.html into the folder, and for each class a folder
-    with tile.svg, tiling.svg, tiling.png, overlay.png and model.safetensors; after a search for
-    both, front.png, too.
+    Writes read.png, a picture of what was read, into the folder at once. Then come result.json,
+    overview.png and index.html, and for each class a folder with tile.svg, tiling.svg, tiling.png,
+    overlay.png and model.safetensors; after a search for both, front.png, too.
 
     Args:
         image: The silhouette: PNG, JPEG, WebP, SVG, or a polygon (.json, .dat).
         out: Folder for the results, made if need be.
         figures: Also write for print tiling.pdf and overlay.pdf, and of the flow field.png and
             field.pdf.
+        verbose: Also show the scores and other figures of result.json.
         called: What the results call the silhouette. Default: its path.
+        shown_out: What the page's commands call the folder. Default: its path.
     """
-    from orbiflow.tiles import pages, search, silhouette
+    from orbiflow.tiles import pages, search
 
     begin = time.perf_counter()
-    target = silhouette.Target.read(image, threshold=reading.threshold, invert=reading.invert)
-    target = target if called is None else replace(target, source=called)
+    target = reading.read(image, called)
     pages.result_folder(out)
     masks = [Path(pin) for pin in settings.pin or ()]
     check_output_folder(out, image, settings.emphasis, *masks)
-    for note in target.notes:
-        on_event(Note(note))
+    picture = pages.show_reading(target, image, out, on_event)
     settings = settings.replace(workers=settings.workers or os.cpu_count() or 1)
     result = search.escherize(target, settings, on_event=on_event, cancel=cancel)
     for text in _remarks(result):
         on_event(Note(text))
-    written = pages.write_run(result, out, figures=figures, on_event=on_event)
+    written = pages.write_run(
+        result, out, picture, figures=figures, shown_out=shown_out, on_event=on_event
+    )
     tiles = result.tiles if written else ()
     summary = {
         "folder": str(out),
@@ -116,37 +111,45 @@ def escherize(
         "failed": [{"class": f.name, "reason": f.reason} for f in result.failures],
     }
     if tiles:
-        on_event(_table(tiles))
+        best = "Tiles, best first"
+        title = best if tiles[0].front is None else "Tiles for likeness, then for overlap"
+        on_event(_table(title, [_words(tile) for tile in tiles]))
+        if verbose:
+            on_event(_table("Figures", [_figures(tile) for tile in tiles]))
     on_event(_closing(out, bool(written), bool(result.tiles), summary["seconds"]))
     if result.interrupted or cancel.cancelled:
         return Outcome(summary, "cancelled")
     return Outcome(summary, "done" if result.tiles else "nothing found")
 
 
-def _table(tiles: Sequence[EscherTile]) -> Table:
-    """The tiles that were found, to look at."""
-    both = any(tile.front is not None for tile in tiles)
-    title = "Tiles for likeness, then for overlap" if both else "Tiles, best first"
-    rows = [_cells(tile, both=both) for tile in tiles]
+def _table(title: str, rows: Sequence[dict[str, str]]) -> Table:
+    """A table of rows by the names of their columns."""
     return Table(title, tuple(rows[0]), tuple(tuple(row.values()) for row in rows))
 
 
-def _cells(tile: EscherTile, *, both: bool) -> dict[str, str]:
-    """Return a row by the names of its columns, which fit into 80 characters."""
-    mismatch, overlap = tile.certificate.edge_mismatch, f"{tile.metrics.iou:.4f}"
-    edges = f"{mismatch:.0e}" if mismatch < float("inf") else "-"
-    bent = "-" if tile.deformation is None else f"{tile.deformation:.3f}"
-    certified = "yes" if tile.certificate.valid else "NO"
-    if both:
-        front = "yes" if tile.front else "near"
-        middle = {"for": tile.objective, "deformation": bent, "overlap": overlap, "front": front}
-        middle["certified"] = certified
-    else:
-        same = f"{tile.recognisability.score:.3f}"
-        middle = {"score": f"{tile.score:.3f}", "bent": bent, "IoU": overlap, "recognised": same}
-        middle |= {"certified": certified, "edges": edges}
-    name = f"{tile.name} ({tile.group_name})"
-    return {"class": name, **middle, "s": f"{tile.seconds:.1f}"}
+def _words(tile: EscherTile) -> dict[str, str]:
+    """What is said of a tile, in 80 characters."""
+    row = {"class": f"{tile.name} ({tile.group_name})"}
+    if tile.front is not None:
+        row |= {"for": tile.objective, "front": "yes" if tile.front else "near"}
+    rating, lies = tile.rating, tile.arrangement
+    row |= {"stars": str(rating or ""), "likeness": rating.word if rating else ""}
+    return {**row, "how its copies lie": lies or "NOT CERTIFIED: they do not tile"}
+
+
+def _figures(tile: EscherTile) -> dict[str, str]:
+    """The same in figures."""
+    mismatch, bent = tile.certificate.edge_mismatch, tile.deformation
+    return {
+        "class": f"{tile.name} ({tile.group_name})",
+        "score": f"{tile.score:.3f}",
+        "bent": "-" if bent is None else f"{bent:.3f}",
+        "IoU": f"{tile.metrics.iou:.4f}",
+        "recognised": f"{tile.recognisability.score:.3f}",
+        "certified": "yes" if tile.certificate.valid else "NO",
+        "edges": f"{mismatch:.0e}" if mismatch < float("inf") else "-",
+        "s": f"{tile.seconds:.1f}",
+    }
 
 
 def _closing(out: Path, written: bool, found: bool, seconds: float) -> Note:
@@ -162,17 +165,17 @@ def _closing(out: Path, written: bool, found: bool, seconds: float) -> Note:
 
 def _remarks(result: SearchResult) -> list[str]:
     """What the user should know of a search's tiles."""
-    from orbiflow.tiles.pages import is_poor
-
     tiles, found, remarks = result.tiles, result.found, list[str]()
     if tiles and tiles[0].front is not None:
         best = sum(tile.front is True for tile in tiles)
         near = "" if best == len(tiles) else f", {len(tiles) - best} near these"
         remarks.append(
-            f"{len(tiles)} of {len(found)} tiles are listed: {best} that no other beats in both "
-            f"deformation and overlap{near}"
+            f"{len(tiles)} of {len(found)} tiles are listed: {best} that no other of them beats in "
+            f"both deformation and overlap{near}"
         )
-    if tiles and is_poor(tiles[0]):
+    for name in sorted(result.interrupted & {tile.isohedral_class for tile in tiles}):
+        remarks.append(f"{name} has its first tile only: its search was interrupted")
+    if tiles and tiles[0].rating and tiles[0].rating.word == "poor":
         remarks.append(POOR)
     return remarks
 
@@ -185,6 +188,9 @@ def _measures(tile: EscherTile) -> dict[str, Any]:
         "objective": tile.objective,
         "deformation": tile.deformation,
         "front": tile.front,
+        "arrangement": tile.arrangement,
+        "stars": tile.rating and tile.rating.stars,
+        "word": tile.rating and tile.rating.word,
         "score": tile.score,
         "iou": tile.metrics.iou,
         "dice": tile.metrics.dice,
@@ -207,6 +213,7 @@ def export(
     choice: TileChoice = TileChoice(),
     *,
     out: Annotated[Path | None, Option("-o"), DefaultText("named after the tile")] = None,
+    picture: Path | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
@@ -215,8 +222,9 @@ def export(
     Lengths are numbers with a unit: mm, cm, in or pt.
 
     Args:
-        result: A search's folder, or its result.json.
+        result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file.
+        picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
     """
     settings = settings.for_file(out)
 
@@ -224,9 +232,9 @@ def export(
 
     tile = choice.read(result)
     out = out or Path(f"{tile.name}.{settings.format}")
-    check_output_file(out, result)
+    check_output_file(out, result, picture)
     done = exporting.export(
-        tile, out, settings, force=choice.force, on_event=on_event, cancel=cancel
+        tile, out, settings, picture=picture, force=choice.force, on_event=on_event, cancel=cancel
     )
     _tell(on_event, (*done.notes, _exported(done, settings, tile.isohedral_class)), *done.files)
     return Outcome(
@@ -241,7 +249,12 @@ def export(
 
 def _exported(done: Exported, settings: ExportSettings, name: str) -> str:
     width, height = settings.page
-    what = {"none": "tiles", "skeleton": "tiles in outline", "pieces": "pieces"}[settings.cut]
+    words = {
+        "skeleton": "tiles in outline",
+        "pieces": "pieces",
+        "jigsaw": "tiles and parts of them",
+    }
+    what = words.get(settings.cut, "tiles")
     files = str(done.files[0])
     if len(done.files) > 1:
         files = f"{len(done.files)} sheets, {done.files[0]} to {done.files[-1].name}"
@@ -269,7 +282,7 @@ def art(
     Without a picture tiles are coloured by a palette, and --engrave draws inside them.
 
     Args:
-        result: A search's folder, or its result.json.
+        result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file, .png or .svg.
         picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
     """
@@ -299,6 +312,52 @@ def art(
     )
 
 
+@operation("solid")
+def solid(
+    result: Path,
+    settings: SolidSettings = SolidSettings(),
+    choice: TileChoice = TileChoice(),
+    *,
+    out: Annotated[Path | None, Option("-o"), DefaultText("named after the tile")] = None,
+    picture: Path | None = None,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Make a solid to print in 3D: a tile, cookie cutter, stamp, mould or puzzle.
+
+    It lies as it is printed, without supports. Lengths are numbers with a unit: mm, cm, in or pt.
+
+    Args:
+        result: A search's folder, its result.json, or the folder of a tile in it.
+        out: The file, .stl or .3mf.
+        picture: An SVG drawing over the silhouette, in the same frame, for a stamp or mould.
+    """
+    settings = settings.for_file(out)
+
+    from orbiflow.tiles.solids import make_solid
+
+    tile = choice.read(result)
+    out = out or Path(f"{tile.name}-{settings.kind}.{settings.format}")
+    check_output_file(out, result, picture)
+    made = make_solid(tile, settings, picture=picture, force=choice.force)
+    cancel.check()
+    made.write(out, settings.format)
+    size = " x ".join(f"{side:.1f}" for side in made.size)
+    cubic = made.volume / 1000
+    note = f"written {out}: {settings.kind} of {tile.isohedral_class}, {size} mm, {cubic:.1f} cm³"
+    _tell(on_event, (*made.notes, note), out)
+    return Outcome(
+        {
+            "file": str(out),
+            "kind": settings.kind,
+            "class": tile.isohedral_class,
+            "parts": len(made.parts),
+            "size": made.size.tolist(),
+            "volume": made.volume,
+        }
+    )
+
+
 @operation("animate")
 def animate(
     result: Path,
@@ -319,7 +378,7 @@ def animate(
     It loops, there and back. In a morph every picture is an exact tiling.
 
     Args:
-        result: A search's folder, or its result.json.
+        result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file: .gif, .svg, or .mp4, which needs ffmpeg.
     """
     settings = settings.for_file(out)

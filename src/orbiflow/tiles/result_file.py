@@ -17,27 +17,40 @@ from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import ResultFolder, is_list, is_object, make_folder, read_json, write_atomic
 from orbiflow.symmetry import CrystallographicGroup, Isometry, checked_lattice
-from orbiflow.tiles.likeness import Fidelity, Recognisability, ShapeMetrics, Thinnest
+from orbiflow.tiles.likeness import Fidelity, Rating, Recognisability, ShapeMetrics, Thinnest
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import CLASSES, Tile, isohedral_class
 
 RESULT, TILE_MODEL = "result.json", "model.safetensors"
 SCHEMA_VERSION = 1
+PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".gif", ".svg", ".pdf")
+MOST_NAMED = 5  # runs that a message names
 
 
-def read_result(path: str | Path, which: str | int = 1) -> EscherTile:
+def read_result(path: str | Path, which: str | int | None = None) -> EscherTile:
     """Return a tile of a run.
 
     Args:
-        path: The run's folder, or its result.json.
-        which: A class, such as "IH4" (its best tile), or a rank from 1, the best.
+        path: The run's folder, its result.json, or the folder of one of its tiles.
+        which: A class, such as "IH4" (its best tile), or a rank from 1, the best. Default: the tile
+            whose folder is given, otherwise the best.
 
     Raises:
         InputFileError: if there is no such file, it is none of orbiflow's, or holds no such tile.
     """
     file, document = read_document(path)
     names, source, silhouette = _contents(file, document)
-    index = _index(names, which, file)
+    index = _index(names, 1 if which is None else which, file)
+    folder = Path(path).resolve()
+    if folder.is_dir() and folder != file.parent.resolve():  # a tile's own
+        folders = folder_names(names)
+        if folder.name not in folders:
+            raise InputFileError(f"{file} tells of {', '.join(folders)}, not of {folder.name}")
+        if which is not None and folders[index] != folder.name:
+            raise InputFileError(
+                f"{path} is one tile's folder, and tile {which} another: give {file.parent} for that"
+            )
+        index = folders.index(folder.name)
     entry = document["tiles"][index]
     try:
         tile = _tile(entry)
@@ -83,19 +96,39 @@ def folder_names(classes: Iterable[str]) -> list[str]:
 
 
 def read_document(path: str | Path) -> tuple[Path, dict[str, Any]]:
-    """Return the result.json at a path, or in a run's folder, and the object that it holds."""
+    """Return the result.json at a path, in a run's folder or above a tile's, and what it holds."""
     given = as_path(path, "the result")
-    file = given / RESULT if given.is_dir() else given
+    file = _result_in(given) if given.is_dir() else given
     if not file.exists():
-        if given.is_dir():
-            what = f"{given} holds no {RESULT}; give the folder that orbiflow escherize wrote"
-        else:
-            what = f"{given}: no such file or folder; give what orbiflow escherize wrote"
+        what = f"{given}: no such file or folder; give what orbiflow escherize wrote"
         raise InputFileError(what)
-    document = read_json(file, "a result of orbiflow escherize")
-    if "tiles" not in document:
-        raise InputFileError(f"{file}: not a result of orbiflow escherize: it names no tiles")
+    first = f"find its tiles first: orbiflow escherize {file}"
+    if file.suffix.lower() in PICTURES:
+        raise InputFileError(f"{file}: a picture, and not a result; {first}")
+    try:
+        document = read_json(file, "a result of orbiflow escherize")
+        if "tiles" not in document:
+            raise InputFileError(f"{file}: not a result of orbiflow escherize: it names no tiles")
+    except InputFileError as error:
+        if file.name == RESULT:
+            raise
+        raise InputFileError(f"{error}; if it is a silhouette, {first}") from error
     return file, document
+
+
+def _result_in(folder: Path) -> Path:
+    """Return the result.json of a run's folder, or of the run that a tile's folder belongs to."""
+    own, above = folder / RESULT, folder.resolve().parent / RESULT
+    runs = [] if own.exists() else sorted(file.parent.name for file in folder.glob(f"*/{RESULT}"))
+    if runs:
+        some = ", ".join(runs[:MOST_NAMED]) + ", ..." * (len(runs) > MOST_NAMED)
+        raise InputFileError(
+            f"{folder} holds the runs {some}: give one, such as {folder / runs[0]}"
+        )
+    if not own.exists() and not above.exists():
+        what = f"{folder} holds no {RESULT}; give the folder that orbiflow escherize wrote"
+        raise InputFileError(what)
+    return own if own.exists() else above
 
 
 def _index(names: list[str], which: str | int, file: Path) -> int:
@@ -146,7 +179,7 @@ def save_tiles(tiles: Sequence[EscherTile], folder: str | Path) -> Path:
 def _saved_files(folder: Path) -> set[str]:
     """Return the files that `save_tiles` wrote into a folder, relative to it."""
     try:
-        names = [entry["class"] or "tile" for entry in read_document(folder)[1]["tiles"]]
+        names = [entry["class"] or "tile" for entry in read_document(folder / RESULT)[1]["tiles"]]
     except (OrbiflowError, KeyError, TypeError):
         return set()
     return {RESULT, *(f"{name}/{TILE_MODEL}" for name in folder_names(names))}
@@ -166,9 +199,11 @@ def group_json(group: CrystallographicGroup) -> dict[str, Any]:
 
 def tile_json(tile: EscherTile) -> dict[str, Any]:
     """Return one entry of `tiles`: polygon and group in the input's own coordinates."""
-    thin = tile.thinnest
+    thin, rating = tile.thinnest, tile.rating
     return {
         "class": tile.isohedral_class,
+        "arrangement": tile.arrangement,
+        "rating": rating and {"stars": rating.stars, "word": rating.word},
         "score": _or_none(tile.score),
         "objective": tile.objective,
         "front": tile.front,
@@ -218,6 +253,8 @@ def _measurements(entry: dict[str, Any]) -> dict[str, Any]:
     recognised = entry.get("recognisability")
     if recognised and recognised["score"] is not None:
         found["recognisability"] = Recognisability(**recognised)
+    if entry.get("rating"):
+        found["rating"] = Rating(entry["rating"]["stars"])
     thinnest, bent = entry.get("thinnest"), entry.get("bent")
     if thinnest is not None:
         ends = np.array(thinnest["ends"], dtype=np.float64)

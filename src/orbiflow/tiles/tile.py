@@ -19,6 +19,7 @@ from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
 from orbiflow.runtime import read_arrays
 from orbiflow.tiles.likeness import (
     Fidelity,
+    Rating,
     Recognisability,
     ShapeMetrics,
     Thinnest,
@@ -26,7 +27,7 @@ from orbiflow.tiles.likeness import (
     rank_score,
 )
 from orbiflow.tiles.silhouette import Bending, Frame
-from orbiflow.tiles.tilings import Certificate, Tile, certify
+from orbiflow.tiles.tilings import Certificate, Tile, arrangement, certify
 
 if TYPE_CHECKING:
     from orbiflow.tiles.art import ArtSettings, Artwork
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from orbiflow.tiles.motion import AnimationSettings
     from orbiflow.tiles.search import TileModel
     from orbiflow.tiles.silhouette import Target
+    from orbiflow.tiles.solids import Solid, SolidSettings
 
 FORMAT = "orbiflow-tile/1"
 MAX_BYTES = 64 * 2**20
@@ -153,11 +155,12 @@ class EscherTile:
     - `bent_iou`: The IoU of the tile with the bent silhouette.
     - `pinned`: How far the worst pinned part is from similar to what it was; None without pins.
     - `known_score`: The score that a file states.
+    - `rating`: Its stars among the tiles of its run.
 
     How it was found:
 
     - `objective`: What the search was after, "likeness" or "overlap".
-    - `front`: After a search for both, whether no other tile beats this one in both.
+    - `front`: After a search for both, whether no other listed tile beats this one in both.
     - `starts`, `dropped`: The number of starts, and of those that gave no certified tile.
     - `seconds`: Computing time on one core.
     - `others`: More tiles of the class, if they were asked for.
@@ -184,6 +187,7 @@ class EscherTile:
     bent_iou: float | None = None
     pinned: float | None = None
     known_score: float | None = None
+    rating: Rating | None = None
     objective: str = "overlap"
     front: bool | None = None
     starts: int = 0
@@ -210,7 +214,7 @@ class EscherTile:
         return cls(as_instance(source, Tile, "the tile", "EscherTile.load(folder) gives one"))
 
     @staticmethod
-    def load(path: str | Path, which: str | int = 1) -> EscherTile:
+    def load(path: str | Path, which: str | int | None = None) -> EscherTile:
         """Return a tile of a run; see `read_result`."""
         from orbiflow.tiles.result_file import read_result
 
@@ -235,6 +239,11 @@ class EscherTile:
     def group_name(self) -> str:
         """The name of the wallpaper group, such as "p2"."""
         return self.tile.group.name
+
+    @cached_property
+    def arrangement(self) -> str:
+        """How its copies lie, in plain words; "" if it does not tile."""
+        return arrangement(self.tile) if self.certificate.valid else ""
 
     @cached_property
     def certificate(self) -> Certificate:
@@ -382,12 +391,29 @@ class EscherTile:
         return draw_art(self, out, settings, picture=picture, target=target, force=force)
 
     def export(
-        self, out: str | Path, settings: ExportSettings | None = None, *, force: bool = False
+        self,
+        out: str | Path,
+        settings: ExportSettings | None = None,
+        *,
+        picture: str | Path | None = None,
+        force: bool = False,
     ) -> Exported:
         """Write the tiling, its lines or its pieces in real size; see `orbiflow.tiles.export`."""
         from orbiflow.tiles.exporting import export
 
-        return export(self, out, settings, force=force)
+        return export(self, out, settings, picture=picture, force=force)
+
+    def solid(
+        self,
+        settings: SolidSettings | None = None,
+        *,
+        picture: str | Path | None = None,
+        force: bool = False,
+    ) -> Solid:
+        """Return a solid to print, which can `write` itself; see `orbiflow.tiles.make_solid`."""
+        from orbiflow.tiles.solids import make_solid
+
+        return make_solid(self, settings, picture=picture, force=force)
 
     def animate(
         self, out: str | Path, settings: AnimationSettings | None = None, *, force: bool = False
@@ -399,5 +425,5 @@ class EscherTile:
 
 
 TileSource: TypeAlias = EscherTile | Tile | str | Path
-"""What functions take for a tile. A text or path is a run's folder, or its result.json, whose best
-tile is meant; `EscherTile.load` gives the others."""
+"""What functions take for a tile. A text or path is a tile's own folder in a run; or the run's folder
+or result.json, whose best tile is meant; `EscherTile.load` gives the others."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pypdfium2
 import pytest
 import shapely
 from PIL import Image
@@ -23,14 +24,15 @@ from orbiflow.tiles import (
     Uses,
     art_scene,
     artwork,
+    read_outline,
     read_over,
     render_artwork,
     write_artwork,
     write_dxf,
     write_pdf,
 )
-from orbiflow.tiles.art.source import covered_area, silhouette_outline
-from orbiflow.tiles.exporting import INK, Part
+from orbiflow.tiles.motifs.source import covered_area, silhouette_outline
+from orbiflow.tiles.scene import INK, Part
 
 PAGE = ArtSettings(size=(300, 200), tile_size=130, outline=0.0, samples=4)
 
@@ -168,12 +170,16 @@ def test_a_picture_in_an_svg_is_one_image() -> None:
     assert (image == (0xC0, 0x20, 0x40, 255)).all()
 
 
-def test_other_formats_refuse_artwork(tmp_path: Path) -> None:
-    scene = art_scene(drawn("IH4", BODY, tmp_path))
-    with pytest.raises(OrbiflowError, match="hold artwork"):
-        write_pdf(scene)
-    with pytest.raises(OrbiflowError, match="hold artwork"):
-        write_dxf(scene, tolerance=0.1)
+def test_other_formats_hold_artwork_unless_it_is_pixels(tmp_path: Path) -> None:
+    art = drawn("IH4", BODY, tmp_path)
+    scene, pixels = art_scene(art), np.asarray(render_artwork(art), dtype=float)
+    page = pypdfium2.PdfDocument(write_pdf(scene))[0]
+    shown = page.render(scale=art.page.width / page.get_width()).to_pil().convert("RGB")
+    assert np.abs(np.asarray(shown.resize(pixels.shape[1::-1])) - pixels).mean() < 3
+    assert write_dxf(scene, tolerance=0.1).startswith("  0\nSECTION")
+    tile = squirrel("IH4")
+    with pytest.raises(OrbiflowError, match="made of pixels; choose SVG or PDF"):
+        write_dxf(art_scene(artwork(tile, PAGE, picture=flat(tile, "#c02040"))), tolerance=0.1)
 
 
 def test_gradients_and_what_is_left_out(tmp_path: Path) -> None:
@@ -186,6 +192,45 @@ def test_gradients_and_what_is_left_out(tmp_path: Path) -> None:
     assert over.drawing is not None
     assert [part.style.fill for part in over.drawing.parts] == ["#808080"]
     assert over.notes == ("left out 1 text of the drawing",)
+
+
+def test_lines_that_no_clip_cuts_stay_lines(tmp_path: Path) -> None:
+    body = """<clipPath id="c"><rect x="0" y="0" width="900" height="900"/></clipPath>
+    <g clip-path="url(#c)"><path d="M350 250L620 380" fill="none" stroke="#000"/></g>"""
+    over = read_over(svg_of("IH4", body, tmp_path), squirrel("IH4"))
+    assert over.drawing is not None
+    assert [part.style.stroke for part in over.drawing.parts] == ["#000000"]
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        '<path {0} stroke-width="20" stroke-dasharray="60 30"/>',
+        '<g transform="translate(0 200) scale(1 .3)"><path {0} stroke-width="40"/></g>',
+        '<clipPath id="c"><circle cx="500" cy="300" r="90"/></clipPath>'
+        '<path {0} stroke-width="20" clip-path="url(#c)"/>',
+        '<marker id="m"><rect width="3" height="3"/></marker>'
+        '<path d="M300 200L500 300" fill="none" marker-end="url(#m)" stroke-width="20"/>',
+    ],
+)
+def test_strokes_that_are_no_plain_lines_are_carried_as_regions(body: str, tmp_path: Path) -> None:
+    """The same region is carried as when it is drawn as a fill."""
+    tile = squirrel("IH4")
+    line = 'd="M350 250L620 380" fill="none" stroke="#000000"'
+    over = read_over(svg_of("IH4", body.format(line), tmp_path), tile)
+    seen = read_outline(tmp_path / "drawing.svg").seen
+    assert seen is not None
+    filled = "".join(
+        "M" + "L".join(f"{x} {y}" for x, y in part.exterior.coords) + "z"
+        for part in getattr(seen, "geoms", [seen])
+    )
+    expected = read_over(svg_of("IH4", f'<path d="{filled}"/>', tmp_path), tile)
+    assert over.drawing is not None
+    assert expected.drawing is not None
+    found, (goal,) = over.drawing.parts, expected.drawing.parts
+    assert {part.style for part in found} == {goal.style}
+    whole = shapely.union_all([region(part) for part in found])
+    assert whole.symmetric_difference(region(goal)).area < 1e-3 * region(goal).area
 
 
 @pytest.mark.parametrize(

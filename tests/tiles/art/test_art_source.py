@@ -13,7 +13,7 @@ import shapely
 from artworks import EYE, squirrel, write_run
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles import CLASSES, ArtSettings, artwork, read_result, signed_area, with_map
-from orbiflow.tiles.art.source import covered_area, silhouette_outline
+from orbiflow.tiles.motifs.source import covered_area, silhouette_outline
 from orbiflow.tiles.search import matched
 from outlines import FOLDER, animal, bent_squirrel, disc, star
 

@@ -11,9 +11,9 @@ from scipy.ndimage import binary_erosion
 from artworks import EYE, checkerboard, face, flat, picture, size_of, squirrel, upside_down
 from orbiflow.drawing import palette
 from orbiflow.tiles import CLASSES, ArtSettings, Artwork, artwork, render_artwork
-from orbiflow.tiles.art.making import picture_paint
-from orbiflow.tiles.art.raster import NOWHERE, runs, triangle_sides
-from orbiflow.tiles.art.source import _places, covered_area, silhouette_outline
+from orbiflow.tiles.motifs import picture_paint
+from orbiflow.tiles.motifs.raster import NOWHERE, runs, triangle_sides
+from orbiflow.tiles.motifs.source import _places, covered_area, silhouette_outline
 from orbiflow.tiles.silhouette import triangulate
 
 PAGE = ArtSettings(size=(240, 160), tile_size=95, outline=0.0)
@@ -106,7 +106,7 @@ def test_every_copy_has_its_eye_mirrored_or_not(name: str) -> None:
 def test_the_map_onto_the_raster_has_no_fold() -> None:
     tile = squirrel("IH6")
     art = artwork(tile, PAGE, picture=flat(tile, "white"))
-    grid = picture_paint(art).grid
+    grid = picture_paint(art.picture, art.tile, art.density, art.page.count).grid
     places = _places(tile, grid)
     whole = np.asarray(binary_erosion(grid.inside(art.page.tile.polygon), iterations=2), dtype=bool)
     down, right = np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]

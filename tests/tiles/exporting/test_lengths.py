@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -10,7 +11,17 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.kinds import Refused, kind_of
-from orbiflow.units import MILLIMETRES, Length, LengthOrZero, Size, length, size
+from orbiflow.units import (
+    MILLIMETRES,
+    Length,
+    LengthOrZero,
+    Size,
+    length,
+    page_size,
+    pixel_size,
+    signed_length,
+    size,
+)
 
 
 @given(st.floats(1e-3, 1e3), st.sampled_from(list(MILLIMETRES)))
@@ -70,3 +81,43 @@ def test_no_sizes(text: str, message: str) -> None:
 def test_no_size_is_without_area() -> None:
     with pytest.raises(Refused, match="entry 1: must be above 0"):
         kind_of(Size).read("0x200mm")
+
+
+@pytest.mark.parametrize(
+    ("text", "page"),
+    [
+        ("A4", (210, 297)),
+        ("a4-Landscape", (297, 210)),
+        ("mug", (228.6, 88.9)),
+        ("mug-portrait", (88.9, 228.6)),
+        ("tabloid", (279.4, 431.8)),
+        ("double", (180, 120)),
+        ("1in x 5cm", (25.4, 50)),
+    ],
+)
+def test_pages_by_name(text: str, page: tuple[float, float]) -> None:
+    assert page_size(text) == pytest.approx(page)
+
+
+def test_sheets_of_paper_halve() -> None:
+    for larger, smaller in pairwise(["A2", "A3", "A4", "A5"]):
+        short, long = page_size(larger)
+        assert page_size(smaller) == (long // 2, short)
+
+
+@pytest.mark.parametrize("text", ["A9", "A4-upright", "paper", ""])
+def test_pages_that_nobody_knows(text: str) -> None:
+    with pytest.raises(OrbiflowError, match=r"is not a page; .*a4, a5, letter.*-landscape"):
+        page_size(text)
+
+
+def test_posts_are_pixels_whatever_the_resolution() -> None:
+    assert pixel_size("square", 72) == pixel_size("Square", 600) == (1080, 1080)
+    assert pixel_size("A4", 254) == pytest.approx((2100, 2970))
+
+
+@given(st.floats(0.01, 1e3))
+def test_a_sign_before_a_length(number: float) -> None:
+    assert signed_length(f" -{number!r}mm") == -signed_length(f"{number!r}mm") == -number
+    with pytest.raises(OrbiflowError, match="is not a length"):
+        signed_length(f"--{number!r}mm")

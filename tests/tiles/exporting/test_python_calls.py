@@ -31,7 +31,7 @@ from orbiflow.tiles import (
     with_map,
 )
 from orbiflow.tiles import write_run as write_folder
-from orbiflow.tiles.art.source import covered_area
+from orbiflow.tiles.motifs.source import covered_area
 from outlines import animal
 
 SMALL = ArtSettings(size=(90, 60), tile_size=40.0)

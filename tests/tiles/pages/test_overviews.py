@@ -3,30 +3,35 @@
 from __future__ import annotations
 
 import io
+import re
+import shlex
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from PIL import Image
 
+from orbiflow.runtime import Call
 from orbiflow.tiles import (
     ClassFailure,
     EscherTile,
     LikenessSearch,
     OccupancySearch,
+    Rating,
     SearchResult,
     Target,
     escherize_class,
     folder_names,
     index_page,
-    is_poor,
     overview_png,
     write_gallery,
     written_files,
 )
-from orbiflow.tiles.pages.overview import measures
+from orbiflow.tiles.pages.page import TRIED
+from shell_lines import call_by_orbiflow
 
 BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]
 VOID = {"meta", "link", "img", "br", "path", "hr"}
@@ -41,6 +46,7 @@ class Page(HTMLParser):
         self.open: list[str] = []
         self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.words = ""
+        self.commands: list[str] = []
         self.feed(text)
         self.close()
         assert self.open == []
@@ -49,14 +55,18 @@ class Page(HTMLParser):
         self.tags.append((tag, dict(attrs)))
         if tag not in VOID:
             self.open.append(tag)
+        if tag == "code":
+            self.commands.append("")
 
     def handle_endtag(self, tag: str) -> None:
         if tag not in VOID:
             assert self.open.pop() == tag
 
     def handle_data(self, data: str) -> None:
-        if self.open and self.open[-1] != "style":
+        if self.open and self.open[-1] not in ("style", "script"):
             self.words += data
+        if "code" in self.open:
+            self.commands[-1] += data
 
     def all(self, tag: str) -> list[dict[str, str | None]]:
         return [attributes for name, attributes in self.tags if name == tag]
@@ -94,7 +104,9 @@ def test_a_page_names_everything_and_refers_to_what_is_there(
     assert "IH21: it <crosses> itself" in page.words
     assert {"html", "title", "main", "header", "nav", "style"} <= {tag for tag, _ in page.tags}
     assert page.all("html")[0]["lang"] == "en"
-    assert page.all("script") == page.all("link") == []
+    assert page.all("script") == [{}]
+    assert page.all("link") == []
+    assert not [name for _, attributes in page.tags for name in attributes if name[:2] == "on"]
     pictures = page.all("img")
     assert all(picture["alt"] for picture in pictures)
     assert len(pictures) == 3 * 3 + 1  # one has a flow
@@ -111,6 +123,49 @@ def test_a_page_names_everything_and_refers_to_what_is_there(
     assert {"IH4-2/tile.svg", "overview.png", "index.html"} <= written
 
 
+def test_commands_of_a_page_can_be_copied_into_a_shell(
+    target: Target, bent: EscherTile, flowed: EscherTile
+) -> None:
+    out, names = "-my <b> $(out)/it's", ["IH4", "IH6", "IH4-2"]
+    refused = flowed.changed(tile=replace(flowed.tile, polygon=flowed.tile.polygon * (1.0, 1.1)))
+    page = Page(index_page([bent, refused, bent], target, names, out=out))
+    calls = [call_by_orbiflow(shlex.split(command)[1:]) for command in page.commands]
+    assert len(calls) == 3 * (7 + len(TRIED))
+    assert all(isinstance(call, Call) for call in calls)
+    flat = [call.flat for call in calls if isinstance(call, Call)]
+    assert [call["result"] for call in flat[:: len(calls) // 3]] == [Path(out) / n for n in names]
+    assert [call["force"] for call in flat[:: len(calls) // 3]] == [False, True, False]
+    files = [call["out"] for call in flat]
+    assert len(set(files)) == len(files)
+    assert {call["palette"] for call in flat if call.get("palette")} >= set(TRIED)
+
+
+def test_small_tilings_are_those_of_the_tile(target: Target, bent: EscherTile) -> None:
+    page = Page(index_page([bent], target, ["IH4"]))
+    uses = page.all("use")
+    ids = {attributes.get("id") for _, attributes in page.tags}
+    assert {str(use["href"])[1:] for use in uses} <= ids
+    assert sum(use["href"] == "#IH4-patch" for use in uses) == len(TRIED)
+    matrices = [str(use["transform"])[7:-1].split() for use in uses if "transform" in use]
+    assert len(matrices) > 6
+    ring = np.array(re.findall(r"[-\d.]+,[-\d.]+", str(page.all("path")[1]["d"])))
+    corners = np.array([[float(x) for x in pair.split(",")] for pair in ring])
+    copies = [shapely.Polygon(corners @ np.reshape(m[:4], (2, 2)) + m[4:])
+              for m in np.array(matrices, dtype=float)]  # fmt: skip
+    left, low, width, height = (float(x) for x in str(page.all("svg")[1]["viewbox"]).split())
+    window = shapely.box(left, low, left + width, low + height)
+    pieces = [copy.intersection(window) for copy in copies]
+    assert sum(piece.area for piece in pieces) == pytest.approx(window.area, rel=0.01)
+    assert shapely.union_all(pieces).area > 0.99 * window.area
+
+
+def test_what_was_read_is_shown_if_it_is_there(target: Target, bent: EscherTile) -> None:
+    assert "read.png" in [
+        p["src"] for p in Page(index_page([bent], target, ["IH4"], read=True)).all("img")
+    ]
+    assert "What was read" not in Page(index_page([bent], target, ["IH4"])).words
+
+
 def test_what_is_not_certified_says_so(target: Target, flowed: EscherTile) -> None:
     bad = replace(flowed.certificate, reasons=("it <overlaps> itself",))
     uncertified = replace(flowed)
@@ -124,19 +179,24 @@ def test_after_a_search_for_both_the_page_says_what_for(
 ) -> None:
     both = [replace(bent, front=True), replace(flowed, front=False)]
     page = Page(index_page(both, target, ["IH4", "IH6"]))
-    assert "found for likeness: no other beats it in both" in page.words
+    assert "found for likeness: no other here beats it in both" in page.words
     assert "found for overlap: near the best" in page.words
     assert {"href": "front.png"} in page.all("a")
     assert {"href": "front.png"} not in Page(index_page([bent], target, ["IH4"])).all("a")
 
 
-def test_measures_have_words(bent: EscherTile, flowed: EscherTile) -> None:
-    for result in (bent, flowed):
-        for measure in measures(result):
-            assert all(measure)
-    names = [measure.name for measure in measures(bent)]
-    assert names[:2] == ["Score", "Deformation"]
-    assert "Deformation" not in [measure.name for measure in measures(flowed)]
+def test_figures_are_those_that_were_taken(
+    target: Target, bent: EscherTile, flowed: EscherTile
+) -> None:
+    of_bent, of_flowed = (
+        Page(index_page([tile.changed(pinned=pinned)], target, ["IH4"])).words
+        for tile, pinned in ((bent, 0.0042), (flowed, None))
+    )
+    for figure in ("Deformation", f"{bent.deformation:.3f}", "Pinned parts", "0.0042"):
+        assert figure in of_bent
+        assert figure not in of_flowed
+    for figure in ("Score", f"{flowed.score:.3g}", f"{flowed.metrics.iou:.3f}", "Thinnest neck"):
+        assert figure in of_flowed
 
 
 @pytest.mark.parametrize(("count", "size"), [(1, 1320), (2, 1920), (3, 1920), (7, 1920)])
@@ -175,15 +235,8 @@ def test_what_was_decided_and_what_failed_is_on_the_sheets(
     assert overview_png([bent], target, failures=[ClassFailure("IH7", "no tile")]) != plain
 
 
-def test_scores_are_called_poor_where_the_words_say_so(
-    bent: EscherTile, flowed: EscherTile
-) -> None:
-    assert bent.fidelity is not None
-    said = set()
-    for cost in np.geomspace(1e-3, 1e3, 13):
-        scored = replace(bent, fidelity=replace(bent.fidelity, cost=float(cost)), thinnest=None)
-        poor = is_poor(scored)
-        assert poor == measures(scored)[0].words.startswith("a poor")
-        said.add(poor)
-    assert said == {False, True}
-    assert is_poor(flowed) == measures(flowed)[0].words.startswith("a poor")
+def test_a_sheet_shows_stars_and_how_tiles_lie(target: Target, bent: EscherTile) -> None:
+    sheets = {overview_png([bent.changed(rating=rating)], target) for rating in (
+        None, Rating(1.0), Rating(3.5), Rating(4.0)
+    )}  # fmt: skip
+    assert len(sheets) == 4

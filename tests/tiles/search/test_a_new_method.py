@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
@@ -57,6 +59,32 @@ def test_a_method_of_one_s_own_is_searched_with(workers: int) -> None:
     document = report(found)
     assert (document["method"], document["objective"]) == ("template", "overlap")
     assert document["settings"] == {"turns": 5, "seed": 0}
+
+
+def blas_threads() -> list[int]:
+    return [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
+
+
+def test_no_part_of_it_shares_its_work_among_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    # the measure of a search for both was outside: two threads took ten times as long as one
+    threads: list[int] = []
+
+    def told(name: str) -> None:
+        whole = getattr(TemplateSearch, name)
+
+        def part(*arguments: Any) -> Any:
+            threads.extend(blas_threads())
+            return whole(*arguments)
+
+        monkeypatch.setattr(TemplateSearch, name, part)
+
+    for name in ("sketch", "fit", "least_neck", "finish"):
+        told(name)
+    with threadpool_limits(2, user_api="blas"):
+        assert set(blas_threads()) == {2}
+        escherize(BOOT, EscherizeSettings(classes=("IH4",)), method=TemplateSearch())
+    assert len(threads) >= 4
+    assert set(threads) == {1}
 
 
 def test_what_it_does_not_take_is_refused() -> None:

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from orbiflow.runtime import NEVER
 from orbiflow.tiles import CLASSES, EscherTile, LikenessSearch
@@ -61,10 +63,34 @@ def test_the_front_and_what_is_near_it(bent: list[EscherTile]) -> None:
 
 def test_of_two_alike_one_is_left(bent: list[EscherTile]) -> None:
     values = [(0.0, 0.20, 0.70, "likeness"), (0.02, 0.19, 0.69, "likeness")]
-    values += [(0.5, 0.10, 0.50, "likeness"), (0.52, 0.50, 0.9, "overlap")]
+    values += [(0.5, 0.10, 0.50, "likeness"), (0.9, 0.50, 0.9, "overlap")]
     chosen = front_list([like(bent[0], *value) for value in values])
-    # the ends come first: the overlap's twin is the least deformed, and that one stays
-    assert [r.deformation for r in chosen] == [0.20, 0.10]
+    assert [r.deformation for r in chosen] == [0.20, 0.10, 0.50]
+
+
+MANY_ALIKE = st.tuples(
+    st.sampled_from((0.0, 0.02, 0.04, 0.3, 0.32, 0.8)),
+    st.sampled_from((0.1, 0.11, 0.12, 0.2, 0.5)),
+    st.sampled_from((0.6, 0.61, 0.62, 0.7, 0.9)),
+    st.sampled_from(("likeness", "overlap")),
+)
+
+
+def test_the_ends_are_listed_and_flags_are_of_what_is_listed(bent: list[EscherTile]) -> None:
+    # an end was left out if it was like the other one, and others were then said to be beaten by it
+    @settings(max_examples=40, deadline=None)
+    @given(st.lists(MANY_ALIKE, min_size=1, max_size=16))
+    def check(values: list[tuple[float, float, float, str]]) -> None:
+        chosen = front_list([like(bent[0], *value) for value in values])
+        points = [(r.deformation or 0.0, r.metrics.iou) for r in chosen]
+        assert min((cost, -iou) for _, cost, iou, _ in values) in [(c, -iou) for c, iou in points]
+        assert min((-iou, cost) for _, cost, iou, _ in values) in [(-iou, c) for c, iou in points]
+        for result, (cost, iou) in zip(chosen, points, strict=True):
+            others = [point for point in points if point != (cost, iou)]
+            beaten = any(c <= cost and other >= iou for c, other in others)
+            assert result.front == (not beaten)
+
+    check()
 
 
 def test_never_more_than_twelve(bent: list[EscherTile]) -> None:

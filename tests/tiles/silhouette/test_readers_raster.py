@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 from PIL import Image, ImageDraw
 
 from orbiflow.errors import InputFileError, OrbiflowError
@@ -134,6 +135,29 @@ def test_largest_component_and_holes(tmp_path: Path) -> None:
         "filled 1 hole (2.1% of the area)",
     )
     assert iou(reading.outline, SHAPE) > 0.995
+
+
+def test_what_was_seen_has_all_parts_and_holes(tmp_path: Path) -> None:
+    image = draw(scale=16)
+    pen = ImageDraw.Draw(image)
+    pen.rectangle((960, 160, 1119, 319), fill=0)
+    pen.rectangle((400, 320, 479, 479), fill=255)
+    reading = read_outline(save(tmp_path, image))
+    shape = shapely.Polygon(SHAPE * 16)
+    shape = shape.union(shapely.box(960, 160, 1120, 320)) - shapely.box(400, 320, 480, 480)
+    assert reading.seen is not None
+    assert reading.seen.symmetric_difference(shape).area < 0.01 * shape.area
+
+
+def test_dust_is_no_component(tmp_path: Path) -> None:
+    image = draw()
+    pixels = np.asarray(image).copy()
+    rng = np.random.default_rng(3)
+    pixels[tuple(rng.integers(0, 100, (2, 40)))] ^= 255
+    reading = read_outline(save(tmp_path, Image.fromarray(pixels)))
+    assert reading.notes[1:] == ("left out specks of dust",)
+    assert isinstance(reading.seen, shapely.Polygon)
+    assert not reading.seen.interiors
 
 
 def test_a_drawn_line_is_read_as_what_it_encloses(tmp_path: Path) -> None:

@@ -180,7 +180,7 @@ def batch(
     """
     given = {**where.to_json(), **density.to_json(), **table.to_json(), "picture": True}
 
-    def call_of(name: str) -> runtime.Call:
+    def call_of(name: str, _results: str) -> runtime.Call:
         return runtime.find("density fit").call({**given, "data": name, "out": "out"})
 
     title = f"Densities of {folder.name or 'a folder'}"

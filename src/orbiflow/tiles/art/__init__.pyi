@@ -1,5 +1,3 @@
-from .drawings import Over as Over
-from .drawings import read_over as read_over
 from .making import Artwork as Artwork
 from .making import art_scene as art_scene
 from .making import artwork as artwork
@@ -7,4 +5,3 @@ from .making import draw_art as draw_art
 from .making import render_artwork as render_artwork
 from .making import write_artwork as write_artwork
 from .settings import ArtSettings as ArtSettings
-from .source import with_map as with_map

@@ -14,20 +14,28 @@ from orbiflow.arguments import as_path
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
-from orbiflow.tiles.art.drawings import Over, paint_motif, read_over
-from orbiflow.tiles.art.engraving import engraved, eye
-from orbiflow.tiles.art.page import ArtPage, art_page
-from orbiflow.tiles.art.raster import Grid, Paint, render_page
+from orbiflow.tiles.art.page import HIDDEN, ArtPage, art_page
+from orbiflow.tiles.art.rendering import render_page
 from orbiflow.tiles.art.settings import ArtSettings
-from orbiflow.tiles.art.source import Picture, carried_picture, with_map
-from orbiflow.tiles.exporting import (
+from orbiflow.tiles.exporting import MOTIF, SYMBOL, tile_layers
+from orbiflow.tiles.motifs import (
+    Over,
+    Paint,
+    Picture,
+    carried_raster,
+    drawn_motif,
+    paint_motif,
+    picture_paint,
+    read_over,
+    with_map,
+)
+from orbiflow.tiles.scene import (
     INCH,
     Box,
     Curve,
     Layer,
     Motif,
     Part,
-    Raster,
     Scene,
     Style,
     Uses,
@@ -66,6 +74,11 @@ class Artwork:
         width = self.settings.outline
         return max(1.0, self.page.tile_size / TILE_PER_OUTLINE) if width is None else width
 
+    @property
+    def density(self) -> float:
+        """The texels of the tile's raster along its unit."""
+        return TEXELS_PER_PIXEL * self.page.scale
+
     def _repr_png_(self) -> bytes:
         """Return what a notebook shows."""
         return png_of(render_artwork(self), self.settings.dpi)
@@ -92,17 +105,12 @@ def artwork(
             lies outside it, there are too many tiles, or no rectangle repeats.
     """
     settings, tile = settings or ArtSettings(), with_map(tile)
-    if picture is not None or drawing is not None or settings.eyes:
+    if picture is not None:
         tile.require_map()
-    page = art_page(tile, settings)
-    parts = () if drawing is None else drawing.parts
-    around = [eye(tile, given, palette(settings.palette)) for given in settings.eyes]
-    if settings.strokes is not None:
-        parts += engraved(tile, settings.strokes, around)
-    parts += tuple(part for one in around for part in one.parts)
-    short = palette(settings.palette).shortage(page.count)
-    said = (*tile.notes, *notes, *page.notes, *short)
-    return Artwork(tile, settings, page, picture, Motif(parts), said)
+    page, chosen = art_page(tile, settings), palette(settings.palette)
+    motif = drawn_motif(tile, settings, chosen, drawing)
+    said = (*tile.notes, *notes, *page.notes, *chosen.shortage(page.count))
+    return Artwork(tile, settings, page, picture, motif, said)
 
 
 def render_artwork(art: Artwork, *, cancel: Cancel | None = None) -> np.ndarray:
@@ -113,20 +121,10 @@ def render_artwork(art: Artwork, *, cancel: Cancel | None = None) -> np.ndarray:
     return render_page(page, paint.grid, coloured, chosen.paper, samples=samples, cancel=cancel)
 
 
-def picture_paint(art: Artwork) -> Paint:
-    """Paint the tile's raster, as fine as the page needs, with the picture alone."""
-    polygon = art.page.tile.polygon
-    paint = Paint(Grid.over(polygon, TEXELS_PER_PIXEL * art.page.scale, art.page.count))
-    if art.picture is not None:
-        paint.lay(*carried_picture(art.picture, art.tile, paint.grid))
-        paint.bleed(paint.grid.inside(polygon))
-    return paint
-
-
 def painted(art: Artwork) -> Paint:
     """Paint the tile's raster with all that is on the tile."""
     polygon = art.page.tile.polygon
-    paint = picture_paint(art)
+    paint = picture_paint(art.picture, art.tile, art.density, art.page.count)
     if art.motif.parts:
         paint_motif(paint, art.motif)
         paint.bleed(paint.grid.inside(polygon))
@@ -138,9 +136,6 @@ def painted(art: Artwork) -> Paint:
     return paint
 
 
-TILE, MOTIF = "tile", "motif"
-
-
 def art_scene(art: Artwork) -> Scene:
     """Return the page in millimetres, as `render_artwork` draws it, with pixels carried already."""
     page, chosen = art.page, palette(art.settings.palette)
@@ -150,33 +145,27 @@ def art_scene(art: Artwork) -> Scene:
     # relative to the tile's own middle, so that rounding transforms moves points least
     middle = tile.center
     symbol = Curve.polyline(tile.polygon - middle, closed=True)
-    motif = Motif(art.motif.parts, _rasters(art), TILE).moved(np.eye(2), -middle)
-    copies = page.copies
+    rasters = ()
+    if art.picture is not None:
+        rasters = (carried_raster(art.picture, art.tile, art.density, page.count),)
+    motif = Motif(art.motif.parts, rasters, SYMBOL).moved(np.eye(2), -middle)
+    shown = page.colours != HIDDEN
+    copies = page.copies.select(shown)
     turned = linear @ tile.group.linear_parts
     places = copies.translations @ linear.T + offset + (turned @ middle)[copies.cosets]
     # symbols in mm, for which the writer's decimals are meant
     scale = unit * page.scale
     turned = turned / scale
-    symbols = {TILE: symbol.moved(scale * np.eye(2), np.zeros(2))}
+    symbols = {SYMBOL: symbol.moved(scale * np.eye(2), np.zeros(2))}
     motifs = {MOTIF: motif.moved(scale * np.eye(2), np.zeros(2))}
-    box = Box(0.0, 0.0, unit * page.width, unit * page.height)
+    box = Box(0.0, 0.0, unit * page.size[0], unit * page.size[1])
     layers = [Layer("paper", "paper", Style(fill=chosen.paper), (rectangle(box),))]
     drawn = bool(motif.parts or motif.rasters)
-    for colour in sorted(set(page.colours.tolist())):
-        own = page.colours == colour
-        fill, name = chosen.fill(colour), f"colour {colour + 1}"
-        # a hairline in the tile's own colour closes the seams that viewers leave between neighbours
-        style = Style(fill, fill, 0.3 * unit)
-        uses = Uses(TILE, turned, copies.cosets[own], places[own])
-        layers.append(Layer(name, "tiles", style, (uses,), clipped=True))
-        if drawn:
-            uses = Uses(MOTIF, turned, copies.cosets[own], places[own])
-            name, ink = f"drawing on {name}", chosen.ink(colour)
-            layers.append(Layer(name, "tiles", Style(), (uses,), clipped=True, ink=ink))
-    if art.outline > 0:
-        style = Style(None, chosen.outline, unit * art.outline)
-        uses = Uses(TILE, turned, copies.cosets, places)
-        layers.append(Layer("outlines", "tiles", style, (uses,), clipped=True))
+    line = Style(None, chosen.outline, unit * art.outline)
+    uses, seam = Uses(SYMBOL, turned, copies.cosets, places), 0.3 * unit
+    layers += tile_layers(
+        uses, page.colours[shown], chosen, line, clipped=True, seam=seam, drawn=drawn
+    )
     notes = (f"Artwork of {tile.isohedral_class or 'a tile'}, made with orbiflow {__version__}.",)
     return Scene(
         box.width,
@@ -188,21 +177,6 @@ def art_scene(art: Artwork) -> Scene:
         notes=notes,
         motifs=motifs if drawn else {},
     )
-
-
-def _rasters(art: Artwork) -> tuple[Raster, ...]:
-    if art.picture is None:
-        return ()
-    paint = picture_paint(art)
-    values, grid = paint.values, paint.grid
-    alpha = 1 - values[..., 3:4]
-    straight = values[..., :3] / np.maximum(alpha, 1e-6)
-    both = np.concatenate([straight, alpha], axis=2)
-    image = Image.fromarray((both * 255 + 0.5).clip(0, 255).astype(np.uint8), "RGBA")
-    buffer = io.BytesIO()
-    image.save(buffer, "PNG")
-    linear = np.eye(2) / grid.density
-    return (Raster(buffer.getvalue(), image.size, linear, grid.corner),)
 
 
 def write_artwork(art: Artwork, ending: str, *, cancel: Cancel | None = None) -> bytes | str:

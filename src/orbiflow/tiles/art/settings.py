@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Literal
 
 from orbiflow.drawing import PaletteName
-from orbiflow.errors import OrbiflowError
 from orbiflow.settings import (
     DefaultText,
     Hidden,
@@ -15,30 +13,15 @@ from orbiflow.settings import (
     Option,
     Parsed,
     Range,
-    Repeated,
     SettingError,
-    Settings,
     Unit,
 )
+from orbiflow.tiles.motifs import MotifSettings
 from orbiflow.units import pixel_size, pixels
-
-Strokes: TypeAlias = Literal["hatch", "echoes", "feathers"]
 
 MOST_PIXELS = 100_000_000  # the largest number of pixels of a picture
 LONGEST = 30_000  # the longest side of a picture in pixels
 SMALLEST_TILE = 8.0  # the size of a tile in pixels below which it shows nothing
-
-
-def eye_numbers(text: str) -> tuple[float, ...]:
-    """Return the numbers of an eye.
-
-    >>> eye_numbers("120, 80,6")
-    (120.0, 80.0, 6.0)
-    """
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise OrbiflowError(f"{text!a:.60} is not x,y or x,y,radius") from None
 
 
 def line_width(text: str, dpi: float) -> float:
@@ -46,11 +29,11 @@ def line_width(text: str, dpi: float) -> float:
     return 0.0 if text.strip().lower() == "none" else pixels(text, dpi)
 
 
-class ArtSettings(Settings, group="Picture"):
+class ArtSettings(MotifSettings, group="Picture"):
     """How a picture of a tiling is made; numbers of a length are pixels."""
 
     size: Annotated[
-        tuple[Annotated[int, Range(1, LONGEST)], Annotated[int, Range(1, LONGEST)]],
+        tuple[Annotated[float, Range(1, LONGEST)], Annotated[float, Range(1, LONGEST)]],
         Parsed(pixel_size, "a size such as 3000x2000 or 300x200mm", "SIZE", needs="dpi"),
         NotWith("repeat", because="the cell that repeats has its own size"),
         DefaultText("3000x2000"),
@@ -66,10 +49,21 @@ class ArtSettings(Settings, group="Picture"):
     ] = None
     """Longer side of the tile's smallest rectangle: pixels, or a length such as 40mm."""
 
-    repeat: bool = False
-    """Make the cell that repeats without seams, instead of a page."""
+    rotate: Annotated[
+        float, Range(-360, 360), Unit("degrees"), NotWith("repeat", because="it turns as it must")
+    ] = 0.0
+    """Turn the tiling on the page by this angle, counterclockwise."""
 
-    tolerance: Annotated[float, Range(0, 0.2), OnlyWith(repeat=True)] = 0.02
+    clip: Annotated[bool, Option("--clip", off="--whole"), NotWith("repeat")] = True
+    """Cut tiles at the page's edge, or leave out those that are not whole."""
+
+    repeat: Literal["basic", "brick", "half-drop"] | None = None
+    """Make the cell that repeats without seams, instead of a page: row on row, with each row moved by
+    half a width, or with each column moved by half a height."""
+
+    tolerance: Annotated[float, Range(0, 0.2), OnlyWith(repeat=("basic", "brick", "half-drop"))] = (
+        0.02
+    )
     """How much that cell may be stretched to be a rectangle; 0.02 is 2 %."""
 
     palette: PaletteName = "earth"
@@ -90,42 +84,20 @@ class ArtSettings(Settings, group="Picture"):
     ] = None
     """Width of the lines between tiles: pixels, a length such as 0.3mm, or none."""
 
-    engrave: bool = False
-    """Draw lines inside the tile, as on a woodcut: hatching, where the strokes say nothing else."""
-
-    strokes: Strokes | None = None
-    """Engrave with hatching, echoes of the outline, or feathers."""
-
-    eyes: Annotated[
-        tuple[
-            Annotated[tuple[float, ...], Parsed(eye_numbers, "x,y or x,y,radius", "X,Y[,R]")], ...
-        ],
-        Repeated(),
-        Option("--eye"),
-    ] = ()
-    """An eye, in the silhouette's coordinates. May be repeated."""
-
     dpi: Annotated[float, Range(1, 10_000)] = 300.0
     """Pixels per inch."""
 
     samples: Annotated[int, Range(1, 8), Hidden()] = 3
     """Number of samples along each side of a pixel."""
 
-    def defaults(self) -> Mapping[str, Any]:
-        return {"strokes": "hatch"} if self.engrave else {}
-
     def check(self) -> None:
+        super().check()
         check_size(*self.size)
-        for number, place in enumerate(self.eyes, 1):
-            if len(place) not in (2, 3) or min(place[2:], default=0) < 0:
-                raise SettingError(
-                    f"{{eyes}}: entry {number} must be x,y or x,y,radius in the silhouette's "
-                    f"coordinates, got {','.join(f'{part:g}' for part in place)}"
-                )
 
 
-def check_size(width: int, height: int) -> None:
-    """Check that a picture is not too large."""
+def check_size(*sides: float) -> None:
+    """Check that a picture of this width and height is not too large."""
+    width, height = map(round, sides)
     if max(width, height) > LONGEST or width * height > MOST_PIXELS:
         raise SettingError(
             f"a picture of {width} x {height} pixels is too large ({{size}}); at most "

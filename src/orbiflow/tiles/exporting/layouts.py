@@ -4,29 +4,28 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
+from operator import itemgetter
 
 import numpy as np
 import shapely
 
-from orbiflow.arrays import Array
-from orbiflow.drawing import palette
+from orbiflow.arrays import Array, Integers
+from orbiflow.drawing import Palette, palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry import rotation_matrix
 from orbiflow.tiles.exporting.nesting import dense_arrangements, on_sheet
 from orbiflow.tiles.exporting.outlines import Outline, fitted, outline, turning
-from orbiflow.tiles.exporting.scene import (
-    Box,
-    Curve,
-    Layer,
-    PlacedTile,
-    Scene,
-    Style,
-    Uses,
-    rectangle,
+from orbiflow.tiles.exporting.placing import (
+    edge_margin,
+    inset,
+    longer_side,
+    place_on_page,
+    rectangle_sides,
 )
-from orbiflow.tiles.exporting.settings import ExportSettings
+from orbiflow.tiles.exporting.settings import USUAL_WIDTH, ExportSettings
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.likeness import Thinnest, narrowest_neck, narrowest_slit
+from orbiflow.tiles.likeness import narrowest_neck, narrowest_slit
+from orbiflow.tiles.scene import Box, Curve, Layer, Motif, PlacedTile, Scene, Style, Uses, rectangle
 from orbiflow.tiles.tilings import Copies, Tile, colouring, copies_inside, copies_meeting
 
 STRIP = 8.0  # height in mm of the strip at the page's foot that the calibration mark has for itself
@@ -40,87 +39,48 @@ class Layout:
     tile: Tile  # the tile in mm on the page, y down
     outline: Outline  # the tile's curves
     box: Box  # the part of the page that tiles may use
+    place: tuple[Array, Array]  # the map, linear part and offset, from the tile's own units
+    motif: Motif | None = None  # what lies on the tile, in mm on the page
 
+    @property
+    def fine(self) -> float:
+        """The tolerance in mm of what is flattened or fitted again, a part of the whole."""
+        return self.settings.deviation / 4
 
-# Places along each side of a lattice cell that are tried for a page with most whole tiles
-SHIFTS = 10
-# Number of tiles on a page beyond which a few more are not worth looking for
-MOST_TILES_TO_SHIFT = 1000
+    @cached_property
+    def piece(self) -> tuple[Array, str]:
+        """The outline (M, 2) of a piece with its offset, and what the user should know of it."""
+        # flattening and fitting again share what the outline's fit left of the tolerance
+        ring = self.outline.closed.flattened(self.fine / 2)
+        return offset_ring(ring, self.settings.offset, self.fine / 2)
 
 
 def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
-    """Scale and turn the tile and put it in the middle, or nearby where that makes most tiles whole."""
+    """Scale and turn the tile and put it on the page."""
     width, height = settings.page
-    box = Box(0.0, 0.0, width, height - (STRIP if settings.calibrate else 0.0))
+    strip = STRIP if settings.calibrate else 0.0
+    box = inset(Box(0.0, 0.0, width, height - strip), settings.margin)
     scale = settings.tile_size / longer_side(tile.polygon)
-    turn = rotation_matrix(-np.radians(settings.rotate))  # y points down on the page
-    linear = scale * turn @ np.diag([1.0, 1.0 if y_down else -1.0])
-    middle = np.array([(box.left + box.right) / 2, (box.top + box.bottom) / 2])
-    placed = tile.transformed(linear, middle - linear @ tile.center)
+    margin = None if settings.clip or settings.cut == "pieces" else edge_margin(settings.tile_size)
+    place = place_on_page(tile, scale, box, y_down, rotate=settings.rotate, margin=margin)
+    placed = tile.transformed(*place)
     if settings.cut != "pieces":
         need = np.ptp(placed.polygon, axis=0) + 2 * bleed(settings)
         if need[0] > box.width or need[1] > box.height:
-            extra = height - box.height
-            strip = f", {extra:g} mm of it for the calibration mark" if extra else ""
+            extra = f", {strip:g} mm of it for the calibration mark" if strip else ""
+            edge = f" with a margin of {settings.margin:g} mm" if settings.margin else ""
             raise OrbiflowError(
                 f"a tile of {settings.tile_size:g} mm does not fit on the page of {width:g} x "
-                f"{height:g} mm: it needs {need[0]:.1f} x {need[1] + extra:.1f} mm{strip}; choose "
-                "a larger area or a smaller tile size"
+                f"{height:g} mm{edge}: it needs {need[0]:.1f} x {need[1] + strip:.1f} mm{extra}; "
+                "choose a larger area or a smaller tile size"
             )
-        if not settings.clip:
-            placed = _with_most_whole(placed, inner_box(box, settings))
-    return Layout(settings, placed, outline(placed, settings.deviation), box)
-
-
-def longer_side(ring: Array) -> float:
-    """Return the longer side of the smallest rectangle, however turned, around a ring."""
-    return rectangle_sides(ring)[1]
-
-
-def rectangle_sides(ring: Array) -> tuple[float, float]:
-    """Return the sides of the smallest rectangle by area around a ring, the shorter first.
-
-    Of the same area, as around a regular hexagon, the shortest: rounding does not choose.
-
-    >>> square = np.array([[0.0, 0.0], [1.0, 1.0], [0.0, 2.0], [-1.0, 1.0]])
-    >>> [round(side, 6) for side in rectangle_sides(square)]
-    [1.414214, 1.414214]
-    """
-    hull = shapely.get_coordinates(shapely.convex_hull(shapely.MultiPoint(ring)))
-    steps = np.diff(hull, axis=0)  # a smallest rectangle lies along one of the hull's sides
-    along = steps / np.linalg.norm(steps, axis=1)[:, None]
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    sides = np.sort(np.stack([np.ptp(hull @ way.T, axis=0) for way in (along, across)]), axis=0)
-    areas = sides.prod(axis=0)
-    smallest = np.flatnonzero(areas <= (1 + 1e-6) * areas.min())
-    best = smallest[sides[1, smallest].argmin()]
-    return float(sides[0, best]), float(sides[1, best])
+    return Layout(settings, placed, outline(placed, settings.deviation), box, place)
 
 
 def bleed(settings: ExportSettings) -> float:
-    """Return how far in mm a line may reach beyond its tile's polygon."""
-    return settings.deviation + (settings.stroke_width or 0.25) / 2
-
-
-def inner_box(box: Box, settings: ExportSettings) -> Box:
-    """Return the box for polygons whose lines are to lie in `box`."""
-    margin = bleed(settings)
-    return Box(box.left + margin, box.top + margin, box.right - margin, box.bottom - margin)
-
-
-def _with_most_whole(tile: Tile, box: Box) -> Tile:
-    """Return the tile moved so that as many copies as possible are whole, or as it is."""
-    if box.width * box.height > MOST_TILES_TO_SHIFT * abs(tile.signed_area):
-        return tile
-    best, shift = len(copies_inside(tile, box)), np.zeros(2)
-    shares = np.arange(SHIFTS) / SHIFTS
-    grid = np.stack(np.meshgrid(shares, shares), axis=-1).reshape(-1, 2)
-    for step in grid @ tile.group.lattice.T:
-        moved = (box.left - step[0], box.top - step[1], box.right - step[0], box.bottom - step[1])
-        count = len(copies_inside(tile, moved))
-        if count > best:
-            best, shift = count, step
-    return tile.transformed(np.eye(2), shift)
+    """Return the room in mm for lines that reach beyond their tile's polygon."""
+    own = settings.deviation + (settings.stroke_width or USUAL_WIDTH) / 2
+    return max(own, edge_margin(settings.tile_size))
 
 
 def placed_tiles(copies: Copies, layout: Layout) -> tuple[PlacedTile, ...]:
@@ -135,40 +95,74 @@ def placed_tiles(copies: Copies, layout: Layout) -> tuple[PlacedTile, ...]:
     return tuple(PlacedTile(k, linear[k], at, ks, kept) for k, at, ks, kept in placed)
 
 
-SYMBOL = "tile"
-
-
 def chosen_copies(layout: Layout) -> Copies:
     """Return the copies on the page: those that meet it if it clips, else the whole ones."""
     settings, box = layout.settings, layout.box
     if settings.clip:
         return copies_meeting(layout.tile, box)
-    return copies_inside(layout.tile, inner_box(box, settings))
+    return copies_inside(layout.tile, inset(box, bleed(settings)))
+
+
+SYMBOL, MOTIF = "tile", "motif"
+
+
+def tile_layers(
+    copies: Uses,
+    colours: Integers,
+    chosen: Palette | None,
+    line: Style,
+    *,
+    clipped: bool,
+    seam: float | None = None,
+    drawn: bool = False,
+) -> list[Layer]:
+    """Return a layer of tiles for each of their colours; with a motif on them, if `drawn`.
+
+    Lines are drawn around each tile; or above all, if hairlines `seam` mm wide close the seams that
+    viewers leave between neighbours.
+    """
+    layers = list[Layer]()
+    for colour in sorted(set(colours.tolist())):
+        own = colours == colour
+        uses = replace(copies, which=copies.which[own], offsets=copies.offsets[own])
+        if chosen is None:
+            return [Layer("tiles", "tiles", line, (uses,), clipped)]
+        fill, name, ink = chosen.fill(colour), f"colour {colour + 1}", chosen.ink(colour)
+        style = line._replace(fill=fill) if seam is None else Style(fill, fill, seam)
+        layers.append(Layer(name, "tiles", style, (uses,), clipped))
+        if drawn:
+            motifs = (replace(uses, symbol=MOTIF),)
+            layers.append(Layer(f"drawing on {name}", "drawing", Style(), motifs, clipped, ink))
+    if seam is not None and line.width > 0:
+        layers.append(Layer("outlines", "tiles", line, (copies,), clipped))
+    return layers
+
+
+SEAM = 0.025  # width in mm of hairlines between filled tiles
 
 
 def tiling_scene(layout: Layout) -> Scene:
     """Return a scene with the tile as a symbol, a use of it for each copy, a layer for each colour."""
-    settings = layout.settings
+    settings, box = layout.settings, layout.box
     copies = chosen_copies(layout)
     # relative to the symbol's own middle, so that rounding a transform moves no point by much
     middle = layout.tile.center
     symbol = layout.outline.closed.moved(np.eye(2), -middle)
     turned = np.einsum("aij,j->ai", copies.group.linear_parts, middle)
     offsets = copies.translations + turned[copies.cosets]
-    chosen = palette(settings.palette)
-    box, layers, line = layout.box, list[Layer](), settings.stroke or "#000000"
-    colours = np.zeros(len(copies), dtype=np.int64)
+    uses = Uses(SYMBOL, copies.group.linear_parts, copies.cosets, offsets)
+    motifs, layers, chosen = dict[str, Motif](), list[Layer](), None
+    colours, line = np.zeros(len(copies), dtype=np.int64), settings.stroke or "#000000"
     if settings.filled:
+        chosen = palette(settings.palette)
         line = settings.stroke or chosen.outline
         colours = colouring(layout.tile).colours(copies)
         layers.append(Layer("paper", "paper", Style(fill=chosen.paper), (rectangle(box),)))
-    for colour in range(int(colours.max(initial=0)) + 1):
-        own = colours == colour
-        uses = Uses(SYMBOL, copies.group.linear_parts, copies.cosets[own], offsets[own])
-        name = f"colour {colour + 1}" if settings.filled else "tiles"
-        fill = chosen.fill(colour) if settings.filled else None
-        style = Style(fill, line, settings.stroke_width or 0.25)
-        layers.append(Layer(name, "tiles", style, (uses,), clipped=settings.clip))
+        if layout.motif is not None:
+            motifs[MOTIF] = replace(layout.motif.moved(np.eye(2), -middle), within=SYMBOL)
+    style = Style(None, line, settings.stroke_width or USUAL_WIDTH)
+    seam, clip = SEAM if motifs else None, settings.clip
+    layers += tile_layers(uses, colours, chosen, style, clipped=clip, seam=seam, drawn=bool(motifs))
     return Scene(
         *settings.page,
         tuple(layers),
@@ -176,10 +170,11 @@ def tiling_scene(layout: Layout) -> Scene:
         window=box,
         prototile=layout.tile.polygon,
         tiles=placed_tiles(copies, layout),
+        motifs=motifs,
     )
 
 
-RED = "#ff0000"
+RED, BLUE = "#ff0000", "#0000ff"
 
 
 def line_style(layout: Layout) -> Style:
@@ -205,13 +200,13 @@ def cut_ring(ring: Array, kerf: float, clearance: float) -> Array:
         what = "kerf" if kerf >= clearance else "clearance"
         raise OrbiflowError(
             f"the {what} of {max(kerf, clearance):g} mm is wider than the piece's neck: it is "
-            f"{neck.width:.2f} mm wide {place_on(ring, neck)}; choose a larger tile size"
+            f"{neck.width:.2f} mm wide {place_on(ring, neck.place)}; choose a larger tile size"
         )
     slit = narrowest_slit(ring)
     if slit is not None and slit.width + clearance <= kerf:
         raise OrbiflowError(
             f"the kerf of {kerf:g} mm is wider than a slit of the piece: it is {slit.width:.2f} mm "
-            f"wide {place_on(ring, slit)}, and would be burned away; choose a larger tile size"
+            f"wide {place_on(ring, slit.place)}, and would be burned away; choose a larger tile size"
         )
     return _offset_ring(ring, (kerf - clearance) / 2)
 
@@ -232,14 +227,59 @@ def _offset_ring(ring: Array, distance: float) -> Array:
     return points[steps > 1e-9]
 
 
-def place_on(ring: Array, found: Thinnest) -> str:
-    """Return in words where on a piece a neck or slit is.
+def offset_ring(ring: Array, distance: float, tolerance: float) -> tuple[Array, str]:
+    """Return the line (M, 2) at a distance outside a ring (N, 2), inside if negative, and a note.
+
+    Every point of it is at that distance, within the tolerance, from the ring: corners are rounded on
+    the side to which the line moves. The note says where gaps close or limbs vanish.
+
+    >>> bar = np.array([[0.0, 0.0], [20, 0], [20, 4], [0, 4]])
+    >>> shapely.Polygon(offset_ring(bar, 1.0, 1e-3)[0]).bounds
+    (-1.0, -1.0, 21.0, 5.0)
+    """
+    if not distance:
+        return ring, ""
+    piece, reach = shapely.Polygon(ring), abs(distance)
+    sides = max(8, math.ceil(np.pi / 4 / math.acos(max(0.0, 1 - tolerance / reach))))
+    parts = polygons_in(piece.buffer(distance, quad_segs=sides))
+    if len(parts) != 1:
+        neck = narrowest_neck(ring)
+        what = f"would fall into {len(parts)} parts" if parts else "vanishes"
+        raise OrbiflowError(
+            f"with an offset of {distance:g} mm the piece {what}: it is {neck.width:.2f} mm wide "
+            f"{place_on(ring, neck.place)}; choose a smaller offset or a larger tile size"
+        )
+    moved = shapely.Polygon(parts[0].exterior)
+    back = moved.buffer(-distance, quad_segs=sides)
+    # what does not come back, but for corners, is a gap that closes or a limb that vanishes
+    lost = polygons_in(piece.difference(back) if distance < 0 else back.difference(piece))
+    ends = [_farthest(part, back) for part in lost]
+    deep = sorted((end for end in ends if end[0] > reach), key=itemgetter(0))
+    note = ""
+    if deep:
+        what = ("limb vanishes", "limbs vanish") if distance < 0 else ("gap closes", "gaps close")
+        note = (
+            f"with an offset of {distance:g} mm, {len(deep)} {what[len(deep) > 1]} where the outline "
+            f"is less than {2 * reach:g} mm across, the largest {place_on(ring, deep[-1][1])}"
+        )
+    return shapely.get_coordinates(moved.exterior)[:-1], note
+
+
+def _farthest(part: shapely.Polygon, other: shapely.Polygon) -> tuple[float, Array]:
+    """Return how far a part reaches from the boundary of another polygon, and where."""
+    points = shapely.get_coordinates(part)
+    distance = np.asarray(shapely.distance(shapely.points(points), other.boundary))
+    return float(distance.max()), points[distance.argmax()]
+
+
+def place_on(ring: Array, place: Array) -> str:
+    """Return in words where on a piece a point (2,) is.
 
     >>> ring = np.array([[10.0, 10.0], [30.0, 10.0], [30.0, 14.0], [10.0, 14.0]])
-    >>> place_on(ring, narrowest_neck(ring)).split(" from ")[1]
+    >>> place_on(ring, narrowest_neck(ring).place).split(" from ")[1]
     'its left and 2.0 mm'
     """
-    x, y = found.place - ring.min(axis=0)
+    x, y = place - ring.min(axis=0)
     return f"{x:.1f} mm from its left and {y:.1f} mm from its top"
 
 
@@ -249,17 +289,16 @@ LEAST_EDGE = 0.1  # twice the least distance in mm of cuts from the sheet's edge
 
 def pieces_scenes(layout: Layout, *, fine: bool = True) -> list[Scene]:
     """Return a scene for each sheet, several where a bed does not hold all; smooth cuts if `fine`."""
-    settings, box = layout.settings, layout.box
-    flat = settings.deviation / 4
-    # flattening and fitting again share what the outline's fit left of the tolerance
-    ring = cut_ring(layout.outline.closed.flattened(flat / 2), settings.kerf, settings.clearance)
+    settings, box, flat = layout.settings, layout.box, layout.fine
+    ring = cut_ring(layout.piece[0], settings.kerf, settings.clearance)
     curve = _closed_fit(ring, flat) if fine else Curve.polyline(ring, closed=True)
     line = curve.flattened(flat / 4)
     gap = max(settings.spacing, LEAST_GAP)
     arrangements = dense_arrangements(layout.tile, line, gap)
     edge = max(gap, LEAST_EDGE) / 2
     placed = on_sheet(arrangements, line, box.width - 2 * edge, box.height - 2 * edge)
-    placed = replace(placed, offsets=placed.offsets + edge)
+    corner = np.array([box.left + edge, box.top + edge])
+    placed = replace(placed, offsets=placed.offsets + corner)
     if not len(placed):
         short, long = rectangle_sides(line)
         raise OrbiflowError(
@@ -292,14 +331,21 @@ def _scene(layout: Layout, placed: Uses, curve: Curve, line: Array, box: Box, ga
         PlacedTile(aspect, placed.linear[aspect], offset)
         for aspect, offset in zip(placed.which.tolist(), placed.offsets, strict=True)
     ]
-    cuts = tuple(curve.moved(piece.linear, piece.offset) for piece in pieces)
+    layers = [Layer("cut", "cut", line_style(layout), _moved(curve, pieces))]
+    if layout.settings.offset > 0:
+        seams = _moved(layout.outline.closed, pieces)
+        layers.insert(0, Layer("seam", "mark", Style(None, BLUE, 0.1), seams))
     return Scene(
         *layout.settings.page,
-        (Layer("cut", "cut", line_style(layout), cuts),),
+        tuple(layers),
         window=box,
         prototile=layout.tile.polygon,
         tiles=tuple(pieces),
     )
+
+
+def _moved(curve: Curve, pieces: list[PlacedTile]) -> tuple[Curve, ...]:
+    return tuple(curve.moved(piece.linear, piece.offset) for piece in pieces)
 
 
 def _closed_fit(ring: Array, tolerance: float) -> Curve:
@@ -320,5 +366,5 @@ def _require_clear(rings: Array, box: Box, gap: float) -> None:
     tree = shapely.STRtree(polygons)
     first, second = tree.query(polygons, predicate="dwithin", distance=0.999 * gap)
     low, high = rings.min(axis=(0, 1)), rings.max(axis=(0, 1))
-    if (first != second).any() or (low < 0).any() or (high > (box.width, box.height)).any():
+    if (first != second).any() or (low < box[:2]).any() or (high > box[2:]).any():
         raise RuntimeError("the nesting broke its promise: pieces too close or off the sheet")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 from orbiflow.arrays import Array
-from orbiflow.tiles.exporting.scene import Uses
+from orbiflow.tiles.scene import Uses
 from orbiflow.tiles.tilings import Tile
 
 

@@ -10,7 +10,7 @@ import shapely
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.scene import Curve, bezier
+from orbiflow.tiles.scene import Curve, bezier
 from orbiflow.tiles.tilings import EdgeImage, Edges, Tile, edge_classes, edges
 
 # The angle in radians by which a polyline turns at a vertex that stays a corner

@@ -17,13 +17,29 @@ from orbiflow.settings import (
     SettingError,
     Unit,
 )
-from orbiflow.units import COLUMNS, Colour, Length, LengthOrZero, PageSize, Size
+from orbiflow.tiles.motifs import MotifSettings
+from orbiflow.units import (
+    COLUMNS,
+    PAGES,
+    Colour,
+    Length,
+    LengthOrZero,
+    PageSize,
+    SignedLength,
+    Size,
+)
 
 PIECES = Group("Pieces")
+USUAL_WIDTH = 0.25  # width in mm of the lines around tiles
 PAGE = (300.0, 200.0)  # width and height of the page in mm where none is asked for
 
 
-class ExportSettings(FileSettings, group="Page and file"):
+def usual_tolerance(tile_size: float) -> float:
+    """Return the usual distance in mm of curves from the outline of a tile of this size."""
+    return max(0.05, tile_size / 800)
+
+
+class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     """How a tiling is drawn in real size; lengths in mm.
 
     >>> ExportSettings(purpose="laser", kerf=0.1, cut="pieces").stroke_width
@@ -31,7 +47,7 @@ class ExportSettings(FileSettings, group="Page and file"):
     """
 
     purpose: Annotated[
-        Literal["laser", "print", "paper", "web", "plotter"] | None, Option("--for")
+        Literal["laser", "print", "paper", "web", "plotter", "colouring"] | None, Option("--for")
     ] = None
     """Settings that suit a purpose; other options go before them."""
 
@@ -45,17 +61,21 @@ class ExportSettings(FileSettings, group="Page and file"):
     """Longer side of the tile's smallest rectangle."""
 
     area: Annotated[PageSize | None, DefaultText("300x200mm, or the bed for pieces")] = None
-    """Width and height of the page; also single or double, a journal's columns."""
+    """Width and height of the page, or its name: A4, A4-landscape, letter, mug, phone; single or
+    double, a journal's columns."""
 
-    cut: Literal["none", "skeleton", "pieces"] = "none"
+    margin: LengthOrZero = 0.0
+    """Width of the page's edge that stays empty."""
+
+    cut: Literal["none", "skeleton", "pieces", "jigsaw"] = "none"
     """With none, every tile is drawn; with skeleton, each shared edge once; with pieces, tiles
-    apart."""
+    apart; with jigsaw, a rectangle whose pieces at the border have no crumbs."""
 
     rotate: Annotated[
         float,
         Range(-360, 360),
         Unit("degrees"),
-        OnlyWith(cut=("none", "skeleton"), because="pieces are turned to fill the page"),
+        OnlyWith(cut=("none", "skeleton", "jigsaw"), because="pieces are turned to fill the page"),
     ] = 0.0
     """Turn the tiling on the page by this angle, counterclockwise."""
 
@@ -69,7 +89,10 @@ class ExportSettings(FileSettings, group="Page and file"):
     border: Annotated[bool, OnlyWith(cut="skeleton", clip=True)] = False
     """Cut the page's border, too."""
 
-    bed: Size | None = None
+    bed: Annotated[
+        Size | None,
+        OnlyWith(cut=("none", "skeleton", "pieces"), because="a jigsaw is cut from one sheet"),
+    ] = None
     """Size of the machine's bed; a larger page becomes several files."""
 
     calibrate: bool = False
@@ -80,8 +103,8 @@ class ExportSettings(FileSettings, group="Page and file"):
     ] = None
     """Largest distance of curves from the tile's outline."""
 
-    warn_neck: Length | None = None
-    """Say where the tile is thinner than this, such as 2mm."""
+    warn_neck: Annotated[LengthOrZero, DefaultText("1.5mm for lasers, else 0")] = 0.0
+    """Say where the tile is thinner than this, such as 2mm; 0 says nothing."""
 
     palette: Annotated[
         PaletteName, OnlyWith(cut="none", because="only filled tiles have colours")
@@ -91,6 +114,13 @@ class ExportSettings(FileSettings, group="Page and file"):
     dpi: Annotated[float, Range(1, 10_000), OnlyWith(format=("png", None))] = 300.0
     """Dots per inch of a PNG."""
 
+    offset: Annotated[
+        SignedLength,
+        OnlyWith(cut="pieces", because="an edge that two tiles share is drawn only once"),
+        PIECES,
+    ] = 0.0
+    """Cut this far outside the tile: a quilt's seam allowance, a sticker's border; negative inside."""
+
     kerf: Annotated[
         LengthOrZero,
         OnlyWith(cut="pieces", because="an edge that two tiles share is cut only once"),
@@ -98,8 +128,8 @@ class ExportSettings(FileSettings, group="Page and file"):
     ] = 0.0
     """Width that the tool burns away."""
 
-    clearance: Annotated[LengthOrZero, OnlyWith(cut="pieces"), PIECES] = 0.0
-    """Gap between pieces put together, for a puzzle."""
+    clearance: Annotated[LengthOrZero, OnlyWith(cut=("pieces", "jigsaw")), PIECES] = 0.0
+    """Gap between pieces put together, for a puzzle; around a jigsaw in its tray."""
 
     spacing: Annotated[LengthOrZero, PIECES] = 1.0
     """Gap between the cuts of different pieces."""
@@ -108,6 +138,9 @@ class ExportSettings(FileSettings, group="Page and file"):
         int | None, Range(1), OnlyWith(cut="pieces"), PIECES, DefaultText("what the page holds")
     ] = None
     """Number of pieces."""
+
+    tray: Annotated[Length | None, OnlyWith(cut="jigsaw"), PIECES] = None
+    """Add two sheets with a jigsaw's tray, a frame with a rim this wide and a base."""
 
     filled: Annotated[bool, Hidden()] = True
     """Fill tiles with colours of the palette."""
@@ -119,12 +152,19 @@ class ExportSettings(FileSettings, group="Page and file"):
     """Width of lines."""
 
     def defaults(self) -> Mapping[str, Any]:
-        values = dict(PURPOSES[self.purpose]) if self.purpose else {}
-        if "cut" in self.fields_given and self.cut == "pieces":
+        values = {**super().defaults(), **PURPOSES.get(self.purpose or "", {})}
+        if "cut" in self.fields_given and self.cut not in ("none", "skeleton"):
             values.pop("clip", None)
         return values
 
     def check(self) -> None:
+        super().check()
+        if 2 * self.margin >= min(self.page):
+            width, height = self.page
+            raise SettingError(
+                f"{{margin}} of {self.margin:g} mm leaves nothing of a page of {width:g} x {height:g} "
+                "mm; choose a smaller one"
+            )
         if self.tolerance is not None and self.tolerance > self.tile_size / 20:
             raise SettingError(
                 f"{{tolerance}} of {self.tolerance:g} mm would lose the shape of a tile of "
@@ -135,9 +175,14 @@ class ExportSettings(FileSettings, group="Page and file"):
             raise SettingError(f"{{palette}} has no effect: {what}; leave {{palette}} out")
 
     @property
+    def coloured(self) -> bool:
+        """Whether what lies on the tiles has its colours, rather than those of a machine's layers."""
+        return (self.cut == "none" and self.filled) or self.purpose in ("print", "paper", "web")
+
+    @property
     def usual_format(self) -> str:
         """What suits the purpose, else svg."""
-        return "pdf" if self.purpose in ("print", "paper") else "svg"
+        return "pdf" if self.purpose in ("print", "paper", "colouring") else "svg"
 
     @property
     def page(self) -> tuple[float, float]:
@@ -150,16 +195,26 @@ class ExportSettings(FileSettings, group="Page and file"):
     @property
     def deviation(self) -> float:
         """The tolerance in mm."""
-        return max(0.05, self.tile_size / 800) if self.tolerance is None else self.tolerance
+        return usual_tolerance(self.tile_size) if self.tolerance is None else self.tolerance
 
 
 _LINES = {"cut": "skeleton", "clip": False, "filled": False}
 
 PURPOSES: Mapping[str, Mapping[str, Any]] = {
-    "laser": {**_LINES, "stroke": "#ff0000", "stroke_width": 0.01},
+    "laser": {**_LINES, "stroke": "#ff0000", "stroke_width": 0.01, "warn_neck": 1.5},
     "plotter": {**_LINES, "stroke": "#000000", "stroke_width": 0.3},
     "print": {"clip": True},
     "web": {"clip": True},
+    "colouring": {
+        **_LINES,
+        "area": PAGES["a4"],
+        "margin": 10.0,
+        "tile_size": 60.0,
+        "clip": True,
+        "border": True,
+        "stroke": "#000000",
+        "stroke_width": 0.8,
+    },
     "paper": {
         "clip": True,
         "area": (COLUMNS["single"], round(COLUMNS["single"] / 1.5)),

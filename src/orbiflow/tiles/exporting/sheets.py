@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.layouts import STRIP
-from orbiflow.tiles.exporting.scene import (
+from orbiflow.tiles.exporting.layouts import BLUE, STRIP
+from orbiflow.tiles.scene import (
     Box,
     Curve,
     Layer,
@@ -27,7 +27,7 @@ ARM = 4.0  # half the width of a cross, in mm
 
 MOST_SHEETS = 400
 
-BLUE = Style(None, "#0000ff", 0.1)
+MARK = Style(None, BLUE, 0.1)
 
 
 def split(scene: Scene, bed: tuple[float, float], tolerance: float) -> list[Scene]:
@@ -102,7 +102,7 @@ def _sheet(
         if page.left + ARM < x < page.right - ARM and page.top + ARM < y < page.bottom - ARM
         for dx, dy in ((ARM, 0.0), (0.0, ARM))
     ]
-    layers.append(Layer("registration", "mark", BLUE, tuple(marks)))
+    layers.append(Layer("registration", "mark", MARK, tuple(marks)))
     return replace(
         scene,
         width=page.width,
@@ -122,12 +122,14 @@ def _part(
     items: list[Curve | Uses] = []
     for item in layer.items:
         if isinstance(item, Uses):
-            images = item.images(scene.symbols[item.symbol].pieces.reshape(-1, 2))
+            images = item.images(scene.points(item.symbol))
             low, high = images.min(axis=1), images.max(axis=1)
             near = (high > window[:2]).all(axis=1) & (low < window[2:]).all(axis=1)
             items.append(
                 Uses(item.symbol, item.linear, item.which[near], item.offsets[near] + back)
             )
+        elif not isinstance(item, Curve):
+            raise TypeError("motifs are flattened after a page is split")
         elif layer.role == "paper":
             items += [part.moved(still, back) for part in clipped_region(item, seams, tolerance)]
         else:
@@ -164,5 +166,5 @@ def calibrated(scene: Scene) -> Scene:
     lines = [[[left, y], [left + 100, y]]]
     lines += [[[x, y - 2.5], [x, y + 2.5]] for x in (left, left + 50, left + 100)]
     marks = tuple(Curve.polyline(line) for line in lines)
-    layer = Layer("calibration 100 mm", "mark", BLUE, marks)
+    layer = Layer("calibration 100 mm", "mark", MARK, marks)
     return replace(scene, layers=(*scene.layers, layer))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,31 +14,38 @@ from scipy.spatial import KDTree
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.exporting.layouts import Layout, chosen_copies, line_style, placed_tiles
-from orbiflow.tiles.exporting.scene import Curve, Layer, Scene, clipped_line, rectangle
-from orbiflow.tiles.tilings import skeleton
+from orbiflow.tiles.scene import Curve, Layer, Scene, clipped_line, rectangle
+from orbiflow.tiles.tilings import Copies, skeleton
 
 
-def skeleton_scene(layout: Layout) -> Scene:
-    """Return a scene with each edge that tiles share once, in few long lines."""
-    settings, box, own = layout.settings, layout.box, layout.outline.edges
+def shared_edges(layout: Layout, copies: Copies) -> Iterator[tuple[Curve, tuple[int, int]]]:
+    """Yield the curve of each edge of the copies once, and the numbers of the vertices at its ends."""
+    own = layout.outline.edges
     if own is None:
         raise OrbiflowError(
             "this tile's edges do not match its neighbours', so there are no shared edges to cut "
             "once; choose cut none or cut pieces"
         )
-    copies = chosen_copies(layout)
     lines = skeleton(own, copies)
     linear, translations = copies.group.linear_parts, copies.translations
+    for copy, edge, (start, end) in zip(
+        lines.copy.tolist(), lines.edge.tolist(), lines.ends.tolist(), strict=True
+    ):
+        curve = layout.outline.curves[edge]
+        yield curve.moved(linear[copies.cosets[copy]], translations[copy]), (start, end)
+
+
+def skeleton_scene(layout: Layout) -> Scene:
+    """Return a scene with each edge that tiles share once, in few long lines."""
+    settings, box = layout.settings, layout.box
+    copies = chosen_copies(layout)
     arcs: list[Curve] = []
     ends: list[tuple[int, int]] = []
     free = -1
-    for copy, edge, vertices in zip(
-        lines.copy.tolist(), lines.edge.tolist(), lines.ends.tolist(), strict=True
-    ):
-        curve = layout.outline.curves[edge].moved(linear[copies.cosets[copy]], translations[copy])
+    for curve, vertices in shared_edges(layout, copies):
         if not settings.clip:
             arcs.append(curve)
-            ends.append((vertices[0], vertices[1]))
+            ends.append(vertices)
             continue
         for part in clipped_line(curve, box, settings.deviation / 4):
             # a cut end is a vertex of its own

@@ -11,14 +11,23 @@ from orbiflow.arguments import as_path
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
-from orbiflow.tiles.exporting.formats import write_dxf, write_json, write_pdf, write_png
+from orbiflow.tiles.exporting.drawings import drawn_on, with_drawing
+from orbiflow.tiles.exporting.jigsaws import jigsaw_scenes
 from orbiflow.tiles.exporting.layouts import Layout, layout, pieces_scenes, place_on, tiling_scene
-from orbiflow.tiles.exporting.scene import Scene
 from orbiflow.tiles.exporting.settings import ExportSettings
 from orbiflow.tiles.exporting.sheets import calibrated, split
 from orbiflow.tiles.exporting.skeletons import skeleton_scene
-from orbiflow.tiles.exporting.svg import write_svg
 from orbiflow.tiles.likeness import narrowest_neck
+from orbiflow.tiles.motifs import Over, read_over, with_map
+from orbiflow.tiles.scene import (
+    Scene,
+    flattened,
+    write_dxf,
+    write_json,
+    write_pdf,
+    write_png,
+    write_svg,
+)
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import Certificate, colouring
 
@@ -54,6 +63,7 @@ def export(
     out: str | Path,
     settings: ExportSettings | None = None,
     *,
+    picture: str | Path | None = None,
     force: bool = False,
     on_event: Sink = ignore,
     cancel: Cancel | None = None,
@@ -65,6 +75,7 @@ def export(
         out: The file; with several sheets its name gets a number. Its ending decides the format, unless
             the settings give one.
         settings: How it is drawn.
+        picture: The file of a picture or drawing over the silhouette, for which the tile needs a map.
         force: Export a tile that is not certified; the file says so.
         on_event: Called with the `Progress`.
         cancel: Stops the work; nothing is then written.
@@ -78,7 +89,7 @@ def export(
     out, cancel = as_path(out, "the file to export to"), cancel or Cancel()
     settings = (settings or ExportSettings()).for_file(out)
     on_event(Progress(0.0, "laying out"))
-    found, notes = scenes(tile, settings, force=force)
+    found, notes = scenes(tile, settings, picture=picture, force=force)
     contents: list[str | bytes] = []  # all, before the first file
     for k, scene in enumerate(found):
         cancel.check()
@@ -91,30 +102,61 @@ def export(
 
 
 def scenes(
-    tile: TileSource, settings: ExportSettings, *, force: bool = False
+    tile: TileSource,
+    settings: ExportSettings,
+    *,
+    picture: str | Path | None = None,
+    force: bool = False,
 ) -> tuple[list[Scene], tuple[str, ...]]:
     """Return the sheets, and what the user should know. Raises as `export`."""
     given = EscherTile.of(tile)
     certificate = given.require_certified(
         force=force, otherwise="so it is not exported; --force exports it, marked so"
     )
-    placed = layout(given.tile, settings, y_down=given.y_down)
-    notes = (*_neck_notes(placed), *_colour_notes(given, settings))
-    if placed.outline.note:
-        notes = (placed.outline.note, *notes)
+    placed, notes = laid_out(given, settings, picture)
+    notes = (*notes, *_colour_notes(given, settings))
     made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
+    if settings.cut == "jigsaw":
+        facts = made[0].facts
+        pieces, whole = facts["pieces"], facts["whole_tiles"]
+        count = f"{pieces} pieces, {whole} whole tiles and {pieces - whole} at the border"
+        notes = (*notes, f"the jigsaw has {count}, the smallest {facts['smallest']:.2f} of a tile")
     if settings.calibrate:
-        # the strip at the foot is the last sheet's; pieces have one on each
-        first = 0 if settings.cut == "pieces" else len(made) - 1
-        made[first:] = [calibrated(scene) for scene in made[first:]]
+        # the strip at the foot is the last sheet's; pieces have one on each, a jigsaw's tray has none
+        marked = {"pieces": slice(None), "jigsaw": slice(1)}.get(settings.cut, slice(-1, None))
+        made[marked] = [calibrated(scene) for scene in made[marked]]
     return made, notes
 
 
+def laid_out(
+    given: EscherTile, settings: ExportSettings, picture: str | Path | None = None
+) -> tuple[Layout, tuple[str, ...]]:
+    """Return a tile in its place with what lies on it, and what the user should know."""
+    placed = layout(given.tile, settings, y_down=given.y_down)
+    told = (placed.outline.note, placed.piece[1] if settings.cut == "pieces" else "")
+    notes = (*filter(None, told), *_neck_notes(placed))
+    if picture is not None or settings.strokes or settings.eyes:
+        given = with_map(given)
+        over = Over() if picture is None else read_over(picture, given)
+        placed = replace(placed, motif=drawn_on(placed, given, over))
+        notes = (*given.notes, *over.notes, *notes)
+    return placed, notes
+
+
 def _made(placed: Layout, settings: ExportSettings) -> list[Scene]:
+    fine = settings.deviation / 4
     if settings.cut == "pieces":
-        return pieces_scenes(placed, fine=settings.file_format not in ("dxf", "json"))
-    scene = skeleton_scene(placed) if settings.cut == "skeleton" else tiling_scene(placed)
-    return [scene] if settings.bed is None else split(scene, settings.bed, settings.deviation / 4)
+        made = pieces_scenes(placed, fine=settings.file_format not in ("dxf", "json"))
+    elif settings.cut == "jigsaw":
+        made = jigsaw_scenes(placed)
+    else:
+        made = [skeleton_scene(placed) if settings.cut == "skeleton" else tiling_scene(placed)]
+    painted = settings.cut == "none" and settings.filled
+    made = [with_drawing(scene, placed) for scene in made]
+    if settings.cut in ("none", "skeleton") and settings.bed is not None:
+        made = split(made[0], settings.bed, fine)
+    # a machine need not know copies
+    return made if painted else [flattened(scene, fine) for scene in made]
 
 
 def _described(
@@ -131,6 +173,7 @@ def _described(
         "one unit is one millimetre."
     )
     facts = {
+        **scene.facts,
         "class": tile.isohedral_class or None,
         "group": tile.group.name or None,
         "rank": given.rank,
@@ -139,6 +182,7 @@ def _described(
         "tile_size": settings.tile_size,
         "kerf": settings.kerf,
         "clearance": settings.clearance,
+        "offset": settings.offset,
         "tolerance": settings.deviation,
     }
     return replace(scene, title=title, notes=tuple(notes), facts=facts)
@@ -153,20 +197,18 @@ def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...
     return (f"its lines of {width:g} mm hardly show on a screen; a cutter follows them",)
 
 
-def _neck_notes(placed: Layout) -> list[str]:
-    limit = placed.settings.warn_neck
-    if limit is None:
-        return []
+def _neck_notes(placed: Layout) -> tuple[str, ...]:
+    limit, ring = placed.settings.warn_neck, placed.tile.polygon
+    if not limit:
+        return ()
     try:
-        neck = narrowest_neck(placed.tile.polygon)
+        neck = narrowest_neck(ring)
     except OrbiflowError as error:  # a forced tile may cross itself
-        return [f"its necks cannot be measured: {error}"]
+        return (f"its necks cannot be measured: {error}",)
     if neck.width >= limit:
-        return []
-    return [
-        f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm "
-        f"{place_on(placed.tile.polygon, neck)}"
-    ]
+        return ()
+    place = place_on(ring, neck.place)
+    return (f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm {place}",)
 
 
 def write_scene(scene: Scene, settings: ExportSettings) -> str | bytes:

@@ -27,6 +27,9 @@ from .overlap import prepared_region as prepared_region
 from .ranking import diverse as diverse
 from .ranking import mutual_iou as mutual_iou
 from .ranking import rank_score as rank_score
+from .rating import MOST_STARS as MOST_STARS
+from .rating import Rating as Rating
+from .rating import likeness_ratings as likeness_ratings
 from .recognition import Recognisability as Recognisability
 from .recognition import Recogniser as Recogniser
 from .recognition import recognisability as recognisability

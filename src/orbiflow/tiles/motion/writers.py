@@ -21,7 +21,6 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import Palette, Raster, limited, palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Note, Progress, Sink, ignore, write_atomic
-from orbiflow.tiles.exporting import Numbers
 from orbiflow.tiles.motion.kinds import (
     MOVE,
     REST,
@@ -36,6 +35,7 @@ from orbiflow.tiles.motion.kinds import (
     morph,
 )
 from orbiflow.tiles.motion.settings import AnimationSettings
+from orbiflow.tiles.scene import Numbers
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import colouring
 

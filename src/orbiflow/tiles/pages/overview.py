@@ -1,91 +1,33 @@
-"""What a search found, with measures in words: a sheet (`overview.png`) and a page (`index.html`).
-
-The page has no scripts; it works in light and dark, on a phone and on paper.
-"""
+"""What a search found on one sheet, `overview.png`."""
 
 from __future__ import annotations
 
 import io
-from bisect import bisect_right
+import textwrap
 from collections.abc import Sequence
 from pathlib import PurePath
-from typing import NamedTuple
 
+import numpy as np
 from PIL import Image, ImageDraw
 
 from orbiflow.arrays import Window
-from orbiflow.drawing import Raster, font, rendered, window_of
+from orbiflow.drawing import Raster, font, window_of
+from orbiflow.tiles.likeness import MOST_STARS
 from orbiflow.tiles.pictures import comparison, tiling_raster
 from orbiflow.tiles.search import ClassFailure
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Colouring
 
-
-class Measure(NamedTuple):
-    """A number in words: its `name`, its `value` as text, a judgement (`words`), and its `meaning`."""
-
-    name: str
-    value: str
-    words: str
-    meaning: str
-
-
-def measures(result: EscherTile) -> list[Measure]:
-    """Return a tile's measures, the most important first, without those that were not taken."""
-    found, bent, thinnest = [_score(result)], result.deformation, result.thinnest
-    if bent is not None:
-        words = ("bent a little", "bent somewhat", "bent much", "bent very much")
-        word = words[bisect_right((0.1, 0.2, 0.35), bent)]
-        meaning = "What bending the silhouette into the tile costs; 0 is the silhouette itself."
-        found.append(Measure("Deformation", f"{bent:.3f}", word, meaning))
-    common = f"{100 * result.metrics.dice:.0f} % of their areas in common"
-    meaning = "Area common to tile and silhouette, as it is, over the area of both together."
-    found.append(Measure("Overlap (IoU)", f"{result.metrics.iou:.3f}", common, meaning))
-    same = result.recognisability
-    meaning = "Share of the outlines that is found again, point by point; 1 is all."
-    found.append(Measure("Recognised", f"{same.score:.2f}", f"limbs {same.limbs:.2f}", meaning))
-    if thinnest is not None:
-        thin = thinnest.share < max(result.min_neck, 0.02)
-        word = "thin: take care when you cut" if thin else "sound"
-        meaning = "Its width, in hundredths of the square root of the tile's area."
-        found.append(Measure("Thinnest neck", f"{100 * thinnest.share:.1f} %", word, meaning))
-    if result.pinned is not None:
-        word = "as they were" if result.pinned < 0.01 else "changed"
-        meaning = "How far the worst of them is from similar to what it was; 0 is the same shape."
-        found.append(Measure("Pinned parts", f"{result.pinned:.4f}", word, meaning))
-    return found
-
-
-# Scores up to which a tile is called poor, after a search for overlap and for likeness
-POOR_MATCH, POOR_LIKENESS = 0.4, 0.2
-
-
-def is_poor(result: EscherTile) -> bool:
-    """Return whether nobody would recognise the silhouette in a tile."""
-    return result.score <= (POOR_MATCH if result.fidelity is None else POOR_LIKENESS)
-
-
-def _score(result: EscherTile) -> Measure:
-    if result.fidelity is None:
-        bounds = (-0.8, -0.6, -POOR_MATCH)
-        words = ("a close match", "a fair match", "a loose match", "a poor match")
-        meaning = "Overlap and recognisability together, 0 to 1; tiles are ranked by it."
-    else:
-        bounds = (-0.6, -0.4, -POOR_LIKENESS)
-        words = ("a good likeness", "a middling likeness", "a loose likeness", "a poor likeness")
-        meaning = "How much of the outline's shape bending left, 0 to 1; tiles are ranked by it."
-    word = words[bisect_right(bounds, -result.score)]
-    return Measure("Score", f"{result.score:.2f}", word, meaning)
-
-
 INK, FAINT, WARNING = "#1a1a1a", "#5b6570", "#b0413e"
+STAR, PALE = "#c98a1b", "#dfe3e7"
 
 # pixels of a sheet 1920 wide: at 1440, a laptop's width, the smallest words are 19 high
 _WIDTH, _MARGIN, _GAP = 1920, 40, 36
 _HEADER, _FOOT = 190, 176
 _TITLE, _NAME, _WORDS = 46, 34, 26
 _THUMB = 156
+_COLUMN = 32  # letters in a line of words
 
 
 def overview_png(
@@ -154,19 +96,32 @@ def _header(
 def _write_words(
     pen: ImageDraw.ImageDraw, result: EscherTile, left: int, below: int, rank: int
 ) -> None:
-    cost = result.deformation
-    same = f"recognised {result.recognisability.score:.2f}"
-    how = same if cost is None else f"bent {cost:.2f}"
-    verdict = f"{how}    IoU {result.metrics.iou:.2f}    score {result.score:.2f}"
-    name = f"{rank}.  {result.isohedral_class}  ({result.group_name})"
-    pen.text((left, below + 34), name, INK, font(_NAME), anchor="ls")
-    pen.text((left, below + 76), verdict, INK, font(_WORDS), anchor="ls")
-    valid = result.certificate.valid
-    words = f"{_score(result).words}, certified" if valid else "NOT CERTIFIED"
+    valid, middle = result.certificate.valid, below + 22
+    pen.text((left, middle), f"{rank}.", INK, font(_NAME), anchor="lm")
+    if result.rating:
+        for k in range(MOST_STARS):
+            _draw_star(pen, left + 60 + 40 * k, middle, result.rating.stars - k)
+        pen.text((left + 272, middle), result.rating.word, INK, font(_NAME), anchor="lm")
+    lines = textwrap.wrap(result.arrangement, _COLUMN)
+    for k, line in enumerate(lines):
+        pen.text((left, below + 76 + 32 * k), line, INK, font(_WORDS), anchor="ls")
+    words = f"{result.isohedral_class} ({result.group_name}), "
+    words += "certified" if valid else "NOT CERTIFIED"
     if result.front is not None:
-        words = f"for {result.objective}, {words.split(', ')[-1]}"
+        words += f", for {result.objective}"
     colour = FAINT if valid else WARNING
-    pen.text((left, below + 114), words, colour, font(_WORDS), anchor="ls")
+    under = below + 80 + 32 * len(lines)
+    pen.text((left, under), words, colour, font(_WORDS), anchor="ls")
+
+
+def _draw_star(pen: ImageDraw.ImageDraw, left: float, middle: float, share: float) -> None:
+    """Draw a star, 34 pixels wide, whole or half; pale where there is none."""
+    turns = np.pi / 5 * np.arange(10)
+    reach = np.where(np.arange(10) % 2, 7.5, 18.0)
+    x, y = left + 17 + reach * np.sin(turns), middle + 1 - reach * np.cos(turns)
+    pen.polygon(list(zip(x, y, strict=True)), STAR if share >= 1 else PALE)
+    if 0 < share < 1:
+        pen.polygon([(x[k], y[k]) for k in (0, 5, 6, 7, 8, 9)], STAR)
 
 
 def _small(result: EscherTile, target: Target) -> Raster:
@@ -180,63 +135,3 @@ def _fitting(window: Window) -> int:
     """Return the width in pixels at which a window fits beside its words; more if it is very long."""
     aspect = (window[2] - window[0]) / (window[3] - window[1])
     return max(16, round(_THUMB * min(1.0, aspect)), round(17 * aspect))
-
-
-# The files in every tile's folder
-TILE_FILES = ("tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors")
-
-CHOICES = {
-    "tile.svg": "the tile (SVG)",
-    "tiling.svg": "the tiling (SVG)",
-    "tiling.png": "the tiling (PNG)",
-    "overlay.png": "the comparison (PNG)",
-    "tiling.pdf": "the tiling, for print (PDF)",
-    "overlay.pdf": "the comparison, for print (PDF)",
-    "field.png": "the flow (PNG)",
-    "field.pdf": "the flow, for print (PDF)",
-    "model.safetensors": "the map (safetensors)",
-}
-"""Files of a class, in words."""
-
-
-def index_page(
-    results: Sequence[EscherTile],
-    target: Target,
-    folders: Sequence[str],
-    *,
-    failures: Sequence[ClassFailure] = (),
-    figures: Sequence[tuple[str, ...]] = (),
-) -> str:
-    """Return the page of one search's tiles, best first, to be written beside their `folders`.
-
-    `figures` are the names of the files in each folder besides the `TILE_FILES`.
-    """
-    name = PurePath(target.source).name
-    extra = figures or [()] * len(results)
-    tiles = [
-        {"found": tile, "folder": folder, "files": TILE_FILES + more, "measures": measures(tile)}
-        for tile, folder, more in zip(results, folders, extra, strict=True)
-    ]
-    return rendered(
-        "orbiflow.tiles.pages",
-        "index_page.html",
-        title=f"Tiles that look like {name}",
-        name=name,
-        silhouette=_silhouette(target),
-        compared=any(result.front is not None for result in results),
-        notes=target.notes,
-        tiles=tiles,
-        failures=failures,
-        choices=CHOICES,
-    )
-
-
-def _silhouette(target: Target) -> dict[str, str]:
-    """Return the silhouette as the path of an SVG, 100 units along its longer side."""
-    left, low, right, high = window_of([target.outline])
-    scale = 100 / max(right - left, high - low)
-    ring = (target.outline - (left, low if target.y_down else high)) * scale
-    ring = ring * (1, 1 if target.y_down else -1)
-    path = "L".join(f"{x:.1f},{y:.1f}" for x, y in ring)
-    size = {"width": f"{(right - left) * scale:.1f}", "height": f"{(high - low) * scale:.1f}"}
-    return {**size, "path": f"M{path}Z"}

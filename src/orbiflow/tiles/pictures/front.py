@@ -31,14 +31,14 @@ def front_png(
     """Return a PNG of tiles by deformation (to the right) and overlap (upwards), as silhouettes.
 
     Chosen tiles are large and coloured by what they were found for, with a line to their place if
-    they had to make room; full colour means that no other beats them. Others are pale, and the dashed
-    steps are the border of what is beaten. All have a deformation.
+    they had to make room; full colour means that no other chosen one beats them. Others are pale, and
+    the dashed steps are the border of what chosen tiles beat. All have a deformation.
     """
     if not (chosen or others):
         raise OrbiflowError("a picture of a front needs at least one tile")
     figure = blank_figure(width_px, round(0.7 * width_px))
     axes = _axes(figure, chosen, others)
-    _steps(axes, (*others, *chosen))
+    _steps(axes, chosen or others)
     corner = axes.transAxes.transform((0, 0)), axes.transAxes.transform((1, 1))
     for tile, anchor in zip(others, axes.transData.transform(_values(others)), strict=True):
         _silhouette(axes, tile, anchor, SMALL * width_px, PALE, zorder=2)
@@ -53,9 +53,8 @@ def front_png(
         _silhouette(axes, tile, place, SIZE * width_px, colour, zorder=4, alpha=alpha)
         below = place - (0, 0.52 * SIZE * width_px)
         (x,), (y,) = _in(axes, [below])
-        axes.text(
-            x, y, tile.isohedral_class, ha="center", va="top", fontsize=6.5, color=INK, zorder=7
-        )
+        label = f"{tile.isohedral_class} {tile.rating or ''}"
+        axes.text(x, y, label, ha="center", va="top", fontsize=6.5, color=INK, zorder=7)
     return png_bytes(figure)
 
 

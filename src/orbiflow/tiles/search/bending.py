@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array, Complex
 from orbiflow.errors import CertificationError
-from orbiflow.runtime import NEVER, Cancel, one_blas_thread
+from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles.geometry import best_similarity, plane_points, signed_area
 from orbiflow.tiles.likeness import (
     Elastic,
@@ -255,14 +255,12 @@ def fit_bending(
     """Fit tiles of one class to a target by letting the silhouette bend (design point 15)."""
     enough = 1 if per_class == 1 else 3 * per_class
     settings = replace(settings, min_neck=least_neck(target.normal, settings.min_neck))
-    with one_blas_thread():  # many small systems
-        found, dropped = bent_tiles(both, kind, settings, progress, cancel, wanted=enough)
+    found, dropped = bent_tiles(both, kind, settings, progress, cancel, wanted=enough)
     if not found:
         raise CertificationError("all tiles near the silhouette cross themselves")
     found = found[: enough + 1]  # one to spare, if one is not certified
     overlaps = [Overlap(target.normal * (1.0, -1.0 if hand.mirrored else 1.0)) for hand in both]
-    with one_blas_thread():
-        placed = [placed_best(bent, overlaps[bent.hand.mirrored]) for bent in found]
+    placed = [placed_best(bent, overlaps[bent.hand.mirrored]) for bent in found]
     starts = Prototiles.joined([prototile(kind, one) for one in placed])
     candidates = StillTiles(kind, starts)
     return Fit(candidates, settings.placements, dropped, enough, tuple(placed))

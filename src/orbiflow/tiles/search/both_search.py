@@ -1,7 +1,8 @@
 """The search for both: a short list of tiles that no other beats in deformation and overlap together.
 
 The front of Pareto: a tile is on it if no other has at most its deformation and at least its IoU,
-and one of them better.
+and one of them better. The list is chosen from the front of all tiles; what is said of each tile in the
+list holds among these.
 """
 
 from __future__ import annotations
@@ -84,10 +85,11 @@ class BothSearch(SearchMethod):
 def front_list(results: Sequence[EscherTile]) -> list[EscherTile]:
     """Return at most twelve tiles: those on the front, no two of them alike, then some behind it.
 
-    The tile of least deformation and that of largest IoU come first, then the others on the front,
-    from each search in turn. While there is room, the first of each search follows, which it would
-    show alone, and tiles that one on the front beats by at most 15% of their deformation and .03 of
-    IoU, nearest first. Tiles without a deformation (forced ones that cross themselves) come last.
+    The tile of least deformation and that of largest IoU are always listed, however alike, then the
+    others on the front, from each search in turn. While there is room, the first of each search
+    follows, which it would show alone, and tiles that one on the front beats by at most 15% of their
+    deformation and .03 of IoU, nearest first. Tiles without a deformation (forced ones that cross
+    themselves) come last. `front` says of each whether no other that is listed beats it.
     """
     measured = [k for k, result in enumerate(results) if result.deformation is not None]
     odd = [k for k, result in enumerate(results) if result.deformation is None]
@@ -95,20 +97,20 @@ def front_list(results: Sequence[EscherTile]) -> list[EscherTile]:
     overlap = np.array([results[k].metrics.iou for k in measured])
     objectives = [results[k].objective for k in measured]
     late = behind(cost, overlap)
-    ends = [] if not measured else [int(np.lexsort((-overlap, cost))[0]), int(overlap.argmax())]
-    order = [k for k in ends if late[k] == 0]
+    ends = [*np.lexsort((-overlap, cost))[:1], *np.lexsort((cost, -overlap))[:1]]
     # in turn from each search: one must not crowd the other out
     own = [objectives[:k].count(objectives[k]) for k in range(len(objectives))]
-    order += [int(k) for k in np.argsort(own, kind="stable") if late[k] == 0]
+    order = [int(k) for k in np.argsort(own, kind="stable") if late[k] == 0]
     order += [objectives.index(objective) for objective in dict.fromkeys(objectives)]
     order += [int(k) for k in np.argsort(late, kind="stable") if 0 < late[k] <= NEAR]
     alike = mutual_iou([results[k].normal_tile.polygon for k in measured], ALIKE)
-    chosen: list[int] = []
-    for k in dict.fromkeys(order):
-        if len(chosen) < MOST and all(alike(k, other) < ALIKE for other in chosen):
+    chosen = list(dict.fromkeys(map(int, ends)))
+    for k in order:
+        if len(chosen) < MOST and all(k != c and alike(k, c) < ALIKE for c in chosen):
             chosen.append(k)
+    shown = behind(cost[chosen], overlap[chosen]) == 0
+    on_front = {measured[k] for k, unbeaten in zip(chosen, shown, strict=True) if unbeaten}
     kept = sorted([measured[k] for k in chosen] + odd[: MOST - len(chosen)])
-    on_front = {measured[k] for k in chosen if late[k] == 0}
     return [results[k].changed(front=k in on_front) for k in kept]
 
 

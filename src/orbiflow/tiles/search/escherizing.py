@@ -29,6 +29,7 @@ from orbiflow.runtime import (
     Sink,
     TileFound,
     ignore,
+    one_blas_thread,
     one_thread,
     process_context,
     work,
@@ -38,7 +39,7 @@ from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
 from orbiflow.tiles.search.both_search import ALIKE
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
-from orbiflow.tiles.search.finished_tiles import HOW, ClassFailure, best_tiles
+from orbiflow.tiles.search.finished_tiles import HOW, ClassFailure, best_tiles, rated
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.search_method import Goal, SearchMethod
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
@@ -54,13 +55,15 @@ class SearchResult:
     """What a search found.
 
     - `target`: The silhouette.
-    - `tiles`: Certified tiles, best first; after a search for both those for likeness come first.
+    - `tiles`: Certified tiles, best first, with their ratings; after a search for both those for
+      likeness come first.
     - `failures`: The classes that gave none, and why.
     - `found`: All tiles that were found, those that are not listed among them.
     - `method`: The method that was used, with its settings.
     - `emphasis`, `pins`: What had to survive, and what did not bend.
     - `seconds`: How long it took.
     - `workers`: The number of processes.
+    - `interrupted`: The classes that were not finished: each is a failure, or has its first tile alone.
     """
 
     target: Target
@@ -72,11 +75,10 @@ class SearchResult:
     pins: Pins | None = None
     seconds: float = 0.0
     workers: int = 1
+    interrupted: frozenset[str] = frozenset()
 
-    @property
-    def interrupted(self) -> frozenset[str]:
-        """The classes that were not finished."""
-        return frozenset(f.name for f in self.failures if f.reason == INTERRUPTED)
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tiles", rated(self.tiles, self.target))
 
 
 def escherize(
@@ -127,10 +129,10 @@ def escherize(
     record = _Record(names, on_event)
     with contextlib.suppress(Cancelled):
         _search(task, names, workers, record, cancel)
-    tiles, failures = record.finish()
+    tiles, failures, left = record.finish()
     tiles, seconds = method.short_list(tiles), time.perf_counter() - begin
     return SearchResult(
-        target, tiles, failures, record.found, method, emphasis, pins, seconds, workers
+        target, tiles, failures, record.found, method, emphasis, pins, seconds, workers, left
     )
 
 
@@ -185,7 +187,7 @@ def fit_tile(
     ('IH4', True)
     """
     task = _task(Goal(target, emphasis, pins), method or LikenessSearch.for_effort("normal"))
-    with one_thread():
+    with one_thread(), one_blas_thread():
         return task.method.fit(task.goal, isohedral_class(kind), per_class, progress, cancel)
 
 
@@ -228,7 +230,7 @@ class _Record:
 
     @property
     def found(self) -> list[EscherTile]:
-        """All tiles of the classes that are finished."""
+        """All tiles of the classes that have an outcome."""
         best = [found for found in self.outcomes.values() if isinstance(found, EscherTile)]
         return [tile for first in best for tile in first.family()]
 
@@ -255,17 +257,20 @@ class _Record:
             iou, certified = found.metrics.iou, found.certificate.valid
             self.on_event(TileFound(found.name, iou, found.score, certified))
 
-    def finish(self) -> tuple[list[EscherTile], list[ClassFailure]]:
-        """Return tiles, best first, those for likeness before those for overlap; and failures."""
-        tiles, names = self.found, list(self.shares)
+    def finish(self) -> tuple[list[EscherTile], list[ClassFailure], frozenset[str]]:
+        """Return tiles, best first, those for likeness before those for overlap; failures; who is left.
+
+        Of a class that is left, a first look is its tile.
+        """
+        names = list(self.shares)
         left = [name for name in names if name not in self.outcomes]
         for name in left:
-            self.outcome(ClassFailure(name, INTERRUPTED), self.shares[name])
-        if self.preview and self.preview.name in left:
-            tiles.append(self.preview)
+            first = self.preview if self.preview and self.preview.name == name else None
+            self.outcome(first or ClassFailure(name, INTERRUPTED), self.shares[name])
+        tiles = self.found
         tiles.sort(key=lambda t: (t.objective != "likeness", -t.score, names.index(t.name)))
         failures = [found for found in self.outcomes.values() if isinstance(found, ClassFailure)]
-        return tiles, failures
+        return tiles, failures, frozenset(left)
 
 
 def _search(
@@ -275,7 +280,7 @@ def _search(
     # asked before torch is limited here: a limit makes no fork safe
     preload = ("orbiflow.tiles.search.escherizing", *task.method.modules)
     context = process_context(preload) if workers > 1 else None
-    with one_thread():
+    with one_thread(), one_blas_thread():
         first = task.method.preview(task.goal, names, cancel)
     if first is not None:
         record.first_look(first)
@@ -293,7 +298,7 @@ def _search_in_processes(
 ) -> None:
     cancel.check()
     if context.get_start_method() == "fork":
-        with one_thread():
+        with one_thread(), one_blas_thread():
             task.method.prepare(task.goal)  # once, for all workers
     # classes with more lattice freedom take longer
     order = sorted(names, key=lambda name: -isohedral_class(name).stretch_dim)
@@ -341,7 +346,8 @@ def _chosen_tiles(
 ) -> Sequence[EscherTile]:
     """Return the tiles of one fit that are shown, best first, no two of them alike."""
     goal, count = task.goal, task.method.shown(task.per_class)
-    with one_thread():
+    # many small systems: several threads would wait for each other, ten times as long as they work
+    with one_thread(), one_blas_thread():
         found = method.fit(goal, kind, count, progress, cancel)
         tiles = best_tiles(goal.target, found, force=task.force, min_neck=method.least_neck(goal))
         chosen = [tiles[k] for k in _without_twins(tiles, count)]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -12,8 +14,17 @@ import shapely
 from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.runtime import one_thread
-from orbiflow.tiles.likeness import Pinned, Recogniser, compare, iou, narrowest_neck
+from orbiflow.runtime import one_blas_thread, one_thread
+from orbiflow.tiles.geometry import ring_length, signed_area
+from orbiflow.tiles.likeness import (
+    Pinned,
+    Rating,
+    Recogniser,
+    compare,
+    iou,
+    likeness_ratings,
+    narrowest_neck,
+)
 from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
 from orbiflow.tiles.search.candidates import Fit, StillTiles
@@ -107,6 +118,18 @@ def recogniser(target: Target) -> Recogniser:
     return Recogniser(target.outline)
 
 
+def rated(tiles: Sequence[EscherTile], target: Target) -> list[EscherTile]:
+    """Return the tiles of a run with their ratings, in the same order."""
+    length = ring_length(target.outline) / math.sqrt(abs(signed_area(target.outline)))
+    likeness = [tile.score for tile in tiles if tile.fidelity is not None]
+    found = iter(likeness_ratings(likeness, length))
+    return [
+        # no marks of tiles for overlap are kept: their scores are taken for marks
+        tile.changed(rating=next(found) if tile.fidelity else Rating.of_mark(10 * tile.score - 1))
+        for tile in tiles
+    ]
+
+
 def certified_tiles(
     target: Target, found: Fit | StillTiles | TileModel, *, force: bool = False
 ) -> list[EscherTile]:
@@ -128,5 +151,5 @@ def certified_tiles(
                 found, Fit, "what was found", "fit_tile gives a Fit, load_model a TileModel"
             )
         found = Fit(found, found.size, 0, found.size)
-    with one_thread():
+    with one_thread(), one_blas_thread():
         return best_tiles(target, found, force=force)

@@ -1,3 +1,4 @@
+from .arrangements import arrangement as arrangement
 from .certificate import Certificate as Certificate
 from .certificate import certify as certify
 from .colourings import Colouring as Colouring

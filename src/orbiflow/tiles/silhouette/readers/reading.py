@@ -5,6 +5,8 @@ import stat
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
+from shapely.geometry.base import BaseGeometry
+
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 
@@ -43,6 +45,9 @@ class Reading:
     - `size`: The width and height of the picture or drawing, if the file states them.
     - `notes`: What was decided for the user, in plain words.
     - `corner`: The corner of least coordinates of that picture or drawing.
+    - `seen`: All that was read as shape, in the outline's units, before parts were left out and
+      holes filled; None if that is the outline.
+    - `warnings`: What may be wrong with it, and what to do then.
     """
 
     outline: Array
@@ -51,6 +56,8 @@ class Reading:
     size: tuple[float, float] | None
     notes: tuple[str, ...]
     corner: tuple[float, float] = (0.0, 0.0)
+    seen: BaseGeometry | None = None
+    warnings: tuple[str, ...] = ()
 
 
 def check_file(path: Source) -> int:

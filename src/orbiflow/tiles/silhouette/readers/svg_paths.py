@@ -1,6 +1,7 @@
 """Sub-paths of an SVG drawing and their flattening into polygons with a bounded error."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -13,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from orbiflow.arrays import Array, Integers
 
 MAX_POINTS = 200_000
+DIRECTION = 1e-6  # of a curve's size: its chords at the ends stray by less
 
 
 class TooManyPoints(Exception):
@@ -149,10 +151,38 @@ def _arc(arc: svgelements.Arc, points: Array) -> Bezier | EllipticArc:
     return EllipticArc(centre, u_end - centre, v_end - centre, t0, sweep, end)
 
 
+def corners(paths: list[SubPath], matrix: Array) -> Iterator[tuple[str, Array, float]]:
+    """Yield where markers stand: "start", "mid" or "end", the point and the angle of the path there.
+
+    Points and directions are mapped by the affine `matrix` (2, 3).
+    """
+    found: list[tuple[Array, Array, Array]] = []
+    for path in paths:
+        close = [Bezier(path.start[None])] * (path.closed and path.gap() > 0)
+        last, into = path.start, [np.zeros(2)]
+        out: list[Array] = []
+        for curve in [*path.curves, *close]:
+            size = float(np.ptp([last, *curve.reach()], axis=0).max()) or 1.0
+            along = np.diff([last, *curve.flatten(last, DIRECTION * size)], axis=0)
+            out.append(along[along.any(axis=1).argmax()])
+            into.append(along[::-1][along[::-1].any(axis=1).argmax()])
+            found.append((last, into[-2], out[-1]))
+            last = curve.end
+        found.append((last, into[-1], out[0] * path.closed))
+        if path.closed:
+            found[-len(into)] = (path.start, into[-1], out[0])
+    for k, (point, *sides) in enumerate(found):
+        key = "start" if k == 0 else "end" if k == len(found) - 1 else "mid"
+        before, after = (matrix[:, :2] @ side for side in sides)
+        x, y = before / (np.hypot(*before) or 1.0) + after / (np.hypot(*after) or 1.0)
+        yield key, matrix[:, :2] @ point + matrix[:, 2], math.atan2(y, x)
+
+
 # Of pairs of segments whose boxes overlap, in all and for each segment: the crossings of a scribble
 # grow with the square of its length.
 MAX_OVERLAPS = 200_000
 MAX_OVERLAPS_EACH = 20
+MAX_OVERLAPS_WIDE = 20  # as many times more of strokes, which are mostly beside each other
 MAX_FACES = 50_000
 _SAMPLE = 400
 
@@ -171,7 +201,7 @@ def fill(rings: list[Array], rule: str = "nonzero") -> BaseGeometry:
         return single
     if not rings:
         return Polygon()
-    _check_tangle(rings)
+    check_tangle(np.concatenate([np.stack([r, np.roll(r, -1, axis=0)], axis=1) for r in rings]))
     lines = [shapely.LinearRing(ring) for ring in rings]
     faces = np.array(shapely.polygonize([shapely.unary_union(lines)]).geoms, dtype=object)
     if len(faces) > MAX_FACES:
@@ -184,16 +214,20 @@ def fill(rings: list[Array], rule: str = "nonzero") -> BaseGeometry:
     return shapely.union_all(faces[kept])
 
 
-def _check_tangle(rings: list[Array]) -> None:
-    """Estimate from a sample how many pairs of segments must be tested for a crossing."""
-    ends = np.concatenate([np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in rings])
-    low, high = ends.min(axis=1), ends.max(axis=1)
-    sample = np.random.default_rng(0).permutation(len(ends))[:_SAMPLE]
-    overlaps = sum(
-        np.count_nonzero(((low <= high[i]) & (high >= low[i])).all(axis=1)) for i in sample
-    )
-    if overlaps / len(sample) * len(ends) > MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(ends):
-        raise TooTangled
+def check_tangle(segments: Array, half: float = 0.0) -> None:
+    """Estimate from a sample how many pairs of segments (S, 2, 2) must be tested for a crossing.
+
+    `half` is half their width. Raises `TooTangled` if there are too many.
+    """
+    sample = np.random.default_rng(0).permutation(len(segments))[:_SAMPLE]
+    for wider, most in ((0.0, 1), (half, MAX_OVERLAPS_WIDE)):
+        low, high = segments.min(axis=1) - wider, segments.max(axis=1) + wider
+        overlaps = sum(
+            np.count_nonzero(((low <= high[i]) & (high >= low[i])).all(axis=1)) for i in sample
+        )
+        most *= MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(segments)
+        if overlaps / len(sample) * len(segments) > most:
+            raise TooTangled
 
 
 def _winding(points: Array, ring: Array) -> Integers:

@@ -3,8 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from xml.etree.ElementTree import Element, TreeBuilder
-from xml.parsers import expat
+from xml.etree.ElementTree import Element
 
 import numpy as np
 import svgelements
@@ -12,154 +11,96 @@ import svgelements
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.reading import Source
-from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, sub_paths
-
-MAX_ELEMENTS = 20_000
-MAX_DEPTH = 100
-MAX_STYLE = 200_000  # characters
-_COMMENT = re.compile(r"/\*.*?(?:\*/|$)", re.DOTALL)
-_SELECTOR = re.compile(r"\*|[\w-]*(?:[.#][\w-]+)?")
-
-
-def parse_xml(path: Source, data: bytes) -> Element:
-    """Return the root element of the SVG document `data`, all names without their namespaces.
-
-    Refused are entities, which can blow up to any size, deep nesting and too many elements.
-    """
-    parser = expat.ParserCreate(namespace_separator="}")
-    parser.buffer_text = True
-    tree = _BoundedTree(path, parser)
-    parser.StartElementHandler = tree.start
-    parser.EndElementHandler = tree.end
-    parser.CharacterDataHandler = tree.builder.data
-    parser.EntityDeclHandler = tree.refuse_entity
-    try:
-        parser.Parse(data, True)
-    except expat.ExpatError as exc:
-        raise InputFileError(
-            f"{path}: line {exc.lineno}: not well-formed XML ({expat.ErrorString(exc.code)}); "
-            "export the drawing again"
-        ) from exc
-    except (LookupError, ValueError) as exc:
-        if isinstance(exc, InputFileError):
-            raise
-        raise InputFileError(
-            f"{path}: its text encoding cannot be read ({exc}); use UTF-8"
-        ) from exc
-    root = tree.builder.close()
-    if root.tag != "svg":
-        raise InputFileError(f"{path}: the XML is a <{root.tag[:40]}>, not an <svg> drawing")
-    return root
-
-
-class _BoundedTree:
-    def __init__(self, path: Source, parser: expat.XMLParserType) -> None:
-        self.path, self.parser, self.builder = path, parser, TreeBuilder()
-        self.count = self.depth = 0
-
-    def start(self, name: str, attributes: dict[str, str]) -> None:
-        self.count += 1
-        self.depth += 1
-        if self.count > MAX_ELEMENTS:
-            self._refuse(f"more than {MAX_ELEMENTS} elements; keep only the silhouette")
-        if self.depth > MAX_DEPTH:
-            self._refuse(f"elements nested more than {MAX_DEPTH} deep; ungroup the drawing")
-        self.builder.start(_local(name), {_local(key): value for key, value in attributes.items()})
-
-    def end(self, name: str) -> None:
-        self.depth -= 1
-        self.builder.end(_local(name))
-
-    def refuse_entity(self, name: str, *_: object) -> None:
-        self._refuse(
-            f"declares the XML entity {name[:40]!a}; entities are not read, save the drawing "
-            "as plain SVG"
-        )
-
-    def _refuse(self, reason: str) -> None:
-        raise InputFileError(f"{self.path}: line {self.parser.CurrentLineNumber}: {reason}")
-
-
-def _local(name: str) -> str:
-    return name.rpartition("}")[2]
-
-
-class StyleSheet:
-    """The rules of a drawing's `<style>` elements with selectors `tag`, `.class`, `#id`, `tag.class`.
-
-    Enough for what drawing programs write; rules with other selectors are passed over.
-    """
-
-    def __init__(self, path: Source, root: Element) -> None:
-        self.rules: dict[str, dict[str, str]] = {}
-        text = "\n".join(style.text or "" for style in root.iter("style"))
-        if len(text) > MAX_STYLE:
-            raise InputFileError(
-                f"{path}: <style> of {len(text)} characters; save the drawing as plain SVG"
-            )
-        for rule in _COMMENT.sub(" ", text).split("}"):
-            selectors, _, body = rule.partition("{")
-            declarations = _declarations(body)
-            for selector in map(str.strip, selectors.split(",")):
-                if _SELECTOR.fullmatch(selector):
-                    self.rules.setdefault(selector, {}).update(declarations)
-
-    def properties(self, element: Element) -> dict[str, str]:
-        """Return attributes of `element` overridden by the rules that match it and by its own style."""
-        properties = dict(element.attrib)
-        tag, names = element.tag, element.get("class", "").split()
-        classes = [f"{before}.{name}" for before in ("", tag) for name in names]
-        for selector in ("*", tag, *classes, f"#{element.get('id', '')}"):
-            properties.update(self.rules.get(selector, {}))
-        properties.update(_declarations(element.get("style", "")))
-        return properties
-
-
-def _declarations(text: str) -> dict[str, str]:
-    pairs = (item.partition(":") for item in text.split(";"))
-    return {
-        key.strip().lower(): value.replace("!important", "").strip()
-        for key, colon, value in pairs
-        if colon
-    }
-
+from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, corners, sub_paths
+from orbiflow.tiles.silhouette.readers.svg_xml import MAX_DEPTH, StyleSheet
 
 PIXELS_PER_INCH = 96
-MAX_DRAWN = 10_000  # elements, those drawn again by <use> counted again
+MAX_DRAWN = 10_000  # elements, those drawn again by <use>, clips, masks and markers counted again
 MAX_TRANSFORM = 2000  # characters
+MOST_DASHES = 1000  # lengths in one pattern
+MAX_NUMBER = 1e9  # the largest width or opacity that is believed
 MAX_TOKENS = 400_000  # commands and numbers in all path data; one with a fraction counts twice
 _GROUPS = {"svg", "g", "a", "switch"}
 _SHAPES = {
     "path": (svgelements.Path, ("d",)),
+    "line": (svgelements.SimpleLine, ()),
     "rect": (svgelements.Rect, ("width", "height")),
     "circle": (svgelements.Circle, ("r",)),
     "ellipse": (svgelements.Ellipse, ("rx", "ry")),
     "polygon": (svgelements.Polygon, ("points",)),
     "polyline": (svgelements.Polyline, ("points",)),
 }
-_GEOMETRY = {"d", "points", "x", "y", "width", "height", "r", "rx", "ry", "cx", "cy"}
+_MARKED = {"path", "line", "polygon", "polyline"}
+_GEOMETRY = {
+    *("d", "points", "x", "y", "width", "height", "r", "rx", "ry", "cx", "cy"),
+    *("x1", "y1", "x2", "y2"),
+}
 _BAD_VALUE = (ValueError, TypeError, IndexError, AttributeError, ZeroDivisionError, OverflowError)
 _TOKEN = re.compile(r"[A-Za-z]|\.?\d+")
 _LENGTH = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?(px|pt|pc|mm|cm|in|%)?", re.IGNORECASE)
-
-
+_REFERENCE = re.compile(r"""\s*url\(\s*["']?#([^"')]+)""")
 # properties of paint that elements have from those around them
-PAINT = ("fill", "stroke", "stroke-width", "fill-opacity", "stroke-opacity", "color", "visibility")
+PAINT = (
+    *("fill", "fill-rule", "fill-opacity", "clip-rule", "color", "visibility", "paint-order"),
+    *("stroke", "stroke-width", "stroke-opacity", "stroke-linecap", "stroke-linejoin"),
+    *("stroke-miterlimit", "stroke-dasharray", "stroke-dashoffset"),
+    *("marker", "marker-start", "marker-mid", "marker-end"),
+)
 
 
 @dataclass(frozen=True)
 class DrawnShape:
-    """The sub-paths of one element, in user units of the drawing, and how they are filled.
+    """One element's sub-paths in the drawing's user units, and how they are painted.
 
-    `paint` is what the element or one around it says of `PAINT`, `opacity` that of all the groups
-    that it is in, `scale` the number of the drawing's user units for one of its own.
+    - `paint`: The properties of paint that apply to it, by name, as they are written.
+    - `opacity`: Its own opacity times that of the groups around it.
+    - `matrix`: The map (3, 3) from the units of its pen to the drawing's.
+    - `diagonal`: The length that percentages of the pen refer to, in units of the pen.
+    - `clips`: What cuts it: it shows where all of these are.
     """
 
     paths: list[SubPath]
-    fill_rule: str
     paint: Mapping[str, str] = field(default_factory=dict[str, str])
     opacity: float = 1.0
-    scale: float = 1.0
+    matrix: Array = field(default_factory=lambda: np.eye(3))
+    diagonal: float = 0.0
+    clips: tuple["Clip", ...] = ()
+
+    @property
+    def scale(self) -> float:
+        """The mean size of a unit of the pen in the drawing's units."""
+        return float(abs(np.linalg.det(self.matrix[:2, :2])) ** 0.5)
+
+    @property
+    def width(self) -> float:
+        """The width of its pen."""
+        width = self.number("stroke-width", 1.0)
+        return width if width >= 0 else 1.0
+
+    @property
+    def dashes(self) -> list[float]:
+        """The lengths of dashes and gaps in turn, an even number of them; none for a whole line."""
+        words = self.paint.get("stroke-dasharray", "none").replace(",", " ").split()
+        found = [as_number(word, -1.0, self.diagonal) for word in words[:MOST_DASHES]]
+        return found * (1 + len(found) % 2) if sum(found) > 0 and min(found) >= 0 else []
+
+    @property
+    def is_plain_line(self) -> bool:
+        """Whether its stroke, before clips, is one whole line everywhere as wide as the pen."""
+        most, least = np.linalg.svd(self.matrix[:2, :2])[1]
+        return not self.dashes and most - least < 1e-3 * most
+
+    def number(self, key: str, usual: float) -> float:
+        """Read a property as a length in units of the pen, or return the usual one."""
+        return as_number(self.paint.get(key), usual, self.diagonal)
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """Shapes that say where others show: by their fills, or as a mask by what is light or opaque."""
+
+    shapes: list[DrawnShape]
+    kind: str = "clip"  # "clip", "luminance" or "alpha"
 
 
 @dataclass(frozen=True)
@@ -168,10 +109,19 @@ class _Place:
 
     matrix: Array  # (3, 3), to the drawing's user units
     viewport: tuple[float, float]  # what percentages refer to
-    fill_rule: str = "nonzero"
     depth: int = 0
     paint: Mapping[str, str] = field(default_factory=dict[str, str])
     opacity: float = 1.0
+
+    def moved(self, matrix: Array) -> "_Place":
+        return replace(self, matrix=self.matrix @ matrix)
+
+    def painted(self, properties: Mapping[str, str]) -> "_Place":
+        own = {key: properties[key] for key in PAINT if properties.get(key, "inherit") != "inherit"}
+        share = min(max(as_number(properties.get("opacity"), 1.0), 0.0), 1.0)
+        return replace(
+            self, depth=self.depth + 1, paint={**self.paint, **own}, opacity=self.opacity * share
+        )
 
 
 @dataclass
@@ -189,13 +139,25 @@ class Drawing:
         self.styles = StyleSheet(self.path, self.root)
         self.by_id = {key: item for item in self.root.iter() if (key := item.get("id"))}
         self.box = self._box()
+        self._clips: dict[tuple[int, bytes], Clip] = {}
 
     def collect(self) -> None:
         """Find all shapes. Raises `InputFileError` for one that cannot be understood."""
         xmin, ymin, xmax, ymax = self.box or (0.0, 0.0, 100.0, 100.0)
-        place = _Place(np.eye(3), (xmax - xmin, ymax - ymin))
+        properties = self.styles.properties(self.root)
+        place = _Place(np.eye(3), (xmax - xmin, ymax - ymin), depth=-1).painted(properties)
         for child in self.root:
             self._visit(child, place)
+
+    def left_out(self) -> list[str]:
+        """Return a note of what was met and is not drawn."""
+        left = [f"{count} {name}{'s' * (count > 1)}" for name, count in self.others.items()]
+        return [f"left out {' and '.join(left)} of the drawing"] * bool(left)
+
+    def referred(self, text: str | None) -> Element | None:
+        """Return the element that the property `url(#id)` names."""
+        found = _REFERENCE.match(text or "")
+        return self.by_id.get(found[1].strip()) if found else None
 
     def _box(self) -> Window | None:
         """Return the visible part (xmin, ymin, xmax, ymax) in user units: the viewBox, or the size."""
@@ -206,6 +168,12 @@ class Drawing:
         if width is None or height is None or not (width > 0 and height > 0):
             return None
         return 0.0, 0.0, width, height
+
+    def _pixel(self) -> float:
+        """Return the size of a pixel of the page in user units, which non-scaling strokes refer to."""
+        box = self.box or (0.0, 0.0, 1.0, 1.0)
+        sizes = zip(("width", "height"), (box[2] - box[0], box[3] - box[1]), strict=True)
+        return max(own / (self._length(self.root, key) or own) for key, own in sizes)
 
     def _view_box(self, element: Element) -> Window | None:
         """Return the viewBox (x, y, width, height) of `element`."""
@@ -233,17 +201,13 @@ class Drawing:
         properties = self.styles.properties(element)
         if properties.get("display", "").lower() == "none":
             return
-        place = replace(
-            place,
-            matrix=place.matrix @ self._transform(element, properties, place),
-            fill_rule=properties.get("fill-rule", place.fill_rule).lower(),
-            depth=place.depth + 1,
-            paint={**place.paint, **{key: properties[key] for key in PAINT if key in properties}},
-            opacity=place.opacity * _share(properties.get("opacity")),
-        )
-        if element.tag in _GROUPS:
-            if element.tag == "svg":
-                place = self._viewport(element, element, place)
+        place = place.moved(self._transform(element, properties, place)).painted(properties)
+        first = len(self.shapes)
+        if np.linalg.det(place.matrix) == 0:  # flat
+            return
+        if element.tag == "svg":
+            self._visit_viewport(element, self._window(element, place), place)
+        elif element.tag in _GROUPS:
             for child in element:
                 self._visit(child, place)
         elif element.tag == "use":
@@ -251,35 +215,80 @@ class Drawing:
         elif element.tag in _SHAPES:
             self._add_shape(element, properties, place)
         elif element.tag in ("image", "text"):
-            self.others[element.tag] = self.others.get(element.tag, 0) + 1
+            self._count(element.tag)
+        if properties.get("filter", "none") != "none":
+            self._count("filter")
+        for key in ("clip-path", "mask"):
+            self._clip(self.referred(properties.get(key)), place, first)
+
+    def _count(self, name: str) -> None:
+        self.others[name] = self.others.get(name, 0) + 1
 
     def _visit_use(self, use: Element, place: _Place) -> None:
         target = self.by_id.get(use.get("href", "").strip().removeprefix("#"))
         if target is None:
             return
         if target.tag in ("symbol", "svg"):
-            place = self._viewport(target, use, place)
-            for child in target:
-                self._visit(child, place)
+            self._visit_viewport(target, self._window(use, place), place)
             return
         shift = np.eye(3)
         shift[:2, 2] = [self._length(use, key, place) or 0.0 for key in ("x", "y")]
-        self._visit(target, replace(place, matrix=place.matrix @ shift))
+        self._visit(target, place.moved(shift))
 
-    def _viewport(self, element: Element, sized_by: Element, place: _Place) -> _Place:
-        """Return the place inside a nested viewport: an inner <svg>, or a <symbol> that is used."""
-        x, y = (self._length(sized_by, key, place) or 0.0 for key in ("x", "y"))
-        width = self._length(sized_by, "width", place) or place.viewport[0]
-        height = self._length(sized_by, "height", place) or place.viewport[1]
+    def _window(self, element: Element, place: _Place) -> Window:
+        """Return x, y, width and height of a viewport: those of an inner <svg>, or of a <use>."""
+        x, y = (self._length(element, key, place) or 0.0 for key in ("x", "y"))
+        width = self._length(element, "width", place) or place.viewport[0]
+        return x, y, width, self._length(element, "height", place) or place.viewport[1]
+
+    def _visit_viewport(self, element: Element, window: Window, place: _Place) -> None:
+        """Draw what an inner <svg>, a <symbol> or a <marker> holds in a window, cut at its edges."""
+        matrix, viewport = self._view(element, window)
+        inner, first = replace(place.moved(matrix), viewport=viewport), len(self.shapes)
+        for child in element:
+            self._visit(child, inner)
+        if self.styles.properties(element).get("overflow") not in ("visible", "auto"):
+            own = self.shapes[first:]
+            x, y, width, height = map(str, window)
+            edge = {"x": x, "y": y, "width": width, "height": height}
+            del self.shapes[first:]
+            self._add_shape(Element("rect"), edge, place)
+            self._cut(own, first, Clip(self.shapes[first:]))
+
+    def _view(self, element: Element, window: Window) -> tuple[Array, tuple[float, float]]:
+        """Return the map (3, 3) of a viewBox into a window, and what percentages refer to."""
         box = self._view_box(element)
         if box is None:
-            shift = np.array([[1, 0, x], [0, 1, y], [0, 0, 1.0]])
-            return replace(place, matrix=place.matrix @ shift, viewport=(width, height))
+            return np.array([[1, 0, window[0]], [0, 1, window[1]], [0, 0, 1.0]]), window[2:]
         text = svgelements.Viewbox.viewbox_transform(
-            x, y, width, height, *box, element.get("preserveAspectRatio")
+            *window, *box, element.get("preserveAspectRatio")
         )
-        matrix = _as_array(svgelements.Matrix(text))
-        return replace(place, matrix=place.matrix @ matrix, viewport=box[2:])
+        return _as_array(svgelements.Matrix(text)), box[2:]
+
+    def _cut(self, own: list[DrawnShape], first: int, clip: Clip) -> None:
+        self.shapes[first:] = [replace(shape, clips=(*shape.clips, clip)) for shape in own]
+
+    def _clip(self, source: Element | None, place: _Place, first: int) -> None:
+        """Cut the shapes from the `first` on by the content of a <clipPath> or <mask>."""
+        own = self.shapes[first:]
+        if source is None or source.tag not in ("clipPath", "mask") or not own:
+            return
+        properties = self.styles.properties(source)
+        inner = place.moved(self._transform(source, properties, place))
+        if "objectBoundingBox" in (source.get("clipPathUnits"), source.get("maskContentUnits")):
+            points = np.concatenate([path.reach() for shape in own for path in shape.paths])
+            points = _mapped(np.linalg.inv(place.matrix), points)
+            low, high = points.min(axis=0), points.max(axis=0)
+            inner = inner.moved(np.array([*np.c_[np.diag(high - low), low], [0, 0, 1.0]]))
+        key = id(source), inner.matrix.tobytes()
+        if key not in self._clips:
+            del self.shapes[first:]
+            inner = replace(inner, paint={}, opacity=1.0).painted(properties)
+            for child in source:
+                self._visit(child, inner)
+            kind = "clip" if source.tag == "clipPath" else properties.get("mask-type", "luminance")
+            self._clips[key] = Clip(self.shapes[first:], kind)
+        self._cut(own, first, self._clips[key])
 
     def _add_shape(self, element: Element, properties: dict[str, str], place: _Place) -> None:
         kind, needed = _SHAPES[element.tag]
@@ -299,8 +308,45 @@ class Drawing:
             paths = sub_paths(svgelements.Path(shape), place.matrix[:2])
         except _BAD_VALUE as exc:
             raise self._refuse(element, "its geometry cannot be read; redraw or delete it") from exc
-        scale = float(abs(np.linalg.det(place.matrix[:2, :2])) ** 0.5)
-        self.shapes.append(DrawnShape(paths, place.fill_rule, place.paint, place.opacity, scale))
+        matrix = place.matrix
+        if properties.get("vector-effect") == "non-scaling-stroke":
+            matrix = np.diag([self._pixel()] * 2 + [1.0])
+        diagonal = float(np.hypot(*place.viewport)) / 2**0.5
+        drawn = DrawnShape(paths, place.paint, place.opacity, matrix, diagonal)
+        self.shapes.append(drawn)
+        if element.tag in _MARKED:
+            self._add_markers(drawn, place)
+
+    def _add_markers(self, shape: DrawnShape, place: _Place) -> None:
+        named = {key: shape.paint.get(f"marker-{key}") for key in ("start", "mid", "end")}
+        named = {
+            key: self.referred(text or shape.paint.get("marker")) for key, text in named.items()
+        }
+        if all(marker is None for marker in named.values()):
+            return
+        for key, point, angle in corners(shape.paths, np.linalg.inv(place.matrix)[:2]):
+            marker = named[key]
+            if marker is None or marker.tag != "marker":
+                continue
+            turn, scale = marker.get("orient", "0"), shape.width
+            if not turn.startswith("auto"):
+                angle = np.radians(as_number(turn.removesuffix("deg"), 0.0))
+            elif turn == "auto-start-reverse" and key == "start":
+                angle += np.pi
+            if marker.get("markerUnits") == "userSpaceOnUse":
+                scale = 1.0
+            x, y = scale * np.cos(angle), scale * np.sin(angle)
+            inner = place.moved(np.array([[x, -y, point[0]], [y, x, point[1]], [0, 0, 1.0]]))
+            inner = replace(inner, paint={}).painted(self.styles.properties(marker))
+            self._visit_marker(marker, inner)
+
+    def _visit_marker(self, marker: Element, place: _Place) -> None:
+        """Draw a marker with its reference point at the origin of a place."""
+        width, height = (as_number(marker.get(f"marker{key}"), 3.0) for key in ("Width", "Height"))
+        matrix, _ = self._view(marker, (0.0, 0.0, width, height))
+        at = np.array([[as_number(marker.get(f"ref{key}"), 0.0) for key in "XY"]])
+        x, y = -_mapped(matrix, at)[0]
+        self._visit_viewport(marker, (x, y, width, height), place)
 
     def _transform(self, element: Element, properties: dict[str, str], place: _Place) -> Array:
         text = properties.get("transform")
@@ -338,14 +384,20 @@ class Drawing:
         return InputFileError(f"{self.path}: <{element.tag}{name}>: {reason}")
 
 
-def _share(text: str | None) -> float:
-    """Return an opacity, 0 to 1; what cannot be read is opaque."""
+def as_number(text: str | None, usual: float, relative: float = 1.0) -> float:
+    """Read a length in user units or a share; return the usual one if it cannot be read."""
+    if not text:
+        return usual
     try:
-        value = float(text.strip().removesuffix("%")) if text else 1.0
-    except ValueError:
-        return 1.0
-    value = value / 100 if text and text.strip().endswith("%") else value
-    return min(max(value, 0.0), 1.0) if value == value else 1.0
+        length = svgelements.Length(text.strip()[:40])
+        value = float(length.value(ppi=PIXELS_PER_INCH, relative_length=relative))
+    except _BAD_VALUE:
+        return usual
+    return value if abs(value) < MAX_NUMBER else usual  # neither is NaN
+
+
+def _mapped(matrix: Array, points: Array) -> Array:
+    return points @ matrix[:2, :2].T + matrix[:2, 2]
 
 
 def _as_array(matrix: svgelements.Matrix) -> Array:

@@ -3,9 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from scipy import ndimage
+from shapely.affinity import scale as scaled
 from shapely.geometry import Polygon, box
+from shapely.geometry.base import BaseGeometry
 from skimage.measure import find_contours
 
 from orbiflow.arrays import Array
@@ -21,6 +24,14 @@ SIMPLIFY_TOLERANCE = 0.15  # pixels
 # are not details of the shape. Small shapes have the finer tolerance for their size.
 STEP_TOLERANCE = 0.7  # pixels
 STEP_TOLERANCE_OF_SIZE = 0.005  # of the square root of the area
+# A shape that is cut off is as wide at the image's border as further in; one that touches it is not.
+CUT_OFF = 0.8
+FURTHER_IN = 0.015  # of the image's longer side
+# Components and holes of at most so many pixels, or this share of the shape, are no parts of a drawing.
+DUST = 4
+DUST_OF_SHAPE = 1e-4
+# for `scipy.ndimage`: background holds together across corners where the shape does not
+_ACROSS_CORNERS = np.ones((3, 3), dtype=int)
 
 
 @dataclass(frozen=True)
@@ -34,24 +45,26 @@ class Level:
 
 def trace(
     path: Source, level: Level, *, scale: int, size: tuple[int, int]
-) -> tuple[Array, list[str]]:
-    """Return the outline (N, 2) of the largest shape in image pixels, with notes.
+) -> tuple[Array, BaseGeometry, list[str]]:
+    """Return the outline (N, 2) of the largest shape in image pixels, all that was seen, and notes.
 
     A pixel of `level` is `scale` pixels of the image wide, and the image is `size` (width, height).
     Pixels of a shape hold together along their sides, not their corners.
     """
-    mask = level.values > level.cut
-    shape, notes = _largest(mask)
+    above = level.values > level.cut
+    mask, notes = _without_dust(above)
+    shape, parts = _largest(mask)
+    notes += parts
     if shape.all():
         raise InputFileError(
             f"{path}: the shape fills the whole image ({size[0]} x {size[1]} pixels); leave a "
             "margin around it, or set invert to take the other part"
         )
-    if shape[[0, -1]].any() or shape[:, [0, -1]].any():
+    if _is_cut_off(shape):
         notes.append("the shape touches the image's border and may be cut off there")
     # the shape's holes filled and all other components taken out
-    values = np.where(shape & ~mask, level.inside, level.values)
-    values = np.where(mask & ~shape, 2 * level.cut - level.inside, values)
+    values = np.where(shape & ~above, level.inside, level.values)
+    values = np.where(above & ~shape, 2 * level.cut - level.inside, values)
     polygon, stepped = _polygon(values, level.cut, level.inside)
     area = polygon.area * scale**2
     if area < MIN_AREA:
@@ -65,21 +78,58 @@ def trace(
         tolerance = max(tolerance, own)
     polygon, simplified = _simplify(polygon, tolerance)
     ring = np.clip(outer_ring(polygon) * scale, 0, size)
-    return ring, notes + simplified
+    seen = scaled(_region(level, mask, tolerance), scale, scale, origin=(0, 0))
+    return ring, seen, notes + simplified
+
+
+def _is_cut_off(shape: NDArray[np.bool_]) -> bool:
+    inner = min(round(FURTHER_IN * max(shape.shape)) + 1, *(side - 1 for side in shape.shape))
+    sides = (shape, shape[::-1], shape.T, shape.T[::-1])
+    return any(side[0].sum() > CUT_OFF * side[inner].sum() for side in sides)
+
+
+def _without_dust(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], list[str]]:
+    """Return the mask without specks and pinholes, and a note if there were any."""
+    most = np.bincount(np.ravel(ndimage.label(mask)[0]))[1:].max(initial=0)
+    limit = min(max(DUST, DUST_OF_SHAPE * most), most - 1)
+    filled = ndimage.binary_fill_holes(mask, structure=_ACROSS_CORNERS)
+    specks = _small(mask, limit)
+    pinholes = _small(filled & ~mask, limit, _ACROSS_CORNERS)
+    note = ["left out specks of dust"] * bool(specks.any() or pinholes.any())
+    return (mask & ~specks) | pinholes, note
+
+
+def _small(
+    mask: NDArray[np.bool_], limit: float, structure: NDArray[np.int_] | None = None
+) -> NDArray[np.bool_]:
+    """Return the components of at most `limit` pixels."""
+    labels = np.asarray(ndimage.label(mask, structure)[0])
+    small = np.bincount(labels.ravel()) <= limit
+    small[0] = False
+    return small[labels]
 
 
 def _largest(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], list[str]]:
     """Return the component that is largest with its holes filled."""
-    # Background holds together across corners where the shape does not: hence the full structure.
-    filled = ndimage.binary_fill_holes(mask, structure=np.ones((3, 3), dtype=int))
+    filled = ndimage.binary_fill_holes(mask, structure=_ACROSS_CORNERS)
     labels, n = ndimage.label(filled)
     areas = np.bincount(labels.ravel())
     areas[0] = 0
     shape = labels == areas.argmax()
     holes = shape & ~mask
-    n_holes = ndimage.label(holes, structure=np.ones((3, 3), dtype=int))[1]
+    n_holes = ndimage.label(holes, structure=_ACROSS_CORNERS)[1]
     kept, bare = areas.max() / max(areas.sum(), 1), holes.sum() / max(shape.sum(), 1)
     return shape, left_out(n, kept, n_holes, bare)
+
+
+def _region(level: Level, mask: NDArray[np.bool_], tolerance: float) -> BaseGeometry:
+    """Return the region of the pixels in `mask`, with its holes, bounded as `_polygon` bounds one."""
+    above, outside = level.values > level.cut, 2 * level.cut - level.inside
+    values = np.where(above & ~mask, outside, np.where(mask & ~above, level.inside, level.values))
+    values = np.pad(values, 1, constant_values=outside)
+    contours = find_contours(values, level.cut, fully_connected="low")
+    rings = [shapely.LinearRing(c[:, ::-1] - 0.5) for c in contours if len(c) > 3]
+    return shapely.build_area(shapely.GeometryCollection(rings)).simplify(tolerance)
 
 
 def _polygon(values: Array, cut: float, inside: float) -> tuple[Polygon, bool]:

@@ -14,10 +14,6 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinat
 from orbiflow.arrays import Array
 from orbiflow.drawing import Palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.art.raster import Grid
-from orbiflow.tiles.art.settings import Strokes
-from orbiflow.tiles.art.source import silhouette_outline
-from orbiflow.tiles.exporting import INK, Curve, Part, Style
 from orbiflow.tiles.geometry import (
     arc_lengths,
     best_similarity,
@@ -25,6 +21,10 @@ from orbiflow.tiles.geometry import (
     resampled,
     signed_area,
 )
+from orbiflow.tiles.motifs.raster import Grid
+from orbiflow.tiles.motifs.settings import Strokes
+from orbiflow.tiles.motifs.source import silhouette_outline
+from orbiflow.tiles.scene import INK, Curve, Part, Style
 from orbiflow.tiles.tile import EscherTile
 
 GRID_DENSITY = 420.0  # cells of the raster along the square root of the area
@@ -158,8 +158,13 @@ def _circle(middle: Array, radius: float) -> Curve:
     return Curve.polyline(ring, closed=True)
 
 
-def engraved(tile: EscherTile, strokes: Strokes, around: Sequence[Eye] = ()) -> tuple[Part, ...]:
-    """Return lines of one kind in ink, thin in the light and deep inside, that keep clear of eyes."""
+def engraved(
+    tile: EscherTile, strokes: Strokes, around: Sequence[Eye] = (), *, hairlines: bool = False
+) -> tuple[Part, ...]:
+    """Return lines of one kind in ink, thin in the light and deep inside, that keep clear of eyes.
+
+    With `hairlines`, they have no width.
+    """
     polygon = tile.tile.polygon
     size = float(np.sqrt(abs(tile.tile.signed_area)))
     flip = np.array([1.0, 1.0 if tile.y_down else -1.0])
@@ -169,6 +174,9 @@ def engraved(tile: EscherTile, strokes: Strokes, around: Sequence[Eye] = ()) -> 
     for eye in around:
         far = EYE_CLEARANCE * eye.radius
         rings = [ring for ring in rings if np.hypot(*(ring - eye.middle).T).min() > far]
+    if hairlines:  # a ring runs along one side of its line and back along the other
+        middles = [(ring + ring[::-1])[: len(ring) // 2] / 2 for ring in rings]
+        return (Part(tuple(map(Curve.polyline, middles)), Style(None, INK)),)
     return (Part(tuple(Curve.polyline(ring, closed=True) for ring in rings), Style(INK)),)
 
 

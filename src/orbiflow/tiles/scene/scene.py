@@ -100,8 +100,8 @@ def bezier(pieces: Array, share: Array) -> Array:
     return (weights * pieces).sum(axis=1)
 
 
-Role = Literal["paper", "tiles", "cut", "mark"]
-"""What a layer is for: a background, filled tiles, lines to cut or draw, marks to measure by."""
+Role = Literal["paper", "tiles", "drawing", "cut", "mark"]
+"""What a layer is for: a background, tiles, what lies on them, lines to cut, marks to measure by."""
 
 INK = "currentColor"
 """A colour in a motif's styles: the one that its layer gives, which shows on the copy's own colour."""
@@ -156,6 +156,12 @@ class Raster(NamedTuple):
     size: tuple[int, int]
     linear: Array
     offset: Array
+
+    @property
+    def corners(self) -> Array:
+        """The corners (4, 2)."""
+        width, height = self.size
+        return [[0, 0], [width, 0], [width, height], [0, height]] @ self.linear.T + self.offset
 
     def moved(self, linear: Array, offset: Array) -> Raster:
         """Return the image under a map p -> linear p + offset."""
@@ -216,7 +222,7 @@ class Layer:
     - `name`: A name for people, such as "colour 1" or "cut".
     - `role`: What the layer is for.
     - `style`: Fill and stroke of all items.
-    - `items`: Curves, and copies of symbols.
+    - `items`: Curves, parts and pictures, and copies of symbols and motifs.
     - `clipped`: Whether it is shown within the scene's `window` alone.
     - `ink`: The colour that `INK` means in the layer's motifs.
     """
@@ -224,7 +230,7 @@ class Layer:
     name: str
     role: Role
     style: Style
-    items: tuple[Curve | Uses, ...]
+    items: tuple[Curve | Uses | Part | Raster, ...]
     clipped: bool = False
     ink: str | None = None
 
@@ -252,7 +258,7 @@ class Scene:
     - `prototile`: The polygon (N, 2) in mm of which `tiles` are copies.
     - `tiles`: The tiles on the page.
     - `facts`: Plain data for the JSON file, such as the class.
-    - `motifs`: Drawings by name, for `Uses`; only SVG can hold them.
+    - `motifs`: Drawings by name, for `Uses`.
     """
 
     width: float
@@ -272,21 +278,33 @@ class Scene:
         """The box within which clipped layers show."""
         return self.window or Box(0.0, 0.0, self.width, self.height)
 
-    def require_plain(self) -> None:
-        """Check that there are no motifs, which only SVG can hold."""
-        if self.motifs:
-            raise OrbiflowError(
-                "this format cannot hold artwork: write it as SVG, or render it as PNG"
-            )
+    def points(self, name: str) -> Array:
+        """Return points (n, 2) whose box holds a symbol or a motif."""
+        motif = self.motifs.get(name)
+        if motif is None or motif.within is not None:
+            own = name if motif is None or motif.within is None else motif.within
+            return self.symbols[own].pieces.reshape(-1, 2)
+        curves = [curve.pieces.reshape(-1, 2) for part in motif.parts for curve in part.curves]
+        return np.concatenate([*curves, *(raster.corners for raster in motif.rasters)])
 
     def curves(self, layer: Layer) -> Iterator[Curve]:
-        """Yield every curve of a layer, including copies of symbols."""
-        self.require_plain()
+        """Yield every curve of a layer, including copies of symbols.
+
+        Raises:
+            OrbiflowError: If there is a picture of pixels.
+        """
         for item in layer.items:
             if isinstance(item, Uses):
                 yield from item.curves(self.symbols[item.symbol])
-            else:
+            elif isinstance(item, Part):
+                yield from item.curves
+            elif isinstance(item, Curve):
                 yield item
+            else:
+                raise OrbiflowError(
+                    "DXF and JSON hold lines, and the picture is made of pixels; choose SVG or PDF, "
+                    "or give a drawing in SVG as the picture"
+                )
 
 
 def rectangle(box: Box) -> Curve:

@@ -8,27 +8,27 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-import svgelements
 from shapely.errors import GEOSException
+from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
-from orbiflow.drawing import plane_axes, rgb
+from orbiflow.drawing import plane_axes
 from orbiflow.errors import InputFileError
-from orbiflow.tiles.art.raster import Grid, Paint
-from orbiflow.tiles.art.source import Picture, covered_area, read_picture
-from orbiflow.tiles.exporting import INK, Curve, Motif, Part, Style, curves_path, draw_paths
 from orbiflow.tiles.geometry import orient, polygons_in
+from orbiflow.tiles.motifs.raster import Grid, Paint
+from orbiflow.tiles.motifs.source import Picture, covered_area, read_picture
+from orbiflow.tiles.scene import INK, Curve, Motif, Part, Style, curves_path, draw_paths
 from orbiflow.tiles.silhouette import (
     MAX_BYTES,
-    MAX_POINTS,
     Drawing,
     DrawnShape,
+    Regions,
     SubPath,
     TooManyPoints,
     TooTangled,
+    brushes,
     check_file,
-    fill,
     parse_xml,
     read_bytes,
     read_head,
@@ -49,19 +49,18 @@ def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
     drawing = Drawing(path, parse_xml(path, read_bytes(path, MAX_BYTES)))
     drawing.collect()
     carry = _Carry(tile, *_onto(path, drawing, tile))
+    regions = Regions(drawing, lambda _: carry.tolerance, 2 * MOST_CARRIED)
     parts: list[Part] = []
     for shape in drawing.shapes:
         try:
-            parts += _parts(shape, drawing, carry)
+            parts += _parts(shape, regions, carry)
         except (TooManyPoints, TooTangled, GEOSException) as error:
             raise InputFileError(
                 f"{path}: the drawing is too intricate to be carried, or much too long; simplify it"
             ) from error
     if not parts:
         raise InputFileError(f"{path}: draws nothing that is filled or stroked")
-    left = [f"{count} {name}" for name, count in drawing.others.items()]
-    notes = (f"left out {' and '.join(left)} of the drawing",) if left else ()
-    return Motif(tuple(parts)), notes
+    return Motif(tuple(parts)), tuple(drawing.left_out())
 
 
 def _onto(path: Path, drawing: Drawing, tile: EscherTile) -> tuple[Array, Array]:
@@ -100,39 +99,40 @@ class _Carry:
         return self.tile.forward(fine[:-1] if closed else fine)
 
 
-def _parts(shape: DrawnShape, drawing: Drawing, carry: _Carry) -> list[Part]:
-    paint = shape.paint
-    if paint.get("visibility") in ("hidden", "collapse"):
-        return []
+def _parts(shape: DrawnShape, regions: Regions, carry: _Carry) -> list[Part]:
+    drawing = regions.drawing
     reach = np.concatenate([path.reach() for path in shape.paths] or [np.zeros((1, 2))])
-    if not (np.abs(reach) < FARTHEST * carry.size / carry.scale).all():  # NaN, too
+    painted = brushes(drawing, shape)
+    if painted and not (np.abs(reach) < FARTHEST * carry.size / carry.scale).all():  # NaN, too
         raise InputFileError(
             f"{drawing.path}: a path reaches much too far beyond the page; delete or shorten it"
         )
-    lines = [(path.flatten(carry.tolerance), path) for path in shape.paths]
-    if sum(len(points) for points, _ in lines) > MAX_POINTS:
-        raise TooManyPoints
-    found = []
-    filled, share = _colour(paint.get("fill", "#000000"), paint, drawing)
-    if filled is not None:
-        region = fill([points for points, _ in lines if len(points) > 2], shape.fill_rule)
-        curves: list[Curve] = []
-        for polygon in polygons_in(region):
-            for k, ring in enumerate([polygon.exterior, *polygon.interiors]):
-                points = carry(shapely.get_coordinates(ring)[:-1], closed=True)
-                # holes run the other way, so that they are holes under every fill rule
-                points = orient(points, counter_clockwise=k == 0)
-                curves.append(Curve.polyline(points, closed=True))
-        opacity = shape.opacity * share * _number(paint.get("fill-opacity"), 1.0)
-        if curves and opacity > 0:
-            found.append(Part(tuple(curves), Style(filled), opacity))
-    stroked, share = _colour(paint.get("stroke", "none"), paint, drawing)
-    width = _number(paint.get("stroke-width"), 1.0) * shape.scale * carry.scale
-    opacity = shape.opacity * share * _number(paint.get("stroke-opacity"), 1.0)
-    if stroked is not None and width > 0 and opacity > 0:
-        curves = [_line(carry, points, path) for points, path in lines if len(points) > 1]
-        found.append(Part(tuple(curves), Style(None, stroked, width), opacity))
+    found: list[Part] = []
+    for kind, (colour, opacity) in painted.items():
+        style = Style(colour)
+        if kind == "fill":
+            curves = _area(regions.clipped(shape, regions.fill(shape)), carry)
+        elif shape.is_plain_line and regions.leaves_stroke(shape):
+            width = shape.width * shape.scale * carry.scale
+            style = Style(None, colour, width)
+            lines = regions.lines(shape)
+            curves = [_line(carry, points, path) for points, path in lines if len(points) > 1]
+        else:
+            curves = _area(regions.clipped(shape, regions.stroke(shape)), carry)
+        if curves:
+            found.append(Part(tuple(curves), style, opacity))
     return found
+
+
+def _area(region: BaseGeometry, carry: _Carry) -> list[Curve]:
+    curves: list[Curve] = []
+    for polygon in polygons_in(region):
+        for k, ring in enumerate([polygon.exterior, *polygon.interiors]):
+            points = carry(shapely.get_coordinates(ring)[:-1], closed=True)
+            # holes run the other way, so that they are holes under every fill rule
+            points = orient(points, counter_clockwise=k == 0)
+            curves.append(Curve.polyline(points, closed=True))
+    return curves
 
 
 def _line(carry: _Carry, points: Array, path: SubPath) -> Curve:
@@ -140,55 +140,6 @@ def _line(carry: _Carry, points: Array, path: SubPath) -> Curve:
         points = points[:-1]
     closed = path.closed and len(points) > 2
     return Curve.polyline(carry(points, closed=closed), closed=closed)
-
-
-def _colour(text: str, paint: object, drawing: Drawing) -> tuple[str | None, float]:
-    """Return a paint as #rrggbb, `INK` or None, and its opacity."""
-    text = text.strip()
-    if text.lower() in ("none", "transparent", ""):
-        return None, 0.0
-    if text.lower() == "currentcolor":
-        text = str(paint.get("color", INK)) if isinstance(paint, dict) else INK
-        # without a colour it is the one that shows on the tile
-        if text.lower() == INK.lower():
-            return INK, 1.0
-    if text.startswith("url("):
-        return _gradient(text, drawing)
-    try:
-        colour = svgelements.Color(text[:60])
-        red, green, blue = (int(getattr(colour, name)) for name in ("red", "green", "blue"))
-        return f"#{red:02x}{green:02x}{blue:02x}", float(colour.opacity or 0.0)
-    except (ValueError, TypeError, AttributeError):
-        return "#000000", 1.0
-
-
-def _gradient(text: str, drawing: Drawing) -> tuple[str | None, float]:
-    """Return the mean colour of a gradient's stops."""
-    element = drawing.by_id.get(text[4:].split(")")[0].strip("'\"# "))
-    for _ in range(5):  # gradients may refer to each other for their stops
-        if element is None or any(child.tag == "stop" for child in element):
-            break
-        element = drawing.by_id.get(element.get("href", "").strip().removeprefix("#"))
-    if element is None:
-        return None, 0.0
-    stops = [drawing.styles.properties(child) for child in element if child.tag == "stop"]
-    colours = [_colour(stop.get("stop-color", "#000000"), {}, drawing)[0] for stop in stops]
-    known = [rgb(colour) for colour in colours if colour not in (None, INK)]
-    if not known:
-        return None, 0.0
-    red, green, blue = np.mean(known, axis=0).round().astype(int)
-    return f"#{red:02x}{green:02x}{blue:02x}", 1.0
-
-
-def _number(text: str | None, usual: float) -> float:
-    """Read a length in user units or a share; return the usual one if it cannot be read."""
-    if text is None:
-        return usual
-    try:
-        value = float(svgelements.Length(text.strip()[:40]).value(ppi=96, relative_length=1.0))
-    except (ValueError, TypeError, AttributeError):
-        return usual
-    return value if np.isfinite(value) and 0 <= value < 1e6 else usual
 
 
 class Over(NamedTuple):

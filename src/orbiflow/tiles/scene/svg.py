@@ -16,8 +16,19 @@ import numpy as np
 
 from orbiflow.arrays import Array, Window, checked_window
 from orbiflow.drawing import DEFAULT_PALETTE, palette
-from orbiflow.tiles.exporting.scene import Box, Curve, Layer, Motif, Scene, Style, Uses, rectangle
 from orbiflow.tiles.pictures import default_window
+from orbiflow.tiles.scene.scene import (
+    Box,
+    Curve,
+    Layer,
+    Motif,
+    Part,
+    Raster,
+    Scene,
+    Style,
+    Uses,
+    rectangle,
+)
 from orbiflow.tiles.tilings import Colouring, Tile, Tiles, as_tiling, colouring, patch
 
 _HEADER = """<?xml version="1.0" encoding="UTF-8"?>
@@ -42,9 +53,13 @@ def write_svg(scene: Scene, *, decimals: int = 3) -> str:
         parts.append(_layer_start(layer))
         for item in layer.items:
             if isinstance(item, Uses):
-                parts.extend(_uses(item, _reach(scene, item.symbol), number))
-            else:
+                reach = float(np.abs(scene.points(item.symbol)).max())
+                parts.extend(_uses(item, reach, number))
+            elif isinstance(item, Curve):
                 parts.append(f'    <path d="{path_data(item, number)}"/>\n')
+            else:
+                own = _image(item) if isinstance(item, Raster) else _part(item, number)
+                parts.append("    " + own)
         parts.append("  </g>\n")
     parts.append("</svg>\n")
     return "".join(parts)
@@ -107,32 +122,26 @@ def _motif(name: str, motif: Motif, number: Numbers) -> str:
             f'    <clipPath id="within-{name}"><use xlink:href="#{motif.within}"/></clipPath>\n'
         )
     parts.append(f'    <g id="{name}"{clip}>\n')
-    for raster in motif.rasters:
-        (a, c), (b, d) = raster.linear.tolist()
-        e, f = raster.offset.tolist()
-        place = ",".join(f"{value:.9g}" for value in (a, b, c, d, e, f))
-        data = base64.b64encode(raster.png).decode("ascii")
-        width, height = raster.size
-        parts.append(
-            f'      <image width="{width}" height="{height}" transform="matrix({place})" '
-            f'preserveAspectRatio="none" xlink:href="data:image/png;base64,{data}"/>\n'
-        )
-    for part in motif.parts:
-        path = "".join(path_data(curve, number) for curve in part.curves)
-        opacity = f' opacity="{part.opacity:.3g}"' if part.opacity < 1 else ""
-        parts.append(f'      <path{_style_attributes(part.style)}{opacity} d="{path}"/>\n')
+    parts += ["      " + _image(raster) for raster in motif.rasters]
+    parts += ["      " + _part(part, number) for part in motif.parts]
     return "".join(parts) + "    </g>\n"
 
 
-def _reach(scene: Scene, name: str) -> float:
-    """Return how far a symbol or motif reaches from its origin, in mm."""
-    if name in scene.symbols:
-        curves = [scene.symbols[name]]
-    elif (within := scene.motifs[name].within) is not None:
-        curves = [scene.symbols[within]]
-    else:
-        curves = [curve for part in scene.motifs[name].parts for curve in part.curves]
-    return max((float(np.abs(curve.bounds()).max()) for curve in curves), default=1.0)
+def _image(raster: Raster) -> str:
+    values = [*raster.linear.T.ravel().tolist(), *raster.offset.tolist()]
+    place = ",".join(f"{value:.9g}" for value in values)
+    data = base64.b64encode(raster.png).decode("ascii")
+    width, height = raster.size
+    return (
+        f'<image width="{width}" height="{height}" transform="matrix({place})" '
+        f'preserveAspectRatio="none" xlink:href="data:image/png;base64,{data}"/>\n'
+    )
+
+
+def _part(part: Part, number: Numbers) -> str:
+    path = "".join(path_data(curve, number) for curve in part.curves)
+    opacity = f' opacity="{part.opacity:.3g}"' if part.opacity < 1 else ""
+    return f'<path{_style_attributes(part.style)}{opacity} d="{path}"/>\n'
 
 
 def _layer_start(layer: Layer) -> str:

@@ -14,8 +14,8 @@ from scipy.ndimage import distance_transform_edt
 
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.tiles.art.raster import Grid, polygon_sides, runs, triangle_sides
 from orbiflow.tiles.geometry import border
+from orbiflow.tiles.motifs.raster import Grid, polygon_sides, runs, triangle_sides
 from orbiflow.tiles.search import matched
 from orbiflow.tiles.silhouette import Frame, Target, deep_channel, open_image, upright
 from orbiflow.tiles.tile import EscherTile, TileMap, TileSource

@@ -8,14 +8,18 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from PIL import Image
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import plane_axes
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.scene import (
+from orbiflow.tiles.scene.flattening import flattened
+from orbiflow.tiles.scene.scene import (
     Curve,
     Layer,
+    Part,
     PlacedTile,
+    Raster,
     Scene,
     Style,
     Uses,
@@ -40,6 +44,7 @@ def write_dxf(scene: Scene, *, tolerance: float) -> str:
     from ezdxf.colors import RGB
     from ezdxf.filemanagement import new
 
+    scene = flattened(scene, tolerance)
     document: Any = new("R2010", units=units.MM)
     document.header["$MEASUREMENT"] = 1
     space = document.modelspace()
@@ -54,12 +59,17 @@ def write_dxf(scene: Scene, *, tolerance: float) -> str:
         if layer.role == "paper":
             continue
         entry = document.layers.add(layer.name, linetype="CONTINUOUS")
-        entry.rgb = RGB.from_hex(layer.style.stroke or layer.style.fill or "#000000")
+        colour = layer.style.stroke or layer.style.fill or "#000000"
+        entry.color, entry.rgb = ACI.get(colour, 7), RGB.from_hex(colour)
         for points, closed in _polylines(scene, layer, tolerance):
             space.add_lwpolyline(points, close=closed, dxfattribs={"layer": layer.name})
     text = io.StringIO()
     document.write(text)
     return text.getvalue()
+
+
+ACI = {"#ff0000": 1, "#0000ff": 5}
+"""AutoCAD's numbers of colours, for readers without true colours; 7 is black on a light ground."""
 
 
 def _polylines(
@@ -82,7 +92,7 @@ SCHEMA_VERSION = 1
 
 def write_json(scene: Scene, *, tolerance: float) -> str:
     """Return the scene as JSON; all lengths in mm, y down from the page's upper left corner."""
-    prototile = scene.prototile
+    scene, prototile = flattened(scene, tolerance), scene.prototile
     document: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "kind": "orbiflow-export",
@@ -116,7 +126,7 @@ def _tile(tile: PlacedTile, number: int, prototile: np.ndarray | None) -> dict[s
 
 def _layer(scene: Scene, layer: Layer, tolerance: float) -> dict[str, Any]:
     paths: list[dict[str, Any]] = []
-    if layer.role in ("cut", "mark"):  # tiles are listed as such
+    if layer.role not in ("paper", "tiles"):  # tiles are listed as such
         paths = [
             {"closed": curve.closed, "points": _rounded(curve.flattened(tolerance))}
             for curve in scene.curves(layer)
@@ -139,26 +149,54 @@ def _rounded(values: np.ndarray, decimals: int = 4) -> list[Any]:
 INCH = 25.4
 """An inch in mm."""
 
+PLOT_TOLERANCE = 0.01  # distance in mm at which curves are cut for a picture
+
 
 def drawn(scene: Scene, *, least_width: float = 0.0) -> Figure:
     """Return a figure of the page in real size; strokes are at least `least_width` mm wide."""
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
 
-    scene.require_plain()
+    scene = flattened(scene, PLOT_TOLERANCE)
     figure = Figure(figsize=(scene.width / INCH, scene.height / INCH))
     figure.patch.set_facecolor("white")
     axes = plane_axes(figure, (0.0, 0.0, scene.width, scene.height), y_down=True)
     axes.set_aspect("auto")  # which rounding would otherwise decide
+
+    def points(style: Style) -> Style:
+        return style._replace(width=max(style.width, least_width) * 72 / INCH)
+
     for layer in scene.layers:
-        style = layer.style._replace(width=max(layer.style.width, least_width) * 72 / INCH)
-        collection = draw_paths(axes, _paths(scene, layer), style)
-        if layer.clipped:
+        # as it is in files of vectors
+        how = "bilinear" if least_width else "none"
+        artists = [_image(axes, item, how) for item in layer.items if isinstance(item, Raster)]
+        artists += [
+            draw_paths(axes, [curves_path(item.curves)], points(item.style), item.opacity)
+            for item in layer.items
+            if isinstance(item, Part)
+        ]
+        artists.append(draw_paths(axes, _paths(scene, layer), points(layer.style)))
+        for artist in artists if layer.clipped else ():
             box = scene.clip
             window = Rectangle((box.left, box.top), box.width, box.height)
             window.set_transform(axes.transData)
-            collection.set_clip_path(window)
+            artist.set_clip_path(window)
     return figure
+
+
+def _image(axes: Axes, raster: Raster, interpolation: str) -> Artist:
+    """Draw a picture of pixels on axes of mm, in its place."""
+    from matplotlib.image import AxesImage
+    from matplotlib.transforms import Affine2D
+
+    width, height = raster.size
+    image = AxesImage(axes, interpolation=interpolation, extent=(0, width, height, 0))
+    image.set_data(np.asarray(Image.open(io.BytesIO(raster.png))))
+    place = np.vstack([np.column_stack([raster.linear, raster.offset]), [0, 0, 1]])
+    image.set_transform(Affine2D(place) + axes.transData)
+    image.set_zorder(1)  # as curves, so that what comes later lies above
+    axes.add_artist(image)
+    return image
 
 
 def draw_paths(axes: Axes, paths: list[PlotPath], style: Style, opacity: float = 1.0) -> Artist:
@@ -181,7 +219,7 @@ def _paths(scene: Scene, layer: Layer) -> list[PlotPath]:
             symbol = scene.symbols[item.symbol]
             points, codes = _points_and_codes(symbol)
             paths += [_path(image, codes) for image in item.images(points)]
-        else:
+        elif isinstance(item, Curve):
             paths.append(_path(*_points_and_codes(item)))
     return paths
 

@@ -1,0 +1,104 @@
+"""What lies on the tiles of an export: to engrave and to score, or in colours."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from orbiflow.drawing import palette
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.exporting.layouts import BLUE, Layout, line_style
+from orbiflow.tiles.motifs import Over, carried_raster, drawn_motif
+from orbiflow.tiles.scene import (
+    INCH,
+    Layer,
+    Motif,
+    Part,
+    Scene,
+    Style,
+    Uses,
+    boundary,
+    cut_off,
+    lines_of,
+    polylines,
+    region_of,
+)
+from orbiflow.tiles.silhouette import lightness
+from orbiflow.tiles.tile import EscherTile
+
+BLACK = "#000000"
+MOST_PIXELS = 1e8  # the largest number of pixels of pictures on a page
+
+
+def drawn_on(layout: Layout, given: EscherTile, over: Over) -> Motif:
+    """Return what the settings draw on a tile, at its place on the page in mm."""
+    settings, (linear, _) = layout.settings, layout.place
+    chosen = palette(settings.palette if settings.coloured else "ink")
+    motif = drawn_motif(given, settings, chosen, over.drawing, hairlines=not settings.coloured)
+    rasters = motif.rasters
+    if over.picture is not None:
+        if settings.purpose == "plotter":
+            raise OrbiflowError(
+                "a pen draws lines, and the picture is made of pixels; give a drawing in SVG"
+            )
+        density = min(settings.dpi / INCH, float(np.sqrt(MOST_PIXELS / np.prod(settings.page))))
+        density *= float(np.sqrt(abs(np.linalg.det(linear))))
+        rasters = (carried_raster(over.picture, given, density),)
+    return Motif(motif.parts, rasters).moved(*layout.place)
+
+
+def with_drawing(scene: Scene, layout: Layout) -> Scene:
+    """Lay the layout's motif on each tile of a scene, in layers under the lines to cut."""
+    settings, area = layout.settings, shapely.Polygon(layout.outline.closed.flattened(0.01))
+    if layout.motif is None or scene.motifs or not scene.tiles:
+        return scene
+    if settings.coloured:
+        motifs = {"drawing": cut_off(layout.motif, area, whole_strokes=False)}
+        styles = {"drawing": Style()}
+    else:
+        line = line_style(layout)
+        styles = {"engrave": Style(BLACK), "score": line._replace(stroke=BLUE)}
+        if settings.purpose in ("plotter", "colouring"):
+            styles = dict.fromkeys(styles, line)
+        motifs = burnt(layout.motif, area, styles)
+    linear = np.array([tile.linear for tile in scene.tiles])
+    offsets = np.array([tile.offset for tile in scene.tiles])
+    which, ink = np.arange(len(offsets)), palette(settings.palette).outline
+    ink, clip = ink if settings.coloured else None, settings.clip or settings.cut == "jigsaw"
+    layers = [
+        Layer(name, "drawing", styles[name], (Uses(name, linear, which, offsets),), clip, ink)
+        for name, motif in motifs.items()
+        if motif.parts or motif.rasters
+    ]
+    return replace(scene, layers=(*layers, *scene.layers), motifs=motifs)
+
+
+def burnt(motif: Motif, tile: shapely.Polygon, styles: dict[str, Style]) -> dict[str, Motif]:
+    """Return the regions and pictures to engrave, and the lines to score.
+
+    What is lighter than middle grey erases what lies under it, as on white; faint colours do nothing.
+    """
+    dark: BaseGeometry = shapely.Polygon()
+    lines: list[BaseGeometry] = []
+    for part in (part for part in motif.parts if part.opacity >= 0.5):
+        fill, stroke, width = part.style
+        if fill is not None:
+            region = region_of(part)
+            dark = dark | region if lightness(fill) < 0.5 else dark - region
+            lines = [line - region for line in lines]
+        if stroke is not None and lightness(stroke) < 0.5:
+            lines.append(lines_of(part))
+        elif stroke is not None:
+            erased = lines_of(part).buffer(width / 2)
+            dark, lines = dark - erased, [line - erased for line in lines]
+    regions = boundary(dark & tile)
+    scored = tuple(curve for line in lines for curve in polylines(line & tile))
+    pictures = cut_off(Motif(rasters=motif.rasters), tile).rasters
+    engraved = (Part(regions, styles["engrave"]),) if regions else ()
+    return {
+        "engrave": Motif(engraved, pictures),
+        "score": Motif((Part(scored, styles["score"]),) if scored else ()),
+    }

@@ -1,0 +1,57 @@
+"""What is drawn on a tile: lines inside it, and eyes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, TypeAlias
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.settings import Group, Option, Parsed, Repeated, SettingError, Settings
+
+Strokes: TypeAlias = Literal["hatch", "echoes", "feathers"]
+
+
+def eye_numbers(text: str) -> tuple[float, ...]:
+    """Return the numbers of an eye.
+
+    >>> eye_numbers("120, 80,6")
+    (120.0, 80.0, 6.0)
+    """
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise OrbiflowError(f"{text!a:.60} is not x,y or x,y,radius") from None
+
+
+ON_TILE = Group("On the tile")
+
+
+class MotifSettings(Settings):
+    """What is drawn on a tile, over its picture if it has one."""
+
+    engrave: Annotated[bool, ON_TILE] = False
+    """Draw lines inside the tile, as on a woodcut: hatching, where the strokes say nothing else."""
+
+    strokes: Annotated[Strokes | None, ON_TILE] = None
+    """Engrave with hatching, echoes of the outline, or feathers."""
+
+    eyes: Annotated[
+        tuple[
+            Annotated[tuple[float, ...], Parsed(eye_numbers, "x,y or x,y,radius", "X,Y[,R]")], ...
+        ],
+        Repeated(),
+        Option("--eye"),
+        ON_TILE,
+    ] = ()
+    """An eye, in the silhouette's coordinates. May be repeated."""
+
+    def defaults(self) -> Mapping[str, Any]:
+        return {"strokes": "hatch"} if self.engrave else {}
+
+    def check(self) -> None:
+        for number, place in enumerate(self.eyes, 1):
+            if len(place) not in (2, 3) or min(place[2:], default=0) < 0:
+                raise SettingError(
+                    f"{{eyes}}: entry {number} must be x,y or x,y,radius in the silhouette's "
+                    f"coordinates, got {','.join(f'{part:g}' for part in place)}"
+                )

@@ -1,0 +1,109 @@
+"""The page of a search, `index.html`: tiles, what to make of them and how, their figures and files.
+
+It works in light and dark, on a phone and on paper, and without its script, which copies commands.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+import shapely
+
+from orbiflow.arrays import Array
+from orbiflow.drawing import PALETTES, STRIP, rendered, window_of
+from orbiflow.tiles.pictures import RAMP, default_window
+from orbiflow.tiles.search import ClassFailure
+from orbiflow.tiles.silhouette import Target
+from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tilings import Colouring, colouring, copies_meeting
+
+# The files in every tile's folder
+TILE_FILES = ("tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors")
+
+TRIED = ("delft", "lagoon", "ochre", "dusk", "forest", "ink")
+"""The palettes that the page shows."""
+
+
+def index_page(
+    results: Sequence[EscherTile],
+    target: Target,
+    folders: Sequence[str],
+    *,
+    out: str = ".",
+    read: bool = False,
+    colours: Sequence[Colouring] | None = None,
+    failures: Sequence[ClassFailure] = (),
+    figures: Sequence[tuple[str, ...]] = (),
+) -> str:
+    """Return the page of one search's tiles, best first, to be written beside their `folders`.
+
+    `out` is what commands call the folder that the page is in, `read` whether `read.png` is there.
+    `colours` has the colouring of each tiling, if it is known already; `figures` are the names of the
+    files in each folder besides the `TILE_FILES`.
+    """
+    name = PurePath(target.source).name
+    extra = figures or [()] * len(results)
+    known = colours or [colouring(tile.tile) for tile in results]
+    tiles = [
+        {"found": tile, "folder": folder, "files": TILE_FILES + more, "patch": _patch(tile, own)}
+        for tile, folder, more, own in zip(results, folders, extra, known, strict=True)
+    ]
+    return rendered(
+        "orbiflow.tiles.pages",
+        "index_page.html",
+        title=f"Tiles that look like {name}",
+        name=name,
+        stem=PurePath(name).stem,
+        out=shlex.quote(f"./{out}" if out.startswith("-") else out),
+        quote=shlex.quote,
+        read=read,
+        silhouette=_silhouette(target),
+        compared=any(result.front is not None for result in results),
+        notes=target.notes,
+        tiles=tiles,
+        palettes={way: PALETTES[way] for way in TRIED},
+        ramp=RAMP,
+        strip=STRIP,
+        failures=failures,
+    )
+
+
+PATCH = 150  # the width of a small tiling in its own units, about pixels
+
+
+def _patch(tile: EscherTile, colours: Colouring) -> dict[str, Any]:
+    """Return a small tiling as an SVG has it: a path, and where its copies of each colour are."""
+    left, low, right, high = default_window(tile.tile)
+    middle, half = tile.tile.center, np.array([right - left, high - low]) * 0.3
+    scale = np.array([1, 1 if tile.y_down else -1]) * PATCH / (2 * half[0])
+    copies = copies_meeting(tile.tile, (*(middle - half), *(middle + half)))
+    linear = copies.group.linear_parts[copies.cosets] * scale[:, None] / scale
+    places = (copies.images(middle[None])[:, 0] - middle) * scale
+    numbers = np.concatenate([linear.transpose(0, 2, 1).reshape(-1, 4), places], axis=1)
+    matrices = [" ".join(f"{x:.4g}" for x in row) for row in numbers]
+    ring = shapely.LinearRing((tile.tile.polygon - middle) * scale).simplify(0.2)
+    own = colours.colours(copies)
+    width, height = (2 * half * abs(scale)).tolist()
+    return {
+        "box": f"{-width / 2:.1f} {-height / 2:.1f} {width:.1f} {height:.1f}",
+        "path": _path(shapely.get_coordinates(ring)[:-1]),
+        "copies": [[matrices[k] for k in np.flatnonzero(own == n)] for n in range(colours.count)],
+    }
+
+
+def _path(ring: Array) -> str:
+    return "M" + "L".join(f"{x:.1f},{y:.1f}" for x, y in ring) + "Z"
+
+
+def _silhouette(target: Target) -> dict[str, str]:
+    """Return the silhouette as the path of an SVG, 100 units along its longer side."""
+    left, low, right, high = window_of([target.outline])
+    scale = 100 / max(right - left, high - low)
+    ring = (target.outline - (left, low if target.y_down else high)) * scale
+    ring = ring * (1, 1 if target.y_down else -1)
+    size = {"width": f"{(right - left) * scale:.1f}", "height": f"{(high - low) * scale:.1f}"}
+    return {**size, "path": _path(ring)}

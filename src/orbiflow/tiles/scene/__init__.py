@@ -1,0 +1,5 @@
+"""A page in millimetres before it is a file, and the files that it becomes."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

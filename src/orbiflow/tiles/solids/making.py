@@ -1,0 +1,144 @@
+"""The solid of a tile: how it is made, what the user should know, and its file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import shapely
+from manifold3d import Manifold
+from shapely.geometry.base import BaseGeometry
+
+from orbiflow import __version__
+from orbiflow.arguments import as_choice
+from orbiflow.arrays import Array
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.runtime import write_atomic
+from orbiflow.tiles.exporting import ExportSettings, laid_out, place_on
+from orbiflow.tiles.likeness import narrowest_slit
+from orbiflow.tiles.scene import Motif, lines_of, region_of
+from orbiflow.tiles.silhouette import lightness
+from orbiflow.tiles.solids.files import write_3mf, write_stl
+from orbiflow.tiles.solids.settings import WITH_DRAWING, SolidSettings
+from orbiflow.tiles.solids.shapes import Plan, shape
+from orbiflow.tiles.tile import EscherTile, TileSource
+
+WRITERS = {"stl": write_stl, "3mf": write_3mf}
+FRAGILE = {"cutter": 5.0, "mould": 2.0}  # widths in mm of necks at which dough and casts break
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A solid in mm as it is printed: z up, from the corner of the bed.
+
+    - `parts`: Closed bodies by name; a puzzle has a "tray" and "piece 1", ...
+    - `title`: What a file says about it.
+    - `notes`: What the user should know.
+    """
+
+    parts: dict[str, Manifold]
+    title: str
+    notes: tuple[str, ...] = ()
+
+    @property
+    def volume(self) -> float:
+        """The volume in mm^3."""
+        return sum(body.volume() for body in self.parts.values())
+
+    @property
+    def size(self) -> Array:
+        """Width, depth and height (3,) in mm."""
+        boxes = np.array([body.bounding_box() for body in self.parts.values()])
+        return boxes[:, 3:].max(axis=0) - boxes[:, :3].min(axis=0)
+
+    def write(self, out: str | Path, format: str | None = None) -> Path:
+        """Write a 3mf or binary stl, by its ending where no format is given."""
+        known = format or Path(out).suffix.lower().lstrip(".")
+        writer = as_choice(known, tuple(WRITERS), "the format")
+        return write_atomic(out, WRITERS[writer](self.parts, self.title))
+
+
+def make_solid(
+    tile: TileSource,
+    settings: SolidSettings | None = None,
+    *,
+    picture: str | Path | None = None,
+    force: bool = False,
+) -> Solid:
+    """Return a solid to print, made of a tile.
+
+    Args:
+        tile, force: As for `export`; for a drawing the tile needs a map.
+        settings: What is made, and how.
+        picture: An SVG drawing over the silhouette, for a stamp or mould.
+
+    Raises:
+        CertificationError: If the tile is not certified.
+        OrbiflowError: If the settings cannot be met.
+        InputFileError: If the drawing cannot be read, or is a picture of pixels.
+    """
+    settings, given = settings or SolidSettings(), EscherTile.of(tile)
+    if picture is not None and settings.kind not in WITH_DRAWING:
+        raise OrbiflowError(f"a {settings.kind} has no picture; a stamp or mould has: leave it out")
+    certificate = given.require_certified(
+        force=force, otherwise="so no solid is made of it; --force makes one, marked so"
+    )
+    title = f"{settings.kind} of {given.name} in mm, made with orbiflow {__version__}"
+    if not certificate.valid:
+        title = f"NOT CERTIFIED: {title}"
+    placed, notes = laid_out(given, _page(settings), picture)
+    drawing = Motif() if placed.motif is None else placed.motif
+    if drawing.rasters:
+        raise InputFileError(f"{picture}: a {settings.kind} needs lines: draw it as SVG")
+    plan = Plan(settings, placed, raised(drawing, settings.nozzle))
+    return Solid(shape(plan), title, (*notes, *_gap_notes(plan)))
+
+
+def _page(settings: SolidSettings) -> ExportSettings:
+    """Return how the tile is laid out: a puzzle's for most whole tiles within the tray's walls.
+
+    Notes say where it is so thin that it breaks, or that the slopes of both sides meet.
+    """
+    kind, slope = settings.kind, settings.chamfer
+    if kind == "mould":
+        slope = settings.height * settings.slope
+    bevelled = 2 * slope + settings.clearance if kind in ("tile", "mould", "puzzle") else 0.0
+    page = ExportSettings(
+        tile_size=settings.tile_size,
+        warn_neck=max(settings.nozzle, bevelled, FRAGILE.get(kind, 0.0)),
+        strokes=settings.strokes,
+        eyes=settings.eyes,
+    )
+    if kind != "puzzle":
+        return page.replace(cut="pieces")
+    sides = [side - 2 * settings.wall - settings.clearance for side in settings.area]
+    return page.replace(area=(sides[0], sides[1]))
+
+
+def _gap_notes(plan: Plan) -> tuple[str, ...]:
+    """Say where the walls of a cutter meet in a gap of the tile."""
+    settings, ring = plan.settings, plan.ring
+    slit = narrowest_slit(ring) if settings.kind == "cutter" else None
+    if slit is None or slit.width >= 2 * settings.wall:
+        return ()
+    thin = ", too thin to print" if slit.width < settings.nozzle else ""
+    return (
+        f"the walls of both sides are one in a gap of the tile: {slit.width:.2f} mm wide "
+        f"{place_on(ring, slit.place)}{thin}",
+    )
+
+
+def raised(drawing: Motif, nozzle: float) -> BaseGeometry:
+    """Return where a drawing in mm is dark, in lines no thinner than the nozzle's.
+
+    What is lighter than middle grey wipes out what lies under it; faint colours do nothing.
+    """
+    dark: BaseGeometry = shapely.Polygon()
+    for part in (part for part in drawing.parts if part.opacity >= 0.5):
+        fill, stroke, width = part.style
+        line = lines_of(part).buffer(max(width, nozzle) / 2)
+        for colour, region in ((fill, region_of(part)), (stroke, line)):
+            if colour is not None:
+                dark = dark | region if lightness(colour) < 0.5 else dark - region
+    return dark

@@ -1,0 +1,111 @@
+"""How a tile becomes a solid to print; lengths in mm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from orbiflow.settings import DefaultText, FileSettings, OnlyWith, Range, SettingError, Unit
+from orbiflow.tiles.motifs import MotifSettings
+from orbiflow.units import Length, LengthOrZero, PageSize
+
+WITH_DRAWING = ("stamp", "mould")
+_CUTTER, _MOULD, _PUZZLE = (OnlyWith(kind=name) for name in ("cutter", "mould", "puzzle"))
+
+_WALLED = OnlyWith(kind=("cutter", "stamp", "mould", "puzzle"))
+
+
+class SolidSettings(MotifSettings, FileSettings, group="Solid"):
+    """How a tile becomes a solid; lengths in mm.
+
+    >>> SolidSettings(kind="cutter").wall
+    1.2
+    """
+
+    kind: Literal["tile", "cutter", "stamp", "mould", "puzzle"] = "tile"
+    """A tile; a cookie cutter; a stamp; a mould to cast tiles in; a puzzle of tiles in a tray."""
+
+    format: Annotated[Literal["stl", "3mf"] | None, DefaultText("stl; for a puzzle 3mf")] = None
+    """Format of the file. In a 3MF each part of a puzzle is an object of its own."""
+
+    tile_size: Annotated[Length, DefaultText("50 mm; cutter 80, puzzle 40 mm")] = 50.0
+    """Longer side of the tile's smallest rectangle."""
+
+    height: Annotated[Length, DefaultText("4 mm; cutter 13, stamp 3, mould 8 mm")] = 4.0
+    """Height of a tile or piece; of a cutter above its rim; of a stamp's base; depth of a mould."""
+
+    clearance: Annotated[LengthOrZero, OnlyWith(kind=("tile", "mould", "puzzle"))] = 0.2
+    """Gap between tiles put together."""
+
+    chamfer: Annotated[LengthOrZero, OnlyWith(kind=("tile", "puzzle"))] = 0.5
+    """Bevel of the upper edge."""
+
+    wall: Annotated[Length, _WALLED, DefaultText("4 mm; cutter 1.2, stamp 1 mm")] = 4.0
+    """Thickness of the wall of a cutter, mould or tray; width of a stamp's border."""
+
+    blade: Annotated[Length, _CUTTER] = 0.6
+    """Thickness of a cutter's wall at its cutting edge; it thins over the last third."""
+
+    foot: Annotated[Length, _CUTTER] = 5.0
+    """Width of a cutter's rim for the hand."""
+
+    floor: Annotated[Length, OnlyWith(kind=("cutter", "mould", "puzzle"))] = 2.0
+    """Thickness of the floor of a mould or tray, and of a cutter's rim."""
+
+    relief: Annotated[Length, OnlyWith(kind=WITH_DRAWING)] = 1.2
+    """How far lines stand out of a stamp, or out of a mould's floor."""
+
+    draft: Annotated[float, Range(0, 45), Unit("degrees"), _MOULD] = 5.0
+    """Slope of a mould's walls, so that casts come out."""
+
+    nozzle: Length = 0.4
+    """Width of the printer's line. Thinner lines of a drawing are widened to it."""
+
+    area: Annotated[PageSize, _PUZZLE, DefaultText("180x180mm")] = (180.0, 180.0)
+    """Largest width and depth of the tray, such as those of the printer's bed."""
+
+    copies: Annotated[int | None, Range(1), _PUZZLE, DefaultText("what the area holds")] = None
+    """Number of pieces; those in the middle are taken."""
+
+    border: Annotated[Literal["straight", "following"], _PUZZLE] = "straight"
+    """With straight, the tray is a rectangle; with following, it follows the pieces."""
+
+    assembled: Annotated[bool, _PUZZLE] = False
+    """Leave the pieces in the tray, to look at; else they lie beside it, to print."""
+
+    def defaults(self) -> Mapping[str, Any]:
+        return {**super().defaults(), **KINDS[self.kind]}
+
+    @property
+    def usual_format(self) -> str:
+        """3MF for a puzzle, else STL."""
+        return "3mf" if self.kind == "puzzle" else "stl"
+
+    @property
+    def slope(self) -> float:
+        """How much narrower in mm a mould is at a depth of 1 mm."""
+        return math.tan(math.radians(self.draft))
+
+    def check(self) -> None:
+        super().check()
+        for name in ("engrave", "strokes", "eyes"):
+            if getattr(self, name) and self.kind not in WITH_DRAWING:
+                raise SettingError(f"{{{name}}} applies only to {{kind}} stamp or mould")
+        part = {"tile": "chamfer", "puzzle": "chamfer", "mould": "relief"}.get(self.kind)
+        if part is not None and getattr(self, part) > self.height:
+            raise SettingError(f"{{{part}}} must be at most {{height}}, {self.height:g} mm")
+        if self.kind == "cutter" and not self.blade <= self.wall <= self.foot:
+            raise SettingError("{blade} must be at most {wall}, and {wall} at most {foot}")
+        if self.kind == "puzzle" and not self.clearance:
+            raise SettingError("{clearance} must be above 0 in a puzzle, or no piece comes out")
+
+
+KINDS: Mapping[str, Mapping[str, Any]] = {
+    "tile": {},
+    "cutter": {"tile_size": 80.0, "height": 13.0, "wall": 1.2},
+    "stamp": {"height": 3.0, "wall": 1.0},
+    "mould": {"height": 8.0},
+    "puzzle": {"tile_size": 40.0},
+}
+"""What each kind is usually made with; settings that are given go before."""

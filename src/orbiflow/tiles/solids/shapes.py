@@ -1,0 +1,159 @@
+"""The shapes of the five kinds, in mm: y points down as on a page, z up from the bed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from manifold3d import Manifold
+from shapely.geometry.base import BaseGeometry
+
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.exporting import Layout, chosen_copies, cut_ring
+from orbiflow.tiles.geometry import polygons_in
+from orbiflow.tiles.solids.settings import SolidSettings
+from orbiflow.tiles.solids.stacking import Level, stacked
+
+FLATNESS = 0.01  # how far in mm straight sides may be from the tile's curves: no printer shows it
+MOST_PIECES = 400  # of a puzzle, so that its file stays below some 100 MB
+APART = 3.0  # distance in mm of a puzzle's parts on the bed
+
+
+class Plan(NamedTuple):
+    """What solids are made from: the tile in its place, and what is drawn on it, in mm."""
+
+    settings: SolidSettings
+    layout: Layout
+    drawing: BaseGeometry
+
+    @property
+    def ring(self) -> Array:
+        """The tile's outline (N, 2)."""
+        return self.layout.outline.closed.flattened(FLATNESS)
+
+    @property
+    def piece(self) -> shapely.Polygon:
+        """The tile, smaller by half of the clearance all around."""
+        return shapely.Polygon(cut_ring(self.ring, 0.0, self.settings.clearance))
+
+
+def shape(plan: Plan) -> dict[str, Manifold]:
+    """Return the parts of a solid by name, as they are printed and seen from above.
+
+    What a cutter, stamp or mould makes is seen from its other side: they are mirrored, so that it
+    looks like the tile.
+    """
+    makers = {"tile": _tile, "cutter": _cutter, "stamp": _stamp, "mould": _mould}
+    kind, across = plan.settings.kind, 1.0
+    if kind in ("cutter", "stamp", "mould"):
+        across = -1.0
+    found = _puzzle(plan) if kind == "puzzle" else {kind: makers[kind](plan)}
+    turned = [body.scale((across, -1.0, 1.0)) for body in found.values()]
+    x, y = np.min([body.bounding_box()[:2] for body in turned], axis=0)
+    return {name: body.translate((-x, -y, 0.0)) for name, body in zip(found, turned, strict=True)}
+
+
+def _grown(region: BaseGeometry, distance: float) -> BaseGeometry:
+    """Return a region grown by a distance, or shrunk, unless nothing is left."""
+    found = region.buffer(distance, quad_segs=12) if distance else region
+    if found.is_empty:
+        raise OrbiflowError(
+            f"nothing is left of the tile {-distance:.3g} mm inside its edge; choose a larger tile size"
+        )
+    return found
+
+
+def _tile(plan: Plan) -> Manifold:
+    settings, piece = plan.settings, plan.piece
+    top = Level(settings.height, _grown(piece, -settings.chamfer))
+    return stacked(Level(0.0, piece), Level(settings.height - settings.chamfer, piece), top)
+
+
+def _cutter(plan: Plan) -> Manifold:
+    """Return a cutter that stands on its rim, blade up; its walls stand outside of the tile."""
+    settings, tile = plan.settings, shapely.Polygon(plan.ring)
+    widths = (settings.foot, settings.wall, settings.blade)
+    foot, wall, blade = (_grown(tile, width).difference(tile) for width in widths)
+    rim, top = settings.floor, settings.floor + settings.height
+    thins = Level(top - settings.height / 3, wall)
+    return stacked(Level(0.0, foot), Level(rim, foot), Level(rim, wall), thins, Level(top, blade))
+
+
+def _stamp(plan: Plan) -> Manifold:
+    """Return a stamp, face up: the tile's border and the drawing inside it are raised."""
+    settings, tile = plan.settings, shapely.Polygon(plan.ring)
+    low = tile.buffer(-settings.wall).difference(plan.drawing)
+    raised = tile.difference(low)
+    base, top = settings.height, settings.height + settings.relief
+    return stacked(Level(0.0, tile), Level(base, tile), Level(base, raised), Level(top, raised))
+
+
+def _mould(plan: Plan) -> Manifold:
+    """Return a block with a cavity that is the tile at its mouth, with the drawing on its floor."""
+    settings, mouth = plan.settings, plan.piece
+    block = shapely.box(*mouth.bounds).buffer(settings.wall)
+    bottom = _grown(mouth, -settings.slope * settings.height)
+    middle = _grown(mouth, -settings.slope * (settings.height - settings.relief))
+    drawing = plan.drawing.intersection(bottom.buffer(-settings.nozzle))
+    floor, relief = settings.floor, settings.floor + settings.relief
+    return stacked(
+        Level(0.0, block),
+        Level(floor, block),
+        Level(floor, block.difference(bottom).union(drawing)),
+        Level(relief, block.difference(middle).union(drawing)),
+        Level(relief, block.difference(middle)),
+        Level(floor + settings.height, block.difference(mouth)),
+    )
+
+
+def _puzzle(plan: Plan) -> dict[str, Manifold]:
+    """Return a tray and its pieces, in it or beside it on the bed."""
+    settings, copies = plan.settings, chosen_copies(plan.layout)
+    fit = min(len(copies), MOST_PIECES)
+    wanted = settings.copies or max(fit, 1)
+    if wanted > fit:
+        raise OrbiflowError(
+            f"a tray of {settings.area[0]:g} x {settings.area[1]:g} mm holds {fit} pieces of "
+            f"{settings.tile_size:g} mm, not {wanted}; choose a larger area or a smaller tile size"
+        )
+    centers = copies.centers()
+    far = np.linalg.norm(centers - centers.mean(axis=0), axis=1)
+    copies = copies.select(np.sort(np.argsort(far, kind="stable")[:wanted]))
+    tray, piece = _tray(plan, copies.images(plan.ring)), _tile(plan)
+    moves = np.zeros((wanted, 3, 4))
+    moves[:, :2, :2] = copies.group.linear_parts[copies.cosets]
+    moves[:, :2, 3], moves[:, 2, 2] = copies.translations, 1.0
+    moves[:, 2, 3] = settings.floor if settings.assembled else 0.0
+    pieces = [piece.transform(move) for move in moves]
+    pieces = pieces if settings.assembled else _beside(tray, pieces)
+    return {"tray": tray, **{f"piece {k}": body for k, body in enumerate(pieces, 1)}}
+
+
+def _tray(plan: Plan, rings: Array) -> Manifold:
+    """Return a tray around tiles (M, N, 2), half as deep as the pieces are high."""
+    settings, gap = plan.settings, plan.settings.clearance / 2
+    grown = shapely.buffer(shapely.polygons(rings), gap, join_style="mitre", mitre_limit=2)
+    cavity = shapely.union_all(grown)
+    if settings.border == "straight":
+        around = shapely.box(*cavity.bounds).buffer(settings.wall)
+    else:
+        parts = polygons_in(cavity.buffer(settings.wall))
+        around = shapely.union_all([shapely.Polygon(part.exterior) for part in parts])
+    floor, walls = settings.floor, around.difference(cavity)
+    top = Level(floor + settings.height / 2, walls)
+    return stacked(Level(0.0, around), Level(floor, around), Level(floor, walls), top)
+
+
+def _beside(tray: Manifold, pieces: Sequence[Manifold]) -> list[Manifold]:
+    """Return pieces moved apart, in rows beside a tray."""
+    boxes = np.array([piece.bounding_box() for piece in pieces]).reshape(-1, 2, 3)[:, :, :2]
+    step = np.ptp(boxes, axis=1).max(axis=0) + APART
+    _, top, _, right, *_ = tray.bounding_box()
+    row, column = np.divmod(np.arange(len(pieces)), math.ceil(math.sqrt(len(pieces))))
+    places = np.array([right + APART, top]) + np.stack([column, row], axis=1) * step
+    moves = places - boxes[:, 0]
+    return [piece.translate((x, y, 0.0)) for piece, (x, y) in zip(pieces, moves, strict=True)]

@@ -1,0 +1,116 @@
+"""A tile lies in the same place whether it is cut, printed or painted."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from artworks import squirrel, upside_down
+from orbiflow.drawing import palette, rgb
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import (
+    CLASSES,
+    ArtSettings,
+    ExportSettings,
+    Uses,
+    artwork,
+    render_artwork,
+    scenes,
+    write_artwork,
+)
+from orbiflow.tiles.art import Artwork, art_scene
+
+PAGE: dict[str, Any] = {"size": "211.7x148mm", "tile_size": "37mm"}
+CUT: dict[str, Any] = {"area": "211.7x148mm", "tile_size": "37mm"}
+
+
+def painted_rings(art: Artwork) -> np.ndarray:
+    """The tiles (M, N, 2) of artwork in mm."""
+    scene = art_scene(art)
+    fills = [item for layer in scene.layers for item in layer.items if layer.style.fill]
+    return np.concatenate(
+        [
+            uses.images(scene.symbols["tile"].pieces[:, 0])
+            for uses in fills
+            if isinstance(uses, Uses)
+        ]
+    )
+
+
+def cut_rings(tile: Any, **settings: Any) -> np.ndarray:
+    """The tiles (M, N, 2) of an export in mm."""
+    (scene,), _ = scenes(tile, ExportSettings(**settings))
+    assert scene.prototile is not None
+    return np.stack([scene.prototile @ one.linear.T + one.offset for one in scene.tiles])
+
+
+def apart(some: np.ndarray, others: np.ndarray) -> float:
+    """How far each of some tiles is from the nearest other, at most, in mm."""
+    gaps = np.abs(some[:, None] - others[None]).max(axis=(2, 3))
+    return float(gaps.min(axis=1).max())
+
+
+@settings(max_examples=5)
+@given(
+    st.sampled_from(list(CLASSES)),
+    st.booleans(),
+    st.booleans(),
+    st.floats(-360, 360),
+    st.sampled_from(["skeleton", "none"]),
+    st.sampled_from(["laser", "print", None]),
+)
+def test_art_and_export_put_tiles_in_the_same_places(
+    name: str, turned: bool, clip: bool, rotate: float, cut: str, purpose: str | None
+) -> None:
+    tile = upside_down(squirrel(name)) if turned else squirrel(name)
+    same: dict[str, Any] = {"rotate": rotate, "clip": clip}
+    painted = painted_rings(artwork(tile, ArtSettings(**PAGE, **same)))
+    found = cut_rings(tile, **CUT, **same, cut=cut, purpose=purpose)
+    assert apart(found, painted) < 1e-6
+    page = shapely.box(0, 0, 211.7, 148)
+    shown = [page.intersects(one) for one in np.asarray(shapely.polygons(painted))]
+    assert apart(painted[shown], found) < 1e-6
+
+
+def test_a_length_stays_that_length() -> None:
+    art = artwork(
+        squirrel("IH4"), ArtSettings(**{"size": "300x200.3mm", "tile_size": "80mm", "dpi": 97})
+    )
+    svg, png = str(write_artwork(art, ".svg")), write_artwork(art, ".png")
+    assert 'width="300mm" height="200.3mm" viewBox="0 0 300 200.3"' in svg
+    assert isinstance(png, bytes)
+    image = Image.open(io.BytesIO(png))
+    assert image.size == (round(300 * 97 / 25.4), round(200.3 * 97 / 25.4))
+    assert image.info["dpi"] == pytest.approx((97, 97), abs=0.01)
+
+
+def test_whole_tiles_alone_are_painted() -> None:
+    art = artwork(squirrel("IH6"), ArtSettings(**PAGE, clip=False, dpi=60))
+    rings = painted_rings(art)
+    assert rings.min() > 0
+    assert (rings < (211.7, 148)).all()
+    assert art.page.shown == len(rings)
+    # on the paper of the palette, nothing but these tiles
+    pixels = np.asarray(render_artwork(art))[2::8, 2::8]
+    rows, columns = np.indices(pixels.shape[:2]) * 8 + 2.5
+    region = shapely.union_all(np.asarray(shapely.polygons(rings))).buffer(0.4)
+    inside = shapely.contains_xy(region, columns * 25.4 / 60, rows * 25.4 / 60)
+    on_paper = (pixels == rgb(palette("earth").paper)).all(axis=2)
+    assert on_paper[~inside].all()
+    assert not on_paper[inside].all()
+    with pytest.raises(OrbiflowError, match="no tile is whole on a page of 2500 x 1748 pixels"):
+        artwork(squirrel("IH6"), ArtSettings(**{**PAGE, "tile_size": "25cm", "clip": False}))
+
+
+def test_the_cell_that_repeats_is_neither_turned_nor_whole() -> None:
+    settings: list[dict[str, Any]] = [{"rotate": 10.0}, {"clip": False}]
+    for setting in settings:
+        with pytest.raises(OrbiflowError, match="exclude each other"):
+            ArtSettings(repeat=True, **setting)

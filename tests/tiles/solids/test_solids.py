@@ -1,0 +1,294 @@
+"""Solids: closed, of the right volume, mirrored where need be, and refused where they cannot be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal, TypeAlias, get_args
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from artworks import EYE, size_of, squirrel
+from exported import tile_of, tiles
+from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, SettingError
+from orbiflow.symmetry import wallpaper_group
+from orbiflow.tiles import (
+    EscherTile,
+    SolidSettings,
+    Tile,
+    make_solid,
+    polygons_in,
+    write_3mf,
+    write_stl,
+)
+from orbiflow.tiles.exporting import ExportSettings, laid_out, longer_side
+from orbiflow.tiles.scene import Curve, Motif, Part, Style
+from orbiflow.tiles.solids.making import raised
+from orbiflow.tiles.solids.shapes import Plan, shape
+from orbiflow.tiles.solids.stacking import Level, stacked
+from solids_read import read_3mf, read_stl, section
+
+Kind: TypeAlias = Literal["tile", "cutter", "stamp", "mould", "puzzle"]
+NEAR = 0.08  # mm: the tolerance of the curves, and of their straight sides
+
+
+def in_mm(tile: Tile, size: float, *, mirrored: bool = False) -> shapely.Polygon:
+    """A tile with y up, seen from above with its lower left corner at 0."""
+    ring = tile.polygon * size / longer_side(tile.polygon) * (-1.0 if mirrored else 1.0, 1.0)
+    return shapely.Polygon(ring - ring.min(axis=0))
+
+
+def at_zero(region: Any) -> Any:
+    return shapely.transform(region, lambda points: points - np.array(region.bounds[:2]))
+
+
+def apart(one: Any, other: Any) -> float:
+    """How much of two regions of about the same outline is in one only, as a width in mm."""
+    return one.symmetric_difference(other).area / other.length
+
+
+@given(tiles, st.sampled_from(get_args(Kind)))
+@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_every_solid_is_closed_in_both_files(tile: Tile, kind: Kind) -> None:
+    own: dict[str, Any] = {"area": (90, 90)} if kind == "puzzle" else {}
+    made = make_solid(tile, SolidSettings(kind=kind, tile_size=45, **own))
+    whole = read_stl(write_stl(made.parts, made.title))
+    objects = read_3mf(write_3mf(made.parts, made.title))
+    assert [own.name for own in objects] == list(made.parts)
+    for mesh in (whole, *(own.mesh for own in objects)):
+        assert mesh.is_watertight
+        assert mesh.is_volume
+        assert mesh.bounds[0, 2] == 0
+    assert whole.volume == pytest.approx(made.volume, rel=1e-5)
+    assert sum(own.mesh.volume for own in objects) == pytest.approx(made.volume, rel=1e-6)
+    assert whole.extents == pytest.approx(made.size, abs=1e-4)
+    assert whole.bounds[0] == pytest.approx([0, 0, 0], abs=1e-4)
+
+
+@given(tiles)
+@settings(max_examples=6, deadline=None)
+def test_the_volume_of_a_tile(tile: Tile) -> None:
+    area = in_mm(tile, 50).area
+    plain = make_solid(tile, SolidSettings(height=5, chamfer=0, clearance=0))
+    assert plain.volume == pytest.approx(5 * area, rel=1e-6)
+    assert at_zero(section(plain.parts["tile"], 2.5)).hausdorff_distance(in_mm(tile, 50)) < NEAR
+    bevelled = make_solid(tile, SolidSettings(height=5, chamfer=1, clearance=0)).parts["tile"]
+    low, middle, top = (section(bevelled, z).area for z in (4 - 1e-6, 4.5, 5 - 1e-6))
+    assert low == pytest.approx(area, rel=1e-6)
+    # Simpson's rule is exact where the section's area is quadratic in height
+    slope = (low + 4 * middle + top) / 6
+    assert bevelled.volume() == pytest.approx(4 * area + slope, rel=1e-3)
+    inset = section(plain.parts["tile"], 1).buffer(-1, quad_segs=32)
+    assert top == pytest.approx(inset.area, rel=2e-3)
+
+
+def test_a_slope_is_exact() -> None:
+    square = shapely.box(0, 0, 10, 10)
+    body = stacked(
+        Level(0, square), Level(0, square), Level(3, square.buffer(-2, join_style="mitre"))
+    )
+    assert body.volume() == pytest.approx(3 / 3 * (100 + 36 + 60))
+    cone = stacked(Level(1, square.buffer(-4)), Level(2, square))
+    assert cone.status().name == "NoError"
+
+
+@pytest.mark.parametrize("kind", ["cutter", "stamp", "mould"])
+def test_what_prints_from_its_other_side_is_mirrored(kind: Kind) -> None:
+    tile = tile_of("IH4")
+    exact: dict[str, Any] = {"clearance": 0} if kind == "mould" else {}
+    body = make_solid(tile, SolidSettings(kind=kind, tile_size=60, **exact)).parts[kind]
+    shape = section(body, 1.0 if kind == "stamp" else body.bounding_box()[5] - 1e-6)
+    if kind != "stamp":
+        (shape,) = (shapely.Polygon(ring) for ring in shape.interiors)
+    shape = at_zero(shape)
+    assert shape.hausdorff_distance(in_mm(tile, 60, mirrored=True)) < NEAR
+    assert apart(shape, in_mm(tile, 60)) > 0.5
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"chamfer": 4},
+        {"kind": "mould", "draft": 0},
+        {"kind": "mould", "relief": 8},
+        {"kind": "cutter", "blade": 5, "wall": 5},
+        {"kind": "stamp", "wall": 90},
+    ],
+)
+def test_extremes(given: dict[str, Any]) -> None:
+    made = make_solid(tile_of("IH4"), SolidSettings(**given))
+    (own,) = read_3mf(write_3mf(made.parts))
+    assert own.mesh.is_volume
+
+
+def test_a_cutter_s_walls() -> None:
+    own = SolidSettings(kind="cutter", wall=1.5, blade=0.5, foot=6, floor=3, height=9)
+    body = make_solid(tile_of("IH6"), own).parts["cutter"]
+    hole = shapely.Polygon(section(body, 1).interiors[0])
+    for z, width in [(1.5, 6), (4, 1.5), (8.9, 1.5), (10.5, 1.0), (12 - 1e-6, 0.5)]:
+        wall = section(body, z)
+        assert shapely.Polygon(wall.interiors[0]).symmetric_difference(hole).area < 1e-6
+        outer = shapely.Polygon(wall.exterior)
+        assert outer.hausdorff_distance(hole) == pytest.approx(width, abs=0.03)
+        assert outer.exterior.distance(hole) == pytest.approx(width, abs=0.03)
+
+
+def test_a_mould_casts_the_tile() -> None:
+    tile, own = (
+        tile_of("IH5"),
+        SolidSettings(kind="mould", clearance=0, draft=10, height=6, floor=3),
+    )
+    body = make_solid(tile, own).parts["mould"]
+    for depth, distance in [(0, 0), (3, 3 * own.slope), (6 - 1e-6, 6 * own.slope)]:
+        cavity = shapely.Polygon(section(body, 9 - 1e-6 - depth).interiors[0])
+        mouth = shapely.Polygon(section(body, 9 - 1e-6).interiors[0])
+        assert apart(cavity, mouth.buffer(-distance)) < 0.02
+    assert not section(body, 2.9).interiors
+    assert mouth.exterior.distance(section(body, 1).exterior) == pytest.approx(4, abs=0.01)
+
+
+@pytest.mark.parametrize("relief", [1.0, 6.0])
+def test_a_drawing_stands_on_the_mould_s_floor(relief: float) -> None:
+    own = SolidSettings(kind="mould", height=6, relief=relief)
+    page = ExportSettings(cut="pieces", tile_size=own.tile_size)
+    placed, _ = laid_out(EscherTile.of(tile_of("IH5")), page)
+    disc = shapely.Point(placed.tile.center).buffer(4)
+    body = shape(Plan(own, placed, disc))["mould"]
+    (island,) = (p for p in polygons_in(section(body, 2 + relief / 2)) if not p.interiors)
+    assert island.area == pytest.approx(disc.area)
+    assert len(polygons_in(section(body, 2 + relief + 1e-3))) == (1 if relief < 6 else 0)
+    assert read_3mf(write_3mf({"mould": body}))[0].mesh.is_volume
+
+
+@pytest.mark.parametrize("border", ["straight", "following"])
+@pytest.mark.parametrize("name", ["IH4", "IH5"])
+def test_a_puzzle_s_pieces_lie_in_the_tray(
+    name: str, border: Literal["straight", "following"]
+) -> None:
+    tile = tile_of(name)
+    own = SolidSettings(kind="puzzle", copies=5, border=border, clearance=0.3, assembled=True)
+    made = make_solid(tile, own)
+    tray, *pieces = made.parts.values()
+    assert len(pieces) == 5
+    assert all(piece.volume() == pytest.approx(pieces[0].volume()) for piece in pieces)
+    assert all((tray ^ piece).volume() == pytest.approx(0, abs=1e-9) for piece in pieces)
+    wall, *plans = (section(body, 2.5) for body in (tray, *pieces))
+    gaps = [plan.distance(other) for k, plan in enumerate(plans) for other in [wall, *plans[:k]]]
+    assert min(gaps) == pytest.approx(0.3, abs=2e-3)
+    assert min(plan.distance(wall) for plan in plans) == pytest.approx(0.3, abs=2e-3)
+    # the tray holds nothing but the pieces and the gaps around them
+    room = shapely.union_all(plans).buffer(0.31)
+    inside = shapely.Polygon(section(tray, 1).exterior).difference(wall)
+    assert inside.difference(room).area < 0.01 * inside.area
+
+
+def test_a_puzzle_s_pieces_lie_apart_on_the_bed() -> None:
+    made = make_solid(tile_of("IH5"), SolidSettings(kind="puzzle", copies=5))
+    plans = [shapely.box(*np.array(b.bounding_box())[[0, 1, 3, 4]]) for b in made.parts.values()]
+    assert min(a.distance(b) for k, a in enumerate(plans) for b in plans[:k]) > 2.9
+    assert {body.bounding_box()[2] for body in made.parts.values()} == {0.0}
+    laid = make_solid(tile_of("IH5"), SolidSettings(kind="puzzle", copies=5, assembled=True))
+    assert made.volume == pytest.approx(laid.volume)
+
+
+def test_a_tray_keeps_to_the_area() -> None:
+    own = SolidSettings(kind="puzzle", area=(100, 130), tile_size=30, assembled=True)
+    made = make_solid(tile_of("IH4"), own)
+    assert (made.size[:2] <= (100, 130)).all()
+    assert len(made.parts) > 6
+    with pytest.raises(OrbiflowError, match=f"holds {len(made.parts) - 1} pieces of 30 mm, not 99"):
+        make_solid(tile_of("IH4"), own.replace(copies=99))
+
+
+def test_dark_lines_stand_out_and_light_ones_do_not() -> None:
+    tile = squirrel("IH4")
+    own = SolidSettings(kind="stamp", tile_size=80, eyes=((*EYE, 12.0),), relief=2)
+    body = make_solid(tile, own).parts["stamp"]
+    scale = 80 / longer_side(tile.tile.polygon)
+    ring = tile.tile.polygon * (-scale, -scale)
+    x, y = tile.forward(np.array(EYE)) * (-scale, -scale) - ring.min(axis=0)
+    face, base, eye = section(body, 4), section(body, 2), shapely.Point(x, y)
+    assert face.contains(eye)  # the pupil
+    assert 0.2 < face.intersection(eye.buffer(2)).area / eye.buffer(2).area < 0.7
+    border = base.difference(base.buffer(-1))
+    assert border.difference(face).area < 1e-3
+    assert face.difference(border.union(eye.buffer(3))).area < 1e-3
+
+
+def test_what_is_raised() -> None:
+    def disc(radius: float, colour: str, opacity: float = 1.0) -> Part:
+        ring = shapely.get_coordinates(shapely.Point(0, 0).buffer(radius))[:-1]
+        return Part((Curve.polyline(ring, closed=True),), Style(colour), opacity)
+
+    line = Part((Curve.polyline([[20, 0], [30, 0]]),), Style(None, "currentColor", 0.1))
+    eye = disc(5, "#202020"), disc(3, "#fff0e0"), disc(1, "#000000"), disc(9, "#000000", 0.3)
+    areas = sorted(part.area for part in polygons_in(raised(Motif((*eye, line)), 0.4)))
+    assert areas == pytest.approx([np.pi, 10 * 0.4 + np.pi * 0.2**2, 16 * np.pi], rel=0.01)
+
+
+def test_notes_say_where_it_is_too_thin() -> None:
+    """A bar with a slit 1 mm wide and a neck 2 mm wide."""
+    ring = [[0, 0], [20, 0], [20, 8], [40, 8], [40, 0], [60, 0], [60, 10], [31, 10], [31, 30]]
+    ring += [[60, 30], [60, 40], [0, 40], [0, 30], [30, 30], [30, 10], [0, 10]]
+    tile = Tile(np.array(ring, float), wallpaper_group("p1", np.diag([80.0, 60.0])))
+    size = longer_side(tile.polygon)
+    with pytest.raises(CertificationError, match="--force"):
+        make_solid(tile, SolidSettings(kind="cutter"))
+    made = make_solid(tile, SolidSettings(kind="cutter", tile_size=size), force=True)
+    assert made.title.startswith("NOT CERTIFIED")
+    assert any("thinner than 5 mm: 1.00 mm" in note for note in made.notes)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"kind": "puzzle", "clearance": 0}, "clearance must be above 0"),
+        ({"chamfer": 5}, "chamfer must be at most height, 4 mm"),
+        ({"kind": "mould", "relief": 9}, "relief must be at most height"),
+        ({"kind": "cutter", "blade": 2}, "blade must be at most wall, and wall at most foot"),
+        ({"kind": "cutter", "chamfer": 1}, "chamfer applies only to kind"),
+        ({"blade": 1}, "blade applies only to kind cutter"),
+        ({"engrave": True}, "engrave applies only to kind stamp or mould"),
+        ({"kind": "vase"}, "kind must be"),
+    ],
+)
+def test_settings_that_cannot_be(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(SettingError, match=words):
+        SolidSettings(**given)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"tile_size": 2, "chamfer": 3}, "nothing is left of the tile"),
+        ({"kind": "mould", "tile_size": 10, "draft": 40}, "nothing is left of the tile"),
+        ({"tile_size": 2, "clearance": 1.9}, "clearance of 1.9 mm is wider than the piece's neck"),
+        ({"kind": "puzzle", "area": (30, 30)}, "does not fit"),
+    ],
+)
+def test_solids_that_cannot_be(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(OrbiflowError, match=words):
+        make_solid(tile_of("IH4"), SolidSettings(**given))
+
+
+def test_a_stamp_wants_lines(tmp_path: Path) -> None:
+    tile, picture = squirrel("IH4"), tmp_path / "photo.png"
+    Image.new("RGB", size_of(tile, 60)).save(picture)
+    with pytest.raises(InputFileError, match="needs lines: draw it as SVG"):
+        tile.solid(SolidSettings(kind="stamp"), picture=picture)
+    with pytest.raises(OrbiflowError, match="a cutter has no picture"):
+        tile.solid(SolidSettings(kind="cutter"), picture=picture)
+
+
+def test_files_are_the_same_every_time(tmp_path: Path) -> None:
+    tile = EscherTile.of(tile_of("IH4"))
+    for name in ("a.stl", "a.3mf"):
+        once = tile.solid().write(tmp_path / name).read_bytes()
+        assert tile.solid().write(tmp_path / name).read_bytes() == once
+        assert not once.startswith(b"solid")
+    with pytest.raises(SettingError, match="stl or 3mf"):
+        tile.solid().write(tmp_path / "a.obj")
