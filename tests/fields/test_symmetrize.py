@@ -224,7 +224,7 @@ def test_lists_arrays_and_dtypes_are_followed(periodic):
     known, slope = field(points), field.divergence(points)
     for same in (points.tolist(), points.numpy()):
         torch.testing.assert_close(field(same), known)
-        torch.testing.assert_close(field.divergence(same), slope)
+        torch.testing.assert_close(field.divergence(same), slope)  # pyright: ignore[reportArgumentType]
     assert field(points.float()).dtype == field.divergence(points.float()).dtype == torch.float32
     assert field(np.array([1, 2])).dtype == torch.float64
     with pytest.raises(OrbiflowError, match="points must be real numbers"):

@@ -21,6 +21,7 @@ from orbiflow.tiles.silhouette import Bending, Mesh, harmonic, triangulate, unfo
 from orbiflow.tiles.tilings import Tile
 
 SAME = 1e-9  # distance along the outline, in outlines, below which points are one
+SHARPENINGS = 12  # most tries to follow the outline's finest parts
 
 
 def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bending:
@@ -123,7 +124,7 @@ def with_outline(mesh: Mesh, points: Array, outline: Array) -> Array:
     All stay in place where the inside cannot follow without folds: behind hairs.
     """
     with contextlib.suppress(OrbiflowError):
-        return unfolded(mesh, np.concatenate([outline, points[len(outline) :]]))
+        return unfolded(mesh, np.concatenate([outline, points[len(outline) :]]), SHARPENINGS)
     return points
 
 
@@ -217,10 +218,10 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
         raise OrbiflowError(
             "the silhouette cannot be carried to this tile without folds: they differ too much"
         ) from error
-    turn: Array = np.interp(
-        (lengths / lengths[-1] * SILHOUETTE - start) % SILHOUETTE, places, turns
-    )
-    at: Array = np.interp((turn + first) % TILE / TILE * knots[-1], knots, numbers)
+    place: Array = (lengths / lengths[-1] * SILHOUETTE - start) % SILHOUETTE
+    turn = np.interp(place, places, turns)
+    along: Array = (turn + first) % TILE / TILE * knots[-1]
+    at = np.interp(along, knots, numbers)
     mesh, moved = divided(mesh, _unknown(mesh, at), moved)
     return Bending(with_outline(mesh, moved, outline(mesh)), mesh.points, mesh.triangles)
 
