@@ -35,7 +35,7 @@ def main() -> None:
         row(tile, f"picture, tiles of {size} px", ArtSettings(tile_size=size), board)
     for strokes in ("hatch", "echoes", "feathers"):
         row(tile, strokes, ArtSettings(tile_size=600, strokes=strokes))
-    row(tile, "repeat", ArtSettings(tile_size=600, repeat=True, tolerance=0.05), board)
+    row(tile, "repeat", ArtSettings(tile_size=600, repeat="basic", tolerance=0.05), board)
 
 
 def row(tile: EscherTile, name: str, settings: ArtSettings, picture: Picture | None = None) -> None:

@@ -114,13 +114,15 @@ def pixel_size(text: str, dpi: float) -> tuple[float, float]:
         raise OrbiflowError(
             f"{text!r} is not a size in pixels; write two whole numbers, such as 3000x2000"
         )
-    width, height = page_size(text)
+    width, height = page_size(text, also=tuple(POSTS))
     per = dpi / MILLIMETRES["in"]
     return width * per, height * per
 
 
-def page_size(text: str) -> tuple[float, float]:
+def page_size(text: str, *, also: tuple[str, ...] = ()) -> tuple[float, float]:
     """Return width and height of a page in mm: two lengths, or one of `PAGES`, perhaps turned.
+
+    What cannot be read is answered with the names of all pages, and those that are known `also`.
 
     >>> page_size("3x2cm"), page_size("A4"), page_size("letter-landscape")
     ((30.0, 20.0), (210, 297), (279.4, 215.9))
@@ -134,7 +136,7 @@ def page_size(text: str) -> tuple[float, float]:
         return (long, short) if way == "landscape" else (short, long)
     if not re.search(r"\d.*[x×]", text, flags=re.IGNORECASE):
         raise OrbiflowError(
-            f"{text!r} is not a page; write a size such as 300x200mm, or one of {', '.join(PAGES)}, "
+            f"{text!r} is not a page; write a size such as 300x200mm, or one of {', '.join((*also, *PAGES))}, "
             "with -landscape or -portrait to turn it"
         )
     return size(text)

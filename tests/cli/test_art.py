@@ -54,7 +54,7 @@ def test_engraving_with_an_eye_as_svg(result: Path, tmp_path: Path, orbiflow) ->
 
 def test_a_repeat_says_its_size(result: Path, tmp_path: Path, orbiflow) -> None:
     out = tmp_path / "cell.png"
-    options = ("--repeat", "--tile-size", "30", "--colour", "aspect", "--palette", "sea")
+    options = ("--repeat", "basic", "--tile-size", "30", "--colour", "aspect", "--palette", "sea")
     outcome = orbiflow("art", result, *options, "-o", out)
     assert outcome.status == 0, outcome.err
     with Image.open(out) as image:
@@ -83,7 +83,7 @@ def png_that_says(width: int, height: int) -> bytes:
         (("--size", "0x100"), "--size ... from 1 to 30000, got 0"),
         (("--size", "30000x30000"), "is too large ... --size ... at most 100 megapixels are made"),
         (("--size", "999999999x2"), "--size ... from 1 to 30000"),
-        (("--size", "big"), "--size ... 'big' is not a width and a height"),
+        (("--size", "big"), "--size ... 'big' is not a page ... square, story, a2"),
         (("--size", "300.5x200"), "write two whole numbers, such as 3000x2000"),
         (("--tile-size", "0"), "--tile-size ... from 8 to 60000, got '0'"),
         (("--tile-size", "1"), "--tile-size must be ... from 8"),
@@ -94,10 +94,10 @@ def png_that_says(width: int, height: int) -> bytes:
         (("--eye", "here"), "--eye ... 'here' is not x,y or x,y,radius"),
         (("--eye", "nan,1"), "--eye ... must be a finite number, got nan"),
         (("--eye", "210,190,-3"), "--eye ... radius ... got 210,190,-3"),
-        (("--repeat", "--size", "30x30"), "--size and --repeat exclude each other"),
+        (("--repeat", "basic", "--size", "30x30"), "--size and --repeat exclude each other"),
         (("--tolerance", "0.1"), "--tolerance ... --repeat"),
-        (("--repeat", "--tolerance", "2"), "--tolerance must be ... from 0 to 0.2"),
-        (("--repeat", "--tile-size", "30000"), "the cell that repeats is too large"),
+        (("--repeat", "basic", "--tolerance", "2"), "--tolerance must be ... from 0 to 0.2"),
+        (("--repeat", "basic", "--tile-size", "30000"), "the cell that repeats is too large"),
         (("--tile", "IH1"), "holds no tile of IH1"),
         (("--picture", "gone.png"), "gone.png: no such file"),
         (("--dpi", "0"), "--dpi must be ... from 1 to 10000"),

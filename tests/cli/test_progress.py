@@ -46,6 +46,7 @@ def test_a_line_every_ten_seconds(capsys: pytest.CaptureFixture[str]) -> None:
 def test_what_was_done_before_does_not_count_as_speed(capsys: pytest.CaptureFixture[str]) -> None:
     clock = Clock()
     shown = Terminal(clock)
+    clock.now += 20
     shown(Progress(0.8, "8 of 10"))
     clock.now += 200
     shown.watch()

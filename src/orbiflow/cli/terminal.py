@@ -110,7 +110,10 @@ class Terminal:
         self.best = max(self.best, (event.iou, event.class_name))
 
     def _show_progress(self, event: Progress) -> None:
-        self.last, self.first = event, self.first or (self.clock(), event.share)
+        self.last = event
+        if self.first is None:
+            self.told = self.clock()
+            self.first = self.told, event.share
         if self.bar is None:
             columns = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
             # no thread that refreshes: workers are forked from a process with one thread

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,11 +21,12 @@ from orbiflow.runtime import (
     ignore,
     operation,
 )
-from orbiflow.settings import DefaultText, Ending, Hidden, Option, Range, Settings
+from orbiflow.settings import DefaultText, Ending, Hidden, Option, Settings
 from orbiflow.tiles.art import ArtSettings
 from orbiflow.tiles.exporting import ExportSettings
 from orbiflow.tiles.motion import AnimationSettings
 from orbiflow.tiles.search import EscherizeSettings
+from orbiflow.tiles.silhouette import ReadingSettings
 from orbiflow.tiles.solids import SolidSettings
 
 if TYPE_CHECKING:
@@ -40,16 +40,6 @@ POOR = (
     "or more effort may do better"
 )
 """Said where nothing that was found looks like the silhouette."""
-
-
-class ReadingSettings(Settings, group="Reading the silhouette"):
-    """How a silhouette is read."""
-
-    threshold: Annotated[float | None, Range(0, 1), DefaultText("found automatically")] = None
-    """Level between shape and background."""
-
-    invert: Annotated[bool | None, DefaultText("found automatically")] = None
-    """Whether the shape is the light part."""
 
 
 class TileChoice(Settings):
@@ -84,9 +74,9 @@ def escherize(
 ) -> Outcome:
     """Find tiles that look like a silhouette and tile the plane, and prove it.
 
-    Writes result.json, overview.png and index.html into the folder, and for each class a folder
-    with tile.svg, tiling.svg, tiling.png, overlay.png and model.safetensors; after a search for
-    both, front.png, too.
+    Writes read.png, a picture of what was read, into the folder at once. Then come result.json,
+    overview.png and index.html, and for each class a folder with tile.svg, tiling.svg, tiling.png,
+    overlay.png and model.safetensors; after a search for both, front.png, too.
 
     Args:
         image: The silhouette: PNG, JPEG, WebP, SVG, or a polygon (.json, .dat).
@@ -97,21 +87,21 @@ def escherize(
         called: What the results call the silhouette. Default: its path.
         shown_out: What the page's commands call the folder. Default: its path.
     """
-    from orbiflow.tiles import pages, search, silhouette
+    from orbiflow.tiles import pages, search
 
     begin = time.perf_counter()
-    target = silhouette.Target.read(image, threshold=reading.threshold, invert=reading.invert)
-    target = target if called is None else replace(target, source=called)
+    target = reading.read(image, called)
     pages.result_folder(out)
     masks = [Path(pin) for pin in settings.pin or ()]
     check_output_folder(out, image, settings.emphasis, *masks)
-    for note in target.notes:
-        on_event(Note(note))
+    picture = pages.show_reading(target, image, out, on_event)
     settings = settings.replace(workers=settings.workers or os.cpu_count() or 1)
     result = search.escherize(target, settings, on_event=on_event, cancel=cancel)
     for text in _remarks(result):
         on_event(Note(text))
-    written = pages.write_run(result, out, figures=figures, shown_out=shown_out, on_event=on_event)
+    written = pages.write_run(
+        result, out, picture, figures=figures, shown_out=shown_out, on_event=on_event
+    )
     tiles = result.tiles if written else ()
     summary = {
         "folder": str(out),

@@ -194,6 +194,14 @@ def test_gradients_and_what_is_left_out(tmp_path: Path) -> None:
     assert over.notes == ("left out 1 text of the drawing",)
 
 
+def test_lines_that_no_clip_cuts_stay_lines(tmp_path: Path) -> None:
+    body = """<clipPath id="c"><rect x="0" y="0" width="900" height="900"/></clipPath>
+    <g clip-path="url(#c)"><path d="M350 250L620 380" fill="none" stroke="#000"/></g>"""
+    over = read_over(svg_of("IH4", body, tmp_path), squirrel("IH4"))
+    assert over.drawing is not None
+    assert [part.style.stroke for part in over.drawing.parts] == ["#000000"]
+
+
 @pytest.mark.parametrize(
     "body",
     [

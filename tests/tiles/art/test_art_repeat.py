@@ -19,7 +19,7 @@ from orbiflow.tiles.art.page import _page, rectangle
 @pytest.mark.parametrize("name", CLASSES)
 def test_two_by_two_is_the_same_plane(name: str, how) -> None:
     tile = squirrel(name)
-    settings = ArtSettings(repeat=True, tile_size=60, colour=how, tolerance=0.05)
+    settings = ArtSettings(repeat="basic", tile_size=60, colour=how, tolerance=0.05)
     art = artwork(tile, settings, picture=None if how == "one" else checkerboard(tile))
     cell = render_artwork(art)
     page, size = art.page, (2 * art.page.width, 2 * art.page.height)
@@ -29,9 +29,50 @@ def test_two_by_two_is_the_same_plane(name: str, how) -> None:
     assert apart.max() <= 1
 
 
+@pytest.mark.parametrize("name", ["IH1", "IH5"])
+@pytest.mark.parametrize("repeat", ["brick", "half-drop"])
+def test_rows_or_columns_moved_by_half_are_the_same_plane(repeat, name: str) -> None:
+    tile = squirrel(name)
+    settings = ArtSettings(repeat=repeat, tile_size=60, tolerance=0.05)
+    art = artwork(tile, settings, picture=checkerboard(tile))
+    cell = render_artwork(art)
+    height, width = cell.shape[:2]
+    if repeat == "brick":
+        moved = np.roll(cell, width // 2, axis=1)
+        pasted = np.vstack([np.hstack([cell, cell]), np.hstack([moved, moved])])
+    else:
+        moved = np.roll(cell, height // 2, axis=0)
+        pasted = np.hstack([np.vstack([cell, cell]), np.vstack([moved, moved])])
+    page = art.page
+    spread = _page(tile.tile, "neighbour", page.linear, page.offset, (2 * width, 2 * height), ())
+    twice = render_artwork(replace(art, page=spread))
+    assert np.abs(pasted.astype(int) - twice).max() <= 1
+
+
+@pytest.mark.parametrize("repeat", ["brick", "half-drop"])
+@pytest.mark.parametrize("turn", [0.0, 0.3, -1.2])
+def test_half_the_cell_where_the_lattice_has_it(turn: float, repeat) -> None:
+    basis = rotation_matrix(turn) @ np.array([[1.0, 0.5], [0.0, 0.9]])
+    basic = rectangle(basis, 100.0, 0.0, flipped=False)
+    found = rectangle(basis, 100.0, 0.0, flipped=False, repeat=repeat)
+    assert (basic.cells, found.cells) == (2, 1)
+    assert found.exact
+    # what repeats are vectors of the lattice: a side, and the other with half of it
+    width, height = found.width, found.height
+    assert (width if repeat == "brick" else height) % 2 == 0
+    ways = (
+        [[width, 0], [width / 2, height]]
+        if repeat == "brick"
+        else [[0, height], [width, height / 2]]
+    )
+    steps = np.linalg.solve(basis, np.linalg.solve(found.linear, np.array(ways, dtype=float).T))
+    np.testing.assert_allclose(steps, np.rint(steps), atol=1e-9)
+    assert abs(round(np.linalg.det(steps))) == 1
+
+
 @pytest.mark.parametrize("name", ["IH2", "IH3", "IH5", "IH6", "IH7", "IH21", "IH28"])
 def test_lattices_with_a_rectangle_are_hardly_stretched(name: str) -> None:
-    art = artwork(squirrel(name), ArtSettings(repeat=True, tile_size=300, tolerance=0.0))
+    art = artwork(squirrel(name), ArtSettings(repeat="basic", tile_size=300, tolerance=0.0))
     assert re.search("whole pixels stretch it|nothing is stretched", art.page.notes[0])
     values = np.linalg.svd(art.page.linear, compute_uv=False)
     assert values[0] / values[1] < 1.002  # whole pixels alone

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +90,8 @@ def art_page(given: EscherTile, settings: ArtSettings) -> ArtPage:
     scale = float(np.sqrt(width * height / USUAL_TILES / abs(tile.signed_area)))
     if settings.tile_size is not None:
         scale = settings.tile_size / size
-    if not settings.repeat:
+    repeat = settings.repeat
+    if repeat is None:
         page, pixels = Box(0.0, 0.0, width, height), settings.dpi / INCH
         margin = None if settings.clip else pixels * edge_margin(scale * size / pixels)
         place = place_on_page(
@@ -98,7 +99,8 @@ def art_page(given: EscherTile, settings: ArtSettings) -> ArtPage:
         )
         made = _page(tile, settings.colour, *place, (width, height), ())
         return made if margin is None else made.whole(margin)
-    found = rectangle(lattice, scale, settings.tolerance, flipped=not given.y_down)
+    flipped = not given.y_down
+    found = rectangle(lattice, scale, settings.tolerance, flipped=flipped, repeat=repeat)
     try:
         check_size(found.width, found.height)
     except OrbiflowError as error:
@@ -164,8 +166,21 @@ class Rectangle(NamedTuple):
     exact: bool  # whether it is a rectangle of the lattice: then only whole pixels strain it
 
 
-def rectangle(lattice: Array, scale: float, tolerance: float, *, flipped: bool) -> Rectangle:
-    """Find the smallest rectangle of lattice vectors, as columns (2, 2), that repeats, in pixels.
+SWAP = np.array([[0.0, 1.0], [1.0, 0.0]])
+
+
+def rectangle(
+    lattice: Array,
+    scale: float,
+    tolerance: float,
+    *,
+    flipped: bool,
+    repeat: Literal["basic", "brick", "half-drop"] = "basic",
+) -> Rectangle:
+    """Find the smallest rectangle that repeats in a lattice with the basis (2, 2), in pixels.
+
+    Copies of it lie side by side and row on row; of a brick, each row is moved along by half a width,
+    and of a half-drop each column by half a height, which is then an even number of pixels.
 
     There are about `scale` pixels per unit. An exact rectangle is preferred if it is not much
     larger; others are strained by at most `tolerance`. The picture is `flipped` if y points up in
@@ -176,15 +191,18 @@ def rectangle(lattice: Array, scale: float, tolerance: float, *, flipped: bool) 
     (101, 175, 2, True, True)
     """
     upright = np.diag([1.0, -1.0 if flipped else 1.0]) @ lattice
-    best = _best_pair(upright, tolerance)
+    # columns that drop are rows that move, seen in a mirror
+    seen = SWAP if repeat == "half-drop" else np.eye(2)
+    best = _best_pair(seen @ upright, tolerance, 0.0 if repeat == "basic" else 0.5)
     if best is None:
         raise OrbiflowError(
             f"no rectangle of up to {LARGEST} cells repeats within a strain of {tolerance:.3g}; "
             "allow a larger tolerance"
         )
-    pair, cells = best
+    pair, cells = seen @ best[0] @ seen, best[1]
     along, up = pair[:, 0], pair[:, 1]
-    width, height = _whole(float(np.hypot(*along)), float(np.hypot(*up)), scale)
+    even = repeat == "brick", repeat == "half-drop"
+    width, height = _whole(float(np.hypot(*along)), float(np.hypot(*up)), scale, *even)
     linear = np.diag([float(width), float(height)]) @ np.linalg.inv(pair)
     exact = _strain(_squared(pair)) <= EXACT
     turn = math.degrees(math.atan2(along[1], along[0]))
@@ -192,8 +210,11 @@ def rectangle(lattice: Array, scale: float, tolerance: float, *, flipped: bool) 
     return Rectangle(linear @ flip, width, height, cells, _strain(linear), -turn, exact)
 
 
-def _best_pair(lattice: Array, tolerance: float) -> tuple[Array, int] | None:
-    """Return two vectors nearly at a right angle, the first nearest to x, and their number of cells."""
+def _best_pair(lattice: Array, tolerance: float, shift: float) -> tuple[Array, int] | None:
+    """Return two vectors nearly at a right angle, the first nearest to x, and their number of cells.
+
+    The first is one of the lattice; so is the second, moved along by a share `shift` of the first.
+    """
     steps = np.arange(-REACH, REACH + 1)
     combos = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     combos = combos[np.gcd(combos[:, 0], combos[:, 1]) == 1]
@@ -202,26 +223,28 @@ def _best_pair(lattice: Array, tolerance: float) -> tuple[Array, int] | None:
     # the first vector within 45 degrees of x
     first = np.flatnonzero((vectors[:, 0] > 0) & (abs(vectors[:, 1]) <= vectors[:, 0] * (1 + 1e-9)))
     first = first[np.argsort(length[first], kind="stable")][:200]
+    ups = vectors - shift * vectors[first][:, None]
+    heights = np.hypot(ups[..., 0], ups[..., 1])
     cross = vectors[first, 0][:, None] * vectors[:, 1] - vectors[first, 1][:, None] * vectors[:, 0]
-    dot = vectors[first] @ vectors.T
+    dot = np.einsum("ik,ijk->ij", vectors[first], ups)
     cells = np.rint(cross / abs(np.linalg.det(lattice))).astype(int)
-    sine = abs(dot) / (length[first][:, None] * length)
+    sine = abs(dot) / (length[first][:, None] * heights)
     # a shear by the angle's cotangent stretches one direction by about as much
     fits = (cells >= 1) & (cells <= LARGEST) & (sine <= min(2 * tolerance + EXACT, 0.5))
     options = []
     for i, j in np.argwhere(fits):
-        pair = np.stack([vectors[first[i]], vectors[j]], axis=1)
+        pair = np.stack([vectors[first[i]], ups[i, j]], axis=1)
         strain = _strain(_squared(pair))
         if strain <= tolerance + EXACT:
             exact = strain <= EXACT and cells[i, j] <= LARGEST_EXACT
             turn = abs(math.atan2(pair[1, 0], pair[0, 0]))
-            long = max(ratio := length[j] / length[first[i]], 1 / ratio) / SLENDER
+            long = max(ratio := heights[i, j] / length[first[i]], 1 / ratio) / SLENDER
             weight = round(float(cells[i, j] * max(1.0, long)), 9)
             options.append((not exact, weight, round(turn, 9), strain, i, j))
     if not options:
         return None
     *_, i, j = min(options)
-    return np.stack([vectors[first[i]], vectors[j]], axis=1), int(cells[i, j])
+    return np.stack([vectors[first[i]], ups[i, j]], axis=1), int(cells[i, j])
 
 
 def _squared(pair: Array) -> Array:
@@ -234,13 +257,17 @@ def _strain(linear: Array) -> float:
     return float(values[0] / values[1] - 1)
 
 
-def _whole(along: float, up: float, scale: float) -> tuple[int, int]:
-    """Return whole sides near the given size whose ratio is nearest to the true one."""
+def _whole(
+    along: float, up: float, scale: float, even_width: bool, even_height: bool
+) -> tuple[int, int]:
+    """Return whole sides near the given size, even if need be, whose ratio is nearest to the true one."""
     ideal = max(1, round(along * scale))
-    reach = max(1, int(SIZE_TOLERANCE * ideal))
+    reach = max(1 + even_width, int(SIZE_TOLERANCE * ideal))
     widths = np.arange(max(1, ideal - reach), ideal + reach + 1)
+    widths = widths[widths % 2 == 0] if even_width else widths
     exact = widths * up / along
-    heights = np.maximum(1, np.rint(exact))
+    step = 1 + even_height
+    heights = np.maximum(step, step * np.rint(exact / step))
     # a slightly better ratio is not worth another size
     error = np.round(abs(heights / exact - 1), 5)
     best = np.lexsort((abs(widths - ideal), error))[0]

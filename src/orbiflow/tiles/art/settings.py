@@ -57,10 +57,13 @@ class ArtSettings(MotifSettings, group="Picture"):
     clip: Annotated[bool, Option("--clip", off="--whole"), NotWith("repeat")] = True
     """Cut tiles at the page's edge, or leave out those that are not whole."""
 
-    repeat: bool = False
-    """Make the cell that repeats without seams, instead of a page."""
+    repeat: Literal["basic", "brick", "half-drop"] | None = None
+    """Make the cell that repeats without seams, instead of a page: row on row, with each row moved by
+    half a width, or with each column moved by half a height."""
 
-    tolerance: Annotated[float, Range(0, 0.2), OnlyWith(repeat=True)] = 0.02
+    tolerance: Annotated[float, Range(0, 0.2), OnlyWith(repeat=("basic", "brick", "half-drop"))] = (
+        0.02
+    )
     """How much that cell may be stretched to be a rectangle; 0.02 is 2 %."""
 
     palette: PaletteName = "earth"

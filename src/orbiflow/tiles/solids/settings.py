@@ -95,6 +95,8 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
         part = {"tile": "chamfer", "puzzle": "chamfer", "mould": "relief"}.get(self.kind)
         if part is not None and getattr(self, part) > self.height:
             raise SettingError(f"{{{part}}} must be at most {{height}}, {self.height:g} mm")
+        if self.kind == "cutter" and not self.blade <= self.wall <= self.foot:
+            raise SettingError("{blade} must be at most {wall}, and {wall} at most {foot}")
         if self.kind == "puzzle" and not self.clearance:
             raise SettingError("{clearance} must be above 0 in a puzzle, or no piece comes out")
 

@@ -59,7 +59,7 @@ def shape(plan: Plan) -> dict[str, Manifold]:
 
 def _grown(region: BaseGeometry, distance: float) -> BaseGeometry:
     """Return a region grown by a distance, or shrunk, unless nothing is left."""
-    found = region.buffer(distance, quad_segs=12)
+    found = region.buffer(distance, quad_segs=12) if distance else region
     if found.is_empty:
         raise OrbiflowError(
             f"nothing is left of the tile {-distance:.3g} mm inside its edge; choose a larger tile size"
@@ -69,9 +69,8 @@ def _grown(region: BaseGeometry, distance: float) -> BaseGeometry:
 
 def _tile(plan: Plan) -> Manifold:
     settings, piece = plan.settings, plan.piece
-    top = _grown(piece, -settings.chamfer) if settings.chamfer else piece
-    side = Level(settings.height - settings.chamfer, piece)
-    return stacked(Level(0.0, piece), side, Level(settings.height, top))
+    top = Level(settings.height, _grown(piece, -settings.chamfer))
+    return stacked(Level(0.0, piece), Level(settings.height - settings.chamfer, piece), top)
 
 
 def _cutter(plan: Plan) -> Manifold:

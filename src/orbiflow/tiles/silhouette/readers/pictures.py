@@ -26,6 +26,7 @@ from orbiflow.tiles.silhouette.readers.reading import (
     Source,
     check_file,
     opened,
+    read_head,
 )
 from orbiflow.tiles.silhouette.readers.tracing import Level, trace
 
@@ -37,6 +38,7 @@ MIN_SIDE_OF_PHOTOGRAPH = 16
 # in CIE Lab for each pixel of a picture of 400: a shape with a fainter edge may be read wrong
 FAINT_EDGE = 4.0
 MIN_CONTRAST = 0.04  # of full scale, between the shape's and the background's usual level
+_STARTS = {"PNG": b"\x89PNG", "JPEG": b"\xff\xd8", "WebP": b"RIFF", "GIF": b"GIF", "BMP": b"BM"}
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
 # What Pillow raises on a damaged file depends on the format.
 _DAMAGED = (
@@ -45,7 +47,7 @@ _DAMAGED = (
 )
 # channels that say by themselves where the shape is: their high part and their low part
 _PARTS = {"alpha": ("opaque", "transparent"), "mask": ("marked", "unmarked")}
-_PLAIN = "cut it out, photograph it on a plain ground of another colour, or set threshold"
+_PLAIN = "cut it out, photograph it on a plain ground of another colour, or set a threshold"
 _FAINT = (
     "the shape differs little from what is around it and may be read wrong: look at what was read, "
     f"and if need be {_PLAIN}"
@@ -125,12 +127,20 @@ def open_image(path: Source, decode: Callable[[Any, Image.Image], _Decoded]) -> 
         raise InputFileError(f"{path}: cannot be read; check its permissions") from exc
     except UnidentifiedImageError as exc:
         raise InputFileError(
-            f"{path}: the image is damaged or cut short, or it is none; give a PNG, JPEG or WebP image"
+            f"{path}: the {_named(path)} is damaged or cut short, or it is none; give a PNG, JPEG or "
+            "WebP image"
         ) from exc
     except _DAMAGED as exc:
         raise InputFileError(
-            f"{path}: the image is damaged or cut short ({exc}); export or download it again"
+            f"{path}: the {_named(path)} is damaged or cut short ({exc}); export or download it again"
         ) from exc
+
+
+def _named(path: Source) -> str:
+    """Return the kind of an image by its first bytes, such as "PNG image"."""
+    head = read_head(path, 12)
+    kinds = (k for k, starts in _STARTS.items() if head.startswith(starts))
+    return f"{next(kinds, '')} image".strip()
 
 
 def check_size(path: Source, size: tuple[int, int]) -> None:

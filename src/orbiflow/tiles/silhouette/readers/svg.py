@@ -96,8 +96,6 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
         layers = [[Layer(regions.fill(shape), PLAIN)] for shape in drawing.shapes]
         layers = [own for own in layers if own[0].region.area > 0]
         notes = ["nothing is painted: took the closed paths as filled"]
-    if not any(layers):
-        raise InputFileError(f"{drawing.path}: {_why_empty(drawing)}")
     paper, grounds = _background(layers, drawing)
     shown = [layer for own in layers if own not in grounds for layer in own]
     if not shown:

@@ -100,6 +100,10 @@ class Regions:
                 region = shapely.intersection(region, self._clips[clip])
         return region
 
+    def leaves_stroke(self, shape: DrawnShape) -> bool:
+        """Return whether the clips and masks of a shape cut nothing off its stroke."""
+        return not shape.clips or self.clipped(shape, whole := self.stroke(shape)) is whole
+
     def layers(self, shape: DrawnShape) -> list[Layer]:
         """Return what a shape paints, from bottom to top."""
         of = {"fill": self.fill, "stroke": self.stroke}
