@@ -111,18 +111,15 @@ def escherize(
         "failed": [{"class": f.name, "reason": f.reason} for f in result.failures],
     }
     if tiles:
-        on_event(_table(_title(tiles), [_words(tile) for tile in tiles]))
+        best = "Tiles, best first"
+        title = best if tiles[0].front is None else "Tiles for likeness, then for overlap"
+        on_event(_table(title, [_words(tile) for tile in tiles]))
         if verbose:
             on_event(_table("Figures", [_figures(tile) for tile in tiles]))
     on_event(_closing(out, bool(written), bool(result.tiles), summary["seconds"]))
     if result.interrupted or cancel.cancelled:
         return Outcome(summary, "cancelled")
     return Outcome(summary, "done" if result.tiles else "nothing found")
-
-
-def _title(tiles: Sequence[EscherTile]) -> str:
-    both = any(tile.front is not None for tile in tiles)
-    return "Tiles for likeness, then for overlap" if both else "Tiles, best first"
 
 
 def _table(title: str, rows: Sequence[dict[str, str]]) -> Table:

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from scipy.stats import spearmanr
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import Fidelity, Rating, rank_score
+from orbiflow.symmetry import wallpaper_group
+from orbiflow.tiles import EscherTile, Fidelity, Rating, SearchResult, Target, Tile, rank_score
 from orbiflow.tiles.likeness import likeness_ratings
 from orbiflow.tiles.likeness.rating import WORDS
 
@@ -25,11 +26,11 @@ SCORES = st.lists(st.floats(0, 1), min_size=1, max_size=12)
 @given(SCORES, st.floats(1, 100))
 def test_stars_follow_the_order_of_scores(scores: list[float], length: float) -> None:
     ordered = sorted(scores, reverse=True)
-    for ratings in (likeness_ratings(ordered, length), list(map(Rating.of_overlap, ordered))):
-        stars = [rating.stars for rating in ratings]
-        assert stars == sorted(stars, reverse=True)
-        words = [list(WORDS.values()).index(rating.word) for rating in ratings]
-        assert words == sorted(words)
+    ratings = likeness_ratings(ordered, length)
+    stars = [rating.stars for rating in ratings]
+    assert stars == sorted(stars, reverse=True)
+    words = [list(WORDS.values()).index(rating.word) for rating in ratings]
+    assert words == sorted(words)
 
 
 @given(st.floats(0, 10))
@@ -56,8 +57,10 @@ def test_tiles_with_legs_have_stars_too() -> None:
 
 
 def test_a_blob_for_a_spider_is_poor() -> None:
+    target = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])
     scores = (0.83, 0.66, 0.5, rank_score(0.64, 0.36))
-    words = [Rating.of_overlap(score).word for score in scores]
+    tiles = [EscherTile(Tile(target.outline, wallpaper_group("p1")), known_score=s) for s in scores]
+    words = [tile.rating and tile.rating.word for tile in SearchResult(target, tiles).tiles]
     assert words == ["excellent", "good", "fair", "poor"]
 
 

@@ -49,11 +49,6 @@ class Rating:
         share = (mark - LOWEST_MARK) / (HIGHEST_MARK - LOWEST_MARK)
         return cls(max(1.0, min(5.0, round(2 * (1 + 4 * share)) / 2)))
 
-    @classmethod
-    def of_overlap(cls, score: float) -> Rating:
-        """Return the rating of a score after a search for overlap."""
-        return cls.of_mark(10 * score - 1)
-
     @property
     def word(self) -> str:
         """The same in a word: excellent, good, fair or poor."""

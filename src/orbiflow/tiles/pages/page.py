@@ -41,15 +41,9 @@ def index_page(
 ) -> str:
     """Return the page of one search's tiles, best first, to be written beside their `folders`.
 
-    Args:
-        results: The tiles.
-        target: The silhouette.
-        folders: The names of the tiles' folders.
-        out: What commands call the folder that the page is in.
-        read: Whether `read.png` is beside the page.
-        colours: The colouring of each tiling, if it is known already.
-        failures: The classes without a tile.
-        figures: The names of the files in each folder besides the `TILE_FILES`.
+    `out` is what commands call the folder that the page is in, `read` whether `read.png` is there.
+    `colours` has the colouring of each tiling, if it is known already; `figures` are the names of the
+    files in each folder besides the `TILE_FILES`.
     """
     name = PurePath(target.source).name
     extra = figures or [()] * len(results)

@@ -124,7 +124,8 @@ def rated(tiles: Sequence[EscherTile], target: Target) -> list[EscherTile]:
     likeness = [tile.score for tile in tiles if tile.fidelity is not None]
     found = iter(likeness_ratings(likeness, length))
     return [
-        tile.changed(rating=next(found) if tile.fidelity else Rating.of_overlap(tile.score))
+        # no marks of tiles for overlap are kept: their scores are taken for marks
+        tile.changed(rating=next(found) if tile.fidelity else Rating.of_mark(10 * tile.score - 1))
         for tile in tiles
     ]
 
