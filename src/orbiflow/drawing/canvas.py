@@ -33,12 +33,9 @@ def fill_rings(axes: Axes, rings: list[Array], fill: str, outline: str, width: f
     """Fill closed polygons, with an outline of `width` points."""
     from matplotlib.collections import PolyCollection
 
-    axes.add_collection(
-        PolyCollection(
-            rings, facecolors=fill, edgecolors=outline, linewidths=width, joinstyle="round"
-        ),
-        autolim=False,
-    )
+    made = PolyCollection(rings, facecolors=fill, edgecolors=outline, linewidths=width)
+    made.set_joinstyle("round")
+    axes.add_collection(made, autolim=False)
 
 
 CENTER_COLOURS = {2: "#c2410c", 3: "#6d28d9", 4: "#0f766e", 6: "#b91c1c"}
@@ -220,11 +217,10 @@ def draw_magnitude(axes: Axes, velocity: Callable[[Any], Any], window: Window) -
     points = np.stack(np.meshgrid(x, y), axis=-1)
     vectors = evaluate(velocity, points)
     limits = axes.get_ylim()
-    speed = np.linalg.norm(vectors, axis=-1)
-    extent = (window[0], window[2], window[1], window[3])
     axes.imshow(
-        speed, extent=extent, origin="lower", cmap="viridis", interpolation="bicubic", aspect="auto"
-    )
+        np.linalg.norm(vectors, axis=-1), extent=(window[0], window[2], window[1], window[3]),
+        origin="lower", cmap="viridis", interpolation="bicubic", aspect="auto",
+    )  # fmt: skip
     axes.set_xlim(window[0], window[2])  # imshow moves the limits
     axes.set_ylim(*limits)
     axes.set_aspect("equal")
@@ -242,28 +238,22 @@ def draw_flow(
     from matplotlib.collections import LineCollection, PolyCollection
 
     scale = np.sqrt((window[2] - window[0]) * (window[3] - window[1]))
-    lines = flow_lines(
-        lambda points: evaluate(velocity, points),
-        _in_window(symmetric_seeds(group, 0.028 * scale), group, window, 0.05 * scale),
-        0.075 * scale,
-    )
+    seeds = _in_window(symmetric_seeds(group, 0.028 * scale), group, window, 0.05 * scale)
+    lines = flow_lines(lambda points: evaluate(velocity, points), seeds, 0.075 * scale)
     # fading tails say which way the flow goes
     segments = np.stack([lines[:, :-1], lines[:, 1:]], axis=2).reshape(-1, 2, 2)
     alpha = np.tile(np.linspace(0.05, 0.9, lines.shape[1] - 1), len(lines))
     colours = np.concatenate([np.ones((len(segments), 3)), alpha[:, None]], axis=1)
-    axes.add_collection(
-        LineCollection(list(segments), colors=colours, linewidths=pen(0.9), zorder=2)
-    )
+    tails = LineCollection(list(segments), colors=colours, linewidths=pen(0.9), zorder=2)
+    axes.add_collection(tails)
     # heads are at the seeds, which keep their distance; at the ends they would pile up in sinks
     middle = lines.shape[1] // 2
     along = lines[:, middle + 1] - lines[:, middle - 1]
     along = 0.009 * scale * along / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
     across = 0.4 * along[:, ::-1] * (-1.0, 1.0)
     seeds = lines[:, middle]
-    heads = np.stack([seeds + along, seeds + across, seeds - across], axis=1)
-    axes.add_collection(
-        PolyCollection(list(heads), facecolors="#ffffff", edgecolors="none", zorder=3)
-    )
+    heads = list(np.stack([seeds + along, seeds + across, seeds - across], axis=1))
+    axes.add_collection(PolyCollection(heads, facecolors="#ffffff", edgecolors="none", zorder=3))
 
 
 def _in_window(seeds: Array, group: CrystallographicGroup, window: Window, margin: float) -> Array:
@@ -299,5 +289,4 @@ def _about_four_cells(group: CrystallographicGroup, middle: Array) -> Window:
     aspect = float(np.clip(sides[0] / sides[1], 2 / 3, 3 / 2))
     area = 4.6 * group.cell_volume
     half = np.sqrt(area * np.array([aspect, 1 / aspect])) / 2
-    low, high = middle - half, middle + half
-    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+    return (*(middle - half).tolist(), *(middle + half).tolist())

@@ -188,7 +188,7 @@ def flow_picture(
     settings, space = settings or PlotSettings(), density.space
     sheet = sheet or settings.sheet
     require_plane(space)
-    view = view_of(space, center=None if space.is_round else settings.center)
+    view = view_of(space, center=settings.center)
     low, high = 0.5 - CELLS / 2, 0.5 + CELLS / 2
     window = (low, low, high, high)
     printed = frames.printed_room(sheet, 0.4, 0.6, 0.6, SPEED, ("0.00",))

@@ -66,7 +66,7 @@ def view_of(
     if len(names) != len(space.columns):
         raise OrbiflowError(f"expected {len(space.columns)} names of columns, got {list(names)}")
     if not space.is_torus:
-        if center is not None:
+        if center is not None and not space.is_round:  # there it is that of a map
             raise SettingError(
                 f"{{center}} applies to the torus and to maps, not to the {space.name}"
             )

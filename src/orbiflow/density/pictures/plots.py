@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -14,15 +14,9 @@ from orbiflow.arguments import as_path
 from orbiflow.density.comparing import density_of
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models import Density
+from orbiflow.density.pictures import figures
 from orbiflow.density.pictures.coastlines import coastlines_for, simplified
 from orbiflow.density.pictures.corner import MAX_COLUMNS, corner_picture
-from orbiflow.density.pictures.figures import (
-    Ground,
-    density_picture,
-    few_colours,
-    flow_picture,
-    samples_picture,
-)
 from orbiflow.density.pictures.frames import view_of
 from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.overlays import region_lines
@@ -104,21 +98,20 @@ def plot_density(
         told(k / (len(makers) + 1), f"drawing {name}.{form}")
         pictures[name] = make()
     captions = tuple(f"{own.title}. {own.caption}".strip() for own in pictures.values())
-    notes: tuple[str, ...] = ()
-    if shown.space.dim == 2 and shown.density.flow_part is None:
-        notes = ("the flow has no part in this density, so that there is no picture of it",)
+    flowless = shown.space.dim == 2 and shown.density.flow_part is None
+    notes = ("the flow has no part in this density, so that there is no picture of it",) * flowless
     if single:
         path = write_atomic(out, pdf_pages(list(pictures.values())))
         return Plotted((path,), captions, notes)
     files = {f"{name}.{form}": picture.file() for name, picture in pictures.items()}
     if "flow.png" in files and not settings.sheet.printed:
-        files["flow.png"] = few_colours(files["flow.png"])
+        files["flow.png"] = figures.few_colours(files["flow.png"])
     contents: dict[str, str | bytes] = {**files}
     if shown.space.dim == 2:
         told(0.75, f"drawing {PAGE}")
         lines = simplified(shown.coastlines, PAGE_POINTS)
         contents[PAGE] = density_page(
-            shown.density, shown.settings, samples=shown.points, coastlines=lines
+            shown.density, settings, samples=shown.points, coastlines=lines
         )
     return Plotted(tuple(write_set(out, PICTURES, contents)), captions, notes)
 
@@ -165,30 +158,28 @@ class _Shown:
         self.map = chosen_map(space, self.points, settings) if space.is_round else None
         self.regions = region_lines(self.density, settings)
 
-    def makers(self) -> dict[str, Callable[[], Picture]]:
+    def makers(self) -> Mapping[str, Callable[[], Picture]]:
         """Return functions that draw the figures, by the names of their files without the ending."""
         density, settings, data, samples = self.density, self.settings, self.data, self.samples
         if self.space.dim != 2:
             return {"samples": partial(corner_picture, density, data, samples, settings)}
         grounds = self._grounds()
         dots = self.points if settings.dots else None
-        draw = partial(density_picture, density, dots, settings, regions=self.regions)
-        makers: dict[str, Callable[[], Picture]] = {
-            name: partial(draw, ground=ground) for name, ground in grounds.items()
-        }
+        draw = partial(figures.density_picture, density, dots, settings, regions=self.regions)
+        makers = {name: partial(draw, ground=ground) for name, ground in grounds.items()}
         if density.flow_part is not None:
-            makers["flow"] = partial(flow_picture, density, settings)
+            makers["flow"] = partial(figures.flow_picture, density, settings)
         if data is not None or settings.samples is not None:
-            draw = partial(samples_picture, density, data, samples, settings)
+            draw = partial(figures.samples_picture, density, data, samples, settings)
             makers["samples"] = partial(draw, ground=grounds["density"])
         return makers
 
-    def _grounds(self) -> dict[str, Ground]:
+    def _grounds(self) -> dict[str, figures.Ground]:
         """Return what the density is drawn on, by the names of the figures."""
         space, square = self.space, Square(self.space, self.settings)
         if self.map is None:
             return {"density": square}
-        grounds: dict[str, Ground] = {"density": Map(space, self.map, self.coastlines)}
+        grounds: dict[str, figures.Ground] = {"density": Map(space, self.map, self.coastlines)}
         if space.name == "sphere" and not isinstance(self.map, PlateCarree):
             plain = PlateCarree((0.0, self.map.center[1]))
             grounds["latlon"] = Map(space, plain, self.coastlines)
@@ -202,7 +193,7 @@ def _check_space(space: Space, settings: PlotSettings) -> None:
             f"this {space.name} has {space.dim} angles, pictures have {MAX_COLUMNS} at most: draw "
             "columns of `orbiflow density sample` beside those of the data"
         )
-    view_of(space, settings.names, None if space.is_round else settings.center)
+    view_of(space, settings.names, settings.center)
     if not space.is_round and (settings.projection != "auto" or settings.radius is not None):
         name = "radius" if settings.projection == "auto" else "projection"
         raise SettingError(
