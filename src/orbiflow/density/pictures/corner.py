@@ -127,9 +127,7 @@ class _Panels:
         """Make the axes of a panel."""
         x = self.left + column * self.side
         y = self.below + (self.dim - 1 - row) * self.side
-        width, height = self.figure.get_size_inches()
-        inner = 0.93 * self.side
-        return self.figure.add_axes((x / width, y / height, inner / width, inner / height))
+        return frames.axes_at(self.figure, x, y, 0.93 * self.side, 0.93 * self.side)
 
     def write_heads(self, counts: dict[str, int], most: int) -> None:
         """Write what is drawn in its colour, with its number; in print the caption has the numbers."""

@@ -150,8 +150,7 @@ class Map:
         if dots is not None:
             shown, known = dots
             parts.append(f"Dots are {f'{shown} of ' if shown < known else ''}{known} points")
-        parts += [note[0].upper() + note[1:] for note in notes]
-        return " ".join(f"{part}." for part in parts)
+        return frames.sentences([*parts, *notes])
 
     def _description(self) -> str:
         projection, frame = self.projection, ""

@@ -126,7 +126,7 @@ class Square:
             for order in self._orders
         ]
         parts += ["Dots are points"] if dots else []
-        return _sentences([*parts, *self._notes(notes, bool(dots))])
+        return frames.sentences([*parts, *self._notes(notes, bool(dots))])
 
     def samples_caption(self, notes: Sequence[str]) -> str:
         """Return the caption of points on two grounds."""
@@ -142,7 +142,7 @@ class Square:
     ) -> None:
         """Write the title, and a legend with notes."""
         frame.axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
-        words = _sentences(self._notes(notes, bool(dots)))
+        words = frames.sentences(self._notes(notes, bool(dots)))
         self._draw_legend(frame.figure, sheet, words, bool(dots))
 
     @property
@@ -264,7 +264,3 @@ def _draw_edge(
             *ring.T, facecolor=colour, edgecolor="#ffffff", linewidth=0.06 * size,
             clip_on=False, zorder=7,
         )  # fmt: skip
-
-
-def _sentences(parts: Sequence[str]) -> str:
-    return " ".join(f"{part[0].upper()}{part[1:]}." for part in parts)

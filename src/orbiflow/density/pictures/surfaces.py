@@ -269,7 +269,7 @@ def density_page(
     if colours.is_sharp(density, pixel=_SOFT / cells):
         notes.append(average_note(round(cells / _SOFT)))
     words = CAPTIONS[space.name].format(*(frames.axis_label(view, k) for k in (0, 1)))
-    caption = " ".join([words, *(f"{n[0].upper()}{n[1:]}." for n in notes)])
+    caption = f"{words} {frames.sentences(notes)}".strip()
     title = title or f"Density on the {frames.space_title(space)}"
     page = rendered(
         "orbiflow.density.pictures", "surface.html", title=title, caption=caption, data=data
@@ -358,7 +358,10 @@ def _labels(view: frames.View) -> list[dict[str, Any]]:
         places = 1.07 * np.concatenate([np.eye(3), -np.eye(3)])
     else:
         turns = (0, 0.25, 0.5, -0.25) if space.is_torus else (0, 0.125, 0.25, 0.375)
-        texts = [f"{frames.column_name(view, 0)} {frames.angle_text(t, space.unit)}" for t in turns]
+        texts = [
+            f"{frames.cut(view.names[0], frames.MAX_NAME)} {frames.angle_text(t, space.unit)}"
+            for t in turns
+        ]
         radius = RING_RADIUS + TUBE_RADIUS if space.is_torus else KLEIN_RADIUS + 1
         places = 1.1 * radius * np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
     return [{"text": t, "at": place.tolist()} for t, place in zip(texts, places, strict=True)]

@@ -7,6 +7,7 @@ import io
 import math
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -109,21 +110,17 @@ def to_csv(columns: Sequence[str], values: ArrayLike) -> bytes:
     values = np.asarray(values, dtype=np.float64)
     if values.ndim != 2 or values.shape[1] != len(columns):
         raise ValueError(f"values must have shape (N, {len(columns)}), not {values.shape}")
-    out = io.BytesIO()
-    out.write((",".join(_name_cell(name, ",") for name in columns) + "\n").encode())
-    np.savetxt(out, values, fmt="%.10g", delimiter=",")
+    out, head = io.BytesIO(), ",".join(_name_cell(name, ",") for name in columns)
+    np.savetxt(out, values, fmt="%.10g", delimiter=",", header=head, comments="", encoding="utf-8")
     return out.getvalue()
 
 
 def _free_names(wanted: Iterable[str], taken: Sequence[str]) -> list[str]:
     found, used = list[str](), {name.casefold() for name in taken}
     for name in wanted:
-        free, i = name, 1
-        while free.casefold() in used:
-            i += 1
-            free = f"{name}_{i}"
-        found.append(free)
-        used.add(free.casefold())
+        free = chain([name], (f"{name}_{i}" for i in count(2)))
+        found.append(next(text for text in free if text.casefold() not in used))
+        used.add(found[-1].casefold())
     return found
 
 
@@ -191,9 +188,8 @@ def read_labels(
         found = dict(zip(numbers.lines.tolist(), cells, strict=True))
     elif kind == "parquet":
         names = _parquet_names(path)
-        name = names[find(path, names, column)]
         with _parquet(path) as file:
-            batches = file.iter_batches(BLOCK, columns=[name])
+            batches = file.iter_batches(BLOCK, columns=[names[find(path, names, column)]])
             cells = [cell for batch in batches for cell in batch.column(0).to_pylist()]
         found = {k: "" if c is None else str(c).strip() for k, c in enumerate(cells, start=1)}
     else:
@@ -241,10 +237,10 @@ def read_npy(path: Path, reading: Reading) -> Table:
     shape, dtype = _npy_header(path)
     check_count(path, shape[0], reading.max_rows, "rows")
     fields = dtype.names
-    count = shape[1] if fields is None else len(fields)
-    check_count(path, count, MAX_COLUMNS, "columns")
-    names = fields or tuple(f"column{i}" for i in range(1, count + 1))
-    types = [dtype] * count if fields is None else [dtype[name] for name in fields]
+    width = shape[1] if fields is None else len(fields)
+    check_count(path, width, MAX_COLUMNS, "columns")
+    names = fields or tuple(f"column{i}" for i in range(1, width + 1))
+    types = [dtype] * width if fields is None else [dtype[name] for name in fields]
     numeric = [kind.kind in "fiu" for kind in types]
     picked, notes = choose(path, names, numeric, reading, types)
     try:

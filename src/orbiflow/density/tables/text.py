@@ -231,7 +231,7 @@ def _has_header(
     # `Paris,48.9,2.4` above `Rome,41.9,12.5` is a row; `city,2019,2020` above it is a header
     names = {cell.strip().casefold() for cell in row}
     wanted = [name.strip() for name in columns or ()]
-    by_number = all(tables.column_number(name, len(row)) is not None for name in wanted)
+    by_number = all(tables.is_number(name, len(row)) for name in wanted)
     if not by_number and all(name.casefold() in names for name in wanted):
         return True
     raise TableError(
