@@ -112,16 +112,22 @@ def escherize(
         "tiles": [_measures(tile) for tile in tiles],
         "failed": [{"class": f.name, "reason": f.reason} for f in result.failures],
     }
-    if tiles:
-        best = "Tiles, best first"
-        title = best if tiles[0].front is None else "Tiles for likeness, then for overlap"
-        on_event(_table(title, [_words(tile) for tile in tiles]))
-        if verbose:
-            on_event(_table("Figures", [_figures(tile) for tile in tiles]))
+    for table in _tables(tiles)[: 1 + verbose]:
+        on_event(table)
     on_event(_closing(out, bool(written), bool(result.tiles), summary["seconds"]))
     if result.interrupted or cancel.cancelled:
         return Outcome(summary, "cancelled")
     return Outcome(summary, "done" if result.tiles else "nothing found")
+
+
+def _tables(tiles: Sequence[EscherTile]) -> list[Table]:
+    """Return what is said of the tiles, in words and in figures; nothing of none."""
+    if not tiles:
+        return []
+    best = "Tiles, best first"
+    title = best if tiles[0].front is None else "Tiles for likeness, then for overlap"
+    figures = _table("Figures", [_figures(tile) for tile in tiles])
+    return [_table(title, [_words(tile) for tile in tiles]), figures]
 
 
 def _table(title: str, rows: Sequence[dict[str, str]]) -> Table:
