@@ -93,8 +93,7 @@ def escherize(
     begin = time.perf_counter()
     target = reading.read(image, called)
     pages.result_folder(out)
-    masks = [Path(pin) for pin in settings.pin or ()]
-    check_output_folder(out, image, settings.emphasis, *masks)
+    check_output_folder(out, image, settings.emphasis, *map(Path, settings.pin or ()))
     picture = pages.read_png(target, image)
     show = functools.partial(pages.show_reading, target, picture, out, on_event)
     settings = settings.replace(workers=settings.workers or os.cpu_count() or 1)
