@@ -102,4 +102,4 @@ def test_the_cell_that_repeats_is_neither_turned_nor_whole() -> None:
     settings: list[dict[str, Any]] = [{"rotate": 10.0}, {"clip": False}]
     for setting in settings:
         with pytest.raises(OrbiflowError, match="exclude each other"):
-            ArtSettings(repeat=True, **setting)
+            ArtSettings(repeat="basic", **setting)
