@@ -22,7 +22,7 @@ from scipy.stats import spearmanr
 from orbiflow.tiles import Fidelity, Rating
 from orbiflow.tiles.likeness import likeness_ratings
 from orbiflow.tiles.likeness.elastic import POSE_WEIGHT
-from orbiflow.tiles.likeness.rating import WORDS, rating_of_mark
+from orbiflow.tiles.likeness.rating import WORDS
 
 Row = dict[str, Any]
 
@@ -63,18 +63,18 @@ def _foretold(ours: dict[str, list[Row]], lengths: dict[str, float], name: str) 
     marks = [np.mean(row["marks"]) for other in others for row in ours[other]]
     known = np.concatenate([terms(other) for other in others])
     weights = np.linalg.lstsq(known, np.array(marks), rcond=None)[0]
-    return [rating_of_mark(mark) for mark in terms(name) @ weights]
+    return [Rating.of_mark(mark) for mark in terms(name) @ weights]
 
 
 def _print_ratings(ours: dict[str, list[Row]], lengths: dict[str, float]) -> None:
     marks = np.array([row["marks"] for rows in ours.values() for row in rows])
-    said = [rating_of_mark(mark) for mark in marks.mean(axis=1)]
+    said = [Rating.of_mark(mark) for mark in marks.mean(axis=1)]
     rated = [
         rating
         for name, rows in ours.items()
         for rating in likeness_ratings([_fidelity(row).score for row in rows], lengths[name])
     ]
-    first, second = ([rating_of_mark(mark) for mark in own] for own in marks.T)
+    first, second = ([Rating.of_mark(mark) for mark in own] for own in marks.T)
     pairs = {
         "stars, and the judges' mean": (rated, said),
         "with weights fitted to other silhouettes": (

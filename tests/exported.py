@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import json
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +16,7 @@ from bent_tiles import bent_tile
 from orbiflow.arrays import Array
 from orbiflow.symmetry import rotation_matrix
 from orbiflow.tiles import CLASSES, Tile, isohedral_class
+from orbiflow.tiles.result_file import group_json
 
 
 class Line(NamedTuple):
@@ -87,6 +90,29 @@ def tile_of(name: str, turn: float = 0.3, stretch: float = 0.1, scale: float = 7
     kind = isohedral_class(name)
     linear = scale * rotation_matrix(turn) @ kind.stretch(np.full(kind.stretch_dim, stretch))
     return tile.transformed(linear, np.array([3.0, -11.0]))
+
+
+def entry(name: str) -> dict[str, Any]:
+    """What result.json says about a tile of a class."""
+    tile = tile_of(name)
+    return {
+        "class": name,
+        "polygon": np.concatenate([tile.polygon, tile.polygon[:1]]).tolist(),
+        "corners": list(tile.corners),
+        "group": group_json(tile.group),
+    }
+
+
+def boot_run(folder: Path) -> Path:
+    """Write the folder of a run with three tiles."""
+    folder.mkdir()
+    document = {
+        "schema_version": 1,
+        "input": {"source": "pictures/boot.png", "y_down": True},
+        "tiles": [entry("IH6"), entry("IH4"), entry("IH6")],
+    }
+    (folder / "result.json").write_text(json.dumps(document))
+    return folder
 
 
 tiles = st.builds(

@@ -53,7 +53,8 @@ def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     command += ["--out", folder / "new" / "out", "--classes", "IH4,ih6", "--workers", 2, *FEW]
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
+    # a slow machine has lines of progress, and nothing else
+    assert all("% after " in line for line in done.stderr.splitlines()), done.stderr
     for name in ("IH4", "IH6"):
         assert f"{name}: IoU" in done.stdout
     assert "dark on light" in done.stdout
@@ -72,6 +73,7 @@ def test_all_files_are_there(folder: Path) -> None:
         "IH6",
         "index.html",
         "overview.png",
+        "read.png",
         "result.json",
     }
     for name in ("IH4", "IH6"):
@@ -192,7 +194,7 @@ def test_no_tile_is_status_one(tmp_path: Path, orbiflow, monkeypatch: pytest.Mon
         assert outcome.status == 1
         assert f"no certified tile was found; see {tmp_path / 'o' / 'result.json'}" in outcome.err
     assert "IH21: no tile: IH21: the boundary crosses itself" in outcome.err
-    assert {p.name for p in (tmp_path / "o").iterdir()} == {"result.json"}
+    assert {p.name for p in (tmp_path / "o").iterdir()} == {"read.png", "result.json"}
     document = json.loads((tmp_path / "o" / "result.json").read_text(encoding="utf-8"))
     assert document["tiles"] == []
     assert [entry["class"] for entry in document["failed"]] == ["IH21"]
@@ -251,13 +253,20 @@ def test_a_second_run_takes_the_place_of_the_first(
     run = ("escherize", path, "--workers", 1, *FEW)
     assert orbiflow(*run, "-o", out, "--classes", "IH4,IH6").status == 0
     assert orbiflow(*run, "-o", out, "--classes", "IH4").status == 0
-    assert {p.name for p in out.iterdir()} == {"IH4", "index.html", "overview.png", "result.json"}
+    assert {p.name for p in out.iterdir()} == {
+        "IH4",
+        "index.html",
+        "overview.png",
+        "read.png",
+        "result.json",
+    }
     monkeypatch.chdir(out)
     assert orbiflow(*run, "-o", ".", "--classes", "IH6").status == 0
     assert {p.name for p in Path().iterdir()} == {
         "IH6",
         "index.html",
         "overview.png",
+        "read.png",
         "result.json",
     }
     before = (out / "result.json").read_bytes()

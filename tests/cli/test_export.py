@@ -9,36 +9,16 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pypdfium2
 import pytest
 
-from exported import tile_of
+from exported import boot_run, entry
 from orbiflow.runtime import Finished, Written, find
-from orbiflow.tiles.result_file import group_json
-
-
-def entry(name: str) -> dict[str, Any]:
-    tile = tile_of(name)
-    return {
-        "class": name,
-        "polygon": np.concatenate([tile.polygon, tile.polygon[:1]]).tolist(),
-        "corners": list(tile.corners),
-        "group": group_json(tile.group),
-    }
 
 
 @pytest.fixture(name="result", scope="module")
 def result_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("runs") / "boot"
-    folder.mkdir()
-    document = {
-        "schema_version": 1,
-        "input": {"source": "pictures/boot.png", "y_down": True},
-        "tiles": [entry("IH6"), entry("IH4"), entry("IH6")],
-    }
-    (folder / "result.json").write_text(json.dumps(document))
-    return folder
+    return boot_run(tmp_path_factory.mktemp("runs") / "boot")
 
 
 @pytest.mark.parametrize("form", ["svg", "pdf", "dxf", "png", "json"])
@@ -250,8 +230,8 @@ def test_a_silhouette_is_escherized_first(name: str, tmp_path: Path, orbiflow) -
     ("place", "tile", "message"),
     [
         ("", None, "holds the runs boot, shoe: give one, such as {}/boot"),
-        ("boot/IH4", "IH6", "is the folder of one tile, and tile IH6 is another"),
-        ("boot/IH4", "1", "for that one give {}/boot"),
+        ("boot/IH4", "IH6", "is one tile's folder, and tile IH6 another"),
+        ("boot/IH4", "1", "give {}/boot for that"),
         ("boot/mine", None, "tells of IH6, IH4, IH6-2, not of mine"),
     ],
 )

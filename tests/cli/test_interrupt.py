@@ -36,6 +36,8 @@ FIRST_IS_SHORT = (
 # two who speak at once would make one line
 DEAF = (
     "import os, time\n"
+    "from orbiflow.cli import terminal\n"
+    "terminal.EVERY = 1e9\n"  # no line of progress, however long the machine takes
     "from orbiflow.runtime import Cancel, processes\n"
     "from orbiflow.tiles.search import occupancy\n"
     "def fit(*_, **__):\n"

@@ -92,6 +92,7 @@ def here_fixture(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         ("art r --out r/overview.png", OWN),
         ("art r --picture picture.svg --out picture.svg", KEPT),
         ("animate r --out r/turtle.gif", ALONE),
+        ("solid r --kind stamp --picture picture.svg --format stl --out picture.svg", KEPT),
         ("escherize r/IH4/tile.svg --classes IH4 --out r", "would replace the file that it reads"),
     ],
 )

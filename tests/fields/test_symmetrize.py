@@ -1,11 +1,13 @@
 """Any field made to commute with a group."""
 
+import numpy as np
 import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import nn
 
+from orbiflow.errors import OrbiflowError
 from orbiflow.fields import jacobian, symmetrize
 from orbiflow.fields.symmetrization import blend
 from orbiflow.symmetry import WALLPAPER_GROUPS, wallpaper_group
@@ -180,3 +182,58 @@ def test_parameters_are_trained_through_the_divergence():
     expected = torch.autograd.grad(trace.square().sum(), list(field.parameters()))
     for one, other in zip(found, expected, strict=True):
         torch.testing.assert_close(one, other, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("field", "message"),
+    [
+        ("p4", "the field must be a function of points .* got 'p4'"),
+        (None, "the field must be a function"),
+        (lambda p: p[..., 0], r"shape \(3, 2\), one vector for each; got a tensor of shape \(3,\)"),
+        (lambda p: torch.cat([p, p], dim=-1), r"got a tensor of shape \(3, 4\)"),
+        (lambda p: p.numpy(), r"got an array of shape \(3, 2\)"),
+        (nn.Linear(2, 3), r"got a tensor of shape \(3, 3\)"),
+    ],
+)
+def test_what_is_no_field_is_refused_at_once(field, message):
+    with pytest.raises(OrbiflowError, match=message):
+        symmetrize(field, wallpaper_group("p4"))
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_a_field_of_other_points_is_refused_with_words(periodic):
+    points = torch.zeros(5, 2, dtype=torch.float64)
+    single = symmetrize(nn.Linear(2, 2), wallpaper_group("p4"), periodic=periodic)
+    spatial = symmetrize(nn.Linear(3, 3).double(), wallpaper_group("p4"), periodic=periodic)
+    late = symmetrize(
+        lambda p: p if len(p) < 4 else p[..., :1], wallpaper_group("p4"), periodic=True
+    )
+    for field in (single, spatial):
+        for call in (field, field.divergence):
+            with pytest.raises(OrbiflowError, match=r"evaluated at torch\.float64 points .* 2\)"):
+                call(points)
+    with pytest.raises(OrbiflowError, match=r"got a tensor of shape \(4, 5, 1\)"):
+        late(points)
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_lists_arrays_and_dtypes_are_followed(periodic):
+    weight = random_tensor(0, 2, 2)
+    field = symmetrize(lambda p: p.double() @ weight, wallpaper_group("p3"), periodic=periodic)
+    points = random_tensor(0, 4, 2)
+    known, slope = field(points), field.divergence(points)
+    for same in (points.tolist(), points.numpy()):
+        torch.testing.assert_close(field(same), known)
+        torch.testing.assert_close(field.divergence(same), slope)  # pyright: ignore[reportArgumentType]
+    assert field(points.float()).dtype == field.divergence(points.float()).dtype == torch.float32
+    assert field(np.array([1, 2])).dtype == torch.float64
+    with pytest.raises(OrbiflowError, match="points must be real numbers"):
+        field("ab")
+
+
+def test_trying_a_field_draws_nothing():
+    torch.manual_seed(3)
+    wanted = torch.rand(4)
+    torch.manual_seed(3)
+    symmetrize(lambda p: p + torch.rand_like(p), wallpaper_group("p1"))
+    assert torch.equal(torch.rand(4), wanted)

@@ -51,7 +51,7 @@ def test_words_become_settings(name: str, called: list[dict[str, Any]]) -> None:
 MISTAKES = {
     "export": ("RESULT", "missing"),
     "export X --tile-size 40": ("--tile-size", "no unit"),
-    "export X --cut nome": ("--cut", "none, skeleton or pieces"),
+    "export X --cut nome": ("--cut", "none, skeleton, pieces or jigsaw"),
     "export X --for lazer": ("--for", "did you mean laser"),
     "export X --cutt none": ("--cutt", "--cut"),
     "export X --dpi": ("--dpi", "needs a value"),
@@ -162,7 +162,7 @@ def test_exit_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_completion_knows_commands_and_choices() -> None:
-    script = app.app_for([app.COMPLETION]).generate_completion(shell="bash")
+    script = app.app_for(["--install-completion"]).generate_completion(shell="bash")
     assert all(word in script for word in ("escherize", "--tile-size", "skeleton"))
 
 
@@ -170,6 +170,7 @@ def test_completion_knows_commands_and_choices() -> None:
     "line",
     [
         "export X --tile-size 40",
+        "solid X --kind tile --chamfer 9mm",
         "density marginal -m X --columns ,",
         "density conditional -m X --given chi",
         "escherize --help",

@@ -91,12 +91,9 @@ def run_files(
         names = folder_names(files, given, RESERVED)
         items = [
             Item(
-                name,
-                names[name],
-                call_of(name, names[name]),
-                partial(read_file, source / name, kind.most_bytes),
+                file, name, call_of(file, name), partial(read_file, source / file, kind.most_bytes)
             )
-            for name in files
+            for file, name in ((file, names[file]) for file in files)
         ]
         left_out = f" or that --match {match} leaves out" if match else ""
         gone = f"of files that are not in {source}{left_out}"

@@ -27,7 +27,6 @@ HELP = "Turn a silhouette into a tile that looks like it and provably tiles the 
 START = (
     "Start with: orbiflow escherize photo-cutout.png --out out/  (then look at out/overview.png)"
 )
-COMPLETION = "--install-completion"
 ARGUMENTS, OPTIONS = Group("Arguments", sort_key=0), Group("Options", sort_key=1)
 GROUPS = {
     "density": "Fit, evaluate, sample and draw exact densities of angles, directions and axes."
@@ -64,10 +63,7 @@ def _to_standard_error(text: str) -> None:
 
 
 def app_for(words: Sequence[str]) -> App:
-    """Return the application with the one command that is asked for, or else a list of all.
-
-    The list is for help: only completion needs the options of all commands, too.
-    """
+    """Return the application with the one command that is asked for, or else with a list of all."""
     app = App(
         name="orbiflow",
         help=HELP,
@@ -85,12 +81,12 @@ def app_for(words: Sequence[str]) -> App:
     for name, text in GROUPS.items():
         app.command(App(name=name, help=text, help_epilogue=""))
     asked = _operation(words)
-    whole = asked is not None or COMPLETION in words
+    whole = asked is not None or "--install-completion" in words  # a list needs no options
     for place, name in enumerate([asked.name] if asked else OPERATIONS):
         *group, command = name.split()
         home = app[group[0]] if group else app
         home.command(
-            _command(find(name)) if whole else _listed,
+            _command(find(name)) if whole else lambda: None,
             name=command,
             help=None if whole else SUMMARIES[name],
             help_epilogue="",
@@ -101,10 +97,6 @@ def app_for(words: Sequence[str]) -> App:
     if asked is None:
         app.register_install_completion_command()  # pyright: ignore[reportUnknownMemberType]
     return app
-
-
-def _listed() -> None:
-    """What a command does in a list, where none is asked for."""
 
 
 def _operation(words: Sequence[str]) -> Operation | None:

@@ -31,19 +31,14 @@ from orbiflow.runtime import (
 
 output, errors = Console(), Console(stderr=True)
 
-EVERY = 10.0
-"""Seconds between the lines that tell the progress where the output is no terminal."""
+EVERY = 10.0  # seconds between lines of progress on the standard error where there can be no bar
 
 
 class Terminal:
-    """A sink of events. Use it in a `with` block: the bar must not outlive an error.
-
-    Where the output goes to a file or a pipe, lines on the standard error take the place of the bar.
-    """
+    """A sink of events. Use it in a `with` block: the bar must not outlive an error."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self.clock = clock
-        self.begun = self.told = clock()
+        self.clock, self.told = clock, clock()
         self.first: tuple[float, float] | None = None  # the time and share of the first progress
         self.last = Progress(1.0, "")
         self.forks = False
@@ -103,22 +98,22 @@ class Terminal:
     def _line(self, now: float) -> str:
         """What is done, of which class, and how much is left."""
         begin, before = self.first or (now, 0.0)
-        event, line = self.last, f"{self.last.share:.0%} after {_duration(now - self.begun)}"
-        line += f": {event.what}"
-        if event.class_name and event.class_share is not None:
-            line += f" {event.class_name} ({event.class_share:.0%})"
-        if self.best[1]:
-            line += ", best {:.4f} ({})".format(*self.best)
-        if event.share > before:
-            rate = (event.share - before) / (now - begin)
-            line += f"; about {_duration((1 - event.share) / rate)} left"
+        event, passed = self.last, now - begin
+        line = f"{event.share:.0%} after {_duration(passed)}: {event.what}"
+        if event.class_name:
+            line += f" {event.class_name}, {event.class_share or 0:.0%} of it"
+        if (done := event.share - before) > 0:
+            line += f"; about {_duration(passed * (1 - event.share) / done)} left"
         return line
 
     def _found(self, event: Preview | TileFound) -> None:
         self.best = max(self.best, (event.iou, event.class_name))
 
     def _show_progress(self, event: Progress) -> None:
-        self.last, self.first = event, self.first or (self.clock(), event.share)
+        self.last = event
+        if self.first is None:
+            self.told = self.clock()
+            self.first = self.told, event.share
         if self.bar is None:
             columns = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
             # no thread that refreshes: workers are forked from a process with one thread

@@ -5,17 +5,20 @@ operators (equations for P_B, R_c^K and G_l^mu of section 3), which are unnormal
 that are periodic by themselves.
 """
 
+import contextlib
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from functools import partial
+from typing import Any, cast
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
-from orbiflow.arguments import as_whole
+from orbiflow.arguments import as_tensor, as_whole, described, is_tensor, refusal
+from orbiflow.errors import OrbiflowError
 from orbiflow.fields.protocol import VectorField, prepared_with_divergence
 from orbiflow.symmetry import CrystallographicGroup, Isometry, checked_group, identity
 from orbiflow.typed_torch import linalg
@@ -31,16 +34,25 @@ class Symmetrized(nn.Module):
         self, field: VectorField, group: CrystallographicGroup, *, periodic: bool = False
     ) -> None:
         super().__init__()
+        if not callable(field):
+            raise refusal(
+                "the field", "a function of points (..., d), such as a torch module", field
+            )
         self.field = field
         self.group = checked_group(group)
         self.periodic = periodic
+        _try_out(field, self.group.dim)
 
     def forward(self, points: Tensor) -> Tensor:
         """Return V at points (..., d)."""
+        points = as_tensor(points, "points")
         images = self.group.images(points)
-        values = (
-            self.field(images) if self.periodic else blend(self.field, self.group.lattice, images)
-        )
+
+        def field(points: Tensor) -> Tensor:
+            with self._explaining(points):
+                return _checked(self.field(points), points)
+
+        values = field(images) if self.periodic else blend(field, self.group.lattice, images)
         return self._mean(values, points)
 
     def divergence(self, points: Tensor) -> Tensor:
@@ -52,15 +64,37 @@ class Symmetrized(nn.Module):
 
         Only the given field is differentiated, not the symmetrization: R^-1 J R has the trace of J.
         """
-        joint = prepared_with_divergence(self.field)
+        own = prepared_with_divergence(self.field)
+
+        def joint(points: Tensor) -> tuple[Tensor, Tensor]:
+            with self._explaining(points):
+                values, divergence = own(points)
+                return _checked(values, points), divergence.to(points.dtype)
+
         if not self.periodic:
             joint = partial(blend_with_divergence, joint, self.group.lattice)
 
         def both(points: Tensor) -> tuple[Tensor, Tensor]:
+            points = as_tensor(points, "points")
             values, divergence = joint(self.group.images(points))
             return self._mean(values, points), divergence.mean(dim=0)
 
         return both
+
+    @contextlib.contextmanager
+    def _explaining(self, points: Tensor) -> Generator[None]:
+        """Raise what goes wrong in the field as an `OrbiflowError` that says where."""
+        try:
+            yield
+        except OrbiflowError:
+            raise
+        except (RuntimeError, TypeError, ValueError, IndexError) as error:
+            hint = "its parameters have {}: convert the points or the field"
+            hints = {hint.format(p.dtype) for p in self.parameters() if p.dtype != points.dtype}
+            raise OrbiflowError(
+                f"the field cannot be evaluated at {points.dtype} points of shape "
+                f"(..., {points.shape[-1]}): {'; '.join([str(error), *sorted(hints)])}"
+            ) from error
 
     def _mean(self, values: Tensor, points: Tensor) -> Tensor:
         linear = torch.tensor(self.group.linear_parts, dtype=values.dtype, device=values.device)
@@ -72,6 +106,29 @@ class Symmetrized(nn.Module):
         return f"{self.group!r}, periodic={self.periodic}"
 
 
+def _checked(values: object, points: Tensor) -> Tensor:
+    """Return a field's values at points in their dtype; raise `OrbiflowError` for another shape."""
+    if not is_tensor(values) or values.shape != points.shape:
+        wanted = f"a tensor of its points' shape {tuple(points.shape)}, one vector for each"
+        raise OrbiflowError(f"the field must give {wanted}; got {described(values)}")
+    return values.to(points.dtype)
+
+
+def _try_out(field: VectorField, dim: int) -> None:
+    """Raise `OrbiflowError` at once for a field whose values have another shape than its points."""
+    module = isinstance(field, nn.Module)
+    if module and any(True for _ in field.buffers()):
+        return  # an evaluation may change them
+    own = next(field.parameters(), None) if module else None
+    points = torch.zeros(3, dim, dtype=torch.float64) if own is None else own.new_zeros(3, dim)
+    with torch.no_grad(), cast(Any, torch.random).fork_rng(devices=[]):
+        try:
+            values: object = field(points)
+        except Exception:  # it may need other points, which a call will tell
+            return
+    _checked(values, points)
+
+
 def symmetrize(
     field: VectorField, group: CrystallographicGroup, *, periodic: bool = False
 ) -> Symmetrized:
@@ -79,14 +136,17 @@ def symmetrize(
 
     Args:
         field: Any callable from points (..., d) to vectors of the same shape: a torch module, a
-            function or a lambda. It need not be periodic: its translates are blended smoothly over
-            neighbouring cells (2^d evaluations). A field that already commutes does not change.
+            function or a lambda, evaluated in the dtype of the points. It need not be periodic: its
+            translates are blended smoothly over neighbouring cells (2^d evaluations). A field that
+            already commutes does not change.
         group: A group of R^d.
         periodic: Whether `field` is known to be periodic under the group's lattice (for instance a
             network behind `PeriodicFeatures`), so that it need not be blended.
 
     Raises:
-        OrbiflowError: if `group` is not a group or, when called, for points of another dimension.
+        OrbiflowError: if `field` is no function or `group` no group; for a field that gives anything
+            but one vector for each point, or cannot take the points, which it is tried on at once
+            and checked for at each call; when called, for points of another dimension.
 
     >>> import torch
     >>> from orbiflow.symmetry import wallpaper_group

@@ -335,12 +335,10 @@ def _run_around(read: Path) -> tuple[Path, set[str]]:
     """The folder of the run that is read, or to which what is read belongs, and its files, if any."""
     if read.is_dir() and (known := _files_of_run(read)):
         return read, known
-    folder, name = (
-        (_real(read).parent, _real(read).name) if read.is_dir() else (read.parent, read.name)
-    )
-    known = _files_of_run(folder)
-    is_part = any(file == name or file.startswith(f"{name}/") for file in known)
-    return folder, known if is_part else set()
+    whole = _real(read) if read.is_dir() else read
+    known = _files_of_run(whole.parent)
+    is_part = any(name == whole.name or name.startswith(f"{whole.name}/") for name in known)
+    return whole.parent, known if is_part else set()
 
 
 def _files_of_run(folder: Path) -> set[str]:

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
 from orbiflow.runtime import NEVER, Call, Cancel, Outcome, Sink, find, ignore, operation
 from orbiflow.settings import Option
-from orbiflow.tiles.operations import ReadingSettings
 from orbiflow.tiles.search import SearchSettings
+from orbiflow.tiles.silhouette import ReadingSettings
 
 # Endings of silhouettes that are no pictures: how these are read does not apply to them
 OUTLINES = (".svg", ".json", ".geojson", ".dat")
@@ -46,7 +46,7 @@ def batch(
 
     def call_of(name: str, results: str) -> Call:
         is_outline = PurePath(name).suffix.lower() in OUTLINES
-        own = {} if is_outline else reading.to_json()
+        own = {"smooth": reading.smooth} if is_outline else reading.to_json()
         # each silhouette has one process: many at a time make better use of the cores
         fixed = {"image": name, "out": "out", "workers": 1}
         words = {"called": name, "shown_out": str(out / results)}

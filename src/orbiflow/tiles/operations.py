@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,11 +22,12 @@ from orbiflow.runtime import (
     ignore,
     operation,
 )
-from orbiflow.settings import DefaultText, Ending, Hidden, Option, Range, Settings
+from orbiflow.settings import DefaultText, Ending, Hidden, Option, Settings
 from orbiflow.tiles.art import ArtSettings
 from orbiflow.tiles.exporting import ExportSettings
 from orbiflow.tiles.motion import AnimationSettings
 from orbiflow.tiles.search import EscherizeSettings
+from orbiflow.tiles.silhouette import ReadingSettings
 from orbiflow.tiles.solids import SolidSettings
 
 if TYPE_CHECKING:
@@ -40,16 +41,6 @@ POOR = (
     "or more effort may do better"
 )
 """Said where nothing that was found looks like the silhouette."""
-
-
-class ReadingSettings(Settings, group="Reading the silhouette"):
-    """How a silhouette is read."""
-
-    threshold: Annotated[float | None, Range(0, 1), DefaultText("found automatically")] = None
-    """Level between shape and background."""
-
-    invert: Annotated[bool | None, DefaultText("found automatically")] = None
-    """Whether the shape is the light part."""
 
 
 class TileChoice(Settings):
@@ -84,9 +75,9 @@ def escherize(
 ) -> Outcome:
     """Find tiles that look like a silhouette and tile the plane, and prove it.
 
-    Writes result.json, overview.png and index.html into the folder, and for each class a folder
-    with tile.svg, tiling.svg, tiling.png, overlay.png and model.safetensors; after a search for
-    both, front.png, too.
+    Writes read.png, a picture of what was read, into the folder at once. Then come result.json,
+    overview.png and index.html, and for each class a folder with tile.svg, tiling.svg, tiling.png,
+    overlay.png and model.safetensors; after a search for both, front.png, too.
 
     Args:
         image: The silhouette: PNG, JPEG, WebP, SVG, or a polygon (.json, .dat).
@@ -97,22 +88,22 @@ def escherize(
         called: What the results call the silhouette. Default: its path.
         shown_out: What the page's commands call the folder. Default: its path.
     """
-    from orbiflow.tiles import pages, search, silhouette
+    from orbiflow.tiles import pages, search
 
     begin = time.perf_counter()
-    target = silhouette.Target.read(image, threshold=reading.threshold, invert=reading.invert)
-    target = target if called is None else replace(target, source=called)
+    target = reading.read(image, called)
     pages.result_folder(out)
     masks = [Path(pin) for pin in settings.pin or ()]
     check_output_folder(out, image, settings.emphasis, *masks)
-    for note in target.notes:
-        on_event(Note(note))
+    picture = pages.read_png(target, image)
+    show = functools.partial(pages.show_reading, target, picture, out, on_event)
     settings = settings.replace(workers=settings.workers or os.cpu_count() or 1)
-    result = search.escherize(target, settings, on_event=on_event, cancel=cancel)
+    result = search.escherize(target, settings, on_checked=show, on_event=on_event, cancel=cancel)
     for text in _remarks(result):
         on_event(Note(text))
-    shown = shown_out or str(out)
-    written = pages.write_run(result, out, figures=figures, shown_out=shown, on_event=on_event)
+    written = pages.write_run(
+        result, out, picture, figures=figures, shown_out=shown_out, on_event=on_event
+    )
     tiles = result.tiles if written else ()
     summary = {
         "folder": str(out),
@@ -122,34 +113,24 @@ def escherize(
         "failed": [{"class": f.name, "reason": f.reason} for f in result.failures],
     }
     if tiles:
-        on_event(_table(tiles))
+        best = "Tiles, best first"
+        title = best if tiles[0].front is None else "Tiles for likeness, then for overlap"
+        on_event(_table(title, [_words(tile) for tile in tiles]))
         if verbose:
-            on_event(_figures(tiles))
+            on_event(_table("Figures", [_figures(tile) for tile in tiles]))
     on_event(_closing(out, bool(written), bool(result.tiles), summary["seconds"]))
     if result.interrupted or cancel.cancelled:
         return Outcome(summary, "cancelled")
     return Outcome(summary, "done" if result.tiles else "nothing found")
 
 
-def _table(tiles: Sequence[EscherTile]) -> Table:
-    """The tiles that were found, in words that fit into 80 characters."""
-    both = any(tile.front is not None for tile in tiles)
-    title = "Tiles for likeness, then for overlap" if both else "Tiles, best first"
-    return _table_of(title, [_words(tile) for tile in tiles])
-
-
-def _figures(tiles: Sequence[EscherTile]) -> Table:
-    """The same tiles in figures."""
-    both = any(tile.front is not None for tile in tiles)
-    return _table_of("Figures", [_cells(tile, both=both) for tile in tiles])
-
-
-def _table_of(title: str, rows: Sequence[dict[str, str]]) -> Table:
+def _table(title: str, rows: Sequence[dict[str, str]]) -> Table:
+    """A table of rows by the names of their columns."""
     return Table(title, tuple(rows[0]), tuple(tuple(row.values()) for row in rows))
 
 
 def _words(tile: EscherTile) -> dict[str, str]:
-    """Return a row of words by the names of its columns."""
+    """What is said of a tile, in 80 characters."""
     row = {"class": f"{tile.name} ({tile.group_name})"}
     if tile.front is not None:
         row |= {"for": tile.objective, "front": "yes" if tile.front else "near"}
@@ -158,22 +139,19 @@ def _words(tile: EscherTile) -> dict[str, str]:
     return {**row, "how its copies lie": lies or "NOT CERTIFIED: they do not tile"}
 
 
-def _cells(tile: EscherTile, *, both: bool) -> dict[str, str]:
-    """Return a row of figures by the names of its columns, which fit into 80 characters."""
-    mismatch, overlap = tile.certificate.edge_mismatch, f"{tile.metrics.iou:.4f}"
-    edges = f"{mismatch:.0e}" if mismatch < float("inf") else "-"
-    bent = "-" if tile.deformation is None else f"{tile.deformation:.3f}"
-    certified = "yes" if tile.certificate.valid else "NO"
-    if both:
-        front = "yes" if tile.front else "near"
-        middle = {"for": tile.objective, "deformation": bent, "overlap": overlap, "front": front}
-        middle["certified"] = certified
-    else:
-        same = f"{tile.recognisability.score:.3f}"
-        middle = {"score": f"{tile.score:.3f}", "bent": bent, "IoU": overlap, "recognised": same}
-        middle |= {"certified": certified, "edges": edges}
-    name = f"{tile.name} ({tile.group_name})"
-    return {"class": name, **middle, "s": f"{tile.seconds:.1f}"}
+def _figures(tile: EscherTile) -> dict[str, str]:
+    """The same in figures."""
+    mismatch, bent = tile.certificate.edge_mismatch, tile.deformation
+    return {
+        "class": f"{tile.name} ({tile.group_name})",
+        "score": f"{tile.score:.3f}",
+        "bent": "-" if bent is None else f"{bent:.3f}",
+        "IoU": f"{tile.metrics.iou:.4f}",
+        "recognised": f"{tile.recognisability.score:.3f}",
+        "certified": "yes" if tile.certificate.valid else "NO",
+        "edges": f"{mismatch:.0e}" if mismatch < float("inf") else "-",
+        "s": f"{tile.seconds:.1f}",
+    }
 
 
 def _closing(out: Path, written: bool, found: bool, seconds: float) -> Note:

@@ -14,7 +14,7 @@ import numpy as np
 
 from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
-from orbiflow.errors import InputFileError, OrbiflowError, system_errors
+from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import ResultFolder, is_list, is_object, make_folder, read_json, write_atomic
 from orbiflow.symmetry import CrystallographicGroup, Isometry, checked_lattice
 from orbiflow.tiles.likeness import Fidelity, Rating, Recognisability, ShapeMetrics, Thinnest
@@ -42,14 +42,15 @@ def read_result(path: str | Path, which: str | int | None = None) -> EscherTile:
     names, source, silhouette = _contents(file, document)
     index = _index(names, 1 if which is None else which, file)
     folder = Path(path).resolve()
-    if folder.is_dir() and folder != file.parent.resolve():
-        own = _index_of_folder(folder.name, names, file)
-        if which is not None and index != own:
+    if folder.is_dir() and folder != file.parent.resolve():  # a tile's own
+        folders = folder_names(names)
+        if folder.name not in folders:
+            raise InputFileError(f"{file} tells of {', '.join(folders)}, not of {folder.name}")
+        if which is not None and folders[index] != folder.name:
             raise InputFileError(
-                f"{path} is the folder of one tile, and tile {which} is another; for that one give "
-                f"{file.parent}"
+                f"{path} is one tile's folder, and tile {which} another: give {file.parent} for that"
             )
-        index = own
+        index = folders.index(folder.name)
     entry = document["tiles"][index]
     try:
         tile = _tile(entry)
@@ -118,27 +119,16 @@ def read_document(path: str | Path) -> tuple[Path, dict[str, Any]]:
 def _result_in(folder: Path) -> Path:
     """Return the result.json of a run's folder, or of the run that a tile's folder belongs to."""
     own, above = folder / RESULT, folder.resolve().parent / RESULT
-    if own.exists():
-        return own
-    with system_errors(InputFileError, f"cannot read {folder}"):
-        runs = sorted(path.parent.name for path in folder.glob(f"*/{RESULT}"))
+    runs = [] if own.exists() else sorted(file.parent.name for file in folder.glob(f"*/{RESULT}"))
     if runs:
-        names = ", ".join(runs[:MOST_NAMED]) + (", ..." if len(runs) > MOST_NAMED else "")
+        some = ", ".join(runs[:MOST_NAMED]) + ", ..." * (len(runs) > MOST_NAMED)
         raise InputFileError(
-            f"{folder} holds the runs {names}: give one, such as {folder / runs[0]}"
+            f"{folder} holds the runs {some}: give one, such as {folder / runs[0]}"
         )
-    if above.exists():
-        return above
-    raise InputFileError(
-        f"{folder} holds no {RESULT}; give the folder that orbiflow escherize wrote"
-    )
-
-
-def _index_of_folder(name: str, names: list[str], file: Path) -> int:
-    folders = folder_names(names)
-    if name not in folders:
-        raise InputFileError(f"{file} tells of {', '.join(folders)}, not of {name}")
-    return folders.index(name)
+    if not own.exists() and not above.exists():
+        what = f"{folder} holds no {RESULT}; give the folder that orbiflow escherize wrote"
+        raise InputFileError(what)
+    return own if own.exists() else above
 
 
 def _index(names: list[str], which: str | int, file: Path) -> int:

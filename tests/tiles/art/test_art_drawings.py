@@ -24,6 +24,7 @@ from orbiflow.tiles import (
     Uses,
     art_scene,
     artwork,
+    read_outline,
     read_over,
     render_artwork,
     write_artwork,
@@ -191,6 +192,45 @@ def test_gradients_and_what_is_left_out(tmp_path: Path) -> None:
     assert over.drawing is not None
     assert [part.style.fill for part in over.drawing.parts] == ["#808080"]
     assert over.notes == ("left out 1 text of the drawing",)
+
+
+def test_lines_that_no_clip_cuts_stay_lines(tmp_path: Path) -> None:
+    body = """<clipPath id="c"><rect x="0" y="0" width="900" height="900"/></clipPath>
+    <g clip-path="url(#c)"><path d="M350 250L620 380" fill="none" stroke="#000"/></g>"""
+    over = read_over(svg_of("IH4", body, tmp_path), squirrel("IH4"))
+    assert over.drawing is not None
+    assert [part.style.stroke for part in over.drawing.parts] == ["#000000"]
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        '<path {0} stroke-width="20" stroke-dasharray="60 30"/>',
+        '<g transform="translate(0 200) scale(1 .3)"><path {0} stroke-width="40"/></g>',
+        '<clipPath id="c"><circle cx="500" cy="300" r="90"/></clipPath>'
+        '<path {0} stroke-width="20" clip-path="url(#c)"/>',
+        '<marker id="m"><rect width="3" height="3"/></marker>'
+        '<path d="M300 200L500 300" fill="none" marker-end="url(#m)" stroke-width="20"/>',
+    ],
+)
+def test_strokes_that_are_no_plain_lines_are_carried_as_regions(body: str, tmp_path: Path) -> None:
+    """The same region is carried as when it is drawn as a fill."""
+    tile = squirrel("IH4")
+    line = 'd="M350 250L620 380" fill="none" stroke="#000000"'
+    over = read_over(svg_of("IH4", body.format(line), tmp_path), tile)
+    seen = read_outline(tmp_path / "drawing.svg").seen
+    assert seen is not None
+    filled = "".join(
+        "M" + "L".join(f"{x} {y}" for x, y in part.exterior.coords) + "z"
+        for part in getattr(seen, "geoms", [seen])
+    )
+    expected = read_over(svg_of("IH4", f'<path d="{filled}"/>', tmp_path), tile)
+    assert over.drawing is not None
+    assert expected.drawing is not None
+    found, (goal,) = over.drawing.parts, expected.drawing.parts
+    assert {part.style for part in found} == {goal.style}
+    whole = shapely.union_all([region(part) for part in found])
+    assert whole.symmetric_difference(region(goal)).area < 1e-3 * region(goal).area
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from artworks import squirrel, upside_down
+from orbiflow.drawing import palette, rgb
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import (
     CLASSES,
@@ -20,6 +21,7 @@ from orbiflow.tiles import (
     ExportSettings,
     Uses,
     artwork,
+    render_artwork,
     scenes,
     write_artwork,
 )
@@ -55,7 +57,7 @@ def apart(some: np.ndarray, others: np.ndarray) -> float:
     return float(gaps.min(axis=1).max())
 
 
-@settings(max_examples=8)
+@settings(max_examples=5)
 @given(
     st.sampled_from(list(CLASSES)),
     st.booleans(),
@@ -90,10 +92,19 @@ def test_a_length_stays_that_length() -> None:
 
 
 def test_whole_tiles_alone_are_painted() -> None:
-    art = artwork(squirrel("IH6"), ArtSettings(**PAGE, clip=False))
+    art = artwork(squirrel("IH6"), ArtSettings(**PAGE, clip=False, dpi=60))
     rings = painted_rings(art)
     assert rings.min() > 0
     assert (rings < (211.7, 148)).all()
+    assert art.page.shown == len(rings)
+    # on the paper of the palette, nothing but these tiles
+    pixels = np.asarray(render_artwork(art))[2::8, 2::8]
+    rows, columns = np.indices(pixels.shape[:2]) * 8 + 2.5
+    region = shapely.union_all(np.asarray(shapely.polygons(rings))).buffer(0.4)
+    inside = shapely.contains_xy(region, columns * 25.4 / 60, rows * 25.4 / 60)
+    on_paper = (pixels == rgb(palette("earth").paper)).all(axis=2)
+    assert on_paper[~inside].all()
+    assert not on_paper[inside].all()
     with pytest.raises(OrbiflowError, match="no tile is whole on a page of 2500 x 1748 pixels"):
         artwork(squirrel("IH6"), ArtSettings(**{**PAGE, "tile_size": "25cm", "clip": False}))
 

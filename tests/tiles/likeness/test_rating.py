@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from scipy.stats import spearmanr
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import Fidelity, Rating, rank_score
-from orbiflow.tiles.likeness import likeness_ratings, overlap_ratings
-from orbiflow.tiles.likeness.rating import WORDS, rating_of_mark
+from orbiflow.symmetry import wallpaper_group
+from orbiflow.tiles import EscherTile, Fidelity, Rating, SearchResult, Target, Tile, rank_score
+from orbiflow.tiles.likeness import likeness_ratings
+from orbiflow.tiles.likeness.rating import WORDS
 
 MARKS = Path(__file__).parents[3] / "benchmarks" / "data" / "likeness_marks.json"
 SCORES = st.lists(st.floats(0, 1), min_size=1, max_size=12)
@@ -25,16 +26,16 @@ SCORES = st.lists(st.floats(0, 1), min_size=1, max_size=12)
 @given(SCORES, st.floats(1, 100))
 def test_stars_follow_the_order_of_scores(scores: list[float], length: float) -> None:
     ordered = sorted(scores, reverse=True)
-    for ratings in (likeness_ratings(ordered, length), overlap_ratings(ordered)):
-        stars = [rating.stars for rating in ratings]
-        assert stars == sorted(stars, reverse=True)
-        words = [list(WORDS.values()).index(rating.word) for rating in ratings]
-        assert words == sorted(words)
+    ratings = likeness_ratings(ordered, length)
+    stars = [rating.stars for rating in ratings]
+    assert stars == sorted(stars, reverse=True)
+    words = [list(WORDS.values()).index(rating.word) for rating in ratings]
+    assert words == sorted(words)
 
 
 @given(st.floats(0, 10))
 def test_stars_are_written_in_halves(mark: float) -> None:
-    rating = rating_of_mark(mark)
+    rating = Rating.of_mark(mark)
     assert len(str(rating).rstrip("½")) + str(rating).count("½") / 2 == rating.stars
 
 
@@ -56,7 +57,10 @@ def test_tiles_with_legs_have_stars_too() -> None:
 
 
 def test_a_blob_for_a_spider_is_poor() -> None:
-    words = [rating.word for rating in overlap_ratings([0.83, 0.66, 0.5, rank_score(0.64, 0.36)])]
+    target = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])
+    scores = (0.83, 0.66, 0.5, rank_score(0.64, 0.36))
+    tiles = [EscherTile(Tile(target.outline, wallpaper_group("p1")), known_score=s) for s in scores]
+    words = [tile.rating and tile.rating.word for tile in SearchResult(target, tiles).tiles]
     assert words == ["excellent", "good", "fair", "poor"]
 
 
@@ -74,7 +78,7 @@ def test_stars_agree_with_marks_as_the_docs_say() -> None:
         pairs += [(a.stars, b) for a, b in zip(found, marks, strict=True)]
     stars, marks = np.array(pairs).T
     assert spearmanr(stars, marks).statistic > 0.74
-    said = [rating_of_mark(mark).word for mark in marks]
+    said = [Rating.of_mark(mark).word for mark in marks]
     place = list(WORDS.values()).index
     apart = [abs(place(Rating(s).word) - place(w)) for s, w in zip(stars, said, strict=True)]
     assert np.mean(np.array(apart) <= 1) > 0.93

@@ -30,7 +30,7 @@ from orbiflow.tiles import (
     write_gallery,
     written_files,
 )
-from orbiflow.tiles.pages.page import MAKINGS, TRIED, measures
+from orbiflow.tiles.pages.page import TRIED
 from shell_lines import call_by_orbiflow
 
 BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]
@@ -130,11 +130,10 @@ def test_commands_of_a_page_can_be_copied_into_a_shell(
     refused = flowed.changed(tile=replace(flowed.tile, polygon=flowed.tile.polygon * (1.0, 1.1)))
     page = Page(index_page([bent, refused, bent], target, names, out=out))
     calls = [call_by_orbiflow(shlex.split(command)[1:]) for command in page.commands]
-    assert len(calls) == 3 * (len(MAKINGS) + len(TRIED))
+    assert len(calls) == 3 * (7 + len(TRIED))
     assert all(isinstance(call, Call) for call in calls)
     flat = [call.flat for call in calls if isinstance(call, Call)]
-    assert {call["result"] for call in flat} == {Path(out)}
-    assert [call["tile"] for call in flat[:: len(calls) // 3]] == ["IH4", "IH6", "3"]
+    assert [call["result"] for call in flat[:: len(calls) // 3]] == [Path(out) / n for n in names]
     assert [call["force"] for call in flat[:: len(calls) // 3]] == [False, True, False]
     files = [call["out"] for call in flat]
     assert len(set(files)) == len(files)
@@ -186,13 +185,18 @@ def test_after_a_search_for_both_the_page_says_what_for(
     assert {"href": "front.png"} not in Page(index_page([bent], target, ["IH4"])).all("a")
 
 
-def test_measures_have_words(bent: EscherTile, flowed: EscherTile) -> None:
-    for result in (bent, flowed):
-        for measure in measures(result):
-            assert all(measure)
-    names = [measure.name for measure in measures(bent)]
-    assert names[:2] == ["Score", "Deformation"]
-    assert "Deformation" not in [measure.name for measure in measures(flowed)]
+def test_figures_are_those_that_were_taken(
+    target: Target, bent: EscherTile, flowed: EscherTile
+) -> None:
+    of_bent, of_flowed = (
+        Page(index_page([tile.changed(pinned=pinned)], target, ["IH4"])).words
+        for tile, pinned in ((bent, 0.0042), (flowed, None))
+    )
+    for figure in ("Deformation", f"{bent.deformation:.3f}", "Pinned parts", "0.0042"):
+        assert figure in of_bent
+        assert figure not in of_flowed
+    for figure in ("Score", f"{flowed.score:.3g}", f"{flowed.metrics.iou:.3f}", "Thinnest neck"):
+        assert figure in of_flowed
 
 
 @pytest.mark.parametrize(("count", "size"), [(1, 1320), (2, 1920), (3, 1920), (7, 1920)])

@@ -124,12 +124,12 @@ def test_bad_dat(tmp_path: Path, content: str | bytes, message: str) -> None:
 @pytest.mark.parametrize(
     ("content", "name", "message"),
     [
-        ("hello there", "a.png", r"holds text of an unknown kind although .* \.png"),
+        ("hello there", "a.png", r"is no PNG image, or a damaged one"),
         (b"\x00\x01\x02\x03" * 9, "a.bin", r"holds data of an unknown kind although .* \.bin"),
         ("hello", "noname", "holds text of an unknown kind; give a PNG"),
         (b"", "a.png", "the file is empty"),
         (b"\x1f\x8b\x08\x00rest", "a.svgz", "gzip-compressed"),
-        (b"%PDF-1.7 ...", "a.svg", "a PDF file; convert it"),
+        (b"%PDF-1.7 ...", "a.svg", "a PDF or Illustrator file; .* save it as SVG"),
         ("<html><body/></html>", "a.html", "holds text of an unknown kind"),
     ],
 )

@@ -25,7 +25,8 @@ def read(tmp_path: Path, body: str, attributes: str = 'viewBox="0 0 100 100"') -
     "body",
     [
         f'<path d="{SQUARE}"/>',
-        '<path d="M10 20L40 20 40 50 10 50Z" fill="none" stroke="red"/>',
+        '<path d="M10 20L40 20 40 50 10 50Z" fill="none"/>',
+        '<path d="M11 21L39 21 39 49 11 49Z" fill="none" stroke="red" stroke-width="2"/>',
         '<path d="M10 20L40 20 40 50 10 50 10 20"/>',
         '<rect x="10" y="20" width="30" height="30"/>',
         '<rect x="10%" y="20%" width="30%" height="30%"/>',
@@ -147,9 +148,10 @@ def test_background_is_left_out(tmp_path: Path) -> None:
     assert hausdorff(alone.outline, box(0, 0, 100, 100)) < 1e-3
 
 
-def test_open_paths_are_left_out_and_said(tmp_path: Path) -> None:
+def test_open_paths_are_filled_as_they_are_drawn(tmp_path: Path) -> None:
     reading = read(tmp_path, f'<path d="M0 0L99 0 99 99"/><path d="{SQUARE}"/>')
-    assert reading.notes == ("left out 1 open path",)
+    assert reading.notes == ()
+    assert Polygon(reading.outline).area == pytest.approx(99**2 / 2 + 700)
 
 
 def test_prefixed_and_encoded_documents(tmp_path: Path) -> None:
@@ -167,8 +169,7 @@ def test_prefixed_and_encoded_documents(tmp_path: Path) -> None:
     ("body", "message"),
     [
         ("", "no closed path: the drawing has no shape"),
-        ('<path d="M0 0L10 0 10 10"/>', "no closed path: its only path is open"),
-        ('<path d="M0 0L1 0M5 5L6 6 8 9"/>', "all 2 paths are open"),
+        ('<path d="M0 0L10 0"/>', "no closed path: the drawing has no shape"),
         ('<image href="a.png" width="9" height="9"/>', r"only 1 embedded image\(s\); trace"),
         ("<text>hi</text><text>ho</text>", r"only 2 text\(s\); convert the text to paths"),
         ('<path d="M0 0L10 0 0 0z"/>', "no shape that encloses an area"),

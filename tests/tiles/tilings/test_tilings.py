@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import shapely
@@ -9,7 +11,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry import WALLPAPER_GROUPS, identity, wallpaper_group
+from orbiflow.symmetry import (
+    WALLPAPER_GROUPS,
+    CrystallographicGroup,
+    identity,
+    symmetry_elements,
+    wallpaper_group,
+)
 from orbiflow.tiles import (
     Placed,
     Prototile,
@@ -160,6 +168,29 @@ def test_dirichlet_cells_have_the_stabiliser_of_their_point(data: st.DataObject)
     assert np.isclose(tile.signed_area * group.order, len(near) * group.cell_volume)
 
 
+@settings(max_examples=24, deadline=None)
+@given(wallpaper_groups(), seeds, st.floats(-12.0, -7.0))
+def test_a_site_beside_a_centre_or_mirror_counts_as_on_it(
+    group: CrystallographicGroup, seed: int, power: float
+) -> None:
+    """Of all 17 groups: neither the cell nor its stabiliser depends on rounding."""
+    rng = np.random.default_rng(seed)
+    elements, size = symmetry_elements(group), np.sqrt(group.cell_volume)
+    lines = [line.line for line in elements.lines if line.is_mirror]
+    special = [center.point for center in elements.centers]
+    special += [line.point + rng.uniform() * size * line.direction for line in lines]
+    assume(special)
+    point = special[rng.integers(len(special))]
+    near = group.elements_near(point, 0.02 * size, source=point)
+    assume(len(near) == len(fixing(group, point)))
+    angle = rng.uniform(0, 2 * np.pi)
+    beside = point + 10.0**power * size * np.array([np.cos(angle), np.sin(angle)])
+    tile = dirichlet_tile(group, beside)
+    certificate = certify(tile)
+    assert certificate.valid, certificate
+    assert tile.tiling.stabilisers[0].order == len(near)
+
+
 @pytest.mark.parametrize("name", WALLPAPER_GROUPS)
 @settings(max_examples=5, deadline=None)
 @given(data=st.data())
@@ -202,6 +233,36 @@ def test_two_prototiles_that_are_one() -> None:
     assert any("overlaps" in reason for reason in certificate.reasons)
     with pytest.raises(OrbiflowError, match="points 0 and 1 of a Dirichlet tiling have the same"):
         dirichlet_tiling(kept.group, [(0.2, 0.3), kept.group.cosets[1](np.array([0.2, 0.3]))])
+
+
+UNIT_SQUARE = SQUARE + 0.5
+
+
+@pytest.mark.parametrize("height", [1e-8, 1e-10, 1e-12])
+@pytest.mark.parametrize("lift", [0.0, 0.5])
+def test_a_sliver_inside_another_prototile_is_refused(height: float, lift: float) -> None:
+    sliver = UNIT_SQUARE * (1.0, height) - (0.0, lift * height)
+    certificate = certify(Tiling(wallpaper_group("p1", np.eye(2)), [UNIT_SQUARE, sliver]))
+    assert not certificate.valid
+    assert re.search(r"prototile 1 is only .* wide: .* leave it out", certificate.reasons[0])
+
+
+@pytest.mark.parametrize("side", [1e-5, 1e-6])
+def test_small_prototiles_overlap_by_a_share_of_their_own(side: float) -> None:
+    """Two equal ones inside another: edges match, and little area is covered twice."""
+    group, small = wallpaper_group("p1", np.eye(2)), 0.3 + side * UNIT_SQUARE
+    certificate = certify(Tiling(group, [UNIT_SQUARE, small, small]))
+    assert certificate.edge_mismatch < 1e-9
+    assert certificate.total_overlap < 1e-9
+    assert any("prototile 1 overlaps" in reason for reason in certificate.reasons)
+
+
+@pytest.mark.parametrize("side", [1e-2, 1e-4, 1e-6])
+def test_a_small_prototile_in_its_place_is_certified(side: float) -> None:
+    corner = [[0.0, 0.0], [side, 0.0], [0.0, side]]
+    rest = [[side, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, side]]
+    certificate = certify(Tiling(wallpaper_group("p1", np.eye(2)), [rest, corner]))
+    assert certificate.valid, certificate
 
 
 def test_half_of_a_pair_is_refused_and_says_which() -> None:

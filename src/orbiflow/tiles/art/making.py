@@ -14,7 +14,7 @@ from orbiflow.arguments import as_path
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
-from orbiflow.tiles.art.page import ArtPage, art_page
+from orbiflow.tiles.art.page import HIDDEN, ArtPage, art_page
 from orbiflow.tiles.art.rendering import render_page
 from orbiflow.tiles.art.settings import ArtSettings
 from orbiflow.tiles.exporting import MOTIF, SYMBOL, tile_layers
@@ -149,7 +149,8 @@ def art_scene(art: Artwork) -> Scene:
     if art.picture is not None:
         rasters = (carried_raster(art.picture, art.tile, art.density, page.count),)
     motif = Motif(art.motif.parts, rasters, SYMBOL).moved(np.eye(2), -middle)
-    copies = page.copies
+    shown = page.colours != HIDDEN
+    copies = page.copies.select(shown)
     turned = linear @ tile.group.linear_parts
     places = copies.translations @ linear.T + offset + (turned @ middle)[copies.cosets]
     # symbols in mm, for which the writer's decimals are meant
@@ -162,7 +163,9 @@ def art_scene(art: Artwork) -> Scene:
     drawn = bool(motif.parts or motif.rasters)
     line = Style(None, chosen.outline, unit * art.outline)
     uses, seam = Uses(SYMBOL, turned, copies.cosets, places), 0.3 * unit
-    layers += tile_layers(uses, page.colours, chosen, line, clipped=True, seam=seam, drawn=drawn)
+    layers += tile_layers(
+        uses, page.colours[shown], chosen, line, clipped=True, seam=seam, drawn=drawn
+    )
     notes = (f"Artwork of {tile.isohedral_class or 'a tile'}, made with orbiflow {__version__}.",)
     return Scene(
         box.width,

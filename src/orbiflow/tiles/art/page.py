@@ -17,6 +17,7 @@ from orbiflow.tiles.scene import INCH, Box
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Copies, Tile, colouring, copies_meeting
 
+HIDDEN = -1  # the colour of copies that are not painted
 USUAL_TILES = 25  # number of tiles on a page if no size of a tile is given
 
 
@@ -29,7 +30,7 @@ class ArtPage:
     copies: Copies  # all copies that the picture shows, and some beyond
     linear: Array  # with `offset`: the map from the tile's units to pixels, y down
     offset: Array
-    colours: NDArray[np.int64]  # the number (M,) of each copy's colour
+    colours: NDArray[np.int64]  # the number (M,) of each copy's colour, or `HIDDEN`
     count: int  # the number of colours
     notes: tuple[str, ...] = ()  # what the user should know
 
@@ -55,11 +56,13 @@ class ArtPage:
 
     @property
     def shown(self) -> float:
-        """The number of tiles that the picture has room for, by area."""
+        """The number of tiles that the picture shows or, where it cuts some, has room for by area."""
+        if (self.colours == HIDDEN).any():
+            return float((self.colours != HIDDEN).sum())
         return math.prod(self.size) / (self.scale**2 * abs(self.tile.signed_area))
 
     def whole(self, margin: float) -> ArtPage:
-        """Return the page with those tiles alone that keep a distance in pixels from its edge."""
+        """Return the page with tiles hidden unless they keep a distance in pixels from its edge."""
         rings = self.rings()
         low, high = rings.min(axis=1), rings.max(axis=1)
         kept = ((low >= margin) & (high <= np.array(self.size) - margin)).all(axis=1)
@@ -68,7 +71,7 @@ class ArtPage:
                 f"no tile is whole on a page of {self.width} x {self.height} pixels; choose a larger "
                 "page or smaller tiles"
             )
-        return replace(self, copies=self.copies.select(kept), colours=self.colours[kept])
+        return replace(self, colours=np.where(kept, self.colours, HIDDEN))
 
     def rings(self) -> Array:
         """Return the copies (M, N, 2) in pixels."""

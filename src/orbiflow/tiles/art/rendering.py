@@ -7,8 +7,8 @@ import torch
 
 from orbiflow.arrays import Array
 from orbiflow.runtime import Cancel
-from orbiflow.tiles.art.page import ArtPage
-from orbiflow.tiles.motifs import Grid, Runs, rgb_of, ring_sides, runs
+from orbiflow.tiles.art.page import HIDDEN, ArtPage
+from orbiflow.tiles.motifs import NOWHERE, Grid, Runs, rgb_of, ring_sides, runs
 
 BAND = 2_000_000  # number of samples that are computed at a time
 
@@ -39,7 +39,8 @@ def render_page(
         first = top * samples
         near = np.flatnonzero((high > first) & (low < first + rows * samples))
         found = runs(ring_sides(rings[near]), first, rows * samples, page.width * samples)
-        named = found._replace(label=np.where(found.label < 0, -1, near[found.label]))
+        unpainted = (found.label < 0) | (page.colours[near[found.label]] == HIDDEN)
+        named = found._replace(label=np.where(unpainted, NOWHERE, near[found.label]))
         colours = look(named, first).reshape(1, 3, rows * samples, page.width * samples)
         mean = torch.nn.functional.avg_pool2d(colours, samples)[0].permute(1, 2, 0)
         result[top : top + rows] = (mean * 255 + 0.5).clamp_(0, 255).byte().numpy()

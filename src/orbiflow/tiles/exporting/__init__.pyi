@@ -3,7 +3,6 @@ from .layouts import SYMBOL as SYMBOL
 from .layouts import Layout as Layout
 from .layouts import chosen_copies as chosen_copies
 from .layouts import cut_ring as cut_ring
-from .layouts import layout as layout
 from .layouts import place_on as place_on
 from .layouts import tile_layers as tile_layers
 from .placing import edge_margin as edge_margin
@@ -13,6 +12,6 @@ from .placing import place_on_page as place_on_page
 from .settings import ExportSettings as ExportSettings
 from .writing import Exported as Exported
 from .writing import export as export
-from .writing import neck_notes as neck_notes
+from .writing import laid_out as laid_out
 from .writing import scenes as scenes
 from .writing import write_scene as write_scene

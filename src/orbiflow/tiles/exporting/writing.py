@@ -8,7 +8,6 @@ from pathlib import Path
 
 from orbiflow import __version__
 from orbiflow.arguments import as_path
-from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
@@ -120,16 +119,9 @@ def scenes(
     certificate = given.require_certified(
         force=force, otherwise="so it is not exported; --force exports it, marked so"
     )
-    placed = layout(given.tile, settings, y_down=given.y_down)
+    placed, notes = laid_out(given, settings, picture)
     settings = placed.settings  # a template's tile is as large as the page allows
-    notes = (*neck_notes(placed.tile.polygon, settings.warn_neck), *_colour_notes(given, settings))
-    told = (placed.outline.note, placed.piece[1] if settings.cut == "pieces" else "")
-    notes = (*filter(None, told), *notes)
-    if picture is not None or settings.strokes or settings.eyes:
-        given = with_map(given)
-        over = Over() if picture is None else read_over(picture, given)
-        placed = replace(placed, motif=drawn_on(placed, given, over))
-        notes = (*given.notes, *over.notes, *notes)
+    notes = (*notes, *_colour_notes(given, settings))
     made = [_described(scene, given, settings, certificate) for scene in _made(placed, given)]
     if settings.cut == "template" and given.bending is None:
         notes = (*notes, "the template has no silhouette: no map of it is known")
@@ -145,6 +137,21 @@ def scenes(
         marked = {"pieces": slice(None), "jigsaw": slice(1)}.get(settings.cut, slice(-1, None))
         made[marked] = [calibrated(scene) for scene in made[marked]]
     return made, notes
+
+
+def laid_out(
+    given: EscherTile, settings: ExportSettings, picture: str | Path | None = None
+) -> tuple[Layout, tuple[str, ...]]:
+    """Return a tile in its place with what lies on it, and what the user should know."""
+    placed = layout(given.tile, settings, y_down=given.y_down)
+    told = (placed.outline.note, placed.piece[1] if settings.cut == "pieces" else "")
+    notes = (*filter(None, told), *_neck_notes(placed))
+    if picture is not None or settings.strokes or settings.eyes:
+        given = with_map(given)
+        over = Over() if picture is None else read_over(picture, given)
+        placed = replace(placed, motif=drawn_on(placed, given, over))
+        notes = (*given.notes, *over.notes, *notes)
+    return placed, notes
 
 
 def _made(placed: Layout, given: EscherTile) -> list[Scene]:
@@ -203,18 +210,18 @@ def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...
     return (f"its lines of {width:g} mm hardly show on a screen; a cutter follows them",)
 
 
-def neck_notes(ring: Array, limit: float) -> list[str]:
-    """Say where a tile's outline in mm is thinner than a limit; 0 says nothing."""
+def _neck_notes(placed: Layout) -> tuple[str, ...]:
+    limit, ring = placed.settings.warn_neck, placed.tile.polygon
     if not limit:
-        return []
+        return ()
     try:
         neck = narrowest_neck(ring)
     except OrbiflowError as error:  # a forced tile may cross itself
-        return [f"its necks cannot be measured: {error}"]
+        return (f"its necks cannot be measured: {error}",)
     if neck.width >= limit:
-        return []
+        return ()
     place = place_on(ring, neck.place)
-    return [f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm {place}"]
+    return (f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm {place}",)
 
 
 def write_scene(scene: Scene, settings: ExportSettings) -> str | bytes:

@@ -30,7 +30,6 @@ from .ranking import rank_score as rank_score
 from .rating import MOST_STARS as MOST_STARS
 from .rating import Rating as Rating
 from .rating import likeness_ratings as likeness_ratings
-from .rating import overlap_ratings as overlap_ratings
 from .recognition import Recognisability as Recognisability
 from .recognition import Recogniser as Recogniser
 from .recognition import recognisability as recognisability

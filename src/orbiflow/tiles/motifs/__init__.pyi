@@ -4,6 +4,7 @@ from .drawings import read_over as read_over
 from .making import carried_raster as carried_raster
 from .making import drawn_motif as drawn_motif
 from .making import picture_paint as picture_paint
+from .raster import NOWHERE as NOWHERE
 from .raster import Grid as Grid
 from .raster import Paint as Paint
 from .raster import Runs as Runs

@@ -6,10 +6,9 @@ It works in light and dark, on a phone and on paper, and without its script, whi
 from __future__ import annotations
 
 import shlex
-from bisect import bisect_right
 from collections.abc import Sequence
 from pathlib import PurePath
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import shapely
@@ -22,73 +21,8 @@ from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Colouring, colouring, copies_meeting
 
-
-class Measure(NamedTuple):
-    """A number in words: its `name`, its `value` as text, a judgement (`words`), and its `meaning`."""
-
-    name: str
-    value: str
-    words: str
-    meaning: str
-
-
-def measures(result: EscherTile) -> list[Measure]:
-    """Return a tile's measures, the most important first, without those that were not taken."""
-    meaning = "How much of the outline's shape bending left, 0 to 1."
-    if result.fidelity is None:
-        meaning = "Overlap and recognisability together, 0 to 1."
-    found = [Measure("Score", f"{result.score:.3g}", "ranks the tiles", meaning)]
-    bent, thinnest = result.deformation, result.thinnest
-    if bent is not None:
-        words = ("bent a little", "bent somewhat", "bent much", "bent very much")
-        word = words[bisect_right((0.1, 0.2, 0.35), bent)]
-        meaning = "What bending the silhouette into the tile costs; 0 is the silhouette itself."
-        found.append(Measure("Deformation", f"{bent:.3f}", word, meaning))
-    common = f"{100 * result.metrics.dice:.0f} % of their areas in common"
-    meaning = "Area common to tile and silhouette, as it is, over the area of both together."
-    found.append(Measure("Overlap (IoU)", f"{result.metrics.iou:.3f}", common, meaning))
-    same = result.recognisability
-    meaning = "Share of the outlines that is found again, point by point; 1 is all."
-    found.append(Measure("Recognised", f"{same.score:.2f}", f"limbs {same.limbs:.2f}", meaning))
-    if thinnest is not None:
-        thin = thinnest.share < max(result.min_neck, 0.02)
-        word = "thin: take care when you cut" if thin else "sound"
-        meaning = "Its width, in hundredths of the square root of the tile's area."
-        found.append(Measure("Thinnest neck", f"{100 * thinnest.share:.1f} %", word, meaning))
-    if result.pinned is not None:
-        word = "as they were" if result.pinned < 0.01 else "changed"
-        meaning = "How far the worst of them is from similar to what it was; 0 is the same shape."
-        found.append(Measure("Pinned parts", f"{result.pinned:.4f}", word, meaning))
-    return found
-
-
 # The files in every tile's folder
 TILE_FILES = ("tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors")
-
-CHOICES = {
-    "tile.svg": "the tile (SVG)",
-    "tiling.svg": "the tiling (SVG)",
-    "tiling.png": "the tiling (PNG)",
-    "overlay.png": "the comparison (PNG)",
-    "tiling.pdf": "the tiling, for print (PDF)",
-    "overlay.pdf": "the comparison, for print (PDF)",
-    "field.png": "the flow (PNG)",
-    "field.pdf": "the flow, for print (PDF)",
-    "model.safetensors": "the map (safetensors)",
-}
-"""Files of a class, in words."""
-
-
-MAKINGS = {
-    "Laser, every line cut once": ("export", "--for laser", ".svg"),
-    "Laser, pieces apart": ("export", "--for laser --cut pieces", "-pieces.svg"),
-    "Print": ("export", "--for print", ".pdf"),
-    "Artwork, engraved": ("art", "--engrave", "-art.png"),
-    "Animation": ("animate", "", ".gif"),
-    "A tile in 3D": ("solid", "", ".stl"),
-    "Cookie cutter": ("solid", "--kind cutter", "-cutter.stl"),
-}
-"""What can be made of a tile: the command, its options, and the end of the file's name."""
 
 TRIED = ("delft", "lagoon", "ochre", "dusk", "forest", "ink")
 """The palettes that the page shows."""
@@ -107,38 +41,25 @@ def index_page(
 ) -> str:
     """Return the page of one search's tiles, best first, to be written beside their `folders`.
 
-    Args:
-        results: The tiles.
-        target: The silhouette.
-        folders: The names of the tiles' folders.
-        out: What commands call the folder that the page is in.
-        read: Whether `read.png` is beside the page.
-        colours: The colouring of each tiling, if it is known already.
-        failures: The classes without a tile.
-        figures: The names of the files in each folder besides the `TILE_FILES`.
+    `out` is what commands call the folder that the page is in, `read` whether `read.png` is there.
+    `colours` has the colouring of each tiling, if it is known already; `figures` are the names of the
+    files in each folder besides the `TILE_FILES`.
     """
     name = PurePath(target.source).name
     extra = figures or [()] * len(results)
     known = colours or [colouring(tile.tile) for tile in results]
     tiles = [
-        {
-            "found": tile,
-            "folder": folder,
-            "files": TILE_FILES + more,
-            "measures": measures(tile),
-            "makings": _makings(tile, folder, rank, f"{PurePath(name).stem}-{folder}"),
-            "patch": _patch(tile, own),
-        }
-        for rank, (tile, folder, more, own) in enumerate(
-            zip(results, folders, extra, known, strict=True), 1
-        )
+        {"found": tile, "folder": folder, "files": TILE_FILES + more, "patch": _patch(tile, own)}
+        for tile, folder, more, own in zip(results, folders, extra, known, strict=True)
     ]
     return rendered(
         "orbiflow.tiles.pages",
         "index_page.html",
         title=f"Tiles that look like {name}",
         name=name,
+        stem=PurePath(name).stem,
         out=shlex.quote(f"./{out}" if out.startswith("-") else out),
+        quote=shlex.quote,
         read=read,
         silhouette=_silhouette(target),
         compared=any(result.front is not None for result in results),
@@ -148,20 +69,7 @@ def index_page(
         ramp=RAMP,
         strip=STRIP,
         failures=failures,
-        choices=CHOICES,
     )
-
-
-def _makings(tile: EscherTile, folder: str, rank: int, stem: str) -> list[tuple[str, str, str]]:
-    """Return what can be made: a title or a palette, a command, and the words after its folder."""
-    which = folder if folder == tile.isohedral_class else str(rank)
-    force = "" if tile.certificate.valid else "--force"
-    makings = {**MAKINGS, **{way: ("art", f"--palette {way}", f"-{way}.png") for way in TRIED}}
-    return [
-        (title, verb, " ".join(["--tile", which, *force.split(), *options.split(), "-o", file]))
-        for title, (verb, options, end) in makings.items()
-        for file in [shlex.quote(stem + end)]
-    ]
 
 
 PATCH = 150  # the width of a small tiling in its own units, about pixels

@@ -22,6 +22,7 @@ from orbiflow.runtime import (
 )
 from orbiflow.tiles.pages.overview import overview_png
 from orbiflow.tiles.pages.page import TILE_FILES, index_page
+from orbiflow.tiles.pages.read_picture import is_read_png
 from orbiflow.tiles.pictures import (
     bending_picture,
     comparison,
@@ -33,7 +34,7 @@ from orbiflow.tiles.pictures import (
 from orbiflow.tiles.result_file import RESULT, folder_names
 from orbiflow.tiles.scene import tile_svg, tiling_svg
 from orbiflow.tiles.search import SearchResult, report
-from orbiflow.tiles.silhouette import Target
+from orbiflow.tiles.silhouette import Target, doubts
 from orbiflow.tiles.tile import EscherTile, TileMap
 from orbiflow.tiles.tilings import Colouring, colouring
 
@@ -97,16 +98,17 @@ def write_tile_folder(
 
 
 OVERVIEW, INDEX, FRONT, READ = "overview.png", "index.html", "front.png", "read.png"
+# what was read for a search that has not replaced an earlier run yet
+READ_NEXT = "read-next.png"
 
 
 def write_gallery(
-    result: SearchResult, out: Path, *, figures: bool = False, shown_out: str = ""
+    result: SearchResult, out: Path, *, figures: bool = False, shown_out: str = "."
 ) -> None:
     """Write each tile's folder, `overview.png`, `index.html` and, after a search for both, `front.png`.
 
     As many processes as searched draw `figures`; without these, starting one would take longer than
-    drawing. There is at least one tile. `shown_out` is what the page's commands call the folder, by
-    default its path.
+    drawing. There is at least one tile. `shown_out` is what the page's commands call the folder.
 
     Raises:
         OutputError: If a file cannot be written.
@@ -125,17 +127,8 @@ def write_gallery(
                 pass
     write_atomic(out / OVERVIEW, overview_png(tiles, target, colours, failures=failures))
     extra = [figure_files(tile) if figures else () for tile in tiles]
-    read, shown = (out / READ).is_file(), shown_out or str(out)
-    page = index_page(
-        tiles,
-        target,
-        names,
-        out=shown,
-        read=read,
-        colours=colours,
-        failures=failures,
-        figures=extra,
-    )
+    read, more = (out / READ).is_file(), {"failures": failures, "figures": extra}
+    page = index_page(tiles, target, names, out=shown_out, read=read, colours=colours, **more)
     write_atomic(out / INDEX, page)
     if result.method.objective == "both":
         _write_front(tiles, result.found, out)
@@ -171,11 +164,11 @@ def written_files(folder: Path) -> set[str]:
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         ours, classes = False, []
     if not ours:
-        return set()
+        return {READ} if is_read_png(folder / READ) else set()
     front = {FRONT} if document.get("objective") == "both" else set()
     files = (*TILE_FILES, *FIGURE_FILES)
     inside = {f"{name}/{file}" for name in folder_names(classes) for file in files}
-    return {RESULT, OVERVIEW, INDEX} | front | inside
+    return {RESULT, OVERVIEW, INDEX, READ, READ_NEXT} | front | inside
 
 
 def result_folder(out: str | Path) -> ResultFolder:
@@ -183,12 +176,32 @@ def result_folder(out: str | Path) -> ResultFolder:
     return ResultFolder(as_path(out, "the folder to write into"), written_files)
 
 
+def show_reading(target: Target, picture: bytes, out: Path, on_event: Sink = ignore) -> None:
+    """Write `read.png` into the folder at once and tell what was read and what may be wrong with it.
+
+    Beside an earlier run it is `read-next.png`, until this run replaces that one.
+
+    Raises:
+        OutputError: If the folder holds what orbiflow did not write, or cannot be written.
+    """
+    folder = result_folder(out)
+    is_beside_a_run = (folder.path / RESULT).is_file()
+    path = make_folder(folder.path) / (READ_NEXT if is_beside_a_run else READ)
+    write_atomic(path, picture)
+    for note in target.notes:
+        on_event(Note(note))
+    on_event(Note(f"what was read is drawn in {path}"))
+    for doubt in doubts(target):
+        on_event(Note(doubt, warning=True))
+
+
 def write_run(
     result: SearchResult,
     out: str | Path,
+    picture: bytes = b"",
     *,
     figures: bool = False,
-    shown_out: str = "",
+    shown_out: str | None = None,
     on_event: Sink = ignore,
 ) -> list[Path]:
     """Write what a search found as a result folder: a folder a class, overviews, `result.json`.
@@ -199,6 +212,7 @@ def write_run(
     Args:
         result: What the search found.
         out: The folder, which every command on a RESULT takes.
+        picture: What was read, as `read_png` draws it.
         figures: Write the figures for print, too, in as many processes as the search had.
         shown_out: What the page's commands call the folder. Default: its path.
         on_event: Called with each `Note` and `Written`.
@@ -219,9 +233,10 @@ def write_run(
     if tiles and figures and not any(FIELD_FILES[0] in figure_files(tile) for tile in tiles):
         on_event(Note("no flow made these tiles, so there is none to draw: the silhouette bent"))
     with folder.replaced() as staged:
+        if picture:
+            write_atomic(staged / READ, picture)
         if tiles:
-            shown = shown_out or str(out)
-            write_gallery(result, staged, figures=figures, shown_out=shown)
+            write_gallery(result, staged, figures=figures, shown_out=shown_out or str(out))
         write_atomic(staged / RESULT, json.dumps(report(result), allow_nan=False))
         files = [path.relative_to(staged) for path in staged.rglob("*") if path.is_file()]
     written = [folder.path / path for path in sorted(files)]

@@ -167,7 +167,9 @@ def drawn(scene: Scene, *, least_width: float = 0.0) -> Figure:
         return style._replace(width=max(style.width, least_width) * 72 / INCH)
 
     for layer in scene.layers:
-        artists = [_image(axes, item) for item in layer.items if isinstance(item, Raster)]
+        # as it is in files of vectors
+        how = "bilinear" if least_width else "none"
+        artists = [_image(axes, item, how) for item in layer.items if isinstance(item, Raster)]
         artists += [
             draw_paths(axes, [curves_path(item.curves)], points(item.style), item.opacity)
             for item in layer.items
@@ -182,13 +184,13 @@ def drawn(scene: Scene, *, least_width: float = 0.0) -> Figure:
     return figure
 
 
-def _image(axes: Axes, raster: Raster) -> Artist:
+def _image(axes: Axes, raster: Raster, interpolation: str) -> Artist:
     """Draw a picture of pixels on axes of mm, in its place."""
     from matplotlib.image import AxesImage
     from matplotlib.transforms import Affine2D
 
     width, height = raster.size
-    image = AxesImage(axes, interpolation="none", origin="upper", extent=(0, width, height, 0))
+    image = AxesImage(axes, interpolation=interpolation, extent=(0, width, height, 0))
     image.set_data(np.asarray(Image.open(io.BytesIO(raster.png))))
     place = np.vstack([np.column_stack([raster.linear, raster.offset]), [0, 0, 1]])
     image.set_transform(Affine2D(place) + axes.transData)

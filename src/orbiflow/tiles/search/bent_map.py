@@ -21,6 +21,7 @@ from orbiflow.tiles.silhouette import Bending, Mesh, harmonic, triangulate, unfo
 from orbiflow.tiles.tilings import Tile
 
 SAME = 1e-9  # distance along the outline, in outlines, below which points are one
+SHARPENINGS = 12  # most tries to follow the outline's finest parts
 
 
 def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bending:
@@ -37,9 +38,11 @@ def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bend
     # how far along the outline each vertex of the mesh lies: all are points of it
     knots = arc_lengths(hand.outline)
     line = shapely.LinearRing(hand.outline)
-    along = shapely.line_locate_point(line, shapely.points(hand.fine.mesh.points[:n]))
-    places = np.append((along - along[0]) % knots[-1], knots[-1])
-    own = np.interp((knots - along[0]) % knots[-1], places, np.arange(n + 1))
+    vertices = shapely.points(hand.fine.mesh.points[:n])
+    along: Array = np.asarray(shapely.line_locate_point(line, vertices))
+    places: Array = np.append((along - along[0]) % knots[-1], knots[-1])
+    passed: Array = (knots - along[0]) % knots[-1]
+    own = np.interp(passed, places, np.arange(n + 1))
     mesh, images = divided(hand.fine.mesh, _unknown(hand.fine.mesh, own), plane_points(z))
     mesh, images = onto_polygon(
         mesh, images, tile.polygon * flip, (first + placement.starts[0]) % n, np.array(tile.corners)
@@ -69,7 +72,8 @@ def onto_polygon(
         raise OrbiflowError("the corners of the outline and the polygon do not correspond")
     places = _places(np.roll(images[:n], -corners[0], axis=0), polygon, knots, own, goal)
 
-    known = np.interp((shares(mesh) - corners[0]) % n, np.arange(n + 1), knots)
+    share: Array = (shares(mesh) - corners[0]) % n
+    known = np.interp(share, np.arange(n + 1), knots)
     places, fresh = _snapped(places, np.sort(known), knots[-1])
     closed = np.append(places, knots[-1])
     along = np.concatenate([known, places[fresh]])
@@ -120,7 +124,7 @@ def with_outline(mesh: Mesh, points: Array, outline: Array) -> Array:
     All stay in place where the inside cannot follow without folds: behind hairs.
     """
     with contextlib.suppress(OrbiflowError):
-        return unfolded(mesh, np.concatenate([outline, points[len(outline) :]]))
+        return unfolded(mesh, np.concatenate([outline, points[len(outline) :]]), SHARPENINGS)
     return points
 
 
@@ -203,8 +207,8 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
     turns, numbers = np.arange(TILE + 1), np.arange(len(knots))
 
     def outline(mesh: Mesh) -> Array:
-        turn = np.interp(shares(mesh), numbers, knots) / knots[-1] * TILE
-        place = np.interp((turn - first) % TILE, turns, places) + start
+        turn: Array = np.interp(shares(mesh), numbers, knots) / knots[-1] * TILE
+        place: Array = np.interp((turn - first) % TILE, turns, places) + start
         return points_along(rest, place / SILHOUETTE * lengths[-1])
 
     moved = mesh.points + harmonic(mesh, outline(mesh) - mesh.points[: len(shares(mesh))])
@@ -214,8 +218,10 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
         raise OrbiflowError(
             "the silhouette cannot be carried to this tile without folds: they differ too much"
         ) from error
-    turn = np.interp((lengths / lengths[-1] * SILHOUETTE - start) % SILHOUETTE, places, turns)
-    at = np.interp((turn + first) % TILE / TILE * knots[-1], knots, numbers)
+    place: Array = (lengths / lengths[-1] * SILHOUETTE - start) % SILHOUETTE
+    turn = np.interp(place, places, turns)
+    along: Array = (turn + first) % TILE / TILE * knots[-1]
+    at = np.interp(along, knots, numbers)
     mesh, moved = divided(mesh, _unknown(mesh, at), moved)
     return Bending(with_outline(mesh, moved, outline(mesh)), mesh.points, mesh.triangles)
 

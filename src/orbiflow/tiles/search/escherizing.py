@@ -88,6 +88,7 @@ def escherize(
     method: SearchMethod | None = None,
     emphasis: Emphasis | None = None,
     pins: Pins | None = None,
+    on_checked: Callable[[], object] | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> SearchResult:
@@ -100,6 +101,7 @@ def escherize(
         method: A method of one's own, or with settings of its own, instead of the settings'.
         emphasis: What must survive, instead of the settings' mask.
         pins: What must not bend, instead of the settings'.
+        on_checked: Called when all arguments have been checked, before the search.
         on_event: Called in this thread with each `Note`, `Progress`, `Preview`, `TileFound` and
             `ClassFailed`. What it raises ends the search.
         cancel: Ends the search early; what was found by then is returned, and the other classes are
@@ -121,10 +123,12 @@ def escherize(
         pins = Pins.read(settings.pin, target, keep_angle=settings.pin_angle)
     method = method or settings.search_method
     task = _task(Goal(target, emphasis, pins), method, settings.per_class, settings.force)
+    names = list(dict.fromkeys(isohedral_class(name).name for name in settings.classes or CLASSES))
+    if on_checked is not None:
+        on_checked()
     for source in (emphasis, pins):
         for note in source.notes if source else ():
             on_event(Note(note))
-    names = list(dict.fromkeys(isohedral_class(name).name for name in settings.classes or CLASSES))
     workers = min(settings.workers or 1, len(names))
     record = _Record(names, on_event)
     with contextlib.suppress(Cancelled):

@@ -18,12 +18,12 @@ from orbiflow.runtime import one_blas_thread, one_thread
 from orbiflow.tiles.geometry import ring_length, signed_area
 from orbiflow.tiles.likeness import (
     Pinned,
+    Rating,
     Recogniser,
     compare,
     iou,
     likeness_ratings,
     narrowest_neck,
-    overlap_ratings,
 )
 from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
@@ -122,11 +122,10 @@ def rated(tiles: Sequence[EscherTile], target: Target) -> list[EscherTile]:
     """Return the tiles of a run with their ratings, in the same order."""
     length = ring_length(target.outline) / math.sqrt(abs(signed_area(target.outline)))
     likeness = [tile.score for tile in tiles if tile.fidelity is not None]
-    overlap = [tile.score for tile in tiles if tile.fidelity is None]
-    of_likeness = iter(likeness_ratings(likeness, length))
-    of_overlap = iter(overlap_ratings(overlap))
+    found = iter(likeness_ratings(likeness, length))
     return [
-        tile.changed(rating=next(of_overlap if tile.fidelity is None else of_likeness))
+        # no marks of tiles for overlap are kept: their scores are taken for marks
+        tile.changed(rating=next(found) if tile.fidelity else Rating.of_mark(10 * tile.score - 1))
         for tile in tiles
     ]
 

@@ -1,5 +1,8 @@
 from .bending import Bending as Bending
 from .bending import unfolded as unfolded
+from .checks import doubts as doubts
+from .checks import holes_filled as holes_filled
+from .checks import parts_left_out as parts_left_out
 from .emphasis import Emphasis as Emphasis
 from .mesh import Locator as Locator
 from .mesh import Mesh as Mesh
@@ -30,6 +33,7 @@ from .readers.svg_regions import lightness as lightness
 from .readers.svg_shapes import Drawing as Drawing
 from .readers.svg_shapes import DrawnShape as DrawnShape
 from .readers.svg_xml import parse_xml as parse_xml
+from .settings import ReadingSettings as ReadingSettings
 from .soft_target import SoftTarget as SoftTarget
 from .soft_target import signed_distance as signed_distance
 from .target import Frame as Frame

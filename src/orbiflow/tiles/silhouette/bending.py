@@ -154,20 +154,22 @@ def folded(mesh: Mesh, points: Array) -> NDArray[np.bool_]:
     return doubled_areas(points, mesh.triangles) <= 0
 
 
-def unfolded(mesh: Mesh, points: Array) -> Array:
+def unfolded(mesh: Mesh, points: Array, sharpenings: int | None = None) -> Array:
     """Move the inner points of a map (N, 2) until no triangle is turned over.
 
     Foldover-free maps in few steps (Garanzha, Kaporin, Kudryavtseva, Protais, Ray and Sokolov,
     SIGGRAPH 2021): L-BFGS minimises the distortion |J|^2 / det J of each triangle, with det J bounded
     away from 0 by a shrinking parameter; if that fails, again from points each in the middle of its
     neighbours. Points on the outline, which bound a simple polygon, stay in place; and all do if
-    nothing was turned over. Raises `OrbiflowError` if triangles stay turned over.
+    nothing was turned over. With `sharpenings` it tries no longer than that, and from `points` alone.
+    Raises `OrbiflowError` if triangles stay turned over.
     """
     if not folded(mesh, points).any():
         return points
     outline = points[: mesh.size + len(mesh.sides)]
-    for start in (points, harmonic(mesh, outline)):  # the second is a start for tangled points
-        found = _untangled(_Distortion(mesh, start))
+    # the second is a start for tangled points
+    for start in (points, harmonic(mesh, outline))[: None if sharpenings is None else 1]:
+        found = _untangled(_Distortion(mesh, start), sharpenings or MAX_SHARPENINGS)
         if found is not None:
             return found
     raise OrbiflowError(
@@ -175,11 +177,11 @@ def unfolded(mesh: Mesh, points: Array) -> Array:
     )
 
 
-def _untangled(work: _Distortion) -> Array | None:
+def _untangled(work: _Distortion, sharpenings: int) -> Array | None:
     import scipy.optimize
 
     x = work.start
-    for _ in range(MAX_SHARPENINGS):
+    for _ in range(sharpenings):
         found = scipy.optimize.minimize(
             work.value, x, jac=True, method="L-BFGS-B", options={"maxiter": 60, "maxcor": 20}
         )

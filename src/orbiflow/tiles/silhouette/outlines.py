@@ -129,6 +129,14 @@ def simplified(polygon: Polygon, tolerance: float) -> Polygon:
     return max(parts, key=lambda part: part.area, default=Polygon())
 
 
+def rounded(geometry: BaseGeometry, width: float) -> Polygon:
+    """Return the largest part, filled, without gaps and then without limbs narrower than `width`."""
+    closed = polygons_in(geometry.buffer(width / 2).buffer(-width / 2))
+    solid = filled(max(closed, key=lambda part: filled(part).area, default=Polygon()))
+    parts = polygons_in(solid.buffer(-width / 2).buffer(width / 2))
+    return simplified(max(parts, key=lambda part: part.area, default=Polygon()), width / 50)
+
+
 def outer_ring(polygon: Polygon) -> Array:
     """Return the exterior of `polygon` as a ring (N, 2)."""
     return np.asarray(polygon.exterior.coords, dtype=np.float64)[:-1, :2].copy()

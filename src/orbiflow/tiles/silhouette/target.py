@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import as_array, described, is_a, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import centroid, orient, signed_area
-from orbiflow.tiles.silhouette.outlines import clean_ring
+from orbiflow.tiles.silhouette.outlines import clean_ring, outer_ring, rounded
 from orbiflow.tiles.silhouette.readers import (
     MAX_BYTES,
     FileContent,
@@ -161,6 +163,8 @@ class Target:
     - `kind`: "image", "svg", "dat", "json" or "polygon".
     - `size`, `corner`: The width and height of the picture or drawing, if there is one, and its corner
       of least coordinates.
+    - `seen`: All that was read as shape, before parts were left out and holes filled, if that differs.
+    - `warnings`: What may be wrong with the reading, and what to do then.
 
     >>> target = Target.from_polygon([[0, 0], [2, 0], [2, 2], [0, 2]])
     >>> target.normal.tolist()
@@ -176,6 +180,8 @@ class Target:
     kind: str = "polygon"
     size: tuple[float, float] | None = None
     corner: tuple[float, float] = (0.0, 0.0)
+    seen: BaseGeometry | None = None
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         outline = orient(np.array(self.outline, float), counter_clockwise=not self.y_down)
@@ -251,7 +257,7 @@ class Target:
 
     @classmethod
     def _of(cls, reading: Reading, source: str) -> Self:
-        page = reading.kind, reading.size, reading.corner
+        page = reading.kind, reading.size, reading.corner, reading.seen, reading.warnings
         return cls(reading.outline, reading.y_down, reading.notes, source, *page)
 
     @classmethod
@@ -266,6 +272,28 @@ class Target:
         with np.errstate(all="ignore"):  # what overflows is refused
             outline, notes = clean_ring(points, source)
         return cls(outline, y_down, tuple(notes), source)
+
+    def smoothed(self, share: float) -> Self:
+        """Return the silhouette with what is narrower than a share of its length rounded off.
+
+        Gaps are closed first, between its parts, too, and then limbs and bumps go.
+
+        Raises `OrbiflowError` if nothing is left.
+
+        >>> target = Target.from_polygon([[0, 0], [8, 0], [8, 8], [4.1, 8], [4, 9], [3.9, 8], [0, 8]])
+        >>> round(float(target.smoothed(0.1).outline.max()), 6)
+        8.0
+        """
+        if share == 0:
+            return self
+        length = float(np.ptp(self.outline, axis=0).max())
+        own = Polygon(self.outline) if self.seen is None else self.seen
+        shape = rounded(own, share * length)
+        if shape.is_empty:
+            raise OrbiflowError(
+                f"{self.source}: smooth {share:g} leaves nothing of the silhouette; choose less"
+            )
+        return replace(self, outline=outer_ring(shape))
 
     @property
     def area(self) -> float:

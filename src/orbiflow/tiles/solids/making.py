@@ -8,17 +8,18 @@ from pathlib import Path
 import numpy as np
 import shapely
 from manifold3d import Manifold
+from shapely.geometry.base import BaseGeometry
 
 from orbiflow import __version__
 from orbiflow.arguments import as_choice
 from orbiflow.arrays import Array
-from orbiflow.drawing import palette
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import write_atomic
-from orbiflow.tiles.exporting import ExportSettings, Layout, layout, neck_notes, place_on
+from orbiflow.tiles.exporting import ExportSettings, laid_out, place_on
 from orbiflow.tiles.likeness import narrowest_slit
+from orbiflow.tiles.scene import Motif, lines_of, region_of
+from orbiflow.tiles.silhouette import lightness
 from orbiflow.tiles.solids.files import write_3mf, write_stl
-from orbiflow.tiles.solids.relief import raised
 from orbiflow.tiles.solids.settings import WITH_DRAWING, SolidSettings
 from orbiflow.tiles.solids.shapes import Plan, shape
 from orbiflow.tiles.tile import EscherTile, TileSource
@@ -78,60 +79,66 @@ def make_solid(
         InputFileError: If the drawing cannot be read, or is a picture of pixels.
     """
     settings, given = settings or SolidSettings(), EscherTile.of(tile)
+    if picture is not None and settings.kind not in WITH_DRAWING:
+        raise OrbiflowError(f"a {settings.kind} has no picture; a stamp or mould has: leave it out")
     certificate = given.require_certified(
         force=force, otherwise="so no solid is made of it; --force makes one, marked so"
     )
     title = f"{settings.kind} of {given.name} in mm, made with orbiflow {__version__}"
     if not certificate.valid:
         title = f"NOT CERTIFIED: {title}"
-    plan, notes = _plan(given, settings, picture)
-    parts = shape(plan)
-    return Solid(parts, title, (*notes, *_thin_notes(plan)))
-
-
-def _plan(
-    given: EscherTile, settings: SolidSettings, picture: str | Path | None
-) -> tuple[Plan, list[str]]:
-    page = ExportSettings(tile_size=settings.tile_size, cut="pieces")
-    if settings.kind == "puzzle":
-        sides = [side - 2 * settings.wall - settings.clearance for side in settings.area]
-        page = ExportSettings(tile_size=settings.tile_size, area=(sides[0], sides[1]))
-    placed = layout(given.tile, page, y_down=given.y_down)
-    notes = [placed.outline.note] if placed.outline.note else []
-    if picture is None and not settings.strokes and not settings.eyes:
-        return Plan(settings, placed, shapely.Polygon()), notes
-    if settings.kind not in WITH_DRAWING:
-        raise OrbiflowError(f"a {settings.kind} has no picture; a stamp or mould has: leave it out")
-    drawing, said = _drawing(given, placed, settings, picture)
-    return Plan(settings, placed, drawing), [*notes, *said]
-
-
-def _drawing(
-    given: EscherTile, placed: Layout, settings: SolidSettings, picture: str | Path | None
-) -> tuple[shapely.geometry.base.BaseGeometry, tuple[str, ...]]:
-    """Return what is raised of all that is drawn on the tile, in mm, and notes."""
-    from orbiflow.tiles.motifs import Over, drawn_motif, read_over, with_map
-
-    tile = with_map(given)
-    over = Over() if picture is None else read_over(picture, tile)
-    if over.picture is not None:
+    placed, notes = laid_out(given, _page(settings), picture)
+    drawing = Motif() if placed.motif is None else placed.motif
+    if drawing.rasters:
         raise InputFileError(f"{picture}: a {settings.kind} needs lines: draw it as SVG")
-    motif = drawn_motif(tile, settings, palette("ink"), over.drawing)
-    drawing = raised(motif.moved(*placed.place), settings.nozzle)
-    return drawing, (*tile.notes, *over.notes)
+    plan = Plan(settings, placed, raised(drawing, settings.nozzle))
+    return Solid(shape(plan), title, (*notes, *_gap_notes(plan)))
 
 
-def _thin_notes(plan: Plan) -> list[str]:
-    """Say where the tile is so thin that slopes of both sides meet, or that it breaks; and its gaps."""
-    settings, ring, kind = plan.settings, plan.ring, plan.settings.kind
-    slope = settings.height * settings.slope if kind == "mould" else settings.chamfer
+def _page(settings: SolidSettings) -> ExportSettings:
+    """Return how the tile is laid out: a puzzle's for most whole tiles within the tray's walls.
+
+    Notes say where it is so thin that it breaks, or that the slopes of both sides meet.
+    """
+    kind, slope = settings.kind, settings.chamfer
+    if kind == "mould":
+        slope = settings.height * settings.slope
     bevelled = 2 * slope + settings.clearance if kind in ("tile", "mould", "puzzle") else 0.0
-    notes = neck_notes(ring, max(settings.nozzle, bevelled, FRAGILE.get(kind, 0.0)))
-    slit = narrowest_slit(ring) if kind == "cutter" else None
-    if slit is not None and slit.width < 2 * settings.wall:
-        thin = ", too thin to print" if slit.width < settings.nozzle else ""
-        notes.append(
-            f"the walls of both sides are one in a gap of the tile: {slit.width:.2f} mm wide "
-            f"{place_on(ring, slit.place)}{thin}"
-        )
-    return notes
+    page = ExportSettings(
+        tile_size=settings.tile_size,
+        warn_neck=max(settings.nozzle, bevelled, FRAGILE.get(kind, 0.0)),
+        strokes=settings.strokes,
+        eyes=settings.eyes,
+    )
+    if kind != "puzzle":
+        return page.replace(cut="pieces")
+    sides = [side - 2 * settings.wall - settings.clearance for side in settings.area]
+    return page.replace(area=(sides[0], sides[1]))
+
+
+def _gap_notes(plan: Plan) -> tuple[str, ...]:
+    """Say where the walls of a cutter meet in a gap of the tile."""
+    settings, ring = plan.settings, plan.ring
+    slit = narrowest_slit(ring) if settings.kind == "cutter" else None
+    if slit is None or slit.width >= 2 * settings.wall:
+        return ()
+    thin = ", too thin to print" if slit.width < settings.nozzle else ""
+    return (
+        f"the walls of both sides are one in a gap of the tile: {slit.width:.2f} mm wide "
+        f"{place_on(ring, slit.place)}{thin}",
+    )
+
+
+def raised(drawing: Motif, nozzle: float) -> BaseGeometry:
+    """Return where a drawing in mm is dark, in lines no thinner than the nozzle's.
+
+    What is lighter than middle grey wipes out what lies under it; faint colours do nothing.
+    """
+    dark: BaseGeometry = shapely.Polygon()
+    for part in (part for part in drawing.parts if part.opacity >= 0.5):
+        fill, stroke, width = part.style
+        line = lines_of(part).buffer(max(width, nozzle) / 2)
+        for colour, region in ((fill, region_of(part)), (stroke, line)):
+            if colour is not None:
+                dark = dark | region if lightness(colour) < 0.5 else dark - region
+    return dark

@@ -13,6 +13,8 @@ from orbiflow.units import Length, LengthOrZero, PageSize
 WITH_DRAWING = ("stamp", "mould")
 _CUTTER, _MOULD, _PUZZLE = (OnlyWith(kind=name) for name in ("cutter", "mould", "puzzle"))
 
+_WALLED = OnlyWith(kind=("cutter", "stamp", "mould", "puzzle"))
+
 
 class SolidSettings(MotifSettings, FileSettings, group="Solid"):
     """How a tile becomes a solid; lengths in mm.
@@ -39,7 +41,7 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
     chamfer: Annotated[LengthOrZero, OnlyWith(kind=("tile", "puzzle"))] = 0.5
     """Bevel of the upper edge."""
 
-    wall: Annotated[Length, DefaultText("4 mm; cutter 1.2, stamp 1 mm")] = 4.0
+    wall: Annotated[Length, _WALLED, DefaultText("4 mm; cutter 1.2, stamp 1 mm")] = 4.0
     """Thickness of the wall of a cutter, mould or tray; width of a stamp's border."""
 
     blade: Annotated[Length, _CUTTER] = 0.6
@@ -60,7 +62,7 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
     nozzle: Length = 0.4
     """Width of the printer's line. Thinner lines of a drawing are widened to it."""
 
-    area: Annotated[PageSize, _PUZZLE] = (180.0, 180.0)
+    area: Annotated[PageSize, _PUZZLE, DefaultText("180x180mm")] = (180.0, 180.0)
     """Largest width and depth of the tray, such as those of the printer's bed."""
 
     copies: Annotated[int | None, Range(1), _PUZZLE, DefaultText("what the area holds")] = None
@@ -87,12 +89,14 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
 
     def check(self) -> None:
         super().check()
-        for name in ("strokes", "eyes"):
+        for name in ("engrave", "strokes", "eyes"):
             if getattr(self, name) and self.kind not in WITH_DRAWING:
                 raise SettingError(f"{{{name}}} applies only to {{kind}} stamp or mould")
         part = {"tile": "chamfer", "puzzle": "chamfer", "mould": "relief"}.get(self.kind)
         if part is not None and getattr(self, part) > self.height:
             raise SettingError(f"{{{part}}} must be at most {{height}}, {self.height:g} mm")
+        if self.kind == "cutter" and not self.blade <= self.wall <= self.foot:
+            raise SettingError("{blade} must be at most {wall}, and {wall} at most {foot}")
         if self.kind == "puzzle" and not self.clearance:
             raise SettingError("{clearance} must be above 0 in a puzzle, or no piece comes out")
 

@@ -19,6 +19,7 @@ from orbiflow.tiles.solids.settings import SolidSettings
 from orbiflow.tiles.solids.stacking import Level, stacked
 
 FLATNESS = 0.01  # how far in mm straight sides may be from the tile's curves: no printer shows it
+MOST_PIECES = 400  # of a puzzle, so that its file stays below some 100 MB
 APART = 3.0  # distance in mm of a puzzle's parts on the bed
 
 
@@ -58,7 +59,7 @@ def shape(plan: Plan) -> dict[str, Manifold]:
 
 def _grown(region: BaseGeometry, distance: float) -> BaseGeometry:
     """Return a region grown by a distance, or shrunk, unless nothing is left."""
-    found = region.buffer(distance, quad_segs=12)
+    found = region.buffer(distance, quad_segs=12) if distance else region
     if found.is_empty:
         raise OrbiflowError(
             f"nothing is left of the tile {-distance:.3g} mm inside its edge; choose a larger tile size"
@@ -68,9 +69,8 @@ def _grown(region: BaseGeometry, distance: float) -> BaseGeometry:
 
 def _tile(plan: Plan) -> Manifold:
     settings, piece = plan.settings, plan.piece
-    top = _grown(piece, -settings.chamfer) if settings.chamfer else piece
-    side = Level(settings.height - settings.chamfer, piece)
-    return stacked(Level(0.0, piece), side, Level(settings.height, top))
+    top = Level(settings.height, _grown(piece, -settings.chamfer))
+    return stacked(Level(0.0, piece), Level(settings.height - settings.chamfer, piece), top)
 
 
 def _cutter(plan: Plan) -> Manifold:
@@ -113,7 +113,8 @@ def _mould(plan: Plan) -> Manifold:
 def _puzzle(plan: Plan) -> dict[str, Manifold]:
     """Return a tray and its pieces, in it or beside it on the bed."""
     settings, copies = plan.settings, chosen_copies(plan.layout)
-    fit, wanted = len(copies), settings.copies or max(len(copies), 1)
+    fit = min(len(copies), MOST_PIECES)
+    wanted = settings.copies or max(fit, 1)
     if wanted > fit:
         raise OrbiflowError(
             f"a tray of {settings.area[0]:g} x {settings.area[1]:g} mm holds {fit} pieces of "

@@ -32,6 +32,7 @@ EdgeMatching: TypeAlias = Literal["segments", "curves", "none"]
 # On edges that agree but for rounding, GEOS without a grid is plainly wrong in about 3 % of turned
 # hexagons (an overlap of 0.93 for neighbours that only touch); snapping to a grid is safe.
 _GRID = 1e-12
+_LEAST_WIDTH = 100  # the least width of one of several prototiles, in tolerances
 _MARGIN = 0.05  # width of the ring around the tile that must be covered; any positive width will do
 
 
@@ -59,7 +60,9 @@ class Certificate:
         uncovered: The area around the tile that no image covers.
         neighbours: The number of images that share a piece of the boundary, the largest of all
             prototiles.
-        tolerance: The bound on area_error, edge_mismatch, total_overlap and uncovered.
+        tolerance: The bound on area_error, edge_mismatch, total_overlap and uncovered. A prototile
+            whose boundary is shorter than one overlaps others by at most as much times its length,
+            and each of several prototiles is at least 100 tolerances wide.
         reasons: What failed, in words; empty if and only if the tile is valid.
     """
 
@@ -152,16 +155,22 @@ def certify(tile: Tiles, *, tolerance: float = 1e-9) -> Certificate:
         if crossing:
             return replace(found, reasons=(crossing,))
     areas = np.array([_areas(a) for a in around])
-    overlap, total, bare = (float(x) for x in areas.max(axis=0))
+    overlap, total, bare = (float(x) for x in areas[:, :3].max(axis=0))
     count = max(int(touching(a, max(1e-7, tolerance))[1].sum()) for a in around)
     found = replace(found, simple=True, overlap=overlap, total_overlap=total, uncovered=bare)
     return replace(found, neighbours=count, reasons=_reasons(found, areas, tiling))
 
 
 def _reasons(found: Certificate, areas: Array, tiling: Tiling) -> tuple[str, ...]:
-    """Return what fails, given the areas (K, 3): overlap, total overlap and uncovered area."""
+    """Return what fails, given what `_areas` gives for each prototile, (K, 5)."""
     several, bound = len(tiling.prototiles) > 1, found.tolerance
+    _, overlaps, bare, lengths, widths = areas.T
     reasons: list[str] = []
+    if several and widths.min() < _LEAST_WIDTH * bound:
+        reasons.append(
+            f"prototile {widths.argmin()} is only {widths.min():.1e} of a tile's size wide: within "
+            f"the tolerance of {bound:.0e} it is hardly more than a line, leave it out"
+        )
     if not found.area_error <= bound:
         symmetry = max(s.order for s in tiling.stabilisers)
         own = f" for a tile with a symmetry of order {symmetry}" if symmetry > 1 else ""
@@ -172,11 +181,15 @@ def _reasons(found: Certificate, areas: Array, tiling: Tiling) -> tuple[str, ...
         )
     if not found.edge_mismatch <= bound:
         reasons.append(f"its edges miss their partners by {found.edge_mismatch:.1e} of its size")
-    if not found.total_overlap <= bound:
-        who = f"prototile {areas[:, 1].argmax()}" if several else "it"
-        reasons.append(f"{who} overlaps its neighbours by {found.total_overlap:.1e} of its area")
+    # edges that miss by the tolerance overlap by at most as much times their length
+    excess = overlaps / np.minimum(lengths, 1.0)
+    if not excess.max() <= bound:
+        who = f"prototile {excess.argmax()}" if several else "it"
+        own = "a tile's" if several else "its"
+        much = overlaps[excess.argmax()]
+        reasons.append(f"{who} overlaps its neighbours by {much:.1e} of {own} area")
     if not found.uncovered <= bound:
-        who = f"prototile {areas[:, 2].argmax()}" if several else "it"
+        who = f"prototile {bare.argmax()}" if several else "it"
         reasons.append(f"its images leave {found.uncovered:.1e} of its area uncovered around {who}")
     return tuple(reasons)
 
@@ -210,8 +223,11 @@ def _edge_mismatch(
     return max(mismatch, asymmetry), matching if asymmetry <= tolerance else "none"
 
 
-def _areas(around: Surroundings) -> tuple[float, float, float]:
-    """Return the largest and total overlap with other tiles, and the uncovered area around."""
+def _areas(around: Surroundings) -> tuple[float, float, float, float, float]:
+    """Return the largest and total overlap with other tiles, and the uncovered area around.
+
+    After them the length of the prototile's boundary, and its width if it were a strip.
+    """
     polygon = shapely.Polygon(around.ring)
     images = cast(NDArray[np.object_], shapely.polygons(around.rings))
     region = shapely.buffer(polygon, _MARGIN, quad_segs=2)
@@ -220,4 +236,6 @@ def _areas(around: Surroundings) -> tuple[float, float, float]:
     common = shapely.area(shapely.intersection(polygon, images, grid_size=_GRID))
     covered = shapely.union_all([polygon, *images], grid_size=_GRID)
     uncovered = shapely.area(shapely.difference(region, covered, grid_size=_GRID))
-    return float(common.max(initial=0.0)), float(common.sum()), float(uncovered)
+    length = float(polygon.length)
+    width = 2 * float(polygon.area) / length
+    return float(common.max(initial=0.0)), float(common.sum()), float(uncovered), length, width

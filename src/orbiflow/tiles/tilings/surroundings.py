@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import shapely
@@ -281,7 +281,7 @@ def _shared_lengths(around: Surroundings, tolerance: float) -> Array:
         return np.zeros(0)
     ring, ahead = around.ring, np.roll(around.ring, -1, axis=0)
     low, high = np.minimum(ring, ahead) - tolerance, np.maximum(ring, ahead) + tolerance
-    boxes = np.asarray(shapely.box(*low.T, *high.T))
+    boxes = cast(NDArray[np.object_], shapely.box(*low.T, *high.T))
     own, other = segment_tree(around).query(boxes)
     lengths = np.linalg.norm(ahead - ring, axis=1)
     along = ((ahead - ring) / lengths[:, None])[own]

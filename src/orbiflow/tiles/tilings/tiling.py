@@ -267,14 +267,15 @@ def as_tiling(tiles: Tiles) -> Tiling:
     )
 
 
-_SAME_DISTANCE = 1e-7  # the distance, in square roots of |det B|, below which points count as one
+_SAME_DISTANCE = 1e-6  # the distance, in square roots of |det B|, below which points count as one
 
 
 def dirichlet_tile(group: CrystallographicGroup, point: ArrayLike) -> Tile:
     """Return the points nearer to `point` than to any other of its images, as a tile.
 
     The tile is convex and tiles edge to edge. Its stabiliser is that of the point: about a rotation
-    centre or on a mirror the cell has that symmetry.
+    centre or on a mirror the cell has that symmetry. A point with an image nearer than a millionth of
+    the square root of |det B| is moved onto that centre or mirror, as rounding decides its cell.
 
     Args:
         group: A group of the plane.
@@ -313,12 +314,23 @@ def dirichlet_tiling(group: CrystallographicGroup, points: Sequence[ArrayLike]) 
     if not len(given):
         raise OrbiflowError("a Dirichlet tiling needs at least one point")
     same = _SAME_DISTANCE * float(np.sqrt(group.cell_volume))
+    given = np.array([_settled(group, point, same) for point in given])
     return Tiling(group, [_cell(group, given, k, same) for k in range(len(given))])
+
+
+def _settled(group: CrystallographicGroup, point: Array, same: float) -> Array:
+    """Return a point (2,), moved onto the centre or mirror that it is within rounding of."""
+    for _ in range(16):  # each step is nearer, where more elements join in
+        images = np.array([g(point) for g in group.elements_near(point, same)])
+        if np.ptp(images, axis=0).max() <= 1e-6 * same:
+            break
+        point = images.mean(axis=0)
+    return point
 
 
 def _cell(group: CrystallographicGroup, points: Array, k: int, same: float) -> Array:
     """Return (N, 2) the cell of point k, counter-clockwise."""
-    from scipy.spatial import KDTree, Voronoi
+    from scipy.spatial import KDTree
 
     site = points[k]
     # no point of the cell is further from the site than half the two shortest lattice vectors
@@ -335,11 +347,25 @@ def _cell(group: CrystallographicGroup, points: Array, k: int, same: float) -> A
     others = np.array(images)
     others = others[np.linalg.norm(others, axis=1) > same]
     pairs = KDTree(others).query_pairs(same, output_type="ndarray")
-    sites = np.concatenate([np.zeros((1, 2)), np.delete(others, pairs[:, 1], axis=0)])
-    cell = Voronoi(sites)
-    region = cell.regions[int(cell.point_region[0])]
-    corners = cell.vertices[region]
+    corners = _nearest_to_origin(np.delete(others, pairs[:, 1], axis=0), reach)
     corners = corners[np.argsort(np.arctan2(corners[:, 1], corners[:, 0]))]
-    # Qhull divides a vertex of four and more cells into several, rounding apart
+    # rounding divides a vertex of four and more cells into several
     steps = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
-    return corners[steps > same / 100] + site
+    return corners[steps > same / 1e4] + site
+
+
+def _nearest_to_origin(others: Array, reach: float) -> Array:
+    """Return the polygon (N, 2) of the points nearer to the origin than to `others` (M, 2).
+
+    It is a square of half side `reach`, cut along one bisector after the other, which keeps digits
+    that Qhull merges away where a point is close.
+    """
+    cell = reach * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    for other in others[np.argsort(np.linalg.norm(others, axis=1))]:
+        over = cell @ other - other @ other / 2
+        ahead, beyond = np.roll(cell, -1, axis=0), np.roll(over, -1)
+        cut = (over > 0) != (beyond > 0)
+        share = np.divide(over, over - beyond, out=np.zeros(len(over)), where=cut)
+        both = np.stack([cell, cell + share[:, None] * (ahead - cell)], axis=1)
+        cell = both[np.stack([over <= 0, cut], axis=1)]
+    return cell

@@ -30,10 +30,27 @@ _IMAGE_MAGIC = (
     *(b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"BM"),
     *(b"GIF87a", b"GIF89a", b"II*\0", b"MM\0*"),
 )
+_SAVE_SVG = "open it in the program that made it, or in Inkscape, and save it as SVG or PNG"
 _CONVERTIBLE = {
     b"\x1f\x8b": "is gzip-compressed (an .svgz?); decompress it first",
-    b"%PDF": "is a PDF file; convert it to SVG first",
-    b"%!PS": "is a PostScript file; convert it to SVG first",
+    b"%PDF": f"is a PDF or Illustrator file; {_SAVE_SVG}",
+    b"%!PS": f"is a PostScript or Illustrator file; {_SAVE_SVG}",
+    b"\xc5\xd0\xd3\xc6": f"is an EPS file; {_SAVE_SVG}",
+    b"8BPS": "is a Photoshop file; save it as PNG",
+}
+_BY_ENDING = {
+    **dict.fromkeys(
+        (".ai", ".eps", ".cdr", ".pdf"), f"is a drawing of another program; {_SAVE_SVG}"
+    ),
+    ".psd": "is a Photoshop file; save it as PNG",
+    **dict.fromkeys(
+        (".heic", ".heif", ".avif"),
+        "is a photograph of a kind that is not read; save it as PNG or JPEG",
+    ),
+    **{
+        f".{kind}": f"is no {kind.upper()} image, or a damaged one; export or download it again"
+        for kind in ("png", "jpg", "jpeg", "webp", "gif", "bmp", "tif", "tiff")
+    },
 }
 _SVG = re.compile(r"<(\w+:)?svg[\s>]")
 _COUNT_LINE = re.compile(r"\s*\d+\s*[\r\n]")
@@ -78,7 +95,7 @@ def _kind(path: Source, head: bytes) -> str:
         # the reader that fits the name of a text file gives the best message
         if path.suffix.lower() in _BY_NAME:
             return _BY_NAME[path.suffix.lower()]
-    raise InputFileError(f"{path}: {_what(path, head, text)}; give {_READABLE}")
+    raise InputFileError(f"{path}: {_what(path, head, text)}")
 
 
 def _text(head: bytes) -> str | None:
@@ -94,8 +111,11 @@ def _what(path: Source, head: bytes, text: str | None) -> str:
     for magic, what in _CONVERTIBLE.items():
         if head.startswith(magic):
             return what
+    if path.suffix.lower() in _BY_ENDING:
+        return _BY_ENDING[path.suffix.lower()]
     suffix = f" although its name ends in {path.suffix}" if path.suffix else ""
-    return f"holds {'text' if text is not None else 'data'} of an unknown kind{suffix}"
+    kind = "text" if text is not None else "data"
+    return f"holds {kind} of an unknown kind{suffix}; give {_READABLE}"
 
 
 MAX_BYTES = 16 * 2**20

@@ -3,9 +3,10 @@
 Masks are pictures whose light or opaque part is selected.
 """
 
+import functools
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any, TypeVar
@@ -18,19 +19,26 @@ from skimage.filters import threshold_otsu
 from orbiflow.arguments import described, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.tiles.silhouette.readers.photographs import is_photograph, shape_in
 from orbiflow.tiles.silhouette.readers.reading import (
     FileContent,
     Reading,
     Source,
     check_file,
     opened,
+    read_head,
 )
 from orbiflow.tiles.silhouette.readers.tracing import Level, trace
 
 MAX_BYTES = 64 * 2**20
 MAX_PIXELS = 40_000_000
 MAX_SIDE = 1500  # pixels; beyond this an image is averaged down before it is traced
+MAX_SIDE_OF_PHOTOGRAPH = 1000  # pixels, in the same way
+MIN_SIDE_OF_PHOTOGRAPH = 16
+# in CIE Lab for each pixel of a picture of 400: a shape with a fainter edge may be read wrong
+FAINT_EDGE = 4.0
 MIN_CONTRAST = 0.04  # of full scale, between the shape's and the background's usual level
+_STARTS = {"PNG": b"\x89PNG", "JPEG": b"\xff\xd8", "WebP": b"RIFF", "GIF": b"GIF", "BMP": b"BM"}
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
 # What Pillow raises on a damaged file depends on the format.
 _DAMAGED = (
@@ -39,6 +47,11 @@ _DAMAGED = (
 )
 # channels that say by themselves where the shape is: their high part and their low part
 _PARTS = {"alpha": ("opaque", "transparent"), "mask": ("marked", "unmarked")}
+_PLAIN = "cut it out, photograph it on a plain ground of another colour, or set a threshold"
+_FAINT = (
+    "the shape differs little from what is around it and may be read wrong: look at what was read, "
+    f"and if need be {_PLAIN}"
+)
 
 _Decoded = TypeVar("_Decoded")
 
@@ -47,7 +60,8 @@ _Decoded = TypeVar("_Decoded")
 class Picture:
     """One channel, 0 to 1, shape (H, W); each of its pixels is `reduced` pixels of the image wide.
 
-    - `name`: "luminance"; or "alpha" or "mask", whose high part is the shape.
+    - `name`: "luminance"; or "alpha", "mask" or "photograph", whose high part is the shape.
+    - `warnings`: What may be wrong with it.
     """
 
     channel: Array
@@ -55,6 +69,7 @@ class Picture:
     size: tuple[int, int]
     reduced: int
     notes: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
 
 
 def read_image(
@@ -63,11 +78,13 @@ def read_image(
     """Read the outline of the shape in a PNG, JPEG or WebP image, in pixels with y down.
 
     The shape is the opaque part where some of the image is transparent and some is opaque, else it is
-    told from the background, which is what most of the border is, by its luminance. `threshold`,
-    between 0 and 1, is the level that parts them; with `invert` the shape is the light (or
-    transparent) part. Coordinates are those of the image turned as its EXIF orientation asks.
+    told from the background, which is what most of the border is: in a drawing by its luminance, in
+    a photograph by its colours. `threshold`, between 0 and 1, is the luminance (or opacity) that
+    parts them; with `invert` the shape is the light (or transparent) part; with either, a photograph
+    is read like a drawing. Coordinates are those of the image turned as its EXIF orientation asks.
     """
-    return _traced(path, open_image(path, _decode), threshold, invert)
+    decode = functools.partial(_decode, by_colour=threshold is None and invert is None)
+    return _traced(path, open_image(path, decode), threshold, invert)
 
 
 def _traced(
@@ -78,7 +95,9 @@ def _traced(
     level, notes = choose_shape(path, picture, threshold, invert)
     outline, seen, traced = trace(path, level, scale=picture.reduced, size=picture.size)
     notes = (*picture.notes, *notes, *traced)
-    return Reading(outline, True, "image", picture.size, notes, seen=seen)
+    return Reading(
+        outline, True, "image", picture.size, notes, seen=seen, warnings=picture.warnings
+    )
 
 
 def open_image(path: Source, decode: Callable[[Any, Image.Image], _Decoded]) -> _Decoded:
@@ -108,12 +127,20 @@ def open_image(path: Source, decode: Callable[[Any, Image.Image], _Decoded]) -> 
         raise InputFileError(f"{path}: cannot be read; check its permissions") from exc
     except UnidentifiedImageError as exc:
         raise InputFileError(
-            f"{path}: the image is damaged or cut short, or it is none; give a PNG, JPEG or WebP image"
+            f"{path}: the {_named(path)} is damaged or cut short, or it is none; give a PNG, JPEG or "
+            "WebP image"
         ) from exc
     except _DAMAGED as exc:
         raise InputFileError(
-            f"{path}: the image is damaged or cut short ({exc}); export or download it again"
+            f"{path}: the {_named(path)} is damaged or cut short ({exc}); export or download it again"
         ) from exc
+
+
+def _named(path: Source) -> str:
+    """Return the kind of an image by its first bytes, such as "PNG image"."""
+    head = read_head(path, 12)
+    kinds = (k for k, starts in _STARTS.items() if head.startswith(starts))
+    return f"{next(kinds, '')} image".strip()
 
 
 def check_size(path: Source, size: tuple[int, int]) -> None:
@@ -142,20 +169,38 @@ def upright(image: Image.Image) -> tuple[Image.Image, list[str]]:
     return turned, notes
 
 
-def _reduced(band: Image.Image) -> tuple[Array, int, list[str]]:
-    """Return levels 0 to 1 with at most `MAX_SIDE` pixels a side, how many became one, and a note."""
-    reduced = -(-max(band.size) // MAX_SIDE)
-    full_scale = 255.0 if band.mode == "L" else 1.0
+def _reduced(band: Image.Image, most: int = MAX_SIDE) -> tuple[Array, int, list[str]]:
+    """Return levels 0 to 1 with at most so many pixels a side, how many became one, and a note."""
+    reduced = -(-max(band.size) // most)
+    full_scale = 1.0 if band.mode == "F" else 255.0
     note = f"averaged {reduced} x {reduced} pixels into one before tracing"
     levels = np.asarray(band.reduce(reduced), dtype=np.float64) / full_scale
     return levels, reduced, [note] * (reduced > 1)
 
 
-def _decode(path: Source, image: Image.Image) -> Picture:
+def _decode(path: Source, image: Image.Image, *, by_colour: bool) -> Picture:
     turned, notes = upright(image)
     band, name, band_notes = _channel(path, turned)
+    if by_colour and name == "luminance":
+        colours = band if band_notes or band.mode == "F" else turned.convert("RGB")
+        photograph = _photograph(path, colours, (*notes, *band_notes))
+        if photograph:
+            return photograph
     channel, reduced, averaging = _reduced(band)
     return Picture(channel, name, turned.size, reduced, (*notes, *averaging, *band_notes))
+
+
+def _photograph(path: Source, image: Image.Image, notes: Sequence[str]) -> Picture | None:
+    """Return how far each pixel belongs to the shape, or None for a drawing in two colours."""
+    levels, reduced, averaging = _reduced(image, MAX_SIDE_OF_PHOTOGRAPH)
+    rgb = levels if levels.ndim == 3 else np.repeat(levels[..., None], 3, axis=2)
+    if min(rgb.shape[:2]) < MIN_SIDE_OF_PHOTOGRAPH or not is_photograph(rgb):
+        return None
+    channel, steepness = shape_in(rgb)
+    if not (channel > 0.5).any():
+        raise InputFileError(f"{path}: no shape stands out in the photograph; {_PLAIN}")
+    warned = (_FAINT,) * (steepness < FAINT_EDGE)
+    return Picture(channel, "photograph", image.size, reduced, (*notes, *averaging), warned)
 
 
 def _bands(path: Source, image: Image.Image) -> tuple[Image.Image, Image.Image | None]:
@@ -218,7 +263,10 @@ def choose_shape(
         )
     high = np.median(channel[above])
     low = np.median(channel[~above])
-    if picture.name in _PARTS:
+    if picture.name == "photograph":
+        take_high = True
+        notes = ["photograph: shape told from its background by colour, shadows apart"]
+    elif picture.name in _PARTS:
         take_high = not invert
         part = _PARTS[picture.name][not take_high]
         notes = [f"shape taken: the {part} part ({picture.name} threshold {cut:.2f}{given})"]
@@ -231,7 +279,7 @@ def choose_shape(
 
 def _cut(path: Source, picture: Picture) -> float:
     """Return level midway between the usual levels of the two classes that Otsu's method finds."""
-    if picture.name in _PARTS:
+    if picture.name != "luminance":
         return 0.5
     channel = picture.channel
     above = channel > threshold_otsu(channel)
@@ -284,8 +332,12 @@ def read_mask_array(
         raise OrbiflowError(
             f"{name}: threshold parts gray levels, and this is a mask; leave it out"
         )
-    channel, reduced, notes = _reduced(Image.fromarray(levels))
-    picture = Picture(channel, "mask" if is_mask else "luminance", size, reduced, tuple(notes))
+    band = Image.fromarray(levels)
+    by_colour = not is_mask and threshold is None and invert is None
+    picture = _photograph(source, band, ()) if by_colour else None
+    if picture is None:
+        channel, reduced, notes = _reduced(band)
+        picture = Picture(channel, "mask" if is_mask else "luminance", size, reduced, tuple(notes))
     return _traced(source, picture, threshold, invert)
 
 

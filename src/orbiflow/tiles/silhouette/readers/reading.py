@@ -47,6 +47,7 @@ class Reading:
     - `corner`: The corner of least coordinates of that picture or drawing.
     - `seen`: All that was read as shape, in the outline's units, before parts were left out and
       holes filled; None if that is the outline.
+    - `warnings`: What may be wrong with it, and what to do then.
     """
 
     outline: Array
@@ -56,6 +57,7 @@ class Reading:
     notes: tuple[str, ...]
     corner: tuple[float, float] = (0.0, 0.0)
     seen: BaseGeometry | None = None
+    warnings: tuple[str, ...] = ()
 
 
 def check_file(path: Source) -> int:

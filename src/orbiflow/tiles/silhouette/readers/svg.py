@@ -39,7 +39,7 @@ COLLINEAR_TOLERANCE = 1e-6
 PAPER = "#ffffff"  # what a drawing without a background lies on
 SAME_COLOUR = 10  # of 255: colours whose channels differ by no more are one
 FAINT, COVERING = 0.5, 0.9  # opacities: less is not seen, more hides what lies below
-MOSTLY, NOTEWORTHY = 0.5, 0.001  # shares of an outline
+MOSTLY, NOTEWORTHY, OVER = 0.5, 0.001, 0.1  # shares of areas
 PLAIN = Brush("#000000", 1.0)
 
 
@@ -96,8 +96,6 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
         layers = [[Layer(regions.fill(shape), PLAIN)] for shape in drawing.shapes]
         layers = [own for own in layers if own[0].region.area > 0]
         notes = ["nothing is painted: took the closed paths as filled"]
-    if not any(layers):
-        raise InputFileError(f"{drawing.path}: {_why_empty(drawing)}")
     paper, grounds = _background(layers, drawing)
     shown = [layer for own in layers if own not in grounds for layer in own]
     if not shown:
@@ -143,27 +141,38 @@ def _overlay(layers: list[Layer], ground: str | None) -> tuple[BaseGeometry, lis
     size = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
     grid = max(OVERLAY_GRID * size, OVERLAY_GRID_FLOOR * float(np.abs(bounds).max()))
     opaque = [layer for layer in layers if layer.brush.opacity >= FAINT]
-    if not opaque:
-        return painted(layers, lambda _: 1, grid), ["took faint shapes, as there are no others"]
     n = len(layers) - len(opaque)
+    if not opaque:
+        return painted(layers, [1] * n, grid), ["took faint shapes, as there are no others"]
     notes = [f"left out {n} faint shape{'s' * (n > 1)}"] * (n > 0)
-    every = painted(opaque, lambda _: 1, grid)
-    if not any(_alike(layer.brush.colour, paper) for layer in opaque):
-        return every, notes
-
-    def effect(layer: Layer) -> int:
-        return -(layer.brush.opacity >= COVERING) if _alike(layer.brush.colour, paper) else 1
-
-    seen = painted(opaque, effect, grid)
+    pale = [_alike(layer.brush.colour, paper) for layer in opaque]
+    signs = [
+        1 if not own else -1 if layer.brush.opacity >= COVERING else 0
+        for layer, own in zip(opaque, pale, strict=True)
+    ]
+    seen = painted(opaque, signs, grid)
+    if not any(pale):
+        return seen, notes
+    # what has the paper's colour and lies on the bare paper may be the shape itself
+    every = painted(opaque, [_sign(opaque, k, pale) for k in range(len(opaque))], grid)
     hidden = 1 - _solid(seen) / (_solid(every) or 1.0)
     if not seen.area > 0 or (ground is None and hidden > MOSTLY):
         return every, [*notes, f"took shapes in {paper} too: they are most of the drawing"]
-    if hidden > NOTEWORTHY:
+    dark = painted(opaque, [int(not own) for own in pale], grid)
+    bitten = 1 - _solid(seen) / _solid(dark)
+    if bitten > NOTEWORTHY:
         notes.append(
-            f"took shapes in {paper} for background, {percent(hidden)} of the whole; give them "
-            "another colour if they belong to the shape"
+            f"took shapes in {paper} for background, which hide {percent(bitten)} of the others; "
+            "give them another colour if they belong to the shape"
         )
     return seen, notes
+
+
+def _sign(layers: list[Layer], k: int, pale: list[bool]) -> int:
+    """Return -1 for a pale layer that lies over darker ones for a good part, else 1."""
+    below = [layer.region for layer, own in zip(layers[:k], pale, strict=False) if not own]
+    over = shapely.area(shapely.intersection(below, layers[k].region)).sum() if pale[k] else 0.0
+    return -1 if over > OVER * layers[k].region.area else 1
 
 
 def _alike(colour: str, other: str) -> bool:

@@ -3,7 +3,7 @@
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from itertools import groupby
 from typing import Literal, NamedTuple
 
@@ -100,6 +100,10 @@ class Regions:
                 region = shapely.intersection(region, self._clips[clip])
         return region
 
+    def leaves_stroke(self, shape: DrawnShape) -> bool:
+        """Return whether the clips and masks of a shape cut nothing off its stroke."""
+        return not shape.clips or self.clipped(shape, whole := self.stroke(shape)) is whole
+
     def layers(self, shape: DrawnShape) -> list[Layer]:
         """Return what a shape paints, from bottom to top."""
         of = {"fill": self.fill, "stroke": self.stroke}
@@ -116,12 +120,14 @@ class Regions:
                 [self.clipped(shape, self.fill(shape, "clip-rule")) for shape in shapes]
             )
 
-        def effect(layer: Layer) -> int:
-            colour, opacity = layer.brush
-            light = 1.0 if clip.kind == "alpha" else lightness(colour)
-            return 1 if light * opacity >= 0.5 else -1 if opacity > 0.5 else 0
+        layers = [layer for shape in clip.shapes for layer in self.layers(shape)]
+        return painted(layers, [_shows(layer.brush, clip.kind) for layer in layers])
 
-        return painted([layer for shape in clip.shapes for layer in self.layers(shape)], effect)
+
+def _shows(brush: Brush, kind: str) -> int:
+    """Return whether paint on a mask shows what is masked (1), hides it (-1) or neither (0)."""
+    opacity = brush.opacity * (1.0 if kind == "alpha" else lightness(brush.colour))
+    return 1 if opacity >= 0.5 else -1 if brush.opacity > 0.5 else 0
 
 
 def lightness(colour: str) -> float:
@@ -129,17 +135,15 @@ def lightness(colour: str) -> float:
     return float(np.dot(rgb(colour), [0.2126, 0.7152, 0.0722])) / 255 if colour[0] == "#" else 0.0
 
 
-def painted(
-    layers: Iterable[Layer], effect: Callable[[Layer], int], grid: float | None = None
-) -> BaseGeometry:
+def painted(layers: list[Layer], signs: list[int], grid: float | None = None) -> BaseGeometry:
     """Paint layers one over the other, and return the region that is left.
 
-    `effect` says whether a layer adds its region (1), takes it away (-1) or changes nothing (0).
+    The signs say whether a layer adds its region (1), takes it away (-1) or changes nothing (0).
     """
     found: BaseGeometry = Polygon()
-    acting = ((effect(layer), layer.region) for layer in layers)
-    for sign, run in groupby(((s, r) for s, r in acting if s), key=lambda pair: pair[0]):
-        regions = [region for _, region in run]
+    acting = [(sign, layer) for sign, layer in zip(signs, layers, strict=True) if sign]
+    for sign, run in groupby(acting, key=lambda pair: pair[0]):
+        regions = [layer.region for _, layer in run]
         if sign > 0:
             regions += [found] * (not found.is_empty)
             found = shapely.union_all(regions, grid_size=grid)

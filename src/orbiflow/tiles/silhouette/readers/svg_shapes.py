@@ -86,9 +86,9 @@ class DrawnShape:
 
     @property
     def is_plain_line(self) -> bool:
-        """Whether its stroke is one whole line everywhere as wide as the pen."""
+        """Whether its stroke, before clips, is one whole line everywhere as wide as the pen."""
         most, least = np.linalg.svd(self.matrix[:2, :2])[1]
-        return not self.dashes and not self.clips and most - least < 1e-3 * most
+        return not self.dashes and most - least < 1e-3 * most
 
     def number(self, key: str, usual: float) -> float:
         """Read a property as a length in units of the pen, or return the usual one."""

@@ -24,6 +24,9 @@ SIMPLIFY_TOLERANCE = 0.15  # pixels
 # are not details of the shape. Small shapes have the finer tolerance for their size.
 STEP_TOLERANCE = 0.7  # pixels
 STEP_TOLERANCE_OF_SIZE = 0.005  # of the square root of the area
+# A shape that is cut off is as wide at the image's border as further in; one that touches it is not.
+CUT_OFF = 0.8
+FURTHER_IN = 0.015  # of the image's longer side
 # Components and holes of at most so many pixels, or this share of the shape, are no parts of a drawing.
 DUST = 4
 DUST_OF_SHAPE = 1e-4
@@ -57,7 +60,7 @@ def trace(
             f"{path}: the shape fills the whole image ({size[0]} x {size[1]} pixels); leave a "
             "margin around it, or set invert to take the other part"
         )
-    if shape[[0, -1]].any() or shape[:, [0, -1]].any():
+    if _is_cut_off(shape):
         notes.append("the shape touches the image's border and may be cut off there")
     # the shape's holes filled and all other components taken out
     values = np.where(shape & ~above, level.inside, level.values)
@@ -77,6 +80,12 @@ def trace(
     ring = np.clip(outer_ring(polygon) * scale, 0, size)
     seen = scaled(_region(level, mask, tolerance), scale, scale, origin=(0, 0))
     return ring, seen, notes + simplified
+
+
+def _is_cut_off(shape: NDArray[np.bool_]) -> bool:
+    inner = min(round(FURTHER_IN * max(shape.shape)) + 1, *(side - 1 for side in shape.shape))
+    sides = (shape, shape[::-1], shape.T, shape.T[::-1])
+    return any(side[0].sum() > CUT_OFF * side[inner].sum() for side in sides)
 
 
 def _without_dust(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], list[str]]:

@@ -1,0 +1,85 @@
+"""What may be wrong with a silhouette, to be said before a search: parts left out, holes, threads."""
+
+from __future__ import annotations
+
+import numpy as np
+from shapely import Polygon
+
+from orbiflow.tiles.geometry import polygons_in
+from orbiflow.tiles.silhouette.outlines import percent
+from orbiflow.tiles.silhouette.target import Target
+
+MOST_LEFT_OUT = 0.02  # of what was seen
+# Shares of the silhouette: smaller holes are eyes; larger ones are what the line of a drawing encloses.
+SMALL_HOLE, LARGE_HOLE = 0.02, 0.3
+THREAD = 0.06  # greatest width, of the length; animals have at least 0.14
+FEWEST_PIXELS = 40
+THIN = 3.0  # pixels
+MOSTLY_THIN = 0.5  # of the outline's length
+
+
+def parts_left_out(target: Target) -> list[Polygon]:
+    """Return the parts of what was seen that are not in the silhouette."""
+    outline = Polygon(target.outline)
+    parts = [] if target.seen is None else polygons_in(target.seen)
+    return [part for part in parts if not outline.intersects(part.representative_point())]
+
+
+def holes_filled(target: Target) -> list[Polygon]:
+    """Return the holes in what was seen that the silhouette fills."""
+    outline = Polygon(target.outline)
+    parts = [] if target.seen is None else polygons_in(target.seen)
+    holes = [Polygon(ring) for part in parts for ring in part.interiors]
+    return [hole for hole in holes if outline.intersects(hole.representative_point())]
+
+
+def doubts(target: Target) -> list[str]:
+    """Return what may be wrong with a silhouette, each with what to do about it."""
+    return [*target.warnings, *_missing(target), *_hopeless(target)]
+
+
+def _missing(target: Target) -> list[str]:
+    found: list[str] = []
+    lost, holes = parts_left_out(target), holes_filled(target)
+    seen = 0.0 if target.seen is None else float(target.seen.area)
+    share = sum(part.area for part in lost) / seen if seen else 0.0
+    level = ", or try another --threshold" if target.kind == "image" else ""
+    if share > MOST_LEFT_OUT:
+        parts = "a part" if len(lost) == 1 else f"{len(lost)} parts"
+        found.append(
+            f"{percent(share)} of what was seen is left out, in {parts} apart from the rest: join "
+            f"them to it in the drawing, or by a larger --smooth{level}"
+        )
+    share = sum(hole.area for hole in holes) / target.area
+    if SMALL_HOLE < share < LARGE_HOLE:
+        level = " or try another --threshold or --invert" if target.kind == "image" else ""
+        found.append(
+            f"filled holes of {percent(share)} of the area, because a tile has none: if one is "
+            f"background, open it to the outside in the drawing{level}"
+        )
+    return found
+
+
+def _hopeless(target: Target) -> list[str]:
+    """Return why no tile will look like a silhouette."""
+    shape, found = Polygon(target.outline), list[str]()
+    length = float(np.ptp(target.outline, axis=0).max())
+    if shape.buffer(-THREAD / 2 * length).is_empty:
+        found.append(
+            f"the silhouette is a line or thread, nowhere wider than {THREAD:.0%} of its length: no "
+            "tile will look like it; draw it wider, or close its outline"
+        )
+    if target.kind != "image":
+        return found
+    if length < FEWEST_PIXELS:
+        found.append(
+            f"the silhouette is only {length:.0f} pixels long, so its outline is of stairs: give a "
+            f"larger picture, at least {FEWEST_PIXELS} pixels and better 400"
+        )
+    wide = shape.buffer(-THIN / 2).buffer(THIN / 2)
+    if 1 - wide.length / shape.length > MOSTLY_THIN:
+        found.append(
+            f"most of the silhouette is less than {THIN:.0f} pixels wide, which is too thin to be "
+            "followed: give a larger picture, or draw it wider"
+        )
+    return found
