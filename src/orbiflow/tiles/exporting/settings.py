@@ -146,7 +146,9 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     ] = None
     """Number of pieces."""
 
-    marks: Annotated[bool, OnlyWith(cut="pieces"), PIECES] = False
+    marks: Annotated[bool, Option("--marks", off="--no-marks"), OnlyWith(cut="pieces"), PIECES] = (
+        False
+    )
     """Add the registration marks of cutters that cut what is printed, 10 mm from the page's edge."""
 
     tray: Annotated[Length | None, OnlyWith(cut="jigsaw"), PIECES] = None
