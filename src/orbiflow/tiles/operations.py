@@ -249,7 +249,7 @@ def export(
             "files": [str(path) for path in done.files],
             "tiles": done.tiles,
             "class": tile.isohedral_class,
-            "tile_size": settings.tile_size,
+            "tile_size": done.tile_size,
         }
     )
 
@@ -259,14 +259,16 @@ def _exported(done: Exported, settings: ExportSettings, name: str) -> str:
     words = {
         "skeleton": "tiles in outline",
         "pieces": "pieces",
-        "jigsaw": "tiles and parts of them",
+        "jigsaw": "pieces of a jigsaw",
+        "template": "template",
     }
     what = words.get(settings.cut, "tiles")
+    count = done.scenes[0].facts.get("pieces", done.tiles)
     files = str(done.files[0])
     if len(done.files) > 1:
         files = f"{len(done.files)} sheets, {done.files[0]} to {done.files[-1].name}"
     return (
-        f"written {files}: {done.tiles} {what} of {name}, {settings.tile_size:g} mm, on "
+        f"written {files}: {count} {what} of {name}, {done.tile_size:.4g} mm, on "
         f"{width:g} x {height:g} mm"
     )
 
