@@ -114,7 +114,7 @@ def test_the_pieces_lie_in_the_tray() -> None:
     ("options", "message"),
     [
         ({"cut": "pieces", "tray": 10.0}, "tray applies only to cut jigsaw"),
-        ({"bed": (100.0, 80.0)}, "bed applies only to .*a jigsaw is cut from one sheet"),
+        ({"bed": (100.0, 80.0)}, "bed applies only to .*others are one sheet"),
         ({"kerf": 0.1}, "kerf applies only to cut pieces"),
         ({"clip": True}, "clip applies only to"),
     ],

@@ -82,7 +82,10 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
         float,
         Range(-360, 360),
         Unit("degrees"),
-        OnlyWith(cut=("none", "skeleton", "jigsaw"), because="pieces are turned to fill the page"),
+        OnlyWith(
+            cut=("none", "skeleton", "jigsaw", "template"),
+            because="pieces are turned to fill the page",
+        ),
     ] = 0.0
     """Turn the tiling on the page by this angle, counterclockwise."""
 
@@ -97,8 +100,7 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     """Cut the page's border, too."""
 
     bed: Annotated[
-        Size | None,
-        OnlyWith(cut=("none", "skeleton", "pieces"), because="a jigsaw is cut from one sheet"),
+        Size | None, OnlyWith(cut=("none", "skeleton", "pieces"), because="others are one sheet")
     ] = None
     """Size of the machine's bed; a larger page becomes several files."""
 
