@@ -59,7 +59,7 @@ def plot(
         name = min(table.fields_given)
         raise SettingError(f"{{{name}}} applies only to {{data}}; give both or neither")
 
-    from orbiflow.density.operations.saved import check_fits, model_at, with_columns_of
+    from orbiflow.density.operations.saved import check_fits, model_at, names_of, with_columns_of
 
     single = pictures.is_one_file(out)
     if single and settings.format not in (None, "pdf"):
@@ -71,9 +71,8 @@ def plot(
         runtime.check_outside_runs(out, *reads)
     density, extra = model_at(model)
     space = density.space
-    names = pictures.known_names(space, extra.get("columns"))
-    if settings.names is None and names is not None:
-        settings = settings.replace(names=names)
+    if settings.names is None:
+        settings = settings.replace(names=tuple(names_of(density, extra)))
     points = None
     if data is not None:
         reading = with_columns_of(table, data, extra, on_event)
