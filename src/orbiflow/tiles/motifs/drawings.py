@@ -20,7 +20,6 @@ from orbiflow.tiles.motifs.raster import Grid, Paint
 from orbiflow.tiles.motifs.source import Picture, covered_area, read_picture
 from orbiflow.tiles.scene import INK, Curve, Motif, Part, Style, curves_path, draw_paths
 from orbiflow.tiles.silhouette import (
-    MAX_BYTES,
     Drawing,
     DrawnShape,
     Regions,
@@ -29,8 +28,6 @@ from orbiflow.tiles.silhouette import (
     TooTangled,
     brushes,
     check_file,
-    parse_xml,
-    read_bytes,
     read_head,
 )
 from orbiflow.tiles.tile import EscherTile
@@ -45,9 +42,7 @@ FARTHEST = 1e6  # greatest reach of a drawing, in sizes of the silhouette
 
 def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
     """Read an SVG file and carry its fills and strokes onto a tile, in the tile's units, with notes."""
-    check_file(path)
-    drawing = Drawing(path, parse_xml(path, read_bytes(path, MAX_BYTES)))
-    drawing.collect()
+    drawing = Drawing(path)
     carry = _Carry(tile, *_onto(path, drawing, tile))
     regions = Regions(drawing, lambda _: carry.tolerance, 2 * MOST_CARRIED)
     parts: list[Part] = []

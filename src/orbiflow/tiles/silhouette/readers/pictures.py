@@ -3,7 +3,6 @@
 Masks are pictures whose light or opaque part is selected.
 """
 
-import functools
 import re
 import warnings
 from collections.abc import Callable, Sequence
@@ -58,18 +57,14 @@ _Decoded = TypeVar("_Decoded")
 
 @dataclass(frozen=True)
 class Picture:
-    """One channel, 0 to 1, shape (H, W); each of its pixels is `reduced` pixels of the image wide.
+    """One channel of an image."""
 
-    - `name`: "luminance"; or "alpha", "mask" or "photograph", whose high part is the shape.
-    - `warnings`: What may be wrong with it.
-    """
-
-    channel: Array
-    name: str
+    channel: Array  # (H, W), 0 to 1
+    name: str  # "luminance"; or "alpha", "mask" or "photograph", whose high part is the shape
     size: tuple[int, int]
-    reduced: int
+    reduced: int  # how many pixels of the image are one of the channel's wide
     notes: tuple[str, ...]
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  # what may be wrong with it
 
 
 def read_image(
@@ -83,8 +78,9 @@ def read_image(
     parts them; with `invert` the shape is the light (or transparent) part; with either, a photograph
     is read like a drawing. Coordinates are those of the image turned as its EXIF orientation asks.
     """
-    decode = functools.partial(_decode, by_colour=threshold is None and invert is None)
-    return _traced(path, open_image(path, decode), threshold, invert)
+    by_colour = threshold is None and invert is None
+    picture = open_image(path, lambda path, image: _decode(path, image, by_colour))
+    return _traced(path, picture, threshold, invert)
 
 
 def _traced(
@@ -178,7 +174,7 @@ def _reduced(band: Image.Image, most: int = MAX_SIDE) -> tuple[Array, int, list[
     return levels, reduced, [note] * (reduced > 1)
 
 
-def _decode(path: Source, image: Image.Image, *, by_colour: bool) -> Picture:
+def _decode(path: Source, image: Image.Image, by_colour: bool) -> Picture:
     turned, notes = upright(image)
     band, name, band_notes = _channel(path, turned)
     if by_colour and name == "luminance":
