@@ -16,7 +16,6 @@ from .readers.files import read_outline as read_outline
 from .readers.pictures import deep_channel as deep_channel
 from .readers.pictures import open_image as open_image
 from .readers.pictures import read_mask_array as read_mask_array
-from .readers.pictures import upright as upright
 from .readers.reading import FileContent as FileContent
 from .readers.reading import Reading as Reading
 from .readers.reading import check_file as check_file

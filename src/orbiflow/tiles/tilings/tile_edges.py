@@ -379,7 +379,9 @@ class Skeleton:
     have several.
     """
 
-    copy: Integers  # with `edge`: edge `edge` of copy `copy`, (S,), in the direction of its boundary
+    copy: (
+        Integers  # with `edge`: edge `edge` of copy `copy`, (S,), in the direction of its boundary
+    )
     edge: Integers
     other: Integers  # the copy (S,) across it, -1 if it is not in the set
     ends: Integers  # the numbers (S, 2) of its first and last vertex
