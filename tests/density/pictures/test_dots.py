@@ -22,7 +22,6 @@ from orbiflow.density import (
     density_picture,
     make_space,
 )
-from orbiflow.density.pictures.figures import draw_density
 from orbiflow.density.pictures.maps import Map, chosen_map
 from orbiflow.density.pictures.overlays import MAX_COVER, uncrowded
 from orbiflow.drawing import Picture, Sheet
@@ -99,7 +98,7 @@ def test_a_peak_is_seen_through_its_dots(
     def picture(dots: torch.Tensor | None) -> np.ndarray:
         if density.space.is_round:
             drawn_map = Map(density.space, chosen_map(density.space, drawn))
-            made = draw_density(drawn_map, density, settings, dots=dots, sheet=sheet)
+            made = density_picture(density, dots, settings, sheet=sheet, ground=drawn_map)
         else:
             made = density_picture(density, dots, settings, sheet=sheet)
         return pixels(made)

@@ -35,7 +35,7 @@ DATA = np.random.default_rng(0).uniform(-3, 3, (40, 2))
 @pytest.fixture(autouse=True)
 def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orbiflow.density.pictures.square._GRID", 12)
-    monkeypatch.setattr("orbiflow.density.pictures.page._CELLS", 8)
+    monkeypatch.setattr("orbiflow.density.pictures.surfaces._CELLS", 8)
     monkeypatch.setattr("orbiflow.density.pictures.maps._PIXELS", 900)
     monkeypatch.setattr("orbiflow.density.pictures.colours._COARSE", 12)
     monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 20)

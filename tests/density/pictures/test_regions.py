@@ -27,7 +27,7 @@ from orbiflow.density import (
     plot_density,
     to_vectors,
 )
-from orbiflow.density.pictures.axes import view_of
+from orbiflow.density.pictures.frames import view_of
 from orbiflow.density.pictures.projections import EqualEarth
 from orbiflow.errors import OrbiflowError
 

@@ -10,7 +10,8 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
-from orbiflow.density.pictures.axes import (
+from orbiflow.density.pictures.colours import density_at
+from orbiflow.density.pictures.frames import (
     INK,
     LETTER,
     View,
@@ -20,7 +21,6 @@ from orbiflow.density.pictures.axes import (
     space_title,
     view_of,
 )
-from orbiflow.density.pictures.colours import density_at
 from orbiflow.density.pictures.overlays import LIGHT, MAX_DOTS, draw_dots
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.drawing import Picture, Sheet

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orbiflow.arrays import Array
-from orbiflow.density.pictures.axes import INK, LETTER, degrees_text
+from orbiflow.density.pictures.frames import INK, LETTER, degrees_text
 from orbiflow.density.pictures.projections import Azimuthal, Mollweide, Projection, WorldMap
 from orbiflow.drawing import Sheet
 

@@ -12,8 +12,8 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
 from orbiflow.density.pictures import frames, projections
-from orbiflow.density.pictures.axes import chart_points, degrees_text
 from orbiflow.density.pictures.colours import chosen_scale, density_on_map, is_sharp, shading
+from orbiflow.density.pictures.frames import chart_points, degrees_text
 from orbiflow.density.pictures.map_axes import draw_map_lines, graticule
 from orbiflow.density.pictures.overlays import LIGHT, Colouring, log_natural
 from orbiflow.density.pictures.projections import Azimuthal, Projection

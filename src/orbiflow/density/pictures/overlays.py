@@ -12,8 +12,8 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
-from orbiflow.density.pictures.axes import INK
 from orbiflow.density.pictures.colours import COLOURS, Shade
+from orbiflow.density.pictures.frames import INK
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.regions import DensityLevels, DensityRegion, samples_for
 from orbiflow.drawing import Sheet

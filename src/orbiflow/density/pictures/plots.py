@@ -14,17 +14,22 @@ from orbiflow.arguments import as_path
 from orbiflow.density.comparing import density_of
 from orbiflow.density.estimator import DensityEstimator
 from orbiflow.density.models import Density, read_density
-from orbiflow.density.pictures.axes import view_of
 from orbiflow.density.pictures.coastlines import coastlines_for, simplified
 from orbiflow.density.pictures.corner import MAX_COLUMNS, corner_picture
-from orbiflow.density.pictures.figures import Ground, draw_density, draw_samples
-from orbiflow.density.pictures.flow import few_colours, flow_picture
+from orbiflow.density.pictures.figures import (
+    Ground,
+    density_picture,
+    few_colours,
+    flow_picture,
+    samples_picture,
+)
+from orbiflow.density.pictures.frames import view_of
 from orbiflow.density.pictures.maps import Map, chosen_map
 from orbiflow.density.pictures.overlays import region_lines
-from orbiflow.density.pictures.page import density_page
 from orbiflow.density.pictures.projections import PlateCarree
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import Square
+from orbiflow.density.pictures.surfaces import density_page
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import FORMATS, Picture, pdf_pages
 from orbiflow.errors import OrbiflowError, OutputError, SettingError
@@ -188,15 +193,15 @@ class _Shown:
             return {"samples": partial(corner_picture, density, data, samples, settings)}
         grounds = self._grounds()
         dots = self.points if settings.dots else None
-        draw = partial(draw_density, dots=dots, regions=self.regions)
+        draw = partial(density_picture, density, dots, settings, regions=self.regions)
         makers: dict[str, Callable[[], Picture]] = {
-            name: partial(draw, own, density, settings) for name, own in grounds.items()
+            name: partial(draw, ground=ground) for name, ground in grounds.items()
         }
         if density.flow_part is not None:
             makers["flow"] = partial(flow_picture, density, settings)
         if data is not None or settings.samples is not None:
-            ground = grounds["density"]
-            makers["samples"] = partial(draw_samples, ground, density, settings, data, samples)
+            draw = partial(samples_picture, density, data, samples, settings)
+            makers["samples"] = partial(draw, ground=grounds["density"])
         return makers
 
     def _grounds(self) -> dict[str, Ground]:

@@ -12,7 +12,8 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, midpoints
 from orbiflow.density.pictures import frames
-from orbiflow.density.pictures.axes import (
+from orbiflow.density.pictures.colours import chosen_scale, density_on_grid, is_sharp, shading
+from orbiflow.density.pictures.frames import (
     INK,
     angle_axis,
     degrees_text,
@@ -21,10 +22,8 @@ from orbiflow.density.pictures.axes import (
     shortened,
     view_of,
 )
-from orbiflow.density.pictures.colours import chosen_scale, density_on_grid, is_sharp, shading
 from orbiflow.density.pictures.overlays import LIGHT, Colouring, log_natural
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.density.pictures.surfaces import edge_pairs
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import CENTER_COLOURS, Sheet, center_sign
 from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
@@ -235,6 +234,25 @@ class Square:
 def average_note(count: int) -> str:
     """Return what a picture with `count` pixels along a side says of narrower peaks."""
     return f"peaks narrower than 1/{count} of a side are averaged over it"
+
+
+def edge_pairs(group: CrystallographicGroup) -> list[tuple[Array, Array]]:
+    """Return pairs of edges (2, 2) of the unit square that `group` identifies, start with start.
+
+    Neighbouring edges both start at the corner where they meet.
+    """
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    edges = [corners[[0, 3]], corners[[1, 2]], corners[[0, 1]], corners[[3, 2]]]
+    middle = np.full(2, 0.5)
+    pairs: list[tuple[Array, Array]] = []
+    for g in group.elements_near(middle, 1.5, source=middle)[1:]:
+        for k, edge in enumerate(edges):
+            for other in edges[k + 1 :]:
+                image = g(edge)
+                if np.allclose(image.mean(axis=0), other.mean(axis=0)):
+                    turn = -1 if np.allclose(image[1], edge[1]) else 1
+                    pairs.append((edge[::turn].copy(), image[::turn].copy()))
+    return pairs
 
 
 def cone_points(group: CrystallographicGroup) -> list[tuple[tuple[float, float], int]]:

@@ -18,8 +18,8 @@ from PIL import Image, ImageDraw
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, midpoints
-from orbiflow.density.pictures.axes import view_of
 from orbiflow.density.pictures.colours import COLOURS, density_on_grid, density_on_map, shading
+from orbiflow.density.pictures.frames import view_of
 from orbiflow.density.pictures.maps import chosen_map, pixels_of
 from orbiflow.density.spaces import RoundSpace, to_vectors
 

@@ -10,7 +10,8 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.layouts import BLUE, Layout, line_style
+from orbiflow.tiles.exporting.layouts import BLACK, BLUE, Layout, line_style
+from orbiflow.tiles.exporting.settings import USUAL_WIDTH
 from orbiflow.tiles.motifs import Over, carried_raster, drawn_motif
 from orbiflow.tiles.scene import (
     INCH,
@@ -29,7 +30,6 @@ from orbiflow.tiles.scene import (
 from orbiflow.tiles.silhouette import lightness
 from orbiflow.tiles.tile import EscherTile
 
-BLACK = "#000000"
 MOST_PIXELS = 1e8  # the largest number of pixels of pictures on a page
 
 
@@ -61,8 +61,10 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
     else:
         line = line_style(layout)
         styles = {"engrave": Style(BLACK), "score": line._replace(stroke=BLUE)}
-        if settings.purpose in ("plotter", "colouring"):
-            styles = dict.fromkeys(styles, line)
+        if settings.purpose in ("plotter", "template", "colouring"):
+            width = min(line.width, USUAL_WIDTH)  # finer than what is thick for small hands
+            pen = line if settings.purpose == "plotter" else line._replace(width=width)
+            styles = dict.fromkeys(styles, pen)
         motifs = burnt(layout.motif, area, styles)
     linear = np.array([tile.linear for tile in scene.tiles])
     offsets = np.array([tile.offset for tile in scene.tiles])
@@ -73,7 +75,9 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
         for name, motif in motifs.items()
         if motif.parts or motif.rasters
     ]
-    return replace(scene, layers=(*layers, *scene.layers), motifs=motifs)
+    below = tuple(layer for layer in scene.layers if layer.role == "tiles")
+    above = tuple(layer for layer in scene.layers if layer.role != "tiles")
+    return replace(scene, layers=(*below, *layers, *above), motifs=motifs)
 
 
 def burnt(motif: Motif, tile: shapely.Polygon, styles: dict[str, Style]) -> dict[str, Motif]:
