@@ -7,7 +7,7 @@ import shapely
 
 from orbiflow.arrays import Array
 from orbiflow.symmetry import rotation_matrix
-from orbiflow.tiles.exporting.settings import USUAL_WIDTH, usual_tolerance
+from orbiflow.tiles.exporting.settings import MARKS_EDGE, USUAL_WIDTH, usual_tolerance
 from orbiflow.tiles.scene import Box
 from orbiflow.tiles.tilings import Tile, copies_inside
 
@@ -54,6 +54,20 @@ def edge_margin(tile_size: float) -> float:
 def inset(box: Box, margin: float) -> Box:
     """Return a box that is smaller by a margin on each side."""
     return Box(box.left + margin, box.top + margin, box.right - margin, box.bottom - margin)
+
+
+MARK = 20.0  # length in mm of registration marks, around which nothing else may lie
+
+
+def mark_corners(page: tuple[float, float]) -> list[Box]:
+    """Return the boxes of registration marks: in the corners of a page but the lower right one."""
+    left = top = MARKS_EDGE
+    right, bottom = page[0] - MARKS_EDGE, page[1] - MARKS_EDGE
+    return [
+        Box(left, top, left + MARK, top + MARK),
+        Box(right - MARK, top, right, top + MARK),
+        Box(left, bottom - MARK, left + MARK, bottom),
+    ]
 
 
 def _shift(tile: Tile, box: Box) -> Array:

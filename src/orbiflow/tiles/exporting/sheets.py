@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.layouts import BLUE, STRIP
+from orbiflow.tiles.exporting.layouts import BLACK, BLUE, STRIP
+from orbiflow.tiles.exporting.placing import mark_corners
 from orbiflow.tiles.scene import (
     Box,
     Curve,
@@ -20,6 +21,7 @@ from orbiflow.tiles.scene import (
     Uses,
     clipped_line,
     clipped_region,
+    rectangle,
 )
 
 OVERLAP = 12.0  # width in mm of the strip that two neighbouring sheets share; the crosses lie in it
@@ -168,3 +170,22 @@ def calibrated(scene: Scene) -> Scene:
     marks = tuple(Curve.polyline(line) for line in lines)
     layer = Layer("calibration 100 mm", "mark", MARK, marks)
     return replace(scene, layers=(*scene.layers, layer))
+
+
+def registered(scene: Scene) -> Scene:
+    """Add the marks by which cutters of the brand Silhouette find what is printed.
+
+    They are a square of 5 mm and two angles of 20 mm, in lines of 0.3 mm, as its cameras expect them.
+    """
+    first, second, third = mark_corners((scene.width, scene.height))
+    left, top = first.left, first.top
+    square = rectangle(Box(left, top, left + 5, top + 5))
+    angles = (
+        Curve.polyline([[second.left, top], [second.right, top], [second.right, second.bottom]]),
+        Curve.polyline([[left, third.top], [left, third.bottom], [third.right, third.bottom]]),
+    )
+    layers = (
+        Layer("registration", "mark", Style(BLACK), (square,)),
+        Layer("registration angles", "mark", Style(None, BLACK, 0.3), angles),
+    )
+    return replace(scene, layers=(*layers, *scene.layers))

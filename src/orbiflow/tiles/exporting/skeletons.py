@@ -62,6 +62,7 @@ def skeleton_scene(layout: Layout) -> Scene:
     return Scene(
         *settings.page,
         tuple(layers),
+        window=box,
         prototile=layout.tile.polygon,
         tiles=placed_tiles(copies, layout),
     )

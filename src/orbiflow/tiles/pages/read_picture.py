@@ -14,7 +14,7 @@ from shapely import Polygon
 from orbiflow.arrays import Array
 from orbiflow.drawing import font
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette import Target, holes_filled, open_image, parts_left_out, upright
+from orbiflow.tiles.silhouette import Target, holes_filled, open_image, parts_left_out
 
 LONGER_SIDE = 1200  # pixels
 FINER = 2  # drawn finer, then averaged
@@ -76,13 +76,9 @@ def _window(target: Target) -> tuple[Array, Array]:
 
 
 def _source(path: Path) -> Image.Image:
-    def decode(_: object, image: Image.Image) -> Image.Image:
-        image.draft("RGB", (LONGER_SIDE, LONGER_SIDE))
-        turned = upright(image)[0].convert("RGBA")
-        white = Image.new("RGBA", turned.size, "white")
-        return Image.alpha_composite(white, turned).convert("RGB")
-
-    return open_image(path, decode)
+    image = open_image(path, enough=LONGER_SIDE)[0].convert("RGBA")
+    white = Image.new("RGBA", image.size, "white")
+    return Image.alpha_composite(white, image).convert("RGB")
 
 
 def _png(picture: Image.Image, marks: Sequence[tuple[str, str]]) -> bytes:

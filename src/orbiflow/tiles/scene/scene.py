@@ -187,18 +187,12 @@ class Motif:
 
 @dataclass(frozen=True, eq=False)
 class Uses:
-    """M copies of a symbol: a point p of it goes to linear[which[m]] p + offsets[m].
+    """M copies of a symbol: a point p of it goes to linear[which[m]] p + offsets[m]."""
 
-    - `symbol`: The symbol's name in the scene.
-    - `linear`: The linear parts (A, 2, 2) of the aspects.
-    - `which`: The aspect (M,) of each copy.
-    - `offsets`: The offset (M, 2) of each copy in mm.
-    """
-
-    symbol: str
-    linear: Array
-    which: NDArray[np.int64]
-    offsets: Array
+    symbol: str  # its name in the scene
+    linear: Array  # the linear parts (A, 2, 2) of the aspects
+    which: NDArray[np.int64]  # the aspect (M,) of each copy
+    offsets: Array  # the offset (M, 2) of each copy in mm
 
     def __len__(self) -> int:
         return len(self.which)
@@ -217,22 +211,14 @@ class Uses:
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """Things of one kind, drawn alike, that programs show under one name.
+    """Things of one kind, drawn alike, that programs show under one name."""
 
-    - `name`: A name for people, such as "colour 1" or "cut".
-    - `role`: What the layer is for.
-    - `style`: Fill and stroke of all items.
-    - `items`: Curves, parts and pictures, and copies of symbols and motifs.
-    - `clipped`: Whether it is shown within the scene's `window` alone.
-    - `ink`: The colour that `INK` means in the layer's motifs.
-    """
-
-    name: str
+    name: str  # a name for people, such as "colour 1" or "cut"
     role: Role
-    style: Style
-    items: tuple[Curve | Uses | Part | Raster, ...]
-    clipped: bool = False
-    ink: str | None = None
+    style: Style  # fill and stroke of all items
+    items: tuple[Curve | Uses | Part | Raster, ...]  # with copies of symbols and motifs
+    clipped: bool = False  # whether it is shown within the scene's `window` alone
+    ink: str | None = None  # the colour that `INK` means in the layer's motifs
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,30 +234,19 @@ class PlacedTile:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A page with everything on it.
+    """A page with everything on it."""
 
-    - `width`, `height`: The page's size in mm.
-    - `layers`: The layers from the bottom up.
-    - `symbols`: Closed curves by name, for `Uses`.
-    - `window`: The box within which clipped layers show. Default: the page.
-    - `title`, `notes`: Words for the file's metadata.
-    - `prototile`: The polygon (N, 2) in mm of which `tiles` are copies.
-    - `tiles`: The tiles on the page.
-    - `facts`: Plain data for the JSON file, such as the class.
-    - `motifs`: Drawings by name, for `Uses`.
-    """
-
-    width: float
+    width: float  # with `height`: the page's size in mm
     height: float
-    layers: tuple[Layer, ...]
-    symbols: dict[str, Curve] = field(default_factory=dict)
-    window: Box | None = None
-    title: str = ""
+    layers: tuple[Layer, ...]  # from the bottom up
+    symbols: dict[str, Curve] = field(default_factory=dict)  # closed curves by name, for `Uses`
+    window: Box | None = None  # the box within which clipped layers show; by default the page
+    title: str = ""  # with `notes`: words for the file's metadata
     notes: tuple[str, ...] = ()
-    prototile: Array | None = None
+    prototile: Array | None = None  # the polygon (N, 2) in mm of which `tiles` are copies
     tiles: tuple[PlacedTile, ...] = ()
-    facts: dict[str, Any] = field(default_factory=dict)
-    motifs: dict[str, Motif] = field(default_factory=dict)
+    facts: dict[str, Any] = field(default_factory=dict)  # for the JSON file, such as the class
+    motifs: dict[str, Motif] = field(default_factory=dict)  # drawings by name, for `Uses`
 
     @property
     def clip(self) -> Box:
