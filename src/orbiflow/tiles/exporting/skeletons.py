@@ -158,11 +158,7 @@ def _without_joints(circuit: Trail, count: int) -> list[Trail]:
 
 
 def in_short_order(curves: list[Curve]) -> list[Curve]:
-    """Return the curves in an order and in directions that make a tool's way between them short.
-
-    The way leads from the upper left corner to the nearest end, and from each curve's other end to
-    the nearest end of a curve that is left.
-    """
+    """Return curves in the order and direction of a way from each to the nearest end that is left."""
     if not curves:
         return []
     nearest = _Nearest(np.array([[curve.start, curve.end] for curve in curves]))

@@ -263,11 +263,7 @@ class Scene:
         return np.concatenate([*curves, *(raster.corners for raster in motif.rasters)])
 
     def curves(self, layer: Layer) -> Iterator[Curve]:
-        """Yield every curve of a layer, including copies of symbols.
-
-        Raises:
-            OrbiflowError: If there is a picture of pixels.
-        """
+        """Yield every curve of a layer, including copies of symbols; refuse pictures of pixels."""
         for item in layer.items:
             if isinstance(item, Uses):
                 yield from item.curves(self.symbols[item.symbol])
