@@ -368,11 +368,7 @@ _PAINT = "paint what must survive white and the rest black"
 
 
 def read_mask(path: Source) -> Picture:
-    """Read a mask from a PNG, JPEG or WebP image, turned as its EXIF orientation asks.
-
-    The level is the opacity where some of the mask is more transparent than the rest, else the
-    luminance.
-    """
+    """Read a mask from an image: its opacity where some is more transparent, else its luminance."""
     image, notes = open_image(path)
     band, alpha = _bands(path, image)
     if alpha is not None:
