@@ -52,6 +52,17 @@ def test_refused(options, message: str) -> None:
         ExportSettings(**options)
 
 
+def test_pages_without_edge_are_filled_and_printed_pieces_keep_off_the_edge() -> None:
+    assert ExportSettings(area="phone").clip
+    assert not ExportSettings(area="phone", clip=False).clip
+    assert not ExportSettings(area="phone", cut="pieces").clip
+    assert not ExportSettings(area="A4").clip
+    assert not ExportSettings(area="phone", purpose="stickers").clip
+    assert ExportSettings(purpose="print", cut="pieces").margin == 5
+    assert ExportSettings(purpose="print", cut="pieces", margin=0).margin == 0
+    assert ExportSettings(purpose="print").margin == ExportSettings(cut="pieces").margin == 0
+
+
 def test_purposes() -> None:
     laser = ExportSettings(purpose="laser")
     assert (laser.file_format, laser.cut, laser.clip) == ("svg", "skeleton", False)

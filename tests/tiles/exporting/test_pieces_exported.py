@@ -134,3 +134,12 @@ def test_offset_there_and_back(kerf: float, clearance: float) -> None:
     wanted = shapely.Polygon(shape).buffer(-clearance / 2, join_style="mitre", mitre_limit=9)
     # the round beam leaves fillets in inner corners, and nothing else
     assert left.symmetric_difference(wanted).area < 0.5 * max(kerf, clearance) ** 2 + 1e-6
+
+
+def test_files_of_all_formats_have_the_same_pieces() -> None:
+    found = []
+    for form in ("svg", "dxf"):
+        own = ExportSettings(cut="pieces", kerf=0.15, area=(120.0, 90.0), tile_size=30, format=form)
+        found.append(scenes(tile_of("IH4"), own)[0][0])
+    one, other = ([tile.offset for tile in scene.tiles] for scene in found)
+    np.testing.assert_array_equal(one, other)

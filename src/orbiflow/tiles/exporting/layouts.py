@@ -305,11 +305,11 @@ LEAST_GAP = 0.01  # the least distance in mm between cuts: pieces never touch
 LEAST_EDGE = 0.1  # twice the least distance in mm of cuts from the sheet's edge
 
 
-def pieces_scenes(layout: Layout, *, fine: bool = True) -> list[Scene]:
-    """Return a scene for each sheet, several where a bed does not hold all; smooth cuts if `fine`."""
+def pieces_scenes(layout: Layout) -> list[Scene]:
+    """Return a scene for each sheet, several where a bed does not hold all."""
     settings, box, flat = layout.settings, layout.box, layout.fine
     ring = cut_ring(layout.piece[0], settings.kerf, settings.clearance)
-    curve = _closed_fit(ring, flat) if fine else Curve.polyline(ring, closed=True)
+    curve = _closed_fit(ring, flat)
     line = curve.flattened(flat / 4)
     gap = max(settings.spacing, LEAST_GAP)
     if settings.coloured:  # colours that reach beyond the cut do not meet

@@ -22,6 +22,7 @@ from orbiflow.units import COLUMNS, PAGES, Colour, Length, LengthOrZero, PageSiz
 
 PIECES = Group("Pieces")
 MARKS_EDGE = 10.0  # distance in mm of registration marks from the page's edge
+PRINTER_EDGE = 5.0  # width in mm of the page's edge that printers at home leave empty
 USUAL_WIDTH = 0.25  # width in mm of the lines around tiles
 PAGE = (300.0, 200.0)  # width and height of the page in mm where none is asked for
 
@@ -62,7 +63,7 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     double, a journal's columns."""
 
     margin: LengthOrZero = 0.0
-    """Width of the page's edge that stays empty."""
+    """Width of the page's edge that stays empty; 5 mm for pieces that are printed."""
 
     cut: Literal["none", "skeleton", "pieces", "jigsaw", "template"] = "none"
     """With none, every tile is drawn; with skeleton, each shared edge once; with pieces, tiles
@@ -85,7 +86,7 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
         Option("--clip", off="--whole"),
         OnlyWith(cut=("none", "skeleton"), because="pieces are whole"),
     ] = False
-    """Cut tiles at the page's edge, or leave out those that are not whole."""
+    """Cut tiles at the page's edge, as on a mug or phone, or leave out those that are not whole."""
 
     border: Annotated[bool, OnlyWith(cut="skeleton", clip=True)] = False
     """Cut the page's border, too."""
@@ -159,8 +160,13 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
 
     def defaults(self) -> Mapping[str, Any]:
         values = {**super().defaults(), **PURPOSES.get(self.purpose or "", {})}
-        if "cut" in self.fields_given and self.cut not in ("none", "skeleton"):
+        cut = self.cut if "cut" in self.fields_given else values.get("cut", "none")
+        if cut not in ("none", "skeleton"):
             values.pop("clip", None)
+        if cut == "none" and self.area in (PAGES["mug"], PAGES["phone"]):
+            values.setdefault("clip", True)
+        if cut == "pieces" and self.purpose in PRINTED:
+            values.setdefault("margin", PRINTER_EDGE)
         return values
 
     def check(self) -> None:

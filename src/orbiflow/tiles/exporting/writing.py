@@ -167,7 +167,7 @@ def laid_out(
 def _made(placed: Layout, given: EscherTile) -> list[Scene]:
     settings, fine = placed.settings, placed.fine
     if settings.cut == "pieces":
-        made = pieces_scenes(placed, fine=settings.file_format not in ("dxf", "json"))
+        made = pieces_scenes(placed)
     elif settings.cut == "jigsaw":
         made = jigsaw_scenes(placed)
     elif settings.cut == "template":
