@@ -342,6 +342,7 @@ def solid(
         picture: An SVG drawing over the silhouette, in the same frame, for a stamp or mould.
     """
     settings = settings.for_file(out)
+    settings.check_picture(picture)
 
     from orbiflow.tiles.solids import make_solid
 

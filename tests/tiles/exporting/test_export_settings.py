@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from exported import tile_of
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.tiles import ExportSettings, scenes
+from orbiflow.units import PAGES
 
 
 @pytest.mark.parametrize(
@@ -53,14 +55,19 @@ def test_refused(options, message: str) -> None:
 
 
 def test_pages_without_edge_are_filled_and_printed_pieces_keep_off_the_edge() -> None:
-    assert ExportSettings(area="phone").clip
-    assert not ExportSettings(area="phone", clip=False).clip
-    assert not ExportSettings(area="phone", cut="pieces").clip
-    assert not ExportSettings(area="A4").clip
-    assert not ExportSettings(area="phone", purpose="stickers").clip
+    assert ExportSettings(area=PAGES["phone"]).clip
+    assert not ExportSettings(area=PAGES["phone"], clip=False).clip
+    assert not ExportSettings(area=PAGES["phone"], cut="pieces").clip
+    assert not ExportSettings(area=PAGES["a4"]).clip
+    assert not ExportSettings(area=PAGES["phone"], purpose="stickers").clip
     assert ExportSettings(purpose="print", cut="pieces").margin == 5
     assert ExportSettings(purpose="print", cut="pieces", margin=0).margin == 0
     assert ExportSettings(purpose="print").margin == ExportSettings(cut="pieces").margin == 0
+
+
+def test_beds_have_names_as_pages_have() -> None:
+    named: dict[str, Any] = {"bed": "A4-landscape", "area": "A2"}
+    assert ExportSettings(**named).bed == (297, 210)
 
 
 def test_purposes() -> None:

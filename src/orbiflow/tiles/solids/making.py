@@ -15,12 +15,12 @@ from orbiflow import __version__
 from orbiflow.arguments import as_choice
 from orbiflow.arrays import Array
 from orbiflow.drawing import rendered
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.errors import InputFileError
 from orbiflow.runtime import write_atomic
 from orbiflow.tiles.exporting import ExportSettings, dark_parts, laid_out, place_on
 from orbiflow.tiles.likeness import narrowest_slit
 from orbiflow.tiles.scene import Motif
-from orbiflow.tiles.solids.settings import WITH_DRAWING, SolidSettings
+from orbiflow.tiles.solids.settings import SolidSettings
 from orbiflow.tiles.solids.shapes import Plan, shape
 from orbiflow.tiles.tile import EscherTile, TileSource
 
@@ -110,10 +110,7 @@ def make_solid(
         InputFileError: If the drawing cannot be read, or is a picture of pixels.
     """
     settings, given = settings or SolidSettings(), EscherTile.of(tile)
-    if picture is not None and settings.kind not in WITH_DRAWING:
-        raise OrbiflowError(
-            f"a {settings.kind} takes no picture; leave it out, or make a stamp or mould"
-        )
+    settings.check_picture(picture)
     certificate = given.require_certified(
         force=force, otherwise="so no solid is made of it; --force makes one, marked so"
     )

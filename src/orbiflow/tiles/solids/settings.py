@@ -100,6 +100,12 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
         if self.kind == "puzzle" and not self.clearance:
             raise SettingError("{clearance} must be above 0 in a puzzle, or no piece comes out")
 
+    def check_picture(self, picture: object) -> None:
+        """Check that a picture, if there is one, has a place on the solid."""
+        if picture is not None and self.kind not in WITH_DRAWING:
+            what = f"a {self.kind} takes no {{picture}}"
+            raise SettingError(f"{what}; leave it out, or make a stamp or mould")
+
 
 KINDS: Mapping[str, Mapping[str, Any]] = {
     "tile": {},
