@@ -56,6 +56,7 @@ def test_refused(options, message: str) -> None:
 
 def test_pages_without_edge_are_filled_and_printed_pieces_keep_off_the_edge() -> None:
     assert ExportSettings(area=PAGES["phone"]).clip
+    assert ExportSettings(area=(180, 90)).clip
     assert not ExportSettings(area=PAGES["phone"], clip=False).clip
     assert not ExportSettings(area=PAGES["phone"], cut="pieces").clip
     assert not ExportSettings(area=PAGES["a4"]).clip

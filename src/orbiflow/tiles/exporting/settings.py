@@ -22,6 +22,7 @@ from orbiflow.units import COLUMNS, PAGES, Colour, Length, LengthOrZero, PageSiz
 
 PIECES = Group("Pieces")
 MARKS_EDGE = 10.0  # distance in mm of registration marks from the page's edge
+WRAPPED = ("mug", "phone")  # pages that things are wrapped in, and so without an edge
 PRINTER_EDGE = 5.0  # width in mm of the page's edge that printers at home leave empty
 USUAL_WIDTH = 0.25  # width in mm of the lines around tiles
 PAGE = (300.0, 200.0)  # width and height of the page in mm where none is asked for
@@ -163,7 +164,7 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
         cut = self.cut if "cut" in self.fields_given else values.get("cut", "none")
         if cut not in ("none", "skeleton"):
             values.pop("clip", None)
-        if cut == "none" and self.area in (PAGES["mug"], PAGES["phone"]):
+        if cut == "none" and sorted(self.area or ()) in [sorted(PAGES[name]) for name in WRAPPED]:
             values.setdefault("clip", True)
         if cut == "pieces" and self.purpose in PRINTED:
             values.setdefault("margin", PRINTER_EDGE)
