@@ -220,10 +220,6 @@ def drawn_motif(
     """Return what is drawn on a tile, in its units: a drawing, engraved lines, then eyes.
 
     Engraved lines are regions that swell and taper, or `hairlines` along their middle.
-
-    Raises:
-        OrbiflowError: If there is a drawing or an eye but no map of the silhouette, or an eye lies
-            outside the silhouette.
     """
     if drawing is not None or settings.eyes:
         tile.require_map()

@@ -6,7 +6,7 @@ Coordinates are in mm from the page's upper left corner, y down, as on a screen 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -203,6 +203,16 @@ class Uses:
         shape = (len(self), *[1] * (points.ndim - 1), 2)
         return turned[self.which] + self.offsets.reshape(shape)
 
+    def near(self, points: Array, box: Box) -> Booleans:
+        """Return which copies (M,) of points (N, 2) have a bounding box that meets a box."""
+        images = self.images(points)
+        low, high = images.min(axis=1), images.max(axis=1)
+        return (high > box[:2]).all(axis=1) & (low < box[2:]).all(axis=1)
+
+    def select(self, keep: Booleans | slice) -> Uses:
+        """Return the copies where `keep` is true, or in a slice."""
+        return replace(self, which=self.which[keep], offsets=self.offsets[keep])
+
     def curves(self, curve: Curve) -> Iterator[Curve]:
         """Yield the images of a curve of the symbol."""
         for pieces in self.images(curve.pieces):
@@ -263,11 +273,7 @@ class Scene:
         return np.concatenate([*curves, *(raster.corners for raster in motif.rasters)])
 
     def curves(self, layer: Layer) -> Iterator[Curve]:
-        """Yield every curve of a layer, including copies of symbols.
-
-        Raises:
-            OrbiflowError: If there is a picture of pixels.
-        """
+        """Yield every curve of a layer, including copies of symbols; refuse pictures of pixels."""
         for item in layer.items:
             if isinstance(item, Uses):
                 yield from item.curves(self.symbols[item.symbol])
@@ -288,30 +294,17 @@ def rectangle(box: Box) -> Curve:
     return Curve.polyline([[left, top], [right, top], [right, bottom], [left, bottom]], closed=True)
 
 
-def inside(curve: Curve, box: Box) -> bool:
-    """Return whether a box holds a curve with all its control points."""
+def clipped(curve: Curve, box: Box, tolerance: float, *, filled: bool) -> list[Curve]:
+    """Return what a box leaves of a curve, or of its inside: the curve if it is all, else polylines."""
     (low, high), corners = curve.bounds(), np.array(box).reshape(2, 2)
-    return bool((low >= corners[0] - 1e-9).all() and (high <= corners[1] + 1e-9).all())
-
-
-def clipped_region(curve: Curve, box: Box, tolerance: float) -> list[Curve]:
-    """Return what a closed curve and the box share: the curve if all is, else polygons near it."""
-    if inside(curve, box):
-        return [curve]
-    polygon = shapely.Polygon(curve.flattened(tolerance))
-    polygon = polygon if polygon.is_valid else shapely.make_valid(polygon)
-    common = shapely.intersection(polygon, shapely.box(*box))
-    return [
-        Curve.polyline(np.asarray(part.exterior.coords)[:-1], closed=True)
-        for part in polygons_in(common)
-    ]
-
-
-def clipped_line(curve: Curve, box: Box, tolerance: float) -> list[Curve]:
-    """Return the parts of an open curve that are in the box."""
-    if inside(curve, box):
+    if (low >= corners[0] - 1e-9).all() and (high <= corners[1] + 1e-9).all():
         return [curve]
     points = curve.flattened(tolerance)
+    if filled:
+        polygon = shapely.Polygon(points)
+        polygon = polygon if polygon.is_valid else shapely.make_valid(polygon)
+        rings = [part.exterior for part in polygons_in(polygon & shapely.box(*box))]
+        return [Curve.polyline(shapely.get_coordinates(r)[:-1], closed=True) for r in rings]
     line = shapely.LineString(np.concatenate([points, points[:1]]) if curve.closed else points)
     parts = shapely.get_parts(shapely.intersection(line, shapely.box(*box)))
     lines = [part for part in parts if part.geom_type == "LineString" and not part.is_empty]

@@ -79,10 +79,7 @@ class Surroundings:
 
 
 def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
-    """Return the tiles whose bounding box comes within `margin` of a prototile's, nearest first.
-
-    The unit is the side of a square of a tile's area.
-    """
+    """Return the tiles whose box is within `margin`, in tile sizes, of a prototile's, nearest first."""
     scale = math.sqrt(tiling.tile_area)
     if tiling.radius > MAX_SPAN * scale:
         raise OrbiflowError(
@@ -164,10 +161,7 @@ def boundaries_cancel(
 
 
 def _orbits(tiling: Tiling, first: Integers) -> Integers | None:
-    """Return the first segment that each is an image of under its prototile's stabiliser.
-
-    None where vertices are not taken to vertices.
-    """
+    """Return the first segment that has each as an image in its tile; None if vertices have none."""
     labels: list[Integers] = []
     for start, own in zip(first, tiling.stabilisers, strict=True):
         images: list[Integers] = []

@@ -34,8 +34,6 @@ MAX_PIXELS = 40_000_000
 MAX_SIDE = 1500  # pixels; beyond this an image is averaged down before it is traced
 MAX_SIDE_OF_PHOTOGRAPH = 1000  # pixels, in the same way
 MIN_SIDE_OF_PHOTOGRAPH = 16
-# in CIE Lab for each pixel of a picture of 400: a shape with a fainter edge may be read wrong
-FAINT_EDGE = 4.0
 MIN_CONTRAST = 0.04  # of full scale, between the shape's and the background's usual level
 _STARTS = {"PNG": b"\x89PNG", "JPEG": b"\xff\xd8", "WebP": b"RIFF", "GIF": b"GIF", "BMP": b"BM"}
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
@@ -47,10 +45,6 @@ _DAMAGED = (
 # channels that say by themselves where the shape is: their high part and their low part
 _PARTS = {"alpha": ("opaque", "transparent"), "mask": ("marked", "unmarked")}
 _PLAIN = "cut it out, photograph it on a plain ground of another colour, or set a threshold"
-_FAINT = (
-    "the shape differs little from what is around it and may be read wrong: look at what was read, "
-    f"and if need be {_PLAIN}"
-)
 
 
 @dataclass(frozen=True)
@@ -62,7 +56,6 @@ class Picture:
     size: tuple[int, int]
     reduced: int  # how many pixels of the image are one of the channel's wide
     notes: tuple[str, ...]
-    warnings: tuple[str, ...] = ()  # what may be wrong with it
 
 
 def read_image(
@@ -94,9 +87,7 @@ def _traced(
     level, notes = choose_shape(path, picture, threshold, invert)
     outline, seen, traced = trace(path, level, scale=picture.reduced, size=picture.size)
     notes = (*picture.notes, *notes, *traced)
-    return Reading(
-        outline, True, "image", picture.size, notes, seen=seen, warnings=picture.warnings
-    )
+    return Reading(outline, True, "image", picture.size, notes, seen=seen)
 
 
 def open_image(path: Source, *, enough: int | None = None) -> tuple[Image.Image, list[str]]:
@@ -185,11 +176,10 @@ def _photograph(path: Source, image: Image.Image, notes: Sequence[str]) -> Pictu
     rgb = levels if levels.ndim == 3 else np.repeat(levels[..., None], 3, axis=2)
     if min(rgb.shape[:2]) < MIN_SIDE_OF_PHOTOGRAPH or not is_photograph(rgb):
         return None
-    channel, steepness = shape_in(rgb)
+    channel = shape_in(rgb)
     if not (channel > 0.5).any():
         raise InputFileError(f"{path}: no shape stands out in the photograph; {_PLAIN}")
-    warned = (_FAINT,) * (steepness < FAINT_EDGE)
-    return Picture(channel, "photograph", image.size, reduced, (*notes, *averaging), warned)
+    return Picture(channel, "photograph", image.size, reduced, (*notes, *averaging))
 
 
 def _bands(path: Source, image: Image.Image) -> tuple[Image.Image, Image.Image | None]:
@@ -368,11 +358,7 @@ _PAINT = "paint what must survive white and the rest black"
 
 
 def read_mask(path: Source) -> Picture:
-    """Read a mask from a PNG, JPEG or WebP image, turned as its EXIF orientation asks.
-
-    The level is the opacity where some of the mask is more transparent than the rest, else the
-    luminance.
-    """
+    """Read a mask from an image: its opacity where some is more transparent, else its luminance."""
     image, notes = open_image(path)
     band, alpha = _bands(path, image)
     if alpha is not None:

@@ -102,10 +102,7 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
 def _background(
     layers: list[list[Layer]], drawing: Drawing
 ) -> tuple[str | None, list[list[Layer]]]:
-    """Return the background's colour, if it is painted, and the shapes that are no more than it.
-
-    These are rectangles that cover the page, as long as something else is there.
-    """
+    """Return the background's colour, if it is painted, and the rectangles that are no more than it."""
     every = [layer.region for own in layers for layer in own]
     xmin, ymin, xmax, ymax = drawing.box or shapely.total_bounds(every)
     page = shapely.box(xmin, ymin, xmax, ymax)

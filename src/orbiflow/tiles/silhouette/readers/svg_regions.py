@@ -201,10 +201,7 @@ def lightness(colour: str) -> float:
 
 
 def painted(layers: list[Layer], signs: list[int], grid: float | None = None) -> BaseGeometry:
-    """Paint layers one over the other, and return the region that is left.
-
-    The signs say whether a layer adds its region (1), takes it away (-1) or changes nothing (0).
-    """
+    """Paint layers in turn, which add their region (sign 1), take it away (-1) or do nothing (0)."""
     found: BaseGeometry = Polygon()
     acting = [(sign, layer) for sign, layer in zip(signs, layers, strict=True) if sign]
     for sign, run in groupby(acting, key=lambda pair: pair[0]):

@@ -120,10 +120,7 @@ class _Place:
 
 
 class Drawing:
-    """The shapes of the SVG drawing in a file, and how many things of other kinds were met.
-
-    Raises `InputFileError` for what cannot be understood.
-    """
+    """The shapes of the SVG drawing in a file, and how many things of other kinds were met."""
 
     def __init__(self, path: Source) -> None:
         self.path, self.root = path, parse_xml(path, read_bytes(path, MAX_BYTES))
