@@ -24,12 +24,12 @@ from .overlap import Overlap as Overlap
 from .overlap import best_overlay as best_overlay
 from .overlap import boundary_iou as boundary_iou
 from .overlap import prepared_region as prepared_region
+from .ranking import MOST_STARS as MOST_STARS
+from .ranking import Rating as Rating
 from .ranking import diverse as diverse
+from .ranking import likeness_ratings as likeness_ratings
 from .ranking import mutual_iou as mutual_iou
 from .ranking import rank_score as rank_score
-from .rating import MOST_STARS as MOST_STARS
-from .rating import Rating as Rating
-from .rating import likeness_ratings as likeness_ratings
 from .recognition import Recognisability as Recognisability
 from .recognition import Recogniser as Recogniser
 from .recognition import recognisability as recognisability
