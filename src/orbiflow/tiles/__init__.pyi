@@ -27,6 +27,7 @@ from .geometry import subdivided as subdivided
 from .likeness.faithful import Fidelity as Fidelity
 from .likeness.faithful import faithfulness as faithfulness
 from .likeness.faithful import fidelity as fidelity
+from .likeness.metrics import Overlap as Overlap
 from .likeness.metrics import Region as Region
 from .likeness.metrics import Shape as Shape
 from .likeness.metrics import ShapeMetrics as ShapeMetrics
@@ -36,13 +37,12 @@ from .likeness.metrics import dice as dice
 from .likeness.metrics import hausdorff as hausdorff
 from .likeness.metrics import iou as iou
 from .likeness.metrics import pixel_accuracy as pixel_accuracy
+from .likeness.metrics import prepared_region as prepared_region
 from .likeness.necks import Thinnest as Thinnest
 from .likeness.necks import hair_share as hair_share
 from .likeness.necks import narrowest_neck as narrowest_neck
 from .likeness.necks import narrowest_slit as narrowest_slit
 from .likeness.necks import slit_share as slit_share
-from .likeness.overlap import Overlap as Overlap
-from .likeness.overlap import prepared_region as prepared_region
 from .likeness.ranking import Rating as Rating
 from .likeness.ranking import diverse as diverse
 from .likeness.ranking import rank_score as rank_score

@@ -21,7 +21,7 @@ from orbiflow.arguments import as_array, as_number, as_whole
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import centroid, complex_points, orient, signed_area
-from orbiflow.tiles.likeness.overlap import Overlap, best_overlay
+from orbiflow.tiles.likeness.metrics import Overlap, best_overlay
 
 WORDS = {4.5: "excellent", 3.5: "good", 2.5: "fair", 1.0: "poor"}
 """The words, each with the least number of stars that has it."""
