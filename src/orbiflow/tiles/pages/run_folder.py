@@ -20,9 +20,8 @@ from orbiflow.runtime import (
     work,
     write_atomic,
 )
-from orbiflow.tiles.pages.overview import overview_png
 from orbiflow.tiles.pages.page import TILE_FILES, index_page
-from orbiflow.tiles.pages.read_picture import is_read_png
+from orbiflow.tiles.pages.sheets import is_read_png, overview_png
 from orbiflow.tiles.pictures import (
     bending_picture,
     comparison,
