@@ -72,6 +72,17 @@ class Range:
         given = [f"{word} {_plainly(bound)}" for word, bound in bounds.items() if bound is not None]
         return " and ".join(given)
 
+    @property
+    def schema(self) -> dict[str, float]:
+        """The keywords of JSON Schema for these bounds."""
+        bounds = {
+            "minimum": self.least,
+            "maximum": self.most,
+            "exclusiveMinimum": self.above,
+            "exclusiveMaximum": self.below,
+        }
+        return {name: bound for name, bound in bounds.items() if bound is not None}
+
 
 ANY = Range()
 

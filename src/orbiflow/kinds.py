@@ -1,7 +1,7 @@
 """Kinds of values that a setting may have, compiled from the annotation of its field.
 
 A kind reads a value from Python, JSON or the command line (`read`), writes it as JSON (`plain`), and
-describes itself in words. Annotations may be built from `bool`, `int`, `float`
+describes itself in words and as JSON Schema. Annotations may be built from `bool`, `int`, `float`
 (always finite), `str`, `Path`, `Literal`, tuples, unions of one of these and None, and `Annotated` with
 `Range`, `Unit`, `Parsed` and `Repeated`.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import types
 import typing
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import repeat
 from numbers import Integral, Real
@@ -23,7 +23,7 @@ from orbiflow.errors import OrbiflowError
 
 @dataclass(frozen=True)
 class Unit:
-    """The unit of a number, for the help, such as "mm", "s" or "degrees"."""
+    """The unit of a number, for help and schema, such as "mm", "s" or "degrees"."""
 
     name: str
 
@@ -76,6 +76,8 @@ class Kind:
 
     wanted = ""
     """What a value must be, in words."""
+    schema: Mapping[str, Any]
+    """The kind as JSON Schema."""
     limits = ""
     """Which values are allowed, where the help should say so."""
     unit = ""
@@ -107,7 +109,7 @@ class Kind:
 class TextKind(Kind):
     """Any text."""
 
-    wanted = "text"
+    wanted, schema = "text", {"type": "string"}
 
     def read(self, value: Any, *, text: bool = False) -> str:  # noqa: ARG002
         if not isinstance(value, str):
@@ -119,6 +121,7 @@ class PathKind(Kind):
     """The path of a file or folder."""
 
     wanted, metavar = "a path", "PATH"
+    schema: Mapping[str, Any] = {"type": "string", "minLength": 1, "format": "path"}
 
     def read(self, value: Any, *, text: bool = False) -> Path:  # noqa: ARG002
         path = path_text(value)
@@ -133,7 +136,7 @@ class PathKind(Kind):
 class FlagKind(Kind):
     """True or false."""
 
-    wanted = "true or false"
+    wanted, schema = "true or false", {"type": "boolean"}
 
     def read(self, value: Any, *, text: bool = False) -> bool:
         known = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
@@ -151,6 +154,7 @@ class NumberKind(Kind):
         self.wanted = number_wanted(allowed, whole=whole)
         self.limits = " ".join(filter(None, (str(allowed), unit)))
         self.metavar = "INT" if whole else "NUMBER"
+        self.schema = {"type": "integer" if whole else "number", **allowed.schema}
 
     def read(self, value: Any, *, text: bool = False) -> float:
         made, abstract = (int, Integral) if self.whole else (float, Real)
@@ -170,7 +174,7 @@ class ChoiceKind(Kind):
     """One of several words."""
 
     def __init__(self, choices: tuple[str, ...]) -> None:
-        self.choices, self.wanted = choices, one_of(choices)
+        self.choices, self.wanted, self.schema = choices, one_of(choices), {"enum": list(choices)}
 
     def read(self, value: Any, *, text: bool = False) -> str:  # noqa: ARG002
         if not isinstance(value, str) or value not in self.choices:
@@ -188,6 +192,7 @@ class ListKind(Kind):
         limits = item.limits or ", ".join(item.choices)
         self.limits = f"each {limits}" if limits else ""
         self.metavar = item.metavar if repeated else "TEXT"
+        self.schema = {"type": "array", "items": item.schema, "minItems": int(not may_be_empty)}
 
     def read(self, value: Any, *, text: bool = False) -> tuple[Any, ...]:
         parts: Sequence[Any] = [value] if text and self.repeated else _parts(value, text)
@@ -208,6 +213,8 @@ class TupleKind(Kind):
         self.items, self.unit, limits = items, unit, items[0].limits
         self.wanted = f"{len(items)} values, each {items[0].wanted}"
         self.limits = " ".join(filter(None, (f"each {limits}" if limits else "", unit)))
+        schema = {"type": "array", "prefixItems": [item.schema for item in items]}
+        self.schema = {**schema, "minItems": len(items), "maxItems": len(items)}
 
     def read(self, value: Any, *, text: bool = False) -> tuple[Any, ...]:
         parts = _parts(value, text)
@@ -226,6 +233,7 @@ class OptionalKind(Kind):
         for name in ("wanted", "limits", "unit", "metavar", "choices", "repeated", "needs"):
             setattr(self, name, getattr(inner, name))
         self.inner, self.finish = inner, inner.finish
+        self.schema = {"anyOf": [inner.schema, {"type": "null"}]}
 
     def read(self, value: Any, *, text: bool = False) -> Any:
         return None if value is None else self.inner.read(value, text=text)
@@ -242,6 +250,8 @@ class ParsedKind(Kind):
         self.wanted = ", ".join(filter(None, (parsed.wanted, inner.limits)))
         self.limits = parsed.values or inner.limits
         self.unit, self.metavar, self.needs = inner.unit, parsed.metavar, parsed.needs
+        text = {"type": "string", "description": parsed.wanted}
+        self.schema = text if isinstance(inner, TextKind) else {"anyOf": [inner.schema, text]}
 
     def read(self, value: Any, *, text: bool = False) -> Any:  # noqa: ARG002
         if not isinstance(value, str):

@@ -31,7 +31,7 @@ values for fields that were not given; so a preset is a field like any other.
 Use `settings.replace(...)`, not `dataclasses.replace`, to change fields: it remembers which were given.
 
 **To add an operation**, see `orbiflow.runtime.operations`. **To add an option** to one: add a field to
-its settings class, and use it. The command line, JSON and reference page follow.
+its settings class, and use it. The command line, JSON, JSON Schema and reference page follow.
 """
 
 from __future__ import annotations
@@ -283,6 +283,16 @@ class Field:
         """Return the value that the command line gives in one word, or several if it is repeated."""
         parts = [self.read(word, text=True) for word in words]
         return tuple(entry for part in parts for entry in part) if self.kind.repeated else parts[-1]
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """The field as JSON Schema."""
+        schema = {**self.kind.schema, "description": self.doc}
+        if self.kind.unit:
+            schema["x-unit"] = self.kind.unit
+        if not self.required:
+            schema["default"] = self.kind.plain(self.default)
+        return schema
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)

@@ -1,4 +1,4 @@
-"""Operations: their arguments, events, JSON forms."""
+"""Operations: their arguments, events, JSON forms and schemas."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Annotated, Any
 
+import jsonschema
 import pytest
 
 from orbiflow.cli.reference import reference
@@ -128,7 +129,9 @@ def test_a_call_from_one_mapping() -> None:
 def test_json_round_trip(given: dict[str, Any]) -> None:
     document = {"schema_version": 2, **given}
     call = call_from_json(document)
+    jsonschema.validate(document, call.operation.schema)
     again = json.loads(json.dumps(call.to_json()))
+    jsonschema.validate(again, call.operation.schema)
     assert call_from_json(again) == call == pickle.loads(pickle.dumps(call))
 
 
@@ -146,6 +149,7 @@ def test_wrong_json_is_refused(document: object) -> None:
 
 @pytest.mark.parametrize("made", list(map(find, OPERATIONS)), ids=lambda made: made.name)
 def test_every_operation_describes_itself(made: Operation) -> None:
+    jsonschema.Draft202012Validator.check_schema(made.schema)
     assert find(made.name) is made
     assert made.doc
     assert not [entry.name for entry in made.fields if not entry.doc]
@@ -160,7 +164,7 @@ def test_operations_are_known_without_numerical_libraries() -> None:
     code = (
         "import sys; from orbiflow.commands import OPERATIONS\n"
         "from orbiflow.runtime import call_from_json, find\n"
-        "[find(name).fields for name in OPERATIONS]\n"
+        "[find(name).schema for name in OPERATIONS]\n"
         "call_from_json({'schema_version': 2, 'operation': 'export', 'result': 'x'})\n"
         "print({'numpy', 'torch', 'scipy', 'rich', 'cyclopts'} & set(sys.modules))"
     )

@@ -46,6 +46,7 @@ from orbiflow.runtime.events import Cancel, Cancelled, Event, Failed, Finished, 
 from orbiflow.settings import Field, Settings, check_names, check_rules, fields_of
 
 SCHEMA_VERSION = 2
+SCHEMA = "https://json-schema.org/draft/2020-12/schema"
 OWN = ("on_event", "cancel")
 """Parameters that every operation may have and no user sets by name."""
 
@@ -170,6 +171,24 @@ class Operation:
         defaults = {entry.name: entry.default for entry in simple}
         check_rules(simple, {**defaults, **call.flat}, call.given)
         return call
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """The JSON form as JSON Schema."""
+        required = [entry.name for entry in self.fields if entry.required]
+        return {
+            "$schema": SCHEMA,
+            "title": self.name,
+            "description": self.doc,
+            "type": "object",
+            "properties": {
+                "schema_version": {"const": SCHEMA_VERSION},
+                "operation": {"const": self.name},
+                **{entry.name: entry.schema for entry in self.fields},
+            },
+            "required": ["schema_version", "operation", *required],
+            "additionalProperties": False,
+        }
 
 
 @dataclass(frozen=True)
