@@ -136,7 +136,6 @@ from .solids.making import write_stl as write_stl
 from .solids.settings import SolidSettings as SolidSettings
 from .tile import EscherTile as EscherTile
 from .tile import TileMap as TileMap
-from .tilings.arrangements import arrangement as arrangement
 from .tilings.certificate import Certificate as Certificate
 from .tilings.certificate import certify as certify
 from .tilings.colourings import Colouring as Colouring
@@ -148,6 +147,7 @@ from .tilings.isohedral import isohedral_class as isohedral_class
 from .tilings.prototile import Prototile as Prototile
 from .tilings.prototile import Stabiliser as Stabiliser
 from .tilings.surroundings import Neighbours as Neighbours
+from .tilings.surroundings import arrangement as arrangement
 from .tilings.surroundings import aspects as aspects
 from .tilings.surroundings import neighbours as neighbours
 from .tilings.surroundings import patch as patch
