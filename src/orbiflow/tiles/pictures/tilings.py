@@ -135,58 +135,43 @@ def tiling_picture(
 
 
 PANEL_ASPECT = 1.25  # width over height of the part of a tiling that a panel of `tilings_png` shows
+PANEL_TILES = 22  # the number of tiles that fit into it, by area
 _NAME, _GAP = 0.13, 0.05  # height of a panel's name, and the space around it, in panel widths
 
 
-def tilings_png(
-    tilings: Mapping[str, Tiles],
-    *,
-    columns: int = 6,
-    width_px: int = 1600,
-    tiles: float = 22.0,
-    palette_name: str | Palette = DEFAULT_PALETTE,
-) -> bytes:
+def tilings_png(tilings: Mapping[str, Tiles], *, columns: int = 6, width_px: int = 1600) -> bytes:
     """Return a PNG of several tilings side by side, in which neighbours have different colours.
 
     Args:
         tilings: The tilings by name, which is written below each.
         columns: The number of tilings in a row.
         width_px: The sheet's width in pixels; its height follows.
-        tiles: The number of tiles that fit into a panel, by area.
-        palette_name: The palette of paper, fills and outlines.
 
     Raises:
-        OrbiflowError: If there are no tilings, the palette is unknown or the size is impossible.
+        OrbiflowError: If there are no tilings or the size is impossible.
     """
     columns = as_whole(columns, "columns", 1, 100)
     if not tilings:
         raise OrbiflowError("a sheet of tilings needs at least one")
-    chosen = palette(palette_name)
     side = width_px / columns
     gap, name = round(_GAP * side), round(_NAME * side)
     panel = round(side) - 2 * gap
-    rasters = [
-        _panel(tiling, panel, tiles, label, name, chosen) for label, tiling in tilings.items()
-    ]
+    rasters = [_panel(tiling, panel, label, name) for label, tiling in tilings.items()]
     step = rasters[0].height + gap
     rows = math.ceil(len(rasters) / columns)
-    sheet = Image.new("RGB", (width_px, rows * step + gap), chosen.paper)
+    sheet = Image.new("RGB", (width_px, rows * step + gap), rasters[0].paper)
     for number, raster in enumerate(rasters):
         row, column = divmod(number, columns)
         sheet.paste(raster.image(), (round(column * side) + gap, row * step + gap))
     return palette_png(sheet, list(dict.fromkeys(c for r in rasters for c in r.colours)))
 
 
-def _panel(
-    tiles: Tiles, width_px: int, count: float, label: str, name_px: int, chosen: Palette
-) -> Raster:
-    tiling = as_tiling(tiles)
-    half = math.sqrt(count * tiling.tile_area * PANEL_ASPECT) / 2
+def _panel(tiles: Tiles, width_px: int, label: str, name_px: int) -> Raster:
+    tiling, chosen = as_tiling(tiles), palette(DEFAULT_PALETTE)
+    half = math.sqrt(PANEL_TILES * tiling.tile_area * PANEL_ASPECT) / 2
     x, y = tiling.center.tolist()
     window: Window = (x - half, y - half / PANEL_ASPECT, x + half, y + half / PANEL_ASPECT)
-    raster = tiling_raster(
-        tiling, window, width_px=width_px, palette_name=chosen, outline_px=1.0, strip_px=name_px
-    )
+    raster = tiling_raster(tiling, window, width_px=width_px, outline_px=1.0, strip_px=name_px)
     for prototile in tiling.prototiles:
         raster.line(prototile.polygon, chosen.outline, max(2.0, 0.013 * width_px), closed=True)
     low, high = raster.plane_px, raster.height

@@ -35,7 +35,7 @@ def opened(source: Source) -> Path | io.BytesIO:
     return io.BytesIO(source.data) if isinstance(source, FileContent) else source
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Reading:
     """A silhouette as found in a file.
 
