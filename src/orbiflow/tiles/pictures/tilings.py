@@ -18,7 +18,6 @@ from orbiflow.drawing import (
     CENTER_COLOURS,
     DEFAULT_PALETTE,
     LINE_COLOUR,
-    Palette,
     Picture,
     Raster,
     Sheet,
@@ -77,7 +76,6 @@ def tiling_raster(
     window: Window | None = None,
     *,
     width_px: int = 1600,
-    palette_name: str | Palette = DEFAULT_PALETTE,
     colours: Colouring | None = None,
     outline_px: float = OUTLINE_PX,
     y_down: bool = False,
@@ -89,17 +87,15 @@ def tiling_raster(
         tile: A tile or a tiling.
         window: The window (xmin, ymin, xmax, ymax) in the tile's units. Default: `default_window`.
         width_px: The width in pixels; the height follows from the window.
-        palette_name: The palette of paper, fills and outlines.
         colours: Which tile has which colour. Default: `colouring(tile)`.
         outline_px: The outline's width in pixels; 0 for none.
         y_down: Whether the tile's y axis points down, as in images.
         strip_px: The height of a strip below, for words.
 
     Raises:
-        OrbiflowError: If the palette is unknown, the size is impossible, or the window is empty or
-            holds too many tiles.
+        OrbiflowError: If the size is impossible, or the window is empty or holds too many tiles.
     """
-    chosen, tiling = palette(palette_name), as_tiling(tile)
+    chosen, tiling = palette(DEFAULT_PALETTE), as_tiling(tile)
     colours = colours or colouring(tiling)
     window = checked_window(window or default_window(tiling))
     raster = Raster(window, width_px, y_down=y_down, paper=chosen.paper, strip_px=strip_px)
@@ -117,16 +113,12 @@ def tiling_picture(
     tile: Tiles,
     window: Window | None = None,
     *,
-    palette_name: str | Palette = DEFAULT_PALETTE,
     colours: Colouring | None = None,
     y_down: bool = False,
     sheet: Sheet | None = None,
 ) -> Picture:
     """Return the picture of `tiling_raster` for print, in curves."""
-    raster = tiling_raster(
-        tile, window, width_px=1600, palette_name=palette_name, colours=colours, y_down=y_down,
-        outline_px=3.0,
-    )  # fmt: skip
+    raster = tiling_raster(tile, window, colours=colours, y_down=y_down, outline_px=3.0)
     kind = tile.isohedral_class if isinstance(tile, Tile) else ""
     count = len(as_tiling(tile).prototiles)
     title = f"Tiling by copies of {'a tile' if count == 1 else f'{count} tiles'}"
