@@ -59,8 +59,6 @@ from .pictures.corner import corner_picture as corner_picture
 from .pictures.figures import density_picture as density_picture
 from .pictures.figures import draw_cells as draw_cells
 from .pictures.figures import flow_picture as flow_picture
-from .pictures.figures import map_picture as map_picture
-from .pictures.figures import map_samples_picture as map_samples_picture
 from .pictures.figures import mean_field as mean_field
 from .pictures.figures import samples_picture as samples_picture
 from .pictures.frames import space_title as space_title
@@ -71,7 +69,6 @@ from .pictures.plots import TABLE as TABLE
 from .pictures.plots import THUMBNAIL as THUMBNAIL
 from .pictures.plots import Plotted as Plotted
 from .pictures.plots import is_one_file as is_one_file
-from .pictures.plots import known_names as known_names
 from .pictures.plots import plot_density as plot_density
 from .pictures.settings import PlotSettings as PlotSettings
 from .pictures.square import edge_pairs as edge_pairs

@@ -5,8 +5,6 @@ from .corner import corner_picture as corner_picture
 from .figures import density_picture as density_picture
 from .figures import draw_cells as draw_cells
 from .figures import flow_picture as flow_picture
-from .figures import map_picture as map_picture
-from .figures import map_samples_picture as map_samples_picture
 from .figures import mean_field as mean_field
 from .figures import samples_picture as samples_picture
 from .frames import space_title as space_title
@@ -17,7 +15,6 @@ from .plots import TABLE as TABLE
 from .plots import THUMBNAIL as THUMBNAIL
 from .plots import Plotted as Plotted
 from .plots import is_one_file as is_one_file
-from .plots import known_names as known_names
 from .plots import plot_density as plot_density
 from .settings import PlotSettings as PlotSettings
 from .square import edge_pairs as edge_pairs

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 import torch
@@ -16,10 +16,12 @@ from orbiflow.density.pictures import frames, overlays
 from orbiflow.density.pictures.coastlines import coastlines_for
 from orbiflow.density.pictures.colours import bar_label, bar_ticks
 from orbiflow.density.pictures.frames import INK, chart_points, require_plane, space_title, view_of
-from orbiflow.density.pictures.maps import Map, chosen_map
+from orbiflow.density.pictures.maps import Map
+from orbiflow.density.pictures.projections import chosen_map
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import Square
 from orbiflow.density.regions import DensityRegion
+from orbiflow.density.spaces import Space
 from orbiflow.drawing import Picture, Sheet, draw_flow, draw_magnitude
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup
@@ -30,6 +32,20 @@ if TYPE_CHECKING:
 Ground: TypeAlias = Square | Map
 """What densities and points of a space are drawn on."""
 
+GroundName = Literal["square", "map"]
+
+
+def _ground(
+    ground: Ground | GroundName, space: Space, points: Tensor | None, settings: PlotSettings
+) -> Ground:
+    """Return the ground of a name; a map is the one that suits the points (N, 2)."""
+    if ground == "square":
+        return Square(space, settings)
+    if ground != "map":
+        return ground
+    about = chart_points(space, torch.empty(0, 2) if points is None else points)
+    return Map(space, chosen_map(space, about, settings), coastlines_for(space, settings))
+
 
 def density_picture(
     density: Density,
@@ -37,14 +53,16 @@ def density_picture(
     settings: PlotSettings | None = None,
     *,
     sheet: Sheet | None = None,
-    ground: Ground | None = None,
+    ground: Ground | GroundName = "square",
     regions: Sequence[DensityRegion] | None = None,
 ) -> Picture:
-    """Draw a density on the canonical square, with the edges marked that are the same edge.
+    """Draw a density on the canonical square, or directions and axes on a map.
 
-    Edges of one colour and number of arrow heads are identified, in the sense of the arrows. Ticks
-    are in the user's units where the chart is a plain rescaling of them (torus, Klein bottle).
-    Peaks narrower than a pixel are averaged over it, and a note says so.
+    Edges of the square of one colour and number of arrow heads are one edge, in the sense of the
+    arrows. Ticks are in the user's units where the chart is a plain rescaling of them (torus, Klein
+    bottle). A map has its graticule, and the density is evaluated at each of its pixels, which end at
+    a curve; of axes it shows one end. Peaks narrower than a pixel are averaged over it, and a note
+    says so.
 
     Args:
         density: A density on a two-dimensional space.
@@ -52,14 +70,14 @@ def density_picture(
             drawn, always the same; dots are smaller where they crowd, so that peaks stay in sight.
         settings: How it is drawn.
         sheet: The sheet. Default: that of the settings.
-        ground: What it is drawn on. Default: the square.
+        ground: What it is drawn on, "square" or "map".
         regions: Regions to draw lines around. Default: those of the settings.
 
     Raises:
         OrbiflowError: If the space has another dimension, or samples or settings do not fit it.
     """
     settings = settings or PlotSettings()
-    sheet, ground = sheet or settings.sheet, ground or Square(density.space, settings)
+    sheet, ground = sheet or settings.sheet, _ground(ground, density.space, samples, settings)
     regions = overlays.region_lines(density, settings) if regions is None else regions
     colouring = ground.colouring(density, settings)
     shade = colouring.shade
@@ -91,23 +109,6 @@ def density_picture(
     return Picture(frame.figure, sheet, title, caption)
 
 
-def map_picture(
-    density: Density,
-    samples: Tensor | None = None,
-    settings: PlotSettings | None = None,
-    *,
-    sheet: Sheet | None = None,
-) -> Picture:
-    """Draw a density on the sphere or the projective plane on a map with its graticule.
-
-    The density is evaluated at each pixel of the map, so that nothing is stretched or sewn; the
-    pixels end at a curve. On the projective plane each axis is drawn at the end that the map shows.
-    Arguments are those of `density_picture`.
-    """
-    ground = _map_about(density, samples, settings)
-    return density_picture(density, samples, settings, sheet=sheet, ground=ground)
-
-
 def samples_picture(
     density: Density,
     data: Tensor | None,
@@ -115,15 +116,15 @@ def samples_picture(
     settings: PlotSettings | None = None,
     *,
     sheet: Sheet | None = None,
-    ground: Ground | None = None,
+    ground: Ground | GroundName = "square",
 ) -> Picture:
-    """Draw data (N, 2) and samples (M, 2) on two squares; without data, the density and samples.
+    """Draw data (N, 2) and samples (M, 2) on two grounds; without data, the density and samples.
 
     Points are of the chart, such as `space.to_chart(table)` and `density.sample((M,))`, as many of
-    each. Another `ground` than squares may be given.
+    each.
     """
-    settings = settings or PlotSettings()
-    sheet, ground = sheet or settings.sheet, ground or Square(density.space, settings)
+    settings, points = settings or PlotSettings(), samples if data is None else data
+    sheet, ground = sheet or settings.sheet, _ground(ground, density.space, points, settings)
     panels = {"data": data, "samples": samples}
     places = {n: ground.places(points) for n, points in panels.items() if points is not None}
     count = min(
@@ -153,26 +154,6 @@ def samples_picture(
         frames.write_caption(figure, words, sheet)
     first = "Density" if data is None else "Data"
     return Picture(figure, sheet, f"{first} and samples on the {space_title(ground.space)}", words)
-
-
-def map_samples_picture(
-    density: Density,
-    data: Tensor | None,
-    samples: Tensor,
-    settings: PlotSettings | None = None,
-    *,
-    sheet: Sheet | None = None,
-) -> Picture:
-    """Draw data (N, 2) and samples (M, 2) on two maps, as `samples_picture` does on two squares."""
-    ground = _map_about(density, samples if data is None else data, settings)
-    return samples_picture(density, data, samples, settings, sheet=sheet, ground=ground)
-
-
-def _map_about(density: Density, points: Tensor | None, settings: PlotSettings | None) -> Map:
-    space, settings = density.space, settings or PlotSettings()
-    about = chart_points(space, torch.empty(0, 2) if points is None else points)
-    chosen = chosen_map(space, about, settings, settings.names)
-    return Map(space, chosen, coastlines_for(space, settings))
 
 
 def _dot_scale(ground: Ground, sheet: Sheet, side: float) -> float:
@@ -207,7 +188,7 @@ def flow_picture(
     settings, space = settings or PlotSettings(), density.space
     sheet = sheet or settings.sheet
     require_plane(space)
-    view = view_of(space, center=None if space.is_round else settings.center)
+    view = view_of(space, center=settings.center)
     low, high = 0.5 - CELLS / 2, 0.5 + CELLS / 2
     window = (low, low, high, high)
     printed = frames.printed_room(sheet, 0.4, 0.6, 0.6, SPEED, ("0.00",))

@@ -66,14 +66,13 @@ def view_of(
     if len(names) != len(space.columns):
         raise OrbiflowError(f"expected {len(space.columns)} names of columns, got {list(names)}")
     if not space.is_torus:
-        if center is not None:
+        if center is not None and not space.is_round:  # there it is that of a map
             raise SettingError(
                 f"{{center}} applies to the torus and to maps, not to the {space.name}"
             )
         return View(space, names, np.zeros(space.dim))
-    turns = np.zeros(space.dim)
-    if center is not None:
-        turns = np.array(center, dtype=float) / whole_turn(space.unit or "")
+    middle = np.zeros(space.dim) if center is None else np.array(center, dtype=float)
+    turns = middle / whole_turn(space.unit or "")
     if turns.shape != (space.dim,) or not np.isfinite(turns).all():
         raise SettingError(
             f"{{center}} must be {space.dim} angles, one for each column, got {list(center or ())}"
@@ -100,15 +99,14 @@ def space_title(space: Space) -> str:
     return space.name.replace("-", " ").replace("klein", "Klein")
 
 
-def column_name(view: View, column: int) -> str:
-    """Return a column's name, cut to what fits an axis."""
-    name = view.names[column]
-    return name if len(name) <= MAX_NAME else f"{name[: MAX_NAME - 1]}…"
+def cut(name: str, most: int) -> str:
+    """Return a name of at most so many letters."""
+    return name if len(name) <= most else f"{name[: most - 1]}…"
 
 
 def axis_label(view: View, column: int) -> str:
     """Return the name and the unit of an angle."""
-    return f"{column_name(view, column)} ({view.space.unit or ''})"
+    return f"{cut(view.names[column], MAX_NAME)} ({view.space.unit or ''})"
 
 
 def shortened(label: str, side: float, sheet: Sheet) -> str:
@@ -122,8 +120,7 @@ def shortened(label: str, side: float, sheet: Sheet) -> str:
         return label
     name, opening, unit = label.rpartition(" (")
     ending = opening + unit if room - len(unit) > 8 else ""
-    room -= len(ending)
-    return (name if len(name) <= room else f"{name[: room - 1]}…") + ending
+    return cut(name, room - len(ending)) + ending
 
 
 def legible(at: list[float], texts: list[str], side: float, sheet: Sheet) -> list[str]:
@@ -231,11 +228,9 @@ def make_frame(sheet: Sheet, room: Room, aspect: float = 1.0) -> Frame:
     figure = sheet.figure(inner + sheet.em * (room.below + room.above))
     left, below = sheet.em * room.left, sheet.em * room.below
     gap, thick = sheet.em * room.gap, sheet.em * room.bar
-    place = (left + side + gap, below, thick, inner)
-    if room.under:
-        place = (left, below - gap - thick, side, thick)
-    bar = _axes_at(figure, *place)
-    return Frame(figure, _axes_at(figure, left, below, side, inner), bar, side, room.under)
+    under = (left, below - gap - thick, side, thick)
+    bar = axes_at(figure, *(under if room.under else (left + side + gap, below, thick, inner)))
+    return Frame(figure, axes_at(figure, left, below, side, inner), bar, side, room.under)
 
 
 def two_panels(
@@ -251,11 +246,11 @@ def two_panels(
     corners = [(left, below + inner + gap), (left, below)]
     if not stacked:
         corners = [(left + k * (side + gap), below) for k in (0, 1)]
-    first, second = (_axes_at(figure, x, y, side, inner) for x, y in corners)
+    first, second = (axes_at(figure, x, y, side, inner) for x, y in corners)
     return figure, (first, second), side
 
 
-def _axes_at(figure: Figure, left: float, below: float, width: float, high: float) -> Axes:
+def axes_at(figure: Figure, left: float, below: float, width: float, high: float) -> Axes:
     """Make axes at a place in inches."""
     wide, height = figure.get_size_inches()
     return figure.add_axes((left / wide, below / height, width / wide, high / height))
@@ -297,6 +292,11 @@ def label_lines(sheet: Sheet, label: str, side: float) -> list[str]:
     return textwrap.wrap(label, min(most, len(label) // max(lines, 1) + 6)) or [""]
 
 
+def sentences(parts: Sequence[str]) -> str:
+    """Return parts of a caption as sentences."""
+    return " ".join(f"{part[0].upper()}{part[1:]}." for part in parts)
+
+
 def caption_lines(words: str, sheet: Sheet) -> list[str]:
     """Break a caption into lines as wide as a picture for a screen."""
     return textwrap.wrap(words, int(0.94 * 72 * sheet.width / (0.9 * LETTER * sheet.small)))
@@ -316,9 +316,9 @@ def colour_bar(
     """Draw the bar of an image's colours; those of a density have ticks in its units."""
     from matplotlib.ticker import MaxNLocator
 
-    cut = shade is not None and shade.cut
-    faint = shade is not None and shade.faint
-    extend = "neither" if cut == faint else "max" if cut else "min"
+    extend = "neither"
+    if shade is not None and shade.cut != shade.faint:
+        extend = "max" if shade.cut else "min"
     way = "horizontal" if frame.under else "vertical"
     bar = frame.figure.colorbar(image, cax=frame.bar, extend=extend, orientation=way)
     if sheet.printed or frame.under:
@@ -353,6 +353,5 @@ def without_overlap(
         half = letter * (len(text) + 1) / 2
         free = place * side - half > end
         kept.append(text if free else "")
-        if free:
-            end = place * side + half
+        end = place * side + half if free else end
     return kept

@@ -106,14 +106,12 @@ def immersion(space: Space) -> Callable[[Tensor], Array]:
     if space.dim != 2:
         raise OrbiflowError(f"only spaces of two dimensions have a surface, not {space!r}")
     if isinstance(space, RoundSpace):
-        surface = vector_immersion(space)
-        return lambda points: surface(space.vectors(points))
+        return lambda points: _of_vectors(space, space.vectors(points))
     return torus_ring if space.is_torus else klein_figure_eight
 
 
-def vector_immersion(space: Space) -> Callable[[Array], Array]:
-    """Return the surface of a round space as a function of unit vectors (N, 3) in the data's frame."""
-    return boy_surface if space.name == "projective-plane" else np.asarray
+def _of_vectors(space: Space, vectors: Array) -> Array:
+    return boy_surface(vectors) if space.name == "projective-plane" else vectors
 
 
 def mesh(space: Space, resolution: int) -> Mesh:
@@ -171,8 +169,7 @@ def viewpoint(space: Space, place: Tensor) -> Viewpoint:
     """
     surface = immersion(space)
     cloud = surface(mesh(space, _RESOLUTION).points)
-    center = (cloud.min(axis=0) + cloud.max(axis=0)) / 2
-    radius = float(np.linalg.norm(cloud - center, axis=1).max())
+    center, radius = _ball(cloud)
     spot = (surface(place[None])[0] - center) / radius
     normal = normals(space, place[None])[0]
     if space.name == "sphere":
@@ -271,7 +268,8 @@ def density_page(
         notes.append(SMALLER)
     if colours.is_sharp(density, pixel=_SOFT / cells):
         notes.append(average_note(round(cells / _SOFT)))
-    caption = " ".join([_caption(view), *(f"{n[0].upper()}{n[1:]}." for n in notes)])
+    words = CAPTIONS[space.name].format(*(frames.axis_label(view, k) for k in (0, 1)))
+    caption = f"{words} {frames.sentences(notes)}".strip()
     title = title or f"Density on the {frames.space_title(space)}"
     page = rendered(
         "orbiflow.density.pictures", "surface.html", title=title, caption=caption, data=data
@@ -285,13 +283,19 @@ def density_page(
     return page
 
 
+def _ball(places: Array) -> tuple[Array, float]:
+    """Return the middle and the radius of a surface of points (N, 3)."""
+    center = (places.min(axis=0) + places.max(axis=0)) / 2
+    return center, float(np.linalg.norm(places - center, axis=1).max())
+
+
 def _surface(space: Space, points: Tensor, peak: int) -> dict[str, Any]:
     """Return the mesh in space, its size, and from where it is seen first."""
     places = immersion(space)(points)
-    center = (places.min(axis=0) + places.max(axis=0)) / 2
+    center, radius = _ball(places)
     return {
         "center": center.tolist(),
-        "radius": float(np.linalg.norm(places - center, axis=1).max()),
+        "radius": radius,
         "start": viewpoint(space, points[peak])._asdict(),
         "eye": EYE,
         "points": _packed(places, "<f4"),
@@ -307,10 +311,7 @@ def _packed(array: Array, kind: str) -> str:
 
 
 def _polylines(lines: list[Array]) -> dict[str, Any]:
-    return {
-        "points": _packed(np.concatenate(lines), "<f4"),
-        "counts": [len(line) for line in lines],
-    }
+    return {"points": _packed(np.concatenate(lines), "<f4"), "counts": list(map(len, lines))}
 
 
 Lines = tuple[tuple[float, list[Array]], tuple[float, list[Array]]]
@@ -333,8 +334,7 @@ def _coordinate_lines(space: Space) -> Lines:
 
 def _on_surface(space: Space, lines: Sequence[Array]) -> list[Array]:
     """Return lines of directions (M, 2), of more than a point, on the surface of a round space."""
-    surface = vector_immersion(space)
-    return [surface(to_vectors(line)) for line in lines if len(line) > 1]
+    return [_of_vectors(space, to_vectors(line)) for line in lines if len(line) > 1]
 
 
 def _eighths(space: Space, steps: int, zero: int) -> Lines:
@@ -358,25 +358,20 @@ def _labels(view: frames.View) -> list[dict[str, Any]]:
         places = 1.07 * np.concatenate([np.eye(3), -np.eye(3)])
     else:
         turns = (0, 0.25, 0.5, -0.25) if space.is_torus else (0, 0.125, 0.25, 0.375)
-        texts = [f"{frames.column_name(view, 0)} {frames.angle_text(t, space.unit)}" for t in turns]
+        texts = [
+            f"{frames.cut(view.names[0], frames.MAX_NAME)} {frames.angle_text(t, space.unit)}"
+            for t in turns
+        ]
         radius = RING_RADIUS + TUBE_RADIUS if space.is_torus else KLEIN_RADIUS + 1
         places = 1.1 * radius * np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
     return [{"text": t, "at": place.tolist()} for t, place in zip(texts, places, strict=True)]
 
 
-def _caption(view: frames.View) -> str:
-    """Return what is seen, and which way the coordinates run."""
-    if view.space.is_round:
-        return CAPTIONS[view.space.name]
-    names = {"first": frames.axis_label(view, 0), "second": frames.axis_label(view, 1)}
-    return CAPTIONS[view.space.name].format(**names)
-
-
 CAPTIONS = {
-    "torus": "{first} runs round the ring, {second} round its tube. Lines every 45°, heavier where an "
+    "torus": "{} runs round the ring, {} round its tube. Lines every 45°, heavier where an "
     "angle is 0.",
     "klein-bottle": "The Klein bottle as a figure eight that makes half a turn on its way round: "
-    "{first} runs round the ring, {second} along the figure eight. Lines every 45°, heavier where an "
+    "{} runs round the ring, {} along the figure eight. Lines every 45°, heavier where an "
     "angle is 0. The surface passes through itself along a circle; the sheets that cross there are far "
     "apart on the bottle.",
     "sphere": "The sphere in the data's frame. Lines every 30°, heavier the equator and longitude 0.",
@@ -384,4 +379,4 @@ CAPTIONS = {
     "15° of latitude and longitude, heavier the equator and longitude 0. The surface passes through "
     "itself; sheets that cross are far apart on the projective plane.",
 }
-"""What is said of each surface, by the name of the space."""
+"""What is seen of each space, and which way its coordinates run."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import itemgetter
@@ -140,7 +140,7 @@ def tile_layers(
     layers = list[Layer]()
     for colour in sorted(set(colours.tolist())):
         own = colours == colour
-        uses = replace(copies, which=copies.which[own], offsets=copies.offsets[own])
+        uses = copies.select(own)
         if chosen is None:
             return [Layer("tiles", "tiles", line, (uses,), clipped)]
         fill, name, ink = chosen.fill(colour), f"colour {colour + 1}", chosen.ink(colour)
@@ -319,7 +319,8 @@ def pieces_scenes(layout: Layout, *, fine: bool = True) -> list[Scene]:
     corner = np.array([box.left + edge, box.top + edge])
     placed = replace(placed, offsets=placed.offsets + corner)
     if settings.marks:
-        placed = _clear_of(placed, line, mark_corners(settings.page))
+        hidden = [placed.near(line, corner) for corner in mark_corners(settings.page)]
+        placed = placed.select(~np.any(hidden, axis=0))
     if not len(placed):
         short, long = rectangle_sides(line)
         raise OrbiflowError(
@@ -343,7 +344,7 @@ def _shared_out(placed: Uses, layout: Layout, box: Box) -> list[Uses]:
             f"the bed to have {sheets} files"
         )
     counts = [min(fit, wanted - k * fit) for k in range(sheets)]
-    return [replace(placed, which=placed.which[:n], offsets=placed.offsets[:n]) for n in counts]
+    return [placed.select(slice(n)) for n in counts]
 
 
 def _scene(layout: Layout, placed: Uses, curve: Curve, line: Array, box: Box, gap: float) -> Scene:
@@ -374,15 +375,6 @@ def _coloured(layout: Layout, pieces: list[PlacedTile]) -> Iterator[Layer]:
         tiles = _moved(layout.outline.closed, pieces[colour::count])
         style = Style(chosen.fill(colour), chosen.outline, USUAL_WIDTH)
         yield Layer(f"colour {colour + 1}", "tiles", style, tiles)
-
-
-def _clear_of(placed: Uses, line: Array, boxes: Sequence[Box]) -> Uses:
-    """Return the copies of a line that meet none of some boxes."""
-    rings = placed.images(line)
-    low, high = rings.min(axis=1), rings.max(axis=1)
-    hits = [(high > box[:2]).all(axis=1) & (low < box[2:]).all(axis=1) for box in boxes]
-    free = ~np.any(hits, axis=0)
-    return replace(placed, which=placed.which[free], offsets=placed.offsets[free])
 
 
 def _moved(curve: Curve, pieces: list[PlacedTile]) -> tuple[Curve, ...]:

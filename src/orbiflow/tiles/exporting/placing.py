@@ -26,16 +26,10 @@ def place_on_page(
     rotate: float = 0.0,
     margin: float | None = None,
 ) -> tuple[Array, Array]:
-    """Put a tile in the middle of a page, or nearby where that makes most tiles whole.
+    """Return the map, linear part and offset, from a tile's units to the middle of a page.
 
-    Args:
-        tile: The tile in its own units, with y pointing down if `y_down`.
-        scale: The page's units in one of the tile's.
-        page: The page.
-        rotate: An angle in degrees by which the tiling is turned counterclockwise.
-        margin: The distance that whole tiles keep from the page's edge; None to stay in the middle.
-
-    Returns the linear part (2, 2) and the offset (2,) of the map from the tile to the page.
+    `rotate` is in degrees counterclockwise. With the `margin` that whole tiles keep from the page's
+    edge, the tile is moved nearby to where most are whole.
     """
     turn = rotation_matrix(-np.radians(rotate))  # y points down on the page
     linear = scale * turn @ np.diag([1.0, 1.0 if y_down else -1.0])

@@ -19,8 +19,7 @@ from orbiflow.tiles.scene import (
     Scene,
     Style,
     Uses,
-    clipped_line,
-    clipped_region,
+    clipped,
     rectangle,
 )
 
@@ -120,24 +119,18 @@ def _part(
     layer: Layer, scene: Scene, seams: Box, window: Box, back: np.ndarray, tolerance: float
 ) -> Layer:
     """Return the part of a layer that a sheet shows, in the sheet's own coordinates."""
-    still = np.eye(2)
     items: list[Curve | Uses] = []
     for item in layer.items:
         if isinstance(item, Uses):
-            images = item.images(scene.points(item.symbol))
-            low, high = images.min(axis=1), images.max(axis=1)
-            near = (high > window[:2]).all(axis=1) & (low < window[2:]).all(axis=1)
-            items.append(
-                Uses(item.symbol, item.linear, item.which[near], item.offsets[near] + back)
-            )
+            near = item.select(item.near(scene.points(item.symbol), window))
+            items.append(replace(near, offsets=near.offsets + back))
         elif not isinstance(item, Curve):
             raise TypeError("motifs are flattened after a page is split")
-        elif layer.role == "paper":
-            items += [part.moved(still, back) for part in clipped_region(item, seams, tolerance)]
         else:
-            items += [part.moved(still, back) for part in clipped_line(item, seams, tolerance)]
-    clipped = layer.clipped or any(isinstance(item, Uses) for item in items)
-    return replace(layer, items=tuple(items), clipped=clipped)
+            parts = clipped(item, seams, tolerance, filled=layer.role == "paper")
+            items += [part.moved(np.eye(2), back) for part in parts]
+    copies = any(isinstance(item, Uses) for item in items)
+    return replace(layer, items=tuple(items), clipped=layer.clipped or copies)
 
 
 def _tiles(scene: Scene, seams: Box, back: np.ndarray) -> tuple[PlacedTile, ...]:

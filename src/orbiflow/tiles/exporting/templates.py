@@ -11,7 +11,7 @@ from shapely.ops import substring
 
 from orbiflow.arrays import Array
 from orbiflow.tiles.exporting.layouts import Layout, line_style
-from orbiflow.tiles.geometry import border
+from orbiflow.tiles.motifs import silhouette_outline
 from orbiflow.tiles.scene import Curve, Layer, PlacedTile, Scene, Style
 from orbiflow.tiles.tile import EscherTile
 
@@ -41,11 +41,8 @@ def template_scene(layout: Layout, given: EscherTile) -> Scene:
     """Return a scene with one tile; edges that fit together have a number, and arrows that agree."""
     style = line_style(layout)
     layers = [Layer("outline", "cut", style, (layout.outline.closed,))]
-    bending, frame = given.bending, given.frame
-    if bending is not None and frame is not None:
-        ring = frame.to_input(bending.rest[border(bending.triangles)])
-        linear, offset = layout.place
-        silhouette = Curve.polyline(ring @ linear.T + offset, closed=True)
+    if given.bending is not None:
+        silhouette = Curve.polyline(silhouette_outline(given), closed=True).moved(*layout.place)
         layers.insert(0, Layer("silhouette", "tiles", Style(FAINT), (silhouette,)))
     marks = tuple(_marks(layout))
     layers.append(Layer("numbers", "mark", style._replace(width=style.width / 2), marks))

@@ -12,7 +12,7 @@ from shapely import MultiPolygon, Polygon, box
 
 from orbiflow.arrays import Window
 from orbiflow.drawing import Raster, strip_middle, window_of
-from orbiflow.tiles.silhouette import Target, holes_filled, open_image, parts_left_out, upright
+from orbiflow.tiles.silhouette import Target, holes_filled, open_image, parts_left_out
 
 LONGER_SIDE = 1200  # pixels
 OUTLINE, LEFT_OUT, FILLED, DRAWING = "#e6007e", "#ff8c00", "#0078ff", "#444444"
@@ -79,13 +79,9 @@ def _mark(raster: Raster, text: str, colour: str, x: float) -> None:
 
 
 def _source(path: Path) -> Image.Image:
-    def decode(_: object, image: Image.Image) -> Image.Image:
-        image.draft("RGB", (LONGER_SIDE, LONGER_SIDE))
-        turned = upright(image)[0].convert("RGBA")
-        white = Image.new("RGBA", turned.size, "white")
-        return Image.alpha_composite(white, turned).convert("RGB")
-
-    return open_image(path, decode)
+    image = open_image(path, enough=LONGER_SIDE)[0].convert("RGBA")
+    white = Image.new("RGBA", image.size, "white")
+    return Image.alpha_composite(white, image).convert("RGB")
 
 
 def is_read_png(path: Path) -> bool:
