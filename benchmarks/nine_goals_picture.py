@@ -17,7 +17,7 @@ import torch
 from common import goal
 
 from orbiflow.arrays import Window
-from orbiflow.drawing import blank_figure, fill_rings, plane_axes, png_bytes
+from orbiflow.drawing import Sheet, fill_rings, plane_axes
 from orbiflow.runtime import write_atomic
 from orbiflow.tiles import EscherizeSettings, EscherTile, OverlapSearch, Target, escherize
 
@@ -68,7 +68,8 @@ def picture(found: list[Found], effort: str) -> bytes:
     """PNG of all of them, and what is what."""
     rows = -(-len(found) // COLUMNS)
     width, height = COLUMNS * PANEL[0], rows * (PANEL[1] + CAPTION) + LEGEND
-    figure = blank_figure(width, height)
+    sheet = Sheet.screen(width)
+    figure = sheet.figure(height / sheet.dpi)
     for i, one in enumerate(found):
         name, target, result = one
         row, column = divmod(i, COLUMNS)
@@ -94,7 +95,7 @@ def picture(found: list[Found], effort: str) -> bytes:
         (0.38, f"effort {effort}, each goal in its best class, every tile certified", INK),
     ):
         figure.text(x, strip / 2, text, va="center", fontsize=7.5, color=colour)
-    return png_bytes(figure)
+    return sheet.file(figure)
 
 
 def main() -> None:

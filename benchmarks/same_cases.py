@@ -314,8 +314,8 @@ def artwork() -> list[Case]:
         "picture": f"../search-pins/run --picture {IN}/drawing.svg --size 600x400 --tile-size 180",
         "picture-overlap": f"../search-overlap/run --picture {IN}/squirrel.svg --size 500x300 "
         "--tile-size 150",
-        "repeat": "../search-likeness/run --repeat basic --tile-size 120 --colour neighbour --outline 2 "
-        "--tile IH4",
+        "repeat": "../search-likeness/run --repeat basic --tile-size 120 --colour neighbour "
+        "--outline 2 --tile IH4",
         "hatch": "../search-pins/run --engrave --strokes hatch --eye 600,150,20 --size 400x300 "
         "--tile-size 200",
         "feathers": "../search-both/run --engrave --strokes feathers --size 400x300 --tile-size 200",

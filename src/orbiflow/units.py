@@ -135,9 +135,10 @@ def page_size(text: str, *, also: tuple[str, ...] = ()) -> tuple[float, float]:
         short, long = sorted(page)
         return (long, short) if way == "landscape" else (short, long)
     if not re.search(r"\d.*[x×]", text, flags=re.IGNORECASE):
+        names = ", ".join((*also, *PAGES))
         raise OrbiflowError(
-            f"{text!r} is not a page; write a size such as 300x200mm, or one of {', '.join((*also, *PAGES))}, "
-            "with -landscape or -portrait to turn it"
+            f"{text!r} is not a page; write a size such as 300x200mm, or one of {names}, with "
+            "-landscape or -portrait to turn it"
         )
     return size(text)
 

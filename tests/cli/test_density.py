@@ -74,7 +74,7 @@ def test_fit_score_sample_plot(space: str, tmp_path: Path, orbiflow) -> None:
 def small_pictures(monkeypatch) -> None:
     for name, size in (("square._GRID", 40), ("page._CELLS", 20), ("maps._PIXELS", 2000)):
         monkeypatch.setattr(f"orbiflow.density.pictures.{name}", size)
-    monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 40)
+    monkeypatch.setattr("orbiflow.drawing.canvas._SAMPLES", 40)
 
 
 @pytest.mark.usefixtures("small_pictures")

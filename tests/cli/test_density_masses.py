@@ -26,7 +26,7 @@ def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orbiflow.density.pictures.square._FINE_GRID", 40)
-    monkeypatch.setattr("orbiflow.density.pictures.page._FINE_CELLS", 20)
+    monkeypatch.setattr("orbiflow.density.pictures.surfaces._FINE_CELLS", 20)
 
 
 def test_a_mass_gets_the_samples_that_it_needs(folder: Path, orbiflow) -> None:

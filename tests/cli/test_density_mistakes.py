@@ -106,7 +106,7 @@ def test_rows_that_lack_a_value_can_be_left_out_of_pictures(
     folder: Path, tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("orbiflow.density.pictures.square._FINE_GRID", 40)
-    monkeypatch.setattr("orbiflow.density.pictures.page._FINE_CELLS", 20)
+    monkeypatch.setattr("orbiflow.density.pictures.surfaces._FINE_CELLS", 20)
     plot = ("density", "plot", "-m", folder / "model2", "--out", tmp_path / "plots", "--data")
     done = orbiflow(*plot, folder / "gaps.csv", "--drop-missing")
     assert done.status == 0, done.err

@@ -12,7 +12,7 @@ from PIL import Image
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import Sheet, field_picture, palette
-from orbiflow.drawing.fields import flow_lines, symmetric_seeds
+from orbiflow.drawing.canvas import flow_lines, symmetric_seeds
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import Tile, classes_png, isohedral_class, overlay_raster, tiling_raster
 from orbiflow.tiles.pictures.overlays import ADDED, COMMON, MISSING

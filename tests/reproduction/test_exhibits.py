@@ -41,7 +41,7 @@ TINY = Extent(
 @pytest.fixture(autouse=True)
 def _small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("reproduction.drawing.SHEET", Sheet.screen(600))
-    monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 50)
+    monkeypatch.setattr("orbiflow.drawing.canvas._SAMPLES", 50)
 
 
 def drawn_alone(name: str, folder: Path, extent: Extent = TINY) -> Findings:

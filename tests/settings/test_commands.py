@@ -51,7 +51,7 @@ def test_words_become_settings(name: str, called: list[dict[str, Any]]) -> None:
 MISTAKES = {
     "export": ("RESULT", "missing"),
     "export X --tile-size 40": ("--tile-size", "no unit"),
-    "export X --cut nome": ("--cut", "none, skeleton, pieces or jigsaw"),
+    "export X --cut nome": ("--cut", "none, skeleton, pieces, jigsaw or template"),
     "export X --for lazer": ("--for", "did you mean laser"),
     "export X --cutt none": ("--cutt", "--cut"),
     "export X --dpi": ("--dpi", "needs a value"),

@@ -27,14 +27,9 @@ class Palette(NamedTuple):
         >>> palette("e76f51").shortage(3)
         ('3 colours are needed and the palette has 1: the others are paler shades of it',)
         """
-        own = len(self.colours)
-        if own >= count:
-            return ()
-        first = "it" if own == 1 else "the first"
-        return (
-            f"{count} colours are needed and the palette has {own}: the others are paler shades of "
-            f"{first}",
-        )
+        own, first = len(self.colours), "it" if len(self.colours) == 1 else "the first"
+        needed = f"{count} colours are needed and the palette has {own}"
+        return (f"{needed}: the others are paler shades of {first}",) * (own < count)
 
     def ink(self, index: int) -> str:
         """Return the colour of lines on colour number `index`: outline or paper, whichever shows.

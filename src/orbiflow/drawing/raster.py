@@ -10,7 +10,7 @@ import io
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,6 @@ from PIL import Image, ImageDraw, ImageFont
 
 from orbiflow.arrays import Array, Window
 from orbiflow.drawing.sheet import Picture, Sheet, check_size
-
-if TYPE_CHECKING:
-    from matplotlib.path import Path
 
 FINER = 3
 """Factor by which each side of a pixel is drawn finer."""
@@ -118,10 +115,8 @@ class Raster:
             if hasattr(part, "geoms"):
                 self.fill_geometry(part, colour)
             elif part.geom_type == "Polygon" and not part.is_empty:
-                outer, *holes = (
-                    self.to_pixels(np.asarray(ring.coords))
-                    for ring in (part.exterior, *part.interiors)
-                )
+                rings = (part.exterior, *part.interiors)
+                outer, *holes = (self.to_pixels(np.asarray(ring.coords)) for ring in rings)
                 self.shapes.append(Filled(outer, tuple(holes), self._number(colour)))
 
     def line(
@@ -175,7 +170,7 @@ class Raster:
             elif shape.holes:
                 _draw_with_holes(band, shape, top)
             else:
-                pen.polygon(_flat(_fine(shape.points, top)), fill=shape.colour)
+                pen.polygon(_fine(shape.points, top).ravel().tolist(), fill=shape.colour)
         return band.convert("RGB").reduce(FINER)
 
 
@@ -184,13 +179,9 @@ def _fine(points: Array, top: int) -> Array:
     return (points - (0.0, top)) * FINER - 0.5
 
 
-def _flat(points: Array) -> list[float]:
-    return points.ravel().tolist()
-
-
 def _draw_line(pen: ImageDraw.ImageDraw, path: Array, width: float, colour: int) -> None:
     whole = max(1, round(width))
-    pen.line(_flat(path), fill=colour, width=whole)
+    pen.line(path.ravel().tolist(), fill=colour, width=whole)
     if whole < 3:
         return
     steps = np.diff(path, axis=0)
@@ -203,9 +194,8 @@ def _draw_line(pen: ImageDraw.ImageDraw, path: Array, width: float, colour: int)
 def _draw_with_holes(band: Image.Image, shape: Filled, top: int) -> None:
     mask = Image.new("1", band.size)
     pen = ImageDraw.Draw(mask)
-    pen.polygon(_flat(_fine(shape.points, top)), fill=1)
-    for hole in shape.holes:
-        pen.polygon(_flat(_fine(hole, top)), fill=0)
+    for ring, inside in ((shape.points, 1), *((hole, 0) for hole in shape.holes)):
+        pen.polygon(_fine(ring, top).ravel().tolist(), fill=inside)
     band.paste(shape.colour, (0, 0), mask)
 
 
@@ -268,6 +258,7 @@ def vector_picture(raster: Raster, sheet: Sheet, *, title: str, caption: str) ->
     The words of a strip would be too small on a narrow sheet; the caption has them.
     """
     from matplotlib.collections import LineCollection, PathCollection
+    from matplotlib.path import Path
 
     figure = sheet.figure(sheet.width * raster.height / raster.width, raster.paper)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
@@ -278,27 +269,18 @@ def vector_picture(raster: Raster, sheet: Sheet, *, title: str, caption: str) ->
     for order, shape in enumerate(raster.shapes):
         colour = raster.colours[shape.colour]
         if isinstance(shape, Filled):
-            path = _path([shape.points, *shape.holes])
+            rings = [shape.points, *shape.holes]
+            parts = [Path(np.concatenate([ring, ring[:1]]), closed=True) for ring in rings]
+            path = Path.make_compound_path(*parts)
             # a hairline in its own colour, or the paper would show where two fills meet
-            made = PathCollection(
-                [path], facecolors=colour, edgecolors=colour, linewidths=0.1, joinstyle="round"
-            )
+            made = PathCollection([path], facecolors=colour, edgecolors=colour, linewidths=0.1)
         else:
             width = max(point * shape.width, MIN_WIDTH)
-            made = LineCollection(
-                [shape.points], colors=colour, linewidths=width, capstyle="round",
-                joinstyle="round",
-            )  # fmt: skip
+            made = LineCollection([shape.points], colors=colour, linewidths=width, capstyle="round")
+        made.set_joinstyle("round")
         made.set_zorder(order)
         axes.add_collection(made, autolim=False)
     return Picture(figure, sheet, title, caption)
-
-
-def _path(rings: list[Array]) -> Path:
-    from matplotlib.path import Path
-
-    parts = [Path(np.concatenate([ring, ring[:1]]), closed=True) for ring in rings]
-    return Path.make_compound_path(*parts)
 
 
 STRIP = 0.075
@@ -341,14 +323,12 @@ def dashes(points: Array, on: float, off: float) -> list[Array]:
     >>> [piece[:, 0].tolist() for piece in dashes(np.array([[0.0, 0.0], [5.0, 0.0]]), 2, 1)]
     [[0.0, 2.0], [3.0, 5.0]]
     """
-    knots = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    pieces = []
-    for start in np.arange(0.0, knots[-1], on + off):
-        end = min(start + on, knots[-1])
-        inner = (knots > start) & (knots < end)
-        ends = np.stack([np.interp([start, end], knots, points[:, k]) for k in (0, 1)], axis=1)
-        pieces.append(np.concatenate([ends[:1], points[inner], ends[1:]]))
-    return pieces
+    from shapely import LineString
+    from shapely.ops import substring
+
+    line = LineString(points)
+    starts = np.arange(0.0, line.length, on + off).tolist()
+    return [np.asarray(substring(line, start, start + on).coords) for start in starts]
 
 
 def arrow(raster: Raster, start: Array, end: Array, colour: str, width_px: float) -> None:

@@ -52,8 +52,7 @@ def check_size(width_px: int, height_px: int) -> None:
 class Sheet:
     """The width of a figure, the size of its texts, and the format of its file.
 
-    - `width`: Width in inches.
-    - `text`: Size of texts in points.
+    - `width`: Width in inches. `text`: Size of texts in points.
     - `format`: The format; "pdf" and "svg" hold curves and texts, "png" pixels.
     - `dpi`: Pixels per inch, also of those inside a PDF or SVG.
     - `printed`: Whether a caption will stand below it; then it has no title and no legend.
@@ -75,14 +74,9 @@ class Sheet:
 
     @classmethod
     def column(cls, width: str | float = "single", format: FigureFormat = "pdf") -> Sheet:
-        """Return a sheet for print, with texts of 7 to 8 points.
+        """Return a sheet for print with texts of 7 to 8 points; a PNG has 600 dots per inch.
 
-        Args:
-            width: "single" or "double", or mm.
-            format: Format of the file; a PNG has 600 dots per inch.
-
-        Raises:
-            OrbiflowError: If the word or the format is unknown, or the width below 40 or above 1000 mm.
+        The width is "single", "double" or from 40 to 1000 mm.
         """
         as_choice(format, FORMATS, "format")
         if isinstance(width, str):
@@ -105,11 +99,7 @@ class Sheet:
         return max(points * self.width / _FULL, least) if self.printed else points
 
     def figure(self, height: float, paper: str = "#ffffff") -> Figure:
-        """Return an empty figure of the sheet's width, `height` inches high.
-
-        Raises:
-            OrbiflowError: If it would have too few or too many pixels.
-        """
+        """Return an empty figure of the sheet's width, `height` inches high."""
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
@@ -120,25 +110,14 @@ class Sheet:
         return figure
 
     def file(self, figure: Figure, *, title: str = "", caption: str = "") -> bytes:
-        """Return the figure's file; the same figure gives the same bytes.
-
-        Args:
-            figure: The figure.
-            title: A title to be kept in the file.
-            caption: A caption to be kept in the file.
-        """
+        """Return the figure's file, which keeps title and caption; the same figure, the same bytes."""
         buffer = io.BytesIO()
         options: dict[str, Any] = {"metadata": _metadata(self.format, title, caption)}
         if self.format == "png":
             options["pil_kwargs"] = {"compress_level": 3}
+        options |= {"dpi": self.dpi, "facecolor": figure.get_facecolor()}
         with _plain_texts():
-            figure.savefig(
-                buffer,
-                format=self.format,
-                dpi=self.dpi,
-                facecolor=figure.get_facecolor(),
-                **options,
-            )
+            figure.savefig(buffer, format=self.format, **options)
         return buffer.getvalue()
 
 
@@ -194,12 +173,8 @@ def _plain_texts() -> Iterator[None]:
     """
     from matplotlib import rc_context
 
-    settings: dict[Any, Any] = {
-        "pdf.fonttype": 42,
-        "svg.fonttype": "none",
-        "svg.hashsalt": "orbiflow",
-    }
-    with _LOCK, rc_context(settings):
+    fonts: dict[Any, Any] = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "orbiflow"}
+    with _LOCK, rc_context(fonts):
         yield
 
 

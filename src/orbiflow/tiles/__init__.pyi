@@ -129,10 +129,10 @@ from .silhouette.soft_target import SoftTarget as SoftTarget
 from .silhouette.soft_target import signed_distance as signed_distance
 from .silhouette.target import Frame as Frame
 from .silhouette.target import Target as Target
-from .solids.files import write_3mf as write_3mf
-from .solids.files import write_stl as write_stl
 from .solids.making import Solid as Solid
 from .solids.making import make_solid as make_solid
+from .solids.making import write_3mf as write_3mf
+from .solids.making import write_stl as write_stl
 from .solids.settings import SolidSettings as SolidSettings
 from .tile import EscherTile as EscherTile
 from .tile import TileMap as TileMap

@@ -93,8 +93,7 @@ def escherize(
     begin = time.perf_counter()
     target = reading.read(image, called)
     pages.result_folder(out)
-    masks = [Path(pin) for pin in settings.pin or ()]
-    check_output_folder(out, image, settings.emphasis, *masks)
+    check_output_folder(out, image, settings.emphasis, *map(Path, settings.pin or ()))
     picture = pages.read_png(target, image)
     show = functools.partial(pages.show_reading, target, picture, out, on_event)
     settings = settings.replace(workers=settings.workers or os.cpu_count() or 1)
@@ -112,16 +111,22 @@ def escherize(
         "tiles": [_measures(tile) for tile in tiles],
         "failed": [{"class": f.name, "reason": f.reason} for f in result.failures],
     }
-    if tiles:
-        best = "Tiles, best first"
-        title = best if tiles[0].front is None else "Tiles for likeness, then for overlap"
-        on_event(_table(title, [_words(tile) for tile in tiles]))
-        if verbose:
-            on_event(_table("Figures", [_figures(tile) for tile in tiles]))
+    for table in _tables(tiles)[: 1 + verbose]:
+        on_event(table)
     on_event(_closing(out, bool(written), bool(result.tiles), summary["seconds"]))
     if result.interrupted or cancel.cancelled:
         return Outcome(summary, "cancelled")
     return Outcome(summary, "done" if result.tiles else "nothing found")
+
+
+def _tables(tiles: Sequence[EscherTile]) -> list[Table]:
+    """Return what is said of the tiles, in words and in figures; nothing of none."""
+    if not tiles:
+        return []
+    best = "Tiles, best first"
+    title = best if tiles[0].front is None else "Tiles for likeness, then for overlap"
+    figures = _table("Figures", [_figures(tile) for tile in tiles])
+    return [_table(title, [_words(tile) for tile in tiles]), figures]
 
 
 def _table(title: str, rows: Sequence[dict[str, str]]) -> Table:
@@ -244,7 +249,7 @@ def export(
             "files": [str(path) for path in done.files],
             "tiles": done.tiles,
             "class": tile.isohedral_class,
-            "tile_size": settings.tile_size,
+            "tile_size": done.tile_size,
         }
     )
 
@@ -254,14 +259,16 @@ def _exported(done: Exported, settings: ExportSettings, name: str) -> str:
     words = {
         "skeleton": "tiles in outline",
         "pieces": "pieces",
-        "jigsaw": "tiles and parts of them",
+        "jigsaw": "pieces of a jigsaw",
+        "template": "template",
     }
     what = words.get(settings.cut, "tiles")
+    count = done.scenes[0].facts.get("pieces", done.tiles)
     files = str(done.files[0])
     if len(done.files) > 1:
         files = f"{len(done.files)} sheets, {done.files[0]} to {done.files[-1].name}"
     return (
-        f"written {files}: {done.tiles} {what} of {name}, {settings.tile_size:g} mm, on "
+        f"written {files}: {count} {what} of {name}, {done.tile_size:.4g} mm, on "
         f"{width:g} x {height:g} mm"
     )
 

@@ -5,7 +5,6 @@ import pytest
 import torch
 
 from orbiflow.density import KleinBottle, ProjectivePlane, Sphere, Torus
-from orbiflow.density.pictures.axes import angle_axis, angle_text, view_of
 from orbiflow.density.pictures.colours import (
     DARK_SHARE,
     Shade,
@@ -17,6 +16,7 @@ from orbiflow.density.pictures.colours import (
     shading,
     short_number,
 )
+from orbiflow.density.pictures.frames import angle_axis, angle_text, view_of
 
 SPACES = [Torus(2, unit="degrees"), KleinBottle(), Sphere(), ProjectivePlane()]
 

@@ -22,9 +22,9 @@ from orbiflow.density import (
     density_picture,
     make_space,
 )
-from orbiflow.density.pictures.figures import draw_density
-from orbiflow.density.pictures.maps import Map, chosen_map
+from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.overlays import MAX_COVER, uncrowded
+from orbiflow.density.pictures.projections import chosen_map
 from orbiflow.drawing import Picture, Sheet
 
 SPACES = ("torus", "klein-bottle", "sphere", "projective-plane")
@@ -38,16 +38,16 @@ def test_widths_are_in_the_points_unit_and_repeated_points_are_one(
     points = rng.normal(size=(count, dim))
     places, widths = uncrowded(points)
     assert np.array_equal(places, points)
-    np.testing.assert_allclose(uncrowded(scale * points).widths, scale * widths, rtol=1e-6)
-    again = uncrowded(np.concatenate([points, points[rng.integers(0, count, 30)]]))
-    assert np.array_equal(again.places, places)
-    assert np.array_equal(again.widths, widths)
+    np.testing.assert_allclose(uncrowded(scale * points)[1], scale * widths, rtol=1e-6)
+    again, same = uncrowded(np.concatenate([points, points[rng.integers(0, count, 30)]]))
+    assert np.array_equal(again, places)
+    assert np.array_equal(same, widths)
 
 
 @pytest.mark.parametrize("count", [200, 20_000])
 def test_dots_hide_no_more_than_their_share(count: int) -> None:
     points = np.random.default_rng(1).uniform(0, 1, (count, 2))
-    widths = uncrowded(points).widths
+    widths = uncrowded(points)[1]
     assert np.pi / 4 * float((widths**2).sum()) == pytest.approx(MAX_COVER, rel=0.35)
 
 
@@ -99,7 +99,7 @@ def test_a_peak_is_seen_through_its_dots(
     def picture(dots: torch.Tensor | None) -> np.ndarray:
         if density.space.is_round:
             drawn_map = Map(density.space, chosen_map(density.space, drawn))
-            made = draw_density(drawn_map, density, settings, dots=dots, sheet=sheet)
+            made = density_picture(density, dots, settings, sheet=sheet, ground=drawn_map)
         else:
             made = density_picture(density, dots, settings, sheet=sheet)
         return pixels(made)

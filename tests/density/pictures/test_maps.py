@@ -6,6 +6,7 @@ import io
 import math
 import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +28,8 @@ from orbiflow.density import (
     Sphere,
     Torus,
     UniformDensity,
-    map_picture,
-    map_samples_picture,
+    density_picture,
+    samples_picture,
     to_vectors,
 )
 from orbiflow.density.pictures.colours import chosen_scale, density_at, density_on_map
@@ -40,6 +41,8 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from printed import check_inside, letters
+
+on_a_map = partial(density_picture, ground="map")
 
 COAST = [np.array([[10.0, 160.0], [20.0, -170.0], [0.0, -150.0]])]
 
@@ -119,7 +122,7 @@ def test_maps_have_room_and_letters_of_7_to_8_points(space: Any, width: Any) -> 
     else:
         asked += [{"projection": p} for p in ("schmidt", "wulff")]
     pictures = [
-        map_picture(density, points(30), PlotSettings(**options), sheet=sheet) for options in asked
+        on_a_map(density, points(30), PlotSettings(**options), sheet=sheet) for options in asked
     ]
     for picture in pictures:
         check_inside(picture)
@@ -132,11 +135,11 @@ def test_maps_have_room_and_letters_of_7_to_8_points(space: Any, width: Any) -> 
         assert kinds.count(pdfium.FPDF_PAGEOBJ_IMAGE) <= 2  # the map and the bar: no cells to sew
         assert page.get_width() == pytest.approx(72 * sheet.width, abs=0.01)
     for data in (points(30), None):
-        check_inside(map_samples_picture(density, data, points(20), sheet=sheet))
+        check_inside(samples_picture(density, data, points(20), sheet=sheet, ground="map"))
 
 
 def test_what_is_outside_the_outline_is_paper_and_inside_is_colour() -> None:
-    picture = map_picture(
+    picture = on_a_map(
         peaked(ROUND[0], (0, 0), 2.0), settings=PlotSettings(projection="mollweide", scale="linear")
     )
     image = np.asarray(Image.open(io.BytesIO(picture.file())).convert("RGB")).astype(int)
@@ -157,23 +160,23 @@ def test_what_is_outside_the_outline_is_paper_and_inside_is_colour() -> None:
 
 def test_captions_say_what_is_seen(coast: Path) -> None:
     sphere = peaked(ROUND[0], (20, 30), 500.0)
-    words = map_picture(
+    words = on_a_map(
         sphere, points(50), PlotSettings(center=(150,), samples=20, coastlines=coast)
     ).caption
     assert "Equal Earth projection (equal-area), about 150° E" in words
     assert "coastlines" in words
     assert "Dots are 20 of 50 points." in words
     assert re.search(r"Colours are logarithmic, as the density is below a tenth .* 99 % of", words)
-    asked = map_picture(sphere, settings=PlotSettings(scale="linear")).caption
+    asked = on_a_map(sphere, settings=PlotSettings(scale="linear")).caption
     assert "Colours are linear, as asked for." in asked
     assert "coastlines" not in asked
-    assert "Peaks narrower than" in map_picture(peaked(ROUND[0], (0, 0), 1e7)).caption
+    assert "Peaks narrower than" in on_a_map(peaked(ROUND[0], (0, 0), 1e7)).caption
     plane = peaked(ROUND[1], (20, 30), 5.0)
-    net = map_picture(plane, settings=PlotSettings(projection="schmidt"))
+    net = on_a_map(plane, settings=PlotSettings(projection="schmidt"))
     assert "Lower hemisphere, Schmidt net (equal-area)" in net.caption
     assert "opposite points of the rim are one axis" in net.caption
     assert "Colours are linear, as the density is above a tenth" in net.caption
-    vectors = map_picture(peaked(Sphere(form="vector"), (20, 30), 5.0)).caption
+    vectors = on_a_map(peaked(Sphere(form="vector"), (20, 30), 5.0)).caption
     assert "latitudes are from the x, y plane towards z" in vectors
 
 
@@ -187,7 +190,7 @@ def test_the_scale_is_the_same_in_all_pictures_and_has_its_reason() -> None:
 def test_coastlines_are_drawn_and_cut(coast: Path) -> None:
     density = peaked(ROUND[0], (20, 30), 5.0)
     plain, lines = (
-        map_picture(density, settings=PlotSettings(projection="latlon", coastlines=path)).file()
+        on_a_map(density, settings=PlotSettings(projection="latlon", coastlines=path)).file()
         for path in (None, coast)
     )
     assert plain != lines
@@ -199,4 +202,4 @@ def test_maps_of_other_spaces_are_refused() -> None:
     space = Torus(2)
     density = FlowDensity(space, Flow([FourierField(space.group, 1)], steps=1))
     with pytest.raises(OrbiflowError, match="maps are of the sphere"):
-        map_picture(density)
+        on_a_map(density)

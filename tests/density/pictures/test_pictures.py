@@ -30,9 +30,9 @@ from orbiflow.density import (
     to_vectors,
 )
 from orbiflow.density.pictures import square as density_square
-from orbiflow.density.pictures.axes import angle_axis, axis_label, view_of
 from orbiflow.density.pictures.colours import chosen_scale, density_at, is_sharp, shading
-from orbiflow.density.pictures.flow import few_colours
+from orbiflow.density.pictures.figures import few_colours
+from orbiflow.density.pictures.frames import angle_axis, axis_label, view_of
 from orbiflow.density.pictures.surfaces import boy_surface, mesh
 from orbiflow.drawing import Sheet
 from orbiflow.errors import OrbiflowError
@@ -94,10 +94,10 @@ def array(text, kind):
 def _coarse(monkeypatch):
     monkeypatch.setattr("orbiflow.density.pictures.square._GRID", 24)
     monkeypatch.setattr("orbiflow.density.pictures.square._FINE_GRID", 30)
-    monkeypatch.setattr("orbiflow.density.pictures.page._FINE_CELLS", 20)
+    monkeypatch.setattr("orbiflow.density.pictures.surfaces._FINE_CELLS", 20)
     monkeypatch.setattr("orbiflow.density.pictures.colours._COARSE", 24)
-    monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 40)
-    monkeypatch.setattr("orbiflow.drawing.fields._STEPS", 2)
+    monkeypatch.setattr("orbiflow.drawing.canvas._SAMPLES", 40)
+    monkeypatch.setattr("orbiflow.drawing.canvas._STEPS", 2)
 
 
 @every_space
@@ -277,7 +277,7 @@ def test_densities_with_kernels_are_drawn_and_say_what_is_averaged(space):
 
 
 def test_a_flow_in_few_colours_is_small(monkeypatch):
-    monkeypatch.setattr("orbiflow.drawing.fields._STEPS", 12)  # lines of the whole length
+    monkeypatch.setattr("orbiflow.drawing.canvas._STEPS", 12)  # lines of the whole length
     png = few_colours(flow_png(example(SPACES[0])))
     assert len(png) < 600_000
     image = Image.open(io.BytesIO(png))

@@ -11,12 +11,12 @@ import pytest
 import torch
 
 from orbiflow.density import (
-    MODEL,
     PICTURES,
     Density,
     DensityEstimator,
     FlowDensity,
     PlotSettings,
+    ProjectivePlane,
     Sphere,
     Torus,
     UniformDensity,
@@ -24,6 +24,7 @@ from orbiflow.density import (
     density_to_bytes,
     plot_density,
 )
+from orbiflow.density.operations.drawing import plot
 from orbiflow.density.pictures.plots import refuse_foreign_files
 from orbiflow.errors import OrbiflowError, OutputError
 from orbiflow.fields import FourierField
@@ -35,11 +36,11 @@ DATA = np.random.default_rng(0).uniform(-3, 3, (40, 2))
 @pytest.fixture(autouse=True)
 def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orbiflow.density.pictures.square._GRID", 12)
-    monkeypatch.setattr("orbiflow.density.pictures.page._CELLS", 8)
+    monkeypatch.setattr("orbiflow.density.pictures.surfaces._CELLS", 8)
     monkeypatch.setattr("orbiflow.density.pictures.maps._PIXELS", 900)
     monkeypatch.setattr("orbiflow.density.pictures.colours._COARSE", 12)
-    monkeypatch.setattr("orbiflow.drawing.fields._SAMPLES", 20)
-    monkeypatch.setattr("orbiflow.drawing.fields._STEPS", 2)
+    monkeypatch.setattr("orbiflow.drawing.canvas._SAMPLES", 20)
+    monkeypatch.setattr("orbiflow.drawing.canvas._STEPS", 2)
     monkeypatch.setattr("orbiflow.density.pictures.plots.SAMPLES", 50)
 
 
@@ -97,18 +98,12 @@ def test_one_picture_is_no_place_for_several(tmp_path: Path, ending: str) -> Non
     assert not list(tmp_path.iterdir())
 
 
-def test_densities_from_wherever_they_are(tmp_path: Path) -> None:
-    density, model = VonMisesDensity(Torus(2)), tmp_path / "model"
-    model.mkdir()
-    (model / MODEL).write_bytes(density_to_bytes(density, columns=["phi", "psi"]))
-    settings = PlotSettings(format="pdf", names=("phi", "psi"))
-    made = []
-    for k, source in enumerate((density, model, str(model / MODEL))):
-        plot_density(source, tmp_path / f"{k}.pdf", settings, data=DATA)
-        made.append((tmp_path / f"{k}.pdf").read_bytes())
-    assert made[0] == made[1] == made[2]
-    plot_density(model, tmp_path / "named.pdf", data=DATA)  # the columns of the fit
-    assert (tmp_path / "named.pdf").read_bytes() == made[0]
+def test_inclinations_are_drawn_in_a_net(tmp_path: Path) -> None:
+    model = tmp_path / "model"
+    model.write_bytes(density_to_bytes(UniformDensity(ProjectivePlane()), columns=["inc", "dec"]))
+    told: list[Any] = []
+    plot(model=model, out=tmp_path / "net.pdf", on_event=told.append)
+    assert "Schmidt net (equal-area)" in " ".join(map(str, told))
 
 
 def test_a_fitted_estimator_is_drawn_and_another_refused(tmp_path: Path) -> None:

@@ -23,11 +23,10 @@ from orbiflow.density import (
     UniformDensity,
     density_picture,
     make_space,
-    map_picture,
     plot_density,
     to_vectors,
 )
-from orbiflow.density.pictures.axes import view_of
+from orbiflow.density.pictures.frames import view_of
 from orbiflow.density.pictures.projections import EqualEarth
 from orbiflow.errors import OrbiflowError
 
@@ -95,7 +94,8 @@ def test_lines_on_a_map(measure: str) -> None:
     density = broad("sphere")
     lines, projection = lines_of(density, 0.9), EqualEarth((0.0, 40.0))
     asked: dict[str, Any] = {"projection": "equal-earth", "center": (40.0,)}
-    picture = map_picture(density, settings=with_regions(0.9, measure=measure, **asked))
+    settings = with_regions(0.9, measure=measure, **asked)
+    picture = density_picture(density, settings=settings, ground="map")
     (places,) = vertices(picture.figure)
     # beyond the outline they are cut off
     places = places[MapPath(projection.outline()).contains_points(places, radius=-0.02)]
@@ -119,7 +119,7 @@ def test_logarithms_are_for_lines_alone(name: str, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(f"{pictures}.square._FINE_GRID", 30)
     monkeypatch.setattr(f"{pictures}.maps._PIXELS", 2000)
     density = broad(name)
-    draw = density_picture if name == "torus" else map_picture
+    draw = functools.partial(density_picture, ground="square" if name == "torus" else "map")
     draw(density)
     assert not called
     draw(density, settings=with_regions(0.5, 0.9))

@@ -60,12 +60,9 @@ def test_half_the_cell_where_the_lattice_has_it(turn: float, repeat) -> None:
     # what repeats are vectors of the lattice: a side, and the other with half of it
     width, height = found.width, found.height
     assert (width if repeat == "brick" else height) % 2 == 0
-    ways = (
-        [[width, 0], [width / 2, height]]
-        if repeat == "brick"
-        else [[0, height], [width, height / 2]]
-    )
-    steps = np.linalg.solve(basis, np.linalg.solve(found.linear, np.array(ways, dtype=float).T))
+    brick, drop = [[width, 0], [width / 2, height]], [[0, height], [width, height / 2]]
+    ways = np.array(brick if repeat == "brick" else drop, dtype=float)
+    steps = np.linalg.solve(basis, np.linalg.solve(found.linear, ways.T))
     np.testing.assert_allclose(steps, np.rint(steps), atol=1e-9)
     assert abs(round(np.linalg.det(steps))) == 1
 

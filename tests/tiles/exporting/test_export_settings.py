@@ -26,7 +26,7 @@ from orbiflow.tiles import ExportSettings, scenes
         ({"palette": 5}, "palette must be a palette's name, .*got 5"),
         ({"bed": (100.0, -1.0)}, "bed: entry 2: must be above 0"),
         ({"format": "bmp"}, "format must be svg, pdf, dxf, png or json, got 'bmp'"),
-        ({"cut": "half"}, "cut must be none, skeleton, pieces or jigsaw"),
+        ({"cut": "half"}, "cut must be none, skeleton, pieces, jigsaw or template"),
         ({"cut": "pieces", "copies": 0}, "copies must be .*at least 1"),
         ({"copies": 3}, "copies applies only to cut pieces, not to none"),
         ({"kerf": 0.1}, "kerf applies only to cut pieces"),

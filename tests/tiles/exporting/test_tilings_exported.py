@@ -71,7 +71,7 @@ def test_a_tiling_is_turned_counterclockwise_on_the_page(cut: Literal["none", "s
 
 
 def test_pieces_are_not_turned() -> None:
-    with pytest.raises(OrbiflowError, match="rotate applies only to cut none, skeleton or jigsaw"):
+    with pytest.raises(OrbiflowError, match="rotate applies only to cut none, skeleton, jigsaw or"):
         ExportSettings(cut="pieces", rotate=30)
 
 

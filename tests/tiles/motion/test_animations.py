@@ -46,10 +46,12 @@ def bent_fixture() -> EscherTile:
 
 
 @settings(max_examples=20)
-@given(swirled, st.floats(0, 1), st.booleans())
-def test_every_picture_of_a_morph_is_full(tile: Tile, share: float, steady: bool) -> None:
+@given(swirled, st.floats(0, 1), st.booleans(), st.sampled_from([9 / 16, 1.0, 1.5]))
+def test_every_picture_of_a_morph_is_full(
+    tile: Tile, share: float, steady: bool, aspect: float
+) -> None:
     assume(is_sound(tile))
-    moving = morph(tile, 150, steady=steady)
+    moving = morph(tile, 150, aspect=aspect, steady=steady)
     own = palette("lagoon")._replace(paper="#ff00ff")
     image = np.asarray(picture(moving, own, share).image()).astype(int)
     paper = np.abs(image - (255, 0, 255)).max(axis=-1) < 40
@@ -136,6 +138,17 @@ def test_colours_of_neighbours_differ_throughout(name: str) -> None:
                 assert own != its
             assert one.intersection(other).area < 1e-6 * size**2
         assert beside > len(shown)
+
+
+@pytest.mark.parametrize(("shape", "height"), [("wide", 720), ("square", 1080), ("story", 1920)])
+@pytest.mark.parametrize("kind", ["morph", "bend", "grow"])
+def test_shapes_of_clips(bent: EscherTile, shape, height: int, kind) -> None:
+    made = motion(bent, AnimationSettings(kind=kind, size=1080, shape=shape))
+    assert (made.page.width, made.page.height) == (1080, height)
+    # about as many tiles, whatever the shape
+    low, high = made.outline(1.0).min(axis=0), made.outline(1.0).max(axis=0)
+    share = np.prod(high - low) / (1080 * height)
+    assert 0.02 < share < 0.5
 
 
 def test_a_silhouette_bends_from_rest_to_tile(bent: EscherTile) -> None:

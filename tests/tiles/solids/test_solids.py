@@ -25,11 +25,9 @@ from orbiflow.tiles import (
     write_3mf,
     write_stl,
 )
-from orbiflow.tiles.exporting import ExportSettings, laid_out, longer_side
+from orbiflow.tiles.exporting import ExportSettings, dark_parts, laid_out, longer_side
 from orbiflow.tiles.scene import Curve, Motif, Part, Style
-from orbiflow.tiles.solids.making import raised
-from orbiflow.tiles.solids.shapes import Plan, shape
-from orbiflow.tiles.solids.stacking import Level, stacked
+from orbiflow.tiles.solids.shapes import Level, Plan, shape, stacked
 from solids_read import read_3mf, read_stl, section
 
 Kind: TypeAlias = Literal["tile", "cutter", "stamp", "mould", "puzzle"]
@@ -226,7 +224,7 @@ def test_what_is_raised() -> None:
 
     line = Part((Curve.polyline([[20, 0], [30, 0]]),), Style(None, "currentColor", 0.1))
     eye = disc(5, "#202020"), disc(3, "#fff0e0"), disc(1, "#000000"), disc(9, "#000000", 0.3)
-    areas = sorted(part.area for part in polygons_in(raised(Motif((*eye, line)), 0.4)))
+    areas = sorted(part.area for part in polygons_in(dark_parts(Motif((*eye, line)), 0.4)[0]))
     assert areas == pytest.approx([np.pi, 10 * 0.4 + np.pi * 0.2**2, 16 * np.pi], rel=0.01)
 
 

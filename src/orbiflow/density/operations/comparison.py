@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from orbiflow import runtime
 from orbiflow.batch import csv_bytes
@@ -86,28 +86,28 @@ def _check_what_is_compared(
     """Check that there are models and a table, or two tables and a space."""
     if models:
         wrong = {
-            "{models} must be given twice or more, to be compared; or give two {data}": len(models)
-            < 2,
+            "{models} must be given twice or more, to be compared; or give two {data}": not models[
+                1:
+            ],
             "{models} names one folder twice: give each once": len(set(models)) < len(models),
             "models are compared at one {data}, rows that none was fitted to": len(data) != 1,
             "{space} is that of the models: leave it out": space is not None,
             "{unit} is that of the models: leave it out": unit is not None,
         }
     else:
+        once = data[0].resolve() == data[-1].resolve()
         wrong = {
             "give two {models} or more and one {data} to compare models, or two {data} and their "
             "{space} to compare data": len(data) != 2,
             "two {data} need their {space}": space is None,
-            "{data} names one file twice: give two data sets": data[0].resolve()
-            == data[-1].resolve(),
+            "{data} names one file twice: give two data sets": once,
         }
     for message, is_wrong in wrong.items():
         if is_wrong:
             raise SettingError(message)
 
 
-@dataclass(frozen=True)
-class _Reader:
+class _Reader(NamedTuple):
     """How tables are read, the column of groups, who is told, and who hears of the progress."""
 
     settings: TableSettings
@@ -117,9 +117,8 @@ class _Reader:
 
     def rows(self, data: Path, columns: Columns, tell: runtime.Sink) -> TableRows:
         """Return rows, without the column of groups if columns are not named."""
-        return tables.read_rows(
-            data, self.settings.replace(columns=columns), tell, group=self.group
-        )
+        settings = self.settings.replace(columns=columns)
+        return tables.read_rows(data, settings, tell, group=self.group)
 
 
 def _compare_models(
@@ -162,9 +161,10 @@ def _compare_data(
     import numpy as np
 
     columns = read.settings.columns or _common_columns(data, read)
-    found = dict(
-        zip(_names(data), [read.rows(path, columns, read.tell) for path in data], strict=True)
-    )
+    found = {
+        name: read.rows(path, columns, read.tell)
+        for name, path in zip(_names(data), data, strict=True)
+    }
     groups = None
     if read.group is not None:
         groups = {name: np.asarray(rows.labels) for name, rows in found.items()}
@@ -172,13 +172,9 @@ def _compare_data(
     both = next(iter(found.values())).table
     if len({own.shape[1] for own in values.values()}) == 1:
         both = replace(both, values=np.concatenate(list(values.values())))
+    unit = tables.angle_unit(space, unit, both, read.tell)
     return comparing.compare_samples(
-        values,
-        space,
-        settings,
-        unit=tables.angle_unit(space, unit, both, read.tell),
-        groups=groups,
-        progress=read.progress,
+        values, space, settings, unit=unit, groups=groups, progress=read.progress
     )
 
 
@@ -245,17 +241,16 @@ def _notes_on_known_rows(
         ]
     sketch = comparing.RowSketch.from_json(extra["fitted_rows"])
     known, looked_up = sketch.known(density.space, values)
-    if not known:
-        return []
-    if looked_up >= MIN_LOOKED_UP and known >= FITTED_SHARE * looked_up:
-        return [
-            f"WARNING: {name} seems to have been fitted to these rows ({known} of {looked_up} that "
-            "were looked up): a model's score at rows that it has seen says little; compare at others"
-        ]
-    return [
+    note = (
         f"{known} of {looked_up} rows that were looked up equal one that {name} was fitted to: "
         "repeated values, or the same rows"
-    ]
+    )
+    if looked_up >= MIN_LOOKED_UP and known >= FITTED_SHARE * looked_up:
+        note = (
+            f"WARNING: {name} seems to have been fitted to these rows ({known} of {looked_up} that "
+            "were looked up): a model's score at rows that it has seen says little; compare at others"
+        )
+    return [note] if known else []
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
@@ -264,10 +259,9 @@ def _names(paths: Sequence[Path]) -> list[str]:
     >>> _names([Path("a/x.csv"), Path("a/y.csv")]), _names([Path("a/x"), Path("b/x")])
     (['x', 'y'], ['a/x', 'b/x'])
     """
-    real = [path.resolve() for path in paths]
     short = [
-        own.stem if path.is_file() or path.suffix else own.name
-        for path, own in zip(paths, real, strict=True)
+        path.resolve().stem if path.is_file() or path.suffix else path.resolve().name
+        for path in paths
     ]
     if len(set(short)) == len(short) and all(short):
         return short

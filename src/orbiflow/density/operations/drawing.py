@@ -59,21 +59,18 @@ def plot(
         name = min(table.fields_given)
         raise SettingError(f"{{{name}}} applies only to {{data}}; give both or neither")
 
-    from orbiflow.density.operations.saved import check_fits, model_at, with_columns_of
+    from orbiflow.density.operations.saved import check_fits, model_at, names_of, with_columns_of
 
     single = pictures.is_one_file(out)
     if single and settings.format not in (None, "pdf"):
         raise SettingError(f"{{out}} ends in .pdf but {{format}} is {settings.format}")
-    reads = (model, data, settings.coastlines)
-    if single:
-        runtime.check_output_file(out, *reads)
-    else:  # pictures may stand beside their model
-        runtime.check_outside_runs(out, *reads)
+    # pictures may stand beside their model
+    check = runtime.check_output_file if single else runtime.check_outside_runs
+    check(out, model, data, settings.coastlines)
     density, extra = model_at(model)
     space = density.space
-    names = pictures.known_names(space, extra.get("columns"))
-    if settings.names is None and names is not None:
-        settings = settings.replace(names=names)
+    if settings.names is None:
+        settings = settings.replace(names=tuple(names_of(density, extra)))
     points = None
     if data is not None:
         reading = with_columns_of(table, data, extra, on_event)
@@ -183,18 +180,16 @@ def _region_notes(found: list[DensityRegion], drawn: list[Outline]) -> list[str]
 
 
 def _described(found: DensityRegion, outline: Outline | None) -> str:
-    size, fraction, polygons = found.size, found.fraction, ""
+    drawn, polygons = outline or found, ""
     if outline is not None:
-        size, fraction = outline.size, outline.fraction
         count = len(outline.shape.geoms)
-        holds = "holds" if count == 1 else "hold"
-        polygons = f"; {_counted(count, 'polygon')}, which {holds} "
+        polygons = f"; {_counted(count, 'polygon')}, which {'holds' if count == 1 else 'hold'} "
         polygons += _with_error(outline.mass, outline.error)
     return (
         f"mass {_with_error(found.held, found.error)}: log density of at least "
         f"{found.log_prob:.4f} ({found.log_prob_low:.4f} to {found.log_prob_high:.4f}), "
-        f"{size:.6g} {regions.size_unit(found.density.space)}, {_percentage(fraction)} of the space"
-        f"{polygons}"
+        f"{drawn.size:.6g} {regions.size_unit(found.density.space)}, "
+        f"{_percentage(drawn.fraction)} of the space{polygons}"
     )
 
 
@@ -215,9 +210,8 @@ def _percentage(share: float) -> str:
     ('2.18%', '0.0012%', '0.00%')
     """
     percents = 100 * share
-    if percents <= 0 or percents >= 0.1:
-        return f"{percents:.2f}%"
-    return f"{percents:.{1 - math.floor(math.log10(percents))}f}%"
+    decimals = 1 - math.floor(math.log10(percents)) if 0 < percents < 0.1 else 2
+    return f"{percents:.{decimals}f}%"
 
 
 def _counted(count: int, noun: str) -> str:
@@ -260,12 +254,10 @@ def patches(
     with runtime.one_thread():
         angles, distances = spaces.to_klein(found.values, unit=unit)
     near = distances <= (np.inf if farthest is None else farthest)
-    if not near.any():
+    if not near.any():  # a table has a row at least
         raise OrbiflowError(
-            f"none of {len(near)} patches is within {farthest:g} of the Klein bottle; the "
-            f"nearest is {distances.min():.3f} away"
-            if len(near)
-            else f"{data}: no patches"
+            f"none of {len(near)} patches is within {farthest:g} of the Klein bottle; the nearest is "
+            f"{distances.min():.3f} away"
         )
     kept = np.column_stack([angles, distances])[near]
     cancel.check()

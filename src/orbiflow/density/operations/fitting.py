@@ -72,10 +72,8 @@ def fit(
         model = models.density_to_bytes(
             estimator.density_, columns=list(rows.table.columns), fitted_rows=known
         )
-        files = {
-            pictures.MODEL: model,
-            pictures.REPORT: json.dumps(document, allow_nan=False, indent=1),
-        }
+        report = json.dumps(document, allow_nan=False, indent=1)
+        files = {pictures.MODEL: model, pictures.REPORT: report}
         if picture:
             files[pictures.THUMBNAIL] = pictures.density_thumbnail(estimator.density_, values)
     write_files(folder, files, on_event)

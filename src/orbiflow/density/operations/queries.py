@@ -85,9 +85,7 @@ def score(
         rows = tables.read_rows(data, with_columns_of(reading, data, extra, on_event), on_event)
         check_fits(data, rows.table, density.space, extra, on_event)
         progress = runtime.progress_events(on_event, cancel)
-        columns, mean, over, notes = score_rows(
-            density, rows, settings, progress, may_lack=may_lack
-        )
+        columns, mean, over, notes = score_rows(density, rows, settings, progress, may_lack)
     weighted = "" if reading.weights is None else f", weighted by {reading.weights}"
     words = f"mean log density {mean:.4f} nats over {over}{weighted}; written to {out}"
     table = tables.append_columns(rows.table, data, columns)
@@ -107,8 +105,7 @@ def score_rows(
     rows: tables.TableRows,
     settings: ScoreSettings,
     progress: fitting.Progress,
-    *,
-    may_lack: bool = False,
+    may_lack: bool,
 ) -> tuple[dict[str, Array], float, str, list[str]]:
     """Return columns (N,) to add to the table, log densities first, and what is known of them.
 
@@ -180,10 +177,9 @@ def _gradients(
     values = rows.table.values
     found: list[Array] = []
     for start in range(0, len(values), BLOCK_GRADIENT):
-        found.append(
-            models.log_density_gradient(density, values[start : start + BLOCK_GRADIENT])[1]
-        )
-        share = min(1.0, (start + BLOCK_GRADIENT) / len(values))
+        part = values[start : start + BLOCK_GRADIENT]
+        found.append(models.log_density_gradient(density, part)[1])
+        share = (start + len(part)) / len(values)
         progress(SCORED + (1 - SCORED) * share, "finding gradients")
     names = [f"log_prob_by_{name}" for name in rows.table.columns]
     return dict(zip(names, np.concatenate(found).T, strict=True))
@@ -195,9 +191,8 @@ def mean_of_whole(scores: Array, weights: Array | None, whole: NDArray[Any]) -> 
     import torch
 
     chosen = whole if whole.any() else np.ones_like(whole)
-    rows = fitting.weighed(
-        torch.tensor(scores[chosen, None]), None if weights is None else weights[chosen]
-    )
+    counts = None if weights is None else weights[chosen]
+    rows = fitting.weighed(torch.tensor(scores[chosen, None]), counts)
     return fitting.mean_of(rows.points[:, 0], rows.weights)
 
 

@@ -35,11 +35,9 @@ def model_at(path: Path) -> tuple[Density, dict[str, Any]]:
     """Return the density in a file or in the folder of a fit, and what was saved with it."""
     file = path / pictures.MODEL if path.is_dir() else path
     if not file.exists():
-        missing = (
-            f"there is no {pictures.MODEL} in it" if path.is_dir() else "there is no such folder"
-        )
+        what = f"{pictures.MODEL} in it" if path.is_dir() else "such folder"
         raise InputFileError(
-            f"cannot read {path}: {missing}; give the folder that `orbiflow density fit` wrote"
+            f"cannot read {path}: there is no {what}; give the folder that `orbiflow density fit` wrote"
         )
     return read_density(file)
 
@@ -132,15 +130,9 @@ def axes_of(wanted: Sequence[str], names: Sequence[str]) -> list[int]:
     [1, 0]
     """
     lower = {name.casefold() for name in names}
-    return conditionals.axes_named(
-        [
-            int(one) - 1
-            if one.casefold() not in lower and one.isdecimal() and 1 <= int(one) <= len(names)
-            else one
-            for one in wanted
-        ],
-        names,
-    )
+    numbers = {str(number): number - 1 for number in range(1, len(names) + 1)}
+    asked = [one if one.casefold() in lower else numbers.get(one, one) for one in wanted]
+    return conditionals.axes_named(asked, names)
 
 
 def condition_of(
@@ -176,9 +168,9 @@ def condition_of(
 
 def evidence_of(density: Density, given: dict[int, float]) -> float:
     """Return the log density of known angles, in turns, relative to the uniform one."""
-    at = torch.full((1, density.space.dim), torch.nan, dtype=torch.float64)
-    at[0, list(given)] = torch.tensor(list(given.values()), dtype=torch.float64)
-    return float(conditionals.log_prob_observed(density, at, measure="uniform"))
+    at = [[given.get(axis, math.nan) for axis in range(density.space.dim)]]
+    points = torch.tensor(at, dtype=torch.float64)
+    return float(conditionals.log_prob_observed(density, points, measure="uniform"))
 
 
 def write_derived(
@@ -192,12 +184,8 @@ def write_derived(
     """Write the folder of a density of fewer angles; `origin` says in the report where it is from."""
     cancel.check()
     space = density.space
-    document = {
-        "space": {"name": space.name, **space.settings()},
-        "columns": names,
-        "report": {"error": density.error},
-        **origin,
-    }
+    named = {"space": {"name": space.name, **space.settings()}, "columns": names}
+    document = {**named, "report": {"error": density.error}, **origin}
     files: dict[str, str | bytes] = {
         pictures.MODEL: density_to_bytes(density, columns=names),
         pictures.REPORT: json.dumps(document, allow_nan=False, indent=1),

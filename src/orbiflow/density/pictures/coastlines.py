@@ -112,8 +112,7 @@ def _lines(path: Path, item: Any, depth: int) -> Iterator[Array]:
         if item.get("geometry") is not None:
             yield from _lines(path, item["geometry"], depth + 1)
     elif kind in _SHAPES:
-        for positions in _flat(path, kind, item.get("coordinates"), _SHAPES[kind]):
-            line = _positions(path, kind, positions)
+        for line in _positions(path, kind, item.get("coordinates"), _SHAPES[kind]):
             parts = _without_cuts(line) if kind.endswith("Polygon") else [line]
             yield from (part for part in parts if len(part) > 1)
     elif kind not in _POINTS:
@@ -122,27 +121,22 @@ def _lines(path: Path, item: Any, depth: int) -> Iterator[Array]:
         )
 
 
-def _flat(path: Path, kind: str, items: Any, depth: int) -> list[Any]:
-    """Return the lists of positions in lists `depth` - 1 deep."""
+def _positions(path: Path, kind: str, items: Any, depth: int) -> list[Array]:
+    """Return latitudes and longitudes (M, 2) of positions in lists `depth` deep, without heights."""
     if not isinstance(items, list):
         raise InputFileError(f"{path}: the coordinates of a {kind} must be lists {depth} deep")
-    if depth == 1:
-        return [items]
-    return [line for item in items for line in _flat(path, kind, item, depth - 1)]
-
-
-def _positions(path: Path, kind: str, positions: list[Any]) -> Array:
-    """Return latitude and longitude (M, 2), without heights."""
+    if depth > 1:
+        return [line for item in items for line in _positions(path, kind, item, depth - 1)]
     try:
         # a position is longitude, latitude
-        line = np.array([(p[1], p[0]) for p in positions], dtype=float).reshape(-1, 2)
+        line = np.array([(p[1], p[0]) for p in items], dtype=float).reshape(-1, 2)
     except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
         raise InputFileError(
             f"{path}: a {kind} has a position that is not longitude, latitude"
         ) from error
     line = _checked(path, line)
     line[:, 0] = np.clip(line[:, 0], -90, 90)
-    return line
+    return [line]
 
 
 def _checked(path: Path, line: Array) -> Array:

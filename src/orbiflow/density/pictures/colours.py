@@ -12,7 +12,6 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import AdaptiveKernels, Density, midpoints
-from orbiflow.density.pictures.surfaces import off_cones
 from orbiflow.density.spaces import Space, rectangle
 
 COLOURS = "viridis"
@@ -24,6 +23,13 @@ _KERNELS = 4096
 
 _COARSE = 120
 """Points along a side by which a scale is chosen."""
+
+
+def off_cones(points: Tensor, margin: float = 1e-3) -> Tensor:
+    """Move chart points (N, 2) within `margin` of a corner inwards: cone points have densities 0/0."""
+    inward = 0.5 - points
+    near = inward.abs().amin(dim=-1, keepdim=True) > 0.5 - margin
+    return torch.where(near, points + margin * inward.sign(), points)
 
 
 @torch.no_grad()
@@ -48,18 +54,16 @@ def density_on_grid(
     """
     shape = (len(x), len(y))
     points = torch.stack(torch.meshgrid(x, y, indexing="ij"), dim=-1).reshape(-1, 2)
-    part = density.kernel_part
-    if part is None:
+    if density.kernel_part is None:
         return density_at(density, points, measure).reshape(shape)
-    half = _half_pixels(part[1], pixel or float(x[1] - x[0]))
+    half = _half_pixels(density.kernel_part[1], pixel or float(x[1] - x[0]))
     return _averaged(density, points, measure, half, (x, y)).reshape(shape)
 
 
 @torch.no_grad()
 def density_on_map(density: Density, points: Tensor, measure: str, angle: float) -> Array:
     """Return the density (N,) at chart points (N, 2) of a round space, averaged over pixels."""
-    part = density.kernel_part
-    if part is None:
+    if density.kernel_part is None:
         return density_at(density, points, measure)
     return _averaged(density, points, measure, torch.tensor(angle / 2))
 
@@ -237,7 +241,9 @@ def bar_ticks(shade: Shade, *, ends: bool = False) -> list[Tick]:
 
     unit = 10.0 ** _power(shade)
     if shade.log:
-        ticks = _log_ticks(shade)
+        powers = _within(shade, (1,))
+        values = powers if len(powers) > 2 else _within(shade, (1, 2, 5))
+        ticks = [Tick(float(shade.places(np.array(v))), short_number(v)) for v in values]
     else:
         values = MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(0.0, shade.high / unit)
         ticks = [Tick(v * unit / shade.high, f"{v:g}") for v in values if v * unit <= shade.high]
@@ -269,12 +275,6 @@ def short_number(value: float, digits: int = 3) -> str:
     factor = f"{value / 10.0**power:.{digits}g}"
     raised = f"10{str(power).translate(_SUPERSCRIPTS)}"
     return raised if factor == "1" else f"{factor} × {raised}"
-
-
-def _log_ticks(shade: Shade) -> list[Tick]:
-    factors = (1,) if len(_within(shade, (1,))) > 2 else (1, 2, 5)
-    values = _within(shade, factors)
-    return [Tick(float(shade.places(np.array(v))), short_number(v)) for v in values]
 
 
 def _within(shade: Shade, factors: Iterable[int]) -> list[float]:

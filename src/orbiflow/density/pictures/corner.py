@@ -10,16 +10,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
-from orbiflow.density.pictures.axes import (
-    INK,
-    LETTER,
-    View,
-    angle_axis,
-    legible,
-    shortened,
-    space_title,
-    view_of,
-)
+from orbiflow.density.pictures import frames
 from orbiflow.density.pictures.colours import density_at
 from orbiflow.density.pictures.overlays import LIGHT, MAX_DOTS, draw_dots
 from orbiflow.density.pictures.settings import PlotSettings
@@ -68,7 +59,7 @@ def corner_picture(
     if not space.is_torus or space.dim > MAX_COLUMNS:
         raise OrbiflowError(f"pairs are drawn of 1 to {MAX_COLUMNS} angles, not of {space!r}")
     dim = space.dim
-    panels = _Panels(sheet, view_of(space, settings.names, settings.center))
+    panels = _Panels(sheet, frames.view_of(space, settings.names, settings.center))
     above = panels.view.places(samples)
     below = None if data is None else panels.view.places(data)
     for row, column in np.ndindex(dim, dim):
@@ -86,11 +77,11 @@ def corner_picture(
         if dim == 1:
             t = torch.linspace(0, 1, 721, dtype=torch.float64)
             line = density_at(density, panels.view.to_chart(t[:, None]), "square")
-            axes.plot(t.numpy(), line, color=INK, linewidth=sheet.pen(1.6, 0.6))
+            axes.plot(t.numpy(), line, color=frames.INK, linewidth=sheet.pen(1.6, 0.6))
     counts = {} if below is None else {"data": len(below)}
     counts["samples"] = len(above)
     panels.write_heads(counts, most)
-    title = f"{'Angles' if dim > 1 else 'Angle'} on the {space_title(space)}"
+    title = f"{'Angles' if dim > 1 else 'Angle'} on the {frames.space_title(space)}"
     caption = " and ".join(f"{count} {what}" for what, count in counts.items())
     caption += f", at most {most} of each as dots" if dim > 1 else ""
     return Picture(panels.figure, sheet, title, f"{caption}. Angles in {space.unit}.")
@@ -112,7 +103,7 @@ class _Panels:
     - `text`, `small`: Sizes of the labels' and of the ticks' letters, in points.
     """
 
-    def __init__(self, sheet: Sheet, view: View) -> None:
+    def __init__(self, sheet: Sheet, view: frames.View) -> None:
         self.sheet, self.view, self.dim = sheet, view, view.space.dim
         left, below, right, above = (5.2, 4.0, 1.2, 2.2) if sheet.printed else _SCREEN
         self.side = (sheet.width - sheet.em * (left + right)) / self.dim
@@ -136,9 +127,7 @@ class _Panels:
         """Make the axes of a panel."""
         x = self.left + column * self.side
         y = self.below + (self.dim - 1 - row) * self.side
-        width, height = self.figure.get_size_inches()
-        inner = 0.93 * self.side
-        return self.figure.add_axes((x / width, y / height, inner / width, inner / height))
+        return frames.axes_at(self.figure, x, y, 0.93 * self.side, 0.93 * self.side)
 
     def write_heads(self, counts: dict[str, int], most: int) -> None:
         """Write what is drawn in its colour, with its number; in print the caption has the numbers."""
@@ -151,12 +140,12 @@ class _Panels:
             colour = _DATA if what == "data" else _SAMPLES
             heads.append((text if sheet.printed else f"{few}{count} {text}", colour))
         if dim == 1:
-            heads.append(("density", INK))
+            heads.append(("density", frames.INK))
         width, height = self.figure.get_size_inches()
         y = (self.below + dim * self.side + 0.6 * sheet.em) / height
         size = sheet.text * (1.0 if sheet.printed else 1.05)
         reach = dim * self.side / width
-        widths = [(len(text) + 1.5) * LETTER * size / 72 / width for text, _ in heads]
+        widths = [(len(text) + 1.5) * frames.LETTER * size / 72 / width for text, _ in heads]
         step = max(reach * (0.53 if dim > 1 else 0.36), max(widths[:-1], default=0.0))
         x = self.left / width
         if x + step * (len(heads) - 1) + widths[-1] > 1:  # a narrow figure
@@ -168,7 +157,7 @@ class _Panels:
     def draw_ticks(self, axes: Axes, row: int, column: int) -> None:
         """Draw ticks of quarter turns, with texts along the left and the lower rim."""
         sheet, size, last = self.sheet, self.text, self.dim - 1
-        style: dict[str, Any] = {"fontsize": size, "color": INK, "parse_math": False}
+        style: dict[str, Any] = {"fontsize": size, "color": frames.INK, "parse_math": False}
         axes.set_facecolor(LIGHT)
         for spine in axes.spines.values():
             spine.set_color("#c8c8c4")
@@ -177,21 +166,21 @@ class _Panels:
             labelsize=self.small, length=0.25 * size, width=sheet.pen(0.8), pad=0.3 * size,
             color="#8a8a86",
         )  # fmt: skip
-        label, at, texts = angle_axis(self.view, column)
+        label, at, texts = frames.angle_axis(self.view, column)
         if sheet.printed:
-            texts = legible(at, texts, self.side, sheet)
+            texts = frames.legible(at, texts, self.side, sheet)
         axes.set_xlim(0, 1)
         axes.set_xticks(at, self._apart(at, texts, row == last, column == last))
         if row == last:
-            axes.set_xlabel(shortened(label, self.side, sheet), **style)
+            axes.set_xlabel(frames.shortened(label, self.side, sheet), **style)
         if row == column:
             axes.set_yticks([])
             return
-        label, at, texts = angle_axis(self.view, row)
+        label, at, texts = frames.angle_axis(self.view, row)
         axes.set_ylim(0, 1)
         axes.set_yticks(at, self._apart(at, texts, column == 0, row == 1))
         if column == 0:
-            axes.set_ylabel(shortened(label, self.side, sheet), **style)
+            axes.set_ylabel(frames.shortened(label, self.side, sheet), **style)
 
     def _apart(self, at: list[float], texts: list[str], wanted: bool, last: bool) -> list[str]:
         """Return texts of ticks without those that would touch others in the next panel."""

@@ -1,26 +1,50 @@
-"""Figures of a density, and of points beside it, on the canonical square or on a map."""
+"""Figures of a density, of points beside it, and of its flow: on the canonical square or on a map."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TypeAlias
+import io
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+import numpy as np
 import torch
+from PIL import Image
 from torch import Tensor
 
-from orbiflow.density.models import Density
+from orbiflow.density.models import Density, FlowDensity
 from orbiflow.density.pictures import frames, overlays
-from orbiflow.density.pictures.axes import chart_points, space_title
 from orbiflow.density.pictures.coastlines import coastlines_for
 from orbiflow.density.pictures.colours import bar_label, bar_ticks
-from orbiflow.density.pictures.maps import Map, chosen_map
+from orbiflow.density.pictures.frames import INK, chart_points, require_plane, space_title, view_of
+from orbiflow.density.pictures.maps import Map
+from orbiflow.density.pictures.projections import chosen_map
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import Square
 from orbiflow.density.regions import DensityRegion
-from orbiflow.drawing import Picture, Sheet
+from orbiflow.density.spaces import Space
+from orbiflow.drawing import Picture, Sheet, draw_flow, draw_magnitude
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import CrystallographicGroup
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Ground: TypeAlias = Square | Map
 """What densities and points of a space are drawn on."""
+
+GroundName = Literal["square", "map"]
+
+
+def _ground(
+    ground: Ground | GroundName, space: Space, points: Tensor | None, settings: PlotSettings
+) -> Ground:
+    """Return the ground of a name; a map is the one that suits the points (N, 2)."""
+    if ground == "square":
+        return Square(space, settings)
+    if ground != "map":
+        return ground
+    about = chart_points(space, torch.empty(0, 2) if points is None else points)
+    return Map(space, chosen_map(space, about, settings), coastlines_for(space, settings))
 
 
 def density_picture(
@@ -29,12 +53,16 @@ def density_picture(
     settings: PlotSettings | None = None,
     *,
     sheet: Sheet | None = None,
+    ground: Ground | GroundName = "square",
+    regions: Sequence[DensityRegion] | None = None,
 ) -> Picture:
-    """Draw a density on the canonical square, with the edges marked that are the same edge.
+    """Draw a density on the canonical square, or directions and axes on a map.
 
-    Edges of one colour and number of arrow heads are identified, in the sense of the arrows. Ticks
-    are in the user's units where the chart is a plain rescaling of them (torus, Klein bottle).
-    Peaks narrower than a pixel are averaged over it, and a note says so.
+    Edges of the square of one colour and number of arrow heads are one edge, in the sense of the
+    arrows. Ticks are in the user's units where the chart is a plain rescaling of them (torus, Klein
+    bottle). A map has its graticule, and the density is evaluated at each of its pixels, which end at
+    a curve; of axes it shows one end. Peaks narrower than a pixel are averaged over it, and a note
+    says so.
 
     Args:
         density: A density on a two-dimensional space.
@@ -42,87 +70,19 @@ def density_picture(
             drawn, always the same; dots are smaller where they crowd, so that peaks stay in sight.
         settings: How it is drawn.
         sheet: The sheet. Default: that of the settings.
+        ground: What it is drawn on, "square" or "map".
+        regions: Regions to draw lines around. Default: those of the settings.
 
     Raises:
         OrbiflowError: If the space has another dimension, or samples or settings do not fit it.
     """
     settings = settings or PlotSettings()
-    square = Square(density.space, settings)
-    return draw_density(square, density, settings, dots=samples, sheet=sheet)
-
-
-def samples_picture(
-    density: Density,
-    data: Tensor | None,
-    samples: Tensor,
-    settings: PlotSettings | None = None,
-    *,
-    sheet: Sheet | None = None,
-) -> Picture:
-    """Draw data (N, 2) and samples (M, 2) on two squares; without data, the density and samples.
-
-    Points are of the chart, such as `space.to_chart(table)` and `density.sample((M,))`.
-    """
-    settings = settings or PlotSettings()
-    square = Square(density.space, settings)
-    return draw_samples(square, density, settings, data, samples, sheet=sheet)
-
-
-def map_picture(
-    density: Density,
-    samples: Tensor | None = None,
-    settings: PlotSettings | None = None,
-    *,
-    sheet: Sheet | None = None,
-) -> Picture:
-    """Draw a density on the sphere or the projective plane on a map with its graticule.
-
-    The density is evaluated at each pixel of the map, so that nothing is stretched or sewn; the
-    pixels end at a curve. On the projective plane each axis is drawn at the end that the map shows.
-    Arguments are those of `density_picture`.
-    """
-    settings = settings or PlotSettings()
-    ground = _map_about(density, samples, settings)
-    return draw_density(ground, density, settings, dots=samples, sheet=sheet)
-
-
-def map_samples_picture(
-    density: Density,
-    data: Tensor | None,
-    samples: Tensor,
-    settings: PlotSettings | None = None,
-    *,
-    sheet: Sheet | None = None,
-) -> Picture:
-    """Draw data (N, 2) and samples (M, 2) on two maps, as `samples_picture` does on two squares."""
-    settings = settings or PlotSettings()
-    ground = _map_about(density, samples if data is None else data, settings)
-    return draw_samples(ground, density, settings, data, samples, sheet=sheet)
-
-
-def _map_about(density: Density, points: Tensor | None, settings: PlotSettings) -> Map:
-    space = density.space
-    about = chart_points(space, torch.empty(0, 2) if points is None else points)
-    chosen = chosen_map(space, about, settings, settings.names)
-    return Map(space, chosen, coastlines_for(space, settings))
-
-
-def draw_density(
-    ground: Ground,
-    density: Density,
-    settings: PlotSettings,
-    *,
-    dots: Tensor | None = None,
-    regions: Sequence[DensityRegion] | None = None,
-    sheet: Sheet | None = None,
-) -> Picture:
-    """Draw a density on a ground, chart points (N, 2) as dots over it, and a colour bar."""
-    sheet = sheet or settings.sheet
+    sheet, ground = sheet or settings.sheet, _ground(ground, density.space, samples, settings)
     regions = overlays.region_lines(density, settings) if regions is None else regions
     colouring = ground.colouring(density, settings)
     shade = colouring.shade
     label = bar_label(shade, ground.space, settings.measure)
-    places = None if dots is None else ground.places(dots)
+    places = None if samples is None else ground.places(samples)
     most = settings.samples or overlays.MAX_DOTS
     masses = sorted(settings.regions or ())
     notes = [*([] if places is None else [overlays.SMALLER]), colouring.reason]
@@ -149,17 +109,22 @@ def draw_density(
     return Picture(frame.figure, sheet, title, caption)
 
 
-def draw_samples(
-    ground: Ground,
+def samples_picture(
     density: Density,
-    settings: PlotSettings,
     data: Tensor | None,
     samples: Tensor,
+    settings: PlotSettings | None = None,
     *,
     sheet: Sheet | None = None,
+    ground: Ground | GroundName = "square",
 ) -> Picture:
-    """Draw data (N, 2), or else the density, beside samples (M, 2): chart points, as many of each."""
-    sheet = sheet or settings.sheet
+    """Draw data (N, 2) and samples (M, 2) on two grounds; without data, the density and samples.
+
+    Points are of the chart, such as `space.to_chart(table)` and `density.sample((M,))`, as many of
+    each.
+    """
+    settings, points = settings or PlotSettings(), samples if data is None else data
+    sheet, ground = sheet or settings.sheet, _ground(ground, density.space, points, settings)
     panels = {"data": data, "samples": samples}
     places = {n: ground.places(points) for n, points in panels.items() if points is not None}
     count = min(
@@ -194,3 +159,105 @@ def draw_samples(
 def _dot_scale(ground: Ground, sheet: Sheet, side: float) -> float:
     """Return what to multiply the area of dots by, on axes `side` inches wide: 1 on a screen."""
     return max(0.2, (max(1.0, side / ground.aspect) / 5.6) ** 2) if sheet.printed else 1.0
+
+
+CELLS = 3
+"""Number of cells along each side of the picture."""
+
+SPEED = "speed, sides of the square per unit time"
+SCREEN = frames.Room(1.8, 3.8, 10.8, 2.7, 1.7, 1.5)
+"""Room on a screen, with a caption below."""
+
+
+def flow_picture(
+    density: Density, settings: PlotSettings | None = None, *, sheet: Sheet | None = None
+) -> Picture:
+    """Draw the time mean of a flow's vector fields, over the canonical square and its images.
+
+    The square is outlined; the letter F in every cell shows how the cell is the square's image. Of a
+    density with kernels beside the flow, the flow's part alone is drawn.
+
+    Args:
+        density: A density on a two-dimensional space.
+        settings: How it is drawn.
+        sheet: The sheet. Default: that of the settings.
+
+    Raises:
+        OrbiflowError: If the space has another dimension, or a centre does not fit.
+    """
+    settings, space = settings or PlotSettings(), density.space
+    sheet = sheet or settings.sheet
+    require_plane(space)
+    view = view_of(space, center=settings.center)
+    low, high = 0.5 - CELLS / 2, 0.5 + CELLS / 2
+    window = (low, low, high, high)
+    printed = frames.printed_room(sheet, 0.4, 0.6, 0.6, SPEED, ("0.00",))
+    frame = frames.make_frame(sheet, printed if sheet.printed else SCREEN)
+    axes = frame.axes
+    axes.set_xlim(low, high)
+    axes.set_ylim(low, high)  # `draw_magnitude` keeps these
+
+    def field(points: Tensor) -> Tensor:
+        return mean_field(density, view.to_chart(points))
+
+    draw_magnitude(axes, field, window)
+    draw_flow(axes, field, space.group, window, pen=sheet.pen)
+    draw_cells(axes, space.group, window, pen=sheet.pen)
+    frames.colour_bar(axes.images[0], frame, sheet, SPEED)
+    axes.set_axis_off()
+    weight, flow = flow_of(density)
+    part = "" if flow is density else f", {100 * weight:.0f} % of the density"
+    title = f"Flow{part} on the {space_title(space)}"
+    signs = "canonical square outlined, its images thin"
+    if not sheet.printed:
+        frame.figure.text(0.03, 0.025, f"{title}: {signs}", fontsize=sheet.text, color=INK)
+    return Picture(frame.figure, sheet, title, f"The {signs}.")
+
+
+def flow_of(density: Density) -> tuple[float, FlowDensity]:
+    """Return the weight and the density of the flow to draw."""
+    part = density.flow_part
+    if part is None:
+        raise OrbiflowError("the density has no flow: draw another picture of it")
+    return part
+
+
+def few_colours(png: bytes) -> bytes:
+    """Return a picture of a flow in 256 colours, a third of the bytes."""
+    buffer = io.BytesIO()
+    # no dither: it would triple the bytes
+    few = Image.open(io.BytesIO(png)).convert("RGB").quantize(kmeans=1, dither=Image.Dither.NONE)
+    few.save(buffer, "PNG", optimize=True)
+    return buffer.getvalue()
+
+
+@torch.no_grad()
+def mean_field(density: Density, points: Tensor) -> Tensor:
+    """Return the time mean of the flow's fields (..., d) at chart points (..., d), float64."""
+    flow = flow_of(density)[1].flow
+    like = next(iter(flow.parameters()), points)
+    vectors = [field(points.to(like)) for field in flow.segments]
+    return torch.stack(vectors).mean(dim=0).double().cpu()
+
+
+def draw_cells(
+    axes: Axes, group: CrystallographicGroup, window: Any, *, pen: Callable[[float], float] = float
+) -> None:
+    """Draw the images of the canonical square in a window, a letter F in each, the square outlined."""
+    thin = pen(0.7)
+    for t in np.arange(np.floor(window[0]), np.ceil(window[2]) + 1):
+        axes.axvline(t, color="#ffffff", linewidth=thin, alpha=0.7, zorder=4)
+        axes.axhline(t, color="#ffffff", linewidth=thin, alpha=0.7, zorder=4)
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
+    for colour, width in (("#111111", 3.6), ("#ffd166", 1.8)):
+        axes.plot(*square.T, color=colour, linewidth=pen(width), solid_joinstyle="miter", zorder=5)
+    letter = np.array(
+        [[0, 0], [0, 5], [3, 5], [3, 4], [1, 4], [1, 3], [2.4, 3], [2.4, 2], [1, 2], [1, 0]]
+    )
+    letter = 0.07 + 0.026 * letter
+    middle = np.full(2, 0.5)
+    for g in group.elements_near(middle, window[2] - window[0], source=middle):
+        axes.fill(
+            *g(letter).T, facecolor="#ffd166", edgecolor="#111111", linewidth=pen(0.5),
+            zorder=6,
+        )  # fmt: skip

@@ -1,19 +1,177 @@
-"""Figures for a screen or print: the room around their axes, panels, captions and colour bars."""
+"""The window and texts of flat pictures, and their figures: room, panels, captions and colour bars."""
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
-from orbiflow.density.pictures.axes import INK, LETTER
+import numpy as np
+from torch import Tensor, tensor
+
+from orbiflow.arrays import Array
 from orbiflow.density.pictures.colours import Shade, bar_ticks, minor_places
+from orbiflow.density.spaces import Space, whole_turn
 from orbiflow.drawing import Sheet
+from orbiflow.errors import OrbiflowError, SettingError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
+
+INK = "#1a1a1a"
+MAX_NAME = 40
+"""Letters of a column's name that are shown."""
+
+LETTER = 0.56
+"""Mean width of a letter, in ems."""
+
+
+class View(NamedTuple):
+    """A window of side 1 onto the chart of a space, with names for the data's columns.
+
+    - `low`: Its lower corner (d,). It is 0 except on the torus.
+    """
+
+    space: Space
+    names: tuple[str, ...]
+    low: Array
+
+    def to_chart(self, points: Tensor) -> Tensor:
+        """Return points (N, d) of the window, in [0, 1]^d, as chart points."""
+        return points + tensor(self.low, dtype=points.dtype)
+
+    def places(self, points: Tensor) -> Array:
+        """Return where chart points (N, d) lie in the window, in [0, 1]^d."""
+        moved = chart_points(self.space, points) - tensor(self.low)
+        # a translation commutes with the torus' group, and is 0 elsewhere
+        return self.space.project(moved).numpy()
+
+
+def chart_points(space: Space, points: Tensor) -> Tensor:
+    """Return chart points (N, d) as float64."""
+    if points.ndim != 2 or points.shape[1] != space.dim:
+        raise OrbiflowError(f"expected chart points (N, {space.dim}), got {tuple(points.shape)}")
+    return points.detach().double().cpu()
+
+
+def view_of(
+    space: Space, names: Sequence[str] | None = None, center: Sequence[float] | None = None
+) -> View:
+    """Return the window of a space's flat pictures."""
+    names = tuple(space.columns if names is None else names)
+    if len(names) != len(space.columns):
+        raise OrbiflowError(f"expected {len(space.columns)} names of columns, got {list(names)}")
+    if not space.is_torus:
+        if center is not None and not space.is_round:  # there it is that of a map
+            raise SettingError(
+                f"{{center}} applies to the torus and to maps, not to the {space.name}"
+            )
+        return View(space, names, np.zeros(space.dim))
+    middle = np.zeros(space.dim) if center is None else np.array(center, dtype=float)
+    turns = middle / whole_turn(space.unit or "")
+    if turns.shape != (space.dim,) or not np.isfinite(turns).all():
+        raise SettingError(
+            f"{{center}} must be {space.dim} angles, one for each column, got {list(center or ())}"
+        )
+    # 3.14 radians are meant as pi: the ticks would be cut off beside the window's edge
+    even = np.round(24 * turns) / 24
+    turns = np.where(abs(turns - even) < 1e-3, even, turns)
+    return View(space, names, turns - 0.5)
+
+
+def require_plane(space: Space) -> None:
+    """Check that a space has two dimensions."""
+    if space.dim != 2:
+        raise OrbiflowError(f"a picture needs two dimensions, this {space.name} has {space.dim}")
+
+
+def space_title(space: Space) -> str:
+    """Return the space's name as it stands in a sentence.
+
+    >>> from orbiflow.density import make_space
+    >>> space_title(make_space("klein-bottle"))
+    'Klein bottle'
+    """
+    return space.name.replace("-", " ").replace("klein", "Klein")
+
+
+def cut(name: str, most: int) -> str:
+    """Return a name of at most so many letters."""
+    return name if len(name) <= most else f"{name[: most - 1]}…"
+
+
+def axis_label(view: View, column: int) -> str:
+    """Return the name and the unit of an angle."""
+    return f"{cut(view.names[column], MAX_NAME)} ({view.space.unit or ''})"
+
+
+def shortened(label: str, side: float, sheet: Sheet) -> str:
+    """Return an axis label, cut in print to what fits along `side` inches.
+
+    >>> shortened("a name that goes on and on (degrees)", 1.5, Sheet.column())
+    'a name that g… (degrees)'
+    """
+    room = int(side / (LETTER * sheet.em))
+    if not sheet.printed or len(label) <= room:
+        return label
+    name, opening, unit = label.rpartition(" (")
+    ending = opening + unit if room - len(unit) > 8 else ""
+    return cut(name, room - len(ending)) + ending
+
+
+def legible(at: list[float], texts: list[str], side: float, sheet: Sheet) -> list[str]:
+    """Return the texts of ticks along `side` inches, every second one left out if they would touch."""
+    widest = max(map(len, texts)) * LETTER * sheet.small / 72
+    if len(at) < 3 or 1.3 * widest < (at[1] - at[0]) * side:
+        return texts
+    return [text if k % 2 == 0 else "" for k, text in enumerate(texts)]
+
+
+def angle_axis(view: View, axis: int) -> tuple[str, list[float], list[str]]:
+    """Return the label of an axis of a torus or Klein bottle, and the places and texts of its ticks."""
+    if view.space.is_torus:
+        low = float(view.low[axis])
+        quarters = range(math.ceil(4 * low - 1e-9), math.floor(4 * low + 4 + 1e-9) + 1)
+        places, turns = [k / 4 - low for k in quarters], [k / 4 for k in quarters]
+        label = axis_label(view, axis)
+    else:  # the first column, theta, goes up: half a turn; phi starts a quarter before 0
+        places = [k / 4 for k in range(5)]
+        turns = [k / 4 - 0.25 for k in range(5)] if axis == 0 else [k / 8 for k in range(5)]
+        label = axis_label(view, 1 - axis)
+    return label, places, [angle_text(t, view.space.unit) for t in turns]
+
+
+def angle_text(turns: float, unit: str | None) -> str:
+    """Return an angle as text in its unit.
+
+    >>> angle_text(0.375, "radians"), angle_text(0.25, "degrees")
+    ('3π/4', '90°')
+    """
+    if unit == "radians":
+        part = Fraction(turns) * 2
+        over = f"/{part.denominator}" if part.denominator > 1 else ""
+        times = "" if abs(part.numerator) == 1 else str(abs(part.numerator))
+        text = f"{times}π{over}" if part else "0"
+    else:
+        text = f"{abs(turns) * 360:g}°" if unit == "degrees" else f"{abs(turns):g}"
+    return f"\N{MINUS SIGN}{text}" if turns < 0 else text
+
+
+def degrees_text(value: float, letters: str) -> str:
+    """Return degrees with the letter of their direction, or with a sign if there are no letters.
+
+    >>> degrees_text(-30.0, "NS"), degrees_text(180.0, "EW"), degrees_text(330.0, "")
+    ('30° S', '180°', '330°')
+    """
+    if not letters:
+        return f"{value:g}°".replace("-", "\N{MINUS SIGN}")
+    letter = "" if value in (0, 180, -180) else f" {letters[int(value < 0)]}"
+    return f"{abs(value):g}°{letter}"
+
 
 NARROW = 70 / 25.4
 """Inches of a printed figure below which there is no room beside the axes."""
@@ -70,11 +228,9 @@ def make_frame(sheet: Sheet, room: Room, aspect: float = 1.0) -> Frame:
     figure = sheet.figure(inner + sheet.em * (room.below + room.above))
     left, below = sheet.em * room.left, sheet.em * room.below
     gap, thick = sheet.em * room.gap, sheet.em * room.bar
-    place = (left + side + gap, below, thick, inner)
-    if room.under:
-        place = (left, below - gap - thick, side, thick)
-    bar = _axes_at(figure, *place)
-    return Frame(figure, _axes_at(figure, left, below, side, inner), bar, side, room.under)
+    under = (left, below - gap - thick, side, thick)
+    bar = axes_at(figure, *(under if room.under else (left + side + gap, below, thick, inner)))
+    return Frame(figure, axes_at(figure, left, below, side, inner), bar, side, room.under)
 
 
 def two_panels(
@@ -90,11 +246,11 @@ def two_panels(
     corners = [(left, below + inner + gap), (left, below)]
     if not stacked:
         corners = [(left + k * (side + gap), below) for k in (0, 1)]
-    first, second = (_axes_at(figure, x, y, side, inner) for x, y in corners)
+    first, second = (axes_at(figure, x, y, side, inner) for x, y in corners)
     return figure, (first, second), side
 
 
-def _axes_at(figure: Figure, left: float, below: float, width: float, high: float) -> Axes:
+def axes_at(figure: Figure, left: float, below: float, width: float, high: float) -> Axes:
     """Make axes at a place in inches."""
     wide, height = figure.get_size_inches()
     return figure.add_axes((left / wide, below / height, width / wide, high / height))
@@ -136,6 +292,11 @@ def label_lines(sheet: Sheet, label: str, side: float) -> list[str]:
     return textwrap.wrap(label, min(most, len(label) // max(lines, 1) + 6)) or [""]
 
 
+def sentences(parts: Sequence[str]) -> str:
+    """Return parts of a caption as sentences."""
+    return " ".join(f"{part[0].upper()}{part[1:]}." for part in parts)
+
+
 def caption_lines(words: str, sheet: Sheet) -> list[str]:
     """Break a caption into lines as wide as a picture for a screen."""
     return textwrap.wrap(words, int(0.94 * 72 * sheet.width / (0.9 * LETTER * sheet.small)))
@@ -155,9 +316,9 @@ def colour_bar(
     """Draw the bar of an image's colours; those of a density have ticks in its units."""
     from matplotlib.ticker import MaxNLocator
 
-    cut = shade is not None and shade.cut
-    faint = shade is not None and shade.faint
-    extend = "neither" if cut == faint else "max" if cut else "min"
+    extend = "neither"
+    if shade is not None and shade.cut != shade.faint:
+        extend = "max" if shade.cut else "min"
     way = "horizontal" if frame.under else "vertical"
     bar = frame.figure.colorbar(image, cax=frame.bar, extend=extend, orientation=way)
     if sheet.printed or frame.under:
@@ -192,6 +353,5 @@ def without_overlap(
         half = letter * (len(text) + 1) / 2
         free = place * side - half > end
         kept.append(text if free else "")
-        if free:
-            end = place * side + half
+        end = place * side + half if free else end
     return kept

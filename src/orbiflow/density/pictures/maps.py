@@ -1,26 +1,24 @@
-"""Pictures of densities of directions or axes on maps, and the map that suits them."""
+"""Pictures of densities of directions or axes on maps, with graticule, degrees and coastlines."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
-from orbiflow.density.pictures import frames, projections
-from orbiflow.density.pictures.axes import chart_points, degrees_text
+from orbiflow.density.pictures import frames
 from orbiflow.density.pictures.colours import chosen_scale, density_on_map, is_sharp, shading
-from orbiflow.density.pictures.map_axes import draw_map_lines, graticule
+from orbiflow.density.pictures.frames import INK, LETTER, chart_points, degrees_text
 from orbiflow.density.pictures.overlays import LIGHT, Colouring, log_natural
-from orbiflow.density.pictures.projections import Azimuthal, Projection
+from orbiflow.density.pictures.projections import Azimuthal, Mollweide, Projection, WorldMap
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors
 from orbiflow.drawing import Sheet
-from orbiflow.errors import OrbiflowError, SettingError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -94,10 +92,41 @@ class Map:
         axes.fill(*self.outline.T, color=LIGHT, linewidth=0, zorder=0)
 
     def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: frames.Panel) -> None:
-        """Draw the outline, the graticule with its degrees, and coastlines."""
-        draw_map_lines(
-            axes, self.projection, sheet, side, coastlines=self.coastlines, light=panel.light
-        )
+        """Draw the outline, the graticule with its degrees, and coastlines, without a frame."""
+        projection, ring = self.projection, self.outline
+        axes.set_axis_off()
+        axes.set_xticks([])
+        axes.set_yticks([])
+        axes.set_xlim(*(ring[:, 0].min(), ring[:, 0].max()))
+        axes.set_ylim(*(ring[:, 1].min(), ring[:, 1].max()))
+        axes.set_aspect("equal")
+        axes.plot(*ring.T, color=INK, linewidth=sheet.pen(1.2, 0.4), clip_on=False, zorder=7)
+        lats, lons = graticule(projection)
+        style: dict[str, Any] = {"color": "#9a9a96" if panel.light else "#ffffff"}
+        style |= {"alpha": 0.8 if panel.light else 0.35, "linewidth": sheet.pen(0.6, 0.2)}
+        for each in (*map(parallel, lats), *map(meridian, lons)):
+            for piece in projection.pieces(each):
+                axes.plot(*piece.T, **style, zorder=3, solid_capstyle="butt")
+        labels = _Labels(axes, projection, sheet, 72 * side / self.width, panel.light)
+        if self.coastlines:
+            self._draw_coastlines(axes, sheet, _TOLERANCE / labels.size, panel.light)
+        if isinstance(projection, WorldMap):
+            labels.along_the_sides(lats, lons)
+        else:
+            labels.along_the_rim(lats, lons)
+
+    def _draw_coastlines(self, axes: Axes, sheet: Sheet, apart: float, light: bool) -> None:
+        from matplotlib.collections import LineCollection
+        from shapely import LineString
+
+        pieces = [piece for line in self.coastlines for piece in self.projection.pieces(line)]
+        # below the resolution of any printer; islands of a point stay as dots
+        fine = [np.array(LineString(piece).simplify(apart).coords) for piece in pieces]
+        drawn = LineCollection(
+            fine, colors="#85857f" if light else COAST, zorder=4, capstyle="round",
+            linewidths=sheet.pen(0.7 if light else 0.9, 0.25),
+        )  # fmt: skip
+        axes.add_collection(drawn, autolim=False)
 
     def caption(self, notes: Sequence[str], dots: tuple[int, int] | None) -> str:
         """Return projection, centre, which points are one, lines and dots, and notes.
@@ -109,21 +138,19 @@ class Map:
         """
         parts = [self._description()]
         if self.space.name == "projective-plane":
-            parts.append("An axis is drawn at the end in this hemisphere")
-            parts[-1] += "; opposite points of the rim are one axis"
-        lats, lons = graticule(self.projection)
-        steps = {line[1] - line[0] for line in (lats, lons) if len(line) > 1}
-        lines = f"Lines every {min(steps):g}°"
-        if len(steps) > 1:
-            lines = (
-                f"Parallels every {lats[1] - lats[0]:g}°, meridians every {lons[1] - lons[0]:g}°"
+            parts.append(
+                "An axis is drawn at the end in this hemisphere; opposite points of the rim are one "
+                "axis"
             )
+        steps = [line[1] - line[0] for line in graticule(self.projection) if len(line) > 1]
+        lines = f"Lines every {min(steps):g}°"
+        if min(steps) < max(steps):
+            lines = "Parallels every {:g}°, meridians every {:g}°".format(*steps)
         parts.append(lines + (", and coastlines" if self.coastlines else ""))
         if dots is not None:
             shown, known = dots
             parts.append(f"Dots are {f'{shown} of ' if shown < known else ''}{known} points")
-        parts += [note[0].upper() + note[1:] for note in notes]
-        return " ".join(f"{part}." for part in parts)
+        return frames.sentences([*parts, *notes])
 
     def _description(self) -> str:
         projection, frame = self.projection, ""
@@ -152,7 +179,11 @@ class Map:
         projection = self.projection
         if not (isinstance(projection, Azimuthal) and projection.flipped):
             return projection.title
-        return "Schmidt net (equal-area)" if projection.is_equal_area else "Wulff net (equal-angle)"
+        return (
+            "Schmidt net (equal-area)"
+            if projection.name == "lambert"
+            else "Wulff net (equal-angle)"
+        )
 
     def samples_caption(self, notes: Sequence[str]) -> str:
         return self.caption(notes or ["dots are points"], None)
@@ -217,102 +248,147 @@ def pixels_of(projection: Projection, count: int | None = None) -> Pixels:
     latlon = projection.inverse(places[kept])
     last = first + step * counts
     extent = (float(first[0]), float(last[0]), float(first[1]), float(last[1]))
-    return Pixels(shown, latlon, within[kept], _areas(projection, latlon), step, extent)
+    return Pixels(shown, latlon, within[kept], projection.areas(latlon), step, extent)
 
 
-def _areas(projection: Projection, latlon: Array) -> Array:
-    """Return the areas on the sphere of equal pixels of the map."""
-    if projection.is_equal_area:
-        return np.ones(len(latlon))
+COAST = "#ffffff"
+_TOLERANCE = 0.03
+"""Points (1/72 inch) by which a coast may be off, so that files stay small."""
+
+
+def graticule(projection: Projection) -> tuple[list[float], list[float]]:
+    """Return the latitudes and longitudes, in degrees, of the lines that are drawn."""
+    step = along = 30.0
     if isinstance(projection, Azimuthal):
-        cosines = to_vectors(latlon) @ projection.frame[2]
-        return ((1 + cosines) / 2) ** 2  # conformal: scale 2 / (1 + cos), squared
-    return np.cos(np.radians(latlon[:, 0]))
+        step = next(s for s in (1.0, 2.0, 5.0, 10.0, 15.0, 30.0) if s >= projection.radius / 3.5)
+        # meridians draw together towards the poles
+        nearest = min(abs(projection.center[0]), 89.0)
+        along = min(30.0, step / max(np.cos(np.radians(nearest)), 0.05))
+        along = min((s for s in (1, 2, 5, 10, 15, 30) if s >= 0.7 * along), default=30.0)
+    lats = np.arange(-90 + step, 90, step)
+    return lats.tolist(), np.arange(-180.0, 180.0, along).tolist()
 
 
-_NET_WORDS = ("inc", "plunge", "dip")
-"""How names of the first column begin if rows are directions in a net, not places on a globe."""
-
-_RADII = (5, 10, 15, 20, 30, 40, 50, 60, 75)
-_SHARE = 0.995
-"""Share of the points that a map of less than the sphere has to show."""
+def parallel(lat: float) -> Array:
+    """Return the parallel of a latitude, (361, 2)."""
+    lon = np.linspace(-180.0, 180.0, 361)
+    return np.stack([np.full_like(lon, lat), lon], axis=-1)
 
 
-def chosen_map(
-    space: Space,
-    points: Tensor,
-    settings: PlotSettings | None = None,
-    names: Sequence[str] | None = None,
-) -> Projection:
-    """Return the map of a sphere or projective plane that settings ask for, or that suits points.
-
-    `points` are chart points (N, 2); `names` of the data's columns may ask for a net.
-
-    >>> from orbiflow.density import Sphere
-    >>> here = Sphere().to_chart([[40.0, 140.0], [44.0, 142.0]])
-    >>> chosen_map(Sphere(), here)
-    Lambert(center=(42.0, 141.0), radius=5.0, flipped=False)
-    """
-    if not space.is_round:
-        raise OrbiflowError(f"maps are of the sphere and the projective plane, not of {space!r}")
-    settings = settings or PlotSettings()
-    projection, radius = settings.projection, settings.radius
-    middle = settings.center
-    if middle is not None and not (len(middle) in (1, 2) and all(map(math.isfinite, middle))):
-        raise SettingError(
-            "{center} must be a latitude and a longitude, or a longitude, in degrees, such as 40,140, "
-            f"got {list(middle)}"
-        )
-    axial = space.name == "projective-plane"
-    cap = None if axial else smallest_cap(cast(RoundSpace, space).vectors(points))
-    if projection == "auto":
-        if axial:
-            a_net = bool(names and names[0].strip().lower().startswith(_NET_WORDS))
-            projection = "schmidt" if a_net and middle is None else "lambert"
-        elif middle is not None:
-            projection = "lambert" if len(middle) == 2 and middle[0] else "equal-earth"
-        else:
-            projection = "equal-earth" if cap is None and radius is None else "lambert"
-    kind = projections.PROJECTIONS[projection]
-    if issubclass(kind, projections.WorldMap):
-        if axial:
-            discs = [n for n, c in projections.PROJECTIONS.items() if issubclass(c, Azimuthal)]
-            raise SettingError(
-                "a direction and its opposite are one point of the projective plane, which needs a "
-                f"map of one hemisphere: {{projection}} must be {', '.join(discs)}, got {projection}"
-            )
-        if radius is not None:
-            raise SettingError(
-                f"a map of the whole sphere ({projection}) has no radius: leave {{radius}} out"
-            )
-        lat, lon = (0.0, 0.0, *(middle or ()))[-2:]
-        return kind((lat, lon))
-    if projection in ("schmidt", "wulff"):
-        if middle is not None:
-            raise SettingError(
-                f"{{center}} does not apply to a {projection} net, which has the vertical in its "
-                "middle: give no centre"
-            )
-        return kind((90.0, 0.0), float(radius or 90.0), flipped=True)
-    reach = 90.0
-    if middle is None:
-        middle, reach = cap or ((90.0, 0.0), 90.0)
-    elif len(middle) == 1:
-        middle = (90.0 if axial else 0.0, *middle)
-    return kind((middle[0], middle[1]), float(radius or reach))
+def meridian(lon: float) -> Array:
+    """Return the meridian of a longitude from pole to pole, (181, 2)."""
+    lat = np.linspace(-90.0, 90.0, 181)
+    return np.stack([lat, np.full_like(lat, lon)], axis=-1)
 
 
-def smallest_cap(vectors: Array) -> tuple[tuple[float, float], float] | None:
-    """Return a centre in whole degrees, and a radius that shows nearly all unit vectors (N, 3).
+class _Labels:
+    """The degrees beside the lines of a graticule, `size` points a unit, none of which touch."""
 
-    It is None if they do not fit into 75 degrees around a centre.
-    """
-    mean = vectors.mean(axis=0) if len(vectors) else np.zeros(3)
-    if np.linalg.norm(mean) < 0.2:
-        return None
-    lat, lon = to_latlon(mean[None] / np.linalg.norm(mean))[0].round() + 0.0
-    middle = to_vectors([[lat, lon]])[0]
-    apart = np.degrees(np.arccos(np.clip(vectors @ middle, -1, 1)))
-    reach = 1.1 * float(np.quantile(apart, _SHARE, method="higher"))
-    fitting = [float(r) for r in _RADII if r >= reach]
-    return ((float(lat), float(lon)), fitting[0]) if fitting else None
+    def __init__(
+        self, axes: Axes, projection: Projection, sheet: Sheet, size: float, light: bool
+    ) -> None:
+        self.axes, self.projection, self.sheet, self.light = axes, projection, sheet, light
+        self.size, self.is_net = size, isinstance(projection, Azimuthal) and projection.flipped
+        self.north_south, self.east_west = ("", "") if self.is_net else ("NS", "EW")
+        self.boxes: list[Array] = []
+
+    def latitude(self, lat: float) -> str:
+        return degrees_text(lat, self.north_south)
+
+    def longitude(self, lon: float) -> str:
+        return degrees_text(lon % 360 if self.is_net else lon, self.east_west)
+
+    def along_the_sides(self, lats: list[float], lons: list[float]) -> None:
+        """Write latitudes at the left and longitudes below, or on the equator if poles are points."""
+        projection, gap = self.projection, 0.5 * self.sheet.small
+        west = projection.center[1] - 180 + 1e-7
+        for lat in lats:
+            end = projection.forward(np.array([[lat, west]]))[0]
+            self._outside(self.latitude(lat), end, (-gap, 0.0), ha="right", va="center")
+        inside = isinstance(projection, Mollweide)
+        middle, at = projection.center[1], 0.0 if inside else -90.0
+        ends = projection.forward(np.array([[at, middle], [at, middle + 60.0]]))
+        room = self.size * float(np.ptp(ends[:, 0]))
+        letters = 7.5 * LETTER * self.sheet.small  # texts must not touch
+        step = next((s for s in (60.0, 90.0, 120.0) if room * s / 60 > letters), 180.0)
+        turns = sorted(((lon - middle + 180) % 360 - 180) for lon in lons if lon % step == 0)
+        turns = [*turns, 180.0] if turns[0] == -180 else turns
+        for turn in turns:
+            lon = np.array([[at, middle + turn - 1e-7 * np.sign(turn)]])
+            place = projection.forward(lon)[0]
+            text = self.longitude((middle + turn + 180) % 360 - 180)
+            if not inside:
+                self._outside(text, place, (0.0, -gap), ha="center", va="top")
+            elif abs(turn) != 180:
+                self._inside(text, place)
+
+    def along_the_rim(self, lats: list[float], lons: list[float]) -> None:
+        """Write texts where lines meet the rim, else on them."""
+        projection = self.projection
+        assert isinstance(projection, Azimuthal)
+        lat0, lon0 = projection.center
+        polar = abs(lat0) > 89
+        level = min(lats, key=lambda lat: abs(lat - lat0))
+        order = sorted(lons, key=lambda v: (v % 90 != 0, v % 60 != 0))
+        missed = [lon for lon in order if not self._at_rim(meridian(lon), self.longitude(lon))]
+        if not polar:
+            lats = [lat for lat in lats if not self._at_rim(parallel(lat), self.latitude(lat))]
+        inside = [(self.latitude(lat), lat, lon0 + (15 if polar else 0)) for lat in lats]
+        inside += [(self.longitude(lon), level, lon) for lon in ([] if polar else missed)]
+        for text, lat, lon in inside:
+            direction = np.array([[lat, lon]])
+            if projection.contains(direction)[0]:
+                self._inside(text, projection.forward(direction)[0])
+
+    def _at_rim(self, line: Array, text: str) -> bool:
+        """Write a text outside the rim, where a line meets it, and return whether there was room."""
+        projection = self.projection
+        assert isinstance(projection, Azimuthal)
+        done = False
+        for piece in projection.pieces(line):
+            for end in piece[[0, -1]]:
+                radius = float(np.hypot(*end))
+                at_rim = abs(radius / projection.rim - 1) < 1e-3
+                if not at_rim or abs(projection.inverse(end[None])[0, 0]) > 89:
+                    continue
+                way = end / radius
+                ha = "left" if way[0] > 0.3 else "right" if way[0] < -0.3 else "center"
+                va = "bottom" if way[1] > 0.3 else "top" if way[1] < -0.3 else "center"
+                shift = 0.45 * self.sheet.small * way
+                done = self._outside(text, end, shift, ha=ha, va=va) or done
+        return done
+
+    def _outside(self, text: str, place: Array, shift: Any, *, ha: str, va: str) -> bool:
+        if not self._free(text, self.size * place + shift, ha, va):
+            return False
+        self.axes.annotate(
+            text, (float(place[0]), float(place[1])), xytext=tuple(shift), ha=ha, va=va,
+            textcoords="offset points",
+            fontsize=self.sheet.small, color=INK, annotation_clip=False,
+        )  # fmt: skip
+        return True
+
+    def _inside(self, text: str, place: Array) -> None:
+        projection = self.projection
+        if isinstance(projection, Azimuthal) and np.hypot(*place) > 0.92 * projection.rim:
+            return
+        if not self._free(text, self.size * place, "center", "center"):
+            return
+        box = {"boxstyle": "round,pad=0.15", "linewidth": 0.0}
+        box |= {"facecolor": "#ffffff" if self.light else "#000000", "alpha": 0.4}
+        self.axes.text(
+            float(place[0]), float(place[1]), text, ha="center", va="center",
+            fontsize=self.sheet.small, color=INK if self.light else "#ffffff", bbox=box, zorder=6,
+        )  # fmt: skip
+
+    def _free(self, text: str, at: Array, ha: str, va: str) -> bool:
+        """Return whether there is no text yet, and reserve the place."""
+        size = np.array([(len(text) + 0.8) * LETTER, 1.3]) * self.sheet.small
+        left = {"left": 0.0, "center": 0.5, "right": 1.0}[ha]
+        low = {"bottom": 0.0, "center": 0.5, "top": 1.0}[va]
+        corner = np.asarray(at) - size * (left, low)
+        box = np.stack([corner, corner + size])
+        if any((box[0] < other[1]).all() and (other[0] < box[1]).all() for other in self.boxes):
+            return False
+        self.boxes.append(box)
+        return True

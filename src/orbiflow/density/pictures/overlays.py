@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
-from orbiflow.density.pictures.axes import INK
 from orbiflow.density.pictures.colours import COLOURS, Shade
+from orbiflow.density.pictures.frames import INK
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.regions import DensityLevels, DensityRegion, samples_for
 from orbiflow.drawing import Sheet
@@ -46,21 +46,15 @@ MIN_INK = 0.03
 """Opacity of the faintest dots."""
 
 
-class Dots(NamedTuple):
-    """Places of dots (N, k), each once, and the widths (N,) that they may have."""
-
-    places: Array
-    widths: Array
-
-
-def uncrowded(points: Array) -> Dots:
-    """Return dots at points (N, k) of a plane or surface that hide `MAX_COVER` of it.
+def uncrowded(points: Array) -> tuple[Array, Array]:
+    """Return places (M, k) and widths (M,) of dots at points (N, k) that hide `MAX_COVER` of a ground.
 
     Widths are in the unit of the points. Points at one place are one dot; as many dots they would be
     smaller and fainter.
 
     >>> even = np.stack(np.meshgrid(np.arange(20.0), np.arange(20.0)), axis=-1).reshape(-1, 2)
-    >>> round(float(np.median(uncrowded(even).widths)), 1)
+    >>> _, widths = uncrowded(even)
+    >>> round(float(np.median(widths)), 1)
     0.5
     """
     from scipy.spatial import cKDTree
@@ -69,27 +63,25 @@ def uncrowded(points: Array) -> Dots:
     places = points[np.sort(first)]
     nearest = min(NEIGHBOURS, len(places) - 1)
     if nearest < 1:
-        return Dots(places, np.full(len(places), np.inf))
+        return places, np.full(len(places), np.inf)
     far = np.asarray(cKDTree(places).query(places, [nearest + 1])[0]).ravel()
     # a disc of this radius holds so many others and the dot itself
-    return Dots(places, 2 * far * np.sqrt(MAX_COVER / (nearest + 1)))
+    return places, 2 * far * np.sqrt(MAX_COVER / (nearest + 1))
 
 
-def draw_dots_over(
-    axes: Axes, points: Array, inches: float, *, limit: int = MAX_DOTS, scale: float = 1.0
-) -> None:
+def draw_dots_over(axes: Axes, points: Array, inches: float, *, limit: int, scale: float) -> None:
     """Draw points (N, 2) as dots over a density, smaller where they crowd, as there its peaks are."""
     chosen = thinned(points, limit)
     most, scale = _largest(len(chosen), scale)
-    dots = uncrowded(chosen)
-    steps = np.ceil(np.log(most / (72 * inches * dots.widths).clip(1e-9, most)) / math.log(STEP))
+    places, widths = uncrowded(chosen)
+    steps = np.ceil(np.log(most / (72 * inches * widths).clip(1e-9, most)) / math.log(STEP))
     # one collection a size: a PDF or SVG holds its circle once
     for step in np.unique(steps):
         wanted = most * STEP**-step
         width = max(wanted, min(MIN_WIDTH * scale**0.5, most))
         ink = max((wanted / width) ** 2, MIN_INK)
         axes.scatter(
-            *dots.places[steps == step].T, s=width**2, c="#ffffff", edgecolors=INK,
+            *places[steps == step].T, s=width**2, c="#ffffff", edgecolors=INK,
             linewidths=0.12 * width, alpha=0.8 * ink, zorder=5, rasterized=len(chosen) > MAX_DOTS,
         )  # fmt: skip
 
@@ -100,8 +92,8 @@ def draw_dots(
     alpha: float,
     *,
     fill: str,
-    limit: int = MAX_DOTS,
-    scale: float = 1.0,
+    limit: int,
+    scale: float,
     rasterized: bool = False,
 ) -> None:
     """Draw points (N, 2) as dots of one size on a ground of one colour."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import torch
 from numpy.typing import ArrayLike
@@ -13,18 +13,17 @@ from numpy.typing import ArrayLike
 from orbiflow.arguments import as_path
 from orbiflow.density.comparing import density_of
 from orbiflow.density.estimator import DensityEstimator
-from orbiflow.density.models import Density, read_density
-from orbiflow.density.pictures.axes import view_of
+from orbiflow.density.models import Density
+from orbiflow.density.pictures import figures
 from orbiflow.density.pictures.coastlines import coastlines_for, simplified
 from orbiflow.density.pictures.corner import MAX_COLUMNS, corner_picture
-from orbiflow.density.pictures.figures import Ground, draw_density, draw_samples
-from orbiflow.density.pictures.flow import few_colours, flow_picture
-from orbiflow.density.pictures.maps import Map, chosen_map
+from orbiflow.density.pictures.frames import view_of
+from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.overlays import region_lines
-from orbiflow.density.pictures.page import density_page
-from orbiflow.density.pictures.projections import PlateCarree
+from orbiflow.density.pictures.projections import PlateCarree, chosen_map
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import Square
+from orbiflow.density.pictures.surfaces import density_page
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import FORMATS, Picture, pdf_pages
 from orbiflow.errors import OrbiflowError, OutputError, SettingError
@@ -56,13 +55,9 @@ class Plotted(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
-Given: TypeAlias = Density | DensityEstimator | str | Path
-"""A density, a fitted estimator, or the folder of `orbiflow density fit`."""
-
-
 @one_thread()
 def plot_density(
-    density: Given,
+    density: Density | DensityEstimator,
     out: str | Path,
     settings: PlotSettings | None = None,
     *,
@@ -77,7 +72,7 @@ def plot_density(
     samples alone, all pairs of angles. All is drawn before anything is written.
 
     Args:
-        density: A density, a fitted estimator, or the folder of `orbiflow density fit`.
+        density: A density or a fitted estimator.
         out: A folder, made if need be, from which the pictures of an earlier density are removed; or a
             .pdf, which gets a page for each figure, without the surface.
         settings: How it is drawn. An `out` that ends in .pdf is a PDF whatever they say.
@@ -87,7 +82,6 @@ def plot_density(
 
     Raises:
         OrbiflowError: If settings or data do not fit the density.
-        InputFileError: If there is no density to read.
         OutputError: If a file cannot be written, or `out` ends like a file of one picture.
     """
     settings, out = settings or PlotSettings(), as_path(out, "the folder to draw into")
@@ -96,7 +90,7 @@ def plot_density(
         settings = settings.replace(format="pdf")
     else:
         refuse_foreign_files(out)
-    shown = _Shown(density, settings, data)
+    shown = _Shown(density_of(density, "this DensityEstimator"), settings, data)
     if not single:
         make_folder(out)
     form, makers, pictures = settings.sheet.format, shown.makers(), dict[str, Picture]()
@@ -104,21 +98,20 @@ def plot_density(
         told(k / (len(makers) + 1), f"drawing {name}.{form}")
         pictures[name] = make()
     captions = tuple(f"{own.title}. {own.caption}".strip() for own in pictures.values())
-    notes: tuple[str, ...] = ()
-    if shown.space.dim == 2 and shown.density.flow_part is None:
-        notes = ("the flow has no part in this density, so that there is no picture of it",)
+    flowless = shown.space.dim == 2 and shown.density.flow_part is None
+    notes = ("the flow has no part in this density, so that there is no picture of it",) * flowless
     if single:
         path = write_atomic(out, pdf_pages(list(pictures.values())))
         return Plotted((path,), captions, notes)
     files = {f"{name}.{form}": picture.file() for name, picture in pictures.items()}
     if "flow.png" in files and not settings.sheet.printed:
-        files["flow.png"] = few_colours(files["flow.png"])
+        files["flow.png"] = figures.few_colours(files["flow.png"])
     contents: dict[str, str | bytes] = {**files}
     if shown.space.dim == 2:
         told(0.75, f"drawing {PAGE}")
         lines = simplified(shown.coastlines, PAGE_POINTS)
         contents[PAGE] = density_page(
-            shown.density, shown.settings, samples=shown.points, coastlines=lines
+            shown.density, settings, samples=shown.points, coastlines=lines
         )
     return Plotted(tuple(write_set(out, PICTURES, contents)), captions, notes)
 
@@ -150,61 +143,43 @@ def is_one_file(out: Path) -> bool:
     return True
 
 
-def known_names(space: Space, columns: Sequence[str] | None) -> tuple[str, ...] | None:
-    """Return the columns of a table as names of axes, or None if they are not angles."""
-    if space.unit is None or not columns or len(columns) != len(space.columns):
-        return None
-    return tuple(columns)
-
-
 class _Shown:
     """A density and what is drawn with it; all that can be wrong is checked before the work."""
 
-    def __init__(self, given: Given, settings: PlotSettings, data: ArrayLike | None) -> None:
-        columns: Sequence[str] | None = None  # those that the density was fitted to, if known
-        if isinstance(given, Density | DensityEstimator):
-            self.density = density_of(given, "this DensityEstimator")
-        else:
-            path = as_path(given, "the density")
-            self.density, extra = read_density(path / MODEL if path.is_dir() else path)
-            columns = extra.get("columns")
-        self.space = space = self.density.space
-        if settings.names is None:
-            settings = settings.replace(names=known_names(space, columns))
-        self.settings = settings
+    def __init__(self, density: Density, settings: PlotSettings, data: ArrayLike | None) -> None:
+        self.density, self.settings = density, settings
+        self.space = space = density.space
         self.coastlines = coastlines_for(space, settings)
         _check_space(space, settings)
         self.data = None if data is None else space.to_chart(data)
         generator = torch.Generator().manual_seed(settings.seed)
         self.samples = self.density.sample((settings.samples or SAMPLES,), generator)
         self.points = self.samples if self.data is None else self.data
-        self.map = chosen_map(space, self.points, settings, columns) if space.is_round else None
+        self.map = chosen_map(space, self.points, settings) if space.is_round else None
         self.regions = region_lines(self.density, settings)
 
-    def makers(self) -> dict[str, Callable[[], Picture]]:
+    def makers(self) -> Mapping[str, Callable[[], Picture]]:
         """Return functions that draw the figures, by the names of their files without the ending."""
         density, settings, data, samples = self.density, self.settings, self.data, self.samples
         if self.space.dim != 2:
             return {"samples": partial(corner_picture, density, data, samples, settings)}
         grounds = self._grounds()
         dots = self.points if settings.dots else None
-        draw = partial(draw_density, dots=dots, regions=self.regions)
-        makers: dict[str, Callable[[], Picture]] = {
-            name: partial(draw, own, density, settings) for name, own in grounds.items()
-        }
+        draw = partial(figures.density_picture, density, dots, settings, regions=self.regions)
+        makers = {name: partial(draw, ground=ground) for name, ground in grounds.items()}
         if density.flow_part is not None:
-            makers["flow"] = partial(flow_picture, density, settings)
+            makers["flow"] = partial(figures.flow_picture, density, settings)
         if data is not None or settings.samples is not None:
-            ground = grounds["density"]
-            makers["samples"] = partial(draw_samples, ground, density, settings, data, samples)
+            draw = partial(figures.samples_picture, density, data, samples, settings)
+            makers["samples"] = partial(draw, ground=grounds["density"])
         return makers
 
-    def _grounds(self) -> dict[str, Ground]:
+    def _grounds(self) -> dict[str, figures.Ground]:
         """Return what the density is drawn on, by the names of the figures."""
         space, square = self.space, Square(self.space, self.settings)
         if self.map is None:
             return {"density": square}
-        grounds: dict[str, Ground] = {"density": Map(space, self.map, self.coastlines)}
+        grounds: dict[str, figures.Ground] = {"density": Map(space, self.map, self.coastlines)}
         if space.name == "sphere" and not isinstance(self.map, PlateCarree):
             plain = PlateCarree((0.0, self.map.center[1]))
             grounds["latlon"] = Map(space, plain, self.coastlines)
@@ -218,7 +193,7 @@ def _check_space(space: Space, settings: PlotSettings) -> None:
             f"this {space.name} has {space.dim} angles, pictures have {MAX_COLUMNS} at most: draw "
             "columns of `orbiflow density sample` beside those of the data"
         )
-    view_of(space, settings.names, None if space.is_round else settings.center)
+    view_of(space, settings.names, settings.center)
     if not space.is_round and (settings.projection != "auto" or settings.radius is not None):
         name = "radius" if settings.projection == "auto" else "projection"
         raise SettingError(

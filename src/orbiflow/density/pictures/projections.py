@@ -1,4 +1,4 @@
-"""Projections of the sphere onto a map.
+"""Projections of the sphere onto a map, and the one that suits.
 
 Directions are degrees (N, 2) of latitude and longitude, places on the map (N, 2) in radii of the
 sphere.
@@ -9,14 +9,16 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, TypeAlias
+from typing import ClassVar, TypeAlias, cast
 
 import numpy as np
+from torch import Tensor
 
 from orbiflow.arguments import as_number
 from orbiflow.arrays import Array
-from orbiflow.density.spaces import to_latlon, to_vectors
-from orbiflow.errors import SettingError
+from orbiflow.density.pictures.settings import PlotSettings
+from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors
+from orbiflow.errors import OrbiflowError, SettingError
 
 FINEST = 1.0
 """Degrees between points of lines that are drawn, at most, so that curves look smooth."""
@@ -27,18 +29,20 @@ class _Centred:
     """A map of directions about `center`, a latitude and a longitude.
 
     - `name`: Its name in settings. `title`: Its name in a sentence.
-    - `is_equal_area`: Whether equal areas of the sphere are equal on the map.
     """
 
     name: ClassVar[str]
     title: ClassVar[str]
-    is_equal_area: ClassVar[bool]
 
     center: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         as_number(self.center[0], "the centre's latitude", -90, 90)
         as_number(self.center[1], "the centre's longitude", -360, 360)
+
+    def areas(self, latlon: Array) -> Array:
+        """Return the areas (N,) on the sphere of equal small areas of the map, up to a factor."""
+        return np.ones(len(latlon))
 
 
 def refined(latlon: Array) -> Array:
@@ -156,7 +160,6 @@ class Lambert(Azimuthal):
     """
 
     name, title = "lambert", "Lambert's azimuthal projection (equal-area)"
-    is_equal_area = True
 
     def distance(self, angle: Array) -> Array:
         return 2 * np.sin(angle / 2)
@@ -169,13 +172,15 @@ class Stereographic(Azimuthal):
     """The stereographic projection, which keeps angles: circles stay circles."""
 
     name, title = "stereographic", "the stereographic projection (true angles, not areas)"
-    is_equal_area = False
 
     def distance(self, angle: Array) -> Array:
         return 2 * np.tan(angle / 2)
 
     def angle(self, distance: Array) -> Array:
         return 2 * np.arctan(distance / 2)
+
+    def areas(self, latlon: Array) -> Array:
+        return ((1 + to_vectors(latlon) @ self.frame[2]) / 2) ** 2  # scale 2 / (1 + cos), squared
 
 
 _NEWTON = 12
@@ -257,7 +262,7 @@ class PlateCarree(WorldMap):
     [[0.0, 1.5708]]
     """
 
-    name, title, is_equal_area = "latlon", "plain latitude and longitude (plate carrée)", False
+    name, title = "latlon", "plain latitude and longitude (plate carrée)"
 
     def height(self, lat: Array) -> Array:
         return lat
@@ -268,6 +273,9 @@ class PlateCarree(WorldMap):
     def stretch(self, y: Array) -> Array:
         return np.ones_like(y)
 
+    def areas(self, latlon: Array) -> Array:
+        return np.cos(np.radians(latlon[:, 0]))
+
 
 class Mollweide(WorldMap):
     """A projection onto an ellipse, of equal areas, in which the poles are points.
@@ -276,7 +284,7 @@ class Mollweide(WorldMap):
     d = pi / 2 - theta, that is 2 d - sin 2 d = pi (1 - sin lat), which loses no digits there.
     """
 
-    name, title, is_equal_area = "mollweide", "the Mollweide projection (equal-area)", True
+    name, title = "mollweide", "the Mollweide projection (equal-area)"
 
     def height(self, lat: Array) -> Array:
         rest = 2 * math.pi * np.sin((math.pi / 2 - abs(lat)) / 2) ** 2
@@ -302,7 +310,7 @@ class EqualEarth(WorldMap):
     2019), equations 7 and 8.
     """
 
-    name, title, is_equal_area = "equal-earth", "the Equal Earth projection (equal-area)", True
+    name, title = "equal-earth", "the Equal Earth projection (equal-area)"
 
     _Y = np.polynomial.Polynomial((0, 1.340264, 0, -0.081106, 0, 0, 0, 0.000893, 0, 0.003796))
     _SLOPE = _Y.deriv()
@@ -333,3 +341,86 @@ PROJECTIONS: dict[str, type[Projection]] = {
     **{c.name: c for c in (EqualEarth, Mollweide, PlateCarree)},
 }
 """By their names in settings; Schmidt's and Wulff's nets of structural geology are `flipped`."""
+
+
+_NET_WORDS = ("inc", "plunge", "dip")
+"""How names of the first column begin if rows are directions in a net, not places on a globe."""
+
+_RADII = (5, 10, 15, 20, 30, 40, 50, 60, 75)
+_SHARE = 0.995
+"""Share of the points that a map of less than the sphere has to show."""
+
+
+def chosen_map(space: Space, points: Tensor, settings: PlotSettings | None = None) -> Projection:
+    """Return the map of a sphere or projective plane that settings ask for, or that suits points.
+
+    `points` are chart points (N, 2); names of the data's columns may ask for a net.
+
+    >>> from orbiflow.density import Sphere
+    >>> here = Sphere().to_chart([[40.0, 140.0], [44.0, 142.0]])
+    >>> chosen_map(Sphere(), here)
+    Lambert(center=(42.0, 141.0), radius=5.0, flipped=False)
+    """
+    if not space.is_round:
+        raise OrbiflowError(f"maps are of the sphere and the projective plane, not of {space!r}")
+    settings = settings or PlotSettings()
+    projection, radius, middle = settings.projection, settings.radius, settings.center
+    if middle is not None and not (len(middle) in (1, 2) and all(map(math.isfinite, middle))):
+        raise SettingError(
+            "{center} must be a latitude and a longitude, or a longitude, in degrees, such as 40,140, "
+            f"got {list(middle)}"
+        )
+    axial = space.name == "projective-plane"
+    cap = None if axial else smallest_cap(cast(RoundSpace, space).vectors(points))
+    if projection == "auto":
+        if axial:
+            names = settings.names or ("",)
+            a_net = names[0].strip().lower().startswith(_NET_WORDS)
+            projection = "schmidt" if a_net and middle is None else "lambert"
+        elif middle is not None:
+            projection = "lambert" if len(middle) == 2 and middle[0] else "equal-earth"
+        else:
+            projection = "equal-earth" if cap is None and radius is None else "lambert"
+    kind = PROJECTIONS[projection]
+    if issubclass(kind, WorldMap):
+        if axial:
+            discs = [n for n, c in PROJECTIONS.items() if issubclass(c, Azimuthal)]
+            raise SettingError(
+                "a direction and its opposite are one point of the projective plane, which needs a "
+                f"map of one hemisphere: {{projection}} must be {', '.join(discs)}, got {projection}"
+            )
+        if radius is not None:
+            raise SettingError(
+                f"a map of the whole sphere ({projection}) has no radius: leave {{radius}} out"
+            )
+        lat, lon = (0.0, 0.0, *(middle or ()))[-2:]
+        return kind((lat, lon))
+    if projection in ("schmidt", "wulff"):
+        if middle is not None:
+            raise SettingError(
+                f"{{center}} does not apply to a {projection} net, which has the vertical in its "
+                "middle: give no centre"
+            )
+        return kind((90.0, 0.0), float(radius or 90.0), flipped=True)
+    reach = 90.0
+    if middle is None:
+        middle, reach = cap or ((90.0, 0.0), 90.0)
+    elif len(middle) == 1:
+        middle = (90.0 if axial else 0.0, *middle)
+    return kind((middle[0], middle[1]), float(radius or reach))
+
+
+def smallest_cap(vectors: Array) -> tuple[tuple[float, float], float] | None:
+    """Return a centre in whole degrees, and a radius that shows nearly all unit vectors (N, 3).
+
+    It is None if they do not fit into 75 degrees around a centre.
+    """
+    mean = vectors.mean(axis=0) if len(vectors) else np.zeros(3)
+    if np.linalg.norm(mean) < 0.2:
+        return None
+    lat, lon = to_latlon(mean[None] / np.linalg.norm(mean))[0].round() + 0.0
+    middle = to_vectors([[lat, lon]])[0]
+    apart = np.degrees(np.arccos(np.clip(vectors @ middle, -1, 1)))
+    reach = 1.1 * float(np.quantile(apart, _SHARE, method="higher"))
+    fitting = [float(r) for r in _RADII if r >= reach]
+    return ((float(lat), float(lon)), fitting[0]) if fitting else None

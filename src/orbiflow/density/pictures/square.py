@@ -12,19 +12,9 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, midpoints
 from orbiflow.density.pictures import frames
-from orbiflow.density.pictures.axes import (
-    INK,
-    angle_axis,
-    degrees_text,
-    legible,
-    require_plane,
-    shortened,
-    view_of,
-)
 from orbiflow.density.pictures.colours import chosen_scale, density_on_grid, is_sharp, shading
 from orbiflow.density.pictures.overlays import LIGHT, Colouring, log_natural
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.density.pictures.surfaces import edge_pairs
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import CENTER_COLOURS, Sheet, center_sign
 from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
@@ -64,10 +54,9 @@ class Square:
     caption_below = False
 
     def __init__(self, space: Space, settings: PlotSettings) -> None:
-        require_plane(space)
+        frames.require_plane(space)
         self.space = space
-        # on round spaces the centre is that of a map
-        self.view = view_of(space, settings.names, None if space.is_round else settings.center)
+        self.view = frames.view_of(space, settings.names, settings.center)
 
     def places(self, points: Tensor) -> Array:
         """Return where chart points (N, 2) lie on the axes."""
@@ -137,7 +126,7 @@ class Square:
             for order in self._orders
         ]
         parts += ["Dots are points"] if dots else []
-        return _sentences([*parts, *self._notes(notes, bool(dots))])
+        return frames.sentences([*parts, *self._notes(notes, bool(dots))])
 
     def samples_caption(self, notes: Sequence[str]) -> str:
         """Return the caption of points on two grounds."""
@@ -153,9 +142,8 @@ class Square:
     ) -> None:
         """Write the title, and a legend with notes."""
         frame.axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
-        self._draw_legend(
-            frame.figure, sheet, _sentences(self._notes(notes, bool(dots))), bool(dots)
-        )
+        words = frames.sentences(self._notes(notes, bool(dots)))
+        self._draw_legend(frame.figure, sheet, words, bool(dots))
 
     @property
     def _has_ticks(self) -> bool:
@@ -177,31 +165,27 @@ class Square:
         axes.set_yticks([])
         if not self._has_ticks:
             return
-        style: dict[str, Any] = {"fontsize": size, "color": INK, "parse_math": False}
-        label, at, texts = angle_axis(self.view, 0)
-        axes.set_xticks(at, legible(at, texts, side, sheet))
-        axes.set_xlabel(shortened(label, side, sheet), **style)
-        label, at, texts = angle_axis(self.view, 1)
+        style: dict[str, Any] = {"fontsize": size, "color": frames.INK, "parse_math": False}
+        label, at, texts = frames.angle_axis(self.view, 0)
+        axes.set_xticks(at, frames.legible(at, texts, side, sheet))
+        axes.set_xlabel(frames.shortened(label, side, sheet), **style)
+        label, at, texts = frames.angle_axis(self.view, 1)
         axes.set_yticks(at, texts if labelled else [""] * len(at))
         if labelled:
-            axes.set_ylabel(shortened(label, side, sheet), labelpad=0.2 * size, **style)
+            axes.set_ylabel(frames.shortened(label, side, sheet), labelpad=0.2 * size, **style)
 
     def _write_place(self, axes: Axes, corner: tuple[float, float], sheet: Sheet) -> None:
         """Write where in the data's columns a cone point lies."""
-        columns = self.space.columns
         row = self.space.from_chart(torch.tensor([corner], dtype=torch.float64))[0]
-        if len(columns) == 2:
-            text = ", ".join(map(degrees_text, row.round() + 0.0, ("NS", "EW")))
+        if len(row) == 2:
+            texts = map(frames.degrees_text, row.round() + 0.0, ("NS", "EW"))
         else:
-            row = row.round(2) + 0.0
-            text = ", ".join(
-                f"{name} {value:.2f}" for name, value in zip(columns, row, strict=True)
-            )
+            texts = map("{} {:.2f}".format, self.space.columns, row.round(2) + 0.0)
         axes.annotate(
-            text.replace("-", "\N{MINUS SIGN}"), corner,
+            ", ".join(texts).replace("-", "\N{MINUS SIGN}"), corner,
             xytext=(0, sheet.text * (2 * corner[1] - 1)), textcoords="offset points",
             ha="right" if corner[0] else "left", va="bottom" if corner[1] else "top",
-            fontsize=sheet.small, color=INK,
+            fontsize=sheet.small, color=frames.INK,
         )  # fmt: skip
 
     def _draw_legend(self, figure: Figure, sheet: Sheet, notes: str, dots: bool) -> None:
@@ -221,8 +205,8 @@ class Square:
             text = f"cone point of a {TURNS[order]} turn: no flow moves it"
             entries.append(Line2D([], [], color=CENTER_COLOURS[order], label=text, **style))
         if dots:
-            style = {"markerfacecolor": "#ffffff", "markeredgecolor": INK, "linestyle": "none"}
-            entries.append(Line2D([], [], marker="o", label="points", **style))
+            style = {"markerfacecolor": "#ffffff", "markeredgecolor": frames.INK}
+            entries.append(Line2D([], [], marker="o", label="points", linestyle="none", **style))
         frames.write_caption(figure, notes, sheet)
         lines = len(frames.caption_lines(notes, sheet))
         up = (0.6 + 1.25 * lines) * sheet.em / figure.get_size_inches()[1]
@@ -237,16 +221,30 @@ def average_note(count: int) -> str:
     return f"peaks narrower than 1/{count} of a side are averaged over it"
 
 
+def edge_pairs(group: CrystallographicGroup) -> list[tuple[Array, Array]]:
+    """Return pairs of edges (2, 2) of the unit square that `group` identifies, start with start.
+
+    Neighbouring edges both start at the corner where they meet.
+    """
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    edges = [corners[[0, 3]], corners[[1, 2]], corners[[0, 1]], corners[[3, 2]]]
+    middle = np.full(2, 0.5)
+    pairs: list[tuple[Array, Array]] = []
+    for g in group.elements_near(middle, 1.5, source=middle)[1:]:
+        for k, edge in enumerate(edges):
+            for other in edges[k + 1 :]:
+                image = g(edge)
+                if np.allclose(image.mean(axis=0), other.mean(axis=0)):
+                    turn = -1 if np.allclose(image[1], edge[1]) else 1
+                    pairs.append((edge[::turn].copy(), image[::turn].copy()))
+    return pairs
+
+
 def cone_points(group: CrystallographicGroup) -> list[tuple[tuple[float, float], int]]:
     """Return the corners of the square that are rotation centres, with their orders."""
     found = symmetry_elements(group, np.full(2, 0.5), 1.0).centers
     corners = [(x, y) for x in (0.0, 1.0) for y in (0.0, 1.0)]
-    return [
-        (corner, center.order)
-        for corner in corners
-        for center in found
-        if np.allclose(center.point, corner)
-    ]
+    return [(c, sign.order) for c in corners for sign in found if np.allclose(sign.point, c)]
 
 
 def _draw_edge(
@@ -266,7 +264,3 @@ def _draw_edge(
             *ring.T, facecolor=colour, edgecolor="#ffffff", linewidth=0.06 * size,
             clip_on=False, zorder=7,
         )  # fmt: skip
-
-
-def _sentences(parts: Sequence[str]) -> str:
-    return " ".join(f"{part[0].upper()}{part[1:]}." for part in parts)

@@ -1,15 +1,17 @@
-"""Surfaces in space for the four identification spaces, and where to look at them from.
+"""Surfaces in space for the four identification spaces, and a web page with one to turn.
 
 A surface is a function that takes chart points (N, 2), anywhere in the plane, to points (N, 3) in
 space, and identified points to the same point. Torus and sphere are embedded; the Klein bottle and
-the projective plane cannot be, and cross themselves along curves.
+the projective plane cannot be, and cross themselves along curves. The page is one file, coloured by a
+density, and needs no network.
 """
 
 from __future__ import annotations
 
+import base64
 import math
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -17,9 +19,14 @@ from torch import Tensor
 
 from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array
-from orbiflow.density.spaces import RoundSpace, Space
+from orbiflow.density.models import Density
+from orbiflow.density.pictures import colours, frames
+from orbiflow.density.pictures.overlays import SMALLER, thinned, uncrowded
+from orbiflow.density.pictures.settings import PlotSettings
+from orbiflow.density.pictures.square import average_note
+from orbiflow.density.spaces import RoundSpace, Space, to_vectors
+from orbiflow.drawing import rendered
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry import CrystallographicGroup
 
 RING_RADIUS, TUBE_RADIUS = 1.0, 0.45
 """Radii of the torus: of its centre line, and of its tube."""
@@ -36,6 +43,11 @@ class Mesh(NamedTuple):
 
     points: Tensor
     triangles: Array
+
+
+def _turns(points: Tensor) -> tuple[Array, Array]:
+    x, y = 2 * math.pi * points.detach().double().cpu().numpy().T
+    return x, y
 
 
 def torus_ring(points: Tensor) -> Array:
@@ -94,14 +106,12 @@ def immersion(space: Space) -> Callable[[Tensor], Array]:
     if space.dim != 2:
         raise OrbiflowError(f"only spaces of two dimensions have a surface, not {space!r}")
     if isinstance(space, RoundSpace):
-        surface = vector_immersion(space)
-        return lambda points: surface(space.vectors(points))
+        return lambda points: _of_vectors(space, space.vectors(points))
     return torus_ring if space.is_torus else klein_figure_eight
 
 
-def vector_immersion(space: Space) -> Callable[[Array], Array]:
-    """Return the surface of a round space as a function of unit vectors (N, 3) in the data's frame."""
-    return boy_surface if space.name == "projective-plane" else np.asarray
+def _of_vectors(space: Space, vectors: Array) -> Array:
+    return boy_surface(vectors) if space.name == "projective-plane" else vectors
 
 
 def mesh(space: Space, resolution: int) -> Mesh:
@@ -116,48 +126,17 @@ def mesh(space: Space, resolution: int) -> Mesh:
     return Mesh(points, corners.reshape(-1, 3))
 
 
-def edge_pairs(group: CrystallographicGroup) -> list[tuple[Array, Array]]:
-    """Return pairs of edges (2, 2) of the unit square that `group` identifies, start with start.
-
-    Neighbouring edges both start at the corner where they meet.
-    """
-    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    edges = [corners[[0, 3]], corners[[1, 2]], corners[[0, 1]], corners[[3, 2]]]
-    middle = np.full(2, 0.5)
-    pairs: list[tuple[Array, Array]] = []
-    for g in group.elements_near(middle, 1.5, source=middle)[1:]:
-        for k, edge in enumerate(edges):
-            for other in edges[k + 1 :]:
-                image = g(edge)
-                if np.allclose(image.mean(axis=0), other.mean(axis=0)):
-                    turn = -1 if np.allclose(image[1], edge[1]) else 1
-                    pairs.append((edge[::turn].copy(), image[::turn].copy()))
-    return pairs
-
-
-def off_cones(points: Tensor, margin: float = 1e-3) -> Tensor:
-    """Move chart points (N, 2) within `margin` of a corner inwards: cone points have densities 0/0."""
-    inward = 0.5 - points
-    near = inward.abs().amin(dim=-1, keepdim=True) > 0.5 - margin
-    return torch.where(near, points + margin * inward.sign(), points)
-
-
 def normals(space: Space, points: Tensor) -> Array:
     """Return unit normals (N, 3) at points (N, 2) of the square, over its edges up to the sign."""
     surface, step = immersion(space), 1e-4
     if space.is_round:
-        points = off_cones(points, 4e-3)
+        points = colours.off_cones(points, 4e-3)
     first, second = (
         surface(points + step * axis) - surface(points - step * axis)
         for axis in torch.eye(2, dtype=points.dtype)
     )
     across = np.cross(first, second)
     return across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-300)
-
-
-def _turns(points: Tensor) -> tuple[Array, Array]:
-    x, y = 2 * math.pi * points.detach().double().cpu().numpy().T
-    return x, y
 
 
 EYE = 4.0
@@ -190,8 +169,7 @@ def viewpoint(space: Space, place: Tensor) -> Viewpoint:
     """
     surface = immersion(space)
     cloud = surface(mesh(space, _RESOLUTION).points)
-    center = (cloud.min(axis=0) + cloud.max(axis=0)) / 2
-    radius = float(np.linalg.norm(cloud - center, axis=1).max())
+    center, radius = _ball(cloud)
     spot = (surface(place[None])[0] - center) / radius
     normal = normals(space, place[None])[0]
     if space.name == "sphere":
@@ -218,3 +196,187 @@ def viewpoint(space: Space, place: Tensor) -> Viewpoint:
     best = int(score.argmax())
     depth = min(1.0, float(toward[best] @ spot) + _NEAR / 2)
     return Viewpoint(*angles[best].tolist(), cut=50 * (1 - depth) if hidden[best] else 0.0)
+
+
+MAX_BYTES = 3_000_000
+
+_CELLS, _FINE_CELLS = 160, 240
+"""Cells along an edge of the square: of a flow, and with kernels beside it."""
+
+_SOFT = 1.6
+"""Cells that the narrowest peak is averaged over: with fewer, a triangle's corners would be seen."""
+
+
+def density_page(
+    density: Density,
+    settings: PlotSettings | None = None,
+    *,
+    samples: Tensor | None = None,
+    coastlines: Sequence[Array] = (),
+    resolution: int | None = None,
+    title: str = "",
+) -> str:
+    """Return a self-contained HTML page with the surface of the space, to be turned.
+
+    The torus is a ring, the sphere the unit sphere in the user's frame, the Klein bottle the figure-8
+    immersion, the projective plane Boy's surface. The density is evaluated at every vertex, so the
+    colours close over the seams; peaks narrower than its triangles are averaged over them, and the
+    caption says so. The page opens with the peak in front. WebGL 2 draws it, or a plain canvas if
+    there is none.
+
+    Args:
+        density: A density on a two-dimensional space.
+        settings: How it is drawn; `dots` says whether the samples are seen at first.
+        samples: Chart points (N, 2) to draw as dots, which a box in the page shows and hides. Of more
+            than `MAX_DOTS` a random choice is drawn.
+        coastlines: For the sphere and the projective plane, lines (M, 2) from `read_coastlines`.
+        resolution: Cells along an edge of the square, 2 to 250. Default: 160, or 240 for a density
+            with kernels.
+        title: The title. Default: "Density on the" and the space.
+    """
+    from matplotlib import colormaps
+
+    settings, space = settings or PlotSettings(), density.space
+    cells = resolution or (_FINE_CELLS if density.has_fine_detail else _CELLS)
+    grid, view = mesh(space, cells), frames.view_of(space, settings.names)
+    t = torch.linspace(0.0, 1.0, cells + 1, dtype=torch.float64)
+    values = colours.density_on_grid(density, t, t, settings.measure, pixel=_SOFT / cells).ravel()
+    # by area on the surface: vertices crowd at the cone points
+    areas = space.log_area(grid.points).exp().numpy()
+    log, _ = colours.chosen_scale(density, settings.measure, settings.scale)
+    shade = colours.shading(values, areas, log=log)
+    lines = (*_coordinate_lines(space), (1.6, _on_surface(space, coastlines)))
+    notes = []
+    data = {
+        **_surface(space, grid.points, int(values.argmax())),
+        "round": space.name == "sphere",  # the near side hides the far one
+        "triangles": _packed(grid.triangles, "<u2"),
+        "values": _packed(65535 * np.clip(shade.places(values), 0, 1), "<u2"),
+        "lines": [{"width": width, **_polylines(parts)} for width, parts in lines if parts],
+        "samples": "",
+        "widths": "",
+        "dots": settings.dots,
+        "labels": _labels(view),
+        "colours": _packed(255 * colormaps[colours.COLOURS](np.linspace(0, 1, 256)), "u1"),
+        "ticks": [tick._asdict() for tick in colours.bar_ticks(shade, ends=True)],
+        "measure": colours.bar_label(shade, space, settings.measure),
+    }
+    if samples is not None:
+        points = torch.tensor(thinned(frames.chart_points(space, samples).numpy()))
+        places, widths = uncrowded(immersion(space)(space.project(points)))
+        data |= {"samples": _packed(places, "<f4"), "widths": _packed(widths, "<f4")}
+        notes.append(SMALLER)
+    if colours.is_sharp(density, pixel=_SOFT / cells):
+        notes.append(average_note(round(cells / _SOFT)))
+    words = CAPTIONS[space.name].format(*(frames.axis_label(view, k) for k in (0, 1)))
+    caption = f"{words} {frames.sentences(notes)}".strip()
+    title = title or f"Density on the {frames.space_title(space)}"
+    page = rendered(
+        "orbiflow.density.pictures", "surface.html", title=title, caption=caption, data=data
+    )
+    size = len(page.encode())
+    if size > MAX_BYTES:
+        raise OrbiflowError(
+            f"the page would have {size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6:g}: lower the "
+            "resolution or give coastlines of fewer points"
+        )
+    return page
+
+
+def _ball(places: Array) -> tuple[Array, float]:
+    """Return the middle and the radius of a surface of points (N, 3)."""
+    center = (places.min(axis=0) + places.max(axis=0)) / 2
+    return center, float(np.linalg.norm(places - center, axis=1).max())
+
+
+def _surface(space: Space, points: Tensor, peak: int) -> dict[str, Any]:
+    """Return the mesh in space, its size, and from where it is seen first."""
+    places = immersion(space)(points)
+    center, radius = _ball(places)
+    return {
+        "center": center.tolist(),
+        "radius": radius,
+        "start": viewpoint(space, points[peak])._asdict(),
+        "eye": EYE,
+        "points": _packed(places, "<f4"),
+        "normals": _packed(127 * normals(space, points), "i1"),
+    }
+
+
+def _packed(array: Array, kind: str) -> str:
+    """Return the base64 text of an array, rounded if `kind` is an integer."""
+    if np.dtype(kind).kind != "f":
+        array = np.rint(array)
+    return base64.b64encode(np.ascontiguousarray(array.astype(kind)).tobytes()).decode()
+
+
+def _polylines(lines: list[Array]) -> dict[str, Any]:
+    return {"points": _packed(np.concatenate(lines), "<f4"), "counts": list(map(len, lines))}
+
+
+Lines = tuple[tuple[float, list[Array]], tuple[float, list[Array]]]
+"""Lines (M, 3) of equal coordinates with their widths, then those of coordinate 0, which are wider."""
+
+
+def _coordinate_lines(space: Space) -> Lines:
+    """Return parallels and meridians of a round space, lines every eighth of a turn of angles."""
+    if not space.is_round:
+        # the Klein bottle's square is half a turn high, and phi is 0 inside
+        return _eighths(space, 8, 0) if space.is_torus else _eighths(space, 4, 2)
+    step = 30 if space.name == "sphere" else 15
+    t = np.linspace(-180.0, 180.0, 181)
+    across = [np.stack([np.full(181, lat), t], axis=-1) for lat in range(0, 90, step)]
+    across += [line * (-1, 1) for line in across[1:]]
+    along = [np.stack([t / 2, np.full(181, lon)], axis=-1) for lon in range(0, 360, step)]
+    parallels, meridians = _on_surface(space, across), _on_surface(space, along)
+    return (1.0, parallels + meridians), (2.0, [parallels[0], meridians[0]])
+
+
+def _on_surface(space: Space, lines: Sequence[Array]) -> list[Array]:
+    """Return lines of directions (M, 2), of more than a point, on the surface of a round space."""
+    return [_of_vectors(space, to_vectors(line)) for line in lines if len(line) > 1]
+
+
+def _eighths(space: Space, steps: int, zero: int) -> Lines:
+    """Return lines every eighth of a turn, `steps` of them up the square; x = zero / 8 is angle 0."""
+    surface, t = immersion(space), torch.linspace(0, 1, 161, dtype=torch.float64)
+    across = [torch.stack([torch.full_like(t, k / 8), t], dim=-1) for k in range(8)]
+    along = [torch.stack([t, torch.full_like(t, k / steps)], dim=-1) for k in range(steps)]
+    zeros = [across[zero], along[0]]
+    return (1.0, [surface(line) for line in across + along]), (2.0, [surface(z) for z in zeros])
+
+
+def _labels(view: frames.View) -> list[dict[str, Any]]:
+    """Return texts of directions, or of the first angle at four places of a ring, and their places."""
+    space = view.space
+    if space.name == "projective-plane":
+        return []
+    if space.is_round:
+        texts = ("+x", "+y", "+z", "−x", "−y", "−z")
+        if space.columns[0] == "lat":
+            texts = ("0°", "90° E", "N", "180°", "90° W", "S")
+        places = 1.07 * np.concatenate([np.eye(3), -np.eye(3)])
+    else:
+        turns = (0, 0.25, 0.5, -0.25) if space.is_torus else (0, 0.125, 0.25, 0.375)
+        texts = [
+            f"{frames.cut(view.names[0], frames.MAX_NAME)} {frames.angle_text(t, space.unit)}"
+            for t in turns
+        ]
+        radius = RING_RADIUS + TUBE_RADIUS if space.is_torus else KLEIN_RADIUS + 1
+        places = 1.1 * radius * np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
+    return [{"text": t, "at": place.tolist()} for t, place in zip(texts, places, strict=True)]
+
+
+CAPTIONS = {
+    "torus": "{} runs round the ring, {} round its tube. Lines every 45°, heavier where an "
+    "angle is 0.",
+    "klein-bottle": "The Klein bottle as a figure eight that makes half a turn on its way round: "
+    "{} runs round the ring, {} along the figure eight. Lines every 45°, heavier where an "
+    "angle is 0. The surface passes through itself along a circle; the sheets that cross there are far "
+    "apart on the bottle.",
+    "sphere": "The sphere in the data's frame. Lines every 30°, heavier the equator and longitude 0.",
+    "projective-plane": "Boy's surface, where a direction and its opposite are one point. Lines every "
+    "15° of latitude and longitude, heavier the equator and longitude 0. The surface passes through "
+    "itself; sheets that cross are far apart on the projective plane.",
+}
+"""What is seen of each space, and which way its coordinates run."""

@@ -18,9 +18,10 @@ from PIL import Image, ImageDraw
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, midpoints
-from orbiflow.density.pictures.axes import view_of
 from orbiflow.density.pictures.colours import COLOURS, density_on_grid, density_on_map, shading
-from orbiflow.density.pictures.maps import chosen_map, pixels_of
+from orbiflow.density.pictures.frames import view_of
+from orbiflow.density.pictures.maps import pixels_of
+from orbiflow.density.pictures.projections import chosen_map
 from orbiflow.density.spaces import RoundSpace, to_vectors
 
 SIZE = (360, 240)
@@ -58,8 +59,7 @@ def density_thumbnail(density: Density, data: ArrayLike) -> bytes:
         places = view_of(space).places(drawn)
         picture = _pairs(places) if space.dim <= MAX_PAIRS else _stripes(places)
     sheet = Image.new("RGB", SIZE, PAPER)
-    width, height = picture.size
-    sheet.paste(picture, ((SIZE[0] - width) // 2, (SIZE[1] - height) // 2))
+    sheet.paste(picture, ((SIZE[0] - picture.width) // 2, (SIZE[1] - picture.height) // 2))
     out = io.BytesIO()
     sheet.save(out, "PNG", optimize=True)
     return out.getvalue()
@@ -128,10 +128,9 @@ def _pairs(places: Array) -> Image.Image:
     count = places.shape[1]
     side = SIZE[1] // count
     sheet = Image.new("RGB", (side * count, side * count), PAPER)
-    for row in range(count):
-        for column in range(row + 1):
-            cell = (_bars if row == column else _pair)(places[:, [column, row]], side - 3)
-            sheet.paste(cell, (side * column + 1, side * row + 1))
+    for row, column in zip(*np.tril_indices(count), strict=True):
+        cell = (_bars if row == column else _pair)(places[:, [column, row]], side - 3)
+        sheet.paste(cell, (int(side * column + 1), int(side * row + 1)))
     return sheet
 
 
@@ -154,8 +153,7 @@ def _bars(places: Array, side: int) -> Image.Image:
 
 def _stripes(places: Array) -> Image.Image:
     """Draw a stripe for each angle, from the top, each as bright as its largest bin."""
-    bins = 90
-    counts = [np.histogram(column, bins, (0, 1))[0] for column in places.T]
+    counts = [np.histogram(column, 90, (0, 1))[0] for column in places.T]
     shades = np.stack([count / max(1, count.max()) for count in counts])
     height = max(1, math.floor(SIZE[1] / len(shades)))
     picture = _coloured(shades).resize((SIZE[0], height * len(shades)), Image.Resampling.BOX)

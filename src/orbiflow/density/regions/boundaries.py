@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -199,9 +199,7 @@ class Window:
 
     def area(self, shape: shapely.MultiPolygon) -> float:
         """Return the natural area; on the globe, of sides straight in longitude and latitude."""
-        if not self.on_globe:
-            return shape.area
-        return sum(map(_steradians, shape.geoms))
+        return sum(map(_steradians, shape.geoms)) if self.on_globe else shape.area
 
 
 def window_of(space: Space) -> Window:
@@ -211,9 +209,7 @@ def window_of(space: Space) -> Window:
             f"outlines are drawn in two dimensions, this {space.name} has {space.dim}; thresholds, "
             "sizes and which rows are inside can be found all the same"
         )
-    if isinstance(space, RoundSpace):
-        return _round(space)
-    return _flat(space)
+    return _round(space) if isinstance(space, RoundSpace) else _flat(space)
 
 
 def _round(space: RoundSpace) -> Window:
@@ -282,10 +278,9 @@ def to_geojson(outlines: Sequence[Outline]) -> dict[str, Any]:
                 "GeoJSON is for places on a globe, not for the angles of a "
                 f"{region.density.space.name}: write .json or .csv"
             )
-        found = region.to_json()
         names = ("mass", "held", "log_prob", "log_prob_low", "log_prob_high")
         properties = {
-            **{name: found[name] for name in names},
+            **{name: getattr(region, name) for name in names},
             "held_error": region.error,
             "area": outline.size,
             "fraction": outline.fraction,
@@ -301,17 +296,15 @@ def to_geojson(outlines: Sequence[Outline]) -> dict[str, Any]:
 def outlines_csv(outlines: Sequence[Outline]) -> bytes:
     """Return CSV text with a row for each vertex of the outlines of one density's regions."""
     heads = ["region", "mass", "log_prob", "polygon", "ring", *outlines[0].window.names]
-    return csv_bytes(heads, _vertices(outlines))
-
-
-def _vertices(outlines: Sequence[Outline]) -> Iterator[list[Any]]:
+    rows: list[list[Any]] = []
     for number, outline in enumerate(outlines, 1):
         mass = "" if outline.region.mass is None else f"{outline.region.mass:g}"
         level = f"{outline.region.log_prob:.10g}"
         for polygon, rings in enumerate(outline.rings(), 1):
             for ring, points in enumerate(rings):
                 for x, y in points:
-                    yield [number, mass, level, polygon, ring, f"{x:.10g}", f"{y:.10g}"]
+                    rows.append([number, mass, level, polygon, ring, f"{x:.10g}", f"{y:.10g}"])
+    return csv_bytes(heads, rows)
 
 
 def regions_document(
@@ -319,20 +312,20 @@ def regions_document(
 ) -> dict[str, Any]:
     """Return one density's regions, with their outlines if there are any, for `json.dumps`."""
     space = regions[0].density.space
-    document: dict[str, Any] = {
+    frame: dict[str, Any] = {}
+    if outlines:
+        window = outlines[0].window
+        corners = [window.low.tolist(), window.high.tolist()]
+        frame = {"axes": list(window.names), "window": corners, "edges": window.edges}
+    return {
         "kind": "regions",
         "space": {"name": space.name, **space.settings()},
         "size_unit": size_unit(space),
         "samples": samples,
         "seed": seed,
+        **frame,
+        "regions": [one.to_json() for one in outlines or regions],
     }
-    if outlines:
-        window = outlines[0].window
-        document["axes"] = list(window.names)
-        document["window"] = [window.low.tolist(), window.high.tolist()]
-        document["edges"] = window.edges
-    document["regions"] = [one.to_json() for one in outlines or regions]
-    return document
 
 
 def size_unit(space: Space) -> str:

@@ -114,11 +114,8 @@ def _extremes(above: Flags) -> tuple[Flags, Flags]:
 
 def _corners(cells: Flags) -> Flags:
     """Return the nodes of cells."""
-    found = np.zeros(np.array(cells.shape) + 1, dtype=bool)
-    for i in (0, 1):
-        for j in (0, 1):
-            found[i : i + cells.shape[0], j : j + cells.shape[1]] |= cells
-    return found
+    edged = np.pad(cells, 1)
+    return edged[1:, 1:] | edged[1:, :-1] | edged[:-1, 1:] | edged[:-1, :-1]
 
 
 def _doubled(values: Array) -> Array:
@@ -203,14 +200,10 @@ def _beside(
 ) -> NDArray[np.int64]:
     """Return neighbours of cells on whose common side the grid is wrong."""
     t = np.arange(PARTS + 1) / PARTS
-    sides = (
-        ((-1, 0), blocks[:, 0]),
-        ((1, 0), blocks[:, -1]),
-        ((0, -1), blocks[:, :, 0]),
-        ((0, 1), blocks[:, :, -1]),
-    )
+    moves = ((-1, 0), (1, 0), (0, -1), (0, 1))
+    sides = (blocks[:, 0], blocks[:, -1], blocks[:, :, 0], blocks[:, :, -1])
     found: list[Array] = []
-    for move, side in sides:
+    for move, side in zip(moves, sides, strict=True):
         drawn = side[:, :1] + t * (side[:, -1:] - side[:, :1])
         off = ((side >= level) != (drawn >= level)).sum(axis=1) >= MIN_WRONG_PARTS
         to = cells + move

@@ -84,9 +84,8 @@ class DensityLevels:
         self.points: Tensor = self.density.sample((count,), generator).double()
         self.log_probs = self.density.log_prob(self.points, measure="natural").numpy()
         self._sorted = np.sort(self.log_probs)
-        even = self.density.space.uniform(
-            max(MIN_SAMPLES, count // SAMPLES_PER_EVEN_POINT), generator
-        )
+        evenly = max(MIN_SAMPLES, count // SAMPLES_PER_EVEN_POINT)
+        even = self.density.space.uniform(evenly, generator)
         self._even = self.density.log_prob(even, measure="natural").numpy()
 
     def highest(self, mass: float) -> DensityRegion:

@@ -7,12 +7,14 @@ import io
 import math
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from orbiflow.density.tables import text
 from orbiflow.density.tables.table import (
     BLOCK,
     MAX_COLUMNS,
@@ -24,7 +26,6 @@ from orbiflow.density.tables.table import (
     finished,
     quote,
 )
-from orbiflow.density.tables.text import layout_of, read_text, split_line, text_lines
 from orbiflow.errors import InputFileError, OrbiflowError
 
 MAX_BYTES = 2 * 2**30
@@ -55,7 +56,7 @@ def read_table(
     be. Rows that lack a value are refused, left out or kept with NaN.
     """
     path = Path(path)
-    read = {"text": read_text, "npy": read_npy, "parquet": read_parquet}[kind_of_file(path)]
+    read = {"text": text.read_text, "npy": read_npy, "parquet": read_parquet}[kind_of_file(path)]
     return read(path, Reading(columns, width, max_rows, has_header, drop_missing, keep_missing))
 
 
@@ -79,7 +80,7 @@ def append_columns(
     path, end, done, out = Path(path_of_source), table.delimiter, 0, bytearray()
     header, lines = table.header, [*table.lines.tolist(), -1]
     changed = InputFileError(f"{path}: the file changed after it was read; run this again")
-    for number, line, is_comment in text_lines(path):
+    for number, line, is_comment in text.text_lines(path):
         if is_comment:
             out += f"{line}\n".encode()
             continue
@@ -109,21 +110,17 @@ def to_csv(columns: Sequence[str], values: ArrayLike) -> bytes:
     values = np.asarray(values, dtype=np.float64)
     if values.ndim != 2 or values.shape[1] != len(columns):
         raise ValueError(f"values must have shape (N, {len(columns)}), not {values.shape}")
-    out = io.BytesIO()
-    out.write((",".join(_name_cell(name, ",") for name in columns) + "\n").encode())
-    np.savetxt(out, values, fmt="%.10g", delimiter=",")
+    out, head = io.BytesIO(), ",".join(_name_cell(name, ",") for name in columns)
+    np.savetxt(out, values, fmt="%.10g", delimiter=",", header=head, comments="", encoding="utf-8")
     return out.getvalue()
 
 
 def _free_names(wanted: Iterable[str], taken: Sequence[str]) -> list[str]:
     found, used = list[str](), {name.casefold() for name in taken}
     for name in wanted:
-        free, i = name, 1
-        while free.casefold() in used:
-            i += 1
-            free = f"{name}_{i}"
-        found.append(free)
-        used.add(free.casefold())
+        free = chain([name], (f"{name}_{i}" for i in count(2)))
+        found.append(next(text for text in free if text.casefold() not in used))
+        used.add(found[-1].casefold())
     return found
 
 
@@ -174,8 +171,8 @@ def column_names(
     path = Path(path)
     kind = kind_of_file(path)
     if kind == "text":
-        return layout_of(path, wanted, has_header).header
-    return _npy_header(path)[1].names if kind == "npy" else parquet_names(path)
+        return text.layout_of(path, wanted, has_header).header
+    return _npy_header(path)[1].names if kind == "npy" else _parquet_names(path)
 
 
 def read_labels(
@@ -190,12 +187,16 @@ def read_labels(
         cells = numbers.values[:, 0].astype(str).tolist()
         found = dict(zip(numbers.lines.tolist(), cells, strict=True))
     elif kind == "parquet":
-        found = dict(enumerate(parquet_labels(path, column), start=1))
+        names = _parquet_names(path)
+        with _parquet(path) as file:
+            batches = file.iter_batches(BLOCK, columns=[names[find(path, names, column)]])
+            cells = [cell for batch in batches for cell in batch.column(0).to_pylist()]
+        found = {k: "" if c is None else str(c).strip() for k, c in enumerate(cells, start=1)}
     else:
-        layout = layout_of(path, [column], has_header)
+        layout = text.layout_of(path, [column], has_header)
         index = find(path, layout.names, column)
-        for number, line, is_comment in text_lines(path):
-            cells = [] if is_comment else split_line(path, number, line, layout.delimiter)
+        for number, line, is_comment in text.text_lines(path):
+            cells = [] if is_comment else text.split_line(path, number, line, layout.delimiter)
             found[number] = cells[index].strip() if index < len(cells) else ""
     missing = [line for line in table.lines.tolist() if not found.get(line)]
     if missing:
@@ -236,10 +237,10 @@ def read_npy(path: Path, reading: Reading) -> Table:
     shape, dtype = _npy_header(path)
     check_count(path, shape[0], reading.max_rows, "rows")
     fields = dtype.names
-    n_columns = len(fields) if fields is not None else shape[1]
-    check_count(path, n_columns, MAX_COLUMNS, "columns")
-    names = fields or tuple(f"column{i}" for i in range(1, n_columns + 1))
-    types = [dtype[name] for name in fields] if fields is not None else [dtype] * n_columns
+    width = shape[1] if fields is None else len(fields)
+    check_count(path, width, MAX_COLUMNS, "columns")
+    names = fields or tuple(f"column{i}" for i in range(1, width + 1))
+    types = [dtype] * width if fields is None else [dtype[name] for name in fields]
     numeric = [kind.kind in "fiu" for kind in types]
     picked, notes = choose(path, names, numeric, reading, types)
     try:
@@ -296,20 +297,9 @@ def _parquet(path: Path) -> Generator[Any]:
         raise _damaged(path, exc) from exc
 
 
-def parquet_names(path: Path) -> tuple[str, ...]:
-    """Return the names of all columns."""
+def _parquet_names(path: Path) -> tuple[str, ...]:
     with _parquet(path) as file:
         return tuple(file.schema_arrow.names)
-
-
-def parquet_labels(path: Path, column: str) -> list[str]:
-    """Return a column's cells as text, "" for empty ones."""
-    names = parquet_names(path)
-    name = names[find(path, names, column)]
-    with _parquet(path) as file:
-        batches = file.iter_batches(BLOCK, columns=[name])
-        cells = [cell for batch in batches for cell in batch.column(0).to_pylist()]
-    return ["" if cell is None else str(cell).strip() for cell in cells]
 
 
 def read_parquet(path: Path, reading: Reading) -> Table:

@@ -72,18 +72,16 @@ def read_rows(
     and those of weights and groups.
     """
     rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
-    how: dict[str, Any] = {
-        "has_header": rows.header,
-        "drop_missing": rows.drop_missing or rows.missing == "drop",
-    }
+    dropped = rows.drop_missing or rows.missing == "drop"
+    how: dict[str, Any] = {"has_header": rows.header, "drop_missing": dropped}
     name = None if group is None or rows.columns is not None else _name(path, group, rows.header)
     weighing = None
     if rows.weights is not None:
         weighing = read_table(path, columns=[rows.weights], width=1, **how)
     others = [*(weighing.columns if weighing else ()), *([name] if name else [])]
     try:
-        keep = rows.missing == "marginalise"
-        table = _read(path, rows.columns, None if others else width, tell, how, keep)
+        how["keep_missing"] = rows.missing == "marginalise"
+        table = _read(path, rows.columns, None if others else width, tell, how)
     except MissingCellsError as error:
         if rows is not settings:  # the command has no way to keep them
             raise
@@ -110,14 +108,8 @@ def read_rows(
 
 
 def _read(
-    path: Path,
-    columns: Sequence[str] | None,
-    width: int | None,
-    tell: Sink,
-    how: dict[str, Any],
-    keep_missing: bool,
+    path: Path, columns: Sequence[str] | None, width: int | None, tell: Sink, how: dict[str, Any]
 ) -> Table:
-    how = {**how, "keep_missing": keep_missing}
     if columns is not None:
         return read_table(path, columns=list(columns), width=None, **how)
     try:
@@ -193,7 +185,9 @@ def check_order(columns: Sequence[str], space: str) -> None:
     orbiflow.errors.SettingError: the columns are 'Longitude (deg)', 'Latitude (deg)', and the sphere \
 takes latitude before longitude; give columns 'Latitude (deg),Longitude (deg)'
     """
-    if len(columns) != 2 or _word(columns[0]) not in EAST or _word(columns[1]) not in NORTH:
+    words = [re.search(r"[^\W\d_]+", name) for name in columns]
+    east, *rest = [found[0].casefold() if found else "" for found in words]
+    if east not in EAST or len(rest) != 1 or rest[0] not in NORTH:
         return
     first, second = columns
     raise SettingError(
@@ -201,8 +195,3 @@ takes latitude before longitude; give columns 'Latitude (deg),Longitude (deg)'
         + "longitude; give {columns} "
         + literal(f"'{second},{first}'")
     )
-
-
-def _word(name: str) -> str:
-    found = re.search(r"[^\W\d_]+", name)
-    return found[0].casefold() if found else ""

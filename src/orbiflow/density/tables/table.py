@@ -107,13 +107,12 @@ def choose(
                 literal(f"{path}: column {quote(names[i])} holds {quote(str(kinds[i]))}")
                 + ", not numbers; choose another with {columns}"
             )
-    if columns is not None:
-        return picked, []
     taken = [names[i] for i in picked]
-    for name in taken:
-        find(path, names, name)
-    all_of_them = len(taken) == len(names)
-    return picked, [] if all_of_them else [f"took the columns of numbers: {listing(taken)}"]
+    if columns is not None or [find(path, names, name) for name in taken] == list(
+        range(len(names))
+    ):
+        return picked, []
+    return picked, [f"took the columns of numbers: {listing(taken)}"]
 
 
 def find(path: Path, names: Sequence[str], wanted: str) -> int:
@@ -129,20 +128,17 @@ def find(path: Path, names: Sequence[str], wanted: str) -> int:
             literal(f"{path}: columns {numbers} are all called {quote(key)}")
             + f"; rename them, or choose by number with {{columns}} {hits[0] + 1}"
         )
-    number = column_number(key, len(names))
-    if number is None:
-        raise InputFileError(
-            f"{path}: no column {quote(wanted)}; it has {listing(names)}: choose by name, or by "
-            f"number from 1 to {len(names)}"
-        )
-    return number
+    if is_number(key, len(names)):
+        return int(key) - 1
+    raise InputFileError(
+        f"{path}: no column {quote(wanted)}; it has {listing(names)}: choose by name, or by number "
+        f"from 1 to {len(names)}"
+    )
 
 
-def column_number(text: str, n: int) -> int | None:
-    """Return the number, from 0, of the column that `text` counts from 1, or None if there is none."""
-    if not (text.isascii() and text.isdigit() and len(text) < 9 and 1 <= int(text) <= n):
-        return None
-    return int(text) - 1
+def is_number(text: str, n: int) -> bool:
+    """Return whether `text` is a column's number, from 1."""
+    return text.isascii() and text.isdigit() and len(text) < 9 and 1 <= int(text) <= n
 
 
 def check_count(path: Path, n: int, most: int, what: str) -> None:

@@ -19,16 +19,13 @@ from pathlib import Path
 
 import numpy as np
 
+from orbiflow.density.tables import table as tables
 from orbiflow.density.tables.table import (
     BLOCK,
-    MAX_COLUMNS,
     Reading,
     Table,
     TableError,
     check_count,
-    choose,
-    column_number,
-    finished,
     listing,
     quote,
 )
@@ -42,6 +39,7 @@ SAMPLE = 100
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
 _WHOLE = re.compile(r"[+-]?\d+")
+_UNDECODED = re.compile("[\udc80-\udcff]")
 _MISSING = frozenset({"", "na", "n/a", "nan", "null", "none"})
 
 
@@ -67,7 +65,7 @@ class Layout:
 def read_text(path: Path, reading: Reading) -> Table:
     """Read a table from a text file."""
     layout = layout_of(path, reading.columns, reading.has_header)
-    picked, notes = choose(path, layout.names, layout.numeric, reading)
+    picked, notes = tables.choose(path, layout.names, layout.numeric, reading)
     names = tuple(layout.names[i] for i in picked)
     values, lines, comments = array("d"), array("q"), 0
     cells: list[str] = []
@@ -76,8 +74,7 @@ def read_text(path: Path, reading: Reading) -> Table:
             comments += is_comment
             continue
         row = split_line(path, number, line, layout.delimiter)
-        if len(row) != len(layout.names):
-            raise _ragged(path, number, len(row), layout.first, len(layout.names), layout.delimiter)
+        _check_length(path, number, row, layout.first, len(layout.names), layout.delimiter)
         lines.append(number)
         cells.extend([row[i] for i in picked])
         if len(cells) >= BLOCK * len(picked):
@@ -88,7 +85,7 @@ def read_text(path: Path, reading: Reading) -> Table:
     check_count(path, len(lines), reading.max_rows, "rows")
     rows, at = np.frombuffer(values).reshape(-1, len(picked)), np.frombuffer(lines, dtype=np.int64)
     named = {name: getattr(layout, name) for name in ("header", "delimiter", "decimal")}
-    table = finished(path, rows, at, names, reading, notes, named)
+    table = tables.finished(path, rows, at, names, reading, notes, named)
     notes = list(table.notes)
     if layout.decimal == ",":
         notes.append("read decimal commas")
@@ -102,8 +99,12 @@ def read_text(path: Path, reading: Reading) -> Table:
 def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
     """Yield the number and text of every line that is not blank, and whether it is a comment."""
     try:
-        with path.open(encoding="utf-8-sig") as file:
+        with path.open(encoding="utf-8-sig", errors="surrogateescape") as file:
             for number, line in enumerate(iter(partial(file.readline, MAX_LINE), ""), start=1):
+                if not line.isascii() and _UNDECODED.search(line):
+                    raise InputFileError(
+                        f"{path}: line {number}: not UTF-8 text; save the file as UTF-8"
+                    )
                 if len(line) == MAX_LINE and line[-1] != "\n":
                     raise InputFileError(
                         f"{path}: line {number} is longer than {MAX_LINE} characters; this is not "
@@ -112,22 +113,8 @@ def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
                 text = line.strip()
                 if text:
                     yield number, line.rstrip("\n"), text[0] == "#"
-    except UnicodeDecodeError as exc:
-        raise InputFileError(
-            f"{path}: line {_undecodable(path)}: not UTF-8 text; save the file as UTF-8"
-        ) from exc
     except OSError as exc:
         raise InputFileError(f"{path}: cannot be read ({exc.strerror}); check it") from exc
-
-
-def _undecodable(path: Path) -> int:
-    with path.open(encoding="utf-8-sig", errors="surrogateescape") as file:
-        pieces, number = iter(partial(file.readline, MAX_LINE), ""), 1
-        for piece in pieces:
-            if any("\ud800" <= char <= "\udfff" for char in piece):
-                break
-            number += piece[-1] == "\n"
-    return number
 
 
 def layout_of(path: Path, columns: Sequence[str] | None, has_header: bool | None = None) -> Layout:
@@ -139,10 +126,9 @@ def layout_of(path: Path, columns: Sequence[str] | None, has_header: bool | None
     first = sample[0][0]
     delimiter = _delimiter([line for _, line in sample])
     rows = [split_line(path, number, line, delimiter) for number, line in sample]
-    check_count(path, len(rows[0]), MAX_COLUMNS, "columns")
+    check_count(path, len(rows[0]), tables.MAX_COLUMNS, "columns")
     for (number, _), row in zip(sample, rows, strict=True):
-        if len(row) != len(rows[0]):
-            raise _ragged(path, number, len(row), first, len(rows[0]), delimiter)
+        _check_length(path, number, row, first, len(rows[0]), delimiter)
     decimal = _decimal(rows)
     classes = [
         tuple(_class(cell.replace(decimal, ".")) for cell in column)
@@ -245,7 +231,7 @@ def _has_header(
     # `Paris,48.9,2.4` above `Rome,41.9,12.5` is a row; `city,2019,2020` above it is a header
     names = {cell.strip().casefold() for cell in row}
     wanted = [name.strip() for name in columns or ()]
-    by_number = all(column_number(name, len(row)) is not None for name in wanted)
+    by_number = all(tables.is_number(name, len(row)) for name in wanted)
     if not by_number and all(name.casefold() in names for name in wanted):
         return True
     raise TableError(
@@ -287,11 +273,12 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
     )
 
 
-def _ragged(
-    path: Path, number: int, n: int, first: int, expected: int, delimiter: str
-) -> InputFileError:
-    spaced = "; a name with a space in it counts as two" if delimiter == " " else ""
-    return InputFileError(
-        f"{path}: line {number} has {n} cell{'s' * (n != 1)} and line {first} has {expected}; give "
-        f"every line as many{spaced}"
-    )
+def _check_length(
+    path: Path, number: int, row: list[str], first: int, expected: int, delimiter: str
+) -> None:
+    if (n := len(row)) != expected:
+        spaced = "; a name with a space in it counts as two" if delimiter == " " else ""
+        raise InputFileError(
+            f"{path}: line {number} has {n} cell{'s' * (n != 1)} and line {first} has {expected}; "
+            f"give every line as many{spaced}"
+        )

@@ -260,7 +260,7 @@ def _strain(linear: Array) -> float:
 def _whole(
     along: float, up: float, scale: float, even_width: bool, even_height: bool
 ) -> tuple[int, int]:
-    """Return whole sides near the given size, even if need be, whose ratio is nearest to the true one."""
+    """Return whole sides, even if need be, near the given size with the ratio nearest to theirs."""
     ideal = max(1, round(along * scale))
     reach = max(1 + even_width, int(SIZE_TOLERANCE * ideal))
     widths = np.arange(max(1, ideal - reach), ideal + reach + 1)

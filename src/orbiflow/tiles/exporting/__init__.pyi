@@ -1,3 +1,4 @@
+from .drawings import dark_parts as dark_parts
 from .layouts import MOTIF as MOTIF
 from .layouts import SYMBOL as SYMBOL
 from .layouts import Layout as Layout

@@ -10,7 +10,8 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.layouts import BLUE, Layout, line_style
+from orbiflow.tiles.exporting.layouts import BLACK, BLUE, Layout, line_style
+from orbiflow.tiles.exporting.settings import USUAL_WIDTH
 from orbiflow.tiles.motifs import Over, carried_raster, drawn_motif
 from orbiflow.tiles.scene import (
     INCH,
@@ -29,7 +30,6 @@ from orbiflow.tiles.scene import (
 from orbiflow.tiles.silhouette import lightness
 from orbiflow.tiles.tile import EscherTile
 
-BLACK = "#000000"
 MOST_PIXELS = 1e8  # the largest number of pixels of pictures on a page
 
 
@@ -61,8 +61,10 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
     else:
         line = line_style(layout)
         styles = {"engrave": Style(BLACK), "score": line._replace(stroke=BLUE)}
-        if settings.purpose in ("plotter", "colouring"):
-            styles = dict.fromkeys(styles, line)
+        if settings.purpose in ("plotter", "template", "colouring"):
+            width = min(line.width, USUAL_WIDTH)  # finer than what is thick for small hands
+            pen = line if settings.purpose == "plotter" else line._replace(width=width)
+            styles = dict.fromkeys(styles, pen)
         motifs = burnt(layout.motif, area, styles)
     linear = np.array([tile.linear for tile in scene.tiles])
     offsets = np.array([tile.offset for tile in scene.tiles])
@@ -73,27 +75,40 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
         for name, motif in motifs.items()
         if motif.parts or motif.rasters
     ]
-    return replace(scene, layers=(*layers, *scene.layers), motifs=motifs)
+    below = tuple(layer for layer in scene.layers if layer.role == "tiles")
+    above = tuple(layer for layer in scene.layers if layer.role != "tiles")
+    return replace(scene, layers=(*below, *layers, *above), motifs=motifs)
 
 
-def burnt(motif: Motif, tile: shapely.Polygon, styles: dict[str, Style]) -> dict[str, Motif]:
-    """Return the regions and pictures to engrave, and the lines to score.
+def dark_parts(
+    motif: Motif, nozzle: float | None = None
+) -> tuple[BaseGeometry, list[BaseGeometry]]:
+    """Return the dark region of a motif, and its dark lines; they are of the region with a nozzle.
 
     What is lighter than middle grey erases what lies under it, as on white; faint colours do nothing.
+    Lines are no thinner than the nozzle's, in mm.
     """
     dark: BaseGeometry = shapely.Polygon()
     lines: list[BaseGeometry] = []
     for part in (part for part in motif.parts if part.opacity >= 0.5):
         fill, stroke, width = part.style
-        if fill is not None:
-            region = region_of(part)
-            dark = dark | region if lightness(fill) < 0.5 else dark - region
+        pen = max(width, nozzle or 0.0)
+        for colour, is_line in ((fill, False), (stroke, True)):
+            if colour is None:
+                continue
+            is_dark = lightness(colour) < 0.5
+            if is_line and is_dark and nozzle is None:
+                lines.append(lines_of(part))
+                continue
+            region = lines_of(part).buffer(pen / 2) if is_line else region_of(part)
+            dark = dark | region if is_dark else dark - region
             lines = [line - region for line in lines]
-        if stroke is not None and lightness(stroke) < 0.5:
-            lines.append(lines_of(part))
-        elif stroke is not None:
-            erased = lines_of(part).buffer(width / 2)
-            dark, lines = dark - erased, [line - erased for line in lines]
+    return dark, lines
+
+
+def burnt(motif: Motif, tile: shapely.Polygon, styles: dict[str, Style]) -> dict[str, Motif]:
+    """Return the regions and pictures to engrave, and the lines to score."""
+    dark, lines = dark_parts(motif)
     regions = boundary(dark & tile)
     scored = tuple(curve for line in lines for curve in polylines(line & tile))
     pictures = cut_off(Motif(rasters=motif.rasters), tile).rasters

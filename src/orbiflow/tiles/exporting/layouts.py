@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import itemgetter
@@ -13,12 +14,14 @@ import shapely
 from orbiflow.arrays import Array, Integers
 from orbiflow.drawing import Palette, palette
 from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import rotation_matrix
 from orbiflow.tiles.exporting.nesting import dense_arrangements, on_sheet
 from orbiflow.tiles.exporting.outlines import Outline, fitted, outline, turning
 from orbiflow.tiles.exporting.placing import (
     edge_margin,
     inset,
     longer_side,
+    mark_corners,
     place_on_page,
     rectangle_sides,
 )
@@ -60,8 +63,11 @@ def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
     width, height = settings.page
     strip = STRIP if settings.calibrate else 0.0
     box = inset(Box(0.0, 0.0, width, height - strip), settings.margin)
+    if settings.cut == "template" and "tile_size" not in settings.fields_given:
+        settings = settings.replace(tile_size=_largest(tile, settings.rotate, box))
     scale = settings.tile_size / longer_side(tile.polygon)
-    margin = None if settings.clip or settings.cut == "pieces" else edge_margin(settings.tile_size)
+    centred = settings.clip or settings.cut in ("pieces", "template")
+    margin = None if centred else edge_margin(settings.tile_size)
     place = place_on_page(tile, scale, box, y_down, rotate=settings.rotate, margin=margin)
     placed = tile.transformed(*place)
     if settings.cut != "pieces":
@@ -75,6 +81,16 @@ def layout(tile: Tile, settings: ExportSettings, *, y_down: bool) -> Layout:
                 "choose a larger area or a smaller tile size"
             )
     return Layout(settings, placed, outline(placed, settings.deviation), box, place)
+
+
+LABELS = 9.0  # width in mm of the edge around a template that numbers have for themselves
+
+
+def _largest(tile: Tile, rotate: float, box: Box) -> float:
+    """Return the size of the largest tile, turned by an angle in degrees, with its numbers in a box."""
+    width, height = np.ptp(tile.polygon @ rotation_matrix(-np.radians(rotate)).T, axis=0)
+    room = inset(box, LABELS)
+    return max(0.0, min(room.width / width, room.height / height)) * longer_side(tile.polygon)
 
 
 def bleed(settings: ExportSettings) -> float:
@@ -124,7 +140,7 @@ def tile_layers(
     layers = list[Layer]()
     for colour in sorted(set(colours.tolist())):
         own = colours == colour
-        uses = replace(copies, which=copies.which[own], offsets=copies.offsets[own])
+        uses = copies.select(own)
         if chosen is None:
             return [Layer("tiles", "tiles", line, (uses,), clipped)]
         fill, name, ink = chosen.fill(colour), f"colour {colour + 1}", chosen.ink(colour)
@@ -174,7 +190,7 @@ def tiling_scene(layout: Layout) -> Scene:
     )
 
 
-RED, BLUE = "#ff0000", "#0000ff"
+RED, BLACK, BLUE = "#ff0000", "#000000", "#0000ff"
 
 
 def line_style(layout: Layout) -> Style:
@@ -283,6 +299,7 @@ def place_on(ring: Array, place: Array) -> str:
     return f"{x:.1f} mm from its left and {y:.1f} mm from its top"
 
 
+STICKER_COLOURS = 3
 LEAST_GAP = 0.01  # the least distance in mm between cuts: pieces never touch
 LEAST_EDGE = 0.1  # twice the least distance in mm of cuts from the sheet's edge
 
@@ -294,11 +311,16 @@ def pieces_scenes(layout: Layout, *, fine: bool = True) -> list[Scene]:
     curve = _closed_fit(ring, flat) if fine else Curve.polyline(ring, closed=True)
     line = curve.flattened(flat / 4)
     gap = max(settings.spacing, LEAST_GAP)
+    if settings.coloured:  # colours that reach beyond the cut do not meet
+        gap += 2 * max(0.0, -settings.offset)
     arrangements = dense_arrangements(layout.tile, line, gap)
     edge = max(gap, LEAST_EDGE) / 2
     placed = on_sheet(arrangements, line, box.width - 2 * edge, box.height - 2 * edge)
     corner = np.array([box.left + edge, box.top + edge])
     placed = replace(placed, offsets=placed.offsets + corner)
+    if settings.marks:
+        hidden = [placed.near(line, corner) for corner in mark_corners(settings.page)]
+        placed = placed.select(~np.any(hidden, axis=0))
     if not len(placed):
         short, long = rectangle_sides(line)
         raise OrbiflowError(
@@ -322,7 +344,7 @@ def _shared_out(placed: Uses, layout: Layout, box: Box) -> list[Uses]:
             f"the bed to have {sheets} files"
         )
     counts = [min(fit, wanted - k * fit) for k in range(sheets)]
-    return [replace(placed, which=placed.which[:n], offsets=placed.offsets[:n]) for n in counts]
+    return [placed.select(slice(n)) for n in counts]
 
 
 def _scene(layout: Layout, placed: Uses, curve: Curve, line: Array, box: Box, gap: float) -> Scene:
@@ -332,7 +354,9 @@ def _scene(layout: Layout, placed: Uses, curve: Curve, line: Array, box: Box, ga
         for aspect, offset in zip(placed.which.tolist(), placed.offsets, strict=True)
     ]
     layers = [Layer("cut", "cut", line_style(layout), _moved(curve, pieces))]
-    if layout.settings.offset > 0:
+    if layout.settings.purpose == "stickers":
+        layers = [*_coloured(layout, pieces), *layers]
+    elif layout.settings.offset > 0 and not layout.settings.coloured:
         seams = _moved(layout.outline.closed, pieces)
         layers.insert(0, Layer("seam", "mark", Style(None, BLUE, 0.1), seams))
     return Scene(
@@ -342,6 +366,15 @@ def _scene(layout: Layout, placed: Uses, curve: Curve, line: Array, box: Box, ga
         prototile=layout.tile.polygon,
         tiles=tuple(pieces),
     )
+
+
+def _coloured(layout: Layout, pieces: list[PlacedTile]) -> Iterator[Layer]:
+    """Yield a layer of tiles for each of a few colours, which pieces have in turn."""
+    chosen, count = palette(layout.settings.palette), min(STICKER_COLOURS, len(pieces))
+    for colour in range(count):
+        tiles = _moved(layout.outline.closed, pieces[colour::count])
+        style = Style(chosen.fill(colour), chosen.outline, USUAL_WIDTH)
+        yield Layer(f"colour {colour + 1}", "tiles", style, tiles)
 
 
 def _moved(curve: Curve, pieces: list[PlacedTile]) -> tuple[Curve, ...]:

@@ -118,10 +118,7 @@ KEPT_LATTICES = 3  # number of best lattices that are then tightened exactly
 
 
 def raster_starts(ring: Array, gap: float) -> list[Arrangement]:
-    """Return dense lattices of the piece, and of pairs, to the raster's precision.
-
-    A pair is the piece and the piece turned by 180 degrees.
-    """
+    """Return dense lattices, to the raster's precision, of the piece and of pairs of opposite ones."""
     raster = _Raster(ring, gap)
     still, center = np.eye(2), raster.center
     single = [
@@ -257,10 +254,7 @@ def _improved(start: Arrangement, ring: Array, gap: float, rng: np.random.Genera
 
 
 def on_sheet(arrangements: Sequence[Arrangement], ring: Array, width: float, height: float) -> Uses:
-    """Fill a rectangle from the origin with as many pieces as fit, in rows from the top.
-
-    Each arrangement is tried in several ways; among equally good ones the first is taken.
-    """
+    """Fill a rectangle from the origin with as many pieces as fit, in rows from the top."""
     best = Uses("piece", np.eye(2)[None], np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
     turns = [(found, angle) for found in arrangements for angle in _angles(found, ring)]
     for arrangement, angle in turns:

@@ -7,7 +7,7 @@ import shapely
 
 from orbiflow.arrays import Array
 from orbiflow.symmetry import rotation_matrix
-from orbiflow.tiles.exporting.settings import USUAL_WIDTH, usual_tolerance
+from orbiflow.tiles.exporting.settings import MARKS_EDGE, USUAL_WIDTH, usual_tolerance
 from orbiflow.tiles.scene import Box
 from orbiflow.tiles.tilings import Tile, copies_inside
 
@@ -26,16 +26,10 @@ def place_on_page(
     rotate: float = 0.0,
     margin: float | None = None,
 ) -> tuple[Array, Array]:
-    """Put a tile in the middle of a page, or nearby where that makes most tiles whole.
+    """Return the map, linear part and offset, from a tile's units to the middle of a page.
 
-    Args:
-        tile: The tile in its own units, with y pointing down if `y_down`.
-        scale: The page's units in one of the tile's.
-        page: The page.
-        rotate: An angle in degrees by which the tiling is turned counterclockwise.
-        margin: The distance that whole tiles keep from the page's edge; None to stay in the middle.
-
-    Returns the linear part (2, 2) and the offset (2,) of the map from the tile to the page.
+    `rotate` is in degrees counterclockwise. With the `margin` that whole tiles keep from the page's
+    edge, the tile is moved nearby to where most are whole.
     """
     turn = rotation_matrix(-np.radians(rotate))  # y points down on the page
     linear = scale * turn @ np.diag([1.0, 1.0 if y_down else -1.0])
@@ -54,6 +48,20 @@ def edge_margin(tile_size: float) -> float:
 def inset(box: Box, margin: float) -> Box:
     """Return a box that is smaller by a margin on each side."""
     return Box(box.left + margin, box.top + margin, box.right - margin, box.bottom - margin)
+
+
+MARK = 20.0  # length in mm of registration marks, around which nothing else may lie
+
+
+def mark_corners(page: tuple[float, float]) -> list[Box]:
+    """Return the boxes of registration marks: in the corners of a page but the lower right one."""
+    left = top = MARKS_EDGE
+    right, bottom = page[0] - MARKS_EDGE, page[1] - MARKS_EDGE
+    return [
+        Box(left, top, left + MARK, top + MARK),
+        Box(right - MARK, top, right, top + MARK),
+        Box(left, bottom - MARK, left + MARK, bottom),
+    ]
 
 
 def _shift(tile: Tile, box: Box) -> Array:

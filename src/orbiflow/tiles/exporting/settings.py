@@ -30,6 +30,7 @@ from orbiflow.units import (
 )
 
 PIECES = Group("Pieces")
+MARKS_EDGE = 10.0  # distance in mm of registration marks from the page's edge
 USUAL_WIDTH = 0.25  # width in mm of the lines around tiles
 PAGE = (300.0, 200.0)  # width and height of the page in mm where none is asked for
 
@@ -39,6 +40,13 @@ def usual_tolerance(tile_size: float) -> float:
     return max(0.05, tile_size / 800)
 
 
+Purpose = Literal["laser", "print", "paper", "web", "plotter", "template", "colouring", "stickers"]
+"""What an export is for, by which many settings go."""
+
+COLOURED = ("print", "paper", "web", "stickers")  # what shows drawings in their colours
+PRINTED = ("print", "paper", "template", "colouring", "stickers")  # what is a PDF unless told
+
+
 class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     """How a tiling is drawn in real size; lengths in mm.
 
@@ -46,9 +54,7 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     0.01
     """
 
-    purpose: Annotated[
-        Literal["laser", "print", "paper", "web", "plotter", "colouring"] | None, Option("--for")
-    ] = None
+    purpose: Annotated[Purpose | None, Option("--for")] = None
     """Settings that suit a purpose; other options go before them."""
 
     format: Annotated[
@@ -67,15 +73,19 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     margin: LengthOrZero = 0.0
     """Width of the page's edge that stays empty."""
 
-    cut: Literal["none", "skeleton", "pieces", "jigsaw"] = "none"
+    cut: Literal["none", "skeleton", "pieces", "jigsaw", "template"] = "none"
     """With none, every tile is drawn; with skeleton, each shared edge once; with pieces, tiles
-    apart; with jigsaw, a rectangle whose pieces at the border have no crumbs."""
+    apart; with jigsaw, a rectangle whose pieces at the border have no crumbs; with template, one
+    tile to draw on, as large as the page allows."""
 
     rotate: Annotated[
         float,
         Range(-360, 360),
         Unit("degrees"),
-        OnlyWith(cut=("none", "skeleton", "jigsaw"), because="pieces are turned to fill the page"),
+        OnlyWith(
+            cut=("none", "skeleton", "jigsaw", "template"),
+            because="pieces are turned to fill the page",
+        ),
     ] = 0.0
     """Turn the tiling on the page by this angle, counterclockwise."""
 
@@ -90,8 +100,7 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     """Cut the page's border, too."""
 
     bed: Annotated[
-        Size | None,
-        OnlyWith(cut=("none", "skeleton", "pieces"), because="a jigsaw is cut from one sheet"),
+        Size | None, OnlyWith(cut=("none", "skeleton", "pieces"), because="others are one sheet")
     ] = None
     """Size of the machine's bed; a larger page becomes several files."""
 
@@ -139,6 +148,11 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     ] = None
     """Number of pieces."""
 
+    marks: Annotated[bool, Option("--marks", off="--no-marks"), OnlyWith(cut="pieces"), PIECES] = (
+        False
+    )
+    """Add the registration marks of cutters that cut what is printed, 10 mm from the page's edge."""
+
     tray: Annotated[Length | None, OnlyWith(cut="jigsaw"), PIECES] = None
     """Add two sheets with a jigsaw's tray, a frame with a rim this wide and a base."""
 
@@ -165,6 +179,11 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
                 f"{{margin}} of {self.margin:g} mm leaves nothing of a page of {width:g} x {height:g} "
                 "mm; choose a smaller one"
             )
+        if self.marks and self.margin < MARKS_EDGE:
+            raise SettingError(
+                f"{{marks}} lie {MARKS_EDGE:g} mm from the page's edge; choose a {{margin}} of at "
+                f"least {MARKS_EDGE:g} mm, got {self.margin:g} mm"
+            )
         if self.tolerance is not None and self.tolerance > self.tile_size / 20:
             raise SettingError(
                 f"{{tolerance}} of {self.tolerance:g} mm would lose the shape of a tile of "
@@ -177,12 +196,12 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     @property
     def coloured(self) -> bool:
         """Whether what lies on the tiles has its colours, rather than those of a machine's layers."""
-        return (self.cut == "none" and self.filled) or self.purpose in ("print", "paper", "web")
+        return (self.cut == "none" and self.filled) or self.purpose in COLOURED
 
     @property
     def usual_format(self) -> str:
         """What suits the purpose, else svg."""
-        return "pdf" if self.purpose in ("print", "paper", "colouring") else "svg"
+        return "pdf" if self.purpose in PRINTED else "svg"
 
     @property
     def page(self) -> tuple[float, float]:
@@ -198,6 +217,7 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
         return usual_tolerance(self.tile_size) if self.tolerance is None else self.tolerance
 
 
+_SHEET = {"area": PAGES["a4"], "margin": 10.0, "stroke": "#000000", "stroke_width": 0.8}
 _LINES = {"cut": "skeleton", "clip": False, "filled": False}
 
 PURPOSES: Mapping[str, Mapping[str, Any]] = {
@@ -205,16 +225,15 @@ PURPOSES: Mapping[str, Mapping[str, Any]] = {
     "plotter": {**_LINES, "stroke": "#000000", "stroke_width": 0.3},
     "print": {"clip": True},
     "web": {"clip": True},
-    "colouring": {
-        **_LINES,
+    "template": {**_SHEET, "cut": "template"},
+    "stickers": {
+        "cut": "pieces",
         "area": PAGES["a4"],
         "margin": 10.0,
-        "tile_size": 60.0,
-        "clip": True,
-        "border": True,
-        "stroke": "#000000",
-        "stroke_width": 0.8,
+        "marks": True,
+        "offset": 2.0,
     },
+    "colouring": {**_LINES, **_SHEET, "tile_size": 60.0, "clip": True, "border": True},
     "paper": {
         "clip": True,
         "area": (COLUMNS["single"], round(COLUMNS["single"] / 1.5)),

@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting.layouts import BLUE, STRIP
+from orbiflow.tiles.exporting.layouts import BLACK, BLUE, STRIP
+from orbiflow.tiles.exporting.placing import mark_corners
 from orbiflow.tiles.scene import (
     Box,
     Curve,
@@ -18,8 +19,8 @@ from orbiflow.tiles.scene import (
     Scene,
     Style,
     Uses,
-    clipped_line,
-    clipped_region,
+    clipped,
+    rectangle,
 )
 
 OVERLAP = 12.0  # width in mm of the strip that two neighbouring sheets share; the crosses lie in it
@@ -118,24 +119,18 @@ def _part(
     layer: Layer, scene: Scene, seams: Box, window: Box, back: np.ndarray, tolerance: float
 ) -> Layer:
     """Return the part of a layer that a sheet shows, in the sheet's own coordinates."""
-    still = np.eye(2)
     items: list[Curve | Uses] = []
     for item in layer.items:
         if isinstance(item, Uses):
-            images = item.images(scene.points(item.symbol))
-            low, high = images.min(axis=1), images.max(axis=1)
-            near = (high > window[:2]).all(axis=1) & (low < window[2:]).all(axis=1)
-            items.append(
-                Uses(item.symbol, item.linear, item.which[near], item.offsets[near] + back)
-            )
+            near = item.select(item.near(scene.points(item.symbol), window))
+            items.append(replace(near, offsets=near.offsets + back))
         elif not isinstance(item, Curve):
             raise TypeError("motifs are flattened after a page is split")
-        elif layer.role == "paper":
-            items += [part.moved(still, back) for part in clipped_region(item, seams, tolerance)]
         else:
-            items += [part.moved(still, back) for part in clipped_line(item, seams, tolerance)]
-    clipped = layer.clipped or any(isinstance(item, Uses) for item in items)
-    return replace(layer, items=tuple(items), clipped=clipped)
+            parts = clipped(item, seams, tolerance, filled=layer.role == "paper")
+            items += [part.moved(np.eye(2), back) for part in parts]
+    copies = any(isinstance(item, Uses) for item in items)
+    return replace(layer, items=tuple(items), clipped=layer.clipped or copies)
 
 
 def _tiles(scene: Scene, seams: Box, back: np.ndarray) -> tuple[PlacedTile, ...]:
@@ -168,3 +163,22 @@ def calibrated(scene: Scene) -> Scene:
     marks = tuple(Curve.polyline(line) for line in lines)
     layer = Layer("calibration 100 mm", "mark", MARK, marks)
     return replace(scene, layers=(*scene.layers, layer))
+
+
+def registered(scene: Scene) -> Scene:
+    """Add the marks by which cutters of the brand Silhouette find what is printed.
+
+    They are a square of 5 mm and two angles of 20 mm, in lines of 0.3 mm, as its cameras expect them.
+    """
+    first, second, third = mark_corners((scene.width, scene.height))
+    left, top = first.left, first.top
+    square = rectangle(Box(left, top, left + 5, top + 5))
+    angles = (
+        Curve.polyline([[second.left, top], [second.right, top], [second.right, second.bottom]]),
+        Curve.polyline([[left, third.top], [left, third.bottom], [third.right, third.bottom]]),
+    )
+    layers = (
+        Layer("registration", "mark", Style(BLACK), (square,)),
+        Layer("registration angles", "mark", Style(None, BLACK, 0.3), angles),
+    )
+    return replace(scene, layers=(*layers, *scene.layers))

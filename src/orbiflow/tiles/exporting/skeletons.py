@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.exporting.layouts import Layout, chosen_copies, line_style, placed_tiles
-from orbiflow.tiles.scene import Curve, Layer, Scene, clipped_line, rectangle
+from orbiflow.tiles.scene import Curve, Layer, Scene, clipped, rectangle
 from orbiflow.tiles.tilings import Copies, skeleton
 
 
@@ -47,12 +47,13 @@ def skeleton_scene(layout: Layout) -> Scene:
             arcs.append(curve)
             ends.append(vertices)
             continue
-        for part in clipped_line(curve, box, settings.deviation / 4):
+        for part in clipped(curve, box, layout.fine, filled=False):
             # a cut end is a vertex of its own
-            start = (
-                vertices[0] if np.allclose(part.start, curve.start, 0, 1e-9) else (free := free - 1)
-            )
-            end = vertices[1] if np.allclose(part.end, curve.end, 0, 1e-9) else (free := free - 1)
+            start, end = vertices
+            if not np.allclose(part.start, curve.start, 0, 1e-9):
+                start = free = free - 1
+            if not np.allclose(part.end, curve.end, 0, 1e-9):
+                end = free = free - 1
             arcs.append(part)
             ends.append((start, end))
     style = line_style(layout)
@@ -62,6 +63,7 @@ def skeleton_scene(layout: Layout) -> Scene:
     return Scene(
         *settings.page,
         tuple(layers),
+        window=box,
         prototile=layout.tile.polygon,
         tiles=placed_tiles(copies, layout),
     )
@@ -157,11 +159,7 @@ def _without_joints(circuit: Trail, count: int) -> list[Trail]:
 
 
 def in_short_order(curves: list[Curve]) -> list[Curve]:
-    """Return the curves in an order and in directions that make a tool's way between them short.
-
-    The way leads from the upper left corner to the nearest end, and from each curve's other end to
-    the nearest end of a curve that is left.
-    """
+    """Return curves in the order and direction of a way from each to the nearest end that is left."""
     if not curves:
         return []
     nearest = _Nearest(np.array([[curve.start, curve.end] for curve in curves]))

@@ -15,8 +15,9 @@ from orbiflow.tiles.exporting.drawings import drawn_on, with_drawing
 from orbiflow.tiles.exporting.jigsaws import jigsaw_scenes
 from orbiflow.tiles.exporting.layouts import Layout, layout, pieces_scenes, place_on, tiling_scene
 from orbiflow.tiles.exporting.settings import ExportSettings
-from orbiflow.tiles.exporting.sheets import calibrated, split
+from orbiflow.tiles.exporting.sheets import calibrated, registered, split
 from orbiflow.tiles.exporting.skeletons import skeleton_scene
+from orbiflow.tiles.exporting.templates import template_scene
 from orbiflow.tiles.likeness import narrowest_neck
 from orbiflow.tiles.motifs import Over, read_over, with_map
 from orbiflow.tiles.scene import (
@@ -51,6 +52,11 @@ class Exported:
     def tiles(self) -> int:
         """The number of tiles on all sheets; a tile cut where sheets meet counts on each."""
         return sum(len(scene.tiles) for scene in self.scenes)
+
+    @property
+    def tile_size(self) -> float:
+        """The longer side in mm of a tile's smallest rectangle."""
+        return self.scenes[0].facts["tile_size"]
 
     def _repr_png_(self) -> bytes:
         """Return what a notebook shows: the first sheet, some 600 pixels wide."""
@@ -114,13 +120,18 @@ def scenes(
         force=force, otherwise="so it is not exported; --force exports it, marked so"
     )
     placed, notes = laid_out(given, settings, picture)
+    settings = placed.settings  # a template's tile is as large as the page allows
     notes = (*notes, *_colour_notes(given, settings))
-    made = [_described(scene, given, settings, certificate) for scene in _made(placed, settings)]
+    made = [_described(scene, given, settings, certificate) for scene in _made(placed, given)]
+    if settings.cut == "template" and given.bending is None:
+        notes = (*notes, "the template has no silhouette: no map of it is known")
     if settings.cut == "jigsaw":
         facts = made[0].facts
         pieces, whole = facts["pieces"], facts["whole_tiles"]
         count = f"{pieces} pieces, {whole} whole tiles and {pieces - whole} at the border"
         notes = (*notes, f"the jigsaw has {count}, the smallest {facts['smallest']:.2f} of a tile")
+    if settings.marks:
+        made = [registered(scene) for scene in made]
     if settings.calibrate:
         # the strip at the foot is the last sheet's; pieces have one on each, a jigsaw's tray has none
         marked = {"pieces": slice(None), "jigsaw": slice(1)}.get(settings.cut, slice(-1, None))
@@ -143,12 +154,14 @@ def laid_out(
     return placed, notes
 
 
-def _made(placed: Layout, settings: ExportSettings) -> list[Scene]:
-    fine = settings.deviation / 4
+def _made(placed: Layout, given: EscherTile) -> list[Scene]:
+    settings, fine = placed.settings, placed.fine
     if settings.cut == "pieces":
         made = pieces_scenes(placed, fine=settings.file_format not in ("dxf", "json"))
     elif settings.cut == "jigsaw":
         made = jigsaw_scenes(placed)
+    elif settings.cut == "template":
+        made = [template_scene(placed, given)]
     else:
         made = [skeleton_scene(placed) if settings.cut == "skeleton" else tiling_scene(placed)]
     painted = settings.cut == "none" and settings.filled
@@ -189,7 +202,7 @@ def _described(
 
 
 def _colour_notes(given: EscherTile, settings: ExportSettings) -> tuple[str, ...]:
-    if settings.cut == "none":
+    if settings.cut == "none" or settings.purpose == "stickers":
         return palette(settings.palette).shortage(colouring(given.tile).count)
     width = settings.stroke_width
     if width is None or width >= VISIBLE:

@@ -1,9 +1,9 @@
 from .drawings import Over as Over
+from .drawings import carried_raster as carried_raster
+from .drawings import drawn_motif as drawn_motif
 from .drawings import paint_motif as paint_motif
+from .drawings import picture_paint as picture_paint
 from .drawings import read_over as read_over
-from .making import carried_raster as carried_raster
-from .making import drawn_motif as drawn_motif
-from .making import picture_paint as picture_paint
 from .raster import NOWHERE as NOWHERE
 from .raster import Grid as Grid
 from .raster import Paint as Paint
@@ -13,4 +13,5 @@ from .raster import ring_sides as ring_sides
 from .raster import runs as runs
 from .settings import MotifSettings as MotifSettings
 from .source import Picture as Picture
+from .source import silhouette_outline as silhouette_outline
 from .source import with_map as with_map

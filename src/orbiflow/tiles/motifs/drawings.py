@@ -1,26 +1,39 @@
-"""Drawings in curves over the silhouette: an SVG file is read, carried onto the tile and painted."""
+"""What every copy of a tile carries: a drawing in curves from an SVG file, or a picture of pixels."""
 
 from __future__ import annotations
 
+import io
 from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import shapely
+from PIL import Image
 from shapely.errors import GEOSException
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
-from orbiflow.drawing import plane_axes
+from orbiflow.drawing import Palette, plane_axes
 from orbiflow.errors import InputFileError
-from orbiflow.tiles.geometry import orient, polygons_in
+from orbiflow.tiles.geometry import polygons_in
+from orbiflow.tiles.motifs.engraving import engraved, eye
 from orbiflow.tiles.motifs.raster import Grid, Paint
-from orbiflow.tiles.motifs.source import Picture, covered_area, read_picture
-from orbiflow.tiles.scene import INK, Curve, Motif, Part, Style, curves_path, draw_paths
+from orbiflow.tiles.motifs.settings import MotifSettings
+from orbiflow.tiles.motifs.source import Picture, carried_picture, covered_area, read_picture
+from orbiflow.tiles.scene import (
+    INK,
+    Curve,
+    Motif,
+    Part,
+    Raster,
+    Style,
+    boundary,
+    curves_path,
+    draw_paths,
+)
 from orbiflow.tiles.silhouette import (
-    MAX_BYTES,
     Drawing,
     DrawnShape,
     Regions,
@@ -29,8 +42,6 @@ from orbiflow.tiles.silhouette import (
     TooTangled,
     brushes,
     check_file,
-    parse_xml,
-    read_bytes,
     read_head,
 )
 from orbiflow.tiles.tile import EscherTile
@@ -45,9 +56,7 @@ FARTHEST = 1e6  # greatest reach of a drawing, in sizes of the silhouette
 
 def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
     """Read an SVG file and carry its fills and strokes onto a tile, in the tile's units, with notes."""
-    check_file(path)
-    drawing = Drawing(path, parse_xml(path, read_bytes(path, MAX_BYTES)))
-    drawing.collect()
+    drawing = Drawing(path)
     carry = _Carry(tile, *_onto(path, drawing, tile))
     regions = Regions(drawing, lambda _: carry.tolerance, 2 * MOST_CARRIED)
     parts: list[Part] = []
@@ -127,11 +136,11 @@ def _parts(shape: DrawnShape, regions: Regions, carry: _Carry) -> list[Part]:
 def _area(region: BaseGeometry, carry: _Carry) -> list[Curve]:
     curves: list[Curve] = []
     for polygon in polygons_in(region):
-        for k, ring in enumerate([polygon.exterior, *polygon.interiors]):
-            points = carry(shapely.get_coordinates(ring)[:-1], closed=True)
-            # holes run the other way, so that they are holes under every fill rule
-            points = orient(points, counter_clockwise=k == 0)
-            curves.append(Curve.polyline(points, closed=True))
+        rings = [
+            shapely.get_coordinates(ring)[:-1] for ring in (polygon.exterior, *polygon.interiors)
+        ]
+        outer, *holes = (carry(ring, closed=True) for ring in rings)
+        curves += boundary(shapely.Polygon(outer, holes))
     return curves
 
 
@@ -198,3 +207,49 @@ def _canvas(parts: list[Part], grid: Grid) -> Array:
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba(), dtype=np.float32) / 255
+
+
+def drawn_motif(
+    tile: EscherTile,
+    settings: MotifSettings,
+    palette: Palette,
+    drawing: Motif | None = None,
+    *,
+    hairlines: bool = False,
+) -> Motif:
+    """Return what is drawn on a tile, in its units: a drawing, engraved lines, then eyes.
+
+    Engraved lines are regions that swell and taper, or `hairlines` along their middle.
+    """
+    if drawing is not None or settings.eyes:
+        tile.require_map()
+    parts = () if drawing is None else drawing.parts
+    around = [eye(tile, given, palette) for given in settings.eyes]
+    if settings.strokes is not None:
+        parts += engraved(tile, settings.strokes, around, hairlines=hairlines)
+    return Motif(parts + tuple(part for one in around for part in one.parts))
+
+
+def picture_paint(
+    picture: Picture | None, tile: EscherTile, density: float, colours: int = 1
+) -> Paint:
+    """Paint a tile's raster of `density` texels along its unit with a picture alone."""
+    polygon = tile.tile.polygon
+    paint = Paint(Grid.over(polygon, density, colours))
+    if picture is not None:
+        paint.lay(*carried_picture(picture, tile, paint.grid))
+        paint.bleed(paint.grid.inside(polygon))
+    return paint
+
+
+def carried_raster(picture: Picture, tile: EscherTile, density: float, colours: int = 1) -> Raster:
+    """Return a picture carried onto a tile, in its units, with `density` pixels along one."""
+    paint = picture_paint(picture, tile, density, colours)
+    values, grid = paint.values, paint.grid
+    alpha = 1 - values[..., 3:4]
+    straight = values[..., :3] / np.maximum(alpha, 1e-6)
+    both = np.concatenate([straight, alpha], axis=2)
+    image = Image.fromarray((both * 255 + 0.5).clip(0, 255).astype(np.uint8), "RGBA")
+    buffer = io.BytesIO()
+    image.save(buffer, "PNG")
+    return Raster(buffer.getvalue(), image.size, np.eye(2) / grid.density, grid.corner)

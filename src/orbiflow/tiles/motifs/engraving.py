@@ -161,10 +161,7 @@ def _circle(middle: Array, radius: float) -> Curve:
 def engraved(
     tile: EscherTile, strokes: Strokes, around: Sequence[Eye] = (), *, hairlines: bool = False
 ) -> tuple[Part, ...]:
-    """Return lines of one kind in ink, thin in the light and deep inside, that keep clear of eyes.
-
-    With `hairlines`, they have no width.
-    """
+    """Return lines of one kind, clear of eyes, thin in the light and deep inside, or without width."""
     polygon = tile.tile.polygon
     size = float(np.sqrt(abs(tile.tile.signed_area)))
     flip = np.array([1.0, 1.0 if tile.y_down else -1.0])

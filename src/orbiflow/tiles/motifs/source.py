@@ -17,7 +17,7 @@ from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import border
 from orbiflow.tiles.motifs.raster import Grid, polygon_sides, runs, triangle_sides
 from orbiflow.tiles.search import matched
-from orbiflow.tiles.silhouette import Frame, Target, deep_channel, open_image, upright
+from orbiflow.tiles.silhouette import Frame, Target, deep_channel, open_image
 from orbiflow.tiles.tile import EscherTile, TileMap, TileSource
 
 
@@ -151,26 +151,20 @@ class Picture:
 
 def read_picture(path: Path, tile: EscherTile) -> Picture:
     """Read a picture of a tile's silhouette from a file; it must have the silhouette's aspect."""
-    image, notes = open_image(path, _decode)
-    covered = covered_area(tile)
+    image, notes = open_image(path)
+    if image.mode.startswith(("I", "F")):  # more than 8 bits
+        levels = np.asarray(deep_channel(path, image))
+        image = Image.fromarray((levels * 255 + 0.5).astype(np.uint8))
+    image, covered = image.convert("RGBA"), covered_area(tile)
     covered.require_aspect(path, "picture", image.size)
     wide, high = covered.high - covered.low
     width, height = image.size
     if (width, height) != (round(wide), round(high)):
-        notes = (
-            *notes,
+        notes.append(
             f"laid the picture ({width} x {height} pixels) over {covered.name} "
-            f"({wide:.6g} x {high:.6g})",
+            f"({wide:.6g} x {high:.6g})"
         )
-    return Picture(image, covered, notes)
-
-
-def _decode(path: Path, image: Image.Image) -> tuple[Image.Image, tuple[str, ...]]:
-    turned, notes = upright(image)
-    if turned.mode.startswith(("I", "F")):  # more than 8 bits
-        levels = np.asarray(deep_channel(path, turned))
-        turned = Image.fromarray((levels * 255 + 0.5).astype(np.uint8))
-    return turned.convert("RGBA"), tuple(notes)
+    return Picture(image, covered, tuple(notes))
 
 
 def carried_picture(picture: Picture, tile: EscherTile, grid: Grid) -> tuple[Array, Array]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
@@ -63,15 +64,15 @@ LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 class Page:
-    """The tile's default window on a picture `width` pixels wide.
+    """The tile's default window, or one of another shape but as large, on a picture in pixels.
 
     `linear` maps the tile's coordinates to pixels; `center` and `middle` are its centre in either.
     """
 
-    def __init__(self, tile: Tile, width: int, y_down: bool) -> None:
+    def __init__(self, tile: Tile, width: int, aspect: float, y_down: bool) -> None:
         window = default_window(tile)
-        self.width, self.height = width, 2 * round(width / ASPECT / 2)
-        scale = width / (window[2] - window[0])
+        self.width, self.height = width, 2 * round(width / aspect / 2)
+        scale = width / (window[2] - window[0]) * math.sqrt(ASPECT / aspect)
         self.linear = scale * np.diag([1.0, 1.0 if y_down else -1.0])
         self.center = tile.center
         self.middle = np.array([self.width, self.height]) / 2
@@ -83,12 +84,14 @@ class Page:
         return (*own.min(axis=0).tolist(), *own.max(axis=0).tolist())
 
 
-def morph(tile: Tile, width: int, *, y_down: bool = False, steady: bool = False) -> Motion:
+def morph(
+    tile: Tile, width: int, *, aspect: float = ASPECT, y_down: bool = False, steady: bool = False
+) -> Motion:
     """Return the tiling by the class's template, with straight edges, becoming the tile's.
 
     It is a tiling throughout; if `steady`, the tile's lattice is there from the start.
     """
-    way, page = Morph(OwnFrame.of(tile)), Page(tile, width, y_down)
+    way, page = Morph(OwnFrame.of(tile)), Page(tile, width, aspect, y_down)
     end = way.end
     group, own = end.kind.group(), Tile(end.points, end.kind.group(), end.kind.name)
     center = np.linalg.solve(end.linear, page.center - end.offset)
@@ -119,9 +122,9 @@ def morph(tile: Tile, width: int, *, y_down: bool = False, steady: bool = False)
     )
 
 
-def grow(tile: Tile, width: int, *, y_down: bool = False) -> Motion:
+def grow(tile: Tile, width: int, *, aspect: float = ASPECT, y_down: bool = False) -> Motion:
     """Return one tile, and the tiling growing around it, nearest first."""
-    page = Page(tile, width, y_down)
+    page = Page(tile, width, aspect, y_down)
     outline = (tile.polygon - page.center) @ page.linear.T
     places, colours = _still_places(tile, page)
     return Motion(
@@ -135,7 +138,7 @@ def grow(tile: Tile, width: int, *, y_down: bool = False) -> Motion:
     )
 
 
-def bend(given: EscherTile, width: int) -> Motion:
+def bend(given: EscherTile, width: int, *, aspect: float = ASPECT) -> Motion:
     """Return the silhouette bending into the tile, and then the tiling growing around it."""
     tile, bending, frame = given.tile, given.bending, given.frame
     if bending is None or frame is None:
@@ -143,7 +146,7 @@ def bend(given: EscherTile, width: int) -> Motion:
             "this tile has no bent silhouette: only tiles of a search for likeness have one, in the "
             "model.safetensors of their folder; choose kind morph or grow"
         )
-    page, way = Page(tile, width, given.y_down), BendingWay(bending)
+    page, way = Page(tile, width, aspect, given.y_down), BendingWay(bending)
     places, colours = _still_places(tile, page)
 
     def outline(progress: float) -> Array:

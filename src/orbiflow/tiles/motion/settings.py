@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from orbiflow.drawing import DEFAULT_PALETTE, PaletteName
 from orbiflow.settings import FileSettings, Hidden, OnlyWith, Range, SettingError, Unit
+from orbiflow.units import POSTS
 
 MOST_FRAMES = 2400  # the largest number of pictures of a GIF or video
 
@@ -33,10 +34,19 @@ class AnimationSettings(FileSettings, group="Animation"):
     """Pictures per second of a GIF or video."""
 
     size: Annotated[int, Range(64, 4000), Unit("pixels")] = 800
-    """Width, an even number; the height is two thirds of it."""
+    """Width, an even number."""
+
+    shape: Literal["wide", "square", "story"] = "wide"
+    """With wide, the height is two thirds of the width; square and story are 1:1 and 9:16."""
 
     palette: PaletteName = DEFAULT_PALETTE
     """Colours of the tiles."""
+
+    @property
+    def aspect(self) -> float:
+        """The width over the height."""
+        width, height = POSTS.get(self.shape, (3, 2))
+        return width / height
 
     def check(self) -> None:
         if self.size % 2:

@@ -98,14 +98,15 @@ def animation(
 
 def motion(tile: EscherTile, settings: AnimationSettings) -> Motion:
     """Return what moves, before it is a file."""
+    width, aspect = settings.size, settings.aspect
     match settings.kind:
         case "morph":
             steady = settings.format == "svg"
-            return morph(tile.tile, settings.size, y_down=tile.y_down, steady=steady)
+            return morph(tile.tile, width, aspect=aspect, y_down=tile.y_down, steady=steady)
         case "grow":
-            return grow(tile.tile, settings.size, y_down=tile.y_down)
+            return grow(tile.tile, width, aspect=aspect, y_down=tile.y_down)
         case "bend":
-            return bend(tile, settings.size)
+            return bend(tile, width, aspect=aspect)
 
 
 OUTLINE = 0.0016  # width of outlines, as a share of the picture's

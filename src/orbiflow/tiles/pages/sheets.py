@@ -10,22 +10,21 @@ from pathlib import Path, PurePath
 import numpy as np
 from PIL import Image, ImageDraw
 from PIL.PngImagePlugin import PngInfo
-from shapely import Polygon
+from shapely import MultiPolygon, Polygon, box
 
-from orbiflow.arrays import Array, Window
-from orbiflow.drawing import Raster, font, window_of
-from orbiflow.tiles.geometry import polygons_in
+from orbiflow.arrays import Window
+from orbiflow.drawing import Raster, font, strip_middle, window_of
 from orbiflow.tiles.likeness import MOST_STARS
 from orbiflow.tiles.pictures import comparison, tiling_raster
 from orbiflow.tiles.search import ClassFailure
-from orbiflow.tiles.silhouette import Target, holes_filled, open_image, parts_left_out, upright
+from orbiflow.tiles.silhouette import Target, holes_filled, open_image, parts_left_out
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Colouring
 
 LONGER_SIDE = 1200  # pixels
-FINER = 2  # drawn finer, then averaged
 OUTLINE, LEFT_OUT, FILLED, DRAWING = "#e6007e", "#ff8c00", "#0078ff", "#444444"
-LINE, STRIP, LETTERS = 4, 44, 24  # pixels
+LEAST_WIDTH, STRIP, LETTERS = 580, 44, 22  # pixels
+LINE = 2.0  # pixels: half of the outline's width
 SOFTWARE = "orbiflow"
 
 
@@ -34,76 +33,62 @@ def read_png(target: Target, source: Path) -> bytes:
 
     Parts left out and holes filled are marked, too.
     """
-    low, size = _window(target)
-    scale = FINER * LONGER_SIDE / size.max()
-    width, height = (max(FINER, round(float(side * scale))) for side in size)
-    image = _source(source) if target.kind == "image" else None
-    canvas = (image or Image.new("RGB", (1, 1), "white")).resize((width, height))
-
-    def pixels(ring: Array) -> list[tuple[float, float]]:
-        points = (ring - low) * scale
-        if not target.y_down:
-            points[:, 1] = height - points[:, 1]
-        return [(x, y) for x, y in points.tolist()]
-
-    def tint(parts: Sequence[Polygon], colour: str, opacity: float) -> None:
-        mask = Image.new("L", canvas.size)
-        pen = ImageDraw.Draw(mask)
-        for part in sorted(parts, key=lambda part: -Polygon(part.exterior).area):
-            pen.polygon(pixels(np.array(part.exterior.coords)), fill=round(255 * opacity))
-            for hole in part.interiors:
-                pen.polygon(pixels(np.array(hole.coords)), fill=0)
-        canvas.paste(colour, mask=mask)
-
+    window, whole = _window(target), Polygon(target.outline)
     lost, holes = parts_left_out(target), holes_filled(target)
-    if image is None:
-        whole = Polygon(target.outline) if target.seen is None else target.seen
-        tint(polygons_in(whole), DRAWING, 1)
-    tint(lost, LEFT_OUT, 0.7)
-    tint(holes, FILLED, 0.5)
-    ring = pixels(np.vstack([target.outline, target.outline[:2]]))
-    for colour, wide in (("white", 2 * LINE), (OUTLINE, LINE)):
-        ImageDraw.Draw(canvas).line(ring, fill=colour, width=wide * FINER, joint="curve")
-    marks = [("read as the silhouette", OUTLINE)]
-    marks += [("left out", LEFT_OUT)] * bool(lost) + [("hole, filled", FILLED)] * bool(holes)
-    return _png(canvas.reduce(FINER), marks)
+    pixel = max(window[2] - window[0], window[3] - window[1]) / LONGER_SIDE
+    width = round((window[2] - window[0]) / pixel)
+
+    def raster(paper: str) -> Raster:
+        return Raster(window, width, y_down=target.y_down, paper=paper, strip_px=STRIP)
+
+    base = raster("#ffffff")
+    if target.kind != "image":
+        base.fill_geometry(whole if target.seen is None else target.seen, DRAWING)
+    _mark(base, "read as the silhouette", OUTLINE, 12)
+    if lost:
+        _mark(base, "left out", LEFT_OUT, 300)
+    if holes:
+        _mark(base, "hole, filled", FILLED, 430)
+    page = base.image()
+    if target.size and target.kind == "image":
+        page.paste(_source(source).resize([max(1, round(side / pixel)) for side in target.size]))
+    for geometry, colour, opacity in (
+        (MultiPolygon(lost), LEFT_OUT, 0.7),
+        (MultiPolygon(holes), FILLED, 0.5),
+        (whole.exterior.buffer(2 * LINE * pixel), "#ffffff", 1.0),
+        (whole.exterior.buffer(LINE * pixel), OUTLINE, 1.0),
+    ):
+        mask = raster("#000000")
+        mask.fill_geometry(geometry, "#" + 3 * f"{round(255 * opacity):02x}")
+        page.paste(colour, mask=mask.image().convert("L"))
+    about, file = PngInfo(), io.BytesIO()
+    about.add_text("Software", SOFTWARE)
+    page.save(file, "PNG", pnginfo=about)
+    return file.getvalue()
 
 
-def _window(target: Target) -> tuple[Array, Array]:
-    """Return the corner and size of what is shown, in the silhouette's units."""
-    if target.kind == "image" and target.size is not None:
-        return np.zeros(2), np.array(target.size)
-    bounds = [target.outline.min(axis=0), target.outline.max(axis=0)]
+def _window(target: Target) -> Window:
+    """Return what is shown, in the silhouette's units, wide enough for the words below."""
+    rings = [target.outline]
     if target.seen is not None:
-        bounds += np.reshape(target.seen.bounds, (2, 2)).tolist()
-    low, high = np.min(bounds, axis=0), np.max(bounds, axis=0)
-    margin = 0.05 * (high - low).max()
-    return low - margin, high - low + 2 * margin
+        rings.append(np.reshape(target.seen.bounds, (2, 2)))
+    xmin, ymin, xmax, ymax = window_of(rings, 0.05)
+    if target.kind == "image" and target.size is not None:
+        xmin, ymin, xmax, ymax = 0.0, 0.0, *target.size
+    return xmin, ymin, max(xmax, xmin + LEAST_WIDTH / LONGER_SIDE * (ymax - ymin)), ymax
+
+
+def _mark(raster: Raster, text: str, colour: str, x: float) -> None:
+    y, half = strip_middle(raster), LETTERS / 2
+    square = box(x, y - half, x + LETTERS, y + half)
+    raster.fill_pixels(np.array(square.exterior.coords), colour)
+    raster.text(x + 1.3 * LETTERS, y, text, LETTERS)
 
 
 def _source(path: Path) -> Image.Image:
-    def decode(_: object, image: Image.Image) -> Image.Image:
-        image.draft("RGB", (LONGER_SIDE, LONGER_SIDE))
-        turned = upright(image)[0].convert("RGBA")
-        white = Image.new("RGBA", turned.size, "white")
-        return Image.alpha_composite(white, turned).convert("RGB")
-
-    return open_image(path, decode)
-
-
-def _png(picture: Image.Image, marks: Sequence[tuple[str, str]]) -> bytes:
-    """Return the picture over a strip that says what is marked how."""
-    page = Image.new("RGB", (max(picture.width, 560), picture.height + STRIP), "white")
-    page.paste(picture)
-    pen, x = ImageDraw.Draw(page), 12.0
-    for text, colour in marks:
-        pen.text((x, page.height - STRIP / 2), text, fill=colour, font=font(LETTERS), anchor="lm")
-        x += pen.textlength(text, font=font(LETTERS)) + LETTERS
-    about = PngInfo()
-    about.add_text("Software", SOFTWARE)
-    file = io.BytesIO()
-    page.save(file, "PNG", pnginfo=about)
-    return file.getvalue()
+    image = open_image(path, enough=LONGER_SIDE)[0].convert("RGBA")
+    white = Image.new("RGBA", image.size, "white")
+    return Image.alpha_composite(white, image).convert("RGB")
 
 
 def is_read_png(path: Path) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import blank_figure, png_bytes
+from orbiflow.drawing import Sheet
 from orbiflow.errors import OrbiflowError
 
 if TYPE_CHECKING:
@@ -36,7 +36,8 @@ def front_png(
     """
     if not (chosen or others):
         raise OrbiflowError("a picture of a front needs at least one tile")
-    figure = blank_figure(width_px, round(0.7 * width_px))
+    sheet = Sheet.screen(width_px)
+    figure = sheet.figure(round(0.7 * width_px) / sheet.dpi)
     axes = _axes(figure, chosen, others)
     _steps(axes, chosen or others)
     corner = axes.transAxes.transform((0, 0)), axes.transAxes.transform((1, 1))
@@ -55,7 +56,7 @@ def front_png(
         (x,), (y,) = _in(axes, [below])
         label = f"{tile.isohedral_class} {tile.rating or ''}"
         axes.text(x, y, label, ha="center", va="top", fontsize=6.5, color=INK, zorder=7)
-    return png_bytes(figure)
+    return sheet.file(figure)
 
 
 def _values(tiles: Sequence[EscherTile]) -> Array:

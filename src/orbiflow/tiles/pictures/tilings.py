@@ -22,7 +22,6 @@ from orbiflow.drawing import (
     Picture,
     Raster,
     Sheet,
-    blank_figure,
     cell_ring,
     center_sign,
     fill_rings,
@@ -32,7 +31,6 @@ from orbiflow.drawing import (
     palette,
     palette_png,
     plane_axes,
-    png_bytes,
     vector_picture,
 )
 from orbiflow.errors import OrbiflowError
@@ -213,15 +211,15 @@ def classes_png(*, width_px: int = 2400) -> bytes:
     Raises:
         OrbiflowError: If the picture would be too large or too small.
     """
-    height = round(width_px * 0.82)
-    figure = blank_figure(width_px, height)
+    sheet = Sheet.screen(width_px)
+    figure = sheet.figure(round(width_px * 0.82) / sheet.dpi)
     for number, kind in enumerate(CLASSES.values()):
         row, column = divmod(number, 3)
         _class_panel(
             figure, kind, (column / 3, 0.045 + 0.955 * (1 - (row + 1) / 3)), (1 / 3, 0.955 / 3)
         )
     draw_key(figure)
-    return png_bytes(figure)
+    return sheet.file(figure)
 
 
 def _class_panel(

@@ -23,8 +23,7 @@ from .scene import Scene as Scene
 from .scene import Style as Style
 from .scene import Uses as Uses
 from .scene import bezier as bezier
-from .scene import clipped_line as clipped_line
-from .scene import clipped_region as clipped_region
+from .scene import clipped as clipped
 from .scene import rectangle as rectangle
 from .svg import Numbers as Numbers
 from .svg import tile_svg as tile_svg

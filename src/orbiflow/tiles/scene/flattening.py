@@ -55,7 +55,9 @@ def _items(
 
 def cut_off(motif: Motif, area: shapely.Polygon, *, whole_strokes: bool = True) -> Motif:
     """Return what of a motif lies in an area; strokes stay lines of their width, or are cut, too."""
-    parts = [kept for part in motif.parts for kept in _cut_off(part, area, whole_strokes)]
+    parts = [
+        kept for part in motif.parts for kept in _cut_off(part, area, whole_strokes) if kept.curves
+    ]
     return Motif(tuple(parts), tuple(_masked(raster, area) for raster in motif.rasters))
 
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from PIL import Image
 
-from orbiflow.arrays import Array
 from orbiflow.drawing import plane_axes
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.scene.flattening import flattened
@@ -23,8 +22,7 @@ from orbiflow.tiles.scene.scene import (
     Scene,
     Style,
     Uses,
-    clipped_line,
-    clipped_region,
+    clipped,
 )
 
 if TYPE_CHECKING:
@@ -79,8 +77,7 @@ def _polylines(
     for curve in scene.curves(layer):
         kept = [curve]
         if layer.clipped:
-            cut = clipped_region if curve.closed else clipped_line
-            kept = cut(curve, scene.clip, tolerance)
+            kept = clipped(curve, scene.clip, tolerance, filled=curve.closed)
         for part in kept:
             points = part.flattened(tolerance)
             found.append(([(x, scene.height - y) for x, y in points.tolist()], part.closed))
@@ -175,7 +172,13 @@ def drawn(scene: Scene, *, least_width: float = 0.0) -> Figure:
             for item in layer.items
             if isinstance(item, Part)
         ]
-        artists.append(draw_paths(axes, _paths(scene, layer), points(layer.style)))
+        paths = []
+        for item in layer.items:
+            if isinstance(item, Uses):
+                paths += [curves_path([c]) for c in item.curves(scene.symbols[item.symbol])]
+            elif isinstance(item, Curve):
+                paths.append(curves_path([item]))
+        artists.append(draw_paths(axes, paths, points(layer.style)))
         for artist in artists if layer.clipped else ():
             box = scene.clip
             window = Rectangle((box.left, box.top), box.width, box.height)
@@ -212,48 +215,25 @@ def draw_paths(axes: Axes, paths: list[PlotPath], style: Style, opacity: float =
     return collection
 
 
-def _paths(scene: Scene, layer: Layer) -> list[PlotPath]:
-    paths = []
-    for item in layer.items:
-        if isinstance(item, Uses):
-            symbol = scene.symbols[item.symbol]
-            points, codes = _points_and_codes(symbol)
-            paths += [_path(image, codes) for image in item.images(points)]
-        elif isinstance(item, Curve):
-            paths.append(_path(*_points_and_codes(item)))
-    return paths
-
-
 def curves_path(curves: Iterable[Curve]) -> PlotPath:
     """Return several curves as one path of matplotlib's, filled together."""
     from matplotlib.path import Path as PlotPath
 
-    parts = [_points_and_codes(curve) for curve in curves]
-    if not parts:
-        return PlotPath(np.zeros((0, 2)))
-    return _path(*(np.concatenate(part) for part in zip(*parts, strict=True)))
-
-
-def _path(points: Array, codes: Array) -> PlotPath:
-    from matplotlib.path import Path as PlotPath
-
-    path = PlotPath(points, codes)
+    points, codes = [np.zeros((0, 2))], [np.zeros(0, dtype=np.uint8)]
+    for curve in curves:
+        # of straight pieces only the end is kept
+        straight = np.repeat(curve.straight, 3)
+        kept = ~straight
+        kept[2::3] = True
+        points += [curve.start[None], curve.pieces[:, 1:].reshape(-1, 2)[kept]]
+        along = np.where(straight, PlotPath.LINETO, PlotPath.CURVE4)[kept]
+        codes += [np.array([PlotPath.MOVETO]), along]
+        if curve.closed:
+            points.append(curve.start[None])
+            codes.append(np.array([PlotPath.CLOSEPOLY]))
+    path = PlotPath(np.concatenate(points), np.concatenate(codes))
     path.should_simplify = False
     return path
-
-
-def _points_and_codes(curve: Curve) -> tuple[Array, Array]:
-    from matplotlib.path import Path as PlotPath
-
-    # of straight pieces only the end is kept
-    straight = np.repeat(curve.straight, 3)
-    kept = ~straight
-    kept[2::3] = True
-    ends = [curve.start] if curve.closed else []
-    points = [curve.start, *curve.pieces[:, 1:].reshape(-1, 2)[kept], *ends]
-    codes = np.where(straight, PlotPath.LINETO, PlotPath.CURVE4)[kept]
-    closing = [PlotPath.CLOSEPOLY for _ in ends]
-    return np.array(points), np.array([PlotPath.MOVETO, *codes, *closing], dtype=np.uint8)
 
 
 def write_pdf(scene: Scene) -> bytes:

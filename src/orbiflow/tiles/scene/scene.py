@@ -6,7 +6,7 @@ Coordinates are in mm from the page's upper left corner, y down, as on a screen 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -187,18 +187,12 @@ class Motif:
 
 @dataclass(frozen=True, eq=False)
 class Uses:
-    """M copies of a symbol: a point p of it goes to linear[which[m]] p + offsets[m].
+    """M copies of a symbol: a point p of it goes to linear[which[m]] p + offsets[m]."""
 
-    - `symbol`: The symbol's name in the scene.
-    - `linear`: The linear parts (A, 2, 2) of the aspects.
-    - `which`: The aspect (M,) of each copy.
-    - `offsets`: The offset (M, 2) of each copy in mm.
-    """
-
-    symbol: str
-    linear: Array
-    which: NDArray[np.int64]
-    offsets: Array
+    symbol: str  # its name in the scene
+    linear: Array  # the linear parts (A, 2, 2) of the aspects
+    which: NDArray[np.int64]  # the aspect (M,) of each copy
+    offsets: Array  # the offset (M, 2) of each copy in mm
 
     def __len__(self) -> int:
         return len(self.which)
@@ -209,6 +203,16 @@ class Uses:
         shape = (len(self), *[1] * (points.ndim - 1), 2)
         return turned[self.which] + self.offsets.reshape(shape)
 
+    def near(self, points: Array, box: Box) -> Booleans:
+        """Return which copies (M,) of points (N, 2) have a bounding box that meets a box."""
+        images = self.images(points)
+        low, high = images.min(axis=1), images.max(axis=1)
+        return (high > box[:2]).all(axis=1) & (low < box[2:]).all(axis=1)
+
+    def select(self, keep: Booleans | slice) -> Uses:
+        """Return the copies where `keep` is true, or in a slice."""
+        return replace(self, which=self.which[keep], offsets=self.offsets[keep])
+
     def curves(self, curve: Curve) -> Iterator[Curve]:
         """Yield the images of a curve of the symbol."""
         for pieces in self.images(curve.pieces):
@@ -217,22 +221,14 @@ class Uses:
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """Things of one kind, drawn alike, that programs show under one name.
+    """Things of one kind, drawn alike, that programs show under one name."""
 
-    - `name`: A name for people, such as "colour 1" or "cut".
-    - `role`: What the layer is for.
-    - `style`: Fill and stroke of all items.
-    - `items`: Curves, parts and pictures, and copies of symbols and motifs.
-    - `clipped`: Whether it is shown within the scene's `window` alone.
-    - `ink`: The colour that `INK` means in the layer's motifs.
-    """
-
-    name: str
+    name: str  # a name for people, such as "colour 1" or "cut"
     role: Role
-    style: Style
-    items: tuple[Curve | Uses | Part | Raster, ...]
-    clipped: bool = False
-    ink: str | None = None
+    style: Style  # fill and stroke of all items
+    items: tuple[Curve | Uses | Part | Raster, ...]  # with copies of symbols and motifs
+    clipped: bool = False  # whether it is shown within the scene's `window` alone
+    ink: str | None = None  # the colour that `INK` means in the layer's motifs
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,30 +244,19 @@ class PlacedTile:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A page with everything on it.
+    """A page with everything on it."""
 
-    - `width`, `height`: The page's size in mm.
-    - `layers`: The layers from the bottom up.
-    - `symbols`: Closed curves by name, for `Uses`.
-    - `window`: The box within which clipped layers show. Default: the page.
-    - `title`, `notes`: Words for the file's metadata.
-    - `prototile`: The polygon (N, 2) in mm of which `tiles` are copies.
-    - `tiles`: The tiles on the page.
-    - `facts`: Plain data for the JSON file, such as the class.
-    - `motifs`: Drawings by name, for `Uses`.
-    """
-
-    width: float
+    width: float  # with `height`: the page's size in mm
     height: float
-    layers: tuple[Layer, ...]
-    symbols: dict[str, Curve] = field(default_factory=dict)
-    window: Box | None = None
-    title: str = ""
+    layers: tuple[Layer, ...]  # from the bottom up
+    symbols: dict[str, Curve] = field(default_factory=dict)  # closed curves by name, for `Uses`
+    window: Box | None = None  # the box within which clipped layers show; by default the page
+    title: str = ""  # with `notes`: words for the file's metadata
     notes: tuple[str, ...] = ()
-    prototile: Array | None = None
+    prototile: Array | None = None  # the polygon (N, 2) in mm of which `tiles` are copies
     tiles: tuple[PlacedTile, ...] = ()
-    facts: dict[str, Any] = field(default_factory=dict)
-    motifs: dict[str, Motif] = field(default_factory=dict)
+    facts: dict[str, Any] = field(default_factory=dict)  # for the JSON file, such as the class
+    motifs: dict[str, Motif] = field(default_factory=dict)  # drawings by name, for `Uses`
 
     @property
     def clip(self) -> Box:
@@ -288,11 +273,7 @@ class Scene:
         return np.concatenate([*curves, *(raster.corners for raster in motif.rasters)])
 
     def curves(self, layer: Layer) -> Iterator[Curve]:
-        """Yield every curve of a layer, including copies of symbols.
-
-        Raises:
-            OrbiflowError: If there is a picture of pixels.
-        """
+        """Yield every curve of a layer, including copies of symbols; refuse pictures of pixels."""
         for item in layer.items:
             if isinstance(item, Uses):
                 yield from item.curves(self.symbols[item.symbol])
@@ -313,30 +294,17 @@ def rectangle(box: Box) -> Curve:
     return Curve.polyline([[left, top], [right, top], [right, bottom], [left, bottom]], closed=True)
 
 
-def inside(curve: Curve, box: Box) -> bool:
-    """Return whether a box holds a curve with all its control points."""
+def clipped(curve: Curve, box: Box, tolerance: float, *, filled: bool) -> list[Curve]:
+    """Return what a box leaves of a curve, or of its inside: the curve if it is all, else polylines."""
     (low, high), corners = curve.bounds(), np.array(box).reshape(2, 2)
-    return bool((low >= corners[0] - 1e-9).all() and (high <= corners[1] + 1e-9).all())
-
-
-def clipped_region(curve: Curve, box: Box, tolerance: float) -> list[Curve]:
-    """Return what a closed curve and the box share: the curve if all is, else polygons near it."""
-    if inside(curve, box):
-        return [curve]
-    polygon = shapely.Polygon(curve.flattened(tolerance))
-    polygon = polygon if polygon.is_valid else shapely.make_valid(polygon)
-    common = shapely.intersection(polygon, shapely.box(*box))
-    return [
-        Curve.polyline(np.asarray(part.exterior.coords)[:-1], closed=True)
-        for part in polygons_in(common)
-    ]
-
-
-def clipped_line(curve: Curve, box: Box, tolerance: float) -> list[Curve]:
-    """Return the parts of an open curve that are in the box."""
-    if inside(curve, box):
+    if (low >= corners[0] - 1e-9).all() and (high <= corners[1] + 1e-9).all():
         return [curve]
     points = curve.flattened(tolerance)
+    if filled:
+        polygon = shapely.Polygon(points)
+        polygon = polygon if polygon.is_valid else shapely.make_valid(polygon)
+        rings = [part.exterior for part in polygons_in(polygon & shapely.box(*box))]
+        return [Curve.polyline(shapely.get_coordinates(r)[:-1], closed=True) for r in rings]
     line = shapely.LineString(np.concatenate([points, points[:1]]) if curve.closed else points)
     parts = shapely.get_parts(shapely.intersection(line, shapely.box(*box)))
     lines = [part for part in parts if part.geom_type == "LineString" and not part.is_empty]

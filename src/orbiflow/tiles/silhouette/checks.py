@@ -35,24 +35,24 @@ def holes_filled(target: Target) -> list[Polygon]:
 
 def doubts(target: Target) -> list[str]:
     """Return what may be wrong with a silhouette, each with what to do about it."""
-    return [*target.warnings, *_missing(target), *_hopeless(target)]
+    return [*_missing(target), *_hopeless(target)]
 
 
 def _missing(target: Target) -> list[str]:
     found: list[str] = []
-    lost, holes = parts_left_out(target), holes_filled(target)
+    lost, holes, is_image = parts_left_out(target), holes_filled(target), target.kind == "image"
     seen = 0.0 if target.seen is None else float(target.seen.area)
     share = sum(part.area for part in lost) / seen if seen else 0.0
-    level = ", or try another --threshold" if target.kind == "image" else ""
+    level = ", or try another --threshold, or a plain ground of another colour for a photograph"
     if share > MOST_LEFT_OUT:
         parts = "a part" if len(lost) == 1 else f"{len(lost)} parts"
         found.append(
             f"{percent(share)} of what was seen is left out, in {parts} apart from the rest: join "
-            f"them to it in the drawing, or by a larger --smooth{level}"
+            f"them to it in the drawing, or by a larger --smooth{level * is_image}"
         )
     share = sum(hole.area for hole in holes) / target.area
     if SMALL_HOLE < share < LARGE_HOLE:
-        level = " or try another --threshold or --invert" if target.kind == "image" else ""
+        level = " or try another --threshold or --invert" if is_image else ""
         found.append(
             f"filled holes of {percent(share)} of the area, because a tile has none: if one is "
             f"background, open it to the outside in the drawing{level}"

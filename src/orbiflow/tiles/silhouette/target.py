@@ -12,7 +12,6 @@ from typing import IO, TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 from shapely.geometry import Polygon
-from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import as_array, described, is_a, is_tensor
 from orbiflow.arrays import Array
@@ -148,23 +147,13 @@ def _pair(values: Any, name: str) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
-    """A silhouette: one simple closed curve.
+class Target(Reading):
+    """A silhouette: one simple closed curve, with all that its `Reading` has.
 
     Create one with `Target.read`, `from_bytes`, `from_mask` or `from_polygon`, which check the
-    outline.
+    outline. It is read-only, and counter-clockwise in the normal form.
 
-    - `outline`: The vertices (N, 2), without a repeated last one, in the input's own units. In an image
-      the unit is the pixel and (0, 0) the image's top left corner, so that pixel (row 0, column 0)
-      spans [0, 1] x [0, 1]. The normal form is counter-clockwise. Read-only.
-    - `y_down`: Whether the input's y axis points down (images, SVG and `.dat` files).
-    - `notes`: What was decided for the user, in plain words.
     - `source`: The file's name, or a name for another source.
-    - `kind`: "image", "svg", "dat", "json" or "polygon".
-    - `size`, `corner`: The width and height of the picture or drawing, if there is one, and its corner
-      of least coordinates.
-    - `seen`: All that was read as shape, before parts were left out and holes filled, if that differs.
-    - `warnings`: What may be wrong with the reading, and what to do then.
 
     >>> target = Target.from_polygon([[0, 0], [2, 0], [2, 2], [0, 2]])
     >>> target.normal.tolist()
@@ -173,15 +162,7 @@ class Target:
     array([2., 2.])
     """
 
-    outline: Array
-    y_down: bool
-    notes: tuple[str, ...] = ()
     source: str = "polygon"
-    kind: str = "polygon"
-    size: tuple[float, float] | None = None
-    corner: tuple[float, float] = (0.0, 0.0)
-    seen: BaseGeometry | None = None
-    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         outline = orient(np.array(self.outline, float), counter_clockwise=not self.y_down)
@@ -206,7 +187,8 @@ class Target:
         Raises `InputFileError` for a file without a usable silhouette, with what to do about it.
         """
         where = path if isinstance(path, str | os.PathLike) else _held(path)
-        return cls._of(read_outline(where, threshold=threshold, invert=invert), str(where))
+        reading = read_outline(where, threshold=threshold, invert=invert)
+        return cls(**vars(reading), source=str(where))
 
     @classmethod
     def from_bytes(
@@ -227,7 +209,8 @@ class Target:
                 f"data must be bytes, got {described(data)}; Target.read takes paths"
             )
         held = FileContent(bytes(data), str(name))
-        return cls._of(read_outline(held, threshold=threshold, invert=invert), held.name)
+        reading = read_outline(held, threshold=threshold, invert=invert)
+        return cls(**vars(reading), source=held.name)
 
     @classmethod
     def from_mask(
@@ -253,12 +236,7 @@ class Target:
         2000
         """
         reading = read_mask_array(mask, source, threshold=threshold, invert=invert)
-        return cls._of(reading, source)
-
-    @classmethod
-    def _of(cls, reading: Reading, source: str) -> Self:
-        page = reading.kind, reading.size, reading.corner, reading.seen, reading.warnings
-        return cls(reading.outline, reading.y_down, reading.notes, source, *page)
+        return cls(**vars(reading), source=source)
 
     @classmethod
     def from_polygon(
@@ -271,7 +249,7 @@ class Target:
         """
         with np.errstate(all="ignore"):  # what overflows is refused
             outline, notes = clean_ring(points, source)
-        return cls(outline, y_down, tuple(notes), source)
+        return cls(outline, y_down, notes=tuple(notes), source=source)
 
     def smoothed(self, share: float) -> Self:
         """Return the silhouette with what is narrower than a share of its length rounded off.

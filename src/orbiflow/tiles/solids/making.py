@@ -1,28 +1,58 @@
-"""The solid of a tile: how it is made, what the user should know, and its file."""
+"""The solid of a tile: how it is made, what the user should know, and its file, STL or 3MF."""
 
 from __future__ import annotations
 
+import io
+import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import shapely
 from manifold3d import Manifold
-from shapely.geometry.base import BaseGeometry
 
 from orbiflow import __version__
 from orbiflow.arguments import as_choice
 from orbiflow.arrays import Array
+from orbiflow.drawing import rendered
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import write_atomic
-from orbiflow.tiles.exporting import ExportSettings, laid_out, place_on
+from orbiflow.tiles.exporting import ExportSettings, dark_parts, laid_out, place_on
 from orbiflow.tiles.likeness import narrowest_slit
-from orbiflow.tiles.scene import Motif, lines_of, region_of
-from orbiflow.tiles.silhouette import lightness
-from orbiflow.tiles.solids.files import write_3mf, write_stl
+from orbiflow.tiles.scene import Motif
 from orbiflow.tiles.solids.settings import WITH_DRAWING, SolidSettings
 from orbiflow.tiles.solids.shapes import Plan, shape
 from orbiflow.tiles.tile import EscherTile, TileSource
+
+
+def write_stl(parts: Mapping[str, Manifold], title: str = "") -> bytes:
+    """Return a binary STL of all parts, with 80 characters of the title in its header."""
+    meshes = [body.to_mesh() for body in parts.values()]
+    corners = np.concatenate([mesh.vert_properties[mesh.tri_verts] for mesh in meshes])
+    # a normal of 0 leaves it to the reader, who has the order of the corners
+    fields = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
+    triangles = np.zeros(len(corners), dtype=fields)
+    triangles["corners"] = corners
+    header = title.encode("ascii", "replace")[:80].ljust(80)
+    return header + len(corners).to_bytes(4, "little") + triangles.tobytes()
+
+
+def write_3mf(parts: Mapping[str, Manifold], title: str = "") -> bytes:
+    """Return a 3MF file with each part as an object of its own, in millimetres."""
+    meshes = {name: body.to_mesh64() for name, body in parts.items()}
+    files = {
+        "[Content_Types].xml": "content_types.xml",
+        "_rels/.rels": "relationships.xml",
+        "3D/3dmodel.model": "model.xml",
+    }
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, template in files.items():
+            text = rendered("orbiflow.tiles.solids", template, meshes=meshes, title=title)
+            entry = zipfile.ZipInfo(name)  # without a date
+            archive.writestr(entry, text, zipfile.ZIP_DEFLATED)
+    return buffer.getvalue()
+
 
 WRITERS = {"stl": write_stl, "3mf": write_3mf}
 FRAGILE = {"cutter": 5.0, "mould": 2.0}  # widths in mm of necks at which dough and casts break
@@ -91,7 +121,7 @@ def make_solid(
     drawing = Motif() if placed.motif is None else placed.motif
     if drawing.rasters:
         raise InputFileError(f"{picture}: a {settings.kind} needs lines: draw it as SVG")
-    plan = Plan(settings, placed, raised(drawing, settings.nozzle))
+    plan = Plan(settings, placed, dark_parts(drawing, settings.nozzle)[0])
     return Solid(shape(plan), title, (*notes, *_gap_notes(plan)))
 
 
@@ -127,18 +157,3 @@ def _gap_notes(plan: Plan) -> tuple[str, ...]:
         f"the walls of both sides are one in a gap of the tile: {slit.width:.2f} mm wide "
         f"{place_on(ring, slit.place)}{thin}",
     )
-
-
-def raised(drawing: Motif, nozzle: float) -> BaseGeometry:
-    """Return where a drawing in mm is dark, in lines no thinner than the nozzle's.
-
-    What is lighter than middle grey wipes out what lies under it; faint colours do nothing.
-    """
-    dark: BaseGeometry = shapely.Polygon()
-    for part in (part for part in drawing.parts if part.opacity >= 0.5):
-        fill, stroke, width = part.style
-        line = lines_of(part).buffer(max(width, nozzle) / 2)
-        for colour, region in ((fill, region_of(part)), (stroke, line)):
-            if colour is not None:
-                dark = dark | region if lightness(colour) < 0.5 else dark - region
-    return dark

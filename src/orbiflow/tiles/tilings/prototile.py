@@ -134,10 +134,7 @@ def stabiliser(group: CrystallographicGroup, ring: Array) -> Stabiliser:
 
 
 def _near_center(group: CrystallographicGroup, ring: Array, reach: float) -> list[Isometry]:
-    """Return the elements that move the boundary's centre of mass by less than `reach`.
-
-    The identity is left out.
-    """
+    """Return the elements, but for the identity, that move the boundary's centre at most so far."""
     if group.order == 1:
         return []
     ahead = np.roll(ring, -1, axis=0)

@@ -32,22 +32,13 @@ MAX_SPAN = 12.0
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """A prototile and the tiles nearby, moved and scaled so that the expected area is one.
+    """A prototile and the tiles nearby, moved and scaled so that the expected area is one."""
 
-    - `prototile`: The number of the prototile.
-    - `ring`: The prototile (N, 2) without repeated vertices, centred at zero.
-    - `copies`: The M other tiles nearby, in the tiling's own coordinates.
-    - `points`: Their vertices (P, 2), tile by tile, in the order of their prototile.
-    - `counts`: The number of vertices of each tile, (M,).
-    - `mirrored`: Whether each tile's element reverses orientation, (M,).
-    """
-
-    prototile: int
-    ring: Array
-    copies: Copies
-    points: Array
-    counts: Integers
-    mirrored: NDArray[np.bool_]
+    ring: Array  # the prototile (N, 2) without repeated vertices, centred at zero
+    copies: Copies  # the M other tiles nearby, in the tiling's own coordinates
+    points: Array  # their vertices (P, 2), tile by tile, in the order of their prototile
+    counts: Integers  # the number of vertices of each tile, (M,)
+    mirrored: NDArray[np.bool_]  # whether each tile's element reverses orientation, (M,)
 
     def __len__(self) -> int:
         return len(self.copies)
@@ -76,10 +67,6 @@ class Surroundings:
         """The tiles' boundaries (M,) as shapely rings."""
         return np.asarray(shapely.linearrings(self.points, indices=self.owner))
 
-    def elements(self) -> tuple[Placed, ...]:
-        """Return the tiles as elements of the group."""
-        return tuple(self.copies.isometry(k) for k in range(len(self)))
-
     def select(self, keep: NDArray[np.bool_]) -> Surroundings:
         """Return the tiles where `keep`, (M,), is true."""
         return replace(
@@ -92,10 +79,7 @@ class Surroundings:
 
 
 def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
-    """Return the tiles whose bounding box comes within `margin` of a prototile's, nearest first.
-
-    The unit is the side of a square of a tile's area.
-    """
+    """Return the tiles whose box is within `margin`, in tile sizes, of a prototile's, nearest first."""
     scale = math.sqrt(tiling.tile_area)
     if tiling.radius > MAX_SPAN * scale:
         raise OrbiflowError(
@@ -119,20 +103,15 @@ def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
     # squares of coordinates such as 1e-200 underflow in GEOS and give areas that are plainly wrong
     ring, points = (np.where(np.abs(part) < 1e-15, 0.0, part) for part in local)
     mirrored = (np.linalg.det(tiling.group.linear_parts) < 0)[near.cosets]
-    return Surroundings(prototile, ring, near, points, counts, mirrored)
+    return Surroundings(ring, near, points, counts, mirrored)
 
 
 class SegmentMatch(NamedTuple):
-    """The nearest reversed segment, in the tiles around, of each segment of a prototile.
+    """The nearest reversed segment, in the tiles around, of each segment of a prototile."""
 
-    - `distance`: The distance (N,) in R^4 of (a, b) to the nearest (b', a').
-    - `tile`: The index (N,) of its tile in the surroundings, -1 where there is none.
-    - `partner`: The index (N,) of the segment in that tile's prototile.
-    """
-
-    distance: Array
-    tile: Integers
-    partner: Integers
+    distance: Array  # the distance (N,) in R^4 of (a, b) to the nearest (b', a')
+    tile: Integers  # the index (N,) of its tile in the surroundings, -1 where there is none
+    partner: Integers  # the index (N,) of the segment in that tile's prototile
 
 
 def match_segments(around: Surroundings, tolerance: float) -> SegmentMatch:
@@ -182,10 +161,7 @@ def boundaries_cancel(
 
 
 def _orbits(tiling: Tiling, first: Integers) -> Integers | None:
-    """Return the first segment that each is an image of under its prototile's stabiliser.
-
-    None where vertices are not taken to vertices.
-    """
+    """Return the first segment that has each as an image in its tile; None if vertices have none."""
     labels: list[Integers] = []
     for start, own in zip(first, tiling.stabilisers, strict=True):
         images: list[Integers] = []
@@ -258,7 +234,7 @@ def neighbours(tile: Tiles, prototile: int = 0) -> Neighbours:
     prototile = as_whole(prototile, "the prototile", 0, len(tiling.prototiles) - 1)
     around = surroundings(tiling, prototile, _TOUCHING)
     near, shares = touching(around, _TOUCHING)
-    return Neighbours(near.select(shares).elements(), near.select(~shares).elements())
+    return Neighbours(*(near.copies.select(kind).elements() for kind in (shares, ~shares)))
 
 
 def touching(around: Surroundings, tolerance: float) -> tuple[Surroundings, NDArray[np.bool_]]:
@@ -309,7 +285,7 @@ def patch(tile: Tiles, window: Sequence[float]) -> list[Placed]:
     xmin, ymin, xmax, ymax = checked_window(window)
     middle = np.array([xmin + xmax, ymin + ymax]) / 2
     away = np.linalg.norm(found.centers() - middle, axis=1)
-    return [found.isometry(int(k)) for k in np.argsort(away, kind="stable")]
+    return list(found.select(np.argsort(away, kind="stable")).elements())
 
 
 def aspects(tile: Tiles, elements: Sequence[Isometry]) -> list[int]:

@@ -58,13 +58,11 @@ MAX_TILES = 20_000  # the largest number of tiles in a patch
 class CopiesAcross(NamedTuple):
     """The copies that E elements lead to from each of M copies.
 
-    - `copy`: The index (M, E) of the copy, -1 if it is not among the copies.
-    - `turn`: The element (M, E) of its prototile's stabiliser that is applied first: copy m followed by
-      element e is that copy after `turn`.
+    Copy m followed by element e is that copy after the element `turn` of its prototile's stabiliser.
     """
 
-    copy: Integers
-    turn: Integers
+    copy: Integers  # the index (M, E) of the copy, -1 if it is not among the copies
+    turn: Integers  # the index (M, E) of the element
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +105,10 @@ class Copies:
         """Return the group element of a copy."""
         linear = self.group.linear_parts[self.cosets[index]]
         return Placed(linear, self.translations[index], int(self.prototiles[index]))
+
+    def elements(self) -> tuple[Placed, ...]:
+        """Return the group element of each copy."""
+        return tuple(self.isometry(k) for k in range(len(self)))
 
     def images(self, points: Array) -> Array:
         """Return (M, N, 2) images of points (N, 2), one set a copy."""
@@ -159,25 +161,16 @@ class Copies:
             ]
             place = np.searchsorted(own, self.aspects[mine])
             aspects, steps, by = (np.array(part)[place] for part in zip(*found, strict=True))
-            copy[mine, number] = self._index(aspects, self.cells[mine] + steps)
+            keys = zip(aspects.tolist(), *(self.cells[mine] + steps).T.tolist(), strict=True)
+            copy[mine, number] = [self._numbers.get(key, -1) for key in keys]
             turn[mine, number] = by
         return CopiesAcross(copy, turn)
 
-    def _index(self, aspects: Integers, cells: Integers) -> Integers:
-        """Return the index (N,) of the copies of these aspects in these cells, -1 if there is none."""
-        if not len(self):
-            return np.full(len(aspects), -1)
-        low, high = self.cells.min(axis=0), self.cells.max(axis=0)
-        rows, columns = (int(n) for n in high - low + 1)
-
-        def number(aspects: Integers, cells: Integers) -> Integers:
-            return (aspects * rows + (cells - low)[:, 0]) * columns + (cells - low)[:, 1]
-
-        mine, wanted = number(self.aspects, self.cells), number(aspects, cells)
-        order = np.argsort(mine)
-        found = order[np.minimum(np.searchsorted(np.sort(mine), wanted), len(self) - 1)]
-        known = ((cells >= low) & (cells <= high)).all(axis=1) & (mine[found] == wanted)
-        return np.where(known, found, -1)
+    @cached_property
+    def _numbers(self) -> dict[tuple[int, int, int], int]:
+        """The index of each copy by its aspect and cell."""
+        keys = zip(self.aspects.tolist(), *self.cells.T.tolist(), strict=True)
+        return {key: number for number, key in enumerate(keys)}
 
 
 def copies_inside(tile: Tiles, window: Sequence[float]) -> Copies:

@@ -255,16 +255,14 @@ class EdgeImage(NamedTuple):
 class EdgeClass(NamedTuple):
     """An edge and all edges that are its images.
 
-    - `edge`: The first edge of the class.
-    - `folds`: The isometries other than the identity under which it is its own image: at most a
-      half-turn about its middle, the mirror along it (not reversed: then it is straight), and the
-      mirror across it.
-    - `images`: The other edges of the class.
+    It folds under the isometries, other than the identity, under which it is its own image: at most a
+    half-turn about its middle, the mirror along it (not reversed: then it is straight), and the
+    mirror across it.
     """
 
-    edge: int
+    edge: int  # the first edge of the class
     folds: tuple[EdgeImage, ...]
-    images: tuple[EdgeImage, ...]
+    images: tuple[EdgeImage, ...]  # the other edges of the class
 
     @property
     def straight(self) -> bool:
@@ -377,16 +375,16 @@ def _with_vertices(tiling: Tiling, k: int) -> Prototile:
 class Skeleton:
     """S edges of copies of prototiles.
 
-    - `copy`, `edge`: Edge `edge` of copy `copy`, (S,), in the direction of that copy's boundary.
-    - `other`: The copy (S,) across it, -1 if it is not in the set.
-    - `ends`: The numbers (S, 2) of its first and last vertex: edges that meet within the set share
-      them. A vertex where copies only touch may have several numbers.
+    Edges that meet within the set share the number of that vertex; one where copies only touch may
+    have several.
     """
 
-    copy: Integers
+    copy: (
+        Integers  # with `edge`: edge `edge` of copy `copy`, (S,), in the direction of its boundary
+    )
     edge: Integers
-    other: Integers
-    ends: Integers
+    other: Integers  # the copy (S,) across it, -1 if it is not in the set
+    ends: Integers  # the numbers (S, 2) of its first and last vertex
 
     def __len__(self) -> int:
         return len(self.copy)

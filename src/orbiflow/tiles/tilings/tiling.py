@@ -29,19 +29,14 @@ class Aspects:
 
     Elements that differ by an element of a prototile's stabiliser make the same tile of it; the
     coset of an aspect is the first of them. With one prototile of no symmetry, aspects are cosets.
-
-    - `prototiles`, `cosets`: The pairs, (A,) each.
-    - `table`: The aspect (K, |G|) of coset i's image of prototile k.
-    - `steps`: The lattice cell (K, |G|, 2) of that aspect.
-    - `turns`: The element s (K, |G|) of the stabiliser that is applied first: coset i is the aspect's
-      representative, in that cell, after s.
+    Coset i is its aspect's representative, in that cell, after the element `turns` of the stabiliser.
     """
 
-    prototiles: Integers
+    prototiles: Integers  # with `cosets`: the pairs, (A,) each
     cosets: Integers
-    table: Integers
-    steps: Integers
-    turns: Integers
+    table: Integers  # the aspect (K, |G|) of coset i's image of prototile k
+    steps: Integers  # the lattice cell (K, |G|, 2) of that aspect
+    turns: Integers  # the element (K, |G|) of the stabiliser
 
     def __len__(self) -> int:
         return len(self.cosets)

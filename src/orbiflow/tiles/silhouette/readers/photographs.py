@@ -4,12 +4,10 @@ Colours are CIE Lab, with lightness counted from -16: a shadow then scales all t
 one factor, its gain, so that a background in shadow lies on the ray from the origin to its colour.
 """
 
-import warnings
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from scipy.cluster.vq import kmeans2
+from scipy.cluster.vq import vq
 from skimage.color import rgb2lab
 from skimage.filters import threshold_otsu
 from skimage.transform import resize
@@ -21,8 +19,9 @@ LUMINANCE = np.array([0.299, 0.587, 0.114])  # of red, green and blue, as Pillow
 FLAT = 8.0  # in CIE Lab: one ink or one paper differs less from itself
 MAX_SHARE_NOT_FLAT = 0.02  # of the pixels of a drawing in two colours, edges apart
 MARGIN = 0.03  # of the shorter side: the border, which is background
-COLOURS = 5  # of a background
-GRAIN = 2.0  # in CIE Lab: colours of a background are not told apart more finely
+QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a background's colours, which are parted around them
+LEAST_SHARE = 0.02  # of the background: rarer colours are none of its own
+GRAIN = 2.0  # in CIE Lab: the least spread of a background's colours
 FAR = 8.0  # standard deviations: nothing is farther from a background
 GAINS = np.arange(1, 0.45, -0.05)
 DEEPEST = (1.0, 0.8, 0.65, 0.5)  # gains of the deepest shadows that are tried
@@ -35,9 +34,7 @@ _Mask = NDArray[np.bool_]
 def is_photograph(rgb: Array) -> bool:
     """Whether an image (H, W, 3), 0 to 1, has more in it than two flat colours and their edges."""
     grey = rgb @ LUMINANCE
-    if np.ptp(rgb) == 0:
-        return False
-    light = grey > (threshold_otsu(grey) if np.ptp(grey) > 0 else 1)
+    light = grey > threshold_otsu(grey)
     flat = ndimage.maximum_filter(light, 5) == ndimage.minimum_filter(light, 5)
     lab = _lab(rgb)
     parts = [lab[part] for part in (flat & light, flat & ~light) if part.any()]
@@ -49,8 +46,8 @@ def is_photograph(rgb: Array) -> bool:
     return float(np.mean(np.concatenate(off))) > MAX_SHARE_NOT_FLAT
 
 
-def shape_in(rgb: Array) -> tuple[Array, float]:
-    """Return how far each pixel belongs to the shape, 0 to 1, and how steep colours are at its edge.
+def shape_in(rgb: Array) -> Array:
+    """Return how far each pixel belongs to the shape, 0 to 1.
 
     The background is what the border shows, in a light that varies slowly. Shadows of several
     depths are taken for background; the depth that leaves the sharpest outline is right.
@@ -58,17 +55,17 @@ def shape_in(rgb: Array) -> tuple[Array, float]:
     scale = min(SIDE / max(rgb.shape), 1)
     size = tuple(round(scale * side) for side in rgb.shape[:2])
     lab = _lab(resize(rgb, size, anti_aliasing=scale < 1))
-    region, steepness = _sharpest(ndimage.gaussian_filter(lab, (1, 1, 0)))
+    region = _sharpest(ndimage.gaussian_filter(lab, (1, 1, 0)))
     region = resize(region.astype(float), rgb.shape[:2]) > 0.5
-    return _matte(_lab(rgb), region, round(EDGE_WIDTH / scale)), steepness
+    return _matte(_lab(rgb), region, round(EDGE_WIDTH / scale))
 
 
 def _lab(rgb: Array) -> Array:
     return rgb2lab(rgb) + np.array([16.0, 0.0, 0.0])
 
 
-def _sharpest(lab: Array) -> tuple[_Mask, float]:
-    """Return the region with the sharpest outline, and its steepness in CIE Lab for each pixel."""
+def _sharpest(lab: Array) -> _Mask:
+    """Return the region with the sharpest outline."""
     margin = max(3, round(MARGIN * min(lab.shape[:2])))
     border = np.ones(lab.shape[:2], dtype=bool)
     border[margin:-margin, margin:-margin] = False
@@ -76,9 +73,7 @@ def _sharpest(lab: Array) -> tuple[_Mask, float]:
     slopes = [ndimage.gaussian_gradient_magnitude(band, 1) for band in np.moveaxis(lab, 2, 0)]
     slope = ndimage.maximum_filter(np.linalg.norm(slopes, axis=0), 3)
     regions = [_differing(surprise, deepest, border) for deepest in DEEPEST]
-    steep = [_steepness(slope, region, regions[0]) for region in regions]
-    best = int(np.argmax(steep))
-    return regions[best], steep[best]
+    return max(regions, key=lambda region: _steepness(slope, region, regions[0]))
 
 
 def _steepness(slope: Array, region: _Mask, whole: _Mask) -> float:
@@ -92,32 +87,21 @@ def _surprise(lab: Array, background: _Mask) -> Array:
     """Return squared distances (gains, H, W) from the background, in its standard deviations."""
     lab = lab / _light(lab[..., 0], background)[..., None]
     colours = lab[background]
-    middle = np.quantile(colours, np.linspace(0.1, 0.9, COLOURS), axis=0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a background may have fewer colours
-        label = kmeans2(colours, middle, minit="matrix")[1]
-    clusters = [colours[label == i] for i in range(COLOURS)]
-    clusters = [part for part in clusters if len(part) > 0.02 * len(colours)]
-    return np.min([_squared_distance(lab, part) for part in clusters], axis=0)
-
-
-def _squared_distance(lab: Array, cluster: Array) -> Array:
-    """Return those from one colour of the background, with each gain undone."""
-    root = np.linalg.cholesky(np.linalg.inv(np.cov(cluster.T) + GRAIN**2 * np.eye(3)))
-    scaled, middle = lab @ root, cluster.mean(axis=0) @ root
-    return np.stack([np.sum((scaled / gain - middle) ** 2, axis=2) for gain in GAINS])
+    label, _ = vq(colours, np.quantile(colours, QUANTILES, axis=0))
+    distances: list[Array] = []
+    for colour in (colours[label == k] for k in range(len(QUANTILES))):
+        if len(colour) > LEAST_SHARE * len(colours):
+            root = np.linalg.cholesky(np.linalg.inv(np.cov(colour.T) + GRAIN**2 * np.eye(3)))
+            apart = lab / GAINS[:, None, None, None] - colour.mean(axis=0)
+            distances.append(np.sum((apart @ root) ** 2, axis=3))
+    return np.min(distances, axis=0)
 
 
 def _light(lightness: Array, background: _Mask) -> Array:
     """Return the light, 1 on average, as a quadratic function of place fitted to the background."""
     x, y = np.meshgrid(*(np.linspace(-1, 1, n) for n in lightness.shape[::-1]))
     terms = np.stack([x**i * y**j for i in range(3) for j in range(3 - i)], axis=-1)
-    weights, fit = background.astype(float), lightness
-    for _ in range(4):
-        sides = terms[background] * weights[background, None], (lightness * weights)[background]
-        fit = terms @ np.linalg.lstsq(*sides, rcond=None)[0]
-        off = np.abs(lightness - fit)
-        weights = 1 / np.maximum(1, off / (3 * np.median(off[background]) + 1))
+    fit = terms @ np.linalg.lstsq(terms[background], lightness[background], rcond=None)[0]
     fit = np.maximum(fit, 0.1 * fit.max())
     return fit / fit.mean()
 

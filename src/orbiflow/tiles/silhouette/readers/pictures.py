@@ -3,13 +3,12 @@
 Masks are pictures whose light or opaque part is selected.
 """
 
-import functools
 import re
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +34,6 @@ MAX_PIXELS = 40_000_000
 MAX_SIDE = 1500  # pixels; beyond this an image is averaged down before it is traced
 MAX_SIDE_OF_PHOTOGRAPH = 1000  # pixels, in the same way
 MIN_SIDE_OF_PHOTOGRAPH = 16
-# in CIE Lab for each pixel of a picture of 400: a shape with a fainter edge may be read wrong
-FAINT_EDGE = 4.0
 MIN_CONTRAST = 0.04  # of full scale, between the shape's and the background's usual level
 _STARTS = {"PNG": b"\x89PNG", "JPEG": b"\xff\xd8", "WebP": b"RIFF", "GIF": b"GIF", "BMP": b"BM"}
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
@@ -48,28 +45,17 @@ _DAMAGED = (
 # channels that say by themselves where the shape is: their high part and their low part
 _PARTS = {"alpha": ("opaque", "transparent"), "mask": ("marked", "unmarked")}
 _PLAIN = "cut it out, photograph it on a plain ground of another colour, or set a threshold"
-_FAINT = (
-    "the shape differs little from what is around it and may be read wrong: look at what was read, "
-    f"and if need be {_PLAIN}"
-)
-
-_Decoded = TypeVar("_Decoded")
 
 
 @dataclass(frozen=True)
 class Picture:
-    """One channel, 0 to 1, shape (H, W); each of its pixels is `reduced` pixels of the image wide.
+    """One channel of an image."""
 
-    - `name`: "luminance"; or "alpha", "mask" or "photograph", whose high part is the shape.
-    - `warnings`: What may be wrong with it.
-    """
-
-    channel: Array
-    name: str
+    channel: Array  # (H, W), 0 to 1
+    name: str  # "luminance"; or "alpha", "mask" or "photograph", whose high part is the shape
     size: tuple[int, int]
-    reduced: int
+    reduced: int  # how many pixels of the image are one of the channel's wide
     notes: tuple[str, ...]
-    warnings: tuple[str, ...] = ()
 
 
 def read_image(
@@ -83,8 +69,14 @@ def read_image(
     parts them; with `invert` the shape is the light (or transparent) part; with either, a photograph
     is read like a drawing. Coordinates are those of the image turned as its EXIF orientation asks.
     """
-    decode = functools.partial(_decode, by_colour=threshold is None and invert is None)
-    return _traced(path, open_image(path, decode), threshold, invert)
+    image, notes = open_image(path)
+    band, name, band_notes = _channel(path, image)
+    picture = None
+    if threshold is None and invert is None and name == "luminance":
+        colours = band if band_notes or band.mode == "F" else image.convert("RGB")
+        picture = _photograph(path, colours, (*notes, *band_notes))
+    picture = picture or _drawing(band, name, notes, band_notes)
+    return _traced(path, picture, threshold, invert)
 
 
 def _traced(
@@ -95,14 +87,13 @@ def _traced(
     level, notes = choose_shape(path, picture, threshold, invert)
     outline, seen, traced = trace(path, level, scale=picture.reduced, size=picture.size)
     notes = (*picture.notes, *notes, *traced)
-    return Reading(
-        outline, True, "image", picture.size, notes, seen=seen, warnings=picture.warnings
-    )
+    return Reading(outline, True, "image", picture.size, notes, seen=seen)
 
 
-def open_image(path: Source, decode: Callable[[Any, Image.Image], _Decoded]) -> _Decoded:
-    """Return what `decode` makes of the image at `path`.
+def open_image(path: Source, *, enough: int | None = None) -> tuple[Image.Image, list[str]]:
+    """Return the first frame of an image, turned as its EXIF orientation asks, with notes.
 
+    With `enough` pixels a side, a JPEG may be decoded to fewer than it has, which is faster.
     Raises `InputFileError` for one that is too large, before a pixel of it is decoded, or damaged.
     """
     n_bytes = check_file(path)
@@ -117,7 +108,12 @@ def open_image(path: Source, decode: Callable[[Any, Image.Image], _Decoded]) -> 
             warnings.simplefilter("ignore")
             with Image.open(opened(path), formats=_FORMATS) as image:
                 check_size(path, image.size)
-                return decode(path, image)
+                if enough is not None:
+                    image.draft("RGB", (enough, enough))
+                notes = ["took the first frame of several"] * (getattr(image, "n_frames", 1) > 1)
+                if image.getexif().get(0x0112, 1) not in (0, 1):
+                    notes.append("turned the image as its EXIF orientation asks")
+                return ImageOps.exif_transpose(image), notes
     except InputFileError:
         raise
     except Image.DecompressionBombError as exc:
@@ -158,17 +154,6 @@ def _too_large(path: Source, size: str) -> str:
     return f"{path}: {size}, at most {MAX_PIXELS // 10**6} megapixels are read; downscale the image"
 
 
-def upright(image: Image.Image) -> tuple[Image.Image, list[str]]:
-    """Return the first frame of `image`, turned as its EXIF orientation asks, with notes."""
-    notes: list[str] = []
-    if getattr(image, "n_frames", 1) > 1:
-        notes.append("took the first frame of several")
-    turned = ImageOps.exif_transpose(image)
-    if image.getexif().get(0x0112, 1) not in (0, 1):
-        notes.append("turned the image as its EXIF orientation asks")
-    return turned, notes
-
-
 def _reduced(band: Image.Image, most: int = MAX_SIDE) -> tuple[Array, int, list[str]]:
     """Return levels 0 to 1 with at most so many pixels a side, how many became one, and a note."""
     reduced = -(-max(band.size) // most)
@@ -178,16 +163,11 @@ def _reduced(band: Image.Image, most: int = MAX_SIDE) -> tuple[Array, int, list[
     return levels, reduced, [note] * (reduced > 1)
 
 
-def _decode(path: Source, image: Image.Image, *, by_colour: bool) -> Picture:
-    turned, notes = upright(image)
-    band, name, band_notes = _channel(path, turned)
-    if by_colour and name == "luminance":
-        colours = band if band_notes or band.mode == "F" else turned.convert("RGB")
-        photograph = _photograph(path, colours, (*notes, *band_notes))
-        if photograph:
-            return photograph
+def _drawing(
+    band: Image.Image, name: str, notes: Sequence[str] = (), more: Sequence[str] = ()
+) -> Picture:
     channel, reduced, averaging = _reduced(band)
-    return Picture(channel, name, turned.size, reduced, (*notes, *averaging, *band_notes))
+    return Picture(channel, name, band.size, reduced, (*notes, *averaging, *more))
 
 
 def _photograph(path: Source, image: Image.Image, notes: Sequence[str]) -> Picture | None:
@@ -196,11 +176,10 @@ def _photograph(path: Source, image: Image.Image, notes: Sequence[str]) -> Pictu
     rgb = levels if levels.ndim == 3 else np.repeat(levels[..., None], 3, axis=2)
     if min(rgb.shape[:2]) < MIN_SIDE_OF_PHOTOGRAPH or not is_photograph(rgb):
         return None
-    channel, steepness = shape_in(rgb)
+    channel = shape_in(rgb)
     if not (channel > 0.5).any():
         raise InputFileError(f"{path}: no shape stands out in the photograph; {_PLAIN}")
-    warned = (_FAINT,) * (steepness < FAINT_EDGE)
-    return Picture(channel, "photograph", image.size, reduced, (*notes, *averaging), warned)
+    return Picture(channel, "photograph", image.size, reduced, (*notes, *averaging))
 
 
 def _bands(path: Source, image: Image.Image) -> tuple[Image.Image, Image.Image | None]:
@@ -325,8 +304,7 @@ def read_mask_array(
     """
     source = FileContent(b"", name)
     array = _array(values, name)
-    size = array.shape[1], array.shape[0]
-    check_size(source, size)
+    check_size(source, array.shape[::-1])
     levels, is_mask = _levels(array, name)
     if is_mask and threshold is not None:
         raise OrbiflowError(
@@ -335,9 +313,7 @@ def read_mask_array(
     band = Image.fromarray(levels)
     by_colour = not is_mask and threshold is None and invert is None
     picture = _photograph(source, band, ()) if by_colour else None
-    if picture is None:
-        channel, reduced, notes = _reduced(band)
-        picture = Picture(channel, "mask" if is_mask else "luminance", size, reduced, tuple(notes))
+    picture = picture or _drawing(band, "mask" if is_mask else "luminance")
     return _traced(source, picture, threshold, invert)
 
 
@@ -382,17 +358,9 @@ _PAINT = "paint what must survive white and the rest black"
 
 
 def read_mask(path: Source) -> Picture:
-    """Read a mask from a PNG, JPEG or WebP image, turned as its EXIF orientation asks.
-
-    The level is the opacity where some of the mask is more transparent than the rest, else the
-    luminance.
-    """
-    return open_image(path, _decode_mask)
-
-
-def _decode_mask(path: Source, image: Image.Image) -> Picture:
-    turned, notes = upright(image)
-    band, alpha = _bands(path, turned)
+    """Read a mask from an image: its opacity where some is more transparent, else its luminance."""
+    image, notes = open_image(path)
+    band, alpha = _bands(path, image)
     if alpha is not None:
         least, most = np.asarray(alpha.getextrema()).tolist()
         if most < MIN_CONTRAST * 255:
@@ -412,4 +380,4 @@ def _decode_mask(path: Source, image: Image.Image) -> Picture:
             f"{path}: the mask is uniform, its levels are {low:.2f} to {high:.2f} of white, and "
             f"emphasises nothing above the rest; {_PAINT}"
         )
-    return Picture(levels, "mask", turned.size, reduced, tuple(notes))
+    return Picture(levels, "mask", image.size, reduced, tuple(notes))

@@ -35,29 +35,29 @@ def opened(source: Source) -> Path | io.BytesIO:
     return io.BytesIO(source.data) if isinstance(source, FileContent) else source
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Reading:
     """A silhouette as found in a file.
 
-    - `outline`: A simple ring (N, 2) without a repeated last vertex, in the file's own units.
-    - `y_down`: Whether the file's y axis points down.
-    - `kind`: "image", "svg", "dat" or "json".
-    - `size`: The width and height of the picture or drawing, if the file states them.
+    - `outline`: A simple ring (N, 2) without a repeated last vertex, in the file's own units. In an
+      image the unit is the pixel and (0, 0) the top left corner, so that pixel (row 0, column 0) spans
+      [0, 1] x [0, 1].
+    - `y_down`: Whether the file's y axis points down (images, SVG and `.dat` files).
+    - `kind`: "image", "svg", "dat", "json" or "polygon".
+    - `size`, `corner`: The width and height of the picture or drawing, if there is one, and its corner
+      of least coordinates.
     - `notes`: What was decided for the user, in plain words.
-    - `corner`: The corner of least coordinates of that picture or drawing.
     - `seen`: All that was read as shape, in the outline's units, before parts were left out and
       holes filled; None if that is the outline.
-    - `warnings`: What may be wrong with it, and what to do then.
     """
 
     outline: Array
     y_down: bool
-    kind: str
-    size: tuple[float, float] | None
-    notes: tuple[str, ...]
+    kind: str = "polygon"
+    size: tuple[float, float] | None = None
+    notes: tuple[str, ...] = ()
     corner: tuple[float, float] = (0.0, 0.0)
     seen: BaseGeometry | None = None
-    warnings: tuple[str, ...] = ()
 
 
 def check_file(path: Source) -> int:

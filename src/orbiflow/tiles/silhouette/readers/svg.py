@@ -21,14 +21,11 @@ from orbiflow.tiles.silhouette.outlines import (
     percent,
     simplified,
 )
-from orbiflow.tiles.silhouette.readers.reading import Reading, Source, read_bytes
-from orbiflow.tiles.silhouette.readers.svg_paint import Brush
+from orbiflow.tiles.silhouette.readers.reading import Reading, Source
 from orbiflow.tiles.silhouette.readers.svg_paths import MAX_POINTS, TooManyPoints, TooTangled
-from orbiflow.tiles.silhouette.readers.svg_regions import Layer, Regions, painted
+from orbiflow.tiles.silhouette.readers.svg_regions import Brush, Layer, Regions, painted
 from orbiflow.tiles.silhouette.readers.svg_shapes import Drawing
-from orbiflow.tiles.silhouette.readers.svg_xml import parse_xml
 
-MAX_BYTES = 16 * 2**20
 # Flattening error, of the size of each shape, and its floor, of the size of the drawing.
 FLATNESS = 1 / 2000
 FLATNESS_FLOOR = 1 / 20_000
@@ -50,9 +47,9 @@ def read_svg(path: Source) -> Reading:
     What has the background's colour hides what lies below. The largest component is kept and its holes
     are filled. Where nothing is painted, all paths count as filled.
     """
-    drawing = Drawing(path, parse_xml(path, read_bytes(path, MAX_BYTES)))
-    drawing.collect()
-    size = _drawing_size(drawing)
+    drawing = Drawing(path)
+    reach = [path.reach() for shape in drawing.shapes for path in shape.paths]
+    size = float(np.ptp(np.concatenate(reach), axis=0).max()) if reach else 0.0
     try:
         seen, notes = _seen(drawing, size)
     except TooManyPoints as exc:
@@ -76,11 +73,6 @@ def read_svg(path: Source) -> Reading:
     if box is None:
         return Reading(outline, True, "svg", None, notes, seen=seen)
     return Reading(outline, True, "svg", (box[2] - box[0], box[3] - box[1]), notes, box[:2], seen)
-
-
-def _drawing_size(drawing: Drawing) -> float:
-    reach = [path.reach() for shape in drawing.shapes for path in shape.paths]
-    return float(np.ptp(np.concatenate(reach), axis=0).max()) if reach else 0.0
 
 
 def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
@@ -110,10 +102,7 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
 def _background(
     layers: list[list[Layer]], drawing: Drawing
 ) -> tuple[str | None, list[list[Layer]]]:
-    """Return the background's colour, if it is painted, and the shapes that are no more than it.
-
-    These are rectangles that cover the page, as long as something else is there.
-    """
+    """Return the background's colour, if it is painted, and the rectangles that are no more than it."""
     every = [layer.region for own in layers for layer in own]
     xmin, ymin, xmax, ymax = drawing.box or shapely.total_bounds(every)
     page = shapely.box(xmin, ymin, xmax, ymax)

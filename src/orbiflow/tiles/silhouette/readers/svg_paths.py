@@ -152,10 +152,7 @@ def _arc(arc: svgelements.Arc, points: Array) -> Bezier | EllipticArc:
 
 
 def corners(paths: list[SubPath], matrix: Array) -> Iterator[tuple[str, Array, float]]:
-    """Yield where markers stand: "start", "mid" or "end", the point and the angle of the path there.
-
-    Points and directions are mapped by the affine `matrix` (2, 3).
-    """
+    """Yield "start", "mid" or "end", the point and angle of each corner, mapped by a matrix (2, 3)."""
     found: list[tuple[Array, Array, Array]] = []
     for path in paths:
         close = [Bezier(path.start[None])] * (path.closed and path.gap() > 0)
@@ -192,10 +189,7 @@ class TooTangled(Exception):
 
 
 def fill(rings: list[Array], rule: str = "nonzero") -> BaseGeometry:
-    """Return the region filled by closed `rings`, each (N, 2), under `rule` "nonzero" or "evenodd".
-
-    Raises `TooTangled` for curves with more crossings than can be resolved.
-    """
+    """Return the region that closed `rings`, each (N, 2), fill under `rule` "nonzero" or "evenodd"."""
     rings = [ring for ring in rings if len(np.unique(ring, axis=0)) >= 3]
     if len(rings) == 1 and (single := Polygon(rings[0])).is_valid:
         return single
@@ -215,10 +209,7 @@ def fill(rings: list[Array], rule: str = "nonzero") -> BaseGeometry:
 
 
 def check_tangle(segments: Array, half: float = 0.0) -> None:
-    """Estimate from a sample how many pairs of segments (S, 2, 2) must be tested for a crossing.
-
-    `half` is half their width. Raises `TooTangled` if there are too many.
-    """
+    """Refuse segments (S, 2, 2), `half` of whose width is given, if a sample has too many overlaps."""
     sample = np.random.default_rng(0).permutation(len(segments))[:_SAMPLE]
     for wider, most in ((0.0, 1), (half, MAX_OVERLAPS_WIDE)):
         low, high = segments.min(axis=1) - wider, segments.max(axis=1) + wider

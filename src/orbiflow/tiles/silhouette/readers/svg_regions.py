@@ -1,4 +1,4 @@
-"""The regions of the plane that the fills, strokes, clips and masks of a drawing cover."""
+"""The regions of the plane that a drawing paints, cut by its clips and masks, and their colours."""
 
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import shapely
+import svgelements
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
@@ -18,7 +19,6 @@ from orbiflow.drawing import rgb
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.geometry import complex_points
 from orbiflow.tiles.silhouette.outlines import MAX_COORDINATE
-from orbiflow.tiles.silhouette.readers.svg_paint import Brush, brushes
 from orbiflow.tiles.silhouette.readers.svg_paths import (
     MAX_POINTS,
     SubPath,
@@ -26,7 +26,7 @@ from orbiflow.tiles.silhouette.readers.svg_paths import (
     check_tangle,
     fill,
 )
-from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, Drawing, DrawnShape
+from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, Drawing, DrawnShape, as_number
 
 CAPS: dict[str, Literal["flat", "round", "square"]] = {
     "butt": "flat",
@@ -36,6 +36,71 @@ CAPS: dict[str, Literal["flat", "round", "square"]] = {
 WIGGLE = 1 / 500  # of half a pen's width: lines are simplified by as much
 SMOOTH = 0.999  # the cosine of half the turn above which a corner needs no mitre
 FINER = 8  # the paths of strokes are flattened as much finer, as a wide pen magnifies what is left
+
+CURRENT = "currentColor"
+"""The colour of what is drawn in `currentColor` where no colour is set."""
+
+
+class Brush(NamedTuple):
+    """A colour, #rrggbb or `CURRENT`, and its opacity, 0 to 1."""
+
+    colour: str
+    opacity: float
+
+
+def brushes(drawing: Drawing, shape: DrawnShape) -> dict[str, Brush]:
+    """Return what paints the "fill" and "stroke" of a shape, without what does not show, in order."""
+    if shape.paint.get("visibility") in ("hidden", "collapse"):
+        return {}
+    found: dict[str, Brush] = {}
+    order = shape.paint.get("paint-order", "fill").split()
+    for kind in ("stroke", "fill") if "stroke" in order[:1] else ("fill", "stroke"):
+        text = shape.paint.get(kind, "#000000" if kind == "fill" else "none")
+        brush = _brush(text, drawing, shape.paint.get("color", CURRENT))
+        if brush and (kind == "fill" or shape.width > 0):
+            own = min(max(as_number(shape.paint.get(f"{kind}-opacity"), 1.0), 0.0), 1.0)
+            found[kind] = Brush(brush.colour, shape.opacity * brush.opacity * own)
+    return {kind: brush for kind, brush in found.items() if brush.opacity > 0}
+
+
+def _brush(text: str, drawing: Drawing, current: str) -> Brush | None:
+    text = text.strip()
+    if text.lower() in ("none", "transparent", ""):
+        return None
+    if text.lower() == CURRENT.lower():
+        # without a colour it is the one that shows on what lies below
+        return Brush(CURRENT, 1.0) if current.lower() == CURRENT.lower() else _colour(current)
+    if text.startswith("url("):
+        return _gradient(text, drawing) or _brush(text.partition(")")[2], drawing, current)
+    return _colour(text)
+
+
+def _colour(text: str) -> Brush:
+    try:
+        colour = svgelements.Color(text[:60])
+        red, green, blue = (int(getattr(colour, name)) for name in ("red", "green", "blue"))
+        return Brush(f"#{red:02x}{green:02x}{blue:02x}", float(colour.opacity or 0.0))
+    except (ValueError, TypeError, AttributeError):
+        return Brush("#000000", 1.0)
+
+
+def _gradient(text: str, drawing: Drawing) -> Brush | None:
+    """Return the mean colour of a gradient's stops; a pattern is gray."""
+    element = drawing.referred(text)
+    for _ in range(5):  # gradients may refer to each other for their stops
+        if element is None or any(child.tag == "stop" for child in element):
+            break
+        if element.tag == "pattern":
+            return Brush("#808080", 1.0)
+        element = drawing.by_id.get(element.get("href", "").strip().removeprefix("#"))
+    if element is None:
+        return None
+    stops = [drawing.styles.properties(child) for child in element if child.tag == "stop"]
+    colours = [_colour(stop.get("stop-color", "#000000")).colour for stop in stops]
+    if not colours:
+        return None
+    red, green, blue = np.mean([rgb(colour) for colour in colours], axis=0).round().astype(int)
+    return Brush(f"#{red:02x}{green:02x}{blue:02x}", 1.0)
 
 
 class Layer(NamedTuple):
@@ -136,10 +201,7 @@ def lightness(colour: str) -> float:
 
 
 def painted(layers: list[Layer], signs: list[int], grid: float | None = None) -> BaseGeometry:
-    """Paint layers one over the other, and return the region that is left.
-
-    The signs say whether a layer adds its region (1), takes it away (-1) or changes nothing (0).
-    """
+    """Paint layers in turn, which add their region (sign 1), take it away (-1) or do nothing (0)."""
     found: BaseGeometry = Polygon()
     acting = [(sign, layer) for sign, layer in zip(signs, layers, strict=True) if sign]
     for sign, run in groupby(acting, key=lambda pair: pair[0]):

@@ -1,6 +1,7 @@
 """The shapes that an SVG drawing shows, with their transforms, found by a walk of its elements."""
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from xml.etree.ElementTree import Element
@@ -10,10 +11,11 @@ import svgelements
 
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError
-from orbiflow.tiles.silhouette.readers.reading import Source
+from orbiflow.tiles.silhouette.readers.reading import Source, read_bytes
 from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, corners, sub_paths
-from orbiflow.tiles.silhouette.readers.svg_xml import MAX_DEPTH, StyleSheet
+from orbiflow.tiles.silhouette.readers.svg_xml import MAX_DEPTH, StyleSheet, parse_xml
 
+MAX_BYTES = 16 * 2**20
 PIXELS_PER_INCH = 96
 MAX_DRAWN = 10_000  # elements, those drawn again by <use>, clips, masks and markers counted again
 MAX_TRANSFORM = 2000  # characters
@@ -50,21 +52,14 @@ PAINT = (
 
 @dataclass(frozen=True)
 class DrawnShape:
-    """One element's sub-paths in the drawing's user units, and how they are painted.
-
-    - `paint`: The properties of paint that apply to it, by name, as they are written.
-    - `opacity`: Its own opacity times that of the groups around it.
-    - `matrix`: The map (3, 3) from the units of its pen to the drawing's.
-    - `diagonal`: The length that percentages of the pen refer to, in units of the pen.
-    - `clips`: What cuts it: it shows where all of these are.
-    """
+    """One element's sub-paths in the drawing's user units, and how they are painted."""
 
     paths: list[SubPath]
-    paint: Mapping[str, str] = field(default_factory=dict[str, str])
-    opacity: float = 1.0
-    matrix: Array = field(default_factory=lambda: np.eye(3))
-    diagonal: float = 0.0
-    clips: tuple["Clip", ...] = ()
+    paint: Mapping[str, str]  # the properties of paint that apply to it, as they are written
+    opacity: float  # its own times that of the groups around it
+    matrix: Array  # the map (3, 3) from the units of its pen to the drawing's
+    diagonal: float  # what percentages of the pen refer to, in units of the pen
+    clips: tuple["Clip", ...] = ()  # what cuts it: it shows where all of these are
 
     @property
     def scale(self) -> float:
@@ -124,25 +119,18 @@ class _Place:
         )
 
 
-@dataclass
 class Drawing:
-    """An SVG drawing: walk it with `collect`, then read off `shapes` and what else was met."""
+    """The shapes of the SVG drawing in a file, and how many things of other kinds were met."""
 
-    path: Source
-    root: Element
-    shapes: list[DrawnShape] = field(default_factory=list[DrawnShape])
-    others: dict[str, int] = field(default_factory=dict[str, int])
-    visited: int = 0
-    tokens: int = 0
-
-    def __post_init__(self) -> None:
-        self.styles = StyleSheet(self.path, self.root)
+    def __init__(self, path: Source) -> None:
+        self.path, self.root = path, parse_xml(path, read_bytes(path, MAX_BYTES))
+        self.shapes: list[DrawnShape] = []
+        self.others = Counter[str]()
+        self.visited = self.tokens = 0
+        self.styles = StyleSheet(path, self.root)
         self.by_id = {key: item for item in self.root.iter() if (key := item.get("id"))}
         self.box = self._box()
         self._clips: dict[tuple[int, bytes], Clip] = {}
-
-    def collect(self) -> None:
-        """Find all shapes. Raises `InputFileError` for one that cannot be understood."""
         xmin, ymin, xmax, ymax = self.box or (0.0, 0.0, 100.0, 100.0)
         properties = self.styles.properties(self.root)
         place = _Place(np.eye(3), (xmax - xmin, ymax - ymin), depth=-1).painted(properties)
@@ -215,14 +203,11 @@ class Drawing:
         elif element.tag in _SHAPES:
             self._add_shape(element, properties, place)
         elif element.tag in ("image", "text"):
-            self._count(element.tag)
+            self.others[element.tag] += 1
         if properties.get("filter", "none") != "none":
-            self._count("filter")
+            self.others["filter"] += 1
         for key in ("clip-path", "mask"):
             self._clip(self.referred(properties.get(key)), place, first)
-
-    def _count(self, name: str) -> None:
-        self.others[name] = self.others.get(name, 0) + 1
 
     def _visit_use(self, use: Element, place: _Place) -> None:
         target = self.by_id.get(use.get("href", "").strip().removeprefix("#"))

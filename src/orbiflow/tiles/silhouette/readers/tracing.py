@@ -133,10 +133,7 @@ def _region(level: Level, mask: NDArray[np.bool_], tolerance: float) -> BaseGeom
 
 
 def _polygon(values: Array, cut: float, inside: float) -> tuple[Polygon, bool]:
-    """Return the region where `values` exceed `cut`, pixel (0, 0) spanning [0, 1] x [0, 1].
-
-    Also whether its outline is stepped: drawn in two levels, without anti-aliasing.
-    """
+    """Return the region where `values` exceed `cut`, and whether it is drawn without anti-aliasing."""
     # The margin mirrors the shape's level in the cut, so that a shape which runs off the image is
     # closed along the image's very edge.
     padded = np.pad(values, 1, constant_values=2 * cut - inside)
