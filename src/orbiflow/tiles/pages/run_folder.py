@@ -226,6 +226,7 @@ def write_run(
     folder, tiles = result_folder(out), result.tiles
     earlier = folder.has_a_run and (folder.path / OVERVIEW).is_file()
     if earlier and all(tile.isohedral_class in result.interrupted for tile in tiles):
+        (folder.path / READ_NEXT).unlink(missing_ok=True)
         return []
     if tiles:
         on_event(Note("drawing"))
