@@ -269,7 +269,8 @@ def offset_ring(ring: Array, distance: float, tolerance: float) -> tuple[Array, 
     # what does not come back, but for corners, is a gap that closes or a limb that vanishes
     lost = polygons_in(piece.difference(back) if distance < 0 else back.difference(piece))
     ends = [_farthest(part, back) for part in lost]
-    deep = sorted((end for end in ends if end[0] > reach), key=itemgetter(0))
+    least = min(reach, np.ptp(ring, axis=0).max() / 10)  # no gap is as deep as a very wide offset
+    deep = sorted((end for end in ends if end[0] > least), key=itemgetter(0))
     note = ""
     if deep:
         what = ("limb vanishes", "limbs vanish") if distance < 0 else ("gap closes", "gaps close")
