@@ -108,7 +108,7 @@ def test_a_hole_that_may_be_background_is_warned_of(tmp_path: Path) -> None:
         image.save(tmp_path / "a.png")
         return doubts(ReadingSettings().read(tmp_path / "a.png"))
 
-    assert "filled holes of" in read(60)[0]
+    assert "large holes were filled" in read(60)[0]
     assert "--invert" in read(60)[0]
     assert not read(10)  # an eye
     assert not read(140)  # the line of a drawing

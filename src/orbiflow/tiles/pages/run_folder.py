@@ -189,7 +189,8 @@ def show_reading(target: Target, picture: bytes, out: Path, on_event: Sink = ign
     write_atomic(path, picture)
     for note in target.notes:
         on_event(Note(note))
-    on_event(Note(f"what was read is drawn in {path}"))
+    soon = f", and in {out / READ} once this run replaces the earlier one" * is_beside_a_run
+    on_event(Note(f"what was read is drawn in {path}{soon}"))
     for doubt in doubts(target):
         on_event(Note(doubt, warning=True))
 
@@ -228,8 +229,6 @@ def write_run(
     if earlier and all(tile.isohedral_class in result.interrupted for tile in tiles):
         (folder.path / READ_NEXT).unlink(missing_ok=True)
         return []
-    if tiles:
-        on_event(Note("drawing"))
     if tiles and figures and not any(FIELD_FILES[0] in figure_files(tile) for tile in tiles):
         on_event(Note("no flow made these tiles, so there is none to draw: the silhouette bent"))
     with folder.replaced() as staged:
@@ -239,6 +238,8 @@ def write_run(
             write_gallery(result, staged, figures=figures, shown_out=shown_out or str(out))
         write_atomic(staged / RESULT, json.dumps(report(result), allow_nan=False))
         files = [path.relative_to(staged) for path in staged.rglob("*") if path.is_file()]
+    if earlier:
+        on_event(Note(f"the earlier run in {out} was replaced"))
     written = [folder.path / path for path in sorted(files)]
     for path in written:
         on_event(Written(path))

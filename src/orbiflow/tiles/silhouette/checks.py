@@ -53,8 +53,8 @@ def _missing(target: Target) -> list[str]:
     if SMALL_HOLE < share < LARGE_HOLE:
         level = " or try another --threshold or --invert" if is_image else ""
         found.append(
-            f"filled holes of {percent(share)} of the area, because a tile has none: if one is "
-            f"background, open it to the outside in the drawing{level}"
+            "large holes were filled, because a tile has none: if one is background, open it to the "
+            f"outside in the drawing{level}"
         )
     return found
 

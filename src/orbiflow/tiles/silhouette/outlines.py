@@ -225,7 +225,8 @@ def sampled(
                 break
     if fine is None:
         raise OrbiflowError(
-            "parts of the silhouette are too thin to be sampled: thicken or remove the hairs"
+            "parts of the silhouette are too thin to be followed: draw them thicker, round them off "
+            "with --smooth 0.01, or, if a photograph was read badly, cut it out or set --threshold"
         )
     middle = with_corners(ring, corners, MIDDLE_MULTIPLE * len(coarse), phase * MIDDLE_MULTIPLE)
     if len(fine) % len(middle) or not shapely.Polygon(middle).is_valid:
