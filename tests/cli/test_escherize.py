@@ -21,7 +21,17 @@ from rich.console import Console
 from orbiflow import __version__
 from orbiflow.cli import terminal
 from orbiflow.runtime import Table
-from orbiflow.tiles import CLASSES, Fit, Rating, Target, TileModel, load_model, write_tile_folder
+from orbiflow.tiles import (
+    CLASSES,
+    Fit,
+    Rating,
+    Target,
+    TileModel,
+    load_model,
+    silhouette,
+    write_tile_folder,
+)
+from orbiflow.tiles.pages import run_folder
 from orbiflow.tiles.pages.run_folder import FIGURE_FILES
 from orbiflow.tiles.search import candidates, occupancy
 from orbiflow.tiles.search.finished_tiles import best_tiles
@@ -56,7 +66,7 @@ def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # a slow machine has lines of progress, and nothing else
     assert all("% after " in line for line in done.stderr.splitlines()), done.stderr
     for name in ("IH4", "IH6"):
-        assert f"{name}: IoU" in done.stdout
+        assert f"{name}: tile found" in done.stdout
     assert "dark on light" in done.stdout
     return folder
 
@@ -188,11 +198,14 @@ def test_no_tile_is_status_one(tmp_path: Path, orbiflow, monkeypatch: pytest.Mon
     path = tmp_path / "boot.json"
     path.write_text(json.dumps(BOOT))
     monkeypatch.setattr(occupancy, "fit_occupancy", lambda *_, **__: crossed())
+    for room in (silhouette, run_folder):
+        monkeypatch.setattr(room, "doubts", lambda _: ["the silhouette is odd"])
     options = ["--classes", "IH21", "--workers", 1, *FEW]
     for _ in range(2):  # the second time there is a run without a tile to replace
         outcome = orbiflow("escherize", path, "-o", tmp_path / "o", *options)
         assert outcome.status == 1
         assert f"no certified tile was found; see {tmp_path / 'o' / 'result.json'}" in outcome.err
+        assert outcome.err.count("the silhouette is odd") == 2  # at the start and at the end
     assert "IH21: no tile: IH21: the boundary crosses itself" in outcome.err
     assert {p.name for p in (tmp_path / "o").iterdir()} == {"read.png", "result.json"}
     document = json.loads((tmp_path / "o" / "result.json").read_text(encoding="utf-8"))

@@ -85,7 +85,7 @@ def wait_for(process: subprocess.Popen[str], text: str) -> None:
 def test_what_was_finished_is_written(whole_group: bool, tmp_path: Path) -> None:
     out = tmp_path / "out"
     with running(tmp_path, before=FIRST_IS_SHORT) as process:
-        wait_for(process, "IH1: IoU")
+        wait_for(process, "IH1: tile found")
         # a terminal sends Ctrl-C to the whole foreground group, workers included
         (os.killpg if whole_group else os.kill)(process.pid, signal.SIGINT)
         # returns once the last process that holds the pipes has ended

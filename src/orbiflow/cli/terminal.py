@@ -42,7 +42,6 @@ class Terminal:
         self.first: tuple[float, float] | None = None  # the time and share of the first progress
         self.last = Progress(1.0, "")
         self.forks = False
-        self.best = (0.0, "")
         self.bar: Bar | None = None
 
     def __enter__(self) -> Terminal:
@@ -66,12 +65,9 @@ class Terminal:
                 self._end_bar()
                 output.print(_aligned(event))
             case Preview():
-                self._found(event)
-                seconds = f"first tile after {event.seconds:.1f} s"
-                _say(f"{seconds}: {event.class_name}, IoU {event.iou:.4f}, certified")
+                _say(f"first tile after {event.seconds:.1f} s: {event.class_name}, certified")
             case TileFound():
-                self._found(event)
-                _say(f"{event.class_name}: IoU {event.iou:.4f}")
+                _say(f"{event.class_name}: tile found{', NOT CERTIFIED' * (not event.certified)}")
             case ClassFailed():
                 interrupted = event.reason == "interrupted"
                 reason = event.reason if interrupted else f"no tile: {event.reason}"
@@ -106,9 +102,6 @@ class Terminal:
             line += f"; about {_duration(passed * (1 - event.share) / done)} left"
         return line
 
-    def _found(self, event: Preview | TileFound) -> None:
-        self.best = max(self.best, (event.iou, event.class_name))
-
     def _show_progress(self, event: Progress) -> None:
         self.last = event
         if self.first is None:
@@ -126,8 +119,7 @@ class Terminal:
             )
             self.bar.add_task("", total=1.0)
             self.bar.start()
-        iou, name = self.best
-        shown = escape(f"{event.what}, best {iou:.4f} ({name})" if name else event.what)
+        shown = escape(f"{event.what} {event.class_name}".rstrip())
         (task,) = self.bar.task_ids
         self.bar.update(task, completed=event.share, description=shown, refresh=self.forks)
 

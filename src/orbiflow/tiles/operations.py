@@ -89,6 +89,7 @@ def escherize(
         shown_out: What the page's commands call the folder. Default: its path.
     """
     from orbiflow.tiles import pages, search
+    from orbiflow.tiles.silhouette import doubts, is_hopeless
 
     begin = time.perf_counter()
     target = reading.read(image, called)
@@ -114,6 +115,8 @@ def escherize(
     for table in _tables(tiles)[: 1 + verbose]:
         on_event(table)
     on_event(_closing(out, bool(written), bool(result.tiles), summary["seconds"]))
+    for text in doubts(target) if not result.tiles or is_hopeless(target) else ():
+        on_event(Note(text, warning=True))  # again, where it explains what was found
     if result.interrupted or cancel.cancelled:
         return Outcome(summary, "cancelled")
     return Outcome(summary, "done" if result.tiles else "nothing found")

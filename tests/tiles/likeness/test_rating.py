@@ -17,7 +17,8 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import wallpaper_group
 from orbiflow.tiles import EscherTile, Fidelity, Rating, SearchResult, Target, Tile, rank_score
 from orbiflow.tiles.likeness import likeness_ratings
-from orbiflow.tiles.likeness.rating import WORDS
+from orbiflow.tiles.likeness.ranking import WORDS
+from orbiflow.tiles.search.finished_tiles import rated
 
 MARKS = Path(__file__).parents[3] / "benchmarks" / "data" / "likeness_marks.json"
 SCORES = st.lists(st.floats(0, 1), min_size=1, max_size=12)
@@ -82,3 +83,10 @@ def test_stars_agree_with_marks_as_the_docs_say() -> None:
     place = list(WORDS.values()).index
     apart = [abs(place(Rating(s).word) - place(w)) for s, w in zip(stars, said, strict=True)]
     assert np.mean(np.array(apart) <= 1) > 0.93
+
+
+def test_a_line_never_has_stars() -> None:
+    line = Target.from_polygon([[0, 0], [100, 0], [100, 2], [0, 2]])
+    tile = EscherTile(Tile(line.outline, wallpaper_group("p1")), known_score=0.9)
+    (own,) = rated([tile], line)
+    assert own.rating == Rating(1)

@@ -85,6 +85,7 @@ def test_a_failed_search_leaves_the_earlier_run(
     out.mkdir()
     (out / "result.json").write_text('{"schema_version": 2, "tiles": []}')
     (out / "read.png").write_bytes(b"earlier")
+    told: list[object] = []
 
     def fail(*_: object) -> None:
         assert (out / "read-next.png").is_file()  # before the search
@@ -92,6 +93,8 @@ def test_a_failed_search_leaves_the_earlier_run(
 
     monkeypatch.setattr("orbiflow.tiles.search.escherizing._search", fail)
     with pytest.raises(RuntimeError):
-        operations.escherize(picture, out)
+        operations.escherize(picture, out, on_event=told.append)
+    note = f"read-next.png, and in {out / 'read.png'} once this run replaces the earlier one"
+    assert any(isinstance(event, Note) and note in event.text for event in told)
     assert (out / "read.png").read_bytes() == b"earlier"
     assert result_folder(out).has_a_run

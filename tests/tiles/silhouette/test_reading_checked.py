@@ -108,7 +108,7 @@ def test_a_hole_that_may_be_background_is_warned_of(tmp_path: Path) -> None:
         image.save(tmp_path / "a.png")
         return doubts(ReadingSettings().read(tmp_path / "a.png"))
 
-    assert "filled holes of" in read(60)[0]
+    assert "large holes were filled" in read(60)[0]
     assert "--invert" in read(60)[0]
     assert not read(10)  # an eye
     assert not read(140)  # the line of a drawing
@@ -175,3 +175,25 @@ def test_files_of_other_programs(tmp_path: Path, content: bytes, name: str, mess
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputFileError, match=message):
         read_outline(tmp_path / name)
+
+
+EAR = '<path d="M240 150 q20 40 -5 60"/>'
+
+
+@pytest.mark.parametrize("ear", ["", EAR])
+@pytest.mark.parametrize(
+    ("dashes", "is_whole"), [("12 6", True), ("820 20", True), ("700 300", False)]
+)
+def test_small_gaps_in_an_outline_are_closed(
+    tmp_path: Path, dashes: str, is_whole: bool, ear: str
+) -> None:
+    body = f'<ellipse cx="200" cy="200" rx="160" ry="100" stroke-dasharray="{dashes}"/>{ear}'
+    head = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 400 400"'
+    path = tmp_path / "a.svg"
+    path.write_text(f'{head} fill="none" stroke="black" stroke-width="4">{body}</svg>')
+    target = Target.read(path)
+    assert (target.area > 0.95 * np.pi * 160 * 100) == is_whole
+    assert (
+        any("gaps of up to 3% of the drawing's size" in note for note in target.notes) == is_whole
+    )
+    assert any("line or thread" in doubt for doubt in doubts(target)) != is_whole

@@ -20,9 +20,8 @@ from orbiflow.runtime import (
     work,
     write_atomic,
 )
-from orbiflow.tiles.pages.overview import overview_png
 from orbiflow.tiles.pages.page import TILE_FILES, index_page
-from orbiflow.tiles.pages.read_picture import is_read_png
+from orbiflow.tiles.pages.sheets import is_read_png, overview_png
 from orbiflow.tiles.pictures import (
     bending_picture,
     comparison,
@@ -190,7 +189,8 @@ def show_reading(target: Target, picture: bytes, out: Path, on_event: Sink = ign
     write_atomic(path, picture)
     for note in target.notes:
         on_event(Note(note))
-    on_event(Note(f"what was read is drawn in {path}"))
+    soon = f", and in {out / READ} once this run replaces the earlier one" * is_beside_a_run
+    on_event(Note(f"what was read is drawn in {path}{soon}"))
     for doubt in doubts(target):
         on_event(Note(doubt, warning=True))
 
@@ -227,9 +227,8 @@ def write_run(
     folder, tiles = result_folder(out), result.tiles
     earlier = folder.has_a_run and (folder.path / OVERVIEW).is_file()
     if earlier and all(tile.isohedral_class in result.interrupted for tile in tiles):
+        (folder.path / READ_NEXT).unlink(missing_ok=True)
         return []
-    if tiles:
-        on_event(Note("drawing"))
     if tiles and figures and not any(FIELD_FILES[0] in figure_files(tile) for tile in tiles):
         on_event(Note("no flow made these tiles, so there is none to draw: the silhouette bent"))
     with folder.replaced() as staged:
@@ -239,6 +238,8 @@ def write_run(
             write_gallery(result, staged, figures=figures, shown_out=shown_out or str(out))
         write_atomic(staged / RESULT, json.dumps(report(result), allow_nan=False))
         files = [path.relative_to(staged) for path in staged.rglob("*") if path.is_file()]
+    if earlier:
+        on_event(Note(f"the earlier run in {out} was replaced"))
     written = [folder.path / path for path in sorted(files)]
     for path in written:
         on_event(Written(path))

@@ -28,7 +28,7 @@ from orbiflow.tiles.likeness import (
 from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
 from orbiflow.tiles.search.candidates import Fit, StillTiles
-from orbiflow.tiles.silhouette import Target
+from orbiflow.tiles.silhouette import Target, is_hopeless
 from orbiflow.tiles.tile import EscherTile
 
 if TYPE_CHECKING:
@@ -120,6 +120,8 @@ def recogniser(target: Target) -> Recogniser:
 
 def rated(tiles: Sequence[EscherTile], target: Target) -> list[EscherTile]:
     """Return the tiles of a run with their ratings, in the same order."""
+    if is_hopeless(target):
+        return [tile.changed(rating=Rating(1)) for tile in tiles]
     length = ring_length(target.outline) / math.sqrt(abs(signed_area(target.outline)))
     likeness = [tile.score for tile in tiles if tile.fidelity is not None]
     found = iter(likeness_ratings(likeness, length))

@@ -6,13 +6,12 @@ import numpy as np
 from shapely import Polygon
 
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette.outlines import percent
+from orbiflow.tiles.silhouette.outlines import THREAD, is_thread, percent
 from orbiflow.tiles.silhouette.target import Target
 
 MOST_LEFT_OUT = 0.02  # of what was seen
 # Shares of the silhouette: smaller holes are eyes; larger ones are what the line of a drawing encloses.
 SMALL_HOLE, LARGE_HOLE = 0.02, 0.3
-THREAD = 0.06  # greatest width, of the length; animals have at least 0.14
 FEWEST_PIXELS = 40
 THIN = 3.0  # pixels
 MOSTLY_THIN = 0.5  # of the outline's length
@@ -54,17 +53,22 @@ def _missing(target: Target) -> list[str]:
     if SMALL_HOLE < share < LARGE_HOLE:
         level = " or try another --threshold or --invert" if is_image else ""
         found.append(
-            f"filled holes of {percent(share)} of the area, because a tile has none: if one is "
-            f"background, open it to the outside in the drawing{level}"
+            "large holes were filled, because a tile has none: if one is background, open it to the "
+            f"outside in the drawing{level}"
         )
     return found
+
+
+def is_hopeless(target: Target) -> bool:
+    """Return whether a silhouette is a mere line, which no tile will look like."""
+    return is_thread(Polygon(target.outline), float(np.ptp(target.outline, axis=0).max()))
 
 
 def _hopeless(target: Target) -> list[str]:
     """Return why no tile will look like a silhouette."""
     shape, found = Polygon(target.outline), list[str]()
     length = float(np.ptp(target.outline, axis=0).max())
-    if shape.buffer(-THREAD / 2 * length).is_empty:
+    if is_hopeless(target):
         found.append(
             f"the silhouette is a line or thread, nowhere wider than {THREAD:.0%} of its length: no "
             "tile will look like it; draw it wider, or close its outline"

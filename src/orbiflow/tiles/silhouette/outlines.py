@@ -28,6 +28,7 @@ MAX_COORDINATE = 1e12
 MIN_RELATIVE_SIZE = 1e-9
 MIN_SIZE = 1e-100
 MIN_RELATIVE_AREA = 1e-9  # Relative to the square of the longer side of the bounding box.
+THREAD = 0.06  # greatest width, of the length; animals have at least 0.14
 # Of the box's longer side: a polygon that is simple by less would cross itself when it is rescaled.
 CLEARANCE_DIGITS = 12
 _POSITION = re.compile(r"\[(\S+) (\S+)\]")
@@ -129,11 +130,20 @@ def simplified(polygon: Polygon, tolerance: float) -> Polygon:
     return max(parts, key=lambda part: part.area, default=Polygon())
 
 
+def is_thread(shape: Polygon, length: float) -> bool:
+    """Return whether a shape is no more than a line, where what is drawn is so long."""
+    return shape.buffer(-THREAD / 2 * length).is_empty
+
+
+def closed(geometry: BaseGeometry, width: float) -> Polygon:
+    """Return the largest part, filled, without gaps narrower than `width`."""
+    parts = polygons_in(geometry.buffer(width / 2).buffer(-width / 2))
+    return filled(max(parts, key=lambda part: filled(part).area, default=Polygon()))
+
+
 def rounded(geometry: BaseGeometry, width: float) -> Polygon:
     """Return the largest part, filled, without gaps and then without limbs narrower than `width`."""
-    closed = polygons_in(geometry.buffer(width / 2).buffer(-width / 2))
-    solid = filled(max(closed, key=lambda part: filled(part).area, default=Polygon()))
-    parts = polygons_in(solid.buffer(-width / 2).buffer(width / 2))
+    parts = polygons_in(closed(geometry, width).buffer(-width / 2).buffer(width / 2))
     return simplified(max(parts, key=lambda part: part.area, default=Polygon()), width / 50)
 
 
@@ -215,7 +225,8 @@ def sampled(
                 break
     if fine is None:
         raise OrbiflowError(
-            "parts of the silhouette are too thin to be sampled: thicken or remove the hairs"
+            "parts of the silhouette are too thin to be followed: draw them thicker, round them off "
+            "with --smooth 0.01, or, if a photograph was read badly, cut it out or set --threshold"
         )
     middle = with_corners(ring, corners, MIDDLE_MULTIPLE * len(coarse), phase * MIDDLE_MULTIPLE)
     if len(fine) % len(middle) or not shapely.Polygon(middle).is_valid:

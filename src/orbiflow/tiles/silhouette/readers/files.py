@@ -5,15 +5,24 @@ Polygons written out as numbers are read here: the `.dat` files of Nagata and Im
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from shapely import Polygon
 
 from orbiflow.arguments import as_path
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import is_list, is_object
-from orbiflow.tiles.silhouette.outlines import MAX_VERTICES, clean_ring
+from orbiflow.tiles.silhouette.outlines import (
+    MAX_VERTICES,
+    clean_ring,
+    closed,
+    is_thread,
+    outer_ring,
+    simplified,
+)
 from orbiflow.tiles.silhouette.readers.pictures import read_image
 from orbiflow.tiles.silhouette.readers.reading import (
     FileContent,
@@ -26,6 +35,8 @@ from orbiflow.tiles.silhouette.readers.reading import (
 from orbiflow.tiles.silhouette.readers.svg import read_svg
 
 _HEAD_BYTES = 65536
+GAP = 0.03  # of the drawing's size: such gaps in an outline are closed
+MOST = 0.8  # of the lines' area
 _IMAGE_MAGIC = (
     *(b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"BM"),
     *(b"GIF87a", b"GIF89a", b"II*\0", b"MM\0*"),
@@ -71,14 +82,31 @@ def read_outline(
     check_file(path)
     kind = _kind(path, read_head(path, _HEAD_BYTES))
     if kind == "image":
-        return read_image(path, threshold=threshold, invert=invert)
+        return _bridged(read_image(path, threshold=threshold, invert=invert))
     for name, value in (("threshold", threshold), ("invert", invert)):
         if value is not None:
             where = f"images only and {path} is a polygon or drawing"
             raise OrbiflowError(f"{name} applies to {where}; leave it out")
     # extreme coordinates overflow in the geometry, whose result is then refused
     with np.errstate(all="ignore"):
-        return {"svg": read_svg, "json": read_json, "dat": read_dat}[kind](path)
+        return _bridged({"svg": read_svg, "json": read_json, "dat": read_dat}[kind](path))
+
+
+def _bridged(reading: Reading) -> Reading:
+    """Return what the lines of a drawing enclose but for small gaps, where they alone are a thread."""
+    seen = reading.seen
+    size = 0.0 if seen is None else float(np.ptp(np.reshape(seen.bounds, (2, 2)), axis=0).max())
+    if seen is None or not is_thread(Polygon(reading.outline), size):
+        return reading
+    body = simplified(closed(seen, GAP * size), GAP * size / 50)
+    lines = seen.intersection(body).area
+    if is_thread(body, size) or not MOST * seen.area < lines < body.area / 2:
+        return reading
+    note = (
+        f"the largest part is no more than a line: took instead what the lines enclose when gaps of "
+        f"up to {GAP:.0%} of the drawing's size are closed"
+    )
+    return replace(reading, outline=outer_ring(body), notes=(*reading.notes, note))
 
 
 def _kind(path: Source, head: bytes) -> str:
@@ -193,9 +221,8 @@ def read_json(path: Source) -> Reading:
     try:
         content = json.loads(data)
     except json.JSONDecodeError as exc:
-        raise InputFileError(
-            f"{path}: line {exc.lineno}, column {exc.colno}: not valid JSON ({exc.msg})"
-        ) from exc
+        where = f"line {exc.lineno}, column {exc.colno}"
+        raise InputFileError(f"{path}: {where}: not valid JSON ({exc.msg})") from exc
     except RecursionError as exc:
         raise InputFileError(f"{path}: nested too deeply to be a polygon") from exc
     except ValueError as exc:
