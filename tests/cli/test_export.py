@@ -100,7 +100,10 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     ),
     "no unit of the area": (["--area", "300x200"], "--area ... '300x200' has no unit"),
     "zero": (["--tile-size", "0mm"], "--tile-size ... above 0 and at most 20000, got '0mm'"),
-    "one side": (["--bed", "300mm"], "--bed ... '300mm' is not a width and a height"),
+    "one side": (
+        ["--bed", "300mm"],
+        "--bed ... '300mm' is not a page; write a size such as 300x200mm",
+    ),
     "small page": (["--area", "10x10mm"], "does not fit on the page of 10 x 10 mm: it needs"),
     "kerf of the skeleton": (["--for", "laser", "--kerf", "1mm"], "--kerf ... --cut pieces"),
     "wide kerf": (["--cut", "pieces", "--kerf", "5cm"], "wider than the piece's neck"),
