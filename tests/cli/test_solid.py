@@ -39,7 +39,7 @@ def test_the_ending_is_the_format(result: Path, tmp_path: Path, orbiflow, monkey
         ("--kind puzzle --eye 1,2", "--eye applies only to --kind stamp or mould"),
         ("--chamfer 5mm", "--chamfer must be at most --height, 4 mm"),
         ("--height 4", "no unit"),
-        ("--picture a.svg", "a tile has no picture"),
+        ("--picture a.svg", "a tile takes no picture"),
     ],
 )
 def test_mistakes(

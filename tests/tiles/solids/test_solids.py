@@ -278,7 +278,7 @@ def test_a_stamp_wants_lines(tmp_path: Path) -> None:
     Image.new("RGB", size_of(tile, 60)).save(picture)
     with pytest.raises(InputFileError, match="needs lines: draw it as SVG"):
         tile.solid(SolidSettings(kind="stamp"), picture=picture)
-    with pytest.raises(OrbiflowError, match="a cutter has no picture"):
+    with pytest.raises(OrbiflowError, match="a cutter takes no picture"):
         tile.solid(SolidSettings(kind="cutter"), picture=picture)
 
 

@@ -110,7 +110,9 @@ def make_solid(
     """
     settings, given = settings or SolidSettings(), EscherTile.of(tile)
     if picture is not None and settings.kind not in WITH_DRAWING:
-        raise OrbiflowError(f"a {settings.kind} has no picture; a stamp or mould has: leave it out")
+        raise OrbiflowError(
+            f"a {settings.kind} takes no picture, only a stamp or mould does: leave it out"
+        )
     certificate = given.require_certified(
         force=force, otherwise="so no solid is made of it; --force makes one, marked so"
     )
