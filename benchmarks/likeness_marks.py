@@ -22,7 +22,7 @@ from scipy.stats import spearmanr
 from orbiflow.tiles import Fidelity, Rating
 from orbiflow.tiles.likeness import likeness_ratings
 from orbiflow.tiles.likeness.elastic import POSE_WEIGHT
-from orbiflow.tiles.likeness.rating import WORDS
+from orbiflow.tiles.likeness.ranking import WORDS
 
 Row = dict[str, Any]
 

@@ -123,12 +123,9 @@ def kl_of_uniform(name: str, space: Space, grid: int = 400) -> float:
 
 
 class Fitted(NamedTuple):
-    """A density fitted to samples of a target.
+    """A density fitted to samples of a target, saved by `density_to_bytes`, and its integral.
 
-    - `space`, `target`, `measure`: What was fitted.
-    - `saved`: The density, as `density_to_bytes` returns it.
     - `kl`: The divergence from the target in nats, by quadrature with doubled steps of the flow.
-    - `mass`: The density's integral over the square.
     """
 
     space: str

@@ -27,14 +27,7 @@ SHEET = Sheet.screen(1800)
 
 
 class Picture(NamedTuple):
-    """A picture of the page.
-
-    - `file`: The PNG.
-    - `alt`: What one sees, in words.
-    - `caption`: What it means.
-    - `width`, `height`: The size of the PNG in pixels.
-    - `others`: The kind and name of each further file that shows the same.
-    """
+    """A PNG of the page, its size in pixels, and the kind and name of each other file that shows it."""
 
     file: str
     alt: str

@@ -64,14 +64,7 @@ class Table(NamedTuple):
 
 @dataclass(frozen=True)
 class Findings:
-    """What drawing an exhibit found.
-
-    - `verdict`: Whether what the paper states agrees with what we find.
-    - `found`: What we see and measure, in words.
-    - `why`: Why it differs, or "".
-    - `numbers`: The numbers for `paper.json`, by name.
-    - `tables`: The tables below the pictures.
-    """
+    """What we see and measure, whether the paper agrees, why not, and the numbers for `paper.json`."""
 
     verdict: Literal["agrees", "agrees in part", "differs"]
     found: str
@@ -86,12 +79,9 @@ Draw = Callable[[Canvas, Extent, list[Any]], Findings]
 
 @dataclass(frozen=True)
 class Exhibit:
-    """A figure or table of the paper.
+    """A figure or table of the paper: what the paper `states`, and how it is drawn here.
 
     - `name`: The name with which its files begin, such as "figure-1".
-    - `title`: What it is about.
-    - `states`: What the paper shows or claims.
-    - `draw`: The function that draws it.
     - `needs`: A function that returns the work to be done first.
     """
 

@@ -184,13 +184,10 @@ _CELL = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
 
 
 class Kind(NamedTuple):
-    """A type of symmetry.
+    """A type of symmetry, with the paper's title and equation.
 
-    - `title`, `equation`: The paper's title and equation, in one line each.
-    - `lattice`: The field's lattice.
     - `operators`: The operators that make the field symmetric, none for periodicity.
-    - `point`: The point that is marked.
-    - `images`: The isometries under which it is marked, the identity first.
+    - `point`, `images`: What is marked: a point under isometries, the identity first.
     """
 
     title: str

@@ -33,7 +33,7 @@ def write_boot(path: Path, height: float = 145) -> None:
 
 def boot_parcels(count: int) -> list[Parcel]:
     """Searches of less than a second."""
-    given = {**QUICK, "image": "boot.json", "workers": 1, "called": "boot"}
+    given = {**QUICK, "image": "boot.json", "workers": 1, "called": "boot", "shown_out": "out"}
     call = find("escherize").call(given)
     data = json.dumps(BOOT).encode()
     return [Parcel(f"boot {k}", call, "image", "out", "boot.json", data) for k in range(count)]

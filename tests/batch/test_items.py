@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from orbiflow.batch import Entry
 from orbiflow.batch.folder import RESERVED, Journal
-from orbiflow.batch.items import folder_names, listed, read_file
+from orbiflow.batch.work import folder_names, listed, read_file
 from orbiflow.errors import InputFileError, OrbiflowError, OutputError
 from orbiflow.runtime import stays_inside
 

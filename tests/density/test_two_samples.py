@@ -19,8 +19,7 @@ from orbiflow.density import (
     make_space,
     mmd_test,
 )
-from orbiflow.density.comparing.resampling import Groups
-from orbiflow.density.comparing.two_samples import chosen_rows
+from orbiflow.density.comparing.resampling import Groups, chosen_rows
 from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
@@ -29,7 +28,7 @@ SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 @pytest.fixture(autouse=True)
 def _fewer_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
     """For a hundred rows the widths of kernels need no half a million pairs."""
-    monkeypatch.setattr("orbiflow.density.comparing.two_samples.PAIRS", 20_000)
+    monkeypatch.setattr("orbiflow.density.comparing.resampling.PAIRS", 20_000)
 
 
 def p_of(space: str, points: torch.Tensor, first: np.ndarray, labels: Any, seed: int) -> float:

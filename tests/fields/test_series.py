@@ -10,7 +10,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.fields.series import differentiate, evaluate, evaluate_plainly, trigonometric_table
+from orbiflow.fields.fourier import differentiate, evaluate, evaluate_plainly, trigonometric_table
 from strategies import central_difference, largest, random_tensor, seeds
 
 orders = st.lists(st.integers(0, 4), min_size=1, max_size=3)

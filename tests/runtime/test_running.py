@@ -26,6 +26,8 @@ from orbiflow.runtime import (
 from orbiflow.tiles.pages.run_folder import TILE_FILES
 from runtime.searches import BOOT, ENDLESS, boot_call, check_order, run
 
+SHEETS = ("index.html", "overview.png", "read.png", "result.json")
+
 
 def files(folder: Path) -> set[str]:
     return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
@@ -51,14 +53,14 @@ def test_a_search(workers: int, tmp_path: Path) -> None:
     written = {event.path for event in events if isinstance(event, Written)}
     assert written == {tmp_path / "out" / name for name in files(tmp_path / "out")}
     expected = {f"{name}/{file}" for name in ("IH4", "IH6") for file in TILE_FILES}
-    assert files(tmp_path / "out") == expected | {"index.html", "result.json", "overview.png"}
+    assert files(tmp_path / "out") == expected | {*SHEETS}
 
 
 def test_a_second_run_takes_the_place_of_the_first(tmp_path: Path) -> None:
     run(boot_call(tmp_path, "IH4", "IH6"))
     out = tmp_path / "out"
     run(boot_call(tmp_path, "IH4"))
-    assert {p.name for p in out.iterdir()} == {"IH4", "index.html", "overview.png", "result.json"}
+    assert {p.name for p in out.iterdir()} == {"IH4", *SHEETS}
     (out / "IH4" / "notes.txt").write_text("mine")
     before = (out / "result.json").read_bytes()
     with pytest.raises(OrbiflowError, match=r"holds IH4/notes.txt, which is of no earlier run"):
@@ -140,12 +142,12 @@ def test_a_first_look_alone_is_kept_unless_there_is_more(tmp_path: Path) -> None
     out = tmp_path / "out"
     document = json.loads((out / "result.json").read_text())
     assert [entry["class"] for entry in document["tiles"] + document["failed"]] == ["IH6", "IH4"]
-    assert {p.name for p in out.iterdir()} == {"IH6", "index.html", "overview.png", "result.json"}
+    assert {p.name for p in out.iterdir()} == {"IH6", *SHEETS}
     assert run(find("escherize").call({**given, "classes": ["IH4"]})).state == "done"
     finished = cancelled()
     assert not finished.summary["written"]
     assert finished.summary["tiles"] == []
-    assert {p.name for p in out.iterdir()} == {"IH4", "index.html", "overview.png", "result.json"}
+    assert {p.name for p in out.iterdir()} == {"IH4", *SHEETS}
 
 
 def test_a_fit_that_is_cancelled_writes_nothing(tmp_path: Path) -> None:
@@ -178,7 +180,7 @@ def test_what_the_sink_raises_comes_out(tmp_path: Path) -> None:
     with pytest.raises(ZeroDivisionError):
         run(boot_call(tmp_path, "IH4", "IH6"), sink)
     assert not any(isinstance(event, Failed) for event in told)
-    assert not (tmp_path / "out").exists()
+    assert files(tmp_path / "out") == {"read.png"}
 
 
 def test_a_mistake_is_told_and_raised(tmp_path: Path) -> None:

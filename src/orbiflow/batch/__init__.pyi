@@ -4,11 +4,11 @@ from .executors import LocalProcesses as LocalProcesses
 from .executors import Parcel as Parcel
 from .executors import WorkSettings as WorkSettings
 from .folder import BatchFolder as BatchFolder
-from .items import Item as Item
 from .overview import Column as Column
 from .overview import Entry as Entry
 from .overview import Kind as Kind
 from .overview import Summary as Summary
 from .overview import csv_bytes as csv_bytes
+from .work import Item as Item
 from .work import run_files as run_files
 from .work import run_items as run_items

@@ -11,10 +11,10 @@ from .comparing.paired import compare_scores as compare_scores
 from .comparing.paired import density_of as density_of
 from .comparing.paired import require_one_space as require_one_space
 from .comparing.paired import scores_of as scores_of
+from .comparing.resampling import TestResult as TestResult
 from .comparing.resampling import cross_validation_folds as cross_validation_folds
+from .comparing.resampling import mmd_test as mmd_test
 from .comparing.settings import ComparisonSettings as ComparisonSettings
-from .comparing.two_samples import TestResult as TestResult
-from .comparing.two_samples import mmd_test as mmd_test
 from .conditionals import at_observed as at_observed
 from .conditionals import axes_named as axes_named
 from .conditionals import chart_of_observed as chart_of_observed

@@ -10,9 +10,9 @@ from .protocol import prepared as prepared
 from .protocol import prepared_with_divergence as prepared_with_divergence
 from .protocol import transformed as transformed
 from .spline_field import SplineField as SplineField
-from .splines import padded as padded
-from .splines import spline_sum as spline_sum
-from .splines import symbol as symbol
+from .spline_field import padded as padded
+from .spline_field import spline_sum as spline_sum
+from .spline_field import symbol as symbol
 from .symmetrization import PeriodicFeatures as PeriodicFeatures
 from .symmetrization import Symmetrized as Symmetrized
 from .symmetrization import periodic_operator as periodic_operator

@@ -1,7 +1,14 @@
-"""Symmetric fields evaluated by splines, at a cost that does not grow with the frequency."""
+"""Symmetric fields evaluated by cubic splines, at a cost that does not grow with the frequency.
+
+A value depends on 4^d coefficients for any size of the even periodic grid. Points are on the last axis:
+`u` is (d, N), in cells of the grid. The derivatives are hand-written; the backward pass needs second
+ones, because the divergence is a result too. Autograd differentiates the backward pass itself.
+"""
 
 import math
 from collections.abc import Callable
+from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 import torch
@@ -10,9 +17,218 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields.invariants import InvariantBasis, InvariantField
-from orbiflow.fields.splines import padded, spline_sum, spline_sum_with_divergence, symbol
+from orbiflow.fields.protocol import plain_gradients, refuse_old_batches, transformed
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.typed_torch import fft, linalg
+from orbiflow.typed_torch import applied, fft, linalg
+
+TAPS = 4  # the number of coefficients along an axis that a cubic spline's value depends on
+
+
+@lru_cache(maxsize=16)
+def _polynomials(orders: int, dtype: torch.dtype, device: torch.device) -> Tensor:
+    """Return the B-splines' pieces and derivatives as polynomials of the fraction, (4 orders, 4)."""
+    pieces = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6
+    rows = [pieces]
+    for _ in range(orders - 1):
+        lower = rows[-1][:, 1:] * np.arange(1, 4)
+        rows.append(np.pad(lower, ((0, 0), (0, 1))))
+    with torch.inference_mode(False):
+        return torch.tensor(np.concatenate(rows), dtype=dtype, device=device)
+
+
+def cubic_weights(fraction: Tensor, orders: int = 1) -> Tensor:
+    """Return weights (d, orders, 4, N) of the four nearest B-splines, and of their derivatives.
+
+    >>> float(cubic_weights(torch.tensor([[0.25]])).sum())
+    1.0
+    """
+    square = fraction * fraction
+    powers = torch.stack([torch.ones_like(fraction), fraction, square, square * fraction])
+    table = _polynomials(orders, fraction.dtype, fraction.device) @ powers.reshape(TAPS, -1)
+    return table.reshape(orders, TAPS, *fraction.shape).permute(2, 0, 1, 3)
+
+
+def symbol(size: int) -> Tensor:
+    """Return the Fourier transform (size,) of the B-spline on its grid: what interpolation divides by.
+
+    >>> float(symbol(8)[0])
+    1.0
+    """
+    k = torch.arange(size, dtype=torch.float64)
+    return 2 / 3 + torch.cos(2 * math.pi * k / size) / 3
+
+
+def padded(table: Tensor) -> Tensor:
+    """Return a periodic table (C, M_1, ..., M_d) with the three more cells that splines reach."""
+    for axis in range(1, table.dim()):
+        side = table.shape[axis]
+        table = torch.cat(
+            [table.narrow(axis, side - 1, 1), table, table.narrow(axis, 0, TAPS - 2)], dim=axis
+        )
+    return table
+
+
+def _cells(sides: tuple[int, ...], u: Tensor) -> tuple[Tensor, Tensor]:
+    """Return flat positions (4^d, N) in a padded table that points meet, and fractions (d, N)."""
+    period = torch.tensor(sides, dtype=u.dtype, device=u.device)[:, None] - (TAPS - 1)
+    u = u - period * (u / period).floor()
+    first = u.floor()
+    fraction = u - first
+    # rounding can put a point just below 0 at the period itself
+    cell = torch.minimum(first, period - 1).long()
+    flat, offsets = cell[0], torch.arange(TAPS, device=u.device)
+    taps = offsets
+    for axis in range(1, len(sides)):
+        flat = flat * sides[axis] + cell[axis]
+        taps = (taps[:, None] * sides[axis] + offsets).reshape(-1)
+    return taps[:, None] + flat, fraction
+
+
+class _Near:
+    """Sums of one channel's coefficients (4, ..., 4, N) times weights; partial sums are kept."""
+
+    def __init__(self, values: Tensor, weights: Tensor) -> None:
+        self.weights = weights
+        self.kept: dict[tuple[int, ...], Tensor] = {(): values}
+
+    def sum(self, *orders: int) -> Tensor:
+        """Return the derivative (N,) of these orders along the axes; the last axis is summed first."""
+        if orders not in self.kept:
+            rest, w = self.sum(*orders[1:]), self.weights[-len(orders)][orders[0]]
+            self.kept[orders] = (rest * w).sum(dim=-2)
+        return self.kept[orders]
+
+
+def _near(table: Tensor, flat: Tensor) -> list[Tensor]:
+    """Return the coefficients (4, ..., 4, N) of each channel that the points meet."""
+    shape = (*(TAPS,) * (table.dim() - 1), -1)
+    return [c.reshape(-1).index_select(0, flat.reshape(-1)).reshape(shape) for c in table]
+
+
+def _sums(
+    near: list[Tensor], fraction: Tensor, rates: tuple[float, ...] | None
+) -> tuple[Tensor, Tensor]:
+    """Return values (C, N) and divergence (N,), zero without rates; autograd can differentiate it."""
+    d = len(fraction)
+    weights = cubic_weights(fraction, 1 if rates is None else 2)
+    sums = [_Near(c, weights) for c in near]
+    values = torch.stack([part.sum(*_unit(d)) for part in sums])
+    divergence = fraction.new_zeros(fraction.shape[1])
+    for axis, rate in enumerate(rates or ()):
+        divergence = divergence.add(sums[axis].sum(*_unit(d, axis)), alpha=rate)
+    return values, divergence
+
+
+class _SplineSum(torch.autograd.Function):
+    """Values (C, N) at grid coordinates and, if asked, sum_c rate_c d value_c / du_c (N,)."""
+
+    @staticmethod
+    def forward(ctx: Any, table: Tensor, u: Tensor, rates: tuple[float, ...] | None) -> Any:
+        flat, fraction = _cells(tuple(table.shape[1:]), u)
+        near = _near(table, flat)
+        ctx.save_for_backward(table, u, flat, fraction, *near)
+        ctx.rates = rates
+        return _sums(near, fraction, rates)
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Any) -> Any:
+        table, u, flat, fraction, *near = ctx.saved_tensors
+        if torch.is_grad_enabled() or transformed():  # to be differentiated again, or in batches
+            # the divergence is a constant where no rates are given
+            count = 1 if ctx.rates is None else 2
+            plain = partial(_plain_sum, rates=ctx.rates, count=count)
+            return *plain_gradients(plain, (table, u), ctx, gradients[:count]), None
+        refuse_old_batches(*gradients)
+        weights = cubic_weights(fraction, 3)
+        on_table = on_u = None
+        if ctx.needs_input_grad[1]:
+            on_u = _on_points(near, weights, gradients, ctx.rates)
+        if ctx.needs_input_grad[0]:
+            on_table = _on_table(table.shape, flat, weights, gradients, ctx.rates)
+        return on_table, on_u, None
+
+
+def _on_points(
+    near: list[Tensor],
+    weights: Tensor,
+    gradients: tuple[Tensor, Tensor],
+    rates: tuple[float, ...] | None,
+) -> Tensor:
+    by_value, by_divergence = gradients
+    d = len(weights)
+    on_u = by_divergence.new_zeros(d, len(by_divergence))
+    for c, values in enumerate(near):
+        part = _Near(values, weights)
+        for j in range(d):
+            on_u[j].addcmul_(by_value[c], part.sum(*_unit(d, j)))
+            if rates is not None:
+                on_u[j].addcmul_(by_divergence, part.sum(*_unit(d, c, j)), value=rates[c])
+    return on_u
+
+
+def _on_table(
+    shape: torch.Size,
+    flat: Tensor,
+    weights: Tensor,
+    gradients: tuple[Tensor, Tensor],
+    rates: tuple[float, ...] | None,
+) -> Tensor:
+    by_value, by_divergence = gradients
+    plain = [w[0] for w in weights]
+    channels: list[Tensor] = []
+    for c in range(shape[0]):
+        factors = list(plain)
+        if rates is None:
+            factors[0] = factors[0] * by_value[c]
+        else:
+            slope = weights[c][1] * (rates[c] * by_divergence)
+            factors[c] = (plain[c] * by_value[c]).add_(slope)
+        spread = _outer(factors).reshape(-1)
+        zeros = spread.new_zeros(math.prod(shape[1:]))
+        channels.append(zeros.scatter_add_(0, flat.reshape(-1), spread))
+    return torch.stack(channels).reshape(shape)
+
+
+def _unit(d: int, *axes: int) -> tuple[int, ...]:
+    """Return how often each of d axes is among `axes`."""
+    return tuple(axes.count(i) for i in range(d))
+
+
+def _outer(factors: list[Tensor]) -> Tensor:
+    """Return the product (4, ..., 4, N) of one (4, N) an axis."""
+    d = len(factors)
+    shaped = [w.reshape(*(1,) * i, TAPS, *(1,) * (d - 1 - i), -1) for i, w in enumerate(factors)]
+    product = shaped[-1]
+    for factor in reversed(shaped[:-1]):
+        product = factor * product
+    return product
+
+
+def spline_sum(table: Tensor, u: Tensor) -> Tensor:
+    """Return values (C, N) of splines at `u` (d, N), in cells of a `padded` grid of coefficients.
+
+    First derivatives in both arguments are in closed form; higher ones, and those of `torch.func`, use
+    ordinary operations. A cubic spline's third derivatives are constant in each cell.
+    """
+    return spline_sum_with_divergence(table, u, None)[0]
+
+
+def spline_sum_with_divergence(
+    table: Tensor, u: Tensor, rates: tuple[float, ...] | None
+) -> tuple[Tensor, Tensor]:
+    """Return `spline_sum` of a vector field (C = d), and sum_i rates_i d value_i / du_i (N,)."""
+    if transformed():
+        return _plain_sum(table, u, rates)  # pyright: ignore[reportReturnType]
+    return applied(_SplineSum, table, u, rates)
+
+
+def _plain_sum(
+    table: Tensor, u: Tensor, rates: tuple[float, ...] | None, count: int = 2
+) -> tuple[Tensor, ...]:
+    """Return the first `count` of values and divergence, by ordinary differentiable operations."""
+    flat, fraction = _cells(tuple(table.shape[1:]), u)
+    return _sums(_near(table, flat), fraction, rates)[:count]
+
 
 # the least number of grid points on the shortest wave, for an error of about 2 per cent
 POINTS_PER_WAVE = 3

@@ -27,6 +27,7 @@ from .geometry import subdivided as subdivided
 from .likeness.faithful import Fidelity as Fidelity
 from .likeness.faithful import faithfulness as faithfulness
 from .likeness.faithful import fidelity as fidelity
+from .likeness.metrics import Overlap as Overlap
 from .likeness.metrics import Region as Region
 from .likeness.metrics import Shape as Shape
 from .likeness.metrics import ShapeMetrics as ShapeMetrics
@@ -36,16 +37,15 @@ from .likeness.metrics import dice as dice
 from .likeness.metrics import hausdorff as hausdorff
 from .likeness.metrics import iou as iou
 from .likeness.metrics import pixel_accuracy as pixel_accuracy
+from .likeness.metrics import prepared_region as prepared_region
 from .likeness.necks import Thinnest as Thinnest
 from .likeness.necks import hair_share as hair_share
 from .likeness.necks import narrowest_neck as narrowest_neck
 from .likeness.necks import narrowest_slit as narrowest_slit
 from .likeness.necks import slit_share as slit_share
-from .likeness.overlap import Overlap as Overlap
-from .likeness.overlap import prepared_region as prepared_region
+from .likeness.ranking import Rating as Rating
 from .likeness.ranking import diverse as diverse
 from .likeness.ranking import rank_score as rank_score
-from .likeness.rating import Rating as Rating
 from .likeness.recognition import Recognisability as Recognisability
 from .likeness.recognition import Recogniser as Recogniser
 from .likeness.recognition import recognisability as recognisability
@@ -55,7 +55,6 @@ from .motifs.source import with_map as with_map
 from .motion.settings import AnimationSettings as AnimationSettings
 from .motion.writers import animate as animate
 from .motion.writers import animation as animation
-from .pages.overview import overview_png as overview_png
 from .pages.page import index_page as index_page
 from .pages.run_folder import FIELD_FILES as FIELD_FILES
 from .pages.run_folder import OVERVIEW as OVERVIEW
@@ -64,6 +63,7 @@ from .pages.run_folder import write_gallery as write_gallery
 from .pages.run_folder import write_run as write_run
 from .pages.run_folder import write_tile_folder as write_tile_folder
 from .pages.run_folder import written_files as written_files
+from .pages.sheets import overview_png as overview_png
 from .pictures.overlays import bending_picture as bending_picture
 from .pictures.overlays import bending_raster as bending_raster
 from .pictures.overlays import overlay_picture as overlay_picture
@@ -136,7 +136,6 @@ from .solids.making import write_stl as write_stl
 from .solids.settings import SolidSettings as SolidSettings
 from .tile import EscherTile as EscherTile
 from .tile import TileMap as TileMap
-from .tilings.arrangements import arrangement as arrangement
 from .tilings.certificate import Certificate as Certificate
 from .tilings.certificate import certify as certify
 from .tilings.colourings import Colouring as Colouring
@@ -148,6 +147,7 @@ from .tilings.isohedral import isohedral_class as isohedral_class
 from .tilings.prototile import Prototile as Prototile
 from .tilings.prototile import Stabiliser as Stabiliser
 from .tilings.surroundings import Neighbours as Neighbours
+from .tilings.surroundings import arrangement as arrangement
 from .tilings.surroundings import aspects as aspects
 from .tilings.surroundings import neighbours as neighbours
 from .tilings.surroundings import patch as patch

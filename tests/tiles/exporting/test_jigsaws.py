@@ -95,6 +95,7 @@ def test_the_pieces_lie_in_the_tray() -> None:
     chosen = ExportSettings(tray=12.0, clearance=0.4, **OPTIONS)
     (puzzle, frame, base), notes = scenes(tile_of("IH4", turn=1.1), chosen)
     assert f"{puzzle.facts['pieces']} pieces" in notes[-1]
+    assert "the tray's two sheets are 174.8 x 134.8 mm" in notes[-1]
     opening, wood = sorted(faces(frame), key=lambda face: len(face.interiors))
     (plate,) = faces(base)
     assert (frame.width, frame.height) == pytest.approx((140.8 + 34, 100.8 + 34))

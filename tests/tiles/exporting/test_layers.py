@@ -200,6 +200,22 @@ def test_lines_are_scored_unless_something_lies_over_them() -> None:
     np.testing.assert_allclose(ends, [-5, -3, 3, 9], atol=1e-9)
 
 
+@pytest.mark.parametrize("fill", ["#000000", None])
+def test_the_drawing_s_own_outline_is_not_drawn_beside_the_tile_s(fill: str | None) -> None:
+    area = shapely.box(-20, -10, 20, 10)
+    own = Part(
+        boundary(area.buffer(-0.4)), Style("#000000" if fill is None else None, "#000000", 1.0)
+    )
+    mouth = Part((Curve.polyline([[-20.0, 0.0], [-12.0, 2.0]]),), Style(None, "#000000", 1.0))
+    styles = {"engrave": Style(fill, "#000000"), "score": Style(None, "#0000ff", 0.01)}
+    found = burnt(Motif((own, mouth)), area, styles, 0.7)
+    assert found["engrave"].parts == ()
+    (curve,) = found["score"].parts[0].curves
+    low, high = curve.bounds()
+    assert low == pytest.approx((-19.3, 0.175), abs=1e-6)
+    assert high == pytest.approx((-12, 2), abs=1e-6)
+
+
 def test_sheets_share_the_engraving_out() -> None:
     tile = squirrel("IH4")
     whole = {

@@ -17,7 +17,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import wallpaper_group
 from orbiflow.tiles import EscherTile, Fidelity, Rating, SearchResult, Target, Tile, rank_score
 from orbiflow.tiles.likeness import likeness_ratings
-from orbiflow.tiles.likeness.rating import WORDS
+from orbiflow.tiles.likeness.ranking import WORDS
 from orbiflow.tiles.search.finished_tiles import rated
 
 MARKS = Path(__file__).parents[3] / "benchmarks" / "data" / "likeness_marks.json"

@@ -11,7 +11,7 @@ from orbiflow.tiles import (
     escherize_class,
     prepared_region,
 )
-from orbiflow.tiles.likeness.overlap import MAX_REGION_VERTICES
+from orbiflow.tiles.likeness.metrics import MAX_REGION_VERTICES
 
 FAST = OverlapSearch.for_effort("fast")
 

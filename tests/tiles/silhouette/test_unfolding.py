@@ -9,7 +9,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import signed_area
 from orbiflow.tiles.silhouette import Mesh, triangulate, unfolded
-from orbiflow.tiles.silhouette.bending import _Distortion, folded
+from orbiflow.tiles.silhouette.bending import _Distortion
 from outlines import ANIMALS, SHAPES, animal, disc
 from strategies import seeds
 
@@ -46,7 +46,7 @@ def test_any_placing_of_the_inner_points_is_untangled(name: str, seed: int, shar
     mesh = MESHES[name]
     images = shuffled(mesh, seed, share)
     found = unfolded(mesh, images)
-    assert not folded(mesh, found).any()
+    assert (signed_area(found[mesh.triangles]) > 0).all()
     assert (signed_area(found[mesh.triangles]) > 0).all()
     assert np.array_equal(found[: outline(mesh)], images[: outline(mesh)])
     assert (
@@ -71,7 +71,7 @@ def test_an_outline_that_moves(seed: int) -> None:
     a, b = rng.uniform(-0.25, 0.25, 2)
     images[: outline(mesh)] *= (1 + a * np.cos(3 * turns) + b * np.sin(2 * turns))[:, None]
     images[outline(mesh) :] += rng.normal(size=(len(images) - outline(mesh), 2)) * 0.1
-    assert not folded(mesh, unfolded(mesh, images)).any()
+    assert (signed_area(unfolded(mesh, images)[mesh.triangles]) > 0).all()
 
 
 @given(seeds, st.floats(0.02, 1.0))

@@ -228,6 +228,20 @@ def test_what_is_raised() -> None:
     assert areas == pytest.approx([np.pi, 10 * 0.4 + np.pi * 0.2**2, 16 * np.pi], rel=0.01)
 
 
+@pytest.mark.parametrize(("fill", "said"), [("#333333", True), ("#eeeeee", False)])
+def test_a_drawing_that_is_dark_all_over_is_said_to_show_nothing(
+    tmp_path: Path, fill: str, said: bool
+) -> None:
+    width, height = size_of(squirrel("IH4"))
+    path = tmp_path / "dark.svg"
+    path.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}">'
+        f'<rect width="{width}" height="{height}" fill="{fill}"/></svg>'
+    )
+    made = squirrel("IH4").solid(SolidSettings(kind="stamp"), picture=path)
+    assert any("the drawing is dark all over" in note for note in made.notes) == said
+
+
 def test_notes_say_where_it_is_too_thin() -> None:
     """A bar with a slit 1 mm wide and a neck 2 mm wide."""
     ring = [[0, 0], [20, 0], [20, 8], [40, 8], [40, 0], [60, 0], [60, 10], [31, 10], [31, 30]]
@@ -278,7 +292,7 @@ def test_a_stamp_wants_lines(tmp_path: Path) -> None:
     Image.new("RGB", size_of(tile, 60)).save(picture)
     with pytest.raises(InputFileError, match="needs lines: draw it as SVG"):
         tile.solid(SolidSettings(kind="stamp"), picture=picture)
-    with pytest.raises(OrbiflowError, match="a cutter takes no picture"):
+    with pytest.raises(OrbiflowError, match="a cutter takes no picture; leave it out"):
         tile.solid(SolidSettings(kind="cutter"), picture=picture)
 
 

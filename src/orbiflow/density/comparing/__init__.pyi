@@ -11,7 +11,7 @@ from .paired import compare_scores as compare_scores
 from .paired import density_of as density_of
 from .paired import require_one_space as require_one_space
 from .paired import scores_of as scores_of
+from .resampling import TestResult as TestResult
 from .resampling import cross_validation_folds as cross_validation_folds
+from .resampling import mmd_test as mmd_test
 from .settings import ComparisonSettings as ComparisonSettings
-from .two_samples import TestResult as TestResult
-from .two_samples import mmd_test as mmd_test

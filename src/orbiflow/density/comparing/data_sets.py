@@ -15,9 +15,8 @@ from torch import Tensor
 
 from orbiflow.arguments import as_array, is_a
 from orbiflow.arrays import Array
-from orbiflow.density.comparing.resampling import Groups, resampled_sums
+from orbiflow.density.comparing.resampling import Groups, TestResult, mmd_test, resampled_sums
 from orbiflow.density.comparing.settings import ComparisonSettings
-from orbiflow.density.comparing.two_samples import TestResult, mmd_test
 from orbiflow.density.fitting import DensitySettings, Progress, fit_automatic
 from orbiflow.density.spaces import Space, space_class
 from orbiflow.errors import OrbiflowError

@@ -21,7 +21,7 @@ from orbiflow.density.models.files import (
     series_parts,
     within,
 )
-from orbiflow.density.spaces import CHART, Space, Torus, rectangle
+from orbiflow.density.spaces import Space, Torus, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
 from orbiflow.runtime import one_thread
@@ -85,9 +85,6 @@ class FlowDensity(Density, kind="flow"):
         start, log_det = self.flow.inverse_and_log_det(points)
         return self.base.log_chart(start) + log_det
 
-    def _log_prob(self, points: Tensor, measure: str) -> Tensor:
-        return self.log_chart(points) + self.space.log_density_factor(points, measure)
-
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         start = self.base.draw(count, generator).to(self._like())
         if torch.is_grad_enabled():
@@ -120,7 +117,7 @@ class FlowDensity(Density, kind="flow"):
         with torch.no_grad():
             # signed: a map that folds still covers the square once
             area = linalg.det(torch.stack(rows, dim=1))
-            return self._log_prob(end.detach(), CHART).exp() * area
+            return self.log_chart(end.detach()).exp() * area
 
     def with_steps(self, steps: int) -> Self:
         """Return a view of the density with its flow integrated in other steps."""

@@ -30,7 +30,6 @@ SIGMAS_95 = 1.96
 class DensityRegion:
     """A region in which a density is at least `exp(log_prob)`, in natural measure.
 
-    - `density`: The density.
     - `mass`: The mass that was asked for, None for a region above a level.
     - `held`, `error`: The mass that the region holds, from samples, and its standard error. If a mass
       was asked for, the threshold is uncertain by so much.

@@ -96,7 +96,7 @@ def read_rows(
     weights = None
     if weighing is not None:
         table, weights = _weighed(path, table, weighing)
-    if others and width is not None and len(table.columns) != width:
+    if others and width not in (None, len(table.columns)):
         raise TableError(
             literal(
                 f"{path}: {width} columns must be taken beside {' and '.join(map(quote, others))}, "

@@ -30,6 +30,7 @@ from orbiflow.tiles.scene import (
 from orbiflow.tiles.silhouette import lightness
 from orbiflow.tiles.tile import EscherTile
 
+EDGE = 0.6  # least distance in mm from the tile's edge of lines, which a drawing has there, too
 MOST_PIXELS = 1e8  # the largest number of pixels of pictures on a page
 
 
@@ -65,7 +66,8 @@ def with_drawing(scene: Scene, layout: Layout) -> Scene:
             width = min(line.width, USUAL_WIDTH)  # finer than what is thick for small hands
             pen = line if settings.purpose == "plotter" else line._replace(width=width)
             styles = dict.fromkeys(styles, pen)
-        motifs = burnt(layout.motif, area, styles)
+        edge = max(EDGE, settings.tile_size / 60) + line.width / 2
+        motifs = burnt(layout.motif, area, styles, edge)
     linear = np.array([tile.linear for tile in scene.tiles])
     offsets = np.array([tile.offset for tile in scene.tiles])
     which, ink = np.arange(len(offsets)), palette(settings.palette).outline
@@ -106,11 +108,22 @@ def dark_parts(
     return dark, lines
 
 
-def burnt(motif: Motif, tile: shapely.Polygon, styles: dict[str, Style]) -> dict[str, Motif]:
-    """Return the regions and pictures to engrave, and the lines to score."""
+def burnt(
+    motif: Motif, tile: shapely.Polygon, styles: dict[str, Style], edge: float = 0.0
+) -> dict[str, Motif]:
+    """Return the regions and pictures to engrave, and the lines to score.
+
+    Lines keep a distance in mm from the tile's `edge`, so that none is drawn twice; what that leaves
+    of a line, no longer than the distance, goes.
+    """
     dark, lines = dark_parts(motif)
-    regions = boundary(dark & tile)
-    scored = tuple(curve for line in lines for curve in polylines(line & tile))
+    inner = tile.buffer(-edge)
+    if styles["engrave"].fill:
+        regions = boundary(dark & tile)
+    else:
+        regions = polylines((dark & tile).boundary & inner)
+    kept = (curve for line in lines for curve in polylines(line & inner))
+    scored = tuple(c for c in kept if c.closed or np.ptp(c.bounds(), axis=0).max() > edge)
     pictures = cut_off(Motif(rasters=motif.rasters), tile).rasters
     engraved = (Part(regions, styles["engrave"]),) if regions else ()
     return {

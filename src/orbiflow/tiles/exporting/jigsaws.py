@@ -51,18 +51,12 @@ def jigsaw_scenes(layout: Layout) -> list[Scene]:
     style = line_style(layout)
     cuts = Layer("cut", "cut", style, tuple(_cuts(pieces, edges, layout)))
     border = Layer("border", "cut", style, (rectangle(layout.box),))
-    puzzle = Scene(
-        *layout.settings.page,
-        (cuts, border),
-        window=layout.box,
-        prototile=layout.tile.polygon,
-        tiles=placed_tiles(copies, layout),
-        facts={
-            "pieces": len(pieces),
-            "whole_tiles": whole,
-            "smallest": round(min(piece.area for piece in pieces) / tile.area, 3),
-        },
-    )
+    facts = {
+        "pieces": len(pieces),
+        "whole_tiles": whole,
+        "smallest": round(min(piece.area for piece in pieces) / tile.area, 3),
+    }
+    puzzle = layout.scene((cuts, border), placed_tiles(copies, layout), facts=facts)
     return [puzzle, *_tray(layout)]
 
 

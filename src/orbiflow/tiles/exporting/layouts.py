@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import itemgetter
+from typing import Any
 
 import numpy as np
 import shapely
@@ -49,6 +50,11 @@ class Layout:
     def fine(self) -> float:
         """The tolerance in mm of what is flattened or fitted again, a part of the whole."""
         return self.settings.deviation / 4
+
+    def scene(self, layers: Iterable[Layer], tiles: tuple[PlacedTile, ...], **more: Any) -> Scene:
+        """Return a scene of the page with these layers and tiles."""
+        own = {"window": self.box, "prototile": self.tile.polygon, "tiles": tiles}
+        return Scene(*self.settings.page, tuple(layers), **own, **more)
 
     @cached_property
     def piece(self) -> tuple[Array, str]:
@@ -179,15 +185,8 @@ def tiling_scene(layout: Layout) -> Scene:
     style = Style(None, line, settings.stroke_width or USUAL_WIDTH)
     seam, clip = SEAM if motifs else None, settings.clip
     layers += tile_layers(uses, colours, chosen, style, clipped=clip, seam=seam, drawn=bool(motifs))
-    return Scene(
-        *settings.page,
-        tuple(layers),
-        {SYMBOL: symbol},
-        window=box,
-        prototile=layout.tile.polygon,
-        tiles=placed_tiles(copies, layout),
-        motifs=motifs,
-    )
+    symbols = {SYMBOL: symbol}
+    return layout.scene(layers, placed_tiles(copies, layout), symbols=symbols, motifs=motifs)
 
 
 RED, BLACK, BLUE = "#ff0000", "#000000", "#0000ff"
@@ -270,7 +269,8 @@ def offset_ring(ring: Array, distance: float, tolerance: float) -> tuple[Array, 
     # what does not come back, but for corners, is a gap that closes or a limb that vanishes
     lost = polygons_in(piece.difference(back) if distance < 0 else back.difference(piece))
     ends = [_farthest(part, back) for part in lost]
-    deep = sorted((end for end in ends if end[0] > reach), key=itemgetter(0))
+    least = min(reach, np.ptp(ring, axis=0).max() / 10)  # no gap is as deep as a very wide offset
+    deep = sorted((end for end in ends if end[0] > least), key=itemgetter(0))
     note = ""
     if deep:
         what = ("limb vanishes", "limbs vanish") if distance < 0 else ("gap closes", "gaps close")
@@ -359,13 +359,7 @@ def _scene(layout: Layout, placed: Uses, curve: Curve, line: Array, box: Box, ga
     elif layout.settings.offset > 0 and not layout.settings.coloured:
         seams = _moved(layout.outline.closed, pieces)
         layers.insert(0, Layer("seam", "mark", Style(None, BLUE, 0.1), seams))
-    return Scene(
-        *layout.settings.page,
-        tuple(layers),
-        window=box,
-        prototile=layout.tile.polygon,
-        tiles=tuple(pieces),
-    )
+    return layout.scene(layers, tuple(pieces))
 
 
 def _coloured(layout: Layout, pieces: list[PlacedTile]) -> Iterator[Layer]:

@@ -18,16 +18,7 @@ from orbiflow.settings import (
     Unit,
 )
 from orbiflow.tiles.motifs import MotifSettings
-from orbiflow.units import (
-    COLUMNS,
-    PAGES,
-    Colour,
-    Length,
-    LengthOrZero,
-    PageSize,
-    SignedLength,
-    Size,
-)
+from orbiflow.units import COLUMNS, PAGES, Colour, Length, LengthOrZero, PageSize, SignedLength
 
 PIECES = Group("Pieces")
 MARKS_EDGE = 10.0  # distance in mm of registration marks from the page's edge
@@ -100,9 +91,10 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     """Cut the page's border, too."""
 
     bed: Annotated[
-        Size | None, OnlyWith(cut=("none", "skeleton", "pieces"), because="others are one sheet")
+        PageSize | None,
+        OnlyWith(cut=("none", "skeleton", "pieces"), because="others are one sheet"),
     ] = None
-    """Size of the machine's bed; a larger page becomes several files."""
+    """Size of the machine's bed, or a page's name; a larger page becomes several files."""
 
     calibrate: bool = False
     """Add a mark of 100 mm on a layer of its own."""

@@ -60,13 +60,7 @@ def skeleton_scene(layout: Layout) -> Scene:
     layers = [Layer("cut", "cut", style, tuple(joined(arcs, ends)))]
     if settings.border:
         layers.append(Layer("border", "cut", style, (rectangle(box),)))
-    return Scene(
-        *settings.page,
-        tuple(layers),
-        window=box,
-        prototile=layout.tile.polygon,
-        tiles=placed_tiles(copies, layout),
-    )
+    return layout.scene(layers, placed_tiles(copies, layout))
 
 
 def joined(arcs: list[Curve], ends: list[tuple[int, int]]) -> list[Curve]:

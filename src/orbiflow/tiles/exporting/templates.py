@@ -46,13 +46,7 @@ def template_scene(layout: Layout, given: EscherTile) -> Scene:
         layers.insert(0, Layer("silhouette", "tiles", Style(FAINT), (silhouette,)))
     marks = tuple(_marks(layout))
     layers.append(Layer("numbers", "mark", style._replace(width=style.width / 2), marks))
-    return Scene(
-        *layout.settings.page,
-        tuple(layers),
-        window=layout.box,
-        prototile=layout.tile.polygon,
-        tiles=(PlacedTile(0, np.eye(2), np.zeros(2)),),
-    )
+    return layout.scene(layers, (PlacedTile(0, np.eye(2), np.zeros(2)),))
 
 
 def numbered_edges(layout: Layout) -> Iterator[tuple[int, Array]]:

@@ -129,7 +129,10 @@ def scenes(
         facts = made[0].facts
         pieces, whole = facts["pieces"], facts["whole_tiles"]
         count = f"{pieces} pieces, {whole} whole tiles and {pieces - whole} at the border"
-        notes = (*notes, f"the jigsaw has {count}, the smallest {facts['smallest']:.2f} of a tile")
+        note = f"the jigsaw has {count}, the smallest {facts['smallest']:.2f} of a tile"
+        if settings.tray:
+            note += f"; the tray's two sheets are {made[1].width:g} x {made[1].height:g} mm"
+        notes = (*notes, note)
     if settings.marks:
         made = [registered(scene) for scene in made]
     if settings.calibrate:
@@ -143,12 +146,19 @@ def laid_out(
     given: EscherTile, settings: ExportSettings, picture: str | Path | None = None
 ) -> tuple[Layout, tuple[str, ...]]:
     """Return a tile in its place with what lies on it, and what the user should know."""
+    over = Over()
+    if drawn := picture is not None or bool(settings.strokes or settings.eyes):
+        given = with_map(given)
+        over = over if picture is None else read_over(picture, given)
+    if over.picture is not None and settings.file_format in ("dxf", "json"):
+        raise OrbiflowError(
+            f"{picture}: DXF and JSON hold lines, and the picture is made of pixels; choose SVG or "
+            "PDF, or draw it as SVG"
+        )
     placed = layout(given.tile, settings, y_down=given.y_down)
     told = (placed.outline.note, placed.piece[1] if settings.cut == "pieces" else "")
     notes = (*filter(None, told), *_neck_notes(placed))
-    if picture is not None or settings.strokes or settings.eyes:
-        given = with_map(given)
-        over = Over() if picture is None else read_over(picture, given)
+    if drawn:
         placed = replace(placed, motif=drawn_on(placed, given, over))
         notes = (*given.notes, *over.notes, *notes)
     return placed, notes

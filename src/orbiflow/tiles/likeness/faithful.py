@@ -29,8 +29,7 @@ from orbiflow.arrays import Array, Complex
 from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
 from orbiflow.tiles.likeness.bending_onto import bent_onto
 from orbiflow.tiles.likeness.elastic import Elastic
-from orbiflow.tiles.likeness.metrics import as_region
-from orbiflow.tiles.likeness.overlap import Overlap, best_overlay
+from orbiflow.tiles.likeness.metrics import Overlap, as_region, best_overlay
 from orbiflow.tiles.silhouette import sampled
 
 PIECE_LENGTHS = (0.04, 0.15, 0.4)  # the lengths of the pieces, as shares of the outline

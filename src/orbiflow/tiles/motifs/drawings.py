@@ -121,7 +121,7 @@ def _parts(shape: DrawnShape, regions: Regions, carry: _Carry) -> list[Part]:
         style = Style(colour)
         if kind == "fill":
             curves = _area(regions.clipped(shape, regions.fill(shape)), carry)
-        elif shape.is_plain_line and regions.leaves_stroke(shape):
+        elif regions.has_plain_stroke(shape):
             width = shape.width * shape.scale * carry.scale
             style = Style(None, colour, width)
             lines = regions.lines(shape)

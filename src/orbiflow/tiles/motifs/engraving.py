@@ -9,7 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates, median_filter
+from scipy.ndimage import (
+    convolve1d,
+    distance_transform_edt,
+    gaussian_filter,
+    map_coordinates,
+    median_filter,
+)
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import Palette
@@ -108,6 +114,7 @@ USUAL_EYE = 0.032  # radius of an eye in square roots of the tile's area
 EYE_CLEARANCE = 1.7  # distance, in radii of an eye, that lines keep from its middle
 # Step of an echo in square roots of the tile's area, and the least number of steps of a piece
 ECHO_STEP, ECHO_LEAST_STEPS = 0.008, 12
+SMOOTHING = np.hanning(13)  # weights of the widths along an echo
 
 
 class Eye(NamedTuple):
@@ -236,7 +243,7 @@ def _echo(body: Body, part: shapely.Polygon, depth: float) -> list[Array]:
     dark = shade(body.inward(points))
     # in the light only the first lines run on
     width = 0.0085 * fade**0.7 * np.clip(1.25 * dark + 1.1 * fade - 0.85, 0, 1)
-    width = _smooth(width, 5)
+    width = convolve1d(width, SMOOTHING / SMOOTHING.sum(), mode="wrap")
     # shorter ones look like strays
     arcs = [own for own in _arcs(width > 0.0012) if len(own) >= min(ECHO_LEAST_STEPS, count)]
     return [stroke(points[own], width[own]) for own in arcs]
@@ -285,12 +292,6 @@ def _wobble(count: int, seed: int) -> Array:
     """Return numbers (count,) from -1 to 1, irregular as by hand but always the same."""
     k = np.arange(count) + 1000.0 * seed
     return 2 * np.modf(np.abs(np.sin(12.9898 * k) * 43758.5453))[0] - 1
-
-
-def _smooth(values: Array, reach: int) -> Array:
-    kernel = np.hanning(2 * reach + 3)
-    padded = np.concatenate([values[-reach - 1 :], values, values[: reach + 1]])
-    return np.convolve(padded, kernel / kernel.sum(), mode="valid")
 
 
 def _arcs(kept: np.ndarray) -> list[np.ndarray]:

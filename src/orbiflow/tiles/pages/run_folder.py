@@ -20,9 +20,8 @@ from orbiflow.runtime import (
     work,
     write_atomic,
 )
-from orbiflow.tiles.pages.overview import overview_png
 from orbiflow.tiles.pages.page import TILE_FILES, index_page
-from orbiflow.tiles.pages.read_picture import is_read_png
+from orbiflow.tiles.pages.sheets import is_read_png, overview_png
 from orbiflow.tiles.pictures import (
     bending_picture,
     comparison,
@@ -228,6 +227,7 @@ def write_run(
     folder, tiles = result_folder(out), result.tiles
     earlier = folder.has_a_run and (folder.path / OVERVIEW).is_file()
     if earlier and all(tile.isohedral_class in result.interrupted for tile in tiles):
+        (folder.path / READ_NEXT).unlink(missing_ok=True)
         return []
     if tiles and figures and not any(FIELD_FILES[0] in figure_files(tile) for tile in tiles):
         on_event(Note("no flow made these tiles, so there is none to draw: the silhouette bent"))

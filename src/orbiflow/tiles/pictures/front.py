@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -97,39 +97,25 @@ def _axes(figure: object, chosen: Sequence[EscherTile], others: Sequence[EscherT
 
 def _steps(axes: Axes, tiles: Sequence[EscherTile]) -> None:
     """Draw the border of what is beaten by others."""
-    x: list[float] = []
-    y: list[float] = []
-    for cost, overlap in sorted(_values(tiles).tolist(), key=lambda pair: (pair[0], -pair[1])):
-        if not y or overlap > y[-1]:
-            x.append(cost)
-            y.append(overlap)
-    x.append(axes.get_xlim()[1])
-    y.append(y[-1])
+    cost, overlap = np.array(sorted(_values(tiles).tolist())).T
+    x = np.append(cost, axes.get_xlim()[1])
+    y = np.maximum.accumulate(np.append(overlap, 0.0))
     axes.step(x, y, where="post", color="#8a949e", linewidth=0.8, linestyle="--", zorder=1)
 
 
 def _silhouette(
-    axes: Axes,
-    tile: EscherTile,
-    place: Array,
-    size: float,
-    colour: str,
-    *,
-    zorder: int,
-    alpha: float = 1.0,
+    axes: Axes, tile: EscherTile, place: Array, size: float, colour: str, **style: Any
 ) -> None:
-    from matplotlib.patches import Polygon
+    """Draw a tile as a marker, `size` pixels long."""
+    from matplotlib.path import Path
 
     ring = tile.tile.polygon * (1.0, -1.0 if tile.y_down else 1.0)
-    low, high = ring.min(axis=0), ring.max(axis=0)
-    pixels = place + (ring - (low + high) / 2) * (size / float((high - low).max()))
-    patch = Polygon(pixels, closed=True, facecolor=colour, edgecolor="white", linewidth=0.5)
-    patch.set_transform(None)
-    patch.set_alpha(alpha)
-    patch.set_zorder(zorder)
-    inside = axes.transAxes.inverted().transform(place)
-    if (inside > 0.01).all() and (inside < 0.99).all():
-        axes.figure.add_artist(patch)
+    marker = Path(ring - (ring.min(axis=0) + ring.max(axis=0)) / 2)
+    points = size * 72 / axes.figure.dpi
+    axes.plot(
+        *_in(axes, [place]), marker=marker, markersize=points, color=colour,
+        markeredgecolor="white", markeredgewidth=0.5, **style,
+    )  # fmt: skip
 
 
 def _in(axes: Axes, pixels: Sequence[Array]) -> tuple[Array, Array]:

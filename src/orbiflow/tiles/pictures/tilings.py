@@ -18,7 +18,6 @@ from orbiflow.drawing import (
     CENTER_COLOURS,
     DEFAULT_PALETTE,
     LINE_COLOUR,
-    Palette,
     Picture,
     Raster,
     Sheet,
@@ -75,7 +74,6 @@ def tiling_raster(
     window: Window | None = None,
     *,
     width_px: int = 1600,
-    palette_name: str | Palette = DEFAULT_PALETTE,
     colours: Colouring | None = None,
     outline_px: float = OUTLINE_PX,
     y_down: bool = False,
@@ -87,17 +85,15 @@ def tiling_raster(
         tile: A tile or a tiling.
         window: The window (xmin, ymin, xmax, ymax) in the tile's units. Default: `default_window`.
         width_px: The width in pixels; the height follows from the window.
-        palette_name: The palette of paper, fills and outlines.
         colours: Which tile has which colour. Default: `colouring(tile)`.
         outline_px: The outline's width in pixels; 0 for none.
         y_down: Whether the tile's y axis points down, as in images.
         strip_px: The height of a strip below, for words.
 
     Raises:
-        OrbiflowError: If the palette is unknown, the size is impossible, or the window is empty or
-            holds too many tiles.
+        OrbiflowError: If the size is impossible, or the window is empty or holds too many tiles.
     """
-    chosen, tiling = palette(palette_name), as_tiling(tile)
+    chosen, tiling = palette(DEFAULT_PALETTE), as_tiling(tile)
     colours = colours or colouring(tiling)
     window = checked_window(window or default_window(tiling))
     raster = Raster(window, width_px, y_down=y_down, paper=chosen.paper, strip_px=strip_px)
@@ -115,16 +111,12 @@ def tiling_picture(
     tile: Tiles,
     window: Window | None = None,
     *,
-    palette_name: str | Palette = DEFAULT_PALETTE,
     colours: Colouring | None = None,
     y_down: bool = False,
     sheet: Sheet | None = None,
 ) -> Picture:
     """Return the picture of `tiling_raster` for print, in curves."""
-    raster = tiling_raster(
-        tile, window, width_px=1600, palette_name=palette_name, colours=colours, y_down=y_down,
-        outline_px=3.0,
-    )  # fmt: skip
+    raster = tiling_raster(tile, window, colours=colours, y_down=y_down, outline_px=3.0)
     kind = tile.isohedral_class if isinstance(tile, Tile) else ""
     count = len(as_tiling(tile).prototiles)
     title = f"Tiling by copies of {'a tile' if count == 1 else f'{count} tiles'}"
@@ -133,58 +125,43 @@ def tiling_picture(
 
 
 PANEL_ASPECT = 1.25  # width over height of the part of a tiling that a panel of `tilings_png` shows
+PANEL_TILES = 22  # the number of tiles that fit into it, by area
 _NAME, _GAP = 0.13, 0.05  # height of a panel's name, and the space around it, in panel widths
 
 
-def tilings_png(
-    tilings: Mapping[str, Tiles],
-    *,
-    columns: int = 6,
-    width_px: int = 1600,
-    tiles: float = 22.0,
-    palette_name: str | Palette = DEFAULT_PALETTE,
-) -> bytes:
+def tilings_png(tilings: Mapping[str, Tiles], *, columns: int = 6, width_px: int = 1600) -> bytes:
     """Return a PNG of several tilings side by side, in which neighbours have different colours.
 
     Args:
         tilings: The tilings by name, which is written below each.
         columns: The number of tilings in a row.
         width_px: The sheet's width in pixels; its height follows.
-        tiles: The number of tiles that fit into a panel, by area.
-        palette_name: The palette of paper, fills and outlines.
 
     Raises:
-        OrbiflowError: If there are no tilings, the palette is unknown or the size is impossible.
+        OrbiflowError: If there are no tilings or the size is impossible.
     """
     columns = as_whole(columns, "columns", 1, 100)
     if not tilings:
         raise OrbiflowError("a sheet of tilings needs at least one")
-    chosen = palette(palette_name)
     side = width_px / columns
     gap, name = round(_GAP * side), round(_NAME * side)
     panel = round(side) - 2 * gap
-    rasters = [
-        _panel(tiling, panel, tiles, label, name, chosen) for label, tiling in tilings.items()
-    ]
+    rasters = [_panel(tiling, panel, label, name) for label, tiling in tilings.items()]
     step = rasters[0].height + gap
     rows = math.ceil(len(rasters) / columns)
-    sheet = Image.new("RGB", (width_px, rows * step + gap), chosen.paper)
+    sheet = Image.new("RGB", (width_px, rows * step + gap), rasters[0].paper)
     for number, raster in enumerate(rasters):
         row, column = divmod(number, columns)
         sheet.paste(raster.image(), (round(column * side) + gap, row * step + gap))
     return palette_png(sheet, list(dict.fromkeys(c for r in rasters for c in r.colours)))
 
 
-def _panel(
-    tiles: Tiles, width_px: int, count: float, label: str, name_px: int, chosen: Palette
-) -> Raster:
-    tiling = as_tiling(tiles)
-    half = math.sqrt(count * tiling.tile_area * PANEL_ASPECT) / 2
+def _panel(tiles: Tiles, width_px: int, label: str, name_px: int) -> Raster:
+    tiling, chosen = as_tiling(tiles), palette(DEFAULT_PALETTE)
+    half = math.sqrt(PANEL_TILES * tiling.tile_area * PANEL_ASPECT) / 2
     x, y = tiling.center.tolist()
     window: Window = (x - half, y - half / PANEL_ASPECT, x + half, y + half / PANEL_ASPECT)
-    raster = tiling_raster(
-        tiling, window, width_px=width_px, palette_name=chosen, outline_px=1.0, strip_px=name_px
-    )
+    raster = tiling_raster(tiling, window, width_px=width_px, outline_px=1.0, strip_px=name_px)
     for prototile in tiling.prototiles:
         raster.line(prototile.polygon, chosen.outline, max(2.0, 0.013 * width_px), closed=True)
     low, high = raster.plane_px, raster.height

@@ -5,7 +5,6 @@ from .checks import holes_filled as holes_filled
 from .checks import is_hopeless as is_hopeless
 from .checks import parts_left_out as parts_left_out
 from .emphasis import Emphasis as Emphasis
-from .mesh import Locator as Locator
 from .mesh import Mesh as Mesh
 from .mesh import harmonic as harmonic
 from .mesh import local_thickness as local_thickness

@@ -1,22 +1,23 @@
 """Maps of a triangulated silhouette: the one to its tile, and how folds are taken out of a map."""
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from orbiflow.arguments import as_array, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import best_similarity, complex_points
-from orbiflow.tiles.silhouette.mesh import Locator, Mesh, doubled_areas, harmonic
-
-if TYPE_CHECKING:
-    pass
+from orbiflow.tiles.silhouette.mesh import Mesh, doubled_areas, harmonic
 
 MAX_POINTS, MAX_TRIANGLES = 100_000, 200_000
 """Beyond these a mesh is refused: real ones have some thousands."""
@@ -76,11 +77,11 @@ class Bending:
         Arrays and lists give an array, tensors a tensor of their dtype and device, without a gradient;
         points that are not finite give NaN.
         """
-        return _mapped(points, self._forward)
+        return self._forward(points)
 
     def inverse(self, points: Any) -> Any:
         """Return where points (..., 2) of the tile come from; as `forward`."""
-        return _mapped(points, self._backward)
+        return self._backward(points)
 
     @cached_property
     def _forward(self) -> _PiecewiseAffine:
@@ -99,7 +100,7 @@ class _PiecewiseAffine:
     """One direction of the map."""
 
     def __init__(self, start: Array, end: Array, triangles: NDArray[np.int64]) -> None:
-        self.locator = Locator(start, triangles)
+        self.tree = shapely.STRtree(np.asarray(shapely.polygons(start[triangles])))
         before, after = start[triangles], end[triangles]
         sides, images = (
             np.stack([c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]], axis=2) for c in (before, after)
@@ -110,15 +111,36 @@ class _PiecewiseAffine:
         factor = complex(best_similarity(complex_points(start), complex_points(end)))
         self.similarity = np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])
 
-    def __call__(self, points: Array) -> Array:
+    def __call__(self, given: Any) -> Any:
+        """Return the images of an array or a tensor (..., 2) as the same."""
+        points = as_array(given, "points", (..., 2), finite=False)
         flat = points.reshape(-1, 2)
         result = np.full_like(flat, np.nan)
         finite = np.isfinite(flat).all(axis=1)
         own = flat[finite]
-        triangle, nearest = self.locator.locate(own)
+        triangle, nearest = self._located(own)
         inside = np.einsum("pij,pj->pi", self.linear[triangle], nearest - self.origin[triangle])
         result[finite] = self.image[triangle] + inside + (own - nearest) @ self.similarity.T
-        return result.reshape(points.shape)
+        result = result.reshape(points.shape)
+        if not is_tensor(given):
+            return result
+        import torch
+
+        dtype = given.dtype if given.is_floating_point() else torch.float64
+        return torch.as_tensor(result, dtype=dtype, device=given.device)
+
+    def _located(self, points: Array) -> tuple[NDArray[np.int64], Array]:
+        """Return the triangle (P,) in or nearest to which points (P, 2) lie, and its nearest points."""
+        found, where = np.full(len(points), -1), np.asarray(shapely.points(points))
+        index, triangle = self.tree.query(where, predicate="intersects")
+        found[index] = triangle
+        nearest = points.copy()
+        outside = np.flatnonzero(found < 0)
+        if len(outside):
+            found[outside] = self.tree.nearest(where[outside])
+            lines = shapely.shortest_line(self.tree.geometries[found[outside]], where[outside])
+            nearest[outside] = shapely.get_coordinates(lines)[::2]
+        return found, nearest
 
 
 def _indices(values: ArrayLike, count: int) -> NDArray[np.int64]:
@@ -138,22 +160,6 @@ def _indices(values: ArrayLike, count: int) -> NDArray[np.int64]:
     return triangles.astype(np.int64)
 
 
-def _mapped(given: Any, function: _PiecewiseAffine) -> Any:
-    """Return the images of an array or a tensor as the same."""
-    result = function(as_array(given, "points", (..., 2), finite=False))
-    if not is_tensor(given):
-        return result
-    import torch
-
-    dtype = given.dtype if given.is_floating_point() else torch.float64
-    return torch.as_tensor(result, dtype=dtype, device=given.device)
-
-
-def folded(mesh: Mesh, points: Array) -> NDArray[np.bool_]:
-    """Return which triangles (M,) are flat or turned over with corners at `points` (N, 2)."""
-    return doubled_areas(points, mesh.triangles) <= 0
-
-
 def unfolded(mesh: Mesh, points: Array, sharpenings: int | None = None) -> Array:
     """Move the inner points of a map (N, 2) until no triangle is turned over.
 
@@ -164,7 +170,7 @@ def unfolded(mesh: Mesh, points: Array, sharpenings: int | None = None) -> Array
     nothing was turned over. With `sharpenings` it tries no longer than that, and from `points` alone.
     Raises `OrbiflowError` if triangles stay turned over.
     """
-    if not folded(mesh, points).any():
+    if (doubled_areas(points, mesh.triangles) > 0).all():
         return points
     outline = points[: mesh.size + len(mesh.sides)]
     # the second is a start for tangled points

@@ -124,7 +124,7 @@ class Emphasis:
             raise OrbiflowError(
                 f"points must have shape (..., 2) and finite coordinates, got shape {at.shape}"
             )
-        xmin, ymin, xmax, ymax = as_array(self.box, f"{self.source}: the box", (4,), finite=False)
+        xmin, ymin, xmax, ymax = self.box
         inside = np.clip(at, [xmin, ymin], [xmax, ymax])
         height, width = self.mask.shape
         column = (inside[..., 0] - xmin) / (xmax - xmin) * width - 0.5

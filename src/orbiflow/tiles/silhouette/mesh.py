@@ -196,30 +196,6 @@ def harmonic(mesh: Mesh, outline: Array) -> Array:
     return np.concatenate([outline, np.reshape(inner, (-1, 2))])
 
 
-class Locator:
-    """A search tree of triangles (M, 3) over points (N, 2), none of them flat."""
-
-    def __init__(self, points: Array, triangles: Integers) -> None:
-        self._tree = shapely.STRtree(np.asarray(shapely.polygons(points[triangles])))
-
-    def locate(self, points: Array) -> tuple[Integers, Array]:
-        """Return the triangle (P,) that contains each finite point (P, 2), and its nearest point.
-
-        Outside the mesh the triangle is the nearest one; inside, the nearest point (P, 2) is the point.
-        """
-        found = np.full(len(points), -1)
-        where = np.asarray(shapely.points(points))
-        index, triangle = self._tree.query(where, predicate="intersects")
-        found[index] = triangle
-        nearest = points.copy()
-        outside = np.flatnonzero(found < 0)
-        if len(outside):
-            found[outside] = self._tree.nearest(where[outside])
-            lines = shapely.shortest_line(self._tree.geometries[found[outside]], where[outside])
-            nearest[outside] = shapely.get_coordinates(lines)[::2]
-        return found, nearest
-
-
 PIECES_PER_SIDE = 3  # number of parts of each side of the outline: more make the medial axis finer
 DISC_OVERREACH = 1.02  # the factor of the discs' radii that makes up for the size of triangles
 

@@ -55,6 +55,7 @@ def write_3mf(parts: Mapping[str, Manifold], title: str = "") -> bytes:
 
 
 WRITERS = {"stl": write_stl, "3mf": write_3mf}
+DARK = 0.9  # share of the tile beyond which a drawing that is raised shows nothing
 FRAGILE = {"cutter": 5.0, "mould": 2.0}  # widths in mm of necks at which dough and casts break
 
 
@@ -111,7 +112,7 @@ def make_solid(
     settings, given = settings or SolidSettings(), EscherTile.of(tile)
     if picture is not None and settings.kind not in WITH_DRAWING:
         raise OrbiflowError(
-            f"a {settings.kind} takes no picture, only a stamp or mould does: leave it out"
+            f"a {settings.kind} takes no picture; leave it out, or make a stamp or mould"
         )
     certificate = given.require_certified(
         force=force, otherwise="so no solid is made of it; --force makes one, marked so"
@@ -124,7 +125,7 @@ def make_solid(
     if drawing.rasters:
         raise InputFileError(f"{picture}: a {settings.kind} needs lines: draw it as SVG")
     plan = Plan(settings, placed, dark_parts(drawing, settings.nozzle)[0])
-    return Solid(shape(plan), title, (*notes, *_gap_notes(plan)))
+    return Solid(shape(plan), title, (*notes, *_gap_notes(plan), *_dark_notes(plan)))
 
 
 def _page(settings: SolidSettings) -> ExportSettings:
@@ -146,6 +147,16 @@ def _page(settings: SolidSettings) -> ExportSettings:
         return page.replace(cut="pieces")
     sides = [side - 2 * settings.wall - settings.clearance for side in settings.area]
     return page.replace(area=(sides[0], sides[1]))
+
+
+def _dark_notes(plan: Plan) -> tuple[str, ...]:
+    """Say that nothing of a drawing shows, as it is dark all over the tile."""
+    tile = plan.piece
+    if (plan.drawing & tile).area < DARK * tile.area:
+        return ()
+    return (
+        "the drawing is dark all over, and raised as one slab: leave out fills, or lighten them",
+    )
 
 
 def _gap_notes(plan: Plan) -> tuple[str, ...]:

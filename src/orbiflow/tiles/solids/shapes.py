@@ -49,9 +49,8 @@ def shape(plan: Plan) -> dict[str, Manifold]:
     looks like the tile.
     """
     makers = {"tile": _tile, "cutter": _cutter, "stamp": _stamp, "mould": _mould}
-    kind, across = plan.settings.kind, 1.0
-    if kind in ("cutter", "stamp", "mould"):
-        across = -1.0
+    kind = plan.settings.kind
+    across = -1.0 if kind in ("cutter", "stamp", "mould") else 1.0
     found = _puzzle(plan) if kind == "puzzle" else {kind: makers[kind](plan)}
     turned = [body.scale((across, -1.0, 1.0)) for body in found.values()]
     x, y = np.min([body.bounding_box()[:2] for body in turned], axis=0)

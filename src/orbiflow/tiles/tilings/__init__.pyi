@@ -1,4 +1,3 @@
-from .arrangements import arrangement as arrangement
 from .certificate import Certificate as Certificate
 from .certificate import certify as certify
 from .colourings import Colouring as Colouring
@@ -10,6 +9,7 @@ from .isohedral import isohedral_class as isohedral_class
 from .prototile import Prototile as Prototile
 from .prototile import Stabiliser as Stabiliser
 from .surroundings import Neighbours as Neighbours
+from .surroundings import arrangement as arrangement
 from .surroundings import aspects as aspects
 from .surroundings import neighbours as neighbours
 from .surroundings import patch as patch

@@ -221,9 +221,8 @@ def read_json(path: Source) -> Reading:
     try:
         content = json.loads(data)
     except json.JSONDecodeError as exc:
-        raise InputFileError(
-            f"{path}: line {exc.lineno}, column {exc.colno}: not valid JSON ({exc.msg})"
-        ) from exc
+        where = f"line {exc.lineno}, column {exc.colno}"
+        raise InputFileError(f"{path}: {where}: not valid JSON ({exc.msg})") from exc
     except RecursionError as exc:
         raise InputFileError(f"{path}: nested too deeply to be a polygon") from exc
     except ValueError as exc:

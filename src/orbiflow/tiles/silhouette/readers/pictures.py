@@ -341,11 +341,9 @@ def _levels(array: Array, name: str) -> tuple[NDArray[np.float32], bool]:
     low, high = (array.min(), array.max()) if array.size else (0, 0)
     if array.dtype.kind == "b" or (array.dtype.kind in "iu" and low >= 0 and high <= 1):
         return array.astype(np.float32), True
-    full = 1.0
-    if array.dtype.kind in "iu":
-        full = 255.0 if high <= 255 else 65535.0
-        if array.dtype.itemsize == 2 and array.dtype.kind == "u":
-            full = 65535.0
+    full = 65535.0 if high > 255 or array.dtype == np.uint16 else 255.0
+    if array.dtype.kind == "f":
+        full = 1.0
     if not (low >= 0 and high <= full and np.isfinite([low, high]).all()):
         what = "0 to 1" if array.dtype.kind == "f" else "0 to 255, or to 65535"
         raise OrbiflowError(

@@ -78,10 +78,10 @@ def read_svg(path: Source) -> Reading:
 def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
     """Return the region that is seen as shape, and notes of what was decided."""
 
-    def tolerance(reach: Array) -> float:
-        return max(float(np.ptp(reach, axis=0).max()) * FLATNESS, size * FLATNESS_FLOOR)
-
-    regions = Regions(drawing, tolerance, MAX_POINTS)
+    least = size * FLATNESS_FLOOR
+    regions = Regions(
+        drawing, lambda reach: max(float(np.ptp(reach, axis=0).max()) * FLATNESS, least), MAX_POINTS
+    )
     layers = [regions.layers(shape) for shape in drawing.shapes]
     notes: list[str] = []
     if not any(layers):
@@ -170,7 +170,6 @@ def _alike(colour: str, other: str) -> bool:
 
 
 def _solid(region: BaseGeometry) -> float:
-    """Return the area of the largest component with its holes filled."""
     return outer_outline(region)[0].area if region.area > 0 else 0.0
 
 

@@ -131,8 +131,13 @@ def sub_paths(path: svgelements.Path, matrix: Array) -> list[SubPath]:
         if isinstance(segment, svgelements.Close):
             found[-1].closed = True
         elif isinstance(segment, svgelements.Arc):
-            frame = mapped(segment.center, segment.prx, segment.pry, segment.end)
-            found[-1].curves.append(_arc(segment, frame))
+            centre, u, v, end = mapped(segment.center, segment.prx, segment.pry, segment.end)
+            if segment.center in (segment.prx, segment.pry):  # an arc of no radius is a line
+                found[-1].curves.append(Bezier(end[None]))
+                continue
+            t0, sweep = float(segment.get_start_t()), float(segment.sweep or 0.0)
+            arc = EllipticArc(centre, u - centre, v - centre, t0, sweep, end)
+            found[-1].curves.append(arc)
         elif isinstance(segment, svgelements.CubicBezier):
             control = mapped(segment.control1, segment.control2, segment.end)
             found[-1].curves.append(Bezier(control))
@@ -141,14 +146,6 @@ def sub_paths(path: svgelements.Path, matrix: Array) -> list[SubPath]:
         else:
             found[-1].curves.append(Bezier(mapped(segment.end)))
     return [path for path in found if path.curves]
-
-
-def _arc(arc: svgelements.Arc, points: Array) -> Bezier | EllipticArc:
-    centre, u_end, v_end, end = points
-    if arc.center == arc.prx or arc.center == arc.pry:
-        return Bezier(end[None])  # an arc of no radius is a line
-    t0, sweep = float(arc.get_start_t()), float(arc.sweep or 0.0)
-    return EllipticArc(centre, u_end - centre, v_end - centre, t0, sweep, end)
 
 
 def corners(paths: list[SubPath], matrix: Array) -> Iterator[tuple[str, Array, float]]:

@@ -5,7 +5,7 @@
 
 from collections.abc import Callable
 from itertools import groupby
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -28,11 +28,6 @@ from orbiflow.tiles.silhouette.readers.svg_paths import (
 )
 from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, Drawing, DrawnShape, as_number
 
-CAPS: dict[str, Literal["flat", "round", "square"]] = {
-    "butt": "flat",
-    "round": "round",
-    "square": "square",
-}
 WIGGLE = 1 / 500  # of half a pen's width: lines are simplified by as much
 SMOOTH = 0.999  # the cosine of half the turn above which a corner needs no mitre
 FINER = 8  # the paths of strokes are flattened as much finer, as a wide pen magnifies what is left
@@ -165,8 +160,11 @@ class Regions:
                 region = shapely.intersection(region, self._clips[clip])
         return region
 
-    def leaves_stroke(self, shape: DrawnShape) -> bool:
-        """Return whether the clips and masks of a shape cut nothing off its stroke."""
+    def has_plain_stroke(self, shape: DrawnShape) -> bool:
+        """Return whether a shape's stroke is one whole line, everywhere as wide as the pen."""
+        most, least = np.linalg.svd(shape.matrix[:2, :2])[1]
+        if shape.dashes or most - least >= 1e-3 * most:
+            return False
         return not shape.clips or self.clipped(shape, whole := self.stroke(shape)) is whole
 
     def layers(self, shape: DrawnShape) -> list[Layer]:
@@ -230,7 +228,8 @@ def stroked(lines: list[Line], shape: DrawnShape) -> BaseGeometry:
     pieces = [piece for line in lines for piece in _pieces(line, dashes, offset)]
     if not pieces or not all(np.isfinite(piece.points).all() for piece in pieces):
         return Polygon()
-    cap = CAPS.get(shape.paint.get("stroke-linecap", "butt"), "flat")
+    cap = shape.paint.get("stroke-linecap")
+    cap = cap if cap == "round" or cap == "square" else "flat"
     corner = shape.paint.get("stroke-linejoin", "miter")
     join = "round" if corner == "round" else "bevel"
     strings = [shapely.LineString(piece.points) for piece in pieces]

@@ -79,12 +79,6 @@ class DrawnShape:
         found = [as_number(word, -1.0, self.diagonal) for word in words[:MOST_DASHES]]
         return found * (1 + len(found) % 2) if sum(found) > 0 and min(found) >= 0 else []
 
-    @property
-    def is_plain_line(self) -> bool:
-        """Whether its stroke, before clips, is one whole line everywhere as wide as the pen."""
-        most, least = np.linalg.svd(self.matrix[:2, :2])[1]
-        return not self.dashes and most - least < 1e-3 * most
-
     def number(self, key: str, usual: float) -> float:
         """Read a property as a length in units of the pen, or return the usual one."""
         return as_number(self.paint.get(key), usual, self.diagonal)
@@ -156,12 +150,6 @@ class Drawing:
         if width is None or height is None or not (width > 0 and height > 0):
             return None
         return 0.0, 0.0, width, height
-
-    def _pixel(self) -> float:
-        """Return the size of a pixel of the page in user units, which non-scaling strokes refer to."""
-        box = self.box or (0.0, 0.0, 1.0, 1.0)
-        sizes = zip(("width", "height"), (box[2] - box[0], box[3] - box[1]), strict=True)
-        return max(own / (self._length(self.root, key) or own) for key, own in sizes)
 
     def _view_box(self, element: Element) -> Window | None:
         """Return the viewBox (x, y, width, height) of `element`."""
@@ -295,7 +283,10 @@ class Drawing:
             raise self._refuse(element, "its geometry cannot be read; redraw or delete it") from exc
         matrix = place.matrix
         if properties.get("vector-effect") == "non-scaling-stroke":
-            matrix = np.diag([self._pixel()] * 2 + [1.0])
+            x, y, *end = self.box or (0.0, 0.0, 1.0, 1.0)
+            sizes = zip(("width", "height"), (end[0] - x, end[1] - y), strict=True)
+            pixel = max(own / (self._length(self.root, key) or own) for key, own in sizes)
+            matrix = np.diag([pixel, pixel, 1.0])
         diagonal = float(np.hypot(*place.viewport)) / 2**0.5
         drawn = DrawnShape(paths, place.paint, place.opacity, matrix, diagonal)
         self.shapes.append(drawn)

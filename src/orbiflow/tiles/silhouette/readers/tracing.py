@@ -51,8 +51,7 @@ def trace(
     A pixel of `level` is `scale` pixels of the image wide, and the image is `size` (width, height).
     Pixels of a shape hold together along their sides, not their corners.
     """
-    above = level.values > level.cut
-    mask, notes = _without_dust(above)
+    mask, notes = _without_dust(level.values > level.cut)
     shape, parts = _largest(mask)
     notes += parts
     if shape.all():
@@ -62,10 +61,7 @@ def trace(
         )
     if _is_cut_off(shape):
         notes.append("the shape touches the image's border and may be cut off there")
-    # the shape's holes filled and all other components taken out
-    values = np.where(shape & ~above, level.inside, level.values)
-    values = np.where(above & ~shape, 2 * level.cut - level.inside, values)
-    polygon, stepped = _polygon(values, level.cut, level.inside)
+    polygon, stepped = _polygon(level, shape)
     area = polygon.area * scale**2
     if area < MIN_AREA:
         raise InputFileError(
@@ -78,8 +74,9 @@ def trace(
         tolerance = max(tolerance, own)
     polygon, simplified = _simplify(polygon, tolerance)
     ring = np.clip(outer_ring(polygon) * scale, 0, size)
-    seen = scaled(_region(level, mask, tolerance), scale, scale, origin=(0, 0))
-    return ring, seen, notes + simplified
+    rings = [shapely.LinearRing(contour) for contour in _contours(level, mask)]
+    seen = shapely.build_area(shapely.GeometryCollection(rings)).simplify(tolerance)
+    return ring, scaled(seen, scale, scale, origin=(0, 0)), notes + simplified
 
 
 def _is_cut_off(shape: NDArray[np.bool_]) -> bool:
@@ -122,25 +119,22 @@ def _largest(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], list[str]]:
     return shape, left_out(n, kept, n_holes, bare)
 
 
-def _region(level: Level, mask: NDArray[np.bool_], tolerance: float) -> BaseGeometry:
-    """Return the region of the pixels in `mask`, with its holes, bounded as `_polygon` bounds one."""
+def _contours(level: Level, mask: NDArray[np.bool_]) -> list[Array]:
+    """Return the borders (N, 2) of the pixels in `mask`, pixel (0, 0) spanning [0, 1] x [0, 1]."""
     above, outside = level.values > level.cut, 2 * level.cut - level.inside
     values = np.where(above & ~mask, outside, np.where(mask & ~above, level.inside, level.values))
-    values = np.pad(values, 1, constant_values=outside)
-    contours = find_contours(values, level.cut, fully_connected="low")
-    rings = [shapely.LinearRing(c[:, ::-1] - 0.5) for c in contours if len(c) > 3]
-    return shapely.build_area(shapely.GeometryCollection(rings)).simplify(tolerance)
-
-
-def _polygon(values: Array, cut: float, inside: float) -> tuple[Polygon, bool]:
-    """Return the region where `values` exceed `cut`, and whether it is drawn without anti-aliasing."""
     # The margin mirrors the shape's level in the cut, so that a shape which runs off the image is
     # closed along the image's very edge.
-    padded = np.pad(values, 1, constant_values=2 * cut - inside)
-    contours = find_contours(padded, cut, fully_connected="low")
-    regions = [Polygon(contour[:, ::-1] - 0.5) for contour in contours if len(contour) > 3]
+    values = np.pad(values, 1, constant_values=outside)
+    contours = find_contours(values, level.cut, fully_connected="low")
+    return [contour[:, ::-1] - 0.5 for contour in contours if len(contour) > 3]
+
+
+def _polygon(level: Level, shape: NDArray[np.bool_]) -> tuple[Polygon, bool]:
+    """Return the region of a shape, and whether its outline is stepped: drawn in two levels."""
+    regions = [Polygon(contour) for contour in _contours(level, shape)]
     largest = max(regions, key=lambda polygon: polygon.area)
-    height, width = values.shape
+    height, width = shape.shape
     # A level that equals the cut at a pixel's centre can pinch the contour there.
     whole = largest if largest.is_valid else largest.buffer(0)
     parts = polygons_in(whole.intersection(box(0, 0, width, height)))
