@@ -106,7 +106,8 @@ def _bridged(reading: Reading) -> Reading:
         f"the largest part is no more than a line: took instead what the lines enclose when gaps of "
         f"up to {GAP:.0%} of the drawing's size are closed"
     )
-    return replace(reading, outline=outer_ring(body), notes=(*reading.notes, note))
+    kept = [other for other in reading.notes if not other.startswith("kept the largest")]
+    return replace(reading, outline=outer_ring(body), notes=(*kept, note))
 
 
 def _kind(path: Source, head: bytes) -> str:
