@@ -119,11 +119,11 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     "dots of no picture": (["--dpi", "600"], "--dpi ... --format png ... svg"),
     "colours of lines": (
         ["--for", "laser", "--palette", "sea"],
-        "--palette ... --cut none ... skeleton",
+        "--palette has no effect ... --for laser fills nothing",
     ),
     "colours of pieces": (
         ["--cut", "pieces", "--palette", "sea"],
-        "--palette ... --cut none ... pieces",
+        "--palette has no effect ... --cut pieces fills nothing",
     ),
     "colours of a plotter": (
         ["--for", "plotter", "--cut", "none", "--palette", "sea"],

@@ -26,7 +26,6 @@ from orbiflow.runtime import (
 from orbiflow.tiles.pages.run_folder import TILE_FILES
 from runtime.searches import BOOT, ENDLESS, boot_call, check_order, run
 
-
 SHEETS = ("index.html", "overview.png", "read.png", "result.json")
 
 

@@ -219,7 +219,7 @@ def _mistake(
     fields = {entry.name: entry for entry in operation.fields} if operation else {}
     named = error.argument.field_info.name if error.argument else ""
     if isinstance(error, RepeatArgumentError):
-        return OrbiflowError(f"{error.token.keyword} is given more than once; give it once")
+        return _repeated(error.token.keyword or "", words, fields.values())
     if isinstance(error, UnusedCliTokensError):
         words = ", ".join(map(repr, error.unused_tokens or ()))
         return OrbiflowError(f"there are arguments too many: {words}; see --help")
@@ -235,6 +235,15 @@ def _mistake(
             return own
     error.verbose = False
     return OrbiflowError(" ".join(str(error).split()))
+
+
+def _repeated(word: str, words: Sequence[str], fields: Iterable[Field]) -> OrbiflowError:
+    """What is wrong where an option is given again, or a flag both ways."""
+    for option in (field.option for field in fields):
+        given = dict.fromkeys(w for w in words if w in (*option.names, option.off))
+        if word in given and option.off in given and len(given) > 1:
+            return OrbiflowError(f"{' and '.join(given)} exclude each other; give one of them")
+    return OrbiflowError(f"{word} is given more than once; give it once")
 
 
 def _unknown(words: Sequence[str], fields: Iterable[Field]) -> OrbiflowError | None:

@@ -89,7 +89,6 @@ def escherize(
         shown_out: What the page's commands call the folder. Default: its path.
     """
     from orbiflow.tiles import pages, search
-    from orbiflow.tiles.silhouette import doubts, is_hopeless
 
     begin = time.perf_counter()
     target = reading.read(image, called)
@@ -114,9 +113,8 @@ def escherize(
     }
     for table in _tables(tiles)[: 1 + verbose]:
         on_event(table)
-    on_event(_closing(out, bool(written), bool(result.tiles), summary["seconds"]))
-    for text in doubts(target) if not result.tiles or is_hopeless(target) else ():
-        on_event(Note(text, warning=True))  # again, where it explains what was found
+    for note in _closing(out, bool(written), result, summary["seconds"]):
+        on_event(note)
     if result.interrupted or cancel.cancelled:
         return Outcome(summary, "cancelled")
     return Outcome(summary, "done" if result.tiles else "nothing found")
@@ -162,15 +160,19 @@ def _figures(tile: EscherTile) -> dict[str, str]:
     }
 
 
-def _closing(out: Path, written: bool, found: bool, seconds: float) -> Note:
-    """What was written, or why nothing was."""
-    if written and found:
+def _closing(out: Path, written: bool, result: SearchResult, seconds: float) -> list[Note]:
+    """What was written, or why nothing was; and the silhouette's doubts again, if they explain it."""
+    from orbiflow.tiles.silhouette import doubts, is_hopeless
+
+    explains = not result.tiles or is_hopeless(result.target)
+    again = [Note(text, warning=True) for text in doubts(result.target)] if explains else []
+    if written and result.tiles:
         where = f"look at {out / 'overview.png'} first, or open {out / 'index.html'}"
-        return Note(f"written to {out} in {seconds:.0f} s; {where}")
+        return [Note(f"written to {out} in {seconds:.0f} s; {where}"), *again]
     where = f"{out} still holds the tiles of an earlier run"
     if written:
         where = f"see {out / 'result.json'}"
-    return Note(f"no certified tile was found; {where}", warning=True)
+    return [Note(f"no certified tile was found; {where}", warning=True), *again]
 
 
 def _remarks(result: SearchResult) -> list[str]:

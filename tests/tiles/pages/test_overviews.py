@@ -130,7 +130,7 @@ def test_commands_of_a_page_can_be_copied_into_a_shell(
     refused = flowed.changed(tile=replace(flowed.tile, polygon=flowed.tile.polygon * (1.0, 1.1)))
     page = Page(index_page([bent, refused, bent], target, names, out=out))
     calls = [call_by_orbiflow(shlex.split(command)[1:]) for command in page.commands]
-    assert len(calls) == 3 * (7 + len(TRIED))
+    assert len(calls) == 3 * (10 + len(TRIED))
     assert all(isinstance(call, Call) for call in calls)
     flat = [call.flat for call in calls if isinstance(call, Call)]
     assert [call["result"] for call in flat[:: len(calls) // 3]] == [Path(out) / n for n in names]
@@ -160,10 +160,11 @@ def test_small_tilings_are_those_of_the_tile(target: Target, bent: EscherTile) -
 
 
 def test_what_was_read_is_shown_if_it_is_there(target: Target, bent: EscherTile) -> None:
-    assert "read.png" in [
-        p["src"] for p in Page(index_page([bent], target, ["IH4"], read=True)).all("img")
-    ]
-    assert "What was read" not in Page(index_page([bent], target, ["IH4"])).words
+    read, bare = (Page(index_page([bent], target, ["IH4"], read=own)) for own in (True, False))
+    assert "read.png" in [picture["src"] for picture in read.all("img")]
+    assert "left out, a hole, filled." in " ".join(read.words.split())
+    assert "What was read" not in bare.words
+    assert len(read.all("svg")) == len(bare.all("svg")) - 1  # one picture of it is enough
 
 
 def test_what_is_not_certified_says_so(target: Target, flowed: EscherTile) -> None:

@@ -196,4 +196,5 @@ def test_small_gaps_in_an_outline_are_closed(
     assert (
         any("gaps of up to 3% of the drawing's size" in note for note in target.notes) == is_whole
     )
+    assert not (is_whole and any("kept the largest" in note for note in target.notes))
     assert any("line or thread" in doubt for doubt in doubts(target)) != is_whole

@@ -48,7 +48,7 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     """
 
     purpose: Annotated[Purpose | None, Option("--for")] = None
-    """Settings that suit a purpose; other options go before them."""
+    """Settings that suit a purpose. Options given beside it override them."""
 
     format: Annotated[
         Literal["svg", "pdf", "dxf", "png", "json"] | None,
@@ -68,8 +68,8 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
 
     cut: Literal["none", "skeleton", "pieces", "jigsaw", "template"] = "none"
     """With none, every tile is drawn; with skeleton, each shared edge once; with pieces, tiles
-    apart; with jigsaw, a rectangle whose pieces at the border have no crumbs; with template, one
-    tile to draw on, as large as the page allows."""
+    apart; with jigsaw, a rectangle cut into tiles, without slivers at its border; with template,
+    one tile to draw on, as large as the page allows."""
 
     rotate: Annotated[
         float,
@@ -109,10 +109,8 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     warn_neck: Annotated[LengthOrZero, DefaultText("1.5mm for lasers, else 0")] = 0.0
     """Say where the tile is thinner than this, such as 2mm; 0 says nothing."""
 
-    palette: Annotated[
-        PaletteName, OnlyWith(cut="none", because="only filled tiles have colours")
-    ] = DEFAULT_PALETTE
-    """Colours of the tiles."""
+    palette: PaletteName = DEFAULT_PALETTE
+    """Colours of the tiles, where these are filled, and of stickers."""
 
     dpi: Annotated[float, Range(1, 10_000), OnlyWith(format=("png", None))] = 300.0
     """Dots per inch of a PNG."""
@@ -134,7 +132,7 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
     clearance: Annotated[LengthOrZero, OnlyWith(cut=("pieces", "jigsaw")), PIECES] = 0.0
     """Gap between pieces put together, for a puzzle; around a jigsaw in its tray."""
 
-    spacing: Annotated[LengthOrZero, PIECES] = 1.0
+    spacing: Annotated[LengthOrZero, OnlyWith(cut="pieces"), PIECES] = 1.0
     """Gap between the cuts of different pieces."""
 
     copies: Annotated[
@@ -188,8 +186,11 @@ class ExportSettings(FileSettings, MotifSettings, group="Page and file"):
                 f"{{tolerance}} of {self.tolerance:g} mm would lose the shape of a tile of "
                 f"{self.tile_size:g} mm; choose at most {self.tile_size / 20:g} mm"
             )
-        if "palette" in self.fields_given and not self.filled:
+        has_palette = self.purpose == "stickers" or (self.cut == "none" and self.filled)
+        if "palette" in self.fields_given and not has_palette:
             what = f"{{purpose}} {self.purpose} fills nothing" if self.purpose else "no {filled}"
+            if "cut" in self.fields_given and self.cut != "none":
+                what = f"{{cut}} {self.cut} fills nothing"
             raise SettingError(f"{{palette}} has no effect: {what}; leave {{palette}} out")
 
     @property

@@ -231,7 +231,7 @@ def _neck_notes(placed: Layout) -> tuple[str, ...]:
     if neck.width >= limit:
         return ()
     place = place_on(ring, neck.place)
-    return (f"the tile is thinner than {limit:g} mm: {neck.width:.2f} mm {place}",)
+    return (f"the tile is thinner than {limit:g} mm: a neck {place} is {neck.width:.2f} mm wide",)
 
 
 def write_scene(scene: Scene, settings: ExportSettings) -> str | bytes:

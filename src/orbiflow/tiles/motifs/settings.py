@@ -30,7 +30,7 @@ class MotifSettings(Settings):
     """What is drawn on a tile, over its picture if it has one."""
 
     engrave: Annotated[bool, ON_TILE] = False
-    """Draw lines inside the tile, as on a woodcut: hatching, where the strokes say nothing else."""
+    """Draw lines inside the tile, as on a woodcut: hatching, unless other strokes are chosen."""
 
     strokes: Annotated[Strokes | None, ON_TILE] = None
     """Engrave with hatching, echoes of the outline, or feathers."""
@@ -53,5 +53,6 @@ class MotifSettings(Settings):
             if len(place) not in (2, 3) or min(place[2:], default=0) < 0:
                 raise SettingError(
                     f"{{eyes}}: entry {number} must be x,y or x,y,radius in the silhouette's "
-                    f"coordinates, got {','.join(f'{part:g}' for part in place)}"
+                    "coordinates, with a radius of 0 or more, got "
+                    f"{','.join(f'{part:g}' for part in place)}"
                 )

@@ -15,6 +15,7 @@ import shapely
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import PALETTES, STRIP, rendered, window_of
+from orbiflow.tiles.pages.sheets import FILLED, LEFT_OUT, OUTLINE
 from orbiflow.tiles.pictures import RAMP, default_window
 from orbiflow.tiles.search import ClassFailure
 from orbiflow.tiles.silhouette import Target
@@ -61,6 +62,7 @@ def index_page(
         out=shlex.quote(f"./{out}" if out.startswith("-") else out),
         quote=shlex.quote,
         read=read,
+        marks=(OUTLINE, LEFT_OUT, FILLED),
         silhouette=_silhouette(target),
         compared=any(result.front is not None for result in results),
         notes=target.notes,

@@ -98,15 +98,19 @@ def _bridged(reading: Reading) -> Reading:
     size = 0.0 if seen is None else float(np.ptp(np.reshape(seen.bounds, (2, 2)), axis=0).max())
     if seen is None or not is_thread(Polygon(reading.outline), size):
         return reading
-    body = simplified(closed(seen, GAP * size), GAP * size / 50)
-    lines = seen.intersection(body).area
+    body = closed(seen, GAP * size)
+    lines = seen.buffer(0).intersection(body).area  # what is traced may touch itself
     if is_thread(body, size) or not MOST * seen.area < lines < body.area / 2:
         return reading
     note = (
         f"the largest part is no more than a line: took instead what the lines enclose when gaps of "
         f"up to {GAP:.0%} of the drawing's size are closed"
     )
-    return replace(reading, outline=outer_ring(body), notes=(*reading.notes, note))
+    kept = [other for other in reading.notes if not other.startswith("kept the largest")]
+    thin = simplified(body, GAP * size / 50)
+    return replace(
+        reading, outline=outer_ring(thin if thin.is_valid else body), notes=(*kept, note)
+    )
 
 
 def _kind(path: Source, head: bytes) -> str:
