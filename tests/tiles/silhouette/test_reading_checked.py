@@ -182,7 +182,7 @@ EAR = '<path d="M240 150 q20 40 -5 60"/>'
 
 @pytest.mark.parametrize("ear", ["", EAR])
 @pytest.mark.parametrize(
-    ("dashes", "is_whole"), [("12 6", True), ("820 20", True), ("700 300", False)]
+    ("dashes", "is_whole"), [("12 6", True), ("820 20", True), ("12 8", True), ("700 300", False)]
 )
 def test_small_gaps_in_an_outline_are_closed(
     tmp_path: Path, dashes: str, is_whole: bool, ear: str

@@ -135,15 +135,11 @@ def is_thread(shape: Polygon, length: float) -> bool:
     return shape.buffer(-THREAD / 2 * length).is_empty
 
 
-def closed(geometry: BaseGeometry, width: float) -> Polygon:
-    """Return the largest part, filled, without gaps narrower than `width`."""
-    parts = polygons_in(geometry.buffer(width / 2).buffer(-width / 2))
-    return filled(max(parts, key=lambda part: filled(part).area, default=Polygon()))
-
-
 def rounded(geometry: BaseGeometry, width: float) -> Polygon:
     """Return the largest part, filled, without gaps and then without limbs narrower than `width`."""
-    parts = polygons_in(closed(geometry, width).buffer(-width / 2).buffer(width / 2))
+    closed = polygons_in(geometry.buffer(width / 2).buffer(-width / 2))
+    solid = filled(max(closed, key=lambda part: filled(part).area, default=Polygon()))
+    parts = polygons_in(solid.buffer(-width / 2).buffer(width / 2))
     return simplified(max(parts, key=lambda part: part.area, default=Polygon()), width / 50)
 
 

@@ -15,11 +15,12 @@ from shapely import Polygon
 from orbiflow.arguments import as_path
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import is_list, is_object
+from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.silhouette.outlines import (
     MAX_VERTICES,
     clean_ring,
-    closed,
     is_thread,
+    outer_outline,
     outer_ring,
     simplified,
 )
@@ -98,7 +99,9 @@ def _bridged(reading: Reading) -> Reading:
     size = 0.0 if seen is None else float(np.ptp(np.reshape(seen.bounds, (2, 2)), axis=0).max())
     if seen is None or not is_thread(Polygon(reading.outline), size):
         return reading
-    body = closed(seen, GAP * size)
+    grown = outer_outline(seen.buffer(GAP / 2 * size))[0]
+    body = grown.buffer(-GAP / 2 * size)
+    body = max(polygons_in(body), key=lambda part: part.area, default=Polygon())
     lines = seen.buffer(0).intersection(body).area  # what is traced may touch itself
     if is_thread(body, size) or not MOST * seen.area < lines < body.area / 2:
         return reading
