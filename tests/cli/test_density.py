@@ -72,7 +72,7 @@ def test_fit_score_sample_plot(space: str, tmp_path: Path, orbiflow) -> None:
 
 @pytest.fixture
 def small_pictures(monkeypatch) -> None:
-    for name, size in (("square._GRID", 40), ("page._CELLS", 20), ("maps._PIXELS", 2000)):
+    for name, size in (("square._GRID", 40), ("surfaces._CELLS", 20), ("maps._PIXELS", 2000)):
         monkeypatch.setattr(f"orbiflow.density.pictures.{name}", size)
     monkeypatch.setattr("orbiflow.drawing.canvas._SAMPLES", 40)
 
