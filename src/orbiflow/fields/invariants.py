@@ -217,6 +217,10 @@ class InvariantField(nn.Module, ABC):
     def layout(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[Array, Array, Array]:
         """Return the basis in the coefficients that the field evaluates, as (row, column, value)."""
 
+    @abstractmethod
+    def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
+        """Return the gradient (P,) of sum forces . V(points) in the parameters; inputs (N, d)."""
+
     def _check_points(self, points: Tensor) -> None:
         """Raise OrbiflowError for points that the field cannot be evaluated at."""
         d, own = self.group.dim, self.parameters_
