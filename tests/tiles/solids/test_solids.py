@@ -252,7 +252,8 @@ def test_notes_say_where_it_is_too_thin() -> None:
         make_solid(tile, SolidSettings(kind="cutter"))
     made = make_solid(tile, SolidSettings(kind="cutter", tile_size=size), force=True)
     assert made.title.startswith("NOT CERTIFIED")
-    assert any("thinner than 5 mm: 1.00 mm" in note for note in made.notes)
+    (note,) = (note for note in made.notes if "thinner than 5 mm: a neck" in note)
+    assert "is 1.00 mm wide" in note
 
 
 @pytest.mark.parametrize(
