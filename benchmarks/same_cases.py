@@ -40,6 +40,7 @@ PRESENT = Renamed(
         "density batch --parts": "--components",
         "density cv --parts": "--components",
         "density fit --detail": "--max-frequency",
+        "art --repeat": "--repeat=basic",
     },
     keys={
         "parts": "components",
@@ -314,7 +315,7 @@ def artwork() -> list[Case]:
         "picture": f"../search-pins/run --picture {IN}/drawing.svg --size 600x400 --tile-size 180",
         "picture-overlap": f"../search-overlap/run --picture {IN}/squirrel.svg --size 500x300 "
         "--tile-size 150",
-        "repeat": "../search-likeness/run --repeat basic --tile-size 120 --colour neighbour "
+        "repeat": "../search-likeness/run --repeat --tile-size 120 --colour neighbour "
         "--outline 2 --tile IH4",
         "hatch": "../search-pins/run --engrave --strokes hatch --eye 600,150,20 --size 400x300 "
         "--tile-size 200",
