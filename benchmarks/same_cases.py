@@ -48,8 +48,15 @@ PRESENT = Renamed(
         "shares": None,
         "settings.kernels": None,
     },
-    added=frozenset({"weights"}),  # the shares, by the names of the components
+    # the shares, by the names of the components; what is said of tiles; offsets of exports
+    added=frozenset({"weights", "rating", "arrangement", "stars", "word", "offset"}),
     expected={
+        "* read.png": "what was read is drawn before the search",
+        "* index.html": "the page has commands, palettes and stars",
+        "* overview.png": "the sheet has stars and names of arrangements",
+        "* front.png": "has stars, and the border of the tiles that are listed",
+        "* model.safetensors": "the map carries the silhouette's whole outline",
+        "*dxf* a.dxf": "layers have colours",
         "* density.safetensors": "saved as a mixture, in format 5",
         "*fit-torus4-flow*": "flows on tori of four or more angles are gone",
         "*batch* batch.csv": "the settings of a line are those of the operation",
