@@ -49,6 +49,7 @@ from orbiflow.density.fitting.rows import (
     effective_rows,
     group_numbers,
     is_whole,
+    lone_groups_note,
     mean_of,
     missing_notes,
     observed_points,
@@ -137,6 +138,7 @@ def fit_automatic(
     report = _report(density, folds, candidates, weights, tried, parts, found)
     after = (
         *weights_note(folds.rows),
+        *lone_groups_note(folds.rows.groups),
         *report.notes,
         *_untried_note(folds, settings, flows),
         *found.notes(settings.repeats),
