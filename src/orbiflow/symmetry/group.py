@@ -5,6 +5,7 @@ Their headers are JSON with the exact bases, in which saved parameters are coord
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -119,6 +120,11 @@ class CrystallographicGroup:
         return np.stack([g.linear for g in self.cosets])
 
     @cached_property
+    def integral_parts(self) -> Array:
+        """(|G|, d, d) linear parts in the lattice's basis: the integers B^-1 R B."""
+        return np.round(self.inverse_lattice @ self.linear_parts @ self.lattice).astype(np.int64)
+
+    @cached_property
     def translations(self) -> Array:
         """(|G|, d) translations of the coset representatives."""
         return np.stack([g.translation for g in self.cosets])
@@ -152,8 +158,7 @@ class CrystallographicGroup:
         Only whole numbers: equality has a tolerance, so a quantity that changes with rounding would
         give some equal groups different hashes.
         """
-        integral = np.round(self.inverse_lattice @ self.linear_parts @ self.lattice)
-        unique = np.unique(integral, axis=0)
+        unique = np.unique(self.integral_parts, axis=0)
         kinds = np.stack([np.trace(unique, axis1=1, axis2=2), np.linalg.det(unique)], axis=1)
         values, counts = np.unique(np.round(kinds).astype(int), axis=0, return_counts=True)
         rows = zip(values.tolist(), counts.tolist(), strict=True)
@@ -248,6 +253,24 @@ class CrystallographicGroup:
             basis, tuple(_reduce_translation(basis, g) for g in cosets), self.name
         )
 
+    def primitive(self) -> CrystallographicGroup:
+        """Return the same group on the lattice of all its translations, with one coset for each R.
+
+        A group whose lattice is that already is returned as it is. The basis is made of the shortest
+        vectors that are one.
+
+        >>> cmm = CrystallographicGroup.generate(np.eye(2), [translation([0.5, 0.5])])
+        >>> cmm.order, cmm.primitive().order, cmm.primitive().cell_volume
+        (2, 1, 0.5)
+        """
+        shifts = [g.translation for g in self.cosets if np.allclose(g.linear, np.eye(self.dim))]
+        if len(shifts) == 1:
+            return self
+        basis = checked_lattice(_shortest_basis(self.lattice, np.stack(shifts)))
+        _, first = np.unique(self.integral_parts, axis=0, return_index=True)
+        cosets = (_reduce_translation(basis, self.cosets[i]) for i in np.sort(first))
+        return CrystallographicGroup(basis, tuple(cosets), self.name)
+
     def __repr__(self) -> str:
         label = f"{self.name}, " if self.name else ""
         basis = (self.lattice.round(6) + 0.0).tolist()
@@ -288,6 +311,41 @@ def _reduce_translation(basis: Array, element: Isometry) -> Isometry:
     fractional = fractional - np.floor(fractional + TOLERANCE)
     fractional[np.abs(fractional) < TOLERANCE] = 0.0
     return Isometry(element.linear, basis @ fractional)
+
+
+def _shortest_basis(lattice: Array, shifts: Array) -> Array:
+    """Return the first d of the shortest vectors that are a basis of a lattice refined by `shifts`."""
+    d = len(lattice)
+    steps = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=d))) @ lattice.T
+    vectors = (shifts[:, None] + steps).reshape(-1, d)
+    fractional = np.round(vectors @ np.linalg.inv(lattice).T, 6) + 0.0
+    length = np.round(np.linalg.norm(vectors, axis=1) / np.abs(lattice).max(), 6)
+    # of each pair +-v the one whose last component is positive; ties in a fixed order
+    order = sorted(range(len(vectors)), key=lambda i: (length[i], *-fractional[i]))
+    order = [i for i in order if tuple(fractional[i, ::-1]) > (0.0,) * d]
+    volume = abs(np.linalg.det(lattice)) / len(shifts)
+    for chosen in itertools.combinations(order, d):
+        basis = vectors[list(chosen)].T
+        if 0.5 < abs(np.linalg.det(basis)) / volume < 1.5:
+            return basis
+    raise AssertionError  # the given basis and a shift are among the vectors
+
+
+def generated(
+    lattice: ArrayLike,
+    isometries: Iterable[Isometry],
+    *,
+    name: str = "",
+    max_order: int = MAX_ORDER,
+) -> CrystallographicGroup:
+    """Return the group that `generate` makes of many isometries, most of which follow from others."""
+    closed = CrystallographicGroup.generate(lattice, name=name)
+    chosen: list[Isometry] = []
+    for isometry in isometries:  # each that is new at least doubles the order
+        if not closed.contains(isometry):
+            chosen.append(isometry)
+            closed = CrystallographicGroup.generate(lattice, chosen, name=name, max_order=max_order)
+    return closed
 
 
 def _closure(basis: Array, generators: Sequence[Isometry], max_order: int) -> tuple[Isometry, ...]:
@@ -368,12 +426,7 @@ def group_from_header(header: Mapping[str, Any], name: str = "") -> Crystallogra
     cosets = tuple(Isometry(*parts) for parts in zip(linear, shifts, strict=True))
     if not order or not cosets[0].is_close(Isometry(np.eye(d), np.zeros(d))):
         raise GroupError("the group's first coset is not that of the identity")
-    closed = CrystallographicGroup.generate(lattice)
-    chosen: list[Isometry] = []
-    for coset in cosets:  # each that is new at least doubles the order
-        if not closed.contains(coset):
-            chosen.append(coset)
-            closed = CrystallographicGroup.generate(lattice, chosen, max_order=order)
+    closed = generated(lattice, cosets, max_order=order)
     if closed.order != order:
         raise GroupError(f"the group has {order} cosets, of which only {closed.order} differ")
     return CrystallographicGroup(closed.lattice, cosets, str(name)[:MAX_NAME])
