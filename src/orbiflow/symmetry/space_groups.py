@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from orbiflow.arguments import described
 from orbiflow.errors import GroupError, OrbiflowError
-from orbiflow.symmetry.cells import cell_lattice, default_cell
+from orbiflow.symmetry.cells import cell_lattice, default_lattice
 from orbiflow.symmetry.group import CrystallographicGroup
 from orbiflow.symmetry.triplets import group_from_operators, parse_operator
 
@@ -40,7 +40,7 @@ def space_group(name: int | str, cell: ArrayLike | None = None) -> Crystallograp
     """
     label, operators = _operators(name)
     if cell is None:
-        cell = default_cell(np.array([parse_operator(text, 3)[0] for text in operators]))
+        cell = default_lattice(np.array([parse_operator(text, 3)[0] for text in operators]))
     return group_from_operators(operators, cell_lattice(cell), name=label)
 
 

@@ -49,7 +49,7 @@ def group_from_operators(
     check_cell(basis, np.array([w for w, _ in parsed]).reshape(-1, *basis.shape), texts)
     inverse = np.linalg.inv(basis)
     isometries = [Isometry(basis @ w @ inverse, basis @ shift) for w, shift in parsed]
-    return generated(basis, isometries, name=name).primitive()
+    return generated(basis, isometries, name).primitive()
 
 
 def parse_operator(text: str, dim: int) -> Operator:
