@@ -27,5 +27,8 @@ from .isometry import rotation as rotation
 from .isometry import rotation_matrix as rotation_matrix
 from .isometry import transflection as transflection
 from .isometry import translation as translation
+from .space_groups import cif_text as cif_text
+from .space_groups import group_from_cif as group_from_cif
 from .space_groups import space_group as space_group
 from .triplets import group_from_operators as group_from_operators
+from .triplets import operators as operators

@@ -366,8 +366,8 @@ def _finite_closure(
         integral = np.linalg.solve(basis, element.linear @ basis)
         same = known.setdefault(np.round(integral).astype(np.int64).tobytes(), [])
         fractional = np.linalg.solve(basis, element.translation)
-        offsets = [fractional - other for other in same]
-        if any(np.abs(o - np.round(o)).max() <= 10 * TOLERANCE for o in offsets):
+        offsets = fractional - np.reshape(same, (-1, len(basis)))
+        if (np.abs(offsets - np.round(offsets)).max(axis=1) <= 10 * TOLERANCE).any():
             continue
         if len(elements) >= max_order:
             return None
