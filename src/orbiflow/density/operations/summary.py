@@ -137,13 +137,15 @@ def _tables(found: dict[str, Any], level: float) -> list[runtime.Table]:
     }  # fmt: skip
     if "columns" not in found:
         (name, (entry,)), *_ = found.items()
-        lines = tuple((words.get(key, key), _shown(key, value)) for key, value in entry.items())
+        lines = tuple(
+            (str(words.get(key, key)), _shown(key, value)) for key, value in entry.items()
+        )
         return [runtime.Table(name.capitalize(), ("figure", "value"), lines)]
     of = dict(zip(TABLES, (found["columns"], found["columns"], found["correlations"]), strict=True))
     return [
         runtime.Table(
             title,
-            tuple(words.get(key, key) for key in keys),
+            tuple(str(words.get(key, key)) for key in keys),
             tuple(tuple(_shown(key, entry[key]) for key in keys) for entry in of[title]),
         )
         for title, keys in TABLES.items()
