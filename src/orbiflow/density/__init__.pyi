@@ -101,6 +101,12 @@ from .spaces.space import SPACES as SPACES
 from .spaces.space import Space as Space
 from .spaces.space import make_space as make_space
 from .spaces.space import space_class as space_class
+from .spaces.unit_vectors import CubicOrientations as CubicOrientations
+from .spaces.unit_vectors import HexagonalOrientations as HexagonalOrientations
+from .spaces.unit_vectors import Hypersphere as Hypersphere
+from .spaces.unit_vectors import ProjectiveSpace as ProjectiveSpace
+from .spaces.unit_vectors import RotationSpace as RotationSpace
+from .spaces.unit_vectors import UnitVectorSpace as UnitVectorSpace
 from .tables.files import append_columns as append_columns
 from .tables.files import column_names as column_names
 from .tables.files import is_identifier as is_identifier

@@ -361,7 +361,7 @@ def chosen_map(space: Space, points: Tensor, settings: PlotSettings | None = Non
     >>> chosen_map(Sphere(), here)
     Lambert(center=(42.0, 141.0), radius=5.0, flipped=False)
     """
-    if not space.is_round:
+    if not (space.is_round and space.has_chart):
         raise OrbiflowError(f"maps are of the sphere and the projective plane, not of {space!r}")
     settings = settings or PlotSettings()
     projection, radius, middle = settings.projection, settings.radius, settings.center

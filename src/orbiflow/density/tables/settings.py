@@ -19,7 +19,15 @@ OTHER_FORMATS = frozenset((
 ))
 # fmt: on
 
-SpaceName = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
+SpaceName = Literal[
+    "torus", "sphere", "klein-bottle", "projective-plane",
+    "hypersphere", "projective-space",
+    "rotation-space", "cubic-orientations", "hexagonal-orientations",
+]  # fmt: skip
+ROTATIONS = ("rotation-space", "cubic-orientations", "hexagonal-orientations")
+ANGULAR = ("torus", "klein-bottle", *ROTATIONS)
+"""Spaces whose data are angles, or may be: three columns of rotations."""
+
 Unit = Literal["radians", "degrees", "turns"]
 
 
@@ -30,7 +38,7 @@ class SpaceSettings(Settings, group="Density"):
     """Where the data live."""
 
     unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None
-    """Unit of angles on the torus and the Klein bottle."""
+    """Unit of angles on the torus and the Klein bottle, and of rotations in three columns."""
 
     def check(self) -> None:
         """Check that only angles have a unit."""
@@ -48,6 +56,10 @@ def check_unit(space: str, unit: Unit | None) -> None:
         raise SettingError(
             f"{{unit}} {unit} applies only to angles on the torus and the Klein bottle: latitude and "
             "longitude are degrees; convert them, or give unit vectors x,y,z"
+        )
+    if space in ("hypersphere", "projective-space") and unit is not None:
+        raise SettingError(
+            f"{{unit}} {unit} applies only to angles: rows of the {space} are unit vectors"
         )
 
 
