@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 import torch
@@ -147,18 +148,14 @@ def fit_mixture(
     width = 1 if space.is_round else space.dim
     kappa = mean.new_full((components, width), 10.0)
     weights = mean.new_full((components,), 1 / components)
+    of_mean = partial(round_concentration, dim=space.dim) if space.is_round else concentration
     last = -math.inf
     for _ in range(iterations):
         count, known, total, score = _expectation(space, every, mean, kappa, weights)
         weights = (count + 0.01) / (count + 0.01).sum()
         mean, length = _directions(space, total)
         resultant = (length + PRIOR * PRIOR_RESULTANT) / (known + PRIOR)
-        kappa = (
-            round_concentration(resultant, space.dim)
-            if space.is_round
-            else concentration(resultant)
-        )
-        kappa = kappa.clamp(WIDEST / 100, narrowest)
+        kappa = of_mean(resultant).clamp(WIDEST / 100, narrowest)
         if score - last < CONVERGED * len(train):
             break
         last = score

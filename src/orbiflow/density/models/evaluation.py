@@ -64,7 +64,7 @@ def log_density_gradient(density: Density, data: ArrayLike) -> tuple[Array, Arra
 def midpoints(space: Space, resolution: int) -> Tensor:
     """Return the midpoints (resolution^2, 2) of a grid on the canonical square, float64."""
     as_whole(resolution, "resolution", 1, 10**6)
-    if not space.has_square:
+    if not space.is_planar:
         raise OrbiflowError(
             f"a grid needs two dimensions, this {space.name} has {space.dimensions}"
         )
@@ -119,7 +119,7 @@ class TabulatedDensity:
     @one_thread()
     def __init__(self, density: Density, resolution: int = 512) -> None:
         space = as_instance(density, Density, "density").space
-        if not space.has_square:
+        if not space.is_planar:
             raise OrbiflowError(
                 f"a table needs two dimensions, this {space.name} has {space.dimensions}"
             )

@@ -32,12 +32,7 @@ MOST_DIM = 3
 
 
 def flow_obstacle(space: Space) -> str | None:
-    """Return why no density on a space has a flow, in words, or None.
-
-    >>> from orbiflow.density import Torus
-    >>> flow_obstacle(Torus(4))
-    'a flow has 3 dimensions at most, this torus has 4'
-    """
+    """Return why no density on a space has a flow, in words, or None."""
     if space.has_chart and space.dim <= MOST_DIM:
         return None
     return f"a flow has {MOST_DIM} dimensions at most, this {space.name} has {space.dimensions}"

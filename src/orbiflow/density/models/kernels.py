@@ -86,7 +86,7 @@ class AdaptiveKernels(Density, kind="kernels"):
         and by which smooth ones that are interpolated may be off.
         """
         flat = points.reshape(-1, self.space.chart_dim).double()
-        features = self.space.own_features(flat).mT
+        features = self.space.features(flat, slice(1))[0].mT
         if features.device.type == "cpu":
             values = near_log_sum(self._terms, features.contiguous(), beside, tolerance)
         else:

@@ -85,7 +85,7 @@ def view_of(
 
 def require_plane(space: Space) -> None:
     """Check that a space has two dimensions, and a chart of the square."""
-    if not space.has_square:
+    if not space.is_planar:
         raise OrbiflowError(
             f"a picture needs two dimensions, this {space.name} has {space.dimensions}"
         )

@@ -149,8 +149,8 @@ class _Shown:
     def __init__(self, density: Density, settings: PlotSettings, data: ArrayLike | None) -> None:
         self.density, self.settings = density, settings
         self.space = space = density.space
-        _check_space(space, settings)
         self.coastlines = coastlines_for(space, settings)
+        _check_space(space, settings)
         self.data = None if data is None else space.to_chart(data)
         generator = torch.Generator().manual_seed(settings.seed)
         self.samples = self.density.sample((settings.samples or SAMPLES,), generator)
@@ -188,11 +188,6 @@ class _Shown:
 
 def _check_space(space: Space, settings: PlotSettings) -> None:
     """Check that a space can be drawn, and that settings fit it."""
-    if not space.has_chart:
-        raise OrbiflowError(
-            f"densities on the {space.name} have no pictures, as there is no chart of the square: draw "
-            "columns of `orbiflow density sample` beside those of the data"
-        )
     if space.dim > MAX_COLUMNS:
         raise OrbiflowError(
             f"this {space.name} has {space.dim} angles, pictures have {MAX_COLUMNS} at most: draw "

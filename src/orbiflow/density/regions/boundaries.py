@@ -204,7 +204,7 @@ class Window:
 
 def window_of(space: Space) -> Window:
     """Return the window in which regions of a space are drawn."""
-    if not space.has_square:
+    if not space.is_planar:
         raise OrbiflowError(
             f"outlines are drawn in two dimensions, this {space.name} has {space.dimensions}; "
             "thresholds, sizes and which rows are inside can be found all the same"

@@ -129,8 +129,11 @@ class RoundSpace(Space):
         """Return `unit_vectors` as a NumPy array, float64."""
         return self.unit_vectors(self._checked(points).detach().double().cpu()).numpy()
 
-    def features(self, points: Tensor) -> Tensor:
-        return self.unit_vectors(points)[None]
+    def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
+        return self.unit_vectors(points)[None][which]
+
+    def step_angle(self, step: float) -> float:
+        return math.radians(step) if self.form == "latlon" else step
 
     def from_features(self, features: Tensor) -> Tensor:
         return self.vectors_to_chart(features.numpy())
@@ -211,9 +214,9 @@ class ProjectivePlane(RoundSpace):
     name = "projective-plane"
     power = 2
 
-    def features(self, points: Tensor) -> Tensor:
+    def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
         vectors = self.unit_vectors(points)
-        return torch.stack([vectors, -vectors])
+        return torch.stack([vectors, -vectors])[which]
 
     def _representatives(self, vectors: Array) -> Array:
         return np.where(vectors[:, 2:] < 0, -1.0, 1.0) * vectors

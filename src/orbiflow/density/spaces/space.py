@@ -75,8 +75,8 @@ class Space(ABC):
         return self.dim
 
     @property
-    def has_square(self) -> bool:
-        """Whether the chart is the square, so that densities can be drawn and tabulated."""
+    def is_planar(self) -> bool:
+        """Whether the chart is the square, on which densities are drawn and tabulated."""
         return self.has_chart and self.dim == 2
 
     @property
@@ -92,9 +92,9 @@ class Space(ABC):
     @property
     def is_torus(self) -> bool:
         """Whether the group is that of the integer translations alone."""
-        if not self.has_chart:
+        if not self.has_chart or self.group.order > 1:
             return False
-        return self.group.order == 1 and np.array_equal(self.group.lattice, np.eye(self.dim))
+        return np.array_equal(self.group.lattice, np.eye(self.dim))
 
     @cached_property
     def domain(self) -> DirichletDomain:
@@ -147,6 +147,10 @@ class Space(ABC):
         `points` are `cover` of the data (N, k), and `gradient` (N, d) those in the chart there.
         """
 
+    def step_angle(self, step: float) -> float:
+        """Return, in radians of the kernels, a step in the unit of the data."""
+        return 2 * math.pi * step / self.volume ** (1 / self.dim)
+
     @abstractmethod
     def settings(self) -> dict[str, Any]:
         """Return the options that, with `name`, make the same space again, for JSON."""
@@ -176,18 +180,14 @@ class Space(ABC):
         square = (images**2).sum(dim=-1, keepdim=True) - 2 * dot
         return (square.amin(dim=0).mT + (start**2).sum(dim=-1, keepdim=True)).clamp_min(0.0)
 
-    def features(self, points: Tensor) -> Tensor:
+    def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
         """Return what kernels see of the E images of points (N, d), themselves first: (E, N, m).
 
-        They are cosines and sines of the lattice's angles, or unit vectors on round spaces. The
-        function is differentiable.
+        They are cosines and sines of the lattice's angles, or unit vectors on round spaces; `which`
+        chooses among the images. The function is differentiable.
         """
         angles = 2 * math.pi * self.group.images(points) / rectangle(self).to(points)
-        return torch.cat([angles.cos(), angles.sin()], dim=-1)
-
-    def own_features(self, points: Tensor) -> Tensor:
-        """Return the features (N, m) of points alone, without those of their images."""
-        return self.features(points)[0]
+        return torch.cat([angles.cos(), angles.sin()], dim=-1)[which]
 
     def from_features(self, features: Tensor) -> Tensor:
         """Return the canonical points (N, d) that have these features (N, m)."""
@@ -205,7 +205,7 @@ class Space(ABC):
         return (
             type(other) is type(self)
             and other.settings() == self.settings()
-            and other.group == self.group
+            and (not self.has_chart or other.group == self.group)
         )
 
     def __hash__(self) -> int:
@@ -250,10 +250,12 @@ def space_class(name: str) -> type[Space]:
     """Return the class of a space, by its name."""
     from orbiflow.density import spaces  # whose classes import this file
 
-    four = (spaces.Torus, spaces.Sphere, spaces.KleinBottle, spaces.ProjectivePlane)
-    spheres = (spaces.Hypersphere, spaces.ProjectiveSpace, spaces.RotationSpace)
-    crystals = (spaces.CubicOrientations, spaces.HexagonalOrientations)
-    known: dict[str, type[Space]] = {kind.name: kind for kind in (*four, *spheres, *crystals)}
+    kinds = (
+        spaces.Torus, spaces.Sphere, spaces.KleinBottle, spaces.ProjectivePlane, spaces.Hypersphere,
+        spaces.ProjectiveSpace, spaces.RotationSpace, spaces.CubicOrientations,
+        spaces.HexagonalOrientations,
+    )  # fmt: skip
+    known: dict[str, type[Space]] = {kind.name: kind for kind in kinds}
     if not is_a(name, str) or name not in known:
         raise OrbiflowError(f"unknown space {name!r}; there are {', '.join(known)}")
     return known[name]

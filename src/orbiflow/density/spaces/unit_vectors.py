@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import gammaln
 from torch import Tensor
 
-from orbiflow.arguments import as_array, as_choice, as_whole
+from orbiflow.arguments import as_choice, as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.spaces.flat import MAX_DIM, whole_turn
 from orbiflow.density.spaces.round import UNIT_TOLERANCE, refuse_rows, to_unit
@@ -22,14 +22,6 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.typed_torch import linalg
 
-MOST_ELEMENTS = 256
-"""The most elements of a group: each is a kernel more about every row."""
-
-MOST_GENERATORS = 16
-
-SAME_MATRIX = 1e-6
-"""Largest difference of entries up to which two elements of a group are one."""
-
 
 class UnitVectorSpace(Space):
     """The unit sphere S^d in d + 1 coordinates, modulo a finite group of isometries.
@@ -37,7 +29,7 @@ class UnitVectorSpace(Space):
     There is no chart of the square: chart points are unit vectors (N, d + 1), and the measure
     "square" is the sphere's own area. So there are kernels and mixtures of von Mises-Fisher
     densities, but neither flows nor pictures. Of the images of a point, the canonical one has the
-    largest last coordinate.
+    largest last coordinate. A subclass gives its elements, `columns`, `for_data` and `settings`.
 
     Args:
         elements: Orthogonal matrices (E, d + 1, d + 1): all elements of the group, the identity first.
@@ -47,8 +39,7 @@ class UnitVectorSpace(Space):
     has_chart = False
 
     def __init__(self, elements: Array) -> None:
-        self.elements = elements
-        self._matrices = torch.tensor(elements)
+        self.elements = torch.tensor(elements)
         # nothing but the last coordinate, until two images are as high
         side = 1e-6 / np.arange(2.0, elements.shape[1] + 2) ** 0.5
         self._height = torch.tensor(side + np.eye(len(side))[-1])
@@ -63,7 +54,6 @@ class UnitVectorSpace(Space):
 
     @property
     def group(self) -> CrystallographicGroup:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """None: asking for the group of a flow or of a chart raises an `OrbiflowError`."""
         raise OrbiflowError(
             f"the {self.name} has no chart of the square and no crystallographic group: densities "
             "there are made of kernels and mixtures"
@@ -71,28 +61,23 @@ class UnitVectorSpace(Space):
 
     @property
     def volume(self) -> float:
-        half = (self.dim + 1) / 2
+        half = self.chart_dim / 2
         return 2 * math.exp(half * math.log(math.pi) - float(gammaln(half))) / len(self.elements)
 
     def log_area(self, points: Tensor) -> Tensor:
         return torch.zeros_like(points[..., 0])
 
     def project(self, points: Tensor) -> Tensor:
-        """Return the canonical images of unit vectors (..., d + 1), exactly of length 1."""
         first = best = self._unit(points)
         height = self._height.to(best)
-        for matrix in self._matrices.to(best)[1:]:
-            image = first @ matrix.mT
-            higher = image @ height > best @ height
-            best = torch.where(higher[..., None], image, best)
+        for element in self.elements.to(best)[1:]:
+            image = first @ element.mT
+            best = torch.where((image @ height > best @ height)[..., None], image, best)
         return best
 
-    def features(self, points: Tensor) -> Tensor:
+    def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
         own = self._unit(points)
-        return torch.stack([own, *(own @ matrix.mT for matrix in self._matrices.to(own)[1:])])
-
-    def own_features(self, points: Tensor) -> Tensor:
-        return self._unit(points)
+        return torch.stack([own @ element.mT for element in self.elements.to(own)[which]])
 
     def from_features(self, features: Tensor) -> Tensor:
         return self.project(features)
@@ -118,73 +103,31 @@ class UnitVectorSpace(Space):
         del data, points
         return gradient.numpy()
 
-    def squared_distances(self, start: Tensor, end: Tensor) -> Tensor:
-        """Return squares (N, M) of chords between all of `start` and the nearest images of `end`."""
-        start, images = self._unit(start), self.features(end)
-        return (2 - 2 * torch.stack([start @ own.mT for own in images]).amax(dim=0)).clamp_min(0.0)
-
-    def distance(self, start: Tensor, end: Tensor) -> Tensor:
-        """Return the angle (...,) between unit vectors, over group images, in radians."""
-        images = self.features(end) - self._unit(start)
-        chord = linalg.vector_norm(images, dim=-1).amin(dim=0)
-        return 2 * torch.asin((chord / 2).clamp_max(1.0))
+    def step_angle(self, step: float) -> float:
+        return step
 
     def uniform(self, count: int, generator: torch.Generator) -> Tensor:
         vectors = torch.randn(count, self.chart_dim, dtype=torch.float64, generator=generator)
         return self.project(vectors / linalg.vector_norm(vectors, dim=1, keepdim=True))
 
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Space):
-            return NotImplemented
-        return type(other) is type(self) and other.settings() == self.settings()
-
-    __hash__ = Space.__hash__
-
 
 class Hypersphere(UnitVectorSpace):
-    """The unit sphere S^d of d + 1 coordinates, or its quotient by a finite group; per unit of area.
+    """The unit sphere S^d of d + 1 coordinates; densities are per unit of its area.
 
     Args:
         dim: The dimension d, 1 to 64.
-        symmetry: Orthogonal matrices (n, d + 1, d + 1) that generate the group, of 256 elements at
-            most. Default: none, the sphere itself.
 
-    >>> space = Hypersphere(3)
-    >>> space.columns, round(space.volume / math.pi**2, 12)
+    >>> Hypersphere(3).columns, round(Hypersphere(3).volume / math.pi**2, 12)
     (('x1', 'x2', 'x3', 'x4'), 2.0)
     """
 
     name = "hypersphere"
-
-    def __init__(self, dim: int = 3, *, symmetry: ArrayLike | None = None) -> None:
-        size = as_whole(dim, "dim", 1, MAX_DIM) + 1
-        given = np.zeros((0, size, size)) if symmetry is None else symmetry
-        self.symmetry = as_array(given, "symmetry", ("n", size, size))
-        self.columns = tuple(f"x{k + 1}" for k in range(size))
-        super().__init__(finite_group(self.symmetry))
-
-    @classmethod
-    def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
-        del unit, seed
-        return cls(data.shape[1] - 1)
-
-    def settings(self) -> dict[str, Any]:
-        return {"dim": self.dim, "symmetry": self.symmetry.tolist() or None}
-
-
-class ProjectiveSpace(UnitVectorSpace):
-    """The space of axes in d + 1 coordinates, unit vectors without a sense; per unit of area.
-
-    Args:
-        dim: The dimension d, 1 to 64.
-    """
-
-    name = "projective-space"
+    signs: ClassVar[tuple[int, ...]] = (1,)
 
     def __init__(self, dim: int = 3) -> None:
         size = as_whole(dim, "dim", 1, MAX_DIM) + 1
         self.columns = tuple(f"x{k + 1}" for k in range(size))
-        super().__init__(np.stack([np.eye(size), -np.eye(size)]))
+        super().__init__(np.stack([sign * np.eye(size) for sign in self.signs]))
 
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
@@ -193,6 +136,12 @@ class ProjectiveSpace(UnitVectorSpace):
 
     def settings(self) -> dict[str, Any]:
         return {"dim": self.dim}
+
+
+class ProjectiveSpace(Hypersphere):
+    """The space of axes in d + 1 coordinates, which are unit vectors without a sense."""
+
+    name, signs = "projective-space", (1, -1)
 
 
 CRYSTALS = ("C1", "C2", "C3", "C4", "C6", "D2", "D3", "D4", "D6", "T", "O", "I")
@@ -205,31 +154,24 @@ FORMS: dict[str, tuple[str, ...]] = {
 }
 """Columns of rotations in each form: a quaternion's scalar is last, a vector is axis times angle."""
 
-EULER = tuple(
-    text
-    for a in "xyz"
-    for b in "xyz"
-    for c in "xyz"
-    if a != b != c
-    for text in (a + b + c, (a + b + c).upper())
-)
-"""Sequences of axes of Euler angles, about fixed axes or, in capitals, about those that turn along."""
+EULER = ("ZXZ", "ZYZ", "XYZ", "ZYX", "xyz", "zyx")
+"""Axes of Euler angles: fixed ones or, in capitals, those that turn along."""
 
 
 class RotationSpace(UnitVectorSpace):
     """The rotations SO(3), as unit quaternions up to sign, or orientations of crystals.
 
-    The natural measure is the area of the sphere of quaternions, so that the whole has pi^2, divided
-    by the order of the crystal's group. In radians of rotation it would have 8 pi^2: eight times as
-    much. Of a rotation's images, the canonical one has the smallest angle.
+    The natural measure is the area of the sphere of quaternions: pi^2 in all, divided by the order of
+    the crystal's group. (In radians of rotation it would be eight times as much, 8 pi^2 in all.) Of a
+    rotation's images, the canonical one has the smallest angle.
 
     Args:
         form: How `from_chart` writes rotations: "quaternion" (x, y, z, w), "vector" (axis times angle),
             "matrix" (nine numbers, row by row), or Euler angles by their axes, such as "ZXZ" for
-            Bunge's. `to_chart` also takes quaternions and matrices, which it knows by their width.
+            Bunge's. `to_chart` knows quaternions and matrices by their width.
         unit: Unit of vectors and Euler angles: "radians", "degrees" or "turns".
         symmetry: Rotation group of the crystal, such as "O" (cubic) or "D6" (hexagonal): the rotation
-            g is the same orientation as g s for each s of the group.
+            g is the same orientation as g s for each s of the group. Default: none, "C1".
 
     >>> space = RotationSpace(form="ZXZ", unit="degrees", symmetry="O")
     >>> space.from_chart(space.to_chart([[100.0, 0.0, 0.0]])).round(9).tolist()
@@ -245,20 +187,18 @@ class RotationSpace(UnitVectorSpace):
     ) -> None:
         self.form = as_choice(form, (*FORMS, *EULER), "form")
         self.period, self.angle_unit = whole_turn(unit), unit
-        symmetry = self.crystal if symmetry is None else symmetry
-        self.symmetry = as_choice(symmetry, CRYSTALS, "symmetry")
+        self.symmetry = as_choice(symmetry or self.crystal, CRYSTALS, "symmetry")
         self.columns = FORMS.get(form, ("angle1", "angle2", "angle3"))
-        turns = Rotation.create_group(cast(Any, symmetry))
-        # from the right: the rows of a product are those of the unit quaternions
+        # products from the right are linear: their columns are those with the four units
+        turns = Rotation.create_group(cast(Any, self.symmetry))
         products = [(Rotation.from_quat(np.eye(4)) * turn).as_quat().T for turn in turns]
-        own = np.stack([sign * product for sign in (1, -1) for product in products])
-        super().__init__(own[np.argsort(-np.trace(own, axis1=1, axis2=2), kind="stable")])
+        both = np.stack([sign * product for sign in (1, -1) for product in products])
+        super().__init__(both[np.argsort(-np.trace(both, axis1=1, axis2=2), kind="stable")])
 
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
         del seed
-        known = {3: cls.of_three, 9: "matrix"}
-        return cls(form=known.get(data.shape[1], "quaternion"), unit=unit)
+        return cls(form={3: cls.of_three, 9: "matrix"}.get(data.shape[1], "quaternion"), unit=unit)
 
     @property
     def widths(self) -> tuple[int, ...]:
@@ -268,25 +208,18 @@ class RotationSpace(UnitVectorSpace):
         table = checked_table(data, self.widths, "rotations")
         if table.shape[1] == 4:
             return torch.tensor(to_unit(table))
-        if table.shape[1] == 9:
-            matrices = table.reshape(-1, 3, 3)
-            off = abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
-            refuse_rows(
-                (off > 2 * UNIT_TOLERANCE) | (np.linalg.det(matrices) < 0),
-                lambda row: f"{table[row].round(4).tolist()} is no rotation matrix, row by row",
-            )
-            return torch.tensor(Rotation.from_matrix(matrices).as_quat())
+        rotations = _from_matrices(table) if table.shape[1] == 9 else self._from_angles(table)
+        return torch.tensor(rotations.as_quat())
+
+    def _from_angles(self, table: Array) -> Rotation:
         angles, euler = table * (2 * math.pi / self.period), self.form in EULER
-        largest = abs(angles).max(axis=1) if euler else np.linalg.norm(angles, axis=1)
         refuse_rows(
-            largest > 2 * math.pi + 1e-9,
+            (abs(angles).max(axis=1) if euler else np.linalg.norm(angles, axis=1)) > 6.2832,
             lambda row: (
-                f"the angles {table[row].tolist()} are more than a turn in {self.angle_unit}: are they "
-                "in another unit?"
+                f"{table[row].tolist()} is more than a turn in {self.angle_unit}: change the unit"
             ),
         )
-        found = Rotation.from_euler(self.form, angles) if euler else Rotation.from_rotvec(angles)
-        return torch.tensor(found.as_quat())
+        return Rotation.from_euler(self.form, angles) if euler else Rotation.from_rotvec(angles)
 
     def from_chart(self, points: Tensor) -> Array:
         found = Rotation.from_quat(super().from_chart(points).reshape(-1, 4))
@@ -303,52 +236,33 @@ class RotationSpace(UnitVectorSpace):
     def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
         """Return gradients (N, 4) at unit quaternions, tangent to their sphere."""
         if np.shape(data)[1] != 4:
-            raise OrbiflowError(
-                "gradients of rotations are found for unit quaternions x, y, z, w: convert the rows"
-            )
+            raise OrbiflowError("gradients of rotations need unit quaternions: convert the rows")
         return super().data_gradient(data, points, gradient)
+
+    def step_angle(self, step: float) -> float:
+        return 2 * math.pi * step / self.period
 
     def settings(self) -> dict[str, Any]:
         return {"form": self.form, "unit": self.angle_unit, "symmetry": self.symmetry}
 
 
-class CubicOrientations(RotationSpace):
-    """Orientations of cubic crystals: a `RotationSpace` with symmetry "O".
+def _from_matrices(table: Array) -> Rotation:
+    matrices = table.reshape(-1, 3, 3)
+    off = abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
+    refuse_rows(
+        (off > 2 * UNIT_TOLERANCE) | (np.linalg.det(matrices) < 0),
+        lambda row: f"{table[row].round(4).tolist()} is no rotation matrix, row by row",
+    )
+    return Rotation.from_matrix(matrices)
 
-    Three columns of data are Bunge's Euler angles phi1, Phi, phi2.
-    """
+
+class CubicOrientations(RotationSpace):
+    """Orientations of cubic crystals ("O"); three columns are Bunge's Euler angles phi1, Phi, phi2."""
 
     name, crystal, of_three = "cubic-orientations", "O", "ZXZ"
 
 
 class HexagonalOrientations(RotationSpace):
-    """Orientations of hexagonal crystals: a `RotationSpace` with symmetry "D6".
-
-    Three columns of data are Bunge's Euler angles phi1, Phi, phi2.
-    """
+    """Orientations of hexagonal crystals ("D6"), otherwise as of cubic ones."""
 
     name, crystal, of_three = "hexagonal-orientations", "D6", "ZXZ"
-
-
-def finite_group(generators: Array) -> Array:
-    """Return all products (E, k, k) of orthogonal matrices (n, k, k), the identity first.
-
-    >>> len(finite_group(np.array([[[0.0, -1.0], [1.0, 0.0]]])))
-    4
-    """
-    count, size, _ = generators.shape
-    if count > MOST_GENERATORS:
-        raise OrbiflowError(f"a group has {MOST_GENERATORS} generators at most, got {count}")
-    if not np.allclose(generators @ generators.transpose(0, 2, 1), np.eye(size), atol=1e-9):
-        raise OrbiflowError(f"symmetry must be orthogonal ({size}, {size}) matrices")
-    found = [np.eye(size)]
-    for element in found:  # which grows
-        for product in generators @ element:
-            if abs(np.stack(found) - product).max(axis=(1, 2)).min() > SAME_MATRIX:
-                found.append(product)
-        if len(found) > MOST_ELEMENTS:
-            raise OrbiflowError(
-                f"symmetry generates more than {MOST_ELEMENTS} isometries: give matrices of a finite "
-                "group"
-            )
-    return np.stack(found)

@@ -24,10 +24,6 @@ SpaceName = Literal[
     "hypersphere", "projective-space",
     "rotation-space", "cubic-orientations", "hexagonal-orientations",
 ]  # fmt: skip
-ROTATIONS = ("rotation-space", "cubic-orientations", "hexagonal-orientations")
-ANGULAR = ("torus", "klein-bottle", *ROTATIONS)
-"""Spaces whose data are angles, or may be: three columns of rotations."""
-
 Unit = Literal["radians", "degrees", "turns"]
 
 
@@ -50,16 +46,19 @@ class SpaceSettings(Settings, group="Density"):
         return 2 if self.space == "klein-bottle" else None
 
 
+def is_angular(space: str, columns: int) -> bool:
+    """Return whether data of so many columns are angles, which have a unit."""
+    rotations = ("rotation-space", "cubic-orientations", "hexagonal-orientations")
+    return space in ("torus", "klein-bottle") or (space in rotations and columns == 3)
+
+
 def check_unit(space: str, unit: Unit | None) -> None:
     """Refuse a unit of data that are not angles."""
-    if space in ("sphere", "projective-plane") and unit in ("radians", "turns"):
+    vectors = ("sphere", "projective-plane", "hypersphere", "projective-space")
+    if space in vectors and unit in ("radians", "turns"):
         raise SettingError(
             f"{{unit}} {unit} applies only to angles on the torus and the Klein bottle: latitude and "
             "longitude are degrees; convert them, or give unit vectors x,y,z"
-        )
-    if space in ("hypersphere", "projective-space") and unit is not None:
-        raise SettingError(
-            f"{{unit}} {unit} applies only to angles: rows of the {space} are unit vectors"
         )
 
 
