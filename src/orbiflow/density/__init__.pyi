@@ -102,6 +102,12 @@ from .spaces.space import SPACES as SPACES
 from .spaces.space import Space as Space
 from .spaces.space import make_space as make_space
 from .spaces.space import space_class as space_class
+from .spaces.unit_vectors import CubicOrientations as CubicOrientations
+from .spaces.unit_vectors import HexagonalOrientations as HexagonalOrientations
+from .spaces.unit_vectors import Hypersphere as Hypersphere
+from .spaces.unit_vectors import ProjectiveSpace as ProjectiveSpace
+from .spaces.unit_vectors import RotationSpace as RotationSpace
+from .spaces.unit_vectors import UnitVectorSpace as UnitVectorSpace
 from .summaries import AngleSummary as AngleSummary
 from .summaries import AxisSummary as AxisSummary
 from .summaries import Correlation as Correlation
