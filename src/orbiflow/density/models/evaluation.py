@@ -64,8 +64,10 @@ def log_density_gradient(density: Density, data: ArrayLike) -> tuple[Array, Arra
 def midpoints(space: Space, resolution: int) -> Tensor:
     """Return the midpoints (resolution^2, 2) of a grid on the canonical square, float64."""
     as_whole(resolution, "resolution", 1, 10**6)
-    if space.dim != 2:
-        raise OrbiflowError(f"a grid needs two dimensions, this {space.name} has {space.dim}")
+    if not space.is_planar:
+        raise OrbiflowError(
+            f"a grid needs two dimensions, this {space.name} has {space.dimensions}"
+        )
     t = (torch.arange(resolution, dtype=torch.float64) + 0.5) / resolution
     return torch.stack(torch.meshgrid(t, t, indexing="ij"), dim=-1).reshape(-1, 2)
 
@@ -117,8 +119,10 @@ class TabulatedDensity:
     @one_thread()
     def __init__(self, density: Density, resolution: int = 512) -> None:
         space = as_instance(density, Density, "density").space
-        if space.dim != 2:
-            raise OrbiflowError(f"a table needs two dimensions, this {space.name} has {space.dim}")
+        if not space.is_planar:
+            raise OrbiflowError(
+                f"a table needs two dimensions, this {space.name} has {space.dimensions}"
+            )
         as_whole(resolution, "resolution", 8, 4096)
         self.space, self.resolution = space, resolution
         self._narrow: AdaptiveKernels | None = None

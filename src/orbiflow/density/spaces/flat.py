@@ -42,6 +42,9 @@ class _AngleSpace(Space):
     def to_chart(self, data: ArrayLike) -> Tensor:
         return self.project(self.cover(data))
 
+    def step_angle(self, step: float) -> float:
+        return 2 * math.pi * step / self.period
+
     def settings(self) -> dict[str, Any]:
         return {"unit": self.unit}
 

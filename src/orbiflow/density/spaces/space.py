@@ -39,13 +39,15 @@ class Space(ABC):
     """An identification space: the unit cube modulo a crystallographic group (design point 12).
 
     Points in the chart are float tensors (..., d); `project` brings them to the canonical cube
-    [0, 1)^d. Data are arrays (N, k) in the user's units.
+    [0, 1)^d. Data are arrays (N, k) in the user's units. Spheres of any dimension have no such chart
+    (`UnitVectorSpace`): their chart points are unit vectors.
 
     - `name`: Its name, such as "klein-bottle".
     - `group`: The group that acts on R^d, under which densities are invariant.
     - `columns`: Names of the data's columns.
     - `unit`: Unit of angles, None if the natural measure is in steradians.
     - `is_round`: Whether the natural measure is the area of the unit sphere.
+    - `has_chart`: Whether chart points are those of the unit cube, not unit vectors.
 
     Spaces of the same class, settings and group are equal.
     """
@@ -55,6 +57,7 @@ class Space(ABC):
     columns: tuple[str, ...]
     unit: str | None = None
     is_round: ClassVar[bool] = False
+    has_chart: ClassVar[bool] = True
 
     @classmethod
     @abstractmethod
@@ -67,9 +70,31 @@ class Space(ABC):
         return self.group.dim
 
     @property
+    def chart_dim(self) -> int:
+        """The number of a chart point's coordinates."""
+        return self.dim
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether the chart is the square, on which densities are drawn and tabulated."""
+        return self.has_chart and self.dim == 2
+
+    @property
+    def dimensions(self) -> str:
+        """The dimension, as a message says it that asks for two."""
+        return str(self.dim) if self.has_chart else f"{self.dim} and no chart of the square"
+
+    @property
+    def widths(self) -> tuple[int, ...]:
+        """The numbers of columns that data may have."""
+        return (len(self.columns),)
+
+    @property
     def is_torus(self) -> bool:
         """Whether the group is that of the integer translations alone."""
-        return self.group.order == 1 and np.array_equal(self.group.lattice, np.eye(self.dim))
+        if not self.has_chart or self.group.order > 1:
+            return False
+        return np.array_equal(self.group.lattice, np.eye(self.dim))
 
     @cached_property
     def domain(self) -> DirichletDomain:
@@ -85,8 +110,10 @@ class Space(ABC):
 
     def _checked(self, points: Tensor) -> Tensor:
         points = as_tensor(points, "points")
-        if not points.dim() or points.shape[-1] != self.dim:
-            raise OrbiflowError(f"expected points (..., {self.dim}), got {tuple(points.shape)}")
+        if not points.dim() or points.shape[-1] != self.chart_dim:
+            raise OrbiflowError(
+                f"expected points (..., {self.chart_dim}), got {tuple(points.shape)}"
+            )
         return points
 
     def log_area(self, points: Tensor) -> Tensor:
@@ -120,6 +147,10 @@ class Space(ABC):
         `points` are `cover` of the data (N, k), and `gradient` (N, d) those in the chart there.
         """
 
+    def step_angle(self, step: float) -> float:
+        """Return, in radians of the kernels, a step in the unit of the data."""
+        return 2 * math.pi * step / self.volume ** (1 / self.dim)
+
     @abstractmethod
     def settings(self) -> dict[str, Any]:
         """Return the options that, with `name`, make the same space again, for JSON."""
@@ -149,14 +180,19 @@ class Space(ABC):
         square = (images**2).sum(dim=-1, keepdim=True) - 2 * dot
         return (square.amin(dim=0).mT + (start**2).sum(dim=-1, keepdim=True)).clamp_min(0.0)
 
-    def features(self, points: Tensor) -> Tensor:
+    def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
         """Return what kernels see of the E images of points (N, d), themselves first: (E, N, m).
 
-        They are cosines and sines of the lattice's angles, or unit vectors on round spaces. The
-        function is differentiable.
+        They are cosines and sines of the lattice's angles, or unit vectors on round spaces; `which`
+        chooses among the images. The function is differentiable.
         """
         angles = 2 * math.pi * self.group.images(points) / rectangle(self).to(points)
-        return torch.cat([angles.cos(), angles.sin()], dim=-1)
+        return torch.cat([angles.cos(), angles.sin()], dim=-1)[which]
+
+    def from_features(self, features: Tensor) -> Tensor:
+        """Return the canonical points (N, d) that have these features (N, m)."""
+        cos, sin = features.chunk(2, dim=-1)
+        return self.project(torch.atan2(sin, cos) / (2 * math.pi) * rectangle(self))
 
     def uniform(self, count: int, generator: torch.Generator) -> Tensor:
         """Draw chart points that are uniform in natural measure."""
@@ -169,7 +205,7 @@ class Space(ABC):
         return (
             type(other) is type(self)
             and other.settings() == self.settings()
-            and other.group == self.group
+            and (not self.has_chart or other.group == self.group)
         )
 
     def __hash__(self) -> int:
@@ -207,17 +243,22 @@ class Space(ABC):
 
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
-"""Names of the four spaces."""
+"""Names of the four spaces whose chart is the square, or the cube."""
 
 
 def space_class(name: str) -> type[Space]:
     """Return the class of a space, by its name."""
     from orbiflow.density import spaces  # whose classes import this file
 
-    if not is_a(name, str) or name not in SPACES:
-        raise OrbiflowError(f"unknown space {name!r}; the four are {', '.join(SPACES)}")
-    four = (spaces.Torus, spaces.Sphere, spaces.KleinBottle, spaces.ProjectivePlane)
-    return dict(zip(SPACES, four, strict=True))[name]
+    kinds = (
+        spaces.Torus, spaces.Sphere, spaces.KleinBottle, spaces.ProjectivePlane, spaces.Hypersphere,
+        spaces.ProjectiveSpace, spaces.RotationSpace, spaces.CubicOrientations,
+        spaces.HexagonalOrientations,
+    )  # fmt: skip
+    known: dict[str, type[Space]] = {kind.name: kind for kind in kinds}
+    if not is_a(name, str) or name not in known:
+        raise OrbiflowError(f"unknown space {name!r}; there are {', '.join(known)}")
+    return known[name]
 
 
 def make_space(name: str, **options: Any) -> Space:

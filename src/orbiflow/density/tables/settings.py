@@ -19,7 +19,11 @@ OTHER_FORMATS = frozenset((
 ))
 # fmt: on
 
-SpaceName = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
+SpaceName = Literal[
+    "torus", "sphere", "klein-bottle", "projective-plane",
+    "hypersphere", "projective-space",
+    "rotation-space", "cubic-orientations", "hexagonal-orientations",
+]  # fmt: skip
 Unit = Literal["radians", "degrees", "turns"]
 
 
@@ -30,7 +34,7 @@ class SpaceSettings(Settings, group="Density"):
     """Where the data live."""
 
     unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None
-    """Unit of angles on the torus and the Klein bottle."""
+    """Unit of angles on the torus and the Klein bottle, and of rotations in three columns."""
 
     def check(self) -> None:
         """Check that only angles have a unit."""
@@ -42,9 +46,16 @@ class SpaceSettings(Settings, group="Density"):
         return 2 if self.space == "klein-bottle" else None
 
 
+def is_angular(space: str, columns: int) -> bool:
+    """Return whether data of so many columns are angles, which have a unit."""
+    rotations = ("rotation-space", "cubic-orientations", "hexagonal-orientations")
+    return space in ("torus", "klein-bottle") or (space in rotations and columns == 3)
+
+
 def check_unit(space: str, unit: Unit | None) -> None:
     """Refuse a unit of data that are not angles."""
-    if space in ("sphere", "projective-plane") and unit in ("radians", "turns"):
+    vectors = ("sphere", "projective-plane", "hypersphere", "projective-space")
+    if space in vectors and unit in ("radians", "turns"):
         raise SettingError(
             f"{{unit}} {unit} applies only to angles on the torus and the Klein bottle: latitude and "
             "longitude are degrees; convert them, or give unit vectors x,y,z"
@@ -85,6 +96,14 @@ class RowSettings(TableSettings, group="Reading the table"):
             raise SettingError(
                 "{drop_missing} leaves out the rows that {missing} marginalise would use; give one"
             )
+
+
+class GroupedRowSettings(RowSettings, group="Reading the table"):
+    """Which columns and rows of a table are read, how much each counts, and which belong together."""
+
+    group: str | None = None
+    """Column that names what rows belong to (a protein, a station, an event): those of one are not
+    independent."""
 
 
 def check_table_name(out: Path) -> None:
