@@ -37,7 +37,7 @@ FULL = Extent()
 # A preview of a minute: every exhibit, with less work in each
 FAST = Extent(
     name="fast", frequencies=(0, 2, 5), affine=30, iterations=30, effort="fast", classes=("IH6",),
-    points=2_048, evaluations=24, grid=100, resolution=100,
+    points=16_384, evaluations=24, grid=100, resolution=100,
 )  # fmt: skip
 
 
