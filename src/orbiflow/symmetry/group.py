@@ -318,9 +318,9 @@ def _shortest_basis(lattice: Array, shifts: Array) -> Array:
     d, n = len(lattice), len(shifts)
     parts = np.round(n * np.linalg.solve(lattice, shifts.T).T).astype(np.int64)[:, None]
     nths = (parts + n * (np.indices((3,) * d).reshape(d, -1).T - 1)).reshape(-1, d)
-    lengths = np.round(np.linalg.norm(nths @ lattice.T, axis=1) / np.linalg.norm(lattice), 6)
+    lengths: Array = np.linalg.norm(nths @ lattice.T, axis=1) / np.linalg.norm(lattice)
     directions: dict[tuple[int, ...], Array] = {}  # the shortest of each; ties in a fixed order
-    for v in nths[np.lexsort((*-nths.T[::-1], lengths))]:
+    for v in nths[np.lexsort(np.vstack([-nths.T[::-1], lengths.round(6)]))]:
         key = tuple((v // max(1, np.gcd.reduce(v))).tolist())
         if key[::-1] > (0,) * d:  # of each pair +-v the one whose last component is positive
             directions.setdefault(key, v)
