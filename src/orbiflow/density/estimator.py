@@ -32,7 +32,7 @@ from orbiflow.density.fitting import (
     weighed,
 )
 from orbiflow.density.models import MOST_DIM, Density, log_density_gradient
-from orbiflow.density.spaces import Space, space_class
+from orbiflow.density.spaces import Space, space_for
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import check_names, fields_of
 
@@ -71,7 +71,8 @@ class DensityEstimator:
     Follows scikit-learn's conventions: works in a `GridSearchCV` and a `Pipeline`.
 
     Args:
-        space: "torus", "sphere", "klein-bottle", "projective-plane", or a `Space`.
+        space: "torus", "sphere", "klein-bottle", "projective-plane"; the name of a group, such as
+            "p4m", "hantzsche-wendt" or "P 21 21 21"; or a `Space`, such as `QuotientSpace(group)`.
         unit: The unit of angles on torus and Klein bottle: "radians", "degrees" or "turns".
         missing: "refuse" rows that lack an angle (NaN), or, on tori, "marginalise": fit kernels and
             mixtures to them, and score them, by the density of the angles that they have.
@@ -315,7 +316,7 @@ class DensityEstimator:
             return self.space
         if data.ndim != 2:
             raise OrbiflowError(f"expected data of shape (N, k), got {data.shape}")
-        return space_class(self.space).for_data(data, unit=self.unit, seed=self.settings().seed)
+        return space_for(self.space, data, unit=self.unit, seed=self.settings().seed)
 
     def _chart(self, data: np.ndarray) -> torch.Tensor:
         """Points of data (N, k); with missing angles where they may be."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -58,7 +57,7 @@ from orbiflow.density.fitting.rows import (
 )
 from orbiflow.density.fitting.settings import COMPONENTS, DensitySettings
 from orbiflow.density.models import MOST_DIM, Mixture
-from orbiflow.density.spaces import Space, Torus, whole_turn
+from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
 
 LEAST_FLOW_ROWS = 300
@@ -209,13 +208,7 @@ def _families(
 
 def _narrowest(space: Space, step: float | None) -> float:
     """Concentration of kernels of a deviation of one step of rounding."""
-    if step is None:
-        return NARROWEST
-    if space.is_round:
-        angle = math.radians(step) if space.settings()["form"] == "latlon" else step
-    else:
-        angle = 2 * math.pi * step / whole_turn(str(space.unit))
-    return min(NARROWEST, 1 / angle**2)
+    return NARROWEST if step is None else min(NARROWEST, 1 / space.step_angle(step) ** 2)
 
 
 def _wants_flow(space: Space, folds: Folds, settings: DensitySettings) -> bool:

@@ -16,7 +16,7 @@ from orbiflow.density.fitting.folds import places
 from orbiflow.density.fitting.likelihood import training
 from orbiflow.density.fitting.rows import Rows, is_whole
 from orbiflow.density.models import FAINT, AdaptiveKernels, kernel_rows
-from orbiflow.density.spaces import RoundSpace, Space, rectangle
+from orbiflow.density.spaces import RoundSpace, Space
 from orbiflow.typed_torch import linalg, special
 
 NEIGHBOURS = (2, 4, 8, 16)
@@ -220,4 +220,4 @@ def _points(space: Space, mean: Tensor) -> Tensor:
     if isinstance(space, RoundSpace):
         return space.vectors_to_chart(mean.numpy())
     cos, sin = mean.chunk(2, dim=1)
-    return space.project(torch.atan2(sin, cos) / (2 * math.pi) * rectangle(space))
+    return space.project(space.from_turns(torch.atan2(sin, cos) / (2 * math.pi)))

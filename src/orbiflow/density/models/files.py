@@ -30,9 +30,9 @@ the second no chains beside a flow; the third no network."""
 def density_to_bytes(density: Density, **extra: Any) -> bytes:
     """Return a density as bytes that `read_density` makes the same again.
 
-    Saved are densities whose class has a `kind`, on the four spaces as `make_space` makes them, and
-    flows of Fourier and spline fields on the space's own group; anything else is refused by the name of
-    the part. Parameters are written in float64. `extra` are further values for the reader, for JSON.
+    Saved are densities whose class has a `kind`, on spaces that `make_space` makes again, and flows of
+    Fourier and spline fields on the space's own group; anything else is refused by the name of the
+    part. Parameters are written in float64. `extra` are further values for the reader, for JSON.
     """
     header, tensors = density_parts(as_instance(density, Density, "density"), "density")
     space = _checked_space(density.space)
@@ -58,8 +58,8 @@ def _checked_space(space: Space) -> Space:
         or not is_same_group(again.group, space.group)
     ):
         raise OrbiflowError(
-            f"the space is a {type(space).__name__}, which `make_space` does not make: save densities "
-            "on the four spaces as they are"
+            f"the space is a {type(space).__name__}, which `make_space` does not make again: give the "
+            'class a name of its own, `name = "..."`, and settings that are its options'
         )
     return space
 

@@ -82,7 +82,7 @@ class RoundSpace(Space):
     """
 
     power: int
-    is_round = True
+    is_round = has_square = True
 
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
@@ -123,8 +123,11 @@ class RoundSpace(Space):
         """Return `unit_vectors` as a NumPy array, float64."""
         return self.unit_vectors(self._checked(points).detach().double().cpu()).numpy()
 
-    def features(self, points: Tensor) -> Tensor:
-        return self.unit_vectors(points)[None]
+    def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
+        return self.unit_vectors(points)[None][which]
+
+    def step_angle(self, step: float) -> float:
+        return math.radians(step) if self.form == "latlon" else step
 
     def to_chart(self, data: ArrayLike) -> Tensor:
         return self.vectors_to_chart(to_vectors(data))
@@ -198,9 +201,9 @@ class ProjectivePlane(RoundSpace):
     name = "projective-plane"
     power = 2
 
-    def features(self, points: Tensor) -> Tensor:
+    def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
         vectors = self.unit_vectors(points)
-        return torch.stack([vectors, -vectors])
+        return torch.stack([vectors, -vectors])[which]
 
     def _representatives(self, vectors: Array) -> Array:
         return np.where(vectors[:, 2:] < 0, -1.0, 1.0) * vectors
