@@ -33,5 +33,8 @@ from .manifolds import FLAT_MANIFOLDS as FLAT_MANIFOLDS
 from .manifolds import flat_manifold as flat_manifold
 from .manifolds import group_by_name as group_by_name
 from .manifolds import is_group_name as is_group_name
+from .space_groups import cif_text as cif_text
+from .space_groups import group_from_cif as group_from_cif
 from .space_groups import space_group as space_group
 from .triplets import group_from_operators as group_from_operators
+from .triplets import operators as operators

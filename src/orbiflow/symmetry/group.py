@@ -267,9 +267,10 @@ class CrystallographicGroup:
         if len(shifts) == 1:
             return self
         basis = checked_lattice(_shortest_basis(self.lattice, np.stack(shifts)))
-        _, first = np.unique(self.integral_parts, axis=0, return_index=True)
-        cosets = (_reduce_translation(basis, self.cosets[i]) for i in np.sort(first))
-        return CrystallographicGroup(basis, tuple(cosets), self.name)
+        one_each: dict[bytes, Isometry] = {}
+        for integral, coset in zip(self.integral_parts, self.cosets, strict=True):
+            one_each.setdefault(integral.tobytes(), _reduce_translation(basis, coset))
+        return CrystallographicGroup(basis, tuple(one_each.values()), self.name)
 
     def __repr__(self) -> str:
         label = f"{self.name}, " if self.name else ""
@@ -314,29 +315,21 @@ def _reduce_translation(basis: Array, element: Isometry) -> Isometry:
 
 
 def _shortest_basis(lattice: Array, shifts: Array) -> Array:
-    """Return the first d of the shortest vectors that are a basis of a lattice refined by `shifts`."""
-    d = len(lattice)
-    steps = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=d))) @ lattice.T
-    vectors = (shifts[:, None] + steps).reshape(-1, d)
-    fractional = np.round(vectors @ np.linalg.inv(lattice).T, 6) + 0.0
-    length = np.round(np.linalg.norm(vectors, axis=1) / np.abs(lattice).max(), 6)
+    """Return the first of the shortest vectors that are a basis of a lattice with n shifts in it."""
+    d, n = len(lattice), len(shifts)
+    parts = np.round(n * np.linalg.solve(lattice, shifts.T).T).astype(np.int64)[:, None]
+    cells = n * (np.indices((3,) * d).reshape(d, -1).T - 1)
     # of each pair +-v the one whose last component is positive; ties in a fixed order
-    order = sorted(range(len(vectors)), key=lambda i: (length[i], *-fractional[i]))
-    order = [i for i in order if tuple(fractional[i, ::-1]) > (0.0,) * d]
-    volume = abs(np.linalg.det(lattice)) / len(shifts)
-    for chosen in itertools.combinations(order, d):
-        basis = vectors[list(chosen)].T
-        if 0.5 < abs(np.linalg.det(basis)) / volume < 1.5:
-            return basis
-    raise AssertionError  # the given basis and a shift are among the vectors
+    nths = [v for v in map(tuple, (parts + cells).reshape(-1, d).tolist()) if v[::-1] > (0,) * d]
+    size = {v: round(float(np.linalg.norm(lattice @ v) / np.linalg.norm(lattice)), 6) for v in nths}
+    nths.sort(key=lambda v: (size[v], *(-x for x in v)))
+    bases = (np.array(rows).T for rows in itertools.combinations(nths, d))
+    shortest = next(m for m in bases if abs(round(np.linalg.det(m))) == n ** (d - 1))
+    return lattice @ shortest / n
 
 
 def generated(
-    lattice: ArrayLike,
-    isometries: Iterable[Isometry],
-    *,
-    name: str = "",
-    max_order: int = MAX_ORDER,
+    lattice: ArrayLike, isometries: Iterable[Isometry], name: str = "", max_order: int = MAX_ORDER
 ) -> CrystallographicGroup:
     """Return the group that `generate` makes of many isometries, most of which follow from others."""
     closed = CrystallographicGroup.generate(lattice, name=name)
@@ -373,8 +366,8 @@ def _finite_closure(
         integral = np.linalg.solve(basis, element.linear @ basis)
         same = known.setdefault(np.round(integral).astype(np.int64).tobytes(), [])
         fractional = np.linalg.solve(basis, element.translation)
-        offsets = [fractional - other for other in same]
-        if any(np.abs(o - np.round(o)).max() <= 10 * TOLERANCE for o in offsets):
+        offsets = fractional - np.reshape(same, (-1, len(basis)))
+        if (np.abs(offsets - np.round(offsets)).max(axis=1) <= 10 * TOLERANCE).any():
             continue
         if len(elements) >= max_order:
             return None

@@ -12,7 +12,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import GroupError
 from orbiflow.symmetry.cells import check_cell
 from orbiflow.symmetry.group import MAX_ORDER, CrystallographicGroup, checked_lattice, generated
-from orbiflow.symmetry.isometry import Isometry
+from orbiflow.symmetry.isometry import TOLERANCE, Isometry, translation
 
 Operator = tuple[Array, Array]
 """The matrix W (d, d) and the shift w (d,) of x' = W x + w."""
@@ -49,7 +49,7 @@ def group_from_operators(
     check_cell(basis, np.array([w for w, _ in parsed]).reshape(-1, *basis.shape), texts)
     inverse = np.linalg.inv(basis)
     isometries = [Isometry(basis @ w @ inverse, basis @ shift) for w, shift in parsed]
-    return generated(basis, isometries, name=name).primitive()
+    return generated(basis, isometries, name).primitive()
 
 
 def parse_operator(text: str, dim: int) -> Operator:
@@ -82,3 +82,41 @@ def _row(text: str, dim: int) -> list[float] | None:
             return None
         row[place] += Fraction(f"{sign}{number or 1}")
     return [float(entry) for entry in row]
+
+
+def operators(group: CrystallographicGroup, lattice: ArrayLike | None = None) -> list[str]:
+    """Return the operators of a group, one for each coset, in fractional coordinates of a lattice.
+
+    The lattice, basis vectors as columns (d, d), is by default the group's; with a coarser one, such as
+    a conventional cell, there are more. `group_from_operators` makes the group again of them.
+
+    Raises `GroupError` for a group of over 3 dimensions, or a lattice whose vectors are no translations
+    of the group or that it does not map to itself.
+
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> operators(wallpaper_group("pgg"))
+    ['x,y', '-x,-y', '-x+1/2,y+1/2', 'x+1/2,-y+1/2']
+    """
+    if group.dim > len(AXES):
+        raise GroupError(f"operators have at most {len(AXES)} parts, got {group.dim} dimensions")
+    coarse = group
+    if lattice is not None:
+        shifts = [translation(vector) for vector in group.lattice.T]
+        coarse = generated(lattice, [*shifts, *group.cosets])
+        if not np.isclose(coarse.cell_volume * group.order, group.cell_volume * coarse.order):
+            raise GroupError("the vectors of the lattice are no translations of the group")
+    shifts = coarse.translations @ coarse.inverse_lattice.T
+    tables = np.concatenate([coarse.integral_parts, shifts[:, :, None]], axis=2)
+    return [",".join(_part(row) for row in table) for table in tables.tolist()]
+
+
+def _part(row: list[float]) -> str:
+    """Return one part of an operator as text: "x-y+1/3"."""
+    terms = [
+        f"{x:+.0f}*{axis}" if abs(x) > 1 else f"{x:+.0f}"[0] + axis
+        for x, axis in zip(row[:-1], AXES, strict=False)
+        if x
+    ]
+    fraction = Fraction(row[-1]).limit_denominator(48)
+    shift = f"{row[-1]:+.12g}" if abs(fraction - row[-1]) > TOLERANCE else f"+{fraction}"
+    return "".join([*terms, shift if row[-1] > TOLERANCE or not terms else ""]).removeprefix("+")

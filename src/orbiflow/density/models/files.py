@@ -39,7 +39,7 @@ def density_to_bytes(density: Density, **extra: Any) -> bytes:
     document = {
         "format": FORMAT,
         "space": {"name": space.name, **space.settings()},
-        "group": group_header(space.group),
+        "group": group_header(space.group) if space.has_chart else None,
         "density": header,
         "extra": extra,
     }
@@ -55,7 +55,8 @@ def _checked_space(space: Space) -> Space:
     if (
         again is None
         or type(again) is not type(space)
-        or not is_same_group(again.group, space.group)
+        or again.settings() != space.settings()
+        or (space.has_chart and not is_same_group(again.group, space.group))
     ):
         raise OrbiflowError(
             f"the space is a {type(space).__name__}, which `make_space` does not make again: give the "
@@ -85,7 +86,7 @@ def _restored(header: dict[str, Any], tensors: dict[str, Tensor]) -> Density:
         import_module(f"orbiflow.density.models.{module}")
     options = dict(header["space"])
     space = make_space(str(options.pop("name")), **options)
-    if header["format"] != FORMATS_BEFORE[0]:
+    if header["format"] != FORMATS_BEFORE[0] and space.has_chart:
         check_group(header["group"], space.group)
     if header["format"] == FORMAT:
         return density_from(space, header["density"], tensors)

@@ -31,6 +31,14 @@ from orbiflow.typed_torch import linalg, special
 MOST_DIM = 3
 """The most dimensions of a flow of splines, whose grid would be too large beyond."""
 
+
+def flow_obstacle(space: Space) -> str | None:
+    """Return why no density on a space has a flow, in words, or None."""
+    if space.has_chart and space.dim <= MOST_DIM:
+        return None
+    return f"a flow has {MOST_DIM} dimensions at most, this {space.name} has {space.dimensions}"
+
+
 BLOCK = 65536
 """Points integrated at a time where no gradient is asked for: bounds the memory."""
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Self, cast
+from typing import Any, Self
 
 import numpy as np
 import torch
+from scipy.special import ive
 from torch import Tensor
 
 from orbiflow.arguments import as_tensor
@@ -15,7 +16,7 @@ from orbiflow.arrays import Array
 from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.near_sums import TOLERANCE, near_log_sum
 from orbiflow.density.models.terms import Terms, log_sum_exp, shares_of
-from orbiflow.density.spaces import RoundSpace, Space, Torus, rectangle
+from orbiflow.density.spaces import Space, Torus, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import special
 
@@ -30,8 +31,8 @@ class AdaptiveKernels(Density, kind="kernels"):
     """A mixture of kernels made invariant under the space's group.
 
     Products of von Mises kernels in the coordinates of the space's frame on flat spaces, summed over
-    images under the group; von Mises-Fisher kernels on sphere and projective plane, there summed over
-    both ends of the axis.
+    images under the group; von Mises-Fisher kernels on spheres of any dimension and their quotients,
+    there summed over the images of a unit vector, such as both ends of an axis.
 
     Args:
         space: Any space.
@@ -51,7 +52,7 @@ class AdaptiveKernels(Density, kind="kernels"):
         width = 1 if space.is_round else space.dim
         shapes = [tuple(t.shape) for t in (centers, concentrations, weights)]
         count = len(centers) if centers.dim() else 0
-        if shapes != [(count, space.dim), (count, width), (count,)] or not count:
+        if shapes != [(count, space.chart_dim), (count, width), (count,)] or not count:
             raise OrbiflowError(f"kernels of shapes {shapes} do not fit a {space.name}")
         if not (
             bool(torch.isfinite(centers).all())
@@ -64,7 +65,7 @@ class AdaptiveKernels(Density, kind="kernels"):
         self.centers, self.concentrations, self.weights = (
             t.double() for t in (centers, concentrations, weights)
         )
-        images = space.features(self.centers, slice(space.frame.own))
+        images = space.features(self.centers, space.own_images)
         self._center_features = images[0]
         self._terms = _terms(space, images, self.concentrations, self.weights)
 
@@ -84,9 +85,9 @@ class AdaptiveKernels(Density, kind="kernels"):
         `tolerance` is the share of the sum of both that far kernels that are left out may add, at most,
         and by which smooth ones that are interpolated may be off.
         """
-        flat = points.reshape(-1, self.space.dim).double()
+        flat = points.reshape(-1, self.space.chart_dim).double()
         # images that turn the axes are of points, all others of kernels
-        images = self.space.features(flat, slice(None, None, self.space.frame.own))
+        images = self.space.features(flat, self.space.turned_images)
         features = images.flatten(0, 1).mT
         if features.device.type == "cpu":
             values = near_log_sum(self._terms, features.contiguous(), beside, tolerance)
@@ -117,7 +118,7 @@ class AdaptiveKernels(Density, kind="kernels"):
         if self.space.is_round:
             centers = self._center_features.cpu().numpy()[chosen]
             vectors = _von_mises_fisher(centers, kappa[:, 0], rng)
-            return cast(RoundSpace, self.space).vectors_to_chart(vectors)
+            return self.space.from_features(torch.tensor(vectors))
         angle = torch.tensor(rng.vonmises(0.0, kappa))
         return self.space.project(
             self.centers.cpu()[chosen] + self.space.from_turns(angle / (2 * math.pi))
@@ -179,7 +180,7 @@ def _terms(space: Space, images: Tensor, kappa: Tensor, weights: Tensor) -> Term
     """Return kernels about all images (E, N, m) of their centers: then points need no images."""
     if space.is_round:
         every = kappa.mT.repeat(1, len(images))
-        peaks = _round_peaks(kappa[:, 0])
+        peaks = _round_peaks(kappa[:, 0], space.dim)
     else:
         # these images permute and flip the axes of the frame
         own, frame = space.frame.own, space.frame.group
@@ -191,8 +192,12 @@ def _terms(space: Space, images: Tensor, kappa: Tensor, weights: Tensor) -> Term
     return Terms(centers, every, (peaks + weights.log()).repeat(len(images)))
 
 
-def _round_peaks(kappa: Tensor) -> Tensor:
-    """Return logarithms of the largest values of von Mises-Fisher kernels, per round area."""
+def _round_peaks(kappa: Tensor, dim: int) -> Tensor:
+    """Return logarithms of the largest values of von Mises-Fisher kernels on S^dim, per its area."""
+    if dim != 2:
+        order = (dim - 1) / 2
+        scaled = as_tensor(ive(order, kappa.cpu().numpy()), "ive").to(kappa)
+        return order * kappa.log() - (order + 1) * math.log(2 * math.pi) - scaled.log()
     return (kappa / (2 * math.pi)).log() - (-torch.expm1(-2 * kappa)).log()
 
 
@@ -203,17 +208,36 @@ def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, T
     """
     if space.is_round:
         k = kappa[:, 0]
-        return kappa * centers, _round_peaks(k) - k
+        return kappa * centers, _round_peaks(k, space.dim) - k
     scaled = special.i0e(kappa) * rectangle(space).to(kappa)
     return torch.cat([kappa, kappa], dim=1) * centers, -(scaled.log() + kappa).sum(dim=1)
 
 
 def _von_mises_fisher(centers: Array, kappa: Array, rng: np.random.Generator) -> Array:
-    """Return one draw (N, 3) about each of `centers` (Wood, 1994; closed form on the sphere)."""
-    u = rng.uniform(size=len(centers))
-    height = 1 + np.log(u + (1 - u) * np.exp(-2 * kappa)) / kappa
+    """Return one draw (N, m) about each of `centers` (Wood, Simulation of the von Mises Fisher
+    distribution, 1994; closed form on the sphere)."""
+    if centers.shape[1] == 3:
+        u = rng.uniform(size=len(centers))
+        height = 1 + np.log(u + (1 - u) * np.exp(-2 * kappa)) / kappa
+    else:
+        height = 1 - _wood(kappa, centers.shape[1] - 1, rng)
     across = rng.normal(size=centers.shape)
     across -= (across * centers).sum(axis=1, keepdims=True) * centers
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     vectors = height[:, None] * centers + np.sqrt(np.clip(1 - height**2, 0, 1))[:, None] * across
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def _wood(kappa: Array, dim: int, rng: np.random.Generator) -> Array:
+    """Return 1 - cos (N,) of the angle between draws on S^dim and their centers, by rejection."""
+    slope = dim / (2 * kappa + np.sqrt(4 * kappa**2 + dim**2))
+    best = (1 - slope) / (1 + slope)
+    most = kappa * best + dim * np.log1p(-(best**2))
+    found, left = np.zeros_like(kappa), np.arange(len(kappa))
+    while len(left):
+        z, b = rng.beta(dim / 2, dim / 2, size=len(left)), slope[left]
+        below = 2 * b * z / (1 - (1 - b) * z)
+        odds = kappa[left] * (1 - below) + dim * np.log1p(-best[left] * (1 - below)) - most[left]
+        found[left] = below
+        left = left[odds < np.log(rng.uniform(size=len(left)))]
+    return found

@@ -23,3 +23,9 @@ from .space import rectangle as rectangle
 from .space import row_count as row_count
 from .space import space_class as space_class
 from .space import space_for as space_for
+from .unit_vectors import CubicOrientations as CubicOrientations
+from .unit_vectors import HexagonalOrientations as HexagonalOrientations
+from .unit_vectors import Hypersphere as Hypersphere
+from .unit_vectors import ProjectiveSpace as ProjectiveSpace
+from .unit_vectors import RotationSpace as RotationSpace
+from .unit_vectors import UnitVectorSpace as UnitVectorSpace

@@ -22,7 +22,11 @@ OTHER_FORMATS = frozenset((
 ))
 # fmt: on
 
-SpaceName = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
+SpaceName = Literal[
+    "torus", "sphere", "klein-bottle", "projective-plane",
+    "hypersphere", "projective-space",
+    "rotation-space", "cubic-orientations", "hexagonal-orientations",
+]  # fmt: skip
 SPACES: tuple[str, ...] = get_args(SpaceName)
 Unit = Literal["radians", "degrees", "turns"]
 
@@ -31,9 +35,10 @@ class SpaceSettings(Settings, group="Density"):
     """Where the data live."""
 
     space: str
-    """Where the data live: torus, sphere, klein-bottle or projective-plane; or a group whose quotient
-    it is: a plane group such as p4m, a flat manifold such as hantzsche-wendt, or a space group such as
-    "P 21 21 21"."""
+    """Where the data live: torus, sphere, klein-bottle, projective-plane, hypersphere,
+    projective-space, rotation-space, cubic-orientations or hexagonal-orientations; or a group whose
+    quotient it is: a plane group such as p4m, a flat manifold such as hantzsche-wendt, or a space group
+    such as "P 21 21 21"."""
 
     cell: Annotated[
         tuple[float, ...] | None, DefaultText("lengths about 1 that suit the group")
@@ -42,7 +47,7 @@ class SpaceSettings(Settings, group="Density"):
     a,b,gamma. Right angles may be left out."""
 
     unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None
-    """Unit of angles on the torus and the Klein bottle."""
+    """Unit of angles on the torus and the Klein bottle, and of rotations in three columns."""
 
     def check(self) -> None:
         """Check that there is such a space, and that only angles have a unit."""
@@ -71,6 +76,12 @@ def group_of(space: str, cell: tuple[float, ...] | None) -> CrystallographicGrou
     return group_by_name(space, cell)
 
 
+def is_angular(space: str, columns: int) -> bool:
+    """Return whether data of so many columns are angles, which have a unit."""
+    rotations = ("rotation-space", "cubic-orientations", "hexagonal-orientations")
+    return space in ("torus", "klein-bottle") or (space in rotations and columns == 3)
+
+
 def check_unit(space: str, unit: Unit | None) -> None:
     """Refuse a unit of data that are not angles."""
     if unit is not None and space not in SPACES:
@@ -78,7 +89,8 @@ def check_unit(space: str, unit: Unit | None) -> None:
             "{unit} applies only to angles: points of a quotient are in the unit of its cell; leave it "
             "out"
         )
-    if space in ("sphere", "projective-plane") and unit in ("radians", "turns"):
+    vectors = ("sphere", "projective-plane", "hypersphere", "projective-space")
+    if space in vectors and unit in ("radians", "turns"):
         raise SettingError(
             f"{{unit}} {unit} applies only to angles on the torus and the Klein bottle: latitude and "
             "longitude are degrees; convert them, or give unit vectors x,y,z"
@@ -119,6 +131,14 @@ class RowSettings(TableSettings, group="Reading the table"):
             raise SettingError(
                 "{drop_missing} leaves out the rows that {missing} marginalise would use; give one"
             )
+
+
+class GroupedRowSettings(RowSettings, group="Reading the table"):
+    """Which columns and rows of a table are read, how much each counts, and which belong together."""
+
+    group: str | None = None
+    """Column that names what rows belong to (a protein, a station, an event): those of one are not
+    independent."""
 
 
 def check_table_name(out: Path) -> None:
