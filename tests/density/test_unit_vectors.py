@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any, cast
 
 import mpmath
 import numpy as np
@@ -257,7 +258,7 @@ def test_hostile_files_are_refused(
 def test_forms_of_rotations_agree_and_symmetry_acts_from_the_right(
     seed: int, symmetry: str
 ) -> None:
-    turns, group = Rotation.random(20, random_state=seed), Rotation.create_group(symmetry)
+    turns, group = Rotation.random(20, random_state=seed), Rotation.create_group(cast(Any, symmetry))
     spaces = {
         form: RotationSpace(form=form, unit="degrees", symmetry=symmetry)
         for form in ("quaternion", "vector", "matrix", "ZXZ", "xyz")
