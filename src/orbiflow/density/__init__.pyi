@@ -70,6 +70,7 @@ from .pictures.plots import THUMBNAIL as THUMBNAIL
 from .pictures.plots import Plotted as Plotted
 from .pictures.plots import is_one_file as is_one_file
 from .pictures.plots import plot_density as plot_density
+from .pictures.roses import rose_picture as rose_picture
 from .pictures.settings import PlotSettings as PlotSettings
 from .pictures.square import edge_pairs as edge_pairs
 from .pictures.surfaces import density_page as density_page
@@ -107,6 +108,13 @@ from .spaces.unit_vectors import Hypersphere as Hypersphere
 from .spaces.unit_vectors import ProjectiveSpace as ProjectiveSpace
 from .spaces.unit_vectors import RotationSpace as RotationSpace
 from .spaces.unit_vectors import UnitVectorSpace as UnitVectorSpace
+from .summaries import AngleSummary as AngleSummary
+from .summaries import AxisSummary as AxisSummary
+from .summaries import Correlation as Correlation
+from .summaries import DirectionSummary as DirectionSummary
+from .summaries import summarize_angles as summarize_angles
+from .summaries import summarize_axes as summarize_axes
+from .summaries import summarize_directions as summarize_directions
 from .tables.files import append_columns as append_columns
 from .tables.files import column_names as column_names
 from .tables.files import is_identifier as is_identifier

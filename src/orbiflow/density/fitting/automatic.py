@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import torch
@@ -12,15 +14,19 @@ from torch import Tensor
 from orbiflow.arguments import as_instance
 from orbiflow.density.fitting.evidence import (
     Candidates,
+    Course,
+    FittedFlow,
     TriedFlow,
     assembled,
     candidates_of,
+    flow_beside,
     flow_settings,
     judged,
     stacked,
     supported_weights,
     try_flow,
     without_idle,
+    work_of,
 )
 from orbiflow.density.fitting.families import (
     ChainFamily,
@@ -59,6 +65,7 @@ from orbiflow.density.fitting.settings import COMPONENTS, DensitySettings
 from orbiflow.density.models import MOST_DIM, Mixture, flow_obstacle
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import SideBySide
 
 LEAST_FLOW_ROWS = 300
 """With fewer, a flow is not tried: none has gained anything."""
@@ -69,8 +76,11 @@ MEMBERS = 12
 SCORED = 2_000
 """Rows over which the report's mean log density is taken: each costs all kernels."""
 
-BEFORE_FLOW, BEFORE_END = 0.7, 0.95
-"""Of the work told: before a flow, if one is tried, and before all is put together."""
+FLOW_WORK = 4.0
+"""Work of fits of a flow, in that of a family in a fold after the first."""
+
+BEFORE_END = 0.95
+"""Of the work told, before all is put together."""
 
 
 @training()
@@ -113,21 +123,17 @@ def fit_automatic(
     folds = folds_of(rows, together=settings.repeats == "rounding", generator=generator)
     families = _families(space, folds, settings, found)
     flows = _wants_flow(space, folds, settings)
-    before = BEFORE_FLOW if flows else BEFORE_END
-    candidates = candidates_of(
-        space, families, folds, lambda done, what: say(before * done, what), budget
-    )
-    weights = supported_weights(candidates.table, candidates.floor, candidates.row_weights)
-    if space.dim > MOST_DIM:  # each part makes integrals dearer
-        weights = without_idle(candidates, weights)
-    tried = TriedFlow()
-    if flows and not budget.is_spent:
-        tried = try_flow(
-            space, folds, candidates, weights,
-            flow_settings(space, len(folds.rows), settings.seed).replace(**settings.of_flow),
-            budget,
-            lambda done, what: say(BEFORE_FLOW + (BEFORE_END - BEFORE_FLOW) * done, what),
-        )  # fmt: skip
+    total = work_of(len(families), folds.used) + FLOW_WORK * flows
+    course = Course(lambda done, what: say(BEFORE_END * done, what), total)
+    with SideBySide() as beside:
+        fitted = _flow_fits(space, folds, settings, budget, course, beside) if flows else None
+        candidates = candidates_of(space, families, folds, course, budget, beside)
+        weights = supported_weights(candidates.table, candidates.floor, candidates.row_weights)
+        if space.dim > MOST_DIM:  # each part makes integrals dearer
+            weights = without_idle(candidates, weights)
+        tried = TriedFlow()
+        if fitted is not None:
+            tried = try_flow(folds, candidates, weights, fitted)
     say(BEFORE_END, "putting together")
     density = assembled(space, families, candidates, weights, folds.rows, tried.flow, tried.share)
     beside = 1 - tried.share
@@ -143,6 +149,25 @@ def fit_automatic(
         *steps_note(report.steps, report.integration_error),
     )
     return density, replace(report, notes=(*notes, *after))
+
+
+def _flow_fits(
+    space: Space,
+    folds: Folds,
+    settings: DensitySettings,
+    budget: Budget,
+    course: Course,
+    beside: SideBySide,
+) -> Callable[[int], FittedFlow | None]:
+    """Begin to fit a flow without the first tenth; return the fits without the first and the second."""
+    chosen = flow_settings(space, len(folds.rows), settings.seed).replace(**settings.of_flow)
+    tell = course.part(FLOW_WORK)
+
+    def begun(number: int) -> Callable[[], FittedFlow | None]:
+        return beside.begin(partial(flow_beside, space, folds, number, chosen, budget), tell)
+
+    first = begun(0)
+    return lambda number: begun(number)() if number else first()
 
 
 def _rows(

@@ -8,6 +8,7 @@ from .rows import TableRows as TableRows
 from .rows import angle_unit as angle_unit
 from .rows import check_order as check_order
 from .rows import read_rows as read_rows
+from .settings import GroupedRowSettings as GroupedRowSettings
 from .settings import RowSettings as RowSettings
 from .settings import SpaceName as SpaceName
 from .settings import SpaceSettings as SpaceSettings

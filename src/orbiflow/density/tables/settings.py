@@ -98,6 +98,14 @@ class RowSettings(TableSettings, group="Reading the table"):
             )
 
 
+class GroupedRowSettings(RowSettings, group="Reading the table"):
+    """Which columns and rows of a table are read, how much each counts, and which belong together."""
+
+    group: str | None = None
+    """Column that names what rows belong to (a protein, a station, an event): those of one are not
+    independent."""
+
+
 def check_table_name(out: Path) -> None:
     """Refuse a name for a table whose ending is that of another format."""
     if out.suffix.lower() in OTHER_FORMATS:
