@@ -91,6 +91,7 @@ from .spaces.flat import KleinBottle as KleinBottle
 from .spaces.flat import Torus as Torus
 from .spaces.patches import KleinCoordinates as KleinCoordinates
 from .spaces.patches import to_klein as to_klein
+from .spaces.quotient import QuotientSpace as QuotientSpace
 from .spaces.round import ProjectivePlane as ProjectivePlane
 from .spaces.round import RoundSpace as RoundSpace
 from .spaces.round import Sphere as Sphere

@@ -32,7 +32,7 @@ from orbiflow.density.fitting import (
     weighed,
 )
 from orbiflow.density.models import Density, flow_obstacle, log_density_gradient
-from orbiflow.density.spaces import Space, space_class
+from orbiflow.density.spaces import Space, space_for
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import check_names, fields_of
 
@@ -71,7 +71,8 @@ class DensityEstimator:
     Follows scikit-learn's conventions: works in a `GridSearchCV` and a `Pipeline`.
 
     Args:
-        space: A name that `make_space` takes, such as "torus" or "sphere", or a `Space`.
+        space: "torus", "sphere" and other names that `make_space` takes; the name of a group, such as
+            "p4m", "hantzsche-wendt" or "P 21 21 21"; or a `Space`, such as `QuotientSpace(group)`.
         unit: The unit of angles, and of rotations in three columns: "radians", "degrees" or "turns".
         missing: "refuse" rows that lack an angle (NaN), or, on tori, "marginalise": fit kernels and
             mixtures to them, and score them, by the density of the angles that they have.
@@ -316,7 +317,7 @@ class DensityEstimator:
             return self.space
         if data.ndim != 2:
             raise OrbiflowError(f"expected data of shape (N, k), got {data.shape}")
-        return space_class(self.space).for_data(data, unit=self.unit, seed=self.settings().seed)
+        return space_for(self.space, data, unit=self.unit, seed=self.settings().seed)
 
     def _chart(self, data: np.ndarray) -> torch.Tensor:
         """Points of data (N, k); with missing angles where they may be."""

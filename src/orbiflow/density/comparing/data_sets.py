@@ -18,7 +18,7 @@ from orbiflow.arrays import Array
 from orbiflow.density.comparing.resampling import Groups, TestResult, mmd_test, resampled_sums
 from orbiflow.density.comparing.settings import ComparisonSettings
 from orbiflow.density.fitting import DensitySettings, Progress, fit_automatic
-from orbiflow.density.spaces import Space, space_class
+from orbiflow.density.spaces import Space, space_for
 from orbiflow.errors import OrbiflowError
 
 T = TypeVar("T")
@@ -189,13 +189,12 @@ def _space_of(
     space: str, names: list[str], tables: list[np.ndarray], unit: str, seed: int
 ) -> Space:
     """Return the space that suits both data sets."""
-    kind = space_class(space)
     try:
-        return kind.for_data(np.concatenate(tables), unit=unit, seed=seed)
+        return space_for(space, np.concatenate(tables), unit=unit, seed=seed)
     except OrbiflowError:
         # the number of a row in both tables together would lead nowhere
         for name, table in zip(names, tables, strict=True):
-            _named(name, lambda own: kind.for_data(own, unit=unit, seed=seed), table)
+            _named(name, lambda own: space_for(space, own, unit=unit, seed=seed), table)
         raise
 
 

@@ -277,7 +277,7 @@ def _report(
     ]
     some = folds.rows[:SCORED]
     mass = None
-    if density.space.is_planar:
+    if density.space.dim == 2:
         mass = 1.0
         if flow and flow.mass is not None:
             mass = tried.share * flow.mass + 1 - tried.share

@@ -32,7 +32,7 @@ from orbiflow.density.fitting.settings import FlowSettings
 from orbiflow.density.models import FlowDensity, UniformDensity, flow_obstacle
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import InvariantField, SplineField
+from orbiflow.fields import FourierField, InvariantField, SplineField, has_even_grid
 from orbiflow.flows import Flow
 
 DTYPE = torch.float32
@@ -197,9 +197,11 @@ def _start(
 ) -> FlowDensity:
     """The closed-form start, by flow matching."""
     # the frequency index that reaches so many waves along a side of the square
-    frequency = round(settings.max_frequency * float(space.group.lattice.diagonal().max()))
+    longest = float(np.linalg.norm(space.group.lattice, axis=0).max())
+    frequency = round(settings.max_frequency * longest)
+    kind = SplineField if has_even_grid(space.group) else FourierField
     segments = [
-        SplineField(space.group, frequency, smoothness=SMOOTHNESS, dtype=DTYPE)
+        kind(space.group, frequency, smoothness=SMOOTHNESS, dtype=DTYPE)
         for _ in range(settings.segments)
     ]
     chosen = _matched(train, generator)

@@ -30,7 +30,7 @@ the second no chains beside a flow; the third no network."""
 def density_to_bytes(density: Density, **extra: Any) -> bytes:
     """Return a density as bytes that `read_density` makes the same again.
 
-    Saved are densities whose class has a `kind`, on the spaces that `make_space` makes, and flows of
+    Saved are densities whose class has a `kind`, on spaces that `make_space` makes again, and flows of
     Fourier and spline fields on the space's own group; anything else is refused by the name of the
     part. Parameters are written in float64. `extra` are further values for the reader, for JSON.
     """
@@ -59,8 +59,8 @@ def _checked_space(space: Space) -> Space:
         or (space.has_chart and not is_same_group(again.group, space.group))
     ):
         raise OrbiflowError(
-            f"the space is a {type(space).__name__}, which `make_space` does not make: save densities "
-            "on the spaces that it makes, as they are"
+            f"the space is a {type(space).__name__}, which `make_space` does not make again: give the "
+            'class a name of its own, `name = "..."`, and settings that are its options'
         )
     return space
 

@@ -30,12 +30,12 @@ BLOCK_ENTRIES = 250_000
 class AdaptiveKernels(Density, kind="kernels"):
     """A mixture of kernels made invariant under the space's group.
 
-    Products of von Mises kernels in the angles of the lattice on torus and Klein bottle, summed over
-    coset representatives; von Mises-Fisher kernels on spheres of any dimension and their quotients,
-    there summed over the images of a unit vector, such as both ends of an axis.
+    Products of von Mises kernels in the coordinates of the space's frame on flat spaces, summed over
+    images under the group; von Mises-Fisher kernels on spheres of any dimension and their quotients,
+    summed over the images of a unit vector, such as both ends of an axis.
 
     Args:
-        space: Any space; with a rectangular lattice if it is flat.
+        space: Any space.
         centers: The chart points (N, d) that the kernels are about.
         concentrations: Concentrations kappa > 0, (N, d) on flat spaces and (N, 1) on round ones.
         weights: Weights (N,) of sum 1.
@@ -65,7 +65,7 @@ class AdaptiveKernels(Density, kind="kernels"):
         self.centers, self.concentrations, self.weights = (
             t.double() for t in (centers, concentrations, weights)
         )
-        images = space.features(self.centers)
+        images = space.features(self.centers, slice(space.kernel_images))
         self._center_features = images[0]
         self._terms = _terms(space, images, self.concentrations, self.weights)
 
@@ -86,11 +86,15 @@ class AdaptiveKernels(Density, kind="kernels"):
         and by which smooth ones that are interpolated may be off.
         """
         flat = points.reshape(-1, self.space.chart_dim).double()
-        features = self.space.features(flat, slice(1))[0].mT
+        # images that turn the axes are of points, all others of kernels
+        images = self.space.features(flat, slice(None, None, self.space.kernel_images))
+        features = images.flatten(0, 1).mT
         if features.device.type == "cpu":
             values = near_log_sum(self._terms, features.contiguous(), beside, tolerance)
         else:
             values = self._terms.plain_log_sum(features)
+        if len(images) > 1:
+            values = values.reshape(len(images), -1).logsumexp(dim=0)
         return values.reshape(points.shape[:-1]).to(points.dtype)
 
     def parted(self, wide: Tensor) -> tuple[AdaptiveKernels | None, AdaptiveKernels | None, float]:
@@ -117,7 +121,7 @@ class AdaptiveKernels(Density, kind="kernels"):
             return self.space.from_features(torch.tensor(vectors))
         angle = torch.tensor(rng.vonmises(0.0, kappa))
         return self.space.project(
-            self.centers.cpu()[chosen] + angle / (2 * math.pi) * rectangle(self.space)
+            self.centers.cpu()[chosen] + self.space.from_turns(angle / (2 * math.pi))
         )
 
     @classmethod
@@ -178,8 +182,10 @@ def _terms(space: Space, images: Tensor, kappa: Tensor, weights: Tensor) -> Term
         every = kappa.mT.repeat(1, len(images))
         peaks = _round_peaks(kappa[:, 0], space.dim)
     else:
-        # the lattice's rectangle leaves signed permutations of the axes
-        turns = [torch.as_tensor(np.abs(g.linear)).to(kappa) for g in space.group.cosets]
+        # these images permute and flip the axes of the frame
+        own, frame = space.frame.own, space.frame.group
+        moved = np.abs(frame.inverse_lattice @ frame.linear_parts[:own] @ frame.lattice).round()
+        turns = torch.as_tensor(moved).to(kappa)
         every = torch.cat([turn @ kappa.mT for turn in turns], dim=1)
         peaks = -(special.i0e(kappa) * rectangle(space).to(kappa)).log().sum(dim=1)
     centers = images.flatten(0, 1).mT.contiguous()

@@ -88,7 +88,7 @@ class RoundSpace(Space):
     """
 
     power: int
-    is_round = True
+    is_round = has_square = True
 
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
