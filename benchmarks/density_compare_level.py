@@ -18,6 +18,7 @@ import numpy as np
 import torch
 
 from orbiflow.density import make_space, mmd_test
+from orbiflow.density.comparing import resampling
 from orbiflow.density.comparing.resampling import Groups
 
 LEVEL, SHIFT = 0.05, 0.6
@@ -80,6 +81,7 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="20 trials of each design")
     options = parser.parse_args()
     torch.set_num_threads(1)
+    resampling.PAIRS = 20_000  # enough for the widths of kernels on so few rows
     trials, bad = 20 if options.quick else options.trials, False
     print(f"{'groups x rows':28}{'test':8}{'cluster':>8}{'level':>18}{'power':>18}")
     for design in DESIGNS:
