@@ -69,19 +69,19 @@ class QuotientSpace(Space):
             raise OrbiflowError("a cell is for a group that is given by its name: leave it out")
         elif isinstance(group, Mapping):
             group = group_from_header(group, str(group.get("name", "")))
-        self.given = checked_group(group)
-        if self.given.dim > MAX_DIM:
+        self.data_group = checked_group(group)
+        if self.data_group.dim > MAX_DIM:
             raise OrbiflowError(
-                f"a quotient has {MAX_DIM} dimensions at most, not {self.given.dim}"
+                f"a quotient has {MAX_DIM} dimensions at most, not {self.data_group.dim}"
             )
-        size = (self.given.cell_volume / self.given.order) ** (1 / self.given.dim)
-        frame = frame_of(self.given)
+        size = (self.data_group.cell_volume / self.data_group.order) ** (1 / self.data_group.dim)
+        frame = frame_of(self.data_group)
         basis = frame.group.lattice
         turn = basis / np.linalg.norm(basis, axis=0) if frame.is_rectangular else np.eye(len(basis))
         self._to_chart = turn.T / size
         # on a rectangle whose axes the group keeps, fields can be splines
         keeps_axes = frame.own == frame.group.order
-        self.group = (frame.group if keeps_axes else self.given).conjugate(self._to_chart)
+        self.group = (frame.group if keeps_axes else self.data_group).conjugate(self._to_chart)
         self.columns = (
             COLUMNS[: self.dim] if self.dim <= 3 else tuple(f"x{k + 1}" for k in range(self.dim))
         )
@@ -98,7 +98,7 @@ class QuotientSpace(Space):
 
     @property
     def volume(self) -> float:
-        return self.given.cell_volume / self.given.order
+        return self.data_group.cell_volume / self.data_group.order
 
     def cover(self, data: ArrayLike) -> Tensor:
         what = f"points of {self.dim} coordinates"
@@ -116,7 +116,7 @@ class QuotientSpace(Space):
         return gradient.numpy() @ self._to_chart
 
     def settings(self) -> dict[str, Any]:
-        return {"group": {**group_header(self.given), "name": self.given.name}}
+        return {"group": {**group_header(self.data_group), "name": self.data_group.name}}
 
     def __repr__(self) -> str:
-        return f"QuotientSpace({self.given!r})"
+        return f"QuotientSpace({self.data_group!r})"
