@@ -330,7 +330,7 @@ def test_a_plane_orbifold_is_drawn_in_the_units_of_its_data(tmp_path: Path) -> N
     assert shapely.Polygon(ring).buffer(1e-9).contains(shapely.MultiPoint(dots))
     colouring = cell.colouring(density, PlotSettings())
     assert colouring.extent == pytest.approx((cell.low[0], cell.high[0], cell.low[1], cell.high[1]))
-    drawn = plot_density(density, tmp_path / "p31m", PlotSettings(width="single"))
+    drawn = plot_density(density, tmp_path / "p31m", PlotSettings(width=3.35))
     assert [path.name for path in drawn.files] == ["density.pdf"]
     assert density_thumbnail(density, np.zeros((0, 2))).startswith(b"\x89PNG")
     levels = DensityLevels(density, samples=1000)
