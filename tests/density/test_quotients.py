@@ -305,10 +305,7 @@ def test_what_is_refused() -> None:
         (lambda: QuotientSpace(wallpaper_group("p4"), cell=(1, 1)), "a cell is for a group"),
         (lambda: QuotientSpace({"lattice": [[1.0]]}), "numbers are missing or invalid"),
         (lambda: QuotientSpace("p4").to_chart([[1.0, 2.0, 3.0]]), "points of 2 coordinates"),
-        (
-            lambda: TabulatedDensity(UniformDensity(QuotientSpace("p4")), 16),
-            "no chart of the square",
-        ),
+        (lambda: TabulatedDensity(UniformDensity(QuotientSpace("p4")), 16), "square"),
         (lambda: make_space("quotient"), "group"),
         (lambda: DensityEstimator("quotient").fit(np.zeros((20, 2))), "needs its group"),
     ):
@@ -330,7 +327,7 @@ def test_a_plane_orbifold_is_drawn_in_the_units_of_its_data(tmp_path: Path) -> N
     assert shapely.Polygon(ring).buffer(1e-9).contains(shapely.MultiPoint(dots))
     colouring = cell.colouring(density, PlotSettings())
     assert colouring.extent == pytest.approx((cell.low[0], cell.high[0], cell.low[1], cell.high[1]))
-    drawn = plot_density(density, tmp_path / "p31m", PlotSettings(width=3.35))
+    drawn = plot_density(density, tmp_path / "p31m", PlotSettings(width=85.0))
     assert [path.name for path in drawn.files] == ["density.pdf"]
     assert density_thumbnail(density, np.zeros((0, 2))).startswith(b"\x89PNG")
     levels = DensityLevels(density, samples=1000)

@@ -56,8 +56,8 @@ def spreads(space: Space, centers: Tensor, neighbours: list[int]) -> list[Tensor
     return [square[:, :m].mean(dim=1) + 1e-12 for m in neighbours]
 
 
-MOST_CENTERS = 20_000
-"""The most kernels of an estimate."""
+MOST_CENTERS, MOST_IMAGES = 20_000, 40_000
+"""The most rows that have a kernel in an estimate, and the most kernels: one for each of its images."""
 
 LADDER = 27
 """Number of widths from `WIDEST` to `NARROWEST`; neighbours differ by a factor of 1.4."""
@@ -72,7 +72,7 @@ def kernel_estimates(
     the nearest neighbours, on tori axis by axis (Breiman, Meisel, Purcell, 1977); "repeated" are the
     narrowest kernels, about the places of several points alone, if `repeats` are real.
     """
-    rows = rows[:MOST_CENTERS]
+    rows = rows[: min(MOST_CENTERS, MOST_IMAGES // len(space.features(rows.points[:1])))]
     train, own = rows.points, torch.full((len(rows),), 1 / len(rows), dtype=torch.float64)
     if rows.weights is not None:
         own = rows.weights / rows.weights.sum()
