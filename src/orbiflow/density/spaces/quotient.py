@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 import torch
@@ -110,7 +110,7 @@ class QuotientSpace(Space):
 
     def from_chart(self, points: Tensor) -> Array:
         own: Array = self.project(points).detach().double().cpu().numpy()
-        data: Array = np.linalg.solve(self._to_chart, own.T)
+        data = cast(Array, np.linalg.solve(self._to_chart, own.T))
         return data.T
 
     def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
