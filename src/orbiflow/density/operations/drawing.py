@@ -97,6 +97,8 @@ def _where_pictures_are(out: Path, single: bool, space: Space) -> str:
             f"density, flow and surface are drawn in two dimensions, this {space.name} has "
             f"{space.dim}: {where} shows samples, angle by angle"
         )
+    if not space.is_planar:
+        return f"written to {out}"
     if single:
         return f"written {out}, a page for each figure; a folder gets the surface to turn, too"
     return f"written to {out}; open {out / 'surface.html'} in a browser"

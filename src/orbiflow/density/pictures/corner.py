@@ -57,7 +57,10 @@ def corner_picture(
     settings, space = settings or PlotSettings(), density.space
     sheet, most = sheet or settings.sheet, settings.samples or MAX_DOTS
     if not space.is_torus or space.dim > MAX_COLUMNS:
-        raise OrbiflowError(f"pairs are drawn of 1 to {MAX_COLUMNS} angles, not of {space!r}")
+        raise OrbiflowError(
+            f"pairs are drawn of 1 to {MAX_COLUMNS} angles on a torus, and other pictures in two "
+            f"dimensions; this {space.name} has {space.dim}: draw columns of `orbiflow density sample`"
+        )
     dim = space.dim
     panels = _Panels(sheet, frames.view_of(space, settings.names, settings.center))
     above = panels.view.places(samples)

@@ -98,6 +98,8 @@ def space_title(space: Space) -> str:
     >>> space_title(make_space("klein-bottle"))
     'Klein bottle'
     """
+    if space.data_group is not None and space.data_group.name:
+        return f"plane modulo {space.data_group.name}"
     return space.name.replace("-", " ").replace("klein", "Klein")
 
 

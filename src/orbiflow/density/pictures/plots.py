@@ -22,7 +22,6 @@ from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.overlays import region_lines
 from orbiflow.density.pictures.projections import PlateCarree, chosen_map
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.density.pictures.square import Square
 from orbiflow.density.pictures.surfaces import density_page
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import FORMATS, Picture, pdf_pages
@@ -98,7 +97,7 @@ def plot_density(
         told(k / (len(makers) + 1), f"drawing {name}.{form}")
         pictures[name] = make()
     captions = tuple(f"{own.title}. {own.caption}".strip() for own in pictures.values())
-    flowless = shown.space.dim == 2 and shown.density.flow_part is None
+    flowless = shown.space.is_planar and shown.density.flow_part is None
     notes = ("the flow has no part in this density, so that there is no picture of it",) * flowless
     if single:
         path = write_atomic(out, pdf_pages(list(pictures.values())))
@@ -107,7 +106,7 @@ def plot_density(
     if "flow.png" in files and not settings.sheet.printed:
         files["flow.png"] = figures.few_colours(files["flow.png"])
     contents: dict[str, str | bytes] = {**files}
-    if shown.space.dim == 2:
+    if shown.space.is_planar:
         told(0.75, f"drawing {PAGE}")
         lines = simplified(shown.coastlines, PAGE_POINTS)
         contents[PAGE] = density_page(
@@ -167,7 +166,7 @@ class _Shown:
         dots = self.points if settings.dots else None
         draw = partial(figures.density_picture, density, dots, settings, regions=self.regions)
         makers = {name: partial(draw, ground=ground) for name, ground in grounds.items()}
-        if density.flow_part is not None:
+        if density.flow_part is not None and self.space.has_square:
             makers["flow"] = partial(figures.flow_picture, density, settings)
         if data is not None or settings.samples is not None:
             draw = partial(figures.samples_picture, density, data, samples, settings)
@@ -176,7 +175,7 @@ class _Shown:
 
     def _grounds(self) -> dict[str, figures.Ground]:
         """Return what the density is drawn on, by the names of the figures."""
-        space, square = self.space, Square(self.space, self.settings)
+        space, square = self.space, figures.plane_ground(self.space, self.settings)
         if self.map is None:
             return {"density": square}
         grounds: dict[str, figures.Ground] = {"density": Map(space, self.map, self.coastlines)}
