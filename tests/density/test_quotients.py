@@ -298,7 +298,10 @@ def test_what_is_refused() -> None:
         (lambda: QuotientSpace(wallpaper_group("p4"), cell=(1, 1)), "a cell is for a group"),
         (lambda: QuotientSpace({"lattice": [[1.0]]}), "numbers are missing or invalid"),
         (lambda: QuotientSpace("p4").to_chart([[1.0, 2.0, 3.0]]), "points of 2 coordinates"),
-        (lambda: TabulatedDensity(UniformDensity(QuotientSpace("p4")), 16), "a canonical square"),
+        (
+            lambda: TabulatedDensity(UniformDensity(QuotientSpace("p4")), 16),
+            "no chart of the square",
+        ),
         (lambda: make_space("quotient"), "group"),
         (lambda: DensityEstimator("quotient").fit(np.zeros((20, 2))), "needs its group"),
     ):

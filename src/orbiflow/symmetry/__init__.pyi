@@ -8,6 +8,7 @@ from .cells import cell_parameters as cell_parameters
 from .elements import DirichletDomain as DirichletDomain
 from .elements import RotationCenter as RotationCenter
 from .elements import central_site as central_site
+from .elements import lattice_along as lattice_along
 from .elements import symmetry_elements as symmetry_elements
 from .equivariance import EquivarianceError as EquivarianceError
 from .equivariance import assert_equivariant as assert_equivariant

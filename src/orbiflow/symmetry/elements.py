@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import is_tensor
+from orbiflow.arguments import is_a, is_tensor, refusal
 from orbiflow.arrays import Array
 from orbiflow.errors import GroupError
 from orbiflow.symmetry.group import CrystallographicGroup
-from orbiflow.symmetry.isometry import Isometry, Line, Points, cast_like
+from orbiflow.symmetry.isometry import TOLERANCE, Isometry, Line, Points, cast_like
 
 
 class RotationCenter(NamedTuple):
@@ -116,6 +116,38 @@ def _same(first: GlideLine, second: GlideLine, reach: float) -> bool:
     (ux, uy), (vx, vy) = first.line.direction, second.line.direction
     apart = np.linalg.norm(first.line.point - second.line.point)
     return bool(abs(ux * vy - uy * vx) < 1e-6 and apart < 1e-6 * reach)
+
+
+def lattice_along(group: CrystallographicGroup, along: str) -> Array:
+    """Return the basis vectors (d, r) of a group's lattice that lie along some of its axes.
+
+    They and the coset representatives make a group that is periodic along r directions alone: a frieze
+    ("x"), a rod ("z"), a layer ("xy") or, with none (""), a point group.
+
+    Raises `GroupError` if they make none, `SettingError` for anything but axes.
+
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> lattice_along(wallpaper_group("pmg"), "x").tolist()
+    [[1.0], [0.0]]
+    """
+    axes = "xyz"[: group.dim]
+    if not is_a(along, str) or not set(along) <= set(axes) or len(set(along)) < len(along):
+        raise refusal("along", f"some of the letters {', '.join(axes)}", along)
+    kept = [axes.index(axis) for axis in along]
+    across = np.delete(np.eye(group.dim), kept, axis=0)
+    size = np.abs(group.lattice).max()
+    inside = np.abs(across @ group.lattice).max(axis=0, initial=0.0) <= TOLERANCE * size
+    # a finite group fixes a point: without the other translations, this one
+    center = across.T @ across @ group.translations.mean(axis=0)
+    moved = (group.linear_parts @ center + group.translations - center) @ across.T
+    turned = (group.linear_parts[:, :, kept]).swapaxes(1, 2) @ across.T
+    off = max(np.abs(turned).max(initial=0.0), np.abs(moved).max(initial=0.0) / size)
+    if inside.sum() != len(kept) or off > 1e-7:
+        raise GroupError(
+            f"{group!r} is not periodic along {along!r} alone: without its other translations, an "
+            "element turns these axes, or screws or glides across them, or the lattice does not split"
+        )
+    return group.lattice[:, inside]
 
 
 TRIED_SITES = 512

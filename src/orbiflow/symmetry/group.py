@@ -256,8 +256,7 @@ class CrystallographicGroup:
     def primitive(self) -> CrystallographicGroup:
         """Return the same group on the lattice of all its translations, with one coset for each R.
 
-        A group whose lattice is that already is returned as it is. The basis is made of the shortest
-        vectors that are one.
+        A group whose lattice is that already is returned as it is.
 
         >>> cmm = CrystallographicGroup.generate(np.eye(2), [translation([0.5, 0.5])])
         >>> cmm.order, cmm.primitive().order, cmm.primitive().cell_volume
@@ -318,12 +317,14 @@ def _shortest_basis(lattice: Array, shifts: Array) -> Array:
     """Return the first of the shortest vectors that are a basis of a lattice with n shifts in it."""
     d, n = len(lattice), len(shifts)
     parts = np.round(n * np.linalg.solve(lattice, shifts.T).T).astype(np.int64)[:, None]
-    cells = n * (np.indices((3,) * d).reshape(d, -1).T - 1)
-    # of each pair +-v the one whose last component is positive; ties in a fixed order
-    nths = [v for v in map(tuple, (parts + cells).reshape(-1, d).tolist()) if v[::-1] > (0,) * d]
-    size = {v: round(float(np.linalg.norm(lattice @ v) / np.linalg.norm(lattice)), 6) for v in nths}
-    nths.sort(key=lambda v: (size[v], *(-x for x in v)))
-    bases = (np.array(rows).T for rows in itertools.combinations(nths, d))
+    nths = (parts + n * (np.indices((3,) * d).reshape(d, -1).T - 1)).reshape(-1, d)
+    lengths: Array = np.linalg.norm(nths @ lattice.T, axis=1) / np.linalg.norm(lattice)
+    directions: dict[tuple[int, ...], Array] = {}  # the shortest of each; ties in a fixed order
+    for v in nths[np.lexsort(np.vstack([-nths.T[::-1], lengths.round(6)]))]:
+        key = tuple((v // max(1, np.gcd.reduce(v))).tolist())
+        if key[::-1] > (0,) * d:  # of each pair +-v the one whose last component is positive
+            directions.setdefault(key, v)
+    bases = (np.stack(rows, axis=1) for rows in itertools.combinations(directions.values(), d))
     shortest = next(m for m in bases if abs(round(np.linalg.det(m))) == n ** (d - 1))
     return lattice @ shortest / n
 

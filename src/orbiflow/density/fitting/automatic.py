@@ -54,6 +54,7 @@ from orbiflow.density.fitting.rows import (
     effective_rows,
     group_numbers,
     is_whole,
+    lone_groups_note,
     mean_of,
     missing_notes,
     observed_points,
@@ -142,6 +143,7 @@ def fit_automatic(
     report = _report(density, folds, candidates, weights, tried, parts, found)
     after = (
         *weights_note(folds.rows),
+        *lone_groups_note(folds.rows.groups),
         *report.notes,
         *_untried_note(folds, settings, flows),
         *found.notes(settings.repeats),
@@ -275,7 +277,7 @@ def _report(
     ]
     some = folds.rows[:SCORED]
     mass = None
-    if density.space.dim == 2:
+    if density.space.has_chart and density.space.dim == 2:
         mass = 1.0
         if flow and flow.mass is not None:
             mass = tried.share * flow.mass + 1 - tried.share

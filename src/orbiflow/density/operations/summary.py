@@ -93,8 +93,8 @@ def _check(where: SpaceSettings, reading: GroupedRowSettings, picture: Path | No
         )
     if where.space not in ("torus", "sphere", "projective-plane"):
         raise SettingError(
-            "{space} must be torus, sphere or projective-plane: summaries are of angles, directions and "
-            f"axes, not of points of a {literal(where.space)}"
+            "{space} must be torus, sphere or projective-plane: summaries are of angles, directions "
+            f"and axes, not of points of a {literal(where.space)}"
         )
     if where.space != "torus":
         if reading.missing == "marginalise":

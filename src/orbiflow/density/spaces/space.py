@@ -52,7 +52,7 @@ SPACE_CLASSES: dict[str, type[Space]] = {}
 
 
 class Space(ABC):
-    """R^d modulo a crystallographic group (design points 12 and 20).
+    """R^d modulo a crystallographic group (design points 12 and 20), or a sphere modulo a finite one.
 
     Points in the chart are float tensors (..., d), and any point of an orbit stands for it. Data are
     arrays (N, k) in the user's units.
@@ -61,7 +61,8 @@ class Space(ABC):
     volume |G|. `domain` holds one point of each orbit, to which `project` brings all others. It is a
     Dirichlet domain, which is a convex polytope of volume 1 and not, in general, a cube: nothing may
     assume that coordinates are between 0 and 1, unless `has_square` says so. An integral over the space
-    is one over the lattice's cell, divided by |G|: no domain is needed for it.
+    is one over the lattice's cell, divided by |G|: no domain is needed for it. Spheres of any dimension
+    have no such chart (`UnitVectorSpace`): their chart points are unit vectors.
 
     **A space of your own** is a subclass with a `group`, the names of its `columns` and what is
     abstract below. With a `name` in its class body it can be saved, as `make_space(name,
@@ -72,9 +73,8 @@ class Space(ABC):
     - `columns`: Names of the data's columns.
     - `unit`: Unit of the data, None if the natural measure is in steradians.
     - `is_round`: Whether the natural measure is the area of the unit sphere.
+    - `has_chart`: Whether chart points are those of R^d, not unit vectors.
     - `has_square`: Whether the domain is the unit cube, with the site (1/2, ..., 1/2).
-    - `has_chart`: Whether chart points are in R^d. On spheres of any dimension they are unit vectors
-      (`UnitVectorSpace`).
 
     Spaces of the same class, settings and group are equal.
     """
@@ -84,8 +84,8 @@ class Space(ABC):
     columns: tuple[str, ...]
     unit: str | None = None
     is_round: ClassVar[bool] = False
-    has_square: ClassVar[bool] = False
     has_chart: ClassVar[bool] = True
+    has_square: ClassVar[bool] = False
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -115,7 +115,7 @@ class Space(ABC):
 
     @property
     def is_planar(self) -> bool:
-        """Whether the chart is the square, on which densities are drawn and tabulated."""
+        """Whether the chart is the square, on which densities are tabulated."""
         return self.has_square and self.dim == 2
 
     @property
@@ -243,8 +243,7 @@ class Space(ABC):
         """Return what kernels see of the E images of points (N, d), themselves first: (E, N, m).
 
         They are cosines and sines of the coordinates in the frame's basis, or unit vectors on round
-        spaces; `which` chooses among the images, in the order of the frame's cosets. The function is
-        differentiable.
+        spaces; `which` chooses among the images. The function is differentiable.
         """
         frame = self.frame.group
         linear, shift, inverse = (
@@ -255,15 +254,20 @@ class Space(ABC):
         angles = 2 * math.pi * (images @ inverse.T)
         return torch.cat([angles.cos(), angles.sin()], dim=-1)
 
-    @property
-    def kernel_images(self) -> int:
-        """The number of images, the first ones, that kernels have; the others are those of points."""
-        return self.frame.own
-
     def from_features(self, features: Tensor) -> Tensor:
         """Return the canonical points (N, d) that have these features (N, m)."""
         cos, sin = features.chunk(2, dim=-1)
         return self.project(self.from_turns(torch.atan2(sin, cos) / (2 * math.pi)))
+
+    @property
+    def own_images(self) -> slice:
+        """Which images of a kernel are kernels again."""
+        return slice(self.frame.own) if self.has_chart else slice(None)
+
+    @property
+    def turned_images(self) -> slice:
+        """Which images of a point, together with `own_images` of kernels, make all pairs of them."""
+        return slice(None, None, self.frame.own) if self.has_chart else slice(1)
 
     def from_turns(self, turns: Tensor) -> Tensor:
         """Return chart vectors (..., d) of coordinates in the basis of the frame."""
@@ -327,15 +331,14 @@ class Space(ABC):
 
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
-"""Names of the four spaces with a canonical square."""
+"""Names of the four spaces whose chart is the square, or the cube."""
 
 
 def space_class(name: str) -> type[Space]:
     """Return the class of a space, by its name."""
     from orbiflow.density import spaces  # whose classes import this file
 
-    # whose files hold all classes
-    _ = spaces.Torus, spaces.Sphere, spaces.Hypersphere, spaces.QuotientSpace
+    _ = spaces.Torus, spaces.Sphere, spaces.Hypersphere, spaces.QuotientSpace  # in all the files
     if not is_a(name, str) or name not in SPACE_CLASSES:
         raise OrbiflowError(
             f"unknown space {name!r}; there are {', '.join(SPACE_CLASSES)}, and groups such as p4m, "
