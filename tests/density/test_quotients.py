@@ -300,7 +300,7 @@ def test_what_is_refused() -> None:
         (lambda: QuotientSpace("p4").to_chart([[1.0, 2.0, 3.0]]), "points of 2 coordinates"),
         (
             lambda: TabulatedDensity(UniformDensity(QuotientSpace("p4")), 16),
-            "no chart of the square",
+            "with a canonical square",
         ),
         (lambda: make_space("quotient"), "group"),
         (lambda: DensityEstimator("quotient").fit(np.zeros((20, 2))), "needs its group"),

@@ -352,8 +352,8 @@ REFUSED = {
         space3, max_frequency=3
     ).fit(np.eye(4)),
     "no crystallographic group": lambda: VonMisesDensity(space3).entropy(),
-    "a table needs two dimensions, this hypersphere has 2 and no": lambda: TabulatedDensity(
-        UniformDensity(Hypersphere(2))
+    "a table needs .* a canonical square, which this hypersphere of 2 is not": lambda: (
+        TabulatedDensity(UniformDensity(Hypersphere(2)))
     ),
     "a picture needs two dimensions, this hypersphere has 2 and no": lambda: density_picture(
         kernels(Hypersphere(2), 0)

@@ -71,8 +71,8 @@ class DensityEstimator:
     Follows scikit-learn's conventions: works in a `GridSearchCV` and a `Pipeline`.
 
     Args:
-        space: A name that `make_space` takes, such as "torus", "sphere", or that of a group: "p4m",
-            "hantzsche-wendt", "P 21 21 21"; or a `Space`, such as `QuotientSpace(group)`.
+        space: "torus", "sphere" and other names that `make_space` takes; the name of a group, such as
+            "p4m", "hantzsche-wendt" or "P 21 21 21"; or a `Space`, such as `QuotientSpace(group)`.
         unit: The unit of angles, and of rotations in three columns: "radians", "degrees" or "turns".
         missing: "refuse" rows that lack an angle (NaN), or, on tori, "marginalise": fit kernels and
             mixtures to them, and score them, by the density of the angles that they have.

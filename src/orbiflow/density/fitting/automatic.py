@@ -277,7 +277,7 @@ def _report(
     ]
     some = folds.rows[:SCORED]
     mass = None
-    if density.space.has_chart and density.space.dim == 2:
+    if density.space.dim == 2:
         mass = 1.0
         if flow and flow.mass is not None:
             mass = tried.share * flow.mass + 1 - tried.share

@@ -118,9 +118,10 @@ class TabulatedDensity:
     @one_thread()
     def __init__(self, density: Density, resolution: int = 512) -> None:
         space = as_instance(density, Density, "density").space
-        if not space.is_planar:
+        if space.dim != 2 or not space.has_square:
             raise OrbiflowError(
-                f"a table needs two dimensions, this {space.name} has {space.dimensions}"
+                f"a table needs a space of two dimensions with a canonical square, which this "
+                f"{space.name} of {space.dim} is not: evaluate the density itself"
             )
         as_whole(resolution, "resolution", 8, 4096)
         self.space, self.resolution = space, resolution

@@ -32,7 +32,7 @@ class AdaptiveKernels(Density, kind="kernels"):
 
     Products of von Mises kernels in the coordinates of the space's frame on flat spaces, summed over
     images under the group; von Mises-Fisher kernels on spheres of any dimension and their quotients,
-    there summed over the images of a unit vector, such as both ends of an axis.
+    summed over the images of a unit vector, such as both ends of an axis.
 
     Args:
         space: Any space.
@@ -65,7 +65,7 @@ class AdaptiveKernels(Density, kind="kernels"):
         self.centers, self.concentrations, self.weights = (
             t.double() for t in (centers, concentrations, weights)
         )
-        images = space.features(self.centers, space.own_images)
+        images = space.features(self.centers, slice(space.kernel_images))
         self._center_features = images[0]
         self._terms = _terms(space, images, self.concentrations, self.weights)
 
@@ -87,7 +87,7 @@ class AdaptiveKernels(Density, kind="kernels"):
         """
         flat = points.reshape(-1, self.space.chart_dim).double()
         # images that turn the axes are of points, all others of kernels
-        images = self.space.features(flat, self.space.turned_images)
+        images = self.space.features(flat, slice(None, None, self.space.kernel_images))
         features = images.flatten(0, 1).mT
         if features.device.type == "cpu":
             values = near_log_sum(self._terms, features.contiguous(), beside, tolerance)

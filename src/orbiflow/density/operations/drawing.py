@@ -127,17 +127,21 @@ def region(
     density, _ = model_at(model)
     kind, space = out.suffix.lower(), density.space
     _require_format(out, kind, space)
+    if settings.min_mass is not None and not space.is_planar:
+        raise SettingError("{min_mass} is of islands, which are outlined in two dimensions alone")
     samples = regions.samples_for(settings.masses, settings.samples)
     progress = runtime.progress_events(on_event, cancel)
     progress(0.0, f"drawing {samples} samples")
     with runtime.one_thread():
-        levels = regions.DensityLevels(density, samples=samples, seed=settings.seed)
+        levels = regions.DensityLevels(
+            density, samples=samples, seed=settings.seed, smooth=settings.smooth
+        )
         found = [levels.highest(mass) for mass in settings.masses]
         found += [levels.above(level) for level in settings.level or ()]
         drawn: list[Outline] = []
         if space.is_planar:
             drawn = regions.outlines(
-                levels, found, budget=settings.budget, seed=settings.seed,
+                levels, found, budget=settings.budget, seed=settings.seed, min_mass=settings.min_mass,
                 told=lambda share, what: progress(0.1 + 0.9 * share, what),
             )  # fmt: skip
     if kind == ".geojson":
@@ -187,8 +191,9 @@ def _described(found: DensityRegion, outline: Outline | None) -> str:
         count = len(outline.shape.geoms)
         polygons = f"; {_counted(count, 'polygon')}, which {'holds' if count == 1 else 'hold'} "
         polygons += _with_error(outline.mass, outline.error)
+    of = "log density" if found.smooth is None else "smoothed log density"
     return (
-        f"mass {_with_error(found.held, found.error)}: log density of at least "
+        f"mass {_with_error(found.held, found.error)}: {of} of at least "
         f"{found.log_prob:.4f} ({found.log_prob_low:.4f} to {found.log_prob_high:.4f}), "
         f"{drawn.size:.6g} {regions.size_unit(found.density.space)}, "
         f"{_percentage(drawn.fraction)} of the space{polygons}"

@@ -73,8 +73,9 @@ class Space(ABC):
     - `columns`: Names of the data's columns.
     - `unit`: Unit of the data, None if the natural measure is in steradians.
     - `is_round`: Whether the natural measure is the area of the unit sphere.
-    - `has_chart`: Whether chart points are those of R^d, not unit vectors.
     - `has_square`: Whether the domain is the unit cube, with the site (1/2, ..., 1/2).
+    - `has_chart`: Whether chart points are in R^d. On spheres of any dimension they are unit vectors
+      (`UnitVectorSpace`).
 
     Spaces of the same class, settings and group are equal.
     """
@@ -84,8 +85,8 @@ class Space(ABC):
     columns: tuple[str, ...]
     unit: str | None = None
     is_round: ClassVar[bool] = False
-    has_chart: ClassVar[bool] = True
     has_square: ClassVar[bool] = False
+    has_chart: ClassVar[bool] = True
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -115,7 +116,7 @@ class Space(ABC):
 
     @property
     def is_planar(self) -> bool:
-        """Whether the chart is the square, on which densities are tabulated."""
+        """Whether the chart is the square, on which densities are drawn and tabulated."""
         return self.has_square and self.dim == 2
 
     @property
@@ -254,20 +255,15 @@ class Space(ABC):
         angles = 2 * math.pi * (images @ inverse.T)
         return torch.cat([angles.cos(), angles.sin()], dim=-1)
 
+    @property
+    def kernel_images(self) -> int:
+        """The number of images, the first ones, that kernels have; the others are those of points."""
+        return self.frame.own
+
     def from_features(self, features: Tensor) -> Tensor:
         """Return the canonical points (N, d) that have these features (N, m)."""
         cos, sin = features.chunk(2, dim=-1)
         return self.project(self.from_turns(torch.atan2(sin, cos) / (2 * math.pi)))
-
-    @property
-    def own_images(self) -> slice:
-        """Which images of a kernel are kernels again."""
-        return slice(self.frame.own) if self.has_chart else slice(None)
-
-    @property
-    def turned_images(self) -> slice:
-        """Which images of a point, together with `own_images` of kernels, make all pairs of them."""
-        return slice(None, None, self.frame.own) if self.has_chart else slice(1)
 
     def from_turns(self, turns: Tensor) -> Tensor:
         """Return chart vectors (..., d) of coordinates in the basis of the frame."""
@@ -331,14 +327,15 @@ class Space(ABC):
 
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
-"""Names of the four spaces whose chart is the square, or the cube."""
+"""Names of the four spaces with a canonical square."""
 
 
 def space_class(name: str) -> type[Space]:
     """Return the class of a space, by its name."""
     from orbiflow.density import spaces  # whose classes import this file
 
-    _ = spaces.Torus, spaces.Sphere, spaces.Hypersphere, spaces.QuotientSpace  # in all the files
+    # whose files hold all classes
+    _ = spaces.Torus, spaces.Sphere, spaces.Hypersphere, spaces.QuotientSpace
     if not is_a(name, str) or name not in SPACE_CLASSES:
         raise OrbiflowError(
             f"unknown space {name!r}; there are {', '.join(SPACE_CLASSES)}, and groups such as p4m, "

@@ -79,6 +79,10 @@ class UnitVectorSpace(Space):
         own = self._unit(points)
         return torch.stack([own @ element.mT for element in self.elements.to(own)[which]])
 
+    @property
+    def kernel_images(self) -> int:
+        return len(self.elements)
+
     def from_features(self, features: Tensor) -> Tensor:
         return self.project(features)
 

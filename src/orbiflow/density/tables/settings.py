@@ -35,10 +35,10 @@ class SpaceSettings(Settings, group="Density"):
     """Where the data live."""
 
     space: str
-    """Where the data live: torus, sphere, klein-bottle, projective-plane, hypersphere,
-    projective-space, rotation-space, cubic-orientations or hexagonal-orientations; or a group whose
-    quotient it is: a plane group such as p4m, a flat manifold such as hantzsche-wendt, or a space group
-    such as "P 21 21 21"."""
+    """Where the data live: torus, sphere, klein-bottle or projective-plane; unit vectors of any
+    dimension on a hypersphere or in a projective-space; a rotation-space, cubic-orientations or
+    hexagonal-orientations; or a group whose quotient it is: a plane group such as p4m, a flat manifold
+    such as hantzsche-wendt, or a space group such as "P 21 21 21"."""
 
     cell: Annotated[
         tuple[float, ...] | None, DefaultText("lengths about 1 that suit the group")
