@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any, cast
 
@@ -252,6 +253,15 @@ def test_the_quotient_by_a_group_of_ones_own_is_fitted_and_saved(
     again = DensityEstimator.fitted(read_density(path)[0])
     assert isinstance(again.space_, HalfTurns)
     assert (again.score_samples(data) == scores).all()
+
+
+def test_the_example_of_the_page_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    quick_search(monkeypatch)
+    page = (Path(__file__).parents[2] / "docs" / "densities.md").read_text(encoding="utf-8")
+    (snippet,) = re.findall(r"```python\n([^`]*RotationSpace[^`]*)```", page)
+    names: dict[str, Any] = {}
+    exec(compile(snippet, "densities.md", "exec"), names)
+    assert names["texture"].space_.symmetry == "D2"
 
 
 def _other(space: Space) -> dict[str, object]:
