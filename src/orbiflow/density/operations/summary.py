@@ -13,7 +13,7 @@ from orbiflow.batch import csv_bytes
 from orbiflow.density import tables
 from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import GroupedRowSettings, SpaceSettings
-from orbiflow.errors import SettingError
+from orbiflow.errors import SettingError, literal
 from orbiflow.settings import DefaultText, Ending, Option, Range, Settings
 
 if TYPE_CHECKING:
@@ -90,6 +90,11 @@ def _check(where: SpaceSettings, reading: GroupedRowSettings, picture: Path | No
         raise SettingError(
             "a klein-bottle has no mean direction, as its points have several angles: summarise theta "
             "and phi with {space} torus, if that is what you mean"
+        )
+    if where.space not in ("torus", "sphere", "projective-plane"):
+        raise SettingError(
+            "{space} must be torus, sphere or projective-plane: summaries are of angles, directions "
+            f"and axes, not of points of a {literal(where.space)}"
         )
     if where.space != "torus":
         if reading.missing == "marginalise":
