@@ -14,9 +14,6 @@ from orbiflow.symmetry.cells import check_cell
 from orbiflow.symmetry.group import MAX_ORDER, CrystallographicGroup, checked_lattice, generated
 from orbiflow.symmetry.isometry import TOLERANCE, Isometry, translation
 
-Operator = tuple[Array, Array]
-"""The matrix W (d, d) and the shift w (d,) of x' = W x + w."""
-
 AXES = "xyz"
 MAX_LENGTH = 200
 _NUMBER = r"\d{1,9}(?:/\d{1,9}|\.\d{0,20})?|\.\d{1,20}"
@@ -28,13 +25,9 @@ def group_from_operators(
 ) -> CrystallographicGroup:
     """Return the group that operators in fractional coordinates generate on a lattice.
 
-    The operators may be all of the group's, modulo the lattice, or generators alone. If there are pure
-    translations among them or their products, the group's lattice is the finer one (`primitive`).
-
-    Args:
-        operators: Texts such as "-x,y+1/2,-z", with as many parts as there are dimensions, 1 to 3.
-        lattice: The basis vectors as columns (d, d) of the cell that the coordinates refer to.
-        name: A name for people to read.
+    The operators are texts such as "-x,y+1/2,-z" with d parts, 1 to 3: all of the group's modulo the
+    lattice, or generators. `lattice` has the basis vectors of their cell as columns (d, d); if pure
+    translations make it finer, the group is on the primitive one.
 
     Raises `GroupError` for a text that is no operator, or one that does not map the lattice to itself.
 
@@ -52,10 +45,8 @@ def group_from_operators(
     return generated(basis, isometries, name).primitive()
 
 
-def parse_operator(text: str, dim: int) -> Operator:
-    """Return the matrix (d, d) and the shift (d,) of an operator such as "x-y,x,z+1/3".
-
-    Raises `GroupError` for any other text.
+def parse_operator(text: str, dim: int) -> tuple[Array, Array]:
+    """Return the matrix (d, d) and the shift (d,) of an operator.
 
     >>> parse_operator("-y, x-y, z+1/3", 3)[0].tolist()
     [[0.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 1.0]]
@@ -87,11 +78,11 @@ def _row(text: str, dim: int) -> list[float] | None:
 def operators(group: CrystallographicGroup, lattice: ArrayLike | None = None) -> list[str]:
     """Return the operators of a group, one for each coset, in fractional coordinates of a lattice.
 
-    The lattice, basis vectors as columns (d, d), is by default the group's; with a coarser one, such as
-    a conventional cell, there are more. `group_from_operators` makes the group again of them.
+    The lattice, basis vectors as columns (d, d), is by default the group's; a coarser one, such as a
+    conventional cell, has more cosets. `group_from_operators` makes the group again of them.
 
-    Raises `GroupError` for a group of over 3 dimensions, or a lattice whose vectors are no translations
-    of the group or that it does not map to itself.
+    Raises `GroupError` for over 3 dimensions, or a lattice whose vectors are no translations of the
+    group or that it does not map to itself.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> operators(wallpaper_group("pgg"))
