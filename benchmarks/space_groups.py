@@ -21,7 +21,7 @@ import gemmi
 import numpy as np
 import torch
 
-from orbiflow.fields import FourierField
+from orbiflow.fields import FourierField, VectorField
 from orbiflow.flows import Flow
 from orbiflow.symmetry import (
     CrystallographicGroup,

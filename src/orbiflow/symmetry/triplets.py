@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orbiflow.arrays import Array
-from orbiflow.errors import GroupError
-from orbiflow.symmetry.cells import check_cell
+from orbiflow.errors import GroupError, LatticeMismatchError, NotAnIsometryError
+from orbiflow.symmetry.cells import cell_parameters, fitting_cell
 from orbiflow.symmetry.group import MAX_ORDER, CrystallographicGroup, checked_lattice, generated
 from orbiflow.symmetry.isometry import TOLERANCE, Isometry, translation
 
 AXES = "xyz"
 MAX_LENGTH = 200
-_NUMBER = r"\d{1,9}(?:/\d{1,9}|\.\d{0,20})?|\.\d{1,20}"
-_TERM = re.compile(rf"([+-])(?:({_NUMBER})\*?)?([xyz])?")
+_NUMBER = r"(?:\d{1,9}(?:/0*[1-9]\d{0,8}|\.\d{0,20})?|\.\d{1,20})"
+_TERM = re.compile(rf"([+-]?)({_NUMBER})?\*?([xyz]?)")
 
 
 def group_from_operators(
@@ -38,41 +38,38 @@ def group_from_operators(
     texts = list(itertools.islice(operators, MAX_ORDER + 1))
     if len(texts) > MAX_ORDER:
         raise GroupError(f"more than {MAX_ORDER} operators were given; generators are enough")
-    parsed = [parse_operator(text, len(basis)) for text in texts]
-    check_cell(basis, np.array([w for w, _ in parsed]).reshape(-1, *basis.shape), texts)
-    inverse = np.linalg.inv(basis)
-    isometries = [Isometry(basis @ w @ inverse, basis @ shift) for w, shift in parsed]
+    d, inverse = len(basis), np.linalg.inv(basis)
+    tables = [parse_operator(text, d) for text in texts]
+    try:
+        isometries = [Isometry(basis @ t[:, :d] @ inverse, basis @ t[:, d]) for t in tables]
+    except NotAnIsometryError as error:
+        nearest = fitting_cell(np.stack(tables)[:, :, :d], basis)
+        own, other = (np.round(cell, 6).tolist() for cell in (cell_parameters(basis), nearest or 0))
+        cure = f"the nearest cell that they fit has {other}" if nearest else "they fit no cell"
+        raise LatticeMismatchError(
+            f"the operators do not fit a cell with lengths and angles {own}; {cure}"
+        ) from error
     return generated(basis, isometries, name).primitive()
 
 
-def parse_operator(text: str, dim: int) -> tuple[Array, Array]:
-    """Return the matrix (d, d) and the shift (d,) of an operator.
+def parse_operator(text: str, dim: int) -> Array:
+    """Return the table (d, d + 1) of an operator: its matrix and its shift.
 
-    >>> parse_operator("-y, x-y, z+1/3", 3)[0].tolist()
-    [[0.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 1.0]]
+    >>> parse_operator("-y, x-y, z+1/3", 3).round(3).tolist()
+    [[0.0, -1.0, 0.0, 0.0], [1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.333]]
     """
-    parts = text.lower().split(",") if len(text) <= MAX_LENGTH else []
-    rows = [_row(part.replace(" ", ""), dim) for part in parts]
-    if len(rows) != dim or None in rows:
+    parts = text.lower().replace(" ", "").split(",") if len(text) <= MAX_LENGTH else []
+    term = rf"(?:(?:{_NUMBER}\*?)?[{AXES[:dim]}]|{_NUMBER})"
+    whole = re.compile(rf"[+-]?{term}(?:[+-]{term})*")
+    if len(parts) != dim or not all(map(whole.fullmatch, parts)):
         example = ",".join(("-x", "y+1/2", "-z")[:dim])
         raise GroupError(f'{text[:60]!r} is no operator in {dim} dimensions, such as "{example}"')
-    table = np.array(rows, dtype=np.float64)
-    return table[:, :dim], table[:, dim]
-
-
-def _row(text: str, dim: int) -> list[float] | None:
-    """Return the coefficients of the axes and the constant of one part of an operator."""
-    signed = text if text[:1] in ("+", "-") else f"+{text}"
-    terms = list(_TERM.finditer(signed))
-    if "".join(term[0] for term in terms) != signed:
-        return None
-    row = [Fraction(0)] * (dim + 1)
-    for sign, number, axis in (term.groups() for term in terms):
-        place = AXES.index(axis) if axis else dim
-        if not (number or axis) or place > dim - bool(axis) or re.search("/0+$", number or ""):
-            return None
-        row[place] += Fraction(f"{sign}{number or 1}")
-    return [float(entry) for entry in row]
+    table = np.zeros((dim, dim + 1))
+    for row, part in zip(table, parts, strict=True):
+        for sign, number, axis in _TERM.findall(part):
+            place = AXES.index(axis) if axis else dim
+            row[place] += float(Fraction(f"{sign}{number or 1}")) if number or axis else 0.0
+    return table
 
 
 def operators(group: CrystallographicGroup, lattice: ArrayLike | None = None) -> list[str]:
@@ -98,16 +95,13 @@ def operators(group: CrystallographicGroup, lattice: ArrayLike | None = None) ->
             raise GroupError("the vectors of the lattice are no translations of the group")
     shifts = coarse.translations @ coarse.inverse_lattice.T
     tables = np.concatenate([coarse.integral_parts, shifts[:, :, None]], axis=2)
-    return [",".join(_part(row) for row in table) for table in tables.tolist()]
+    return [",".join(map(_part, table)) for table in tables.tolist()]
 
 
 def _part(row: list[float]) -> str:
     """Return one part of an operator as text: "x-y+1/3"."""
-    terms = [
-        f"{x:+.0f}*{axis}" if abs(x) > 1 else f"{x:+.0f}"[0] + axis
-        for x, axis in zip(row[:-1], AXES, strict=False)
-        if x
-    ]
     fraction = Fraction(row[-1]).limit_denominator(48)
-    shift = f"{row[-1]:+.12g}" if abs(fraction - row[-1]) > TOLERANCE else f"+{fraction}"
-    return "".join([*terms, shift if row[-1] > TOLERANCE or not terms else ""]).removeprefix("+")
+    shift = f"{row[-1]:.12g}" if abs(fraction - row[-1]) > TOLERANCE else str(fraction)
+    terms = [f"{x:+.0f}*{axis}" for x, axis in zip(row[:-1], AXES, strict=False) if x]
+    terms += [f"+{shift}"] if row[-1] > TOLERANCE or not terms else []
+    return re.sub(r"(?<!\d)1\*", "", "".join(terms)).removeprefix("+")
