@@ -17,6 +17,7 @@ s_i in [-1, 1]. The spectral norm is convex in s, hence largest at a corner of t
 over all choices of signs is a bound, and there are few signs (design point 17).
 """
 
+import copy
 import itertools
 import math
 from abc import ABC, abstractmethod
@@ -184,6 +185,7 @@ class InvariantField(nn.Module, ABC):
     values: Tensor
     scale: Tensor
     frame: Tensor
+    stackable = False  # whether the parameters may be those of a stack
 
     def __init__(
         self,
@@ -214,6 +216,39 @@ class InvariantField(nn.Module, ABC):
     @abstractmethod
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
         """Return the gradient (P,) of sum forces . V(points) in the parameters; inputs (N, d)."""
+
+    def with_parameters(self, parameters: Tensor) -> Self:
+        """Return the field with other parameters, such as the output of a network, which get gradients.
+
+        Args:
+            parameters: (P,) for one field, or (S, P) for a stack of S: of S contexts, say. Only a
+                `FourierField` can be a stack.
+
+        Raises `OrbiflowError` for another shape or dtype.
+
+        >>> from orbiflow.fields import FourierField
+        >>> from orbiflow.symmetry import wallpaper_group
+        >>> field = FourierField(wallpaper_group("p4"), 1)
+        >>> context, network = torch.rand(5, 3), torch.nn.Linear(3, field.size)
+        >>> each = field.float().with_parameters(network(context))
+        >>> each(torch.rand(5, 7, 2)).shape  # seven points of each context
+        torch.Size([5, 7, 2])
+        """
+        own = self.parameters_
+        if parameters.shape[-1:] != (self.size,) or parameters.dim() > 1 + self.stackable:
+            wanted = f"({self.size},)" + f" or (S, {self.size})" * self.stackable
+            raise OrbiflowError(
+                f"expected parameters of shape {wanted}, got {tuple(parameters.shape)}"
+            )
+        if parameters.dtype != own.dtype:
+            raise OrbiflowError(
+                f"expected parameters of the field's dtype, {own.dtype}, got {parameters.dtype}: "
+                f"convert them, or the field with .to({parameters.dtype})"
+            )
+        view = copy.copy(self)  # shallow: it shares the basis
+        view._parameters = {}
+        view.parameters_ = parameters  # pyright: ignore[reportAttributeAccessIssue]
+        return view
 
     def _check_points(self, points: Tensor) -> None:
         """Raise OrbiflowError for points that the field cannot be evaluated at."""

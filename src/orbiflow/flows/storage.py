@@ -229,6 +229,8 @@ def save_flow(flow: Flow, path: str | Path) -> Path:
         segments.append(same if first < index else writer.header(field, f"segments.{index}"))
     header = {"format": FORMAT, "groups": writer.groups, "segments": segments, "warn": flow.warns}
     header |= {name: getattr(flow, name) for name in ("steps", "method", "duration")}
+    if flow.bijective:
+        header["bijective"] = True
     return write_atomic(path, tensor_bytes(header, tensors, "a flow"))
 
 
@@ -283,6 +285,7 @@ def _restored(
         method=str(header["method"]),
         duration=as_number(header["duration"], "duration"),
         warn=bool(header["warn"]),
+        bijective=bool(header.get("bijective", False)),
     )
     flow.load_state_dict(tensors)
     return flow
