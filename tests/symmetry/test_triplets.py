@@ -84,7 +84,7 @@ def test_too_many_operators_are_refused():
 def test_an_operator_that_does_not_fit_names_a_cell_that_does():
     with pytest.raises(LatticeMismatchError, match=r"do not fit .* 74.*, 90.0]$") as caught:
         group_from_operators(["-x,-y", "-y,x"], [[1.0, 0.3], [0.0, 1.1]])
-    side = float(str(caught.value).split("fit has [")[1].split(",")[0])
+    side = float(str(caught.value).split("fits has [")[1].split(",")[0])
     assert group_from_operators(["-y,x"], side * np.eye(2)).order == 4
     with pytest.raises(LatticeMismatchError, match="they fit no cell"):
         group_from_operators(["x+y,y"], np.eye(2))

@@ -45,7 +45,7 @@ def group_from_operators(
     except NotAnIsometryError as error:
         nearest = fitting_cell(np.stack(tables)[:, :, :d], basis)
         own, other = (np.round(cell, 6).tolist() for cell in (cell_parameters(basis), nearest or 0))
-        cure = f"the nearest cell that they fit has {other}" if nearest else "they fit no cell"
+        cure = f"the nearest that fits has {other}" if nearest else "they fit no cell"
         raise LatticeMismatchError(
             f"the operators do not fit a cell with lengths and angles {own}; {cure}"
         ) from error
