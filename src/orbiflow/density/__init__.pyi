@@ -91,6 +91,7 @@ from .spaces.flat import KleinBottle as KleinBottle
 from .spaces.flat import Torus as Torus
 from .spaces.patches import KleinCoordinates as KleinCoordinates
 from .spaces.patches import to_klein as to_klein
+from .spaces.quotient import QuotientSpace as QuotientSpace
 from .spaces.round import ProjectivePlane as ProjectivePlane
 from .spaces.round import RoundSpace as RoundSpace
 from .spaces.round import Sphere as Sphere
@@ -102,6 +103,12 @@ from .spaces.space import SPACES as SPACES
 from .spaces.space import Space as Space
 from .spaces.space import make_space as make_space
 from .spaces.space import space_class as space_class
+from .spaces.unit_vectors import CubicOrientations as CubicOrientations
+from .spaces.unit_vectors import HexagonalOrientations as HexagonalOrientations
+from .spaces.unit_vectors import Hypersphere as Hypersphere
+from .spaces.unit_vectors import ProjectiveSpace as ProjectiveSpace
+from .spaces.unit_vectors import RotationSpace as RotationSpace
+from .spaces.unit_vectors import UnitVectorSpace as UnitVectorSpace
 from .summaries import AngleSummary as AngleSummary
 from .summaries import AxisSummary as AxisSummary
 from .summaries import Correlation as Correlation

@@ -139,7 +139,7 @@ def region(
         found = [levels.highest(mass) for mass in settings.masses]
         found += [levels.above(level) for level in settings.level or ()]
         drawn: list[Outline] = []
-        if space.dim == 2:
+        if space.is_planar:
             drawn = regions.outlines(
                 levels, found, budget=settings.budget, seed=settings.seed, min_mass=settings.min_mass,
                 told=lambda share, what: progress(0.1 + 0.9 * share, what),
@@ -158,15 +158,17 @@ def region(
 
 def _require_format(out: Path, kind: str, space: Space) -> None:
     """Check that regions of a space can be written in a format."""
-    if kind == ".geojson" and not space.is_round:
+    if kind == ".geojson" and not (space.is_round and space.is_planar):
+        points = "the angles of a" if space.has_chart else "points of the"
         raise OrbiflowError(
-            f"{out}: GeoJSON is for places on a globe, not for the angles of a {space.name}: write "
-            ".json or .csv"
+            f"{out}: GeoJSON is for places on a globe, not for {points} {space.name}: write .json"
+            + " or .csv" * space.is_planar
         )
-    if kind == ".csv" and space.dim != 2:
+    if kind == ".csv" and not space.is_planar:
         raise OrbiflowError(
             f"{out}: a table holds outlines, which are drawn in two dimensions; this {space.name} has "
-            f"{space.dim}: write .json, and use `orbiflow density score --region` for the rows inside"
+            f"{space.dimensions}: write .json, and use `orbiflow density score --region` for the rows "
+            "inside"
         )
 
 
@@ -176,7 +178,7 @@ def _region_notes(found: list[DensityRegion], drawn: list[Outline]) -> list[str]
     if drawn:
         return [note for one in drawn for note in (_described(one.region, one), *one.notes)]
     return [
-        f"outlines are drawn in two dimensions, this {space.name} has {space.dim}: there are "
+        f"outlines are drawn in two dimensions, this {space.name} has {space.dimensions}: there are "
         "thresholds and sizes alone; `orbiflow density score --region` says of each row how far "
         "inside it is",
         *(_described(one, None) for one in found),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from orbiflow import runtime
 from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
-from orbiflow.density import comparing, models, pictures, tables
+from orbiflow.density import comparing, models, pictures, spaces, tables
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
 from orbiflow.density.run_folder import write_files, written_files
 from orbiflow.density.tables import GroupedRowSettings, RowSettings, SpaceSettings
@@ -93,7 +93,8 @@ def fit_rows(
     values, labels = rows.table.values, rows.labels
     unit = tables.angle_unit(where.space, where.unit, rows.table, tell)
     given = {name: getattr(settings, name) for name in settings.fields_given}
-    estimator = DensityEstimator(where.space, unit=unit, missing=reading.kept_missing, **given)
+    space = spaces.make_space(where.space, cell=where.cell) if where.cell else where.space
+    estimator = DensityEstimator(space, unit=unit, missing=reading.kept_missing, **given)
     progress = runtime.progress_events(tell, cancel)
     return estimator.fit(values, sample_weight=rows.weights, groups=labels, progress=progress)
 

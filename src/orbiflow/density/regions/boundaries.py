@@ -259,10 +259,10 @@ class Window:
 
 def window_of(space: Space) -> Window:
     """Return the window in which regions of a space are drawn."""
-    if space.dim != 2:
+    if not space.is_planar:
         raise OrbiflowError(
-            f"outlines are drawn in two dimensions, this {space.name} has {space.dim}; thresholds, "
-            "sizes and which rows are inside can be found all the same"
+            f"outlines are drawn in two dimensions, this {space.name} has {space.dimensions}; "
+            "thresholds, sizes and which rows are inside can be found all the same"
         )
     return _round(space) if isinstance(space, RoundSpace) else _flat(space)
 
@@ -391,5 +391,5 @@ def size_unit(space: Space) -> str:
     'degrees^2'
     """
     if space.is_round:
-        return "steradians"
+        return "steradians" if space.dim == 2 else f"radians^{space.dim} of the unit sphere"
     return str(space.unit) if space.dim == 1 else f"{space.unit}^{space.dim}"

@@ -15,6 +15,7 @@ from .settings import SpaceSettings as SpaceSettings
 from .settings import TableSettings as TableSettings
 from .settings import Unit as Unit
 from .settings import check_table_name as check_table_name
+from .settings import is_angular as is_angular
 from .table import MissingCellsError as MissingCellsError
 from .table import Table as Table
 from .table import TableError as TableError
