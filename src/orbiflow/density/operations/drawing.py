@@ -127,7 +127,7 @@ def region(
     density, _ = model_at(model)
     kind, space = out.suffix.lower(), density.space
     _require_format(out, kind, space)
-    if settings.min_mass is not None and space.dim != 2:
+    if settings.min_mass is not None and not space.is_planar:
         raise SettingError("{min_mass} is of islands, which are outlined in two dimensions alone")
     samples = regions.samples_for(settings.masses, settings.samples)
     progress = runtime.progress_events(on_event, cancel)
