@@ -68,6 +68,7 @@ def test_areas_of_a_rose_are_shares() -> None:
     assert np.divide(areas, areas[0]) == pytest.approx([1, 2, 3])
     assert isinstance(one, PolarAxes)
     assert isinstance(other, PolarAxes)
+    assert (one.get_title(), other.get_title()) == ("φ", "wind direction")
     assert (one.get_theta_direction(), other.get_theta_direction()) == (1, -1)  # as on a compass
     mean = other.lines[0].get_xydata()
     assert np.asarray(mean)[:, 0] == pytest.approx(np.pi / 2)
