@@ -48,7 +48,7 @@ def plot(
 
     Directions and axes are drawn on maps (density, latlon) and on the square.
 
-    On a torus of more or fewer than two angles there are samples alone, all pairs of angles.
+    On a torus of more angles there are samples alone, all pairs of angles; of one, a rose, too.
 
     Args:
         model: Folder that `fit` wrote.

@@ -86,10 +86,10 @@ def _csv(found: dict[str, Any]) -> bytes:
 
 def _check(where: SpaceSettings, reading: GroupedRowSettings, picture: Path | None) -> None:
     """Refuse what has no summary before the table is read."""
-    if where.space == "klein-bottle":
+    if where.space not in ("torus", "sphere", "projective-plane"):
         raise SettingError(
-            "a klein-bottle has no mean direction, as its points have several angles: summarise theta "
-            "and phi with {space} torus, if that is what you mean"
+            "{space} must be torus, sphere or projective-plane: there is no summary of points of the "
+            + literal(where.space)
         )
     if where.space not in ("torus", "sphere", "projective-plane"):
         raise SettingError(

@@ -21,6 +21,7 @@ from orbiflow.density.pictures.frames import view_of
 from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.overlays import region_lines
 from orbiflow.density.pictures.projections import PlateCarree, chosen_map
+from orbiflow.density.pictures.roses import rose_picture
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.surfaces import density_page
 from orbiflow.density.spaces import Space
@@ -37,7 +38,7 @@ THUMBNAIL = "thumbnail.png"
 """The small picture beside the model of a fit in a batch."""
 
 PAGE = "surface.html"
-NAMES = ("density", "latlon", "square", "flow", "samples")
+NAMES = ("density", "latlon", "square", "flow", "samples", "rose")
 PICTURES = (*(f"{name}.{form}" for form in FORMATS for name in NAMES), PAGE)
 """The files that a plot may write into a folder, and that go when another one is written there."""
 
@@ -68,7 +69,7 @@ def plot_density(
     The density of angles is drawn on its square; that of directions or axes on a map ("density"), on
     the sphere also in plain latitude and longitude ("latlon"), and on its square ("square"). A flow
     that has no part in the density is left out. On a torus of more or fewer than two angles there are
-    samples alone, all pairs of angles. All is drawn before anything is written.
+    samples alone, all pairs of angles, and of one angle a rose. All is drawn before any is written.
 
     Args:
         density: A density or a fitted estimator.
@@ -161,7 +162,11 @@ class _Shown:
         """Return functions that draw the figures, by the names of their files without the ending."""
         density, settings, data, samples = self.density, self.settings, self.data, self.samples
         if self.space.dim != 2:
-            return {"samples": partial(corner_picture, density, data, samples, settings)}
+            made = {"samples": partial(corner_picture, density, data, samples, settings)}
+            if self.space.dim == 1:
+                what = "samples" if data is None else "data"
+                made["rose"] = partial(rose_picture, density, self.points, settings, what=what)
+            return made
         grounds = self._grounds()
         dots = self.points if settings.dots else None
         draw = partial(figures.density_picture, density, dots, settings, regions=self.regions)
