@@ -169,7 +169,8 @@ class TileVariations:
             return (share - np.floor(share)) % 1.0  # what is just below 0 ends up at 1
 
         moved = np.stack([g(ring) for g in group.cosets])
-        tree = KDTree(within_cell(ring), boxsize=[1.0, 1.0])
+        around: dict[str, Any] = {"boxsize": 1.0}  # which the stubs believe to be a matrix
+        tree = KDTree(within_cell(ring), **around)
         found: Any = tree.query_ball_point(within_cell(moved.reshape(-1, 2)), SAME_POINT)
         pairs = np.array([(i, k) for k, near in enumerate(found) for i in near], dtype=np.int64)
         vertex, coset, source = pairs[:, 0], *np.divmod(pairs[:, 1], len(ring))
