@@ -66,8 +66,8 @@ class InvariantBasis:
 def frequency_set(group: CrystallographicGroup, max_frequency: int) -> Array:
     """Return (M, d) integer frequencies, one of each pair +-k, k = 0 first.
 
-    The box |k_i| <= max_frequency and its images under the dual point group: a set that is not a
-    union of orbits would lose symmetry (hexagonal groups).
+    The box |k_i| <= max_frequency and its images under the dual point group, rows k @ B^-1 R B: a set
+    that is not a union of orbits would lose symmetry (hexagonal groups).
     """
     if isinstance(max_frequency, bool) or int(max_frequency) != max_frequency or max_frequency < 0:
         raise OrbiflowError(f"max_frequency must be an integer >= 0, got {max_frequency!r}")
@@ -81,14 +81,8 @@ def frequency_set(group: CrystallographicGroup, max_frequency: int) -> Array:
         )
     axis = np.arange(-max_frequency, max_frequency + 1)
     box = np.stack(np.meshgrid(*[axis] * group.dim, indexing="ij"), axis=-1).reshape(-1, group.dim)
-    images = np.concatenate([box @ m for m in np.unique(_integral_parts(group), axis=0)])
+    images = np.concatenate([box @ m for m in np.unique(group.integral_parts, axis=0)])
     return np.unique(_half(images)[0], axis=0)
-
-
-def _integral_parts(group: CrystallographicGroup) -> Array:
-    """Return (|G|, d, d) integer matrices B^-1 R B; a frequency k (a row) goes to k @ M."""
-    m = group.inverse_lattice @ group.linear_parts @ group.lattice
-    return np.round(m).astype(np.int64)
 
 
 def _half(k: Array) -> tuple[Array, Array]:
@@ -106,7 +100,7 @@ def _action(group: CrystallographicGroup, frequencies: Array) -> tuple[Array, Ar
     (g V)(p) = R^-1 V(R p + t) sends the coefficient at k to k M times R^-1 exp(2 pi i k . B^-1 t).
     """
     d = group.dim
-    integral = _integral_parts(group)
+    integral = group.integral_parts
     targets = np.empty((group.order, len(frequencies)), dtype=np.int64)
     blocks = np.zeros((group.order, len(frequencies), 2, d, 2, d))
     base = int(np.abs(frequencies).max(initial=0)) * 2 + 3

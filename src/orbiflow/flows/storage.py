@@ -44,7 +44,8 @@ class Writer:
         if kind is Symmetrized:
             inner = self.header(field.field, f"{place}.field")
             own = {"group": self._group(field.group), "periodic": field.periodic, "field": inner}
-            return {"kind": "symmetrized", **own}
+            along = {} if field.along is None else {"along": field.along}
+            return {"kind": "symmetrized", **own, **along}
         if is_perceptron(field):
             features, *layers = field
             linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
@@ -96,7 +97,8 @@ class Reader:
             return self._series(header, place)
         if kind == "symmetrized":
             inner = self.field(header["field"], f"{place}.field", nesting + 1)
-            return Symmetrized(inner, self._group(header), periodic=bool(header["periodic"]))
+            group, periodic = self._group(header), bool(header["periodic"])
+            return Symmetrized(inner, group, periodic=periodic, along=header.get("along"))
         if kind == "torus-network":
             what = f"{place} is a NeuralTorusField"
             raise OrbiflowError(f"{what}, which orbiflow no longer has: use orbiflow 0.1")
