@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -50,6 +50,9 @@ class Family(ABC):
 
     name: str
 
+    kept: int | None = 2
+    """How many names go on after the first fold, besides the best alone; None: all of any use."""
+
     @abstractmethod
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
         """Return what is fitted to the training rows of a fold, to be judged by the rows held out."""
@@ -71,21 +74,28 @@ class KernelFamily(Family):
     narrowest: float = NARROWEST
     repeats: bool = True
     name = "kernels"
+    kept = None
+    _names: set[str] | None = None
 
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
         del number, held
         say("kernels")
-        return self._estimates(train)
+        return self._estimates(train, self._names)
 
     def final(self, rows: Rows, folds: list[dict[str, Density]], names: list[str]) -> list[Density]:
         del folds
-        found = self._estimates(rows)
+        found = self._estimates(rows, names)
         return [found[name] for name in names]
 
-    def _estimates(self, rows: Rows) -> dict[str, Density]:
+    def keep(self, names: set[str]) -> None:
+        self._names = names | {"repeated"}
+
+    def _estimates(self, rows: Rows, only: Collection[str] | None) -> dict[str, Density]:
         known = is_whole(rows)
         whole = rows[known]
-        found = kernel_estimates(self.space, whole, narrowest=self.narrowest, repeats=self.repeats)
+        found = kernel_estimates(
+            self.space, whole, narrowest=self.narrowest, repeats=self.repeats, only=only
+        )
         if len(whole) == len(rows):
             return dict(found)
         total = float(len(whole)) if whole.weights is None else float(whole.weights.sum())
