@@ -25,6 +25,7 @@ from orbiflow.density.fitting.settings import FlowSettings
 from orbiflow.density.models import MOST_DIM, Density, Mixture, UniformDensity, mixture_of
 from orbiflow.density.spaces import Space
 from orbiflow.runtime import SideBySide, Tell
+from orbiflow.typed_torch import listed
 
 STEP = 0.85
 """The share of a fold's work that is left after each thing that is tried."""
@@ -168,18 +169,14 @@ def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: 
     """Keep of each family what has most weight in the first fold, or may have, and the best alone."""
     keys = list(block)
     table = torch.stack([block[key] for key in keys])
-    weights = stacking_weights(table, held.weights)
-    # what has a weight has a mean ratio of 1 to the mixture, the others have less
-    ratios = (table - stacked(table, weights)).exp()
-    short = [gain_of(torch.ones_like(ratio), ratio, held.weights).is_sure for ratio in ratios]
+    weights: list[float] = listed(stacking_weights(table, held.weights))
     for family in families:
-        own = {name: k for k, (kind, name) in enumerate(keys) if kind == family.name}
+        own = {name: w for (f, name), w in zip(keys, weights, strict=True) if f == family.name}
         if own:
             best = max(own, key=lambda name, f=family.name: held.mean(block[f, name]))
-            by_weight = sorted(own, key=lambda name, own=own: -float(weights[own[name]]))
-            some = [name for name in by_weight if weights[own[name]] >= NEGLIGIBLE][: family.kept]
-            if family.kept is None:
-                some = [name for name, k in own.items() if not short[k]]
+            some = [name for name, w in own.items() if w >= family.negligible]
+            if family.kept is not None:
+                some = sorted(some, key=lambda name, w=own: -w[name])[: family.kept]
             family.keep({best, *some})
 
 

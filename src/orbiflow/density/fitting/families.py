@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
+from itertools import compress
 from typing import Any, cast
 
 import torch
@@ -35,6 +36,9 @@ SMALLEST_CHAINS = 4
 MOST_MIXED, MOST_CHAINED = 20_000, 12_000
 """Rows that mixtures and chains are fitted to at most."""
 
+TELLING = 500
+"""Rows held out by which kernels without a weight, and without a neighbour of any, are left out."""
+
 CLEARLY = 2.0
 """Standard errors by which a larger mixture must be worse to be the last that is tried."""
 
@@ -51,7 +55,10 @@ class Family(ABC):
     name: str
 
     kept: int | None = 2
-    """How many names go on after the first fold, besides the best alone; None: all of any use."""
+    """How many names go on after the first fold, besides the best alone; None: any number."""
+
+    negligible = 3e-3
+    """Weight in the first fold below which they do not."""
 
     @abstractmethod
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
@@ -74,13 +81,16 @@ class KernelFamily(Family):
     narrowest: float = NARROWEST
     repeats: bool = True
     name = "kernels"
-    kept = None
-    _names: set[str] | None = None
+    # other rows may prefer what has next to no weight, or its neighbours
+    kept, negligible = None, 1e-8
+    _names: list[str] | None = None
 
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
-        del number, held
         say("kernels")
-        return self._estimates(train, self._names)
+        found = self._estimates(train, self._names)
+        if number == 0 and len(held) >= TELLING:
+            self._names = list(found)
+        return found
 
     def final(self, rows: Rows, folds: list[dict[str, Density]], names: list[str]) -> list[Density]:
         del folds
@@ -88,7 +98,9 @@ class KernelFamily(Family):
         return [found[name] for name in names]
 
     def keep(self, names: set[str]) -> None:
-        self._names = names | {"repeated"}
+        if (every := self._names) is not None:
+            near = [not names.isdisjoint(every[max(0, k - 1) : k + 2]) for k in range(len(every))]
+            self._names = list(compress(every, near))
 
     def _estimates(self, rows: Rows, only: Collection[str] | None) -> dict[str, Density]:
         known = is_whole(rows)
