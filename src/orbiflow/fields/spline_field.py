@@ -108,7 +108,7 @@ class _Near:
             # tap by tap: a table of products would go through the memory twice
             total = rest[..., 0, :] * w[0]
             for tap in range(1, TAPS):
-                total.addcmul_(rest[..., tap, :], w[tap])
+                total = torch.addcmul(total, rest[..., tap, :], w[tap])
             self.kept[orders] = total
         return self.kept[orders]
 
