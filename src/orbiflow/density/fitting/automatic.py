@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -55,6 +54,7 @@ from orbiflow.density.fitting.rows import (
     effective_rows,
     group_numbers,
     is_whole,
+    lone_groups_note,
     mean_of,
     missing_notes,
     observed_points,
@@ -63,8 +63,8 @@ from orbiflow.density.fitting.rows import (
     weights_of,
 )
 from orbiflow.density.fitting.settings import COMPONENTS, DensitySettings
-from orbiflow.density.models import MOST_DIM, Mixture
-from orbiflow.density.spaces import Space, Torus, whole_turn
+from orbiflow.density.models import MOST_DIM, Mixture, flow_obstacle
+from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import SideBySide
 
@@ -143,6 +143,7 @@ def fit_automatic(
     report = _report(density, folds, candidates, weights, tried, parts, found)
     after = (
         *weights_note(folds.rows),
+        *lone_groups_note(folds.rows.groups),
         *report.notes,
         *_untried_note(folds, settings, flows),
         *found.notes(settings.repeats),
@@ -218,12 +219,10 @@ def _families(
         families.append(NetworkFamily(space, settings.seed))
     chosen = [family for family in families if family.name in settings.allowed]
     beside = "flow" in settings.allowed and settings.allowed not in (COMPONENTS, ("flow",))
-    if beside and space.dim > MOST_DIM:
-        raise OrbiflowError(
-            f"a flow has {MOST_DIM} dimensions at most, this {space.name} has {space.dim}: leave it "
-            "out of the parts"
-        )
-    if not chosen and (space.dim > MOST_DIM or settings.allowed != ("flow",)):
+    obstacle = flow_obstacle(space)
+    if beside and obstacle:
+        raise OrbiflowError(f"{obstacle}: leave it out of the parts")
+    if not chosen and (obstacle or settings.allowed != ("flow",)):
         raise OrbiflowError(
             f"a density on this {type(space).__name__} of {space.dim} dimensions cannot be made of "
             f"{' and '.join(settings.allowed)} alone: chains are for tori of two angles or more, a "
@@ -234,18 +233,12 @@ def _families(
 
 def _narrowest(space: Space, step: float | None) -> float:
     """Concentration of kernels of a deviation of one step of rounding."""
-    if step is None:
-        return NARROWEST
-    if space.is_round:
-        angle = math.radians(step) if space.settings()["form"] == "latlon" else step
-    else:
-        angle = 2 * math.pi * step / whole_turn(str(space.unit))
-    return min(NARROWEST, 1 / angle**2)
+    return NARROWEST if step is None else min(NARROWEST, 1 / space.step_angle(step) ** 2)
 
 
 def _wants_flow(space: Space, folds: Folds, settings: DensitySettings) -> bool:
     enough = len(folds.rows) >= LEAST_FLOW_ROWS or settings.allowed == ("flow",)
-    return "flow" in settings.allowed and space.dim <= MOST_DIM and enough
+    return "flow" in settings.allowed and not flow_obstacle(space) and enough
 
 
 def _untried_note(folds: Folds, settings: DensitySettings, flows: bool) -> list[str]:

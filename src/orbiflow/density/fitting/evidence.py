@@ -24,6 +24,7 @@ from orbiflow.density.fitting.rows import Gain, Rows, gain_of, mean_of
 from orbiflow.density.fitting.settings import FlowSettings
 from orbiflow.density.models import MOST_DIM, Density, Mixture, UniformDensity, mixture_of
 from orbiflow.density.spaces import Space
+from orbiflow.fields import has_even_grid
 from orbiflow.runtime import SideBySide, Tell
 from orbiflow.typed_torch import listed
 
@@ -345,6 +346,11 @@ def _is_worth_it(worth: ComponentEvidence) -> bool:
 
 def flow_settings(space: Space, rows: int, seed: int) -> FlowSettings:
     """Of a flow beside other parts: those have the clusters, it has what is smooth."""
+    if space.dim == MOST_DIM and not has_even_grid(space.group):
+        # each point costs a sum over all waves: as many as of splines would take minutes
+        return FlowSettings(
+            max_frequency=2, segments=2, roughness=(1e-3,), iterations=30, seed=seed
+        )
     if space.dim == MOST_DIM:
         return FlowSettings(
             max_frequency=5, segments=3, roughness=(1e-3,), iterations=60, seed=seed
