@@ -3,11 +3,12 @@
     python benchmarks/density_speed.py [--rows N ...] [--points N] [--quick] [SPACE ...]
 
 Points in forty clusters of 0.01 to 0.3 radians. Fit: seconds of processor time, and by the clock on
-all cores that `taskset` leaves. Then evaluations a second of processor time, side by side in one run: of `log_prob`; of its gradient in the points; of all
-kernels for all points; and off a `TabulatedDensity`, once made. Off: largest differences in nats, of
-the exact one to that of all kernels (which knows the narrowest ones to 1e-9), and of the table to
-the exact one at the density's own points. --components: of the density, such as kernels. --search:
-`GridSearchCV` over five settings of 2,000 points in five folds.
+all cores that `taskset` leaves. Then evaluations a second of processor time, side by side in one run:
+of `log_prob`; of its gradient in the points; of all kernels for all points; and off a
+`TabulatedDensity`, once made. Off: largest differences in nats, of the exact one to that of all kernels
+(which knows the narrowest ones to 1e-9), and of the table to the exact one at the density's own points.
+--components: of the density, such as kernels. --search: `GridSearchCV` over five settings of 2,000
+points in five folds.
 """
 
 from __future__ import annotations
