@@ -2,12 +2,13 @@
 
     python benchmarks/density_speed.py [--rows N ...] [--points N] [--quick] [SPACE ...]
 
-Points in forty clusters of 0.01 to 0.3 radians. Fit: seconds of processor time. Then evaluations a
-second of processor time, side by side in one run: of `log_prob`; of its gradient in the points; of all
-kernels for all points; and off a `TabulatedDensity`, once made. Off: largest differences in nats, of
-the exact one to that of all kernels (which knows the narrowest ones to 1e-9), and of the table to
-the exact one at the density's own points. --components: of the density, such as kernels. --search:
-`GridSearchCV` over five settings of 2,000 points in five folds.
+Points in forty clusters of 0.01 to 0.3 radians. Fit: seconds of processor time, and by the clock on
+all cores that `taskset` leaves. Then evaluations a second of processor time, side by side in one run:
+of `log_prob`; of its gradient in the points; of all kernels for all points; and off a
+`TabulatedDensity`, once made. Off: largest differences in nats, of the exact one to that of all kernels
+(which knows the narrowest ones to 1e-9), and of the table to the exact one at the density's own points.
+--components: of the density, such as kernels. --search: `GridSearchCV` over five settings of 2,000
+points in five folds.
 """
 
 from __future__ import annotations
@@ -94,10 +95,10 @@ def kernel_count(density: Mixture) -> int:
 def line(space: str, rows: int, points: int, parts: str) -> str:
     """A row of the table."""
     data = clustered(space, rows)
-    begin = time.process_time()
+    begin, wall = time.process_time(), time.perf_counter()
     name = "torus" if space == "three angles" else space
     estimator = DensityEstimator(name, components=parts).fit(data)
-    fit = time.process_time() - begin
+    fit, wall = time.process_time() - begin, time.perf_counter() - wall
     density = estimator.density_
     assert isinstance(density, Mixture)
     generator = torch.Generator().manual_seed(0)
@@ -114,7 +115,7 @@ def line(space: str, rows: int, points: int, parts: str) -> str:
     if density.space.dim == 2:
         shown = tabulated(density, drawn, exact)
     return (
-        f"{space:18}{rows:8,}{fit:9.1f}{kernel_count(density):10,}{of_exact}{of_slope}"
+        f"{space:18}{rows:8,}{fit:9.1f}{wall:9.1f}{kernel_count(density):10,}{of_exact}{of_slope}"
         f"{of_dense}{off:10.1e}{shown}"
     )
 
@@ -156,8 +157,8 @@ def main() -> None:
     spaces = ["torus"] if options.quick else options.spaces or SPACES
     points = 5_000 if options.quick else options.points
     print(
-        f"{'space':18}{'rows':>8}{'fit, s':>9}{'kernels':>10}{'exact, 1/s':>12}{'slope, 1/s':>12}"
-        f"{'dense, 1/s':>12}{'off':>10}{'table, 1/s':>12}{'off':>10}"
+        f"{'space':18}{'rows':>8}{'fit, s':>9}{'wall, s':>9}{'kernels':>10}{'exact, 1/s':>12}"
+        f"{'slope, 1/s':>12}{'dense, 1/s':>12}{'off':>10}{'table, 1/s':>12}{'off':>10}"
     )
     for count in rows:
         for space in spaces:

@@ -22,6 +22,7 @@ from orbiflow.density import (
     kl_by_quadrature,
     midpoints,
 )
+from orbiflow.density.models.density import neighbourhoods
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
@@ -208,6 +209,27 @@ def test_large_batches_are_the_same_in_blocks(monkeypatch) -> None:
         draws = [density.sample((4, 5), torch.Generator().manual_seed(3)) for _ in range(2)]
     assert torch.equal(*draws)
     assert draws[0].shape == (4, 5, 2)
+
+
+@given(st.integers(1, 200), st.integers(1, 40), st.integers(0, 2**31))
+def test_neighbourhoods_hold_each_point_once(count: int, size: int, seed: int) -> None:
+    points = torch.rand(count, 3, generator=torch.Generator().manual_seed(seed))
+    parts = neighbourhoods(points, size)
+    assert torch.equal(torch.cat(parts).sort().values, torch.arange(count))
+    assert all(0 < len(at) <= size for at in parts)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_many_points_are_the_same_on_any_number_of_cores(count: int, monkeypatch) -> None:
+    density, points = make(KleinBottle()), square(0, 60).reshape(3, 20, 2)
+    with torch.no_grad():
+        whole = density.log_prob(points, measure="natural")
+        monkeypatch.setattr("orbiflow.density.models.density.BLOCK", 7)
+        monkeypatch.setattr("orbiflow.runtime.side_by_side.cores", lambda: count)
+        found = density.log_prob(points, measure="natural")
+    torch.testing.assert_close(found, whole, rtol=0, atol=1e-12)
+    assert not found.requires_grad
+    assert found.shape == (3, 20)
 
 
 def test_what_is_refused() -> None:

@@ -68,20 +68,30 @@ def padded(table: Tensor) -> Tensor:
     return table
 
 
+@lru_cache(maxsize=64)
+def _layout(
+    sides: tuple[int, ...], dtype: torch.dtype, device: torch.device
+) -> tuple[Tensor, Tensor]:
+    """Return the periods (d, 1) of a padded table, and positions (4^d, 1) of the taps of a cell."""
+    with torch.inference_mode(False):
+        offsets = torch.arange(TAPS, device=device)
+        taps = offsets
+        for side in sides[1:]:
+            taps = (taps[:, None] * side + offsets).reshape(-1)
+        return torch.tensor(sides, dtype=dtype, device=device)[:, None] - (TAPS - 1), taps[:, None]
+
+
 def _cells(sides: tuple[int, ...], u: Tensor) -> tuple[Tensor, Tensor]:
     """Return flat positions (4^d, N) in a padded table that points meet, and fractions (d, N)."""
-    period = torch.tensor(sides, dtype=u.dtype, device=u.device)[:, None] - (TAPS - 1)
+    period, taps = _layout(sides, u.dtype, u.device)
     u = u - period * (u / period).floor()
-    first = u.floor()
-    fraction = u - first
     # rounding can put a point just below 0 at the period itself
-    cell = torch.minimum(first, period - 1).long()
-    flat, offsets = cell[0], torch.arange(TAPS, device=u.device)
-    taps = offsets
+    first = torch.minimum(u.floor(), period - 1)
+    cell = first.long()
+    flat = cell[0]
     for axis in range(1, len(sides)):
         flat = flat * sides[axis] + cell[axis]
-        taps = (taps[:, None] * sides[axis] + offsets).reshape(-1)
-    return taps[:, None] + flat, fraction
+    return taps + flat, u - first
 
 
 class _Near:
@@ -95,7 +105,11 @@ class _Near:
         """Return the derivative (N,) of these orders along the axes; the last axis is summed first."""
         if orders not in self.kept:
             rest, w = self.sum(*orders[1:]), self.weights[-len(orders)][orders[0]]
-            self.kept[orders] = (rest * w).sum(dim=-2)
+            # tap by tap: a table of products would go through the memory twice
+            total = rest[..., 0, :] * w[0]
+            for tap in range(1, TAPS):
+                total = torch.addcmul(total, rest[..., tap, :], w[tap])
+            self.kept[orders] = total
         return self.kept[orders]
 
 

@@ -130,8 +130,7 @@ def fit_automatic(
         fitted = _flow_fits(space, folds, settings, budget, course, beside) if flows else None
         candidates = candidates_of(space, families, folds, course, budget, beside)
         weights = supported_weights(candidates.table, candidates.floor, candidates.row_weights)
-        if space.dim > MOST_DIM:  # each part makes integrals dearer
-            weights = without_idle(candidates, weights)
+        weights = without_idle(candidates, weights)  # each part costs time at every query
         tried = TriedFlow()
         if fitted is not None:
             tried = try_flow(folds, candidates, weights, fitted)

@@ -28,9 +28,6 @@ from orbiflow.fields import has_even_grid
 from orbiflow.runtime import SideBySide, Tell
 from orbiflow.typed_torch import listed
 
-KEPT = 2
-"""Sizes of a family that are fitted to all folds, besides the best alone."""
-
 STEP = 0.85
 """The share of a fold's work that is left after each thing that is tried."""
 
@@ -170,7 +167,7 @@ def _fitted(family: Family, folds: Folds, number: int, budget: Budget, say: Tell
 
 
 def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: Rows) -> None:
-    """Keep of each family what has most weight in the first fold, and the best alone."""
+    """Keep of each family what has most weight in the first fold, or may have, and the best alone."""
     keys = list(block)
     table = torch.stack([block[key] for key in keys])
     weights: list[float] = listed(stacking_weights(table, held.weights))
@@ -178,8 +175,10 @@ def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: 
         own = {name: w for (f, name), w in zip(keys, weights, strict=True) if f == family.name}
         if own:
             best = max(own, key=lambda name, f=family.name: held.mean(block[f, name]))
-            weighty = [name for name, w in own.items() if w >= NEGLIGIBLE]
-            family.keep({best, *sorted(weighty, key=lambda name, w=own: -w[name])[:KEPT]})
+            some = [name for name, w in own.items() if w >= family.negligible]
+            if family.kept is not None:
+                some = sorted(some, key=lambda name, w=own: -w[name])[: family.kept]
+            family.keep({best, *some})
 
 
 def without_idle(candidates: Candidates, weights: Tensor) -> Tensor:

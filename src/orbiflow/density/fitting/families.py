@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
+from itertools import compress
 from typing import Any, cast
 
 import torch
@@ -35,6 +36,9 @@ SMALLEST_CHAINS = 4
 MOST_MIXED, MOST_CHAINED = 20_000, 12_000
 """Rows that mixtures and chains are fitted to at most."""
 
+TELLING = 500
+"""Rows held out by which kernels without a weight, and without a neighbour of any, are left out."""
+
 CLEARLY = 2.0
 """Standard errors by which a larger mixture must be worse to be the last that is tried."""
 
@@ -49,6 +53,12 @@ class Family(ABC):
     """Candidates of one class of densities, by their names."""
 
     name: str
+
+    kept: int | None = 2
+    """How many names go on after the first fold, besides the best alone; None: any number."""
+
+    negligible = 3e-3
+    """Weight in the first fold below which they do not."""
 
     @abstractmethod
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
@@ -71,21 +81,33 @@ class KernelFamily(Family):
     narrowest: float = NARROWEST
     repeats: bool = True
     name = "kernels"
+    # other rows may prefer what has next to no weight, or its neighbours
+    kept, negligible = None, 1e-8
+    _names: list[str] | None = None
 
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
-        del number, held
         say("kernels")
-        return self._estimates(train)
+        found = self._estimates(train, self._names)
+        if number == 0 and len(held) >= TELLING:
+            self._names = list(found)
+        return found
 
     def final(self, rows: Rows, folds: list[dict[str, Density]], names: list[str]) -> list[Density]:
         del folds
-        found = self._estimates(rows)
+        found = self._estimates(rows, names)
         return [found[name] for name in names]
 
-    def _estimates(self, rows: Rows) -> dict[str, Density]:
+    def keep(self, names: set[str]) -> None:
+        if (every := self._names) is not None:
+            near = [not names.isdisjoint(every[max(0, k - 1) : k + 2]) for k in range(len(every))]
+            self._names = list(compress(every, near))
+
+    def _estimates(self, rows: Rows, only: Collection[str] | None) -> dict[str, Density]:
         known = is_whole(rows)
         whole = rows[known]
-        found = kernel_estimates(self.space, whole, narrowest=self.narrowest, repeats=self.repeats)
+        found = kernel_estimates(
+            self.space, whole, narrowest=self.narrowest, repeats=self.repeats, only=only
+        )
         if len(whole) == len(rows):
             return dict(found)
         total = float(len(whole)) if whole.weights is None else float(whole.weights.sum())

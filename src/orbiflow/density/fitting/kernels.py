@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -28,18 +28,17 @@ NARROWEST, WIDEST = 1e7, 0.5
 """The largest and the least concentration: a deviation of 0.02 degrees, or nearly uniform."""
 
 
-def _near_kernels(
-    space: Space, centers: Tensor, weights: Tensor, narrowest: float
-) -> Iterator[tuple[str, AdaptiveKernels]]:
-    """Yield kernels as wide as shares of the distances to neighbours, by name, of all shapes tried."""
+def _near_concentrations(
+    space: Space, centers: Tensor, narrowest: float
+) -> Iterator[tuple[str, Tensor]]:
+    """Yield concentrations as wide as shares of the distances to neighbours, by name, of all shapes."""
     neighbours = [m for m in NEIGHBOURS if m < len(centers)]
     shrinkage = (1.0,) if space.is_round or space.dim == 1 else ISOTROPY
     for number, spread in zip(neighbours, spreads(space, centers, neighbours), strict=True):
         mean = spread.mean(dim=1, keepdim=True)
         for scale, share in itertools.product(SCALES, shrinkage):
             kappa = 1 / (scale * ((1 - share) * spread + share * mean))
-            kernels = AdaptiveKernels(space, centers, kappa.clamp(WIDEST, narrowest), weights)
-            yield f"near {number}, {scale:g}, {share:g}", kernels
+            yield f"near {number}, {scale:g}, {share:g}", kappa.clamp(WIDEST, narrowest)
 
 
 def spreads(space: Space, centers: Tensor, neighbours: list[int]) -> list[Tensor]:
@@ -64,9 +63,14 @@ LADDER = 27
 
 
 def kernel_estimates(
-    space: Space, rows: Rows, *, narrowest: float = NARROWEST, repeats: bool = True
+    space: Space,
+    rows: Rows,
+    *,
+    narrowest: float = NARROWEST,
+    repeats: bool = True,
+    only: Collection[str] | None = None,
 ) -> dict[str, AdaptiveKernels]:
-    """Return estimates about training rows in random order, by their names.
+    """Return estimates about training rows in random order, by their names; all, or `only` some.
 
     "width ..." have one concentration, in a ladder; "near ..." a share of the mean square distance to
     the nearest neighbours, on tori axis by axis (Breiman, Meisel, Purcell, 1977); "repeated" are the
@@ -77,8 +81,11 @@ def kernel_estimates(
     if rows.weights is not None:
         own = rows.weights / rows.weights.sum()
     found: dict[str, AdaptiveKernels] = {}
-    for kappa in np.geomspace(WIDEST, narrowest, LADDER):
-        found[f"width {kappa**-0.5:.2g}"] = even_kernels(space, train, float(kappa), own)
+    start = even_kernels(space, train, WIDEST, own)
+    for kappa in np.geomspace(WIDEST, narrowest, LADDER).tolist():
+        name = f"width {kappa**-0.5:.2g}"
+        if only is None or name in only:
+            found[name] = start.with_concentrations(torch.full_like(start.concentrations, kappa))
     counts, place = places(train)
     first = torch.full((len(counts),), len(train)).scatter_reduce(
         0, place, torch.arange(len(train)), "amin"
@@ -86,7 +93,11 @@ def kernel_estimates(
     centers, weights = train[first], counts.double() / len(train)
     if rows.weights is not None:
         weights = torch.zeros_like(weights).index_add_(0, place, own)
-    found |= dict(_near_kernels(space, centers, weights, narrowest))
+    if only is None or any(name.startswith("near") for name in only):
+        start = even_kernels(space, centers, WIDEST, weights)
+        for name, kappa in _near_concentrations(space, centers, narrowest):
+            if only is None or name in only:
+                found[name] = start.with_concentrations(kappa)
     repeated = counts > 1
     if repeats and bool(repeated.any()):
         weights = weights[repeated] / weights[repeated].sum()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from typing import Any, Self
@@ -67,7 +68,15 @@ class AdaptiveKernels(Density, kind="kernels"):
         )
         images = space.features(self.centers, slice(space.kernel_images))
         self._center_features = images[0]
-        self._terms = _terms(space, images, self.concentrations, self.weights)
+        features = images.flatten(0, 1).mT.contiguous()
+        self._terms = _terms(space, features, self.concentrations, self.weights)
+
+    def with_concentrations(self, concentrations: Tensor) -> Self:
+        """Return kernels of other concentrations > 0, (N, d) or (N, 1), about the same centers."""
+        new = copy.copy(self)
+        new.concentrations = concentrations.double()
+        new._terms = _terms(self.space, self._terms.centers, new.concentrations, self.weights)
+        return new
 
     @property
     def kernel_part(self) -> tuple[float, AdaptiveKernels]:
@@ -176,10 +185,11 @@ class AdaptiveKernels(Density, kind="kernels"):
         return {"kernels": len(self.centers)}
 
 
-def _terms(space: Space, images: Tensor, kappa: Tensor, weights: Tensor) -> Terms:
-    """Return kernels about all images (E, N, m) of their centers: then points need no images."""
+def _terms(space: Space, features: Tensor, kappa: Tensor, weights: Tensor) -> Terms:
+    """Return kernels about all E images (m, E * N) of their centers: then points need no images."""
+    images = features.shape[1] // len(kappa)
     if space.is_round:
-        every = kappa.mT.repeat(1, len(images))
+        every = kappa.mT.repeat(1, images)
         peaks = _round_peaks(kappa[:, 0], space.dim)
     else:
         # these images permute and flip the axes of the frame
@@ -188,8 +198,7 @@ def _terms(space: Space, images: Tensor, kappa: Tensor, weights: Tensor) -> Term
         turns = torch.as_tensor(moved).to(kappa)
         every = torch.cat([turn @ kappa.mT for turn in turns], dim=1)
         peaks = -(special.i0e(kappa) * rectangle(space).to(kappa)).log().sum(dim=1)
-    centers = images.flatten(0, 1).mT.contiguous()
-    return Terms(centers, every, (peaks + weights.log()).repeat(len(images)))
+    return Terms(features, every, (peaks + weights.log()).repeat(images))
 
 
 def _round_peaks(kappa: Tensor, dim: int) -> Tensor:
