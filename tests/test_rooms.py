@@ -17,7 +17,16 @@ TILES = ["geometry", "tilings", "silhouette", "likeness", "tile", "result_file"]
 TILES += ["search", "pictures", "scene", "motifs", "exporting", "solids"]
 TILES += ["art", "motion", "pages"]
 DENSITY = ["spaces", "models", "inference", "fitting"]
-DENSITY += ["estimator", "comparing", "regions", "tables", "pictures", "run_folder", "operations"]
+DENSITY += [
+    "estimator",
+    "comparing",
+    "regions",
+    "summaries",
+    "tables",
+    "pictures",
+    "run_folder",
+    "operations",
+]
 DENSITY += ["cross_validation"]
 ROOMS = [
     *("runtime", "symmetry", "fields", "flows", "drawing", "batch"),

@@ -12,7 +12,7 @@ sentence, in a string under it::
 
 The class becomes a frozen dataclass whose fields are keywords. A field without default is required.
 Types are those of `orbiflow.kinds` and `orbiflow.units`: `bool`, `int`, `float`, `str`, `Path`,
-`Literal`, tuples, unions with None, `Length`, `Size`, ...; `Annotated` adds:
+`Literal`, tuples, unions with None, `Length`, `PageSize`, ...; `Annotated` adds:
 
 - `Range(1, 100)`, `Range(above=0)`, `Unit("s")`: which numbers, in which unit.
 - `Option("-n", "--count", off="--no-count")`: what the command line calls the field, where that is

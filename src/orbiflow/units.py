@@ -178,9 +178,6 @@ SignedLength = Annotated[
 ]
 """A length that may be negative: text with a unit, or a number of mm."""
 
-Size = Annotated[tuple[_Side, _Side], Parsed(size, "a size such as 300x200mm", "SIZE"), Unit("mm")]
-"""A width and a height: text with a unit, or two numbers of mm."""
-
 PageSize = Annotated[
     tuple[_Side, _Side],
     Parsed(page_size, "a size such as 300x200mm, or a page such as A4 or A4-landscape", "SIZE"),

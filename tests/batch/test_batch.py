@@ -8,6 +8,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from batch.small_batches import QUICK, Here, rows, run_call, write_boot
@@ -213,6 +214,27 @@ def test_mistakes(given: dict[str, Any], names: set[str]) -> None:
 def test_what_belongs_to_one_silhouette_is_no_setting_of_a_batch(name: str) -> None:
     with pytest.raises(SettingError, match=f"batch has no setting '{name}'"):
         find("batch").call({"folder": "in", name: "a.png"})
+
+
+@pytest.mark.usefixtures("here")
+def test_a_batch_fits_as_fit_does(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    rows_of = np.column_stack(
+        [rng.vonmises(0, 3, (40, 2)), rng.uniform(1, 2, 40), np.arange(40) // 4]
+    )
+    rows_of[3, 0] = np.nan
+    (tmp_path / "in").mkdir()
+    file = tmp_path / "in" / "one.csv"
+    np.savetxt(file, rows_of, delimiter=",", header="phi,psi,w,chain", comments="")
+    given = {"space": "torus", "unit": "radians", "components": ["kernels"], "seed": 3}
+    given |= {"weights": "w", "group": "chain", "missing": "marginalise"}
+    find("density fit").call({**given, "data": file, "out": tmp_path / "fit"}).run()
+    batch = {**given, "folder": tmp_path / "in", "out": tmp_path / "out"}
+    assert find("density batch").call(batch).run().summary["done"] == 1
+    ours, single = (tmp_path / name / "density.safetensors" for name in ("out/one", "fit"))
+    assert ours.read_bytes() == single.read_bytes()
+    with pytest.raises(SettingError, match="a flow alone has no choice"):
+        find("density batch").call({**batch, "components": ["flow"]}).run()
 
 
 def test_no_scheduler_there(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -151,3 +151,8 @@ def test_options_of_a_search_are_those_of_escherize() -> None:
     of_one = {"--emphasis", "--strength", "--pin", "--pin-angle"}
     own, other = options("batch"), options("escherize")
     assert {names[0] for names in other - own} == {*of_one, "--called", "--shown-out", "--verbose"}
+
+
+def test_a_batch_of_densities_has_all_options_of_a_fit() -> None:
+    own, of_one = ({field.name for field in find(f"density {n}").fields} for n in ("batch", "fit"))
+    assert of_one - own == {"data", "picture"}

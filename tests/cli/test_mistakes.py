@@ -223,6 +223,14 @@ def test_a_missing_argument(orbiflow) -> None:
     assert "IMAGE is missing" in outcome.err
 
 
+@pytest.mark.parametrize("words", ["--out --force", "--seed --out x", "--for -o x.svg"])
+def test_an_option_is_not_taken_for_the_value_of_another(words: str, orbiflow) -> None:
+    command = "export" if words.startswith("--for") else "escherize"
+    outcome = orbiflow(command, "silhouette.png", *words.split())
+    assert outcome.status == 2
+    assert outcome.err.startswith(f"error: {words.split()[0]} needs a value; give ")
+
+
 def test_the_disc_is_a_good_input(tmp_path: Path) -> None:
     # the options above must be what is wrong
     assert 0 < np.mean(np.asarray(Image.open(disc(tmp_path))) == 0) < 0.5

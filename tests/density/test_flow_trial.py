@@ -14,8 +14,10 @@ from orbiflow.density.fitting.automatic import BEFORE_END
 from orbiflow.density.fitting.evidence import (
     FIRST,
     Candidates,
+    Course,
     TriedFlow,
     candidates_of,
+    flow_beside,
     judged,
     stacked,
     supported_weights,
@@ -27,6 +29,7 @@ from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence
 from orbiflow.density.fitting.rows import Gain
 from orbiflow.density.fitting.settings import Component
+from orbiflow.runtime import SideBySide, one_core
 
 QUICK: dict[str, Any] = {
     "max_frequency": 2, "segments": 2, "iterations": 10, "roughness": (1e-3,)
@@ -42,9 +45,12 @@ def evidence(weights: np.ndarray | None = None) -> tuple[Folds, Candidates, torc
     folds = folds_of(
         weighed(points, weights), together=False, generator=torch.Generator().manual_seed(0)
     )
-    with pytest.MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch, one_core():
         few_kernels(patch)
-        candidates = candidates_of(SPACE, [KernelFamily(SPACE)], folds, lambda *_: None, Budget())
+        course = Course(lambda *_: None, 1.0)
+        candidates = candidates_of(
+            SPACE, [KernelFamily(SPACE)], folds, course, Budget(), SideBySide()
+        )
     return (
         folds,
         candidates,
@@ -55,7 +61,10 @@ def evidence(weights: np.ndarray | None = None) -> tuple[Folds, Candidates, torc
 def tried(
     folds: Folds, candidates: Candidates, weights: torch.Tensor, told=lambda *_: None
 ) -> TriedFlow:
-    return try_flow(SPACE, folds, candidates, weights, FlowSettings(**QUICK), Budget(), told)
+    settings = FlowSettings(**QUICK)
+    return try_flow(
+        folds, candidates, weights, lambda k: flow_beside(SPACE, folds, k, settings, Budget(), told)
+    )
 
 
 @pytest.mark.parametrize("tenths", [1, 2])
@@ -84,6 +93,14 @@ def test_no_step_of_a_fit_is_half_of_it(
     assert shares == sorted(shares)
     assert shares[-1] == BEFORE_END
     assert max(np.diff(shares)) < 0.35
+
+
+def test_a_flow_that_has_no_time_is_none() -> None:
+    folds, candidates, weights = evidence()
+    spent = Budget(seconds=0)
+    none = flow_beside(SPACE, folds, 0, FlowSettings(**QUICK), spent, lambda *_: None)
+    assert none is None
+    assert try_flow(folds, candidates, weights, lambda _: none) == TriedFlow()
 
 
 @pytest.mark.parametrize("weighted", [False, True])

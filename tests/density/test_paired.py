@@ -107,6 +107,34 @@ def test_groups_keep_chance_from_being_taken_for_a_difference() -> None:
     assert kept > 50
 
 
+def test_notes_on_groups_that_are_few_unequal_or_of_single_rows() -> None:
+    table = scores(np.random.default_rng(7), 200, 0, 0)
+    sizes = {"equal": [8] * 25, "few": [20] * 10, "unequal": [100] + [4] * 25}
+    notes = {
+        name: compare_scores(
+            table, ComparisonSettings(bootstrap=100), groups=np.repeat(np.arange(len(own)), own)
+        ).notes
+        for name, own in sizes.items()
+    }
+    assert notes["equal"] == ()
+    assert notes["few"] == ("of only 10 groups the uncertainties themselves are rough",)
+    assert "26 groups, no better than 3.8 equal ones, the" in notes["unequal"][0]
+    lone = compare_scores(table, ComparisonSettings(bootstrap=100), groups=np.arange(200)).notes
+    assert "each row has a group of its own" in lone[0]
+    assert not compare_scores(table, ComparisonSettings(bootstrap=100)).notes
+
+
+@pytest.mark.usefixtures("quick_fits")
+def test_a_fit_says_that_groups_are_of_single_rows() -> None:
+    data = np.random.default_rng(8).vonmises(0, 1, (60, 2))
+    fits = {
+        count: DensityEstimator(components="kernels").fit(data, groups=np.arange(60) % count)
+        for count in (60, 30)
+    }
+    said = {n: any("group of its own" in x for x in f.report_.notes) for n, f in fits.items()}
+    assert said == {60: True, 30: False}
+
+
 def test_the_best_is_named_only_if_it_beats_all() -> None:
     rng = np.random.default_rng(3)
     base = rng.normal(size=400)

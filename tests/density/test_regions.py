@@ -23,6 +23,8 @@ from orbiflow.density import (
     outlines,
     to_geojson,
 )
+from orbiflow.density.regions import boundaries
+from orbiflow.density.regions import levels as region_levels
 from orbiflow.density.regions.grid import LevelGrid, filled
 from orbiflow.errors import OrbiflowError
 
@@ -192,6 +194,56 @@ def test_islands_between_the_nodes_are_found() -> None:
     assert any("too small to outline" in note for note in rough.notes)
 
 
+@pytest.fixture(name="few_samples")
+def few_samples_fixture(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(boundaries, "CHECKED", 4000)
+    monkeypatch.setattr(region_levels, "KERNELS", 2000)
+
+
+ACROSS = [
+    ("torus", [math.pi, math.pi], 4), ("klein-bottle", [0.0, 0.1], 2), ("sphere", [10.0, 180.0], 2),
+    ("klein-bottle", [1.0, -1.57], 2), ("sphere", [88.0, 180.0], 1),
+    ("projective-plane", [0.0, 20.0], 2),
+]  # fmt: skip
+
+
+@pytest.mark.usefixtures("few_samples")
+@pytest.mark.parametrize(("name", "center", "pieces"), ACROSS)
+def test_an_island_across_an_edge_is_one(name: str, center: list[float], pieces: int) -> None:
+    """Each of its pieces holds less than the least mass of an island, and all together more."""
+    space = make_space(name)
+    far = [[45.0, 80.0]] if space.is_round else [[1.5, 1.0]]
+    density = kernels_about(space, [center, *far], [60.0, 60.0], [0.7, 0.3])
+    levels = DensityLevels(density, samples=1000)
+    (large,) = outlines(levels, [levels.highest(0.9)], budget=1, min_mass=0.55)
+    assert len(large.shape.geoms) == pieces
+    assert 0.55 < large.mass < 0.7
+    assert "left out 1 island of less than 0.55 of the mass, which held 0." in large.notes[-1]
+    assert float(large.notes[-1].split()[-3]) == pytest.approx(0.9 - large.mass, abs=0.05)
+    assert large.size < 0.85 * large.region.size
+
+
+@pytest.mark.usefixtures("few_samples")
+@pytest.mark.parametrize("name", ["torus", "sphere"])
+def test_regions_of_a_smoothed_density_hold_the_mass_of_the_density(name: str) -> None:
+    """Sixty peaks within 6 degrees of a place are as many islands, or one of the smoothed density."""
+    space = make_space(name, unit="degrees") if name == "torus" else make_space(name)
+    middle = np.array([20, 178])
+    specks = np.random.default_rng(3).uniform(-6, 6, (60, 2)) + middle
+    density = kernels_about(space, [*specks, [-30, 0]], [1e5] * 60 + [30.0], [1] * 60 + [20])
+    levels = DensityLevels(density, samples=2000, smooth=2.0)
+    region = levels.highest(0.5)
+    (smooth,) = outlines(levels, [region], budget=20_000)
+    assert len(smooth.shape.geoms) <= 2  # cut at 180 degrees
+    assert (region.smooth, region.held) == (2.0, pytest.approx(0.5, abs=1e-3))
+    assert smooth.mass == pytest.approx(0.5, abs=4 * math.hypot(region.error, smooth.error))
+    assert smooth.size == pytest.approx(region.size, abs=4 * region.size_error)
+    assert region.size_error < 0.05 * region.size
+    sharp = DensityLevels(density, samples=2000).highest(0.5)
+    assert sharp.size < 0.2 * region.size
+    assert region.contains(specks)[np.hypot(*(specks - middle).T) < 3].all()
+
+
 @pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("dim", [1, 2, 4])
 def test_thresholds_in_any_dimension(dim: int) -> None:
@@ -241,6 +293,7 @@ TORUS = kernels_about(make_space("torus"), [[0.0, 0.0]], [4.0], [1.0])
         (lambda: highest_density_region(DensityEstimator(), 0.5), "not fitted"),
         (lambda: highest_density_region("quakes", 0.5), "Density"),  # pyright: ignore[reportArgumentType]
         (lambda: DensityLevels(TORUS, samples=3), "samples"),
+        (lambda: DensityLevels(TORUS, smooth=1e-5), "smooth must be at least 0.00032"),
         (lambda: DensityLevels(TORUS).above(math.inf), "level"),
         (lambda: highest_density_region(TORUS, 0.5).contains([[1.0, 2.0, 3.0]]), "2 angles"),
         (lambda: to_geojson(outlines(*both())), "not for the angles of a torus"),

@@ -168,7 +168,7 @@ def test_options_that_are_none() -> None:
         (lambda: Torus(2, unit="grad"), "unit must be radians, degrees or turns"),
         (lambda: Sphere(form="utm"), "form must be latlon or vector"),
         (lambda: Sphere(rotation=2 * np.eye(3)), "orthogonal"),
-        (lambda: make_space("moebius"), "unknown space 'moebius'; the four are"),
+        (lambda: make_space("moebius"), "unknown space 'moebius'; there are torus"),
         (lambda: make_space("sphere", unit="degrees"), "the sphere has no option unit"),
     ):
         with pytest.raises(OrbiflowError, match=message):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from scipy.stats import vonmises
+from scipy.stats import binom, vonmises
 
 from orbiflow.density import (
     ComparisonSettings,
@@ -66,6 +66,83 @@ def test_rows_of_a_group_are_no_evidence_of_a_difference() -> None:
     assert np.median(by_row) < 0.02
     assert 0.25 < np.mean(by_group) < 0.75
     assert 0.25 < np.mean(shared) < 0.75
+
+
+DESIGNS = {
+    "20 of 10 rows, 20 of 1": ([(10, 0)] * 20 + [(0, 1)] * 20, False),
+    "30 shared, 8 rows and 1": ([(8, 1)] * 30, False),
+    "6 of 8 rows, 6 of 1": ([(8, 0)] * 6 + [(0, 1)] * 6, False),
+    "shared and not": ([(7, 2)] * 8 + [(3, 0)] * 9 + [(0, 6)] * 12, False),
+    "8 of 4 rows, 8 of 4": ([(4, 0)] * 8 + [(0, 4)] * 8, True),
+}
+"""Rows of each group in the first data set and in the second, and whether p is exact."""
+
+
+@pytest.mark.parametrize("cluster", [0.0, 0.6])
+@pytest.mark.parametrize("design", DESIGNS)
+def test_the_level_holds_whatever_the_sizes_of_groups(design: str, cluster: float) -> None:
+    sizes, exact = DESIGNS[design]
+    labels = np.repeat(np.arange(len(sizes)), np.sum(sizes, axis=1))
+    first = np.concatenate([np.arange(own + other) < own for own, other in sizes])
+    groups, space, wrong, trials = Groups.of(labels, len(labels)), make_space("torus"), 0, 30
+    for trial in range(trials):
+        rng = np.random.default_rng(trial)
+        normal = rng.normal(size=(len(labels), 2)), rng.normal(size=(len(sizes), 2))
+        angles = np.sqrt(1 - cluster) * normal[0] + np.sqrt(cluster) * normal[1][labels]
+        points = torch.as_tensor((angles / 8) % 1)
+        found = mmd_test(space, points, first, groups, permutations=59, seed=trial)
+        assert found.exact is exact
+        wrong += found.p <= 0.05
+    assert wrong <= binom.isf(1e-3, trials, 0.05)
+
+
+def test_a_difference_between_groups_of_different_sizes_is_found() -> None:
+    sizes, _ = DESIGNS["20 of 10 rows, 20 of 1"]
+    labels = np.repeat(np.arange(40), np.sum(sizes, axis=1))
+    rng = np.random.default_rng(0)
+    points = torch.as_tensor(rng.normal(0.1 + 0.15 * (labels < 20)[:, None], 0.1, (220, 2)) % 1)
+    assert p_of("torus", points, labels < 20, labels, 0) <= 0.05
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "both", "enough"),
+    [
+        ([4] * 3, [4] * 3, [], False),
+        ([4] * 4, [4] * 4, [], True),
+        ([4] * 3, [4] * 4, [], True),
+        ([4] * 2, [4] * 40, [], False),
+        ([4] * 5, [2] * 50, [], False),
+        ([4] * 6, [2] * 6, [], True),
+        ([], [], [(3, 3)] * 5, False),
+        ([], [], [(3, 1)] * 5, False),
+        ([], [], [(3, 1)] * 6, True),
+        ([4] * 2, [3] * 2, [(2, 1)] * 4, True),
+    ],
+)
+def test_too_few_groups_are_refused(
+    own: list[int], other: list[int], both: list[tuple[int, int]], enough: bool
+) -> None:
+    sizes = [(rows, 0) for rows in own] + [(0, rows) for rows in other] + both
+    labels = np.repeat(np.arange(len(sizes)), np.sum(sizes, axis=1))
+    first = np.concatenate([np.arange(one + two) < one for one, two in sizes])
+    points = (
+        torch.rand(len(labels), 2, dtype=torch.float64) / 20 + 0.4 * torch.as_tensor(first)[:, None]
+    )
+    if not enough:
+        with pytest.raises(OrbiflowError, match=r"too few .* level 0.95, which takes [46] of each"):
+            p_of("torus", points, first, labels, 0)
+        return
+    # far apart, and as clearly as so few can tell
+    assert p_of("torus", points, first, labels, 0) <= 0.06
+    with pytest.raises(OrbiflowError, match="99 permutations are too few"):
+        mmd_test(
+            make_space("torus"),
+            points,
+            first,
+            Groups.of(None, len(first)),
+            permutations=99,
+            level=0.999,
+        )
 
 
 def test_whole_groups_are_drawn() -> None:

@@ -96,3 +96,11 @@ def test_constants_have_no_slope() -> None:
         field.parameters_[:2] = 1.0
     assert steep(field) == 0.0
     assert float(field.lipschitz_bound()) == 0.0
+
+
+@given(st.sampled_from(sorted(WALLPAPER_GROUPS)), st.integers(1, 3), seeds)
+def test_the_bound_is_near_what_is_reached_in_the_plane(
+    name: str, max_frequency: int, seed: int
+) -> None:
+    field = random_field(wallpaper_group(name), max_frequency, seed)
+    assert float(field.lipschitz_bound()) <= 1.35 * steepest(field, seed, 4000)

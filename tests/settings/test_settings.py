@@ -43,7 +43,7 @@ from orbiflow.settings import (
     Unit,
     fields_of,
 )
-from orbiflow.units import Colour, Length, LengthOrZero, PageSize, Size
+from orbiflow.units import Colour, Length, LengthOrZero, PageSize
 from strategies import names_in
 
 
@@ -63,7 +63,7 @@ class Sheet(Settings, group="Sheet"):
     burns away."""
 
     page: PageSize | None = None
-    bed: Size | None = None
+    bed: PageSize | None = None
     ink: Colour = "#000000"
     copies: Annotated[int | None, Range(1, 99), Option("-n"), DefaultText("many")] = None
     share: Annotated[float, Range(above=0, below=1)] = 0.5

@@ -30,6 +30,7 @@ from orbiflow.runtime import (
     Sink,
     call_from_json,
     event_from_json,
+    one_core,
     process_context,
     stays_inside,
     work,
@@ -220,7 +221,8 @@ def carry_out(header: str, data: bytes, cancel: Cancel) -> tuple[str, dict[str, 
     Returns:
         The last event as text, and files, for `Answer.from_worker`. Whatever fails is in the event.
     """
-    with tempfile.TemporaryDirectory(prefix="orbiflow-", ignore_cleanup_errors=True) as folder:
+    temporary = tempfile.TemporaryDirectory(prefix="orbiflow-", ignore_cleanup_errors=True)
+    with temporary as folder, one_core():
         end, files = _run(json.loads(header), data, Path(folder), cancel)
     text = json.dumps(end.to_json(), allow_nan=False)
     for part in ("in", "out"):  # a folder that is gone is not to be named

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
 from inspect import Parameter as Argument
 from inspect import Signature
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -43,7 +44,9 @@ def run(words: Sequence[str]) -> int:
     """Run a command and return its exit status."""
     try:
         try:
-            status = app_for(words)(words)
+            app = app_for(words)
+            _check_values(words, _operation(words))
+            status = app(words)
         except CycloptsError as error:
             raise _mistake(error, _operation(words), words) from error
     except OrbiflowError as error:
@@ -226,8 +229,9 @@ def _mistake(
     if isinstance(error, MissingArgumentError) and (unknown := _unknown(words, fields.values())):
         return unknown  # what is missing may be what was misspelt
     if isinstance(error, MissingArgumentError) and named in fields:
-        lacks = "needs a value" if error.keyword else "is missing"
-        return SettingError(f"{{{named}}} {lacks}; give {literal(fields[named].kind.wanted)}")
+        if error.keyword:
+            return _needs_value(fields[named])
+        return SettingError(f"{{{named}}} is missing; give {literal(fields[named].kind.wanted)}")
     if isinstance(error, CoercionError) and error.token and named in fields:
         try:
             fields[named].parse([error.token.value])
@@ -235,6 +239,20 @@ def _mistake(
             return own
     error.verbose = False
     return OrbiflowError(" ".join(str(error).split()))
+
+
+def _check_values(words: Sequence[str], operation: Operation | None) -> None:
+    """Refuse an option whose value is missing, so that the next option would be taken for it."""
+    fields = operation.fields if operation else ()
+    known = {name for field in fields for name in (*field.option.names, field.option.off)}
+    valued = {name: field for field in fields for name in field.option.names}
+    for word, after in pairwise(words):
+        if after in known and word in valued and not valued[word].is_of(FlagKind):
+            raise _needs_value(valued[word])
+
+
+def _needs_value(field: Field) -> SettingError:
+    return SettingError(f"{{{field.name}}} needs a value; give {literal(field.kind.wanted)}")
 
 
 def _repeated(word: str, words: Sequence[str], fields: Iterable[Field]) -> OrbiflowError:

@@ -71,6 +71,7 @@ from .pictures.plots import THUMBNAIL as THUMBNAIL
 from .pictures.plots import Plotted as Plotted
 from .pictures.plots import is_one_file as is_one_file
 from .pictures.plots import plot_density as plot_density
+from .pictures.roses import rose_picture as rose_picture
 from .pictures.settings import PlotSettings as PlotSettings
 from .pictures.square import edge_pairs as edge_pairs
 from .pictures.surfaces import density_page as density_page
@@ -91,6 +92,7 @@ from .spaces.flat import KleinBottle as KleinBottle
 from .spaces.flat import Torus as Torus
 from .spaces.patches import KleinCoordinates as KleinCoordinates
 from .spaces.patches import to_klein as to_klein
+from .spaces.quotient import QuotientSpace as QuotientSpace
 from .spaces.round import ProjectivePlane as ProjectivePlane
 from .spaces.round import RoundSpace as RoundSpace
 from .spaces.round import Sphere as Sphere
@@ -102,6 +104,19 @@ from .spaces.space import SPACES as SPACES
 from .spaces.space import Space as Space
 from .spaces.space import make_space as make_space
 from .spaces.space import space_class as space_class
+from .spaces.unit_vectors import CubicOrientations as CubicOrientations
+from .spaces.unit_vectors import HexagonalOrientations as HexagonalOrientations
+from .spaces.unit_vectors import Hypersphere as Hypersphere
+from .spaces.unit_vectors import ProjectiveSpace as ProjectiveSpace
+from .spaces.unit_vectors import RotationSpace as RotationSpace
+from .spaces.unit_vectors import UnitVectorSpace as UnitVectorSpace
+from .summaries import AngleSummary as AngleSummary
+from .summaries import AxisSummary as AxisSummary
+from .summaries import Correlation as Correlation
+from .summaries import DirectionSummary as DirectionSummary
+from .summaries import summarize_angles as summarize_angles
+from .summaries import summarize_axes as summarize_axes
+from .summaries import summarize_directions as summarize_directions
 from .tables.files import append_columns as append_columns
 from .tables.files import column_names as column_names
 from .tables.files import is_identifier as is_identifier

@@ -31,8 +31,8 @@ from orbiflow.density.inference import (
     given_named,
     marginal,
 )
-from orbiflow.density.models import MOST_DIM, Density, log_density_gradient
-from orbiflow.density.spaces import Space, space_class
+from orbiflow.density.models import Density, flow_obstacle, log_density_gradient
+from orbiflow.density.spaces import Space, space_for
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import check_names, fields_of
 
@@ -71,14 +71,16 @@ class DensityEstimator:
     Follows scikit-learn's conventions: works in a `GridSearchCV` and a `Pipeline`.
 
     Args:
-        space: "torus", "sphere", "klein-bottle", "projective-plane", or a `Space`.
-        unit: The unit of angles on torus and Klein bottle: "radians", "degrees" or "turns".
+        space: "torus", "sphere" and other names that `make_space` takes; the name of a group, such as
+            "p4m", "hantzsche-wendt" or "P 21 21 21"; or a `Space`, such as `QuotientSpace(group)`.
+        unit: The unit of angles, and of rotations in three columns: "radians", "degrees" or "turns".
         missing: "refuse" rows that lack an angle (NaN), or, on tori, "marginalise": fit kernels and
             mixtures to them, and score them, by the density of the angles that they have.
         settings: Those of `DensitySettings`, by name: `components`, `repeats`, `max_frequency`,
             `seconds`, `seed` and others. They are checked by `fit`.
 
-    On tori of four or more angles there is no flow, and its settings must be left at their defaults.
+    On tori of four or more angles and on spaces of unit vectors there is no flow, and its settings
+    must be left at their defaults.
 
     After `fit`: `space_`, `density_` (a `Density`), `report_` (a `FitReport`),
     `n_features_in_`, and `feature_names_in_` where the data, a data frame, name their columns.
@@ -140,7 +142,7 @@ class DensityEstimator:
         points = self._chart(data)
         self.density_: Density
         self.report_: FitReport
-        if self.space_.dim > MOST_DIM:
+        if flow_obstacle(self.space_):
             _refuse_flows(settings, self.space_)
         settings.check_rows(self.missing, None if groups is None else "groups")
         if settings.flow_alone:
@@ -315,7 +317,7 @@ class DensityEstimator:
             return self.space
         if data.ndim != 2:
             raise OrbiflowError(f"expected data of shape (N, k), got {data.shape}")
-        return space_class(self.space).for_data(data, unit=self.unit, seed=self.settings().seed)
+        return space_for(self.space, data, unit=self.unit, seed=self.settings().seed)
 
     def _chart(self, data: np.ndarray) -> torch.Tensor:
         """Points of data (N, k); with missing angles where they may be."""
@@ -340,8 +342,9 @@ class DensityEstimator:
 def _refuse_flows(settings: DensitySettings, space: Space) -> None:
     given = list(settings.of_flow)
     if given:
+        where = f"a torus of {space.dim} angles" if space.is_torus else f"the {space.name}"
         names = ", ".join(f"{{{name}}}" for name in given)
         raise SettingError(
-            f"{names} would have no effect on a torus of {space.dim} angles, where there is no flow; "
-            f"leave {'it' if len(given) == 1 else 'them'} out"
+            f"{names} would have no effect on {where}, where there is no flow; leave "
+            f"{'it' if len(given) == 1 else 'them'} out"
         )

@@ -8,8 +8,10 @@ from .protocol import jacobian as jacobian
 from .protocol import lipschitz_bound as lipschitz_bound
 from .protocol import prepared as prepared
 from .protocol import prepared_with_divergence as prepared_with_divergence
+from .protocol import prepared_with_jacobian as prepared_with_jacobian
 from .protocol import transformed as transformed
 from .spline_field import SplineField as SplineField
+from .spline_field import has_even_grid as has_even_grid
 from .spline_field import padded as padded
 from .spline_field import spline_sum as spline_sum
 from .spline_field import symbol as symbol

@@ -17,6 +17,7 @@ s_i in [-1, 1]. The spectral norm is convex in s, hence largest at a corner of t
 over all choices of signs is a bound, and there are few signs (design point 17).
 """
 
+import copy
 import itertools
 import math
 from abc import ABC, abstractmethod
@@ -65,8 +66,8 @@ class InvariantBasis:
 def frequency_set(group: CrystallographicGroup, max_frequency: int) -> Array:
     """Return (M, d) integer frequencies, one of each pair +-k, k = 0 first.
 
-    The box |k_i| <= max_frequency and its images under the dual point group: a set that is not a
-    union of orbits would lose symmetry (hexagonal groups).
+    The box |k_i| <= max_frequency and its images under the dual point group, rows k @ B^-1 R B: a set
+    that is not a union of orbits would lose symmetry (hexagonal groups).
     """
     if isinstance(max_frequency, bool) or int(max_frequency) != max_frequency or max_frequency < 0:
         raise OrbiflowError(f"max_frequency must be an integer >= 0, got {max_frequency!r}")
@@ -80,14 +81,8 @@ def frequency_set(group: CrystallographicGroup, max_frequency: int) -> Array:
         )
     axis = np.arange(-max_frequency, max_frequency + 1)
     box = np.stack(np.meshgrid(*[axis] * group.dim, indexing="ij"), axis=-1).reshape(-1, group.dim)
-    images = np.concatenate([box @ m for m in np.unique(_integral_parts(group), axis=0)])
+    images = np.concatenate([box @ m for m in np.unique(group.integral_parts, axis=0)])
     return np.unique(_half(images)[0], axis=0)
-
-
-def _integral_parts(group: CrystallographicGroup) -> Array:
-    """Return (|G|, d, d) integer matrices B^-1 R B; a frequency k (a row) goes to k @ M."""
-    m = group.inverse_lattice @ group.linear_parts @ group.lattice
-    return np.round(m).astype(np.int64)
 
 
 def _half(k: Array) -> tuple[Array, Array]:
@@ -105,7 +100,7 @@ def _action(group: CrystallographicGroup, frequencies: Array) -> tuple[Array, Ar
     (g V)(p) = R^-1 V(R p + t) sends the coefficient at k to k M times R^-1 exp(2 pi i k . B^-1 t).
     """
     d = group.dim
-    integral = _integral_parts(group)
+    integral = group.integral_parts
     targets = np.empty((group.order, len(frequencies)), dtype=np.int64)
     blocks = np.zeros((group.order, len(frequencies), 2, d, 2, d))
     base = int(np.abs(frequencies).max(initial=0)) * 2 + 3
@@ -190,6 +185,7 @@ class InvariantField(nn.Module, ABC):
     values: Tensor
     scale: Tensor
     frame: Tensor
+    stackable = False  # whether the parameters may be those of a stack
 
     def __init__(
         self,
@@ -220,6 +216,39 @@ class InvariantField(nn.Module, ABC):
     @abstractmethod
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
         """Return the gradient (P,) of sum forces . V(points) in the parameters; inputs (N, d)."""
+
+    def with_parameters(self, parameters: Tensor) -> Self:
+        """Return the field with other parameters, such as the output of a network, which get gradients.
+
+        Args:
+            parameters: (P,) for one field, or (S, P) for a stack of S: of S contexts, say. Only a
+                `FourierField` can be a stack.
+
+        Raises `OrbiflowError` for another shape or dtype.
+
+        >>> from orbiflow.fields import FourierField
+        >>> from orbiflow.symmetry import wallpaper_group
+        >>> field = FourierField(wallpaper_group("p4"), 1)
+        >>> context, network = torch.rand(5, 3), torch.nn.Linear(3, field.size)
+        >>> each = field.float().with_parameters(network(context))
+        >>> each(torch.rand(5, 7, 2)).shape  # seven points of each context
+        torch.Size([5, 7, 2])
+        """
+        own = self.parameters_
+        if parameters.shape[-1:] != (self.size,) or parameters.dim() > 1 + self.stackable:
+            wanted = f"({self.size},)" + f" or (S, {self.size})" * self.stackable
+            raise OrbiflowError(
+                f"expected parameters of shape {wanted}, got {tuple(parameters.shape)}"
+            )
+        if parameters.dtype != own.dtype:
+            raise OrbiflowError(
+                f"expected parameters of the field's dtype, {own.dtype}, got {parameters.dtype}: "
+                f"convert them, or the field with .to({parameters.dtype})"
+            )
+        view = copy.copy(self)  # shallow: it shares the basis
+        view._parameters = {}
+        view.parameters_ = parameters  # pyright: ignore[reportAttributeAccessIssue]
+        return view
 
     def _check_points(self, points: Tensor) -> None:
         """Raise OrbiflowError for points that the field cannot be evaluated at."""

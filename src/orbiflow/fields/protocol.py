@@ -10,6 +10,7 @@ must do what is described here. `jacobian` returns dV_i / dp_j (..., d, d), `div
 | `jacobian(points)`, `divergence(points)` | closed forms are used in place of autograd |
 | `bound()` | what depends only on the parameters is computed once for many evaluations |
 | `bound_with_divergence()` | V and its divergence come from shared work |
+| `bound_with_jacobian()` | V and its Jacobian come from shared work |
 | `lipschitz_bound()` | the accuracy of integration steps is judged without trying them |
 
 Built-in fields are evaluated by autograd functions with hand-written derivatives. Under `torch.func`
@@ -62,6 +63,16 @@ def prepared_with_divergence(field: VectorField) -> Callable[[Tensor], tuple[Ten
         return values, _trace(slopes)
 
     return both
+
+
+def prepared_with_jacobian(field: VectorField) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
+    """Return, as `prepared` does, a function for V and its Jacobian, sharing work if possible."""
+    own: Any = getattr(field, "bound_with_jacobian", None)
+    if own:
+        return own()
+    if hasattr(field, "jacobian"):
+        return lambda points: (field(points), jacobian(field, points))
+    return lambda points: _by_autograd(field, points)
 
 
 def lipschitz_bound(field: object) -> float | None:

@@ -362,29 +362,60 @@ class SplineField(InvariantField):
         return points.reshape(-1, d).mT * rates[:, None]
 
 
+def has_even_grid(group: CrystallographicGroup) -> bool:
+    """Return whether a group can have a `SplineField`.
+
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> has_even_grid(wallpaper_group("p4m")), has_even_grid(wallpaper_group("p6m"))
+    (True, False)
+    """
+    # one wave along the longest side has some grid, if any number of waves has
+    lengths = np.abs(np.diag(group.lattice))
+    return _keeps_axes(group) and _even_grid(group, 1 / lengths.min()) is not None
+
+
 def grid_sides(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[int, ...]:
     """Return the number of points along each lattice vector of a grid that the group preserves.
 
-    The points are equally spaced.
+    The points are equally spaced along each vector.
     """
-    lengths = np.diag(group.lattice)
-    permute = np.abs(group.linear_parts)
-    if (
-        not 1 <= group.dim <= 3
-        or not np.allclose(group.lattice, np.diag(lengths))
-        or not np.allclose(permute, np.round(permute))
-    ):
+    if not _keeps_axes(group):
         raise OrbiflowError(
             "a spline field needs a rectangular lattice in one to three dimensions and linear parts "
             f"that permute and flip the axes; {group!r} has not: use FourierField"
         )
-    waves = np.abs(basis.frequencies).max(axis=0) / lengths  # per unit of length
-    # multiples of four: half and quarter translations stay on the grid
-    density = (
-        4 * math.ceil(POINTS_PER_WAVE * waves.max() * lengths.min() / 4 + 1e-9) / lengths.min()
-    )
-    sides: Array = density * lengths
-    shifts: Array = np.array([g.translation for g in group.cosets]) * density
-    if not np.allclose(sides, np.round(sides)) or not np.allclose(shifts, np.round(shifts)):
+    waves = np.abs(basis.frequencies).max(axis=0) / np.diag(group.lattice)  # per unit of length
+    sides = _even_grid(group, float(waves.max()))
+    if sides is None:
         raise OrbiflowError(f"no even grid is mapped to itself by {group!r}: use FourierField")
-    return tuple(round(m) for m in sides)
+    return sides
+
+
+def _keeps_axes(group: CrystallographicGroup) -> bool:
+    """Return whether the lattice is rectangular and the group permutes and flips the axes."""
+    permute = np.abs(group.linear_parts)
+    return bool(
+        1 <= group.dim <= 3
+        and np.allclose(group.lattice, np.diag(np.diag(group.lattice)))
+        and np.allclose(permute, np.round(permute))
+    )
+
+
+def _even_grid(group: CrystallographicGroup, waves: float) -> tuple[int, ...] | None:
+    """Return the sides of a grid for so many waves per unit of length, None if the group has none.
+
+    Equally dense along all axes, if it can be; else each side has as many points as it needs.
+    """
+    lengths = np.diag(group.lattice)
+    shifts = group.translations / lengths
+    # multiples of four: half and quarter translations stay on the grid
+    density = 4 * math.ceil(POINTS_PER_WAVE * waves * lengths.min() / 4 + 1e-9) / lengths.min()
+    choices: list[Array] = [density * lengths]
+    # of twelve: thirds and sixths, too; equal lengths come out equal
+    needed = np.round(POINTS_PER_WAVE * waves * lengths, 6)
+    choices += [multiple * np.ceil(needed / multiple + 1e-9) for multiple in (4, 12)]
+    for sides in choices:
+        places = np.vstack([sides, shifts * sides])
+        if np.allclose(places, np.round(places)):
+            return tuple(round(m) for m in sides)
+    return None

@@ -20,7 +20,13 @@ from torch import Tensor, nn
 from orbiflow.arguments import as_tensor, as_whole, described, is_tensor, refusal
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields.protocol import VectorField, prepared_with_divergence
-from orbiflow.symmetry import CrystallographicGroup, Isometry, checked_group, identity
+from orbiflow.symmetry import (
+    CrystallographicGroup,
+    Isometry,
+    checked_group,
+    identity,
+    lattice_along,
+)
 from orbiflow.typed_torch import linalg
 
 
@@ -31,7 +37,12 @@ class Symmetrized(nn.Module):
     """
 
     def __init__(
-        self, field: VectorField, group: CrystallographicGroup, *, periodic: bool = False
+        self,
+        field: VectorField,
+        group: CrystallographicGroup,
+        *,
+        periodic: bool = False,
+        along: str | None = None,
     ) -> None:
         super().__init__()
         if not callable(field):
@@ -40,7 +51,9 @@ class Symmetrized(nn.Module):
             )
         self.field = field
         self.group = checked_group(group)
-        self.periodic = periodic
+        self.periodic, self.along = periodic, along
+        self._lattice = self.group.lattice if along is None else lattice_along(self.group, along)
+        self._blended = not periodic and self._lattice.size > 0
         _try_out(field, self.group.dim)
 
     def forward(self, points: Tensor) -> Tensor:
@@ -52,7 +65,7 @@ class Symmetrized(nn.Module):
             with self._explaining(points):
                 return _checked(self.field(points), points)
 
-        values = field(images) if self.periodic else blend(field, self.group.lattice, images)
+        values = blend(field, self._lattice, images) if self._blended else field(images)
         return self._mean(values, points)
 
     def divergence(self, points: Tensor) -> Tensor:
@@ -71,8 +84,8 @@ class Symmetrized(nn.Module):
                 values, divergence = own(points)
                 return _checked(values, points), divergence.to(points.dtype)
 
-        if not self.periodic:
-            joint = partial(blend_with_divergence, joint, self.group.lattice)
+        if self._blended:
+            joint = partial(blend_with_divergence, joint, self._lattice)
 
         def both(points: Tensor) -> tuple[Tensor, Tensor]:
             points = as_tensor(points, "points")
@@ -103,7 +116,7 @@ class Symmetrized(nn.Module):
         return flat.mean(dim=0).reshape(points.shape)
 
     def extra_repr(self) -> str:
-        return f"{self.group!r}, periodic={self.periodic}"
+        return f"{self.group!r}, periodic={self.periodic}, along={self.along!r}"
 
 
 def _checked(values: object, points: Tensor) -> Tensor:
@@ -130,7 +143,11 @@ def _try_out(field: VectorField, dim: int) -> None:
 
 
 def symmetrize(
-    field: VectorField, group: CrystallographicGroup, *, periodic: bool = False
+    field: VectorField,
+    group: CrystallographicGroup,
+    *,
+    periodic: bool = False,
+    along: str | None = None,
 ) -> Symmetrized:
     """Make any field commute with `group`: V(g p) = R_g V(p).
 
@@ -142,9 +159,12 @@ def symmetrize(
         group: A group of R^d.
         periodic: Whether `field` is known to be periodic under the group's lattice (for instance a
             network behind `PeriodicFeatures`), so that it need not be blended.
+        along: The axes that the field is to be periodic along, for groups with fewer translations: "x"
+            for a frieze, "z" for a rod, "xy" for a layer, "" for a point group. Default: all.
 
     Raises:
-        OrbiflowError: if `field` is no function or `group` no group; for a field that gives anything
+        OrbiflowError: if `field` is no function or `group` no group, or none that is periodic along
+            these axes alone (`lattice_along`); for a field that gives anything
             but one vector for each point, or cannot take the points, which it is tried on at once
             and checked for at each call; when called, for points of another dimension.
 
@@ -157,12 +177,13 @@ def symmetrize(
     >>> bool(torch.allclose(field(g(p)), g.push(field(p))))
     True
     """
-    return Symmetrized(field, group, periodic=periodic)
+    return Symmetrized(field, group, periodic=periodic, along=along)
 
 
 def blend(field: VectorField, lattice: ArrayLike, points: Tensor) -> Tensor:
-    """Return a periodic field from any field: sum over n of w(u - n) field(B (u - n)), u = B^-1 p.
+    """Return a periodic field from any field: sum over n of w(u - n) field(p - B n), u = B^-1 p.
 
+    B may have fewer columns than rows: then the field becomes periodic along these alone.
     w(u) = prod cos^2(pi u_i / 2) on [-1, 1]^d sums to one over the translates, so a periodic field is
     unchanged and a smooth field stays continuously differentiable.
     """
@@ -180,8 +201,8 @@ def blend_with_divergence(
     single = torch.cos(shifted * (torch.pi / 2)).square()
     weight = single.prod(dim=-1)
     slopes: list[Tensor] = []
-    for axis in range(points.shape[-1]):
-        others = [i for i in range(points.shape[-1]) if i != axis]
+    for axis in range(shifted.shape[-1]):
+        others = [i for i in range(shifted.shape[-1]) if i != axis]
         along = -torch.pi / 2 * torch.sin(torch.pi * shifted[..., axis])
         slopes.append(along * single[..., others].prod(dim=-1))
     gradient = torch.stack(slopes, dim=-1) @ _inverse(lattice, points)
@@ -190,17 +211,20 @@ def blend_with_divergence(
 
 
 def _translates(lattice: ArrayLike, points: Tensor) -> tuple[Tensor, Tensor]:
-    """Return u - n for the 2^d corners n of the cell, fractional (2^d, ..., d), and as points."""
+    """Return u - n for the 2^r corners n of the cell, fractional (2^r, ..., r), and as points."""
     basis = torch.as_tensor(np.array(lattice), dtype=points.dtype, device=points.device)
     u = points @ _inverse(lattice, points).mT
+    across = points - u @ basis.mT if basis.shape[0] > basis.shape[1] else 0.0
     u = u - u.detach().floor()
-    corners = itertools.product((0.0, 1.0), repeat=basis.shape[0])
+    corners = itertools.product((0.0, 1.0), repeat=basis.shape[1])
     shifted = torch.stack([u - u.new_tensor(corner) for corner in corners])
-    return shifted, shifted @ basis.mT
+    return shifted, shifted @ basis.mT + across
 
 
 def _inverse(lattice: ArrayLike, like: Tensor) -> Tensor:
-    return linalg.inv(torch.as_tensor(np.array(lattice), dtype=like.dtype, device=like.device))
+    """Return B^-1, or B's pseudoinverse if it has fewer columns than rows."""
+    basis = torch.as_tensor(np.array(lattice), dtype=like.dtype, device=like.device)
+    return linalg.inv(basis) if basis.shape[0] == basis.shape[1] else linalg.pinv(basis)
 
 
 def periodic_operator(field: VectorField, lattice: ArrayLike) -> VectorField:

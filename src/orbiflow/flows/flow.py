@@ -2,22 +2,33 @@
 
 import contextlib
 import copy
+import math
 from collections.abc import Callable, Iterable
 from typing import Any, Self
 
+import torch
 from torch import Tensor, nn
 
 from orbiflow.arguments import is_a
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import VectorField, prepared, prepared_with_divergence
+from orbiflow.fields import (
+    VectorField,
+    lipschitz_bound,
+    prepared,
+    prepared_with_divergence,
+    prepared_with_jacobian,
+)
 from orbiflow.flows.integrators import RungeKutta, StepCheck
 from orbiflow.flows.integrators import method as runge_kutta
 from orbiflow.runtime import one_thread
+from orbiflow.typed_torch import linalg
 
 State = tuple[Tensor, ...]
+Step = Callable[[Callable[[State], State], State, float], State]
 
 # the number of coordinates from which several threads can be faster than one
 MULTITHREADED_COORDINATES = 2**17
+MAX_INJECTIVE_STEPS = 4096  # steps of a segment beyond which a field counts as too steep
 
 
 class _FunctionSegment(nn.Module):
@@ -39,15 +50,28 @@ class Flow(nn.Module):
     rounding, for any number of steps. Few points are moved on one thread; torch runs the backward
     passes of training itself, so run those inside `orbiflow.runtime.one_thread`.
 
+    A likelihood that is maximised through few steps exploits their error: the log-determinant, an
+    integral along the path, is then not that of the map. With `bijective`, it is exact at any number
+    of steps. The map is a product of Runge-Kutta steps, each of which is injective because it is
+    shorter than the fields' Lipschitz bounds allow (`RungeKutta.injective_below`), so the map is a
+    bijection; and the derivatives of the steps are multiplied instead of integrated. Whatever the
+    fields become, a density that is carried by the map, by `inverse_and_log_det` or by
+    `forward_and_log_det`, integrates to one.
+
     Args:
         fields: The vector fields, one per segment, from points (..., d) to vectors (..., d).
         steps: The number of Runge-Kutta steps in each segment.
         method: "euler", "midpoint", "rk3", "rk4" or "rk5".
         duration: The length of time of each segment.
         warn: Whether to check, for new parameters, that the steps are fine enough.
+        bijective: Whether to take, at each call, at least so many steps that each is injective, and
+            the log-determinants of the steps themselves. `forward` and `inverse` are two bijections,
+            inverse to each other up to the integrator's error. Costs the fields' Jacobians in place
+            of their divergences.
 
-    Raises `OrbiflowError` for no field, `steps` < 1 or an unknown method; when called, for points
-    of a dtype or shape that the fields do not take, or a field whose values have another shape.
+    Raises `OrbiflowError` for no field, `steps` < 1 or an unknown method, and with `bijective` for a
+    field without `lipschitz_bound`; when called, for points of a dtype or shape that the fields do
+    not take, a field whose values have another shape, or one that is too steep for `bijective`.
 
     Warns:
         CoarseStepsWarning: once, when called, if the steps are too coarse for the fields.
@@ -69,6 +93,7 @@ class Flow(nn.Module):
         method: str = "rk4",
         duration: float = 1.0,
         warn: bool = True,
+        bijective: bool = False,
     ) -> None:
         super().__init__()
         given: Any = fields
@@ -86,12 +111,24 @@ class Flow(nn.Module):
         self._duration = float(duration)
         self._steps = _checked_steps(steps)
         self.integrator: RungeKutta = runge_kutta(method)
-        self._step_check = StepCheck() if warn else None
+        self._step_check = StepCheck() if warn and not bijective else None
+        self._bijective = bool(bijective)
+        _ = self.steps  # a mistake in the fields is told at once
 
     @property
     def steps(self) -> int:
-        """Runge-Kutta steps in each segment; see `with_steps`."""
-        return self._steps
+        """Runge-Kutta steps in each segment; see `with_steps`.
+
+        If the flow is `bijective`, so many as its fields need now, and at least those given.
+        """
+        if not self._bijective:
+            return self._steps
+        return max([self._steps, *map(self._injective_steps, self.fields())])
+
+    @property
+    def bijective(self) -> bool:
+        """Whether each step is injective, and log-determinants are those of the steps."""
+        return self._bijective
 
     @property
     def duration(self) -> float:
@@ -129,6 +166,23 @@ class Flow(nn.Module):
         view._step_check = None if self._step_check is None else StepCheck()
         return view
 
+    def _injective_steps(self, field: VectorField) -> int:
+        """Return the least number of steps of a segment that are injective by the field's bound."""
+        bound = lipschitz_bound(field)
+        if bound is None:
+            raise OrbiflowError(
+                f"a bijective flow needs fields that bound their slope, and {field!r} has no "
+                "lipschitz_bound(): use a FourierField, give it that method, or leave out bijective"
+            )
+        needed = abs(self.duration) * bound / self.integrator.injective_below
+        if not needed < MAX_INJECTIVE_STEPS:
+            raise OrbiflowError(
+                f"a field became so steep (Lipschitz bound {bound:.3g}) that a bijective flow needs "
+                f"{needed:.3g} {self.method} steps in its segment, of at most {MAX_INJECTIVE_STEPS}: "
+                "lower the learning rate, or add a penalty on the parameters to the loss"
+            )
+        return math.floor(needed) + 1
+
     def forward(self, points: Tensor) -> Tensor:
         """Return where the flow takes points (..., d)."""
         self._check(points)
@@ -146,7 +200,8 @@ class Flow(nn.Module):
     def forward_and_log_det(self, points: Tensor) -> tuple[Tensor, Tensor]:
         """Return `forward` and the log-determinant (...,) of its Jacobian, from one integration.
 
-        It is the integral of the divergence along the path (paper, section 5.2).
+        It is the integral of the divergence along the path (paper, section 5.2), or that of the
+        steps if the flow is `bijective`.
         """
         self._check(points)
         return self._with_log_det(points, inverse=False)
@@ -171,18 +226,37 @@ class Flow(nn.Module):
 
     def _moved(self, state: State, *, inverse: bool) -> State:
         """Return what becomes of points (..., d), and of their log-determinants if they are given."""
-        points, h = state[0], (-self.duration if inverse else self.duration) / self.steps
-        fields = self.fields()
+        points, steps, fields = state[0], self.steps, self.fields()
+        h = (-self.duration if inverse else self.duration) / steps
+        exact = self._bijective and len(state) == 2
+        step: Step = self._differentiated_step if exact else self.integrator.step
         with _thread_limit(points):
             try:
                 for field in reversed(fields) if inverse else fields:
-                    slope = _slope(field, len(state) == 2)
-                    for _ in range(self.steps):
-                        state = self.integrator.step(slope, state, h)
+                    # fields prepare their weights once per segment, not once per stage
+                    slope = _slope(field, with_log_det=len(state) == 2, exact=exact)
+                    for _ in range(steps):
+                        state = step(slope, state, h)
             except RuntimeError as error:
                 self._explain(points, error)
                 raise
         return state
+
+    def _differentiated_step(
+        self, slope: Callable[[State], State], state: State, h: float
+    ) -> State:
+        """Return the points after a step, and log-determinants with that of the step's Jacobian."""
+
+        def tangents(both: State) -> State:
+            values, jacobian = slope((both[0],))
+            return values, jacobian @ both[1]
+
+        points, log_det = state
+        one = torch.eye(points.shape[-1], dtype=points.dtype, device=points.device)
+        start = (points, one.expand(*points.shape, -1))
+        # a method's step of the variational equation is the derivative of its step
+        moved, derivative = self.integrator.step(tangents, start, h)
+        return moved, log_det + linalg.slogdet(derivative).logabsdet
 
     def _explain(self, points: Tensor, error: RuntimeError) -> None:
         """Explain torch's error if the dtypes of points and parameters differ."""
@@ -194,7 +268,8 @@ class Flow(nn.Module):
                 ) from error
 
     def extra_repr(self) -> str:
-        return f"steps={self.steps}, method={self.method}, duration={self.duration}"
+        own = f"steps={self.steps}, method={self.method}, duration={self.duration}"
+        return f"{own}, bijective=True" if self._bijective else own
 
 
 def _checked_steps(value: int) -> int:
@@ -221,9 +296,10 @@ def _thread_limit(points: Tensor) -> contextlib.AbstractContextManager[None]:
     return one_thread() if small else contextlib.nullcontext()
 
 
-def _slope(field: VectorField, with_log_det: bool) -> Callable[[State], State]:
-    # fields prepare their weights once per segment, not once per stage
-    evaluate: Any = prepared_with_divergence(field) if with_log_det else prepared(field)
+def _slope(field: VectorField, *, with_log_det: bool, exact: bool) -> Callable[[State], State]:
+    """Return the field as a function of states: its values, with divergence or Jacobian if wanted."""
+    joint = prepared_with_jacobian if exact else prepared_with_divergence
+    evaluate: Any = joint(field) if with_log_det else prepared(field)
 
     def slope(state: State) -> State:
         points = state[0]

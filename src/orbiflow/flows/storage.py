@@ -44,7 +44,8 @@ class Writer:
         if kind is Symmetrized:
             inner = self.header(field.field, f"{place}.field")
             own = {"group": self._group(field.group), "periodic": field.periodic, "field": inner}
-            return {"kind": "symmetrized", **own}
+            along = {} if field.along is None else {"along": field.along}
+            return {"kind": "symmetrized", **own, **along}
         if is_perceptron(field):
             features, *layers = field
             linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
@@ -96,7 +97,8 @@ class Reader:
             return self._series(header, place)
         if kind == "symmetrized":
             inner = self.field(header["field"], f"{place}.field", nesting + 1)
-            return Symmetrized(inner, self._group(header), periodic=bool(header["periodic"]))
+            group, periodic = self._group(header), bool(header["periodic"])
+            return Symmetrized(inner, group, periodic=periodic, along=header.get("along"))
         if kind == "torus-network":
             what = f"{place} is a NeuralTorusField"
             raise OrbiflowError(f"{what}, which orbiflow no longer has: use orbiflow 0.1")
@@ -227,6 +229,8 @@ def save_flow(flow: Flow, path: str | Path) -> Path:
         segments.append(same if first < index else writer.header(field, f"segments.{index}"))
     header = {"format": FORMAT, "groups": writer.groups, "segments": segments, "warn": flow.warns}
     header |= {name: getattr(flow, name) for name in ("steps", "method", "duration")}
+    if flow.bijective:
+        header["bijective"] = True
     return write_atomic(path, tensor_bytes(header, tensors, "a flow"))
 
 
@@ -281,6 +285,7 @@ def _restored(
         method=str(header["method"]),
         duration=as_number(header["duration"], "duration"),
         warn=bool(header["warn"]),
+        bijective=bool(header.get("bijective", False)),
     )
     flow.load_state_dict(tensors)
     return flow

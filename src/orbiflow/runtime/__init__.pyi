@@ -42,9 +42,13 @@ from .operations import operation as operation
 from .operations import progress_events as progress_events
 from .processes import process_context as process_context
 from .processes import work as work
+from .side_by_side import SideBySide as SideBySide
+from .side_by_side import Tell as Tell
 from .tensor_files import read_arrays as read_arrays
 from .tensor_files import read_tensors as read_tensors
 from .tensor_files import tensor_bytes as tensor_bytes
+from .threads import cores as cores
 from .threads import one_blas_thread as one_blas_thread
+from .threads import one_core as one_core
 from .threads import one_thread as one_thread
 from .threads import use_one_thread as use_one_thread

@@ -7,10 +7,12 @@ busy machine a wait lasts as long as the scheduler likes: tens of times the work
 from __future__ import annotations
 
 import contextlib
+import multiprocessing
 import os
 import sys
 import threading
 from collections.abc import Generator
+from contextvars import ContextVar
 from typing import Any
 
 import threadpoolctl
@@ -78,6 +80,32 @@ def _default_for_new_threads(torch: Any, count: int) -> None:
     helper = threading.Thread(target=torch.set_num_threads, args=(count,))
     helper.start()
     helper.join()
+
+
+_only_one = ContextVar("only_one", default=False)
+
+
+def cores() -> int:
+    """Return how many threads may work side by side, which changes no result.
+
+    As many as the process may use cores; 1 in worker processes of any kind, which have others beside
+    them, and inside `one_core`.
+    """
+    if _only_one.get() or multiprocessing.current_process().name != "MainProcess":
+        return 1
+    if hasattr(os, "sched_getaffinity"):  # Linux knows what `taskset` or a scheduler leaves
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@contextlib.contextmanager
+def one_core() -> Generator[None]:
+    """Work in this thread alone in this block: what is in it has others beside it."""
+    before = _only_one.set(True)
+    try:
+        yield
+    finally:
+        _only_one.reset(before)
 
 
 _blas_lock = threading.Lock()

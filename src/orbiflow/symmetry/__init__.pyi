@@ -3,8 +3,12 @@ from .catalogue import LATTICES as LATTICES
 from .catalogue import WALLPAPER_GROUPS as WALLPAPER_GROUPS
 from .catalogue import identification_group as identification_group
 from .catalogue import wallpaper_group as wallpaper_group
+from .cells import cell_lattice as cell_lattice
+from .cells import cell_parameters as cell_parameters
 from .elements import DirichletDomain as DirichletDomain
 from .elements import RotationCenter as RotationCenter
+from .elements import central_site as central_site
+from .elements import lattice_along as lattice_along
 from .elements import symmetry_elements as symmetry_elements
 from .equivariance import EquivarianceError as EquivarianceError
 from .equivariance import assert_equivariant as assert_equivariant
@@ -25,3 +29,13 @@ from .isometry import rotation as rotation
 from .isometry import rotation_matrix as rotation_matrix
 from .isometry import transflection as transflection
 from .isometry import translation as translation
+from .manifolds import ALIASES as ALIASES
+from .manifolds import FLAT_MANIFOLDS as FLAT_MANIFOLDS
+from .manifolds import flat_manifold as flat_manifold
+from .manifolds import group_by_name as group_by_name
+from .manifolds import is_group_name as is_group_name
+from .space_groups import cif_text as cif_text
+from .space_groups import group_from_cif as group_from_cif
+from .space_groups import space_group as space_group
+from .triplets import group_from_operators as group_from_operators
+from .triplets import operators as operators

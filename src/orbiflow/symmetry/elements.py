@@ -3,17 +3,18 @@
 Dirichlet domains contain one point of each orbit. All are found from the group itself.
 """
 
+import itertools
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orbiflow.arguments import is_tensor
+from orbiflow.arguments import is_a, is_tensor, refusal
 from orbiflow.arrays import Array
 from orbiflow.errors import GroupError
 from orbiflow.symmetry.group import CrystallographicGroup
-from orbiflow.symmetry.isometry import Isometry, Line, Points, cast_like
+from orbiflow.symmetry.isometry import TOLERANCE, Isometry, Line, Points, cast_like
 
 
 class RotationCenter(NamedTuple):
@@ -117,22 +118,90 @@ def _same(first: GlideLine, second: GlideLine, reach: float) -> bool:
     return bool(abs(ux * vy - uy * vx) < 1e-6 and apart < 1e-6 * reach)
 
 
+def lattice_along(group: CrystallographicGroup, along: str) -> Array:
+    """Return the basis vectors (d, r) of a group's lattice that lie along some of its axes.
+
+    They and the coset representatives make a group that is periodic along r directions alone: a frieze
+    ("x"), a rod ("z"), a layer ("xy") or, with none (""), a point group.
+
+    Raises `GroupError` if they make none, `SettingError` for anything but axes.
+
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> lattice_along(wallpaper_group("pmg"), "x").tolist()
+    [[1.0], [0.0]]
+    """
+    axes = "xyz"[: group.dim]
+    if not is_a(along, str) or not set(along) <= set(axes) or len(set(along)) < len(along):
+        raise refusal("along", f"some of the letters {', '.join(axes)}", along)
+    kept = [axes.index(axis) for axis in along]
+    across = np.delete(np.eye(group.dim), kept, axis=0)
+    size = np.abs(group.lattice).max()
+    inside = np.abs(across @ group.lattice).max(axis=0, initial=0.0) <= TOLERANCE * size
+    # a finite group fixes a point: without the other translations, this one
+    center = across.T @ across @ group.translations.mean(axis=0)
+    moved = (group.linear_parts @ center + group.translations - center) @ across.T
+    turned = (group.linear_parts[:, :, kept]).swapaxes(1, 2) @ across.T
+    off = max(np.abs(turned).max(initial=0.0), np.abs(moved).max(initial=0.0) / size)
+    if inside.sum() != len(kept) or off > 1e-7:
+        raise GroupError(
+            f"{group!r} is not periodic along {along!r} alone: without its other translations, an "
+            "element turns these axes, or screws or glides across them, or the lattice does not split"
+        )
+    return group.lattice[:, inside]
+
+
+TRIED_SITES = 512
+"""Points of the cell among which `central_site` chooses."""
+
+
+def central_site(group: CrystallographicGroup) -> Array:
+    """Return a point (d,) far from its own images, always the same, for a round Dirichlet domain.
+
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> site = central_site(wallpaper_group("p4m"))
+    >>> bool(min(abs(site[0]), abs(site[1]), abs(abs(site[0]) - abs(site[1]))) > 0.1)
+    True
+    """
+    center, reach = _cell_ball(group)
+    size = (group.cell_volume / group.order) ** (1 / group.dim)
+    elements = group.elements_near(center, 2 * (reach + size))[1:]
+    # Kronecker's sequence of the powers of the root of x^(d + 1) = x + 1 is even in any dimension
+    root = 2.0
+    for _ in range(64):
+        root = (1 + root) ** (1 / (group.dim + 1))
+    steps = np.arange(TRIED_SITES)[:, None] * root ** -np.arange(1.0, group.dim + 1)
+    points = np.mod(0.5 + steps, 1.0) @ group.lattice.T
+    nearest = np.full(TRIED_SITES, np.inf)
+    for g in elements:
+        nearest = np.minimum(nearest, np.linalg.norm(g(points) - points, axis=1))
+    return points[int(nearest.argmax())]
+
+
+def _cell_ball(group: CrystallographicGroup) -> tuple[Array, float]:
+    """Return the centre (d,) of the cell B [0, 1)^d and the radius of the ball around it."""
+    signs = np.array(list(itertools.product((-0.5, 0.5), repeat=group.dim)))
+    return group.lattice.sum(axis=1) / 2, float(
+        np.linalg.norm(signs @ group.lattice.T, axis=1).max()
+    )
+
+
 class DirichletDomain:
     """The fundamental domain of the points nearer to `site` than to any other point of its orbit.
 
-    For the four identification spaces and the site (1/2, 1/2) it is the paper's canonical square,
-    and `project` the canonical projection (paper, section 5.2; design point 12).
+    It is a convex polytope of any dimension. For the four identification spaces and the site (1/2,
+    1/2) it is the paper's canonical square, and `project` the canonical projection (paper, section 5.2;
+    design point 12).
 
     Args:
         group: Any crystallographic group.
-        site: A point (d,) that every element but the identity moves.
+        site: A point (d,) that every element but the identity moves. Default: `central_site`.
 
     Raises `GroupError` if an element fixes the site.
     """
 
-    def __init__(self, group: CrystallographicGroup, site: ArrayLike) -> None:
+    def __init__(self, group: CrystallographicGroup, site: ArrayLike | None = None) -> None:
         self.group = group
-        self.site = np.asarray(site, dtype=np.float64)
+        self.site = central_site(group) if site is None else np.asarray(site, dtype=np.float64)
         if self.site.shape != (group.dim,) or not np.isfinite(self.site).all():
             raise GroupError(f"the site must be {group.dim} finite numbers, got {site!r}")
         size = group.cell_volume ** (1 / group.dim)
@@ -141,10 +210,11 @@ class DirichletDomain:
 
     @cached_property
     def _candidates(self) -> list[Isometry]:
-        # every point of the cell lies within `diameter` of some image of the site
-        center = self.group.lattice.sum(axis=1) / 2
-        diameter = float(np.linalg.norm(self.group.lattice, axis=0).sum())
-        return self.group.elements_near(center, 1.5 * diameter, source=self.site)
+        # by Babai's rounding, every point has an image of the site within half the root of the sum of
+        # the basis vectors' squares
+        center, reach = _cell_ball(self.group)
+        near = float(np.linalg.norm(self.group.lattice)) / 2
+        return self.group.elements_near(center, (reach + near) * (1 + 1e-9), source=self.site)
 
     @cached_property
     def _sites(self) -> Array:
@@ -160,10 +230,10 @@ class DirichletDomain:
         plain: Array = own.detach().cpu().numpy() if is_tensor(own) else own
         flat = np.asarray(plain, dtype=np.float64).reshape(-1, self.group.dim)
         nearest = np.empty(len(flat), dtype=np.int64)
-        for start in range(0, len(flat), 65536):  # bounds the distance table
-            block = flat[start : start + 65536]
+        for start in range(0, len(flat), 16384):  # bounds the distance table
+            block = flat[start : start + 16384]
             squared = (self._sites**2).sum(axis=1) - 2.0 * block @ self._sites.T
-            nearest[start : start + 65536] = squared.argmin(axis=1)
+            nearest[start : start + 16384] = squared.argmin(axis=1)
         chosen = nearest.reshape(plain.shape[:-1])
         linear = np.stack([g.linear for g in self._candidates])[chosen]
         shift = np.stack([g.translation for g in self._candidates])[chosen]

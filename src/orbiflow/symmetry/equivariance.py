@@ -7,7 +7,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry.elements import lattice_along
 from orbiflow.symmetry.group import CrystallographicGroup, checked_group
 from orbiflow.symmetry.isometry import Isometry, translation
 from orbiflow.typed_torch import listed
@@ -34,6 +36,7 @@ def assert_equivariant(
     group: CrystallographicGroup,
     *,
     kind: Kind = "field",
+    along: str | None = None,
     points: Tensor | None = None,
     atol: float = 1e-9,
     rtol: float = 1e-9,
@@ -53,6 +56,7 @@ def assert_equivariant(
         function: A function of points (N, d).
         group: A group of R^d.
         kind: "field", "map" or "invariant".
+        along: The axes that the group is periodic along, as for `symmetrize`. Default: all.
         points: Points (N, d). Default: 32 random float64 points in a cell.
         atol, rtol: Deviations up to atol + rtol times the largest value are accepted.
         cells: The number of cells to move by.
@@ -78,8 +82,9 @@ def assert_equivariant(
         unit = torch.rand(32, group.dim, dtype=torch.float64, generator=source)
         points = unit @ torch.tensor(np.array(group.lattice)).mT
     values = _values(function, points, kind)
+    lattice = group.lattice if along is None else lattice_along(group, along)
     worst: tuple[float, int, Isometry, Tensor] | None = None
-    for number, element in _elements(group, cells):
+    for number, element in _elements(group, lattice, cells):
         moved = {"field": element.push, "map": element}.get(kind)
         expected = moved(values) if moved else values
         errors = (_values(function, element(points), kind) - expected).abs()
@@ -99,9 +104,11 @@ def assert_equivariant(
         )
 
 
-def _elements(group: CrystallographicGroup, cells: int) -> Iterator[tuple[int, Isometry]]:
+def _elements(
+    group: CrystallographicGroup, lattice: Array, cells: int
+) -> Iterator[tuple[int, Isometry]]:
     """Yield each coset's number, from 1, with its representative and translates of it."""
-    moves = [translation(sign * cells * vector) for vector in group.lattice.T for sign in (1, -1)]
+    moves = [translation(sign * cells * vector) for vector in lattice.T for sign in (1, -1)]
     for number, coset in enumerate(group.cosets, start=1):
         yield number, coset
         yield from ((number, move @ coset) for move in moves)

@@ -5,6 +5,7 @@ Their headers are JSON with the exact bases, in which saved parameters are coord
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -119,6 +120,11 @@ class CrystallographicGroup:
         return np.stack([g.linear for g in self.cosets])
 
     @cached_property
+    def integral_parts(self) -> Array:
+        """(|G|, d, d) linear parts in the lattice's basis: the integers B^-1 R B."""
+        return np.round(self.inverse_lattice @ self.linear_parts @ self.lattice).astype(np.int64)
+
+    @cached_property
     def translations(self) -> Array:
         """(|G|, d) translations of the coset representatives."""
         return np.stack([g.translation for g in self.cosets])
@@ -152,8 +158,7 @@ class CrystallographicGroup:
         Only whole numbers: equality has a tolerance, so a quantity that changes with rounding would
         give some equal groups different hashes.
         """
-        integral = np.round(self.inverse_lattice @ self.linear_parts @ self.lattice)
-        unique = np.unique(integral, axis=0)
+        unique = np.unique(self.integral_parts, axis=0)
         kinds = np.stack([np.trace(unique, axis1=1, axis2=2), np.linalg.det(unique)], axis=1)
         values, counts = np.unique(np.round(kinds).astype(int), axis=0, return_counts=True)
         rows = zip(values.tolist(), counts.tolist(), strict=True)
@@ -248,6 +253,24 @@ class CrystallographicGroup:
             basis, tuple(_reduce_translation(basis, g) for g in cosets), self.name
         )
 
+    def primitive(self) -> CrystallographicGroup:
+        """Return the same group on the lattice of all its translations, with one coset for each R.
+
+        A group whose lattice is that already is returned as it is.
+
+        >>> cmm = CrystallographicGroup.generate(np.eye(2), [translation([0.5, 0.5])])
+        >>> cmm.order, cmm.primitive().order, cmm.primitive().cell_volume
+        (2, 1, 0.5)
+        """
+        shifts = [g.translation for g in self.cosets if np.allclose(g.linear, np.eye(self.dim))]
+        if len(shifts) == 1:
+            return self
+        basis = checked_lattice(_shortest_basis(self.lattice, np.stack(shifts)))
+        one_each: dict[bytes, Isometry] = {}
+        for integral, coset in zip(self.integral_parts, self.cosets, strict=True):
+            one_each.setdefault(integral.tobytes(), _reduce_translation(basis, coset))
+        return CrystallographicGroup(basis, tuple(one_each.values()), self.name)
+
     def __repr__(self) -> str:
         label = f"{self.name}, " if self.name else ""
         basis = (self.lattice.round(6) + 0.0).tolist()
@@ -290,6 +313,35 @@ def _reduce_translation(basis: Array, element: Isometry) -> Isometry:
     return Isometry(element.linear, basis @ fractional)
 
 
+def _shortest_basis(lattice: Array, shifts: Array) -> Array:
+    """Return the first of the shortest vectors that are a basis of a lattice with n shifts in it."""
+    d, n = len(lattice), len(shifts)
+    parts = np.round(n * np.linalg.solve(lattice, shifts.T).T).astype(np.int64)[:, None]
+    nths = (parts + n * (np.indices((3,) * d).reshape(d, -1).T - 1)).reshape(-1, d)
+    lengths: Array = np.linalg.norm(nths @ lattice.T, axis=1) / np.linalg.norm(lattice)
+    directions: dict[tuple[int, ...], Array] = {}  # the shortest of each; ties in a fixed order
+    for v in nths[np.lexsort(np.vstack([-nths.T[::-1], lengths.round(6)]))]:
+        key = tuple((v // max(1, np.gcd.reduce(v))).tolist())
+        if key[::-1] > (0,) * d:  # of each pair +-v the one whose last component is positive
+            directions.setdefault(key, v)
+    bases = (np.stack(rows, axis=1) for rows in itertools.combinations(directions.values(), d))
+    shortest = next(m for m in bases if abs(round(np.linalg.det(m))) == n ** (d - 1))
+    return lattice @ shortest / n
+
+
+def generated(
+    lattice: ArrayLike, isometries: Iterable[Isometry], name: str = "", max_order: int = MAX_ORDER
+) -> CrystallographicGroup:
+    """Return the group that `generate` makes of many isometries, most of which follow from others."""
+    closed = CrystallographicGroup.generate(lattice, name=name)
+    chosen: list[Isometry] = []
+    for isometry in isometries:  # each that is new at least doubles the order
+        if not closed.contains(isometry):
+            chosen.append(isometry)
+            closed = CrystallographicGroup.generate(lattice, chosen, name=name, max_order=max_order)
+    return closed
+
+
 def _closure(basis: Array, generators: Sequence[Isometry], max_order: int) -> tuple[Isometry, ...]:
     elements = _finite_closure(basis, generators, max_order)
     if elements is not None:
@@ -315,8 +367,8 @@ def _finite_closure(
         integral = np.linalg.solve(basis, element.linear @ basis)
         same = known.setdefault(np.round(integral).astype(np.int64).tobytes(), [])
         fractional = np.linalg.solve(basis, element.translation)
-        offsets = [fractional - other for other in same]
-        if any(np.abs(o - np.round(o)).max() <= 10 * TOLERANCE for o in offsets):
+        offsets = fractional - np.reshape(same, (-1, len(basis)))
+        if (np.abs(offsets - np.round(offsets)).max(axis=1) <= 10 * TOLERANCE).any():
             continue
         if len(elements) >= max_order:
             return None
@@ -368,12 +420,7 @@ def group_from_header(header: Mapping[str, Any], name: str = "") -> Crystallogra
     cosets = tuple(Isometry(*parts) for parts in zip(linear, shifts, strict=True))
     if not order or not cosets[0].is_close(Isometry(np.eye(d), np.zeros(d))):
         raise GroupError("the group's first coset is not that of the identity")
-    closed = CrystallographicGroup.generate(lattice)
-    chosen: list[Isometry] = []
-    for coset in cosets:  # each that is new at least doubles the order
-        if not closed.contains(coset):
-            chosen.append(coset)
-            closed = CrystallographicGroup.generate(lattice, chosen, max_order=order)
+    closed = generated(lattice, cosets, max_order=order)
     if closed.order != order:
         raise GroupError(f"the group has {order} cosets, of which only {closed.order} differ")
     return CrystallographicGroup(closed.lattice, cosets, str(name)[:MAX_NAME])

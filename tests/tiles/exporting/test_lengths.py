@@ -15,7 +15,7 @@ from orbiflow.units import (
     MILLIMETRES,
     Length,
     LengthOrZero,
-    Size,
+    PageSize,
     length,
     page_size,
     pixel_size,
@@ -80,7 +80,7 @@ def test_no_sizes(text: str, message: str) -> None:
 
 def test_no_size_is_without_area() -> None:
     with pytest.raises(Refused, match="entry 1: must be above 0"):
-        kind_of(Size).read("0x200mm")
+        kind_of(PageSize).read("0x200mm")
 
 
 @pytest.mark.parametrize(

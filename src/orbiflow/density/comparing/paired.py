@@ -286,7 +286,8 @@ def require_one_space(spaces: Mapping[str, Space]) -> None:
     """Check that log densities on all spaces are with respect to one measure."""
     (first, one), *others = spaces.items()
     for name, other in others:
-        if (one.name, one.dim) != (other.name, other.dim):
+        areas = [space.volume if space.is_round else 0.0 for space in (one, other)]
+        if (one.name, one.dim, areas[0]) != (other.name, other.dim, areas[1]):
             titles = [
                 f"torus of {space.dim} angles" if space.is_torus else space.name
                 for space in (one, other)

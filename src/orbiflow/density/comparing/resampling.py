@@ -1,7 +1,8 @@
-"""Groups of rows that belong together: their bootstrap resamples, folds and permutation test."""
+"""Groups of rows that belong together: their bootstrap resamples, folds and test of two samples."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from torch import Tensor
 
 from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array
-from orbiflow.density.fitting import group_numbers, lightest_folds
+from orbiflow.density.fitting import group_numbers, lightest_folds, lone_groups_note
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
@@ -21,7 +22,7 @@ MIN_GROUPS = 5
 """Number of independent rows or groups that an uncertainty needs."""
 
 FEW_GROUPS = 20
-"""Number of rows or groups below which a note says that the uncertainty is rough itself."""
+"""Number of equal rows or groups below which a note says that the uncertainty is rough itself."""
 
 BLOCK_ENTRIES = 4_000_000
 """Entries of a block of resamples times groups, which bounds the memory."""
@@ -65,9 +66,15 @@ class Groups:
 
     def notes(self) -> list[str]:
         """Return what the user should know of them."""
-        if self.count >= FEW_GROUPS:
-            return []
-        return [f"of only {self.count} {self.what} the uncertainties themselves are rough"]
+        lone = lone_groups_note(torch.as_tensor(self.index) if self.given else None)
+        equal = len(self.index) ** 2 / (np.bincount(self.index) ** 2).sum()  # Kish, 1965
+        if equal >= FEW_GROUPS:
+            return lone
+        like = f", no better than {equal:.1f} equal ones," if equal < 0.9 * self.count else ""
+        return [
+            *lone,
+            f"of only {self.count} {self.what}{like} the uncertainties themselves are rough",
+        ]
 
     def sums(self, values: Array) -> Array:
         """Return sums (G, ...) over each group of values (N, ...)."""
@@ -136,18 +143,20 @@ clusters, the widest a shift."""
 PAIRS, MIN_SCALE = 500_000, 1e-9
 """Pairs drawn for the quantiles, and the least half of a kernel's squared width."""
 
-PERMUTED = 250
-"""Permutations computed at a time."""
+MOVED = 250
+"""Random labels computed at a time."""
 
 
 @dataclass(frozen=True)
 class TestResult:
-    """The result of a permutation test.
+    """The result of a test of two samples.
 
     - `p`: The share of random labels that give as large a difference.
-    - `z`: The largest of the differences at all widths, in standard deviations of those of the
-      permutations.
-    - `permutations`: Their number. `rows`: The number of rows that were looked at.
+    - `z`: The largest of the differences at all widths, in standard deviations of those of random
+      labels.
+    - `permutations`: Number of random labels. `rows`: Number of rows that were looked at.
+    - `exact`: Whether whole groups changed sides, so that p is exact. Otherwise their terms changed
+      signs, and p is approximate.
     """
 
     __test__ = False  # pytest would take it for a test
@@ -156,6 +165,7 @@ class TestResult:
     z: float
     permutations: int
     rows: int
+    exact: bool = True
 
 
 @one_thread()
@@ -167,43 +177,108 @@ def mmd_test(
     groups: Groups,
     *,
     permutations: int = 999,
+    level: float = 0.95,
     seed: int = 0,
 ) -> TestResult:
     """Test by the largest standardised maximum mean discrepancy over kernels of four widths.
 
     Kernels are von Mises-Fisher ones, summed over the space's images, so that they are positive
-    definite on it (Gretton and others, A kernel two-sample test, 2012). Pairs within a group are left
-    out. Whole groups are permuted: groups of one data set among each other, while the two halves of
-    a group with rows in both change places. All permutations, with the observed one among them, are
-    standardised alike, so that p is exact.
+    definite on it (Gretton and others, A kernel two-sample test, 2012).
+
+    Where groups have equally many rows, whole groups are permuted: groups of one data set among each
+    other, while the two halves of a group with rows in both change places. Pairs within a group are
+    left out. All permutations, with the observed one among them, are standardised alike, so that p is
+    exact. Groups of different sizes are not exchangeable. There, the difference of the data sets' mean
+    features is a sum with one term for each group, and the signs of the terms are drawn: a wild cluster
+    bootstrap (Cameron, Gelbach and Miller, Bootstrap-based improvements for inference with clustered
+    errors, 2008; Leucht and Neumann, Dependent wild bootstrap for degenerate U- and V-statistics,
+    2013).
+
     `points` are chart points (N, d) of both data sets; `first` says which (N,) are of the first one.
     The test looks at `MAX_ROWS` of them at most.
+
+    Raises:
+        OrbiflowError: If there are too few groups or permutations for any p to reach 1 - `level`.
     """
     kept = chosen_rows(first, groups, MAX_ROWS, seed)
     points, first = points[torch.as_tensor(kept)], first[kept]
     groups = Groups.of(groups.index[kept] if groups.given else None, len(kept))
+    sides = _Sides.of(first, groups)
+    sides.require(level, permutations)
     rng = np.random.default_rng(seed)
-    labels = _permuted(first, groups, permutations, rng)
+    draw = _permuted if sides.alike else _flipped
+    labels = draw(first, groups, permutations, rng)
     index = torch.as_tensor(groups.index)
     apart = index[:, None] != index[None, :]
     images = space.features(points)
     dots = [images[0] @ image.mT for image in images]  # their exponentials are kernels
     top = float(dots[0].diagonal().mean())
-    scales = _scales(top - dots[0], apart, rng)
-    counts = np.maximum(_pair_sums(apart.double(), labels), 1)
+    counts = np.maximum(_pair_sums(apart.double(), labels), 1) if sides.alike else None
     found: list[Array] = []
-    for scale in scales:
+    for scale in _scales(top - dots[0], apart, rng):
         kernel = sum(((dot - top) / scale).exp() for dot in dots)
         assert isinstance(kernel, Tensor)
-        own, other, between = _pair_sums(kernel * apart, labels) / counts
-        found.append(own + other - 2 * between)
+        if counts is None:
+            found.append(_squares(kernel, labels))
+        else:
+            own, other, between = _pair_sums(kernel * apart, labels) / counts
+            found.append(own + other - 2 * between)
     table = np.stack(found)
     spread = table.std(axis=1, keepdims=True)
     largest = ((table - table.mean(axis=1, keepdims=True)) / np.maximum(spread, 1e-300)).max(axis=0)
-    as_large = int((largest[1:] >= largest[0] - 1e-12).sum())
-    return TestResult(
-        (1 + as_large) / (1 + permutations), float(largest[0]), permutations, len(points)
-    )
+    p = float((largest >= largest[0] - 1e-12).mean())
+    return TestResult(p, float(largest[0]), permutations, len(points), sides.alike)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sides:
+    """Numbers of rows (G,) that each group has in the first data set and in the second."""
+
+    own: Array
+    other: Array
+    what: str
+
+    @classmethod
+    def of(cls, first: Array, groups: Groups) -> _Sides:
+        own, other = (np.bincount(groups.index, side, groups.count) for side in (first, ~first))
+        return cls(own, other, groups.what)
+
+    @property
+    def both(self) -> Array:
+        """Which groups (G,) have rows in both data sets."""
+        return (self.own > 0) & (self.other > 0)
+
+    @property
+    def alike(self) -> bool:
+        """Whether sides can be changed and leave everything else as it is."""
+        alone = (self.own + self.other)[~self.both]
+        halved = (self.own == self.other)[self.both]
+        return bool(halved.all() and (alone == alone[:1]).all())
+
+    def require(self, level: float, permutations: int) -> None:
+        """Check that a difference, however large, can be told from chance at this level."""
+        highest, both = 1 - level + 1e-12, int(self.both.sum())
+        one, two = (int((side > 0).sum()) - both for side in (self.own, self.other))
+        common = 1 + math.ceil(-math.log2(highest))
+        each = common
+        if self.alike:
+            each = next(n for n in range(3, common + 3) if 2 / math.comb(2 * n, n) <= highest)
+            # two rows that happen to be far from all others show no density of their own
+            ways = math.comb(one + two, one) if min(one, two) > 2 else 1
+            enough = (1 + (one == two)) / (ways << both) <= highest
+        else:
+            enough = both + min(one, two) >= common
+        if not enough:
+            raise OrbiflowError(
+                f"the data sets have {one} and {two} {self.what} of their own and {both} in common: "
+                f"too few to tell a difference from chance at level {level:g}, which takes {each} of "
+                f"each data set's own or {common} in common"
+            )
+        if highest * (1 + permutations) < 1:
+            raise OrbiflowError(
+                f"{permutations} permutations are too few for level {level:g}: ask for at least "
+                f"{math.ceil(1 / highest) - 1}"
+            )
 
 
 def chosen_rows(first: Array, groups: Groups, most: int, seed: int = 0) -> Array:
@@ -244,12 +319,33 @@ def _permuted(first: Array, groups: Groups, permutations: int, rng: np.random.Ge
     return torch.as_tensor(found)
 
 
+def _flipped(first: Array, groups: Groups, permutations: int, rng: np.random.Generator) -> Tensor:
+    """Return weights (N, 1 + P) of rows in the difference of both means: as observed, then flipped.
+
+    Each group's term is taken about the mean of all rows, so that it has mean 0 if the densities are
+    equal, and its sign is drawn. A group with the share h of the rows draws that mean nearer, which
+    shrinks its distance by sqrt(1 - h): this is undone, as in HC2 (MacKinnon and White, 1985).
+    """
+    sizes, signed = np.bincount(groups.index), np.where(first, 1 / first.sum(), -1 / (~first).sum())
+    lean = groups.sums(signed) / sizes
+    away = lean / np.sqrt(1 - sizes / len(first))
+    signs = rng.choice([-1.0, 1.0], size=(groups.count, permutations))
+    drawn = (signed + (away - lean)[groups.index])[:, None] * signs[groups.index]
+    return torch.as_tensor(np.column_stack([signed, drawn - (away * sizes) @ signs / len(first)]))
+
+
+def _squares(kernel: Tensor, weights: Tensor) -> Array:
+    """Return the squared lengths (1 + P,) of sums of features with weights (N, 1 + P)."""
+    blocks = torch.split(weights, MOVED, dim=1)
+    return torch.cat([(block * (kernel @ block)).sum(dim=0) for block in blocks]).numpy()
+
+
 def _pair_sums(kernel: Tensor, labels: Tensor) -> Array:
     """Return sums (3, 1 + P) over pairs within the first, within the second, and between."""
     rows = kernel.sum(dim=1)
     parts = [
         torch.stack([(block * (kernel @ block)).sum(dim=0), rows @ block])
-        for block in torch.split(labels, PERMUTED, dim=1)
+        for block in torch.split(labels, MOVED, dim=1)
     ]
     within, touching = torch.cat(parts, dim=1).numpy()
     between = touching - within

@@ -28,7 +28,7 @@ from orbiflow.density.cross_validation.splits import (
     splits_of,
 )
 from orbiflow.density.pictures import space_title
-from orbiflow.density.tables import append_columns
+from orbiflow.density.tables import append_columns, is_angular
 from orbiflow.drawing import rendered
 from orbiflow.errors import InputFileError
 
@@ -226,7 +226,7 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
         # a flow alone has no components to choose
         "group": str(angles + weighted + 1) if grouped and fit.components != ("flow",) else None,
         "missing": asked.rows.kept_missing,
-        "unit": split.rows.unit if space in ("torus", "klein-bottle") else None,
+        "unit": split.rows.unit if is_angular(space, angles) else None,
         "components": fit.components,
         "repeats": density.repeats,
         "seed": density.seed,

@@ -19,7 +19,7 @@ from orbiflow.density import comparing
 from orbiflow.density.cross_validation.operations import SCORES, UNIFORM, CrossValidation
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
 from orbiflow.density.inference import chart_of_observed
-from orbiflow.density.spaces import Space, space_class
+from orbiflow.density.spaces import Space, space_for
 from orbiflow.density.tables import TableRows, Unit, angle_unit, read_rows, read_table
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import Note, Sink, one_blas_thread
@@ -103,9 +103,8 @@ def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
         rows = rows.only(rows.weights > 0)  # others count for nothing
     table = rows.table
     unit = angle_unit(asked.where.space, asked.where.unit, table, tell)
-    space = space_class(asked.where.space).for_data(
-        table.values, unit=unit, seed=asked.density.seed
-    )
+    where, seed = asked.where, asked.density.seed
+    space = space_for(where.space, table.values, unit=unit, seed=seed, cell=where.cell)
     marginalise = asked.rows.missing == "marginalise"
     points = chart_of_observed(space, table.values) if marginalise else space.to_chart(table.values)
     counts, place = places(points)

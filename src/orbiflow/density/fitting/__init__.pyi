@@ -8,6 +8,7 @@ from .report import FitReport as FitReport
 from .report import Progress as Progress
 from .rows import check_missing as check_missing
 from .rows import group_numbers as group_numbers
+from .rows import lone_groups_note as lone_groups_note
 from .rows import mean_of as mean_of
 from .rows import weighed as weighed
 from .settings import COMPONENTS as COMPONENTS

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import torch
@@ -13,15 +14,19 @@ from torch import Tensor
 from orbiflow.arguments import as_instance
 from orbiflow.density.fitting.evidence import (
     Candidates,
+    Course,
+    FittedFlow,
     TriedFlow,
     assembled,
     candidates_of,
+    flow_beside,
     flow_settings,
     judged,
     stacked,
     supported_weights,
     try_flow,
     without_idle,
+    work_of,
 )
 from orbiflow.density.fitting.families import (
     ChainFamily,
@@ -49,6 +54,7 @@ from orbiflow.density.fitting.rows import (
     effective_rows,
     group_numbers,
     is_whole,
+    lone_groups_note,
     mean_of,
     missing_notes,
     observed_points,
@@ -57,9 +63,10 @@ from orbiflow.density.fitting.rows import (
     weights_of,
 )
 from orbiflow.density.fitting.settings import COMPONENTS, DensitySettings
-from orbiflow.density.models import MOST_DIM, Mixture
-from orbiflow.density.spaces import Space, Torus, whole_turn
+from orbiflow.density.models import MOST_DIM, Mixture, flow_obstacle
+from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import SideBySide
 
 LEAST_FLOW_ROWS = 300
 """With fewer, a flow is not tried: none has gained anything."""
@@ -70,8 +77,11 @@ MEMBERS = 12
 SCORED = 2_000
 """Rows over which the report's mean log density is taken: each costs all kernels."""
 
-BEFORE_FLOW, BEFORE_END = 0.7, 0.95
-"""Of the work told: before a flow, if one is tried, and before all is put together."""
+FLOW_WORK = 4.0
+"""Work of fits of a flow, in that of a family in a fold after the first."""
+
+BEFORE_END = 0.95
+"""Of the work told, before all is put together."""
 
 
 @training()
@@ -114,21 +124,17 @@ def fit_automatic(
     folds = folds_of(rows, together=settings.repeats == "rounding", generator=generator)
     families = _families(space, folds, settings, found)
     flows = _wants_flow(space, folds, settings)
-    before = BEFORE_FLOW if flows else BEFORE_END
-    candidates = candidates_of(
-        space, families, folds, lambda done, what: say(before * done, what), budget
-    )
-    weights = supported_weights(candidates.table, candidates.floor, candidates.row_weights)
-    if space.dim > MOST_DIM:  # each part makes integrals dearer
-        weights = without_idle(candidates, weights)
-    tried = TriedFlow()
-    if flows and not budget.is_spent:
-        tried = try_flow(
-            space, folds, candidates, weights,
-            flow_settings(space, len(folds.rows), settings.seed).replace(**settings.of_flow),
-            budget,
-            lambda done, what: say(BEFORE_FLOW + (BEFORE_END - BEFORE_FLOW) * done, what),
-        )  # fmt: skip
+    total = work_of(len(families), folds.used) + FLOW_WORK * flows
+    course = Course(lambda done, what: say(BEFORE_END * done, what), total)
+    with SideBySide() as beside:
+        fitted = _flow_fits(space, folds, settings, budget, course, beside) if flows else None
+        candidates = candidates_of(space, families, folds, course, budget, beside)
+        weights = supported_weights(candidates.table, candidates.floor, candidates.row_weights)
+        if space.dim > MOST_DIM:  # each part makes integrals dearer
+            weights = without_idle(candidates, weights)
+        tried = TriedFlow()
+        if fitted is not None:
+            tried = try_flow(folds, candidates, weights, fitted)
     say(BEFORE_END, "putting together")
     density = assembled(space, families, candidates, weights, folds.rows, tried.flow, tried.share)
     beside = 1 - tried.share
@@ -137,6 +143,7 @@ def fit_automatic(
     report = _report(density, folds, candidates, weights, tried, parts, found)
     after = (
         *weights_note(folds.rows),
+        *lone_groups_note(folds.rows.groups),
         *report.notes,
         *_untried_note(folds, settings, flows),
         *found.notes(settings.repeats),
@@ -144,6 +151,25 @@ def fit_automatic(
         *steps_note(report.steps, report.integration_error),
     )
     return density, replace(report, notes=(*notes, *after))
+
+
+def _flow_fits(
+    space: Space,
+    folds: Folds,
+    settings: DensitySettings,
+    budget: Budget,
+    course: Course,
+    beside: SideBySide,
+) -> Callable[[int], FittedFlow | None]:
+    """Begin to fit a flow without the first tenth; return the fits without the first and the second."""
+    chosen = flow_settings(space, len(folds.rows), settings.seed).replace(**settings.of_flow)
+    tell = course.part(FLOW_WORK)
+
+    def begun(number: int) -> Callable[[], FittedFlow | None]:
+        return beside.begin(partial(flow_beside, space, folds, number, chosen, budget), tell)
+
+    first = begun(0)
+    return lambda number: begun(number)() if number else first()
 
 
 def _rows(
@@ -193,12 +219,10 @@ def _families(
         families.append(NetworkFamily(space, settings.seed))
     chosen = [family for family in families if family.name in settings.allowed]
     beside = "flow" in settings.allowed and settings.allowed not in (COMPONENTS, ("flow",))
-    if beside and space.dim > MOST_DIM:
-        raise OrbiflowError(
-            f"a flow has {MOST_DIM} dimensions at most, this {space.name} has {space.dim}: leave it "
-            "out of the parts"
-        )
-    if not chosen and (space.dim > MOST_DIM or settings.allowed != ("flow",)):
+    obstacle = flow_obstacle(space)
+    if beside and obstacle:
+        raise OrbiflowError(f"{obstacle}: leave it out of the parts")
+    if not chosen and (obstacle or settings.allowed != ("flow",)):
         raise OrbiflowError(
             f"a density on this {type(space).__name__} of {space.dim} dimensions cannot be made of "
             f"{' and '.join(settings.allowed)} alone: chains are for tori of two angles or more, a "
@@ -209,18 +233,12 @@ def _families(
 
 def _narrowest(space: Space, step: float | None) -> float:
     """Concentration of kernels of a deviation of one step of rounding."""
-    if step is None:
-        return NARROWEST
-    if space.is_round:
-        angle = math.radians(step) if space.settings()["form"] == "latlon" else step
-    else:
-        angle = 2 * math.pi * step / whole_turn(str(space.unit))
-    return min(NARROWEST, 1 / angle**2)
+    return NARROWEST if step is None else min(NARROWEST, 1 / space.step_angle(step) ** 2)
 
 
 def _wants_flow(space: Space, folds: Folds, settings: DensitySettings) -> bool:
     enough = len(folds.rows) >= LEAST_FLOW_ROWS or settings.allowed == ("flow",)
-    return "flow" in settings.allowed and space.dim <= MOST_DIM and enough
+    return "flow" in settings.allowed and not flow_obstacle(space) and enough
 
 
 def _untried_note(folds: Folds, settings: DensitySettings, flows: bool) -> list[str]:

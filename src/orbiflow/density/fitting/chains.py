@@ -17,7 +17,6 @@ from orbiflow.density.models import (
     VonMisesNetwork,
     chained,
     log_conditional,
-    shares_of,
     waves,
 )
 from orbiflow.density.spaces import Space, Torus
@@ -39,6 +38,13 @@ EVERY, IDLE = 5, 1e-3
 """Iterations between looks at the held-out points, and nats between two of them that are too few."""
 
 
+BLOCK_ENTRIES = 2**15
+"""Rows times components worked on at a time: few enough for the cache."""
+
+FAINTEST = -44.0
+"""Logarithm of the least exponential, whose 16th power does not underflow."""
+
+
 def _nll(mixture: VonMisesChains, rows: Rows) -> float:
     return -rows.mean(mixture.log_prob(rows.points))
 
@@ -48,7 +54,7 @@ def fit_chain_mixture(
     start: VonMisesChains, train: Rows, held: Rows, iterations: int
 ) -> VonMisesChains:
     """Fit by EM from a start whose chains have one order; return the iterate best on `held`."""
-    step = _Maximization(train, start.order[0])
+    step = _Maximization(train, start.order[0], len(start.order))
     mixture = best = start
     least = _nll(start, held)
     for iteration in range(1, iterations + 1):
@@ -102,58 +108,128 @@ def far_apart(
     return chosen
 
 
+class _Block(NamedTuple):
+    """Some rows: angles (N, d), their `waves` (N, p), products of these (N, p^2), weights (N, 1)."""
+
+    angle: Tensor
+    waves: Tensor
+    products: Tensor
+    row_weights: Tensor
+
+    def residual(self, means: Tensor, axis: int) -> Tensor:
+        """Return one angle less its regression (N, K), for means (K, d, p)."""
+        return torch.addmm(self.angle[:, axis, None], self.waves, means[:, axis].mT, alpha=-1)
+
+
+class _Sums(NamedTuple):
+    """What belongs to each component but the first, summed over rows.
+
+    - `counts`: (L, K + 1), of each component and scale. `seen`: (K, p), waves, as far as rows count.
+    - `gram`: (K, p^2), products of waves. `force`: (K, d, p), waves times sines of residuals.
+    """
+
+    counts: Tensor
+    seen: Tensor
+    gram: Tensor
+    force: Tensor
+
+
 class _Maximization:
     """The E and M steps on fixed points, of chains of one order (d,); component 0 stays uniform."""
 
-    def __init__(self, rows: Rows, order: Tensor) -> None:
-        points = rows.points
-        self.row_weights = rows.weights
-        self.points, self.allowed = points, chained(order)
-        self.angle = 2 * math.pi * points
-        self.waves = waves(self.angle)
-        self.products = (self.waves[:, :, None] * self.waves[:, None, :]).flatten(1)
-        self.scale = points.new_tensor(SCALES)
+    def __init__(self, rows: Rows, order: Tensor, components: int) -> None:
+        self.allowed = chained(order)
+        angle = 2 * math.pi * rows.points
+        seen = waves(angle)
+        products = (seen[:, :, None] * seen[:, None, :]).flatten(1)
+        weights = torch.ones_like(angle[:, 0]) if rows.weights is None else rows.weights
+        size = max(1, BLOCK_ENTRIES // components)
+        parts = (torch.split(part, size) for part in (angle, seen, products, weights[:, None]))
+        self.blocks = [_Block(*block) for block in zip(*parts, strict=True)]
+        self.scale = angle.new_tensor(SCALES)
 
     def __call__(self, mixture: VonMisesChains, *, bent: bool) -> VonMisesChains:
-        joint = mixture.joint(self.points)
-        share = shares_of(joint.flatten(1)).reshape(joint.shape)  # (N, L, K)
-        if self.row_weights is not None:
-            share = share * self.row_weights[:, None, None]
-        weight = share[..., 1:].sum(dim=1)  # (N, K) of each component
-        precise = (share[..., 1:] / self.scale[:, None]).sum(dim=1)  # each as far as it counts
-        center = torch.atan2(precise.mT @ self.angle.sin(), precise.mT @ self.angle.cos())
-        means = mixture.means.clone()
+        sums, precise = self._expectation(mixture, bent)
+        d, weight = mixture.means.shape[1], sums.counts[:, 1:].sum(dim=0)
+        sine, cosine = sums.seen[:, 1 : 1 + d], sums.seen[:, 1 + d :]
+        center = torch.atan2(sine, cosine)
+        means = torch.zeros_like(mixture.means)
         if bent:
-            means[1:] = self._regressed(mixture, precise, center)
+            means[1:] = self._regressed(mixture, sums, center)
+            spread = self._spread(means[1:], precise)
         else:
-            means[1:] = 0.0
             means[1:, :, 0] = center
-        weights = self._weights(share)
-        moved = VonMisesChains(mixture.space, weights, means, mixture.concentrations, mixture.order)
-        loss = 1 - moved.residuals(self.points)[:, 1:].cos()
-        spread = torch.einsum("nk,nkd->kd", precise, loss) + PRIOR * (1 - PRIOR_RESULTANT)
+            # about the mean direction, cosines sum to the resultant's length
+            spread = sums.seen[:, :1] - torch.hypot(sine, cosine)
+        spread = spread + PRIOR * (1 - PRIOR_RESULTANT)
         concentrations = mixture.concentrations.clone()
-        concentrations[1:] = concentration(1 - spread / (weight.sum(dim=0)[:, None] + PRIOR))
-        return VonMisesChains(mixture.space, weights, means, concentrations, mixture.order)
+        concentrations[1:] = concentration(1 - spread / (weight[:, None] + PRIOR))
+        return VonMisesChains(
+            mixture.space, self._weights(sums.counts), means, concentrations, mixture.order
+        )
 
-    def _weights(self, share: Tensor) -> Tensor:
-        count = share.sum(dim=0).mT
+    def _expectation(self, mixture: VonMisesChains, bent: bool) -> tuple[_Sums, list[Tensor]]:
+        """Return sums, and what each row (N, K) counts for each component, one table a block."""
+        scaled = mixture.concentrations / self.scale[:, None, None]
+        peaks = (mixture.log_weights.mT - special.i0e(scaled).log().sum(dim=-1)).exp()
+        found = [self._shared(block, mixture, peaks, bent) for block in self.blocks]
+        totals = (
+            torch.stack(parts).sum(dim=0) for parts in zip(*[own for own, _ in found], strict=True)
+        )
+        return _Sums(*totals), [precise for _, precise in found]
+
+    def _shared(
+        self, block: _Block, mixture: VonMisesChains, peaks: Tensor, bent: bool
+    ) -> tuple[_Sums, Tensor]:
+        means, kappa = mixture.means, mixture.concentrations
+        fit, sines = torch.zeros_like(block.waves[:, :1] * kappa[:, 0]), list[Tensor]()
+        for axis in range(kappa.shape[1]):
+            residual = block.residual(means, axis)
+            if bent:
+                sines.append(residual[:, 1:].sin())
+            fit.addcmul_(residual.cos_().sub_(1), kappa[:, axis])
+        # powers are cheaper than exponentials; a uniform component keeps all sums above 0
+        assert SCALES == (1.0, 4.0, 16.0)
+        wide = fit.div_(16).clamp_min_(FAINTEST).exp_()
+        middle = wide.square().square_()
+        share = torch.stack([middle.square().square_(), middle, wide], dim=1).mul_(peaks)
+        share *= block.row_weights[:, None] / share.sum(dim=(1, 2), keepdim=True)
+        precise = torch.einsum("nlk,l->nk", share[..., 1:], 1 / self.scale)
+        force = [(precise * sine).mT @ block.waves for sine in sines]
+        sums = _Sums(
+            share.sum(dim=0),
+            precise.mT @ block.waves,
+            precise.mT @ block.products,
+            torch.stack(force, dim=1) if force else block.waves[:0],
+        )
+        return sums, precise
+
+    def _spread(self, means: Tensor, precise: list[Tensor]) -> Tensor:
+        """Return sums (K, d) of 1 less the cosine of residuals of means (K, d, p)."""
+        total = torch.zeros_like(means[..., 0])
+        for block, counts in zip(self.blocks, precise, strict=True):
+            for axis in range(means.shape[1]):
+                loss = block.residual(means, axis).cos_().sub_(1).mul_(counts)
+                total[:, axis] -= loss.sum(dim=0)
+        return total
+
+    def _weights(self, count: Tensor) -> Tensor:
+        count = count.mT
         pooled = count[1:].sum(dim=0)
         drawn = (count + SHARED * pooled / pooled.sum()) / (count.sum(1, keepdim=True) + SHARED)
         drawn[0] = 1 / len(SCALES)
         total = count.sum(dim=1, keepdim=True) + 0.1
         return (drawn * total / total.sum()).log()
 
-    def _regressed(self, mixture: VonMisesChains, precise: Tensor, center: Tensor) -> Tensor:
+    def _regressed(self, mixture: VonMisesChains, sums: _Sums, center: Tensor) -> Tensor:
         """Take one Fisher scoring step of all circular regressions, their slopes held by a ridge."""
         count, d = center.shape
         kappa = mixture.concentrations[1:]
         bessel = special.i1e(kappa) / special.i0e(kappa)
         local = _local(center)
         back = linalg.inv(local)
-        gram = local @ (precise.mT @ self.products).reshape(count, 1 + 2 * d, -1) @ local.mT
-        pull = mixture.residuals(self.points)[:, 1:].sin() * precise[..., None]
-        force = torch.einsum("nkd,np->kdp", pull, self.waves) @ local.mT
+        gram = local @ sums.gram.reshape(count, 1 + 2 * d, -1) @ local.mT
+        force = sums.force @ local.mT
         slopes = mixture.means[1:] @ back
         found = torch.zeros_like(slopes)
         for i, used in enumerate(self.allowed):

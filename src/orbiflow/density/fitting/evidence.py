@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import count
 from typing import NamedTuple
 
@@ -23,6 +24,8 @@ from orbiflow.density.fitting.settings import FlowSettings
 from orbiflow.density.inference import at_observed
 from orbiflow.density.models import MOST_DIM, Density, Mixture, UniformDensity, mixture_of
 from orbiflow.density.spaces import Space
+from orbiflow.fields import has_even_grid
+from orbiflow.runtime import SideBySide, Tell
 from orbiflow.typed_torch import listed
 
 KEPT = 2
@@ -66,45 +69,104 @@ class Candidates:
         return weights
 
 
+class Course:
+    """How much is done of several things, each of which has a weight among a `total`."""
+
+    def __init__(self, say: Progress, total: float) -> None:
+        self._say, self._total = say, total
+        self._done: list[float] = []
+
+    def part(self, weight: float) -> Progress:
+        """Return what is told the share that is done of one more thing, and what is being done."""
+        number = len(self._done)
+        self._done.append(0.0)
+
+        def tell(share: float, what: str) -> None:
+            self._done[number] = weight * share
+            self._say(sum(self._done) / self._total, what)
+
+        return tell
+
+
+class Fitted(NamedTuple):
+    """What a family fitted to a fold, and the log densities of the rows held out, by name."""
+
+    parts: dict[str, Density]
+    logs: dict[str, Tensor]
+
+
+FIRST_FOLD = 2.0
+"""Work of a family in the first fold, which tries more, in that of another fold."""
+
+
+def work_of(families: int, used: int) -> float:
+    """Return the weight of all fits of families to the folds in a `Course`."""
+    return families * (FIRST_FOLD + used - 1)
+
+
 def candidates_of(
-    space: Space, families: list[Family], folds: Folds, say: Progress, budget: Budget
+    space: Space,
+    families: list[Family],
+    folds: Folds,
+    course: Course,
+    budget: Budget,
+    beside: SideBySide,
 ) -> Candidates:
-    """Fit all families to all folds; after the first, only what may be of use."""
+    """Fit all families to all folds; after the first, only what may be of use.
+
+    The families are fitted side by side; so are all folds after the first.
+    """
+
+    def begun(number: int) -> list[Callable[[], Fitted | None]]:
+        return [
+            beside.begin(
+                partial(_fitted, family, folds, number, budget),
+                course.part(1.0 if number else FIRST_FOLD),
+            )
+            for family in families
+        ]
+
+    waiting = [begun(0)]
     blocks: list[dict[tuple[str, str], Tensor]] = []
-    weights: list[Tensor | None] = []
     fitted: dict[str, list[dict[str, Density]]] = {family.name: [] for family in families}
-    for number, (train, held) in enumerate(folds):
-        if number and budget.is_spent:
+    weights: list[Tensor | None] = []
+    for number in range(folds.used):
+        found = [result() for result in waiting[number]]
+        whole = [one for one in found if one is not None]
+        if len(whole) < len(families):
             break
-        tell = _teller(number, folds.used, say)
+        held = folds.held(number)
         block: dict[tuple[str, str], Tensor] = {}
-        for family in families:
-            found = family.fitted(number, train, held, tell)
-            fitted[family.name].append(found)
-            with torch.no_grad():
-                for name, part in found.items():
-                    block[family.name, name] = at_observed(part, held.points)
+        for family, (parts, logs) in zip(families, whole, strict=True):
+            fitted[family.name].append(parts)
+            block |= {(family.name, name): values for name, values in logs.items()}
         block[FLOOR, FLOOR] = at_observed(UniformDensity(space), held.points)
         blocks.append(block)
         weights.append(held.weights)
         if number == 0:
             _narrow(families, block, held)
+            waiting += map(begun, range(1, folds.used))
     keys = [key for key in blocks[-1] if all(key in block for block in blocks)]
     table = torch.cat([torch.stack([block[key] for key in keys]) for block in blocks], dim=1)
     known = [own for own in weights if own is not None]
     return Candidates(keys, table, fitted, torch.cat(known) if known else None)
 
 
-def _teller(number: int, used: int, say: Progress) -> Callable[[str], None]:
-    """Return what tells the progress in a fold, whose amount of work is not known beforehand."""
-    begin, size = (number + 1, 1) if number else (0, 2)  # the first fold tries more
+def _fitted(family: Family, folds: Folds, number: int, budget: Budget, say: Tell) -> Fitted | None:
+    """Fit a family to a fold; None if the time is over before one after the first begins."""
+    if number and budget.is_spent:
+        return None
     tried = count()
 
-    def tell(what: str) -> None:
-        share = 1 - STEP ** next(tried)
-        say((begin + share * size) / (used + 1), f"held-out part {number + 1} of {used}: {what}")
+    def tell(what: str, share: float | None = None) -> None:
+        # how much there is to try is not known beforehand
+        done = 1 - STEP ** next(tried) if share is None else share
+        say(done, f"held-out part {number + 1} of {folds.used}: {what}")
 
-    return tell
+    held = folds.held(number)
+    parts = family.fitted(number, folds.train(number), held, tell)
+    tell(family.name, 1.0)
+    return Fitted(parts, {name: at_observed(part, held.points) for name, part in parts.items()})
 
 
 def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: Rows) -> None:
@@ -201,14 +263,31 @@ class TriedFlow(NamedTuple):
     report: FitReport | None = None
 
 
+FittedFlow = tuple[Density, FitReport]
+
+
+def flow_beside(
+    space: Space, folds: Folds, number: int, chosen: FlowSettings, budget: Budget, say: Tell
+) -> FittedFlow | None:
+    """Fit a flow without a tenth; None if the time is over before it begins."""
+    if budget.is_spent:
+        return None
+    train = folds.train(number)
+    begin, end = ((0.0, FIRST), (FIRST, 1.0))[number]
+    return fit_density(
+        space,
+        train.points,
+        chosen.replace(seconds=budget.seconds_left),
+        weights=train.weights,
+        progress=lambda done, what: say(begin + (end - begin) * done, f"flow: {what}"),
+    )
+
+
 def try_flow(
-    space: Space,
     folds: Folds,
     candidates: Candidates,
     weights: Tensor,
-    chosen: FlowSettings,
-    budget: Budget,
-    told: Callable[[float, str], None],
+    fitted: Callable[[int], FittedFlow | None],
 ) -> TriedFlow:
     """A flow fitted without the first tenth, and the share that this tenth gives it.
 
@@ -219,29 +298,23 @@ def try_flow(
     tables: list[Tensor] = []
     held: list[Rows] = []
 
-    def tried(number: int) -> tuple[Density, FitReport, ComponentEvidence]:
-        train, rows = folds.train(number), folds.held(number)
-        begin, end = ((0.0, FIRST), (FIRST, 1.0))[number]
-        density, report = fit_density(
-            space,
-            train.points,
-            chosen.replace(seconds=budget.seconds_left),
-            weights=train.weights,
-            progress=lambda done, what: told(begin + (end - begin) * done, f"flow: {what}"),
-        )
-        start = sum(map(len, held))
+    def worth_of(density: Density, number: int) -> ComponentEvidence:
+        rows, start = folds.held(number), sum(map(len, held))
         columns = candidates.table[:, start : start + len(rows)]
         with torch.no_grad():
             own = density.log_prob(rows.points)
         tables.append(torch.stack([stacked(columns, weights), own, columns[-1]]))
         held.append(rows)
-        return density, report, _worth(tables, held)
+        return _worth(tables, held)
 
-    density, report, worth = tried(0)
+    if (first := fitted(0)) is None:
+        return TriedFlow()
+    density, report = first
+    worth = worth_of(density, 0)
     kept = _is_worth_it(worth)
     sure = Gain(worth.gain, worth.error).is_sure
-    if kept and not sure and folds.used > 1 and not budget.is_spent:
-        worth = tried(1)[2]
+    if kept and not sure and folds.used > 1 and (second := fitted(1)) is not None:
+        worth = worth_of(second[0], 1)
         kept = _is_worth_it(worth) and worth.gain >= LIKELY * worth.error
     if not kept:
         worth = replace(worth, share=0.0, gain=0.0, error=0.0)
@@ -274,6 +347,11 @@ def _is_worth_it(worth: ComponentEvidence) -> bool:
 
 def flow_settings(space: Space, rows: int, seed: int) -> FlowSettings:
     """Of a flow beside other parts: those have the clusters, it has what is smooth."""
+    if space.dim == MOST_DIM and not has_even_grid(space.group):
+        # each point costs a sum over all waves: as many as of splines would take minutes
+        return FlowSettings(
+            max_frequency=2, segments=2, roughness=(1e-3,), iterations=30, seed=seed
+        )
     if space.dim == MOST_DIM:
         return FlowSettings(
             max_frequency=5, segments=3, roughness=(1e-3,), iterations=60, seed=seed

@@ -29,10 +29,10 @@ from orbiflow.density.fitting.report import (
 )
 from orbiflow.density.fitting.rows import Rows, effective_rows, weighed, weights_note
 from orbiflow.density.fitting.settings import FlowSettings
-from orbiflow.density.models import MOST_DIM, FlowDensity, UniformDensity
+from orbiflow.density.models import FlowDensity, UniformDensity, flow_obstacle
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import InvariantField, SplineField
+from orbiflow.fields import FourierField, InvariantField, SplineField, has_even_grid
 from orbiflow.flows import Flow
 
 DTYPE = torch.float32
@@ -145,11 +145,10 @@ def fit_density(
     settings = as_instance(
         FlowSettings() if settings is None else settings, FlowSettings, "settings"
     )
-    if as_instance(space, Space, "space", "see `make_space`").dim > MOST_DIM:
-        raise OrbiflowError(
-            f"a flow has {MOST_DIM} dimensions at most, this {space.name} has {space.dim}: fit other "
-            'components, such as "kernels,mixture,chains,network"'
-        )
+    obstacle = flow_obstacle(as_instance(space, Space, "space", "see `make_space`"))
+    if obstacle:
+        others = "kernels,mixture,chains,network" if space.has_chart else "kernels,mixture"
+        raise OrbiflowError(f'{obstacle}: fit other components, such as "{others}"')
     say = progress or silent
     generator = torch.Generator().manual_seed(settings.seed)
     rows = weighed(own_points(space, points), weights)
@@ -198,9 +197,11 @@ def _start(
 ) -> FlowDensity:
     """The closed-form start, by flow matching."""
     # the frequency index that reaches so many waves along a side of the square
-    frequency = round(settings.max_frequency * float(space.group.lattice.diagonal().max()))
+    longest = float(np.linalg.norm(space.group.lattice, axis=0).max())
+    frequency = round(settings.max_frequency * longest)
+    kind = SplineField if has_even_grid(space.group) else FourierField
     segments = [
-        SplineField(space.group, frequency, smoothness=SMOOTHNESS, dtype=DTYPE)
+        kind(space.group, frequency, smoothness=SMOOTHNESS, dtype=DTYPE)
         for _ in range(settings.segments)
     ]
     chosen = _matched(train, generator)

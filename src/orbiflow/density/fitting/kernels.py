@@ -5,10 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 import torch
 from scipy.spatial import KDTree
+from scipy.special import ive
 from torch import Tensor
 
 from orbiflow.density.fitting.chains import PRIOR, PRIOR_RESULTANT, concentration, far_apart
@@ -16,7 +18,7 @@ from orbiflow.density.fitting.folds import places
 from orbiflow.density.fitting.likelihood import training
 from orbiflow.density.fitting.rows import Rows, is_whole
 from orbiflow.density.models import FAINT, AdaptiveKernels, kernel_rows
-from orbiflow.density.spaces import RoundSpace, Space, rectangle
+from orbiflow.density.spaces import Space
 from orbiflow.typed_torch import linalg, special
 
 NEIGHBOURS = (2, 4, 8, 16)
@@ -48,14 +50,14 @@ def spreads(space: Space, centers: Tensor, neighbours: list[int]) -> list[Tensor
     near = images.reshape(-1, images.shape[-1])[torch.as_tensor(np.asarray(nearest)[:, 1:])]
     square = (near - images[0][:, None]) ** 2
     if space.is_round:
-        square = square.sum(dim=-1, keepdim=True) / 2
+        square = square.sum(dim=-1, keepdim=True) / space.dim
     else:  # a chord's square is nearly the angle's
         square = square[..., : space.dim] + square[..., space.dim :]
     return [square[:, :m].mean(dim=1) + 1e-12 for m in neighbours]
 
 
-MOST_CENTERS = 20_000
-"""The most kernels of an estimate."""
+MOST_CENTERS, MOST_IMAGES = 20_000, 40_000
+"""The most rows that have a kernel in an estimate, and the most kernels: one for each of its images."""
 
 LADDER = 27
 """Number of widths from `WIDEST` to `NARROWEST`; neighbours differ by a factor of 1.4."""
@@ -70,7 +72,7 @@ def kernel_estimates(
     the nearest neighbours, on tori axis by axis (Breiman, Meisel, Purcell, 1977); "repeated" are the
     narrowest kernels, about the places of several points alone, if `repeats` are real.
     """
-    rows = rows[:MOST_CENTERS]
+    rows = rows[: min(MOST_CENTERS, MOST_IMAGES // len(space.features(rows.points[:1])))]
     train, own = rows.points, torch.full((len(rows),), 1 / len(rows), dtype=torch.float64)
     if rows.weights is not None:
         own = rows.weights / rows.weights.sum()
@@ -119,7 +121,7 @@ def fit_mixture(
     """Fit a mixture of few components with places, widths and weights of their own.
 
     Products of von Mises distributions with a concentration an angle on torus and Klein bottle, von
-    Mises-Fisher on sphere and projective plane (Banerjee et al., Clustering on the unit hypersphere
+    Mises-Fisher on spheres and their quotients (Banerjee et al., Clustering on the unit hypersphere
     using von Mises-Fisher distributions, 2005), summed over the group. A few prior points hold each
     concentration finite.
 
@@ -146,18 +148,18 @@ def fit_mixture(
     width = 1 if space.is_round else space.dim
     kappa = mean.new_full((components, width), 10.0)
     weights = mean.new_full((components,), 1 / components)
+    of_mean = partial(round_concentration, dim=space.dim) if space.is_round else concentration
     last = -math.inf
     for _ in range(iterations):
         count, known, total, score = _expectation(space, every, mean, kappa, weights)
         weights = (count + 0.01) / (count + 0.01).sum()
         mean, length = _directions(space, total)
         resultant = (length + PRIOR * PRIOR_RESULTANT) / (known + PRIOR)
-        kappa = (_round_concentration if space.is_round else concentration)(resultant)
-        kappa = kappa.clamp(WIDEST / 100, narrowest)
+        kappa = of_mean(resultant).clamp(WIDEST / 100, narrowest)
         if score - last < CONVERGED * len(train):
             break
         last = score
-    return AdaptiveKernels(space, _points(space, mean), kappa, weights)
+    return AdaptiveKernels(space, space.from_features(mean), kappa, weights)
 
 
 def _expectation(
@@ -205,19 +207,21 @@ def _directions(space: Space, total: Tensor) -> tuple[Tensor, Tensor]:
     return (unit[:, 0] if space.is_round else torch.cat(unit.unbind(dim=-1), dim=1)), length
 
 
-def _round_concentration(resultant: Tensor) -> Tensor:
-    """Return kappa of mean cosines coth(kappa) - 1 / kappa: Banerjee et al. (2005), then Newton."""
+def round_concentration(resultant: Tensor, dim: int) -> Tensor:
+    """Return kappa of von Mises-Fisher densities on S^dim that have these mean cosines.
+
+    Banerjee et al. (2005), then Newton. On the sphere the mean cosine is coth(kappa) - 1 / kappa.
+    """
     r = resultant.clamp(1e-4, 1 - 1e-8)
-    kappa = r * (3 - r**2) / (1 - r**2)
+    kappa = r * (dim + 1 - r**2) / (1 - r**2)
     for _ in range(4):
-        ratio = 1 / torch.tanh(kappa) - 1 / kappa
-        kappa = (kappa - (ratio - r) / (1 - ratio**2 - 2 * ratio / kappa)).clamp(1e-3, 1e8)
+        ratio = _mean_cosine(kappa, dim)
+        kappa = (kappa - (ratio - r) / (1 - ratio**2 - dim * ratio / kappa)).clamp(1e-3, 1e8)
     return kappa
 
 
-def _points(space: Space, mean: Tensor) -> Tensor:
-    """Return chart points of features (K, m)."""
-    if isinstance(space, RoundSpace):
-        return space.vectors_to_chart(mean.numpy())
-    cos, sin = mean.chunk(2, dim=1)
-    return space.project(torch.atan2(sin, cos) / (2 * math.pi) * rectangle(space))
+def _mean_cosine(kappa: Tensor, dim: int) -> Tensor:
+    if dim == 2:
+        return 1 / torch.tanh(kappa) - 1 / kappa
+    upper, lower = (ive((dim + k) / 2, kappa.numpy()) for k in (1, -1))
+    return torch.as_tensor(upper / lower)

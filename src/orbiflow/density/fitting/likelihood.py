@@ -228,18 +228,22 @@ def merged(rows: Rows, cells: int, crowd: int) -> Rows:
     within a cell, which is below 1 / (6 cells^2). Where the density is sharp, points crowd: cells of
     more than `crowd` points are quartered, again and again.
 
-    Points (N, d) in [0, 1]^d become points (M, d), M <= N, with weights of sum 1; the coarsest grid has
-    so many `cells` along a side.
+    Points (N, d) of the chart become points (M, d), M <= N, with weights of sum 1; the coarsest grid
+    has so many `cells` along a unit of length.
 
     >>> merged(Rows(torch.tensor([[0.1], [0.2], [0.9]])), 2, crowd=2).weights
     tensor([0.6667, 0.3333])
     """
     points = rows.points
+    # the unit cube, or as many cubes as hold the points
+    low = points.amin(dim=0).floor()
+    high = (points.amax(dim=0) - low).ceil().clamp_min(1).max()
+    cells = cells * int(high)
     group = torch.zeros(len(points), dtype=torch.long)
     left, groups = torch.arange(len(points)), 0
     for level in range(LEVELS + 1):
         side = cells << level
-        cell = (points[left] * side).floor().clamp(0, side - 1).long()
+        cell = ((points[left] - low) / high * side).floor().clamp(0, side - 1).long()
         label = (cell * side ** torch.arange(points.shape[1]).flip(0)).sum(dim=1)
         _, where, counts = unique(label, return_inverse=True, return_counts=True)
         settled = (counts[where] <= crowd) | (level == LEVELS)

@@ -141,7 +141,7 @@ def _figures(values: list[float | None]) -> tuple[float, ...]:
 def own_points(space: Space, points: Any) -> Tensor:
     """Canonical points (N, d), float64: a copy, for those of `torch.inference_mode` cannot be used."""
     as_instance(space, Space, "space", "see `make_space`")
-    return space.project(as_points(points, space.dim, flat=True).detach().double().clone())
+    return space.project(as_points(points, space.chart_dim, flat=True).detach().double().clone())
 
 
 def sides(points: Tensor, share: float, generator: torch.Generator) -> tuple[Tensor, Tensor, int]:

@@ -123,6 +123,20 @@ def group_numbers(labels: ArrayLike, rows: int) -> NDArray[np.int64]:
     return np.unique(array, return_inverse=True)[1].astype(np.int64)
 
 
+def lone_groups_note(groups: Tensor | None) -> list[str]:
+    """Return a note if there are group numbers (N,) and no two rows have the same.
+
+    >>> len(lone_groups_note(torch.tensor([0, 1, 2]))), lone_groups_note(torch.tensor([0, 1, 0]))
+    (1, [])
+    """
+    if groups is None or len(groups.unique()) < len(groups):
+        return []
+    return [
+        "each row has a group of its own, as if there were no groups: does the column say what rows "
+        "have in common?"
+    ]
+
+
 def weighed(points: Tensor, weights: Any, groups: Tensor | None = None) -> Rows:
     """Return the rows that have a weight, with weights of mean 1: only their ratios count.
 

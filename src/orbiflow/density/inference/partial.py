@@ -114,7 +114,7 @@ def _restricted(
     accuracy = as_number(accuracy, "accuracy")
     if not 0 < accuracy <= MOST_OFF:
         raise OrbiflowError(f"accuracy must be above 0 and at most {MOST_OFF}, got {accuracy}")
-    say = progress or (lambda _share, _what: None)
+    say = progress or _silent
     closed, left = density.restricted(split, space)
     error = 0.0
     if left and space.dim > MOST_TABULATED:
@@ -133,6 +133,10 @@ def _restricted(
         )
     whole.error = math.hypot(error, _inherited(density, split))
     return whole
+
+
+def _silent(share: float, what: str) -> None:
+    del share, what
 
 
 def _inherited(density: Density, split: Split) -> float:

@@ -17,6 +17,7 @@ from .flow import MOST_DIM as MOST_DIM
 from .flow import FlowDensity as FlowDensity
 from .flow import UniformDensity as UniformDensity
 from .flow import VonMisesDensity as VonMisesDensity
+from .flow import flow_obstacle as flow_obstacle
 from .kernels import AdaptiveKernels as AdaptiveKernels
 from .kernels import kernel_rows as kernel_rows
 from .mixture import Mixture as Mixture

@@ -97,7 +97,7 @@ class _Walk:
                 noise[:, axis] += slope[:, None] * noise[:, j]
                 curved = slope.abs() * bend[:, j] + most * (self.reach[:, j] / 2) ** 2 / 2
                 bend[:, axis] += torch.minimum(curved, 2 * most)
-            self.reach[:, axis] = REACH * noise[:, axis].norm(dim=1) + bend[:, axis]
+            self.reach[:, axis] = REACH * noise[:, axis].square().sum(dim=1).sqrt() + bend[:, axis]
             if axis in given:
                 at = torch.tensor(2 * math.pi * given[axis], dtype=torch.float64)
                 rough = 1 / (

@@ -85,7 +85,7 @@ class Density(Distribution):
 
     def __init__(self, space: Space) -> None:
         self.space = as_instance(space, Space, "space", "see `make_space`")
-        super().__init__(event_shape=torch.Size([space.dim]), validate_args=False)
+        super().__init__(event_shape=torch.Size([space.chart_dim]), validate_args=False)
 
     # What a component must say, and what it may.
 
@@ -287,9 +287,9 @@ class Density(Distribution):
         """Return samples as `sample` does, differentiable in the parameters of a flow."""
         shape, source = shape_of(sample_shape), source_of(generator)
         if not shape.numel():
-            return torch.empty(*shape, self.space.dim, dtype=self.dtype, device=self.device)
+            return torch.empty(*shape, self.space.chart_dim, dtype=self.dtype, device=self.device)
         drawn = self.draw(shape.numel(), source).to(dtype=self.dtype, device=self.device)
-        return drawn.reshape(*shape, self.space.dim)
+        return drawn.reshape(*shape, self.space.chart_dim)
 
     @torch.no_grad()
     def entropy(
@@ -330,7 +330,7 @@ class Density(Distribution):
 
     def _here(self, value: Any) -> Tensor:
         """Return points (..., d) on the density's device; tensors are never moved from another."""
-        points, device = as_points(value, self.space.dim), self.device
+        points, device = as_points(value, self.space.chart_dim), self.device
         if device is None:
             return points
         if not isinstance(value, Tensor):

@@ -45,7 +45,8 @@ def grids_for(factors: Sequence[Factor], split: Split, level: int) -> Grids | No
     given = dict(zip(split.given, split.values, strict=True))
     wanted = dict.fromkeys((factor.axes[-1] for factor in factors), 1.0)
     for axes, chains in factors:
-        slopes = chains.means[:, :, 1:].unflatten(2, (2, -1)).square().sum(dim=2)  # (K, d, d)
+        d = len(axes)
+        slopes = chains.means[:, :, 1 : 1 + d] ** 2 + chains.means[:, :, 1 + d :] ** 2  # (K, d, d)
         bent = (chains.concentrations[:, :, None] * slopes).amax(dim=1)
         kappa = torch.maximum(chains.concentrations, bent)[..., None] / torch.tensor(SCALES)
         for k, axis in enumerate(axes):
@@ -113,7 +114,7 @@ def elimination_order(
     order: list[int] = []
     most = max((_entries(axes, sizes) for axes in left), default=1)
     while hidden:
-        cliques = {axis: frozenset().union(*(t for t in left if axis in t)) for axis in hidden}
+        cliques = {axis: frozenset[int]().union(*(t for t in left if axis in t)) for axis in hidden}
         axis = min(sorted(hidden), key=lambda one: _entries(cliques[one], sizes))
         most = max(most, _entries(cliques[axis], sizes))
         left = [t for t in left if axis not in t] + [cliques[axis] - {axis}]

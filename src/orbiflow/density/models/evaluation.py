@@ -62,12 +62,13 @@ def log_density_gradient(density: Density, data: ArrayLike) -> tuple[Array, Arra
 
 
 def midpoints(space: Space, resolution: int) -> Tensor:
-    """Return the midpoints (resolution^2, 2) of a grid on the canonical square, float64."""
-    as_whole(resolution, "resolution", 1, 10**6)
-    if space.dim != 2:
-        raise OrbiflowError(f"a grid needs two dimensions, this {space.name} has {space.dim}")
-    t = (torch.arange(resolution, dtype=torch.float64) + 0.5) / resolution
-    return torch.stack(torch.meshgrid(t, t, indexing="ij"), dim=-1).reshape(-1, 2)
+    """Return points (resolution^d, d) at which a mean is an integral over the space, float64.
+
+    They are the midpoints of an even grid on the unit cube or, where that is not the fundamental
+    domain, on the lattice's cell.
+    """
+    as_instance(space, Space, "space", "see `make_space`")
+    return space.midpoints(resolution)
 
 
 def kl_by_quadrature(target: Tensor, log_density: Tensor) -> float:
@@ -117,8 +118,11 @@ class TabulatedDensity:
     @one_thread()
     def __init__(self, density: Density, resolution: int = 512) -> None:
         space = as_instance(density, Density, "density").space
-        if space.dim != 2:
-            raise OrbiflowError(f"a table needs two dimensions, this {space.name} has {space.dim}")
+        if space.dim != 2 or not space.has_square:
+            raise OrbiflowError(
+                f"a table needs a space of two dimensions with a canonical square, which this "
+                f"{space.name} of {space.dim} is not: evaluate the density itself"
+            )
         as_whole(resolution, "resolution", 8, 4096)
         self.space, self.resolution = space, resolution
         self._narrow: AdaptiveKernels | None = None

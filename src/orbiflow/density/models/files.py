@@ -30,16 +30,16 @@ the second no chains beside a flow; the third no network."""
 def density_to_bytes(density: Density, **extra: Any) -> bytes:
     """Return a density as bytes that `read_density` makes the same again.
 
-    Saved are densities whose class has a `kind`, on the four spaces as `make_space` makes them, and
-    flows of Fourier and spline fields on the space's own group; anything else is refused by the name of
-    the part. Parameters are written in float64. `extra` are further values for the reader, for JSON.
+    Saved are densities whose class has a `kind`, on spaces that `make_space` makes again, and flows of
+    Fourier and spline fields on the space's own group; anything else is refused by the name of the
+    part. Parameters are written in float64. `extra` are further values for the reader, for JSON.
     """
     header, tensors = density_parts(as_instance(density, Density, "density"), "density")
     space = _checked_space(density.space)
     document = {
         "format": FORMAT,
         "space": {"name": space.name, **space.settings()},
-        "group": group_header(space.group),
+        "group": group_header(space.group) if space.has_chart else None,
         "density": header,
         "extra": extra,
     }
@@ -55,11 +55,12 @@ def _checked_space(space: Space) -> Space:
     if (
         again is None
         or type(again) is not type(space)
-        or not is_same_group(again.group, space.group)
+        or again.settings() != space.settings()
+        or (space.has_chart and not is_same_group(again.group, space.group))
     ):
         raise OrbiflowError(
-            f"the space is a {type(space).__name__}, which `make_space` does not make: save densities "
-            "on the four spaces as they are"
+            f"the space is a {type(space).__name__}, which `make_space` does not make again: give the "
+            'class a name of its own, `name = "..."`, and settings that are its options'
         )
     return space
 
@@ -85,7 +86,7 @@ def _restored(header: dict[str, Any], tensors: dict[str, Tensor]) -> Density:
         import_module(f"orbiflow.density.models.{module}")
     options = dict(header["space"])
     space = make_space(str(options.pop("name")), **options)
-    if header["format"] != FORMATS_BEFORE[0]:
+    if header["format"] != FORMATS_BEFORE[0] and space.has_chart:
         check_group(header["group"], space.group)
     if header["format"] == FORMAT:
         return density_from(space, header["density"], tensors)

@@ -25,10 +25,19 @@ from orbiflow.density.spaces import Space, Torus, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
 from orbiflow.runtime import one_thread
+from orbiflow.symmetry import cast_like
 from orbiflow.typed_torch import linalg, special
 
 MOST_DIM = 3
 """The most dimensions of a flow of splines, whose grid would be too large beyond."""
+
+
+def flow_obstacle(space: Space) -> str | None:
+    """Return why no density on a space has a flow, in words, or None."""
+    if space.has_chart and space.dim <= MOST_DIM:
+        return None
+    return f"a flow has {MOST_DIM} dimensions at most, this {space.name} has {space.dimensions}"
+
 
 BLOCK = 65536
 """Points integrated at a time where no gradient is asked for: bounds the memory."""
@@ -96,7 +105,7 @@ class FlowDensity(Density, kind="flow"):
     @one_thread()
     @torch.no_grad()
     def mass(self, resolution: int = 64) -> float:
-        """Return the integral over the square, by the midpoint rule on resolution^2 points.
+        """Return the integral over the space, by the midpoint rule on resolution^d points.
 
         The points are spread evenly over the base and carried by the flow, so that they crowd where
         the density is high, and each counts for the area that its surroundings are carried to: the
@@ -112,7 +121,8 @@ class FlowDensity(Density, kind="flow"):
             start = start.requires_grad_()
             end = self.flow(start)
             rows = [
-                torch.autograd.grad(end[:, k].sum(), start, retain_graph=k == 0)[0] for k in (0, 1)
+                torch.autograd.grad(end[:, k].sum(), start, retain_graph=True)[0]
+                for k in range(self.space.dim)
             ]
         with torch.no_grad():
             # signed: a map that folds still covers the square once
@@ -226,10 +236,10 @@ class UniformDensity(Density, kind="uniform"):
 
 
 class VonMisesDensity(Density, kind="von-mises"):
-    """The paper's base: a product of von Mises densities about the square's centre.
+    """The paper's base: a product of von Mises densities about the point (1/2, ..., 1/2) of the chart.
 
-    It is made invariant by summing over the group: with periods those of the lattice, the sum over
-    coset representatives integrates to 1 over the square.
+    It is made invariant by summing over the group: with the periods of the space's frame, the sum over
+    coset representatives integrates to 1 over the space.
 
     Args:
         space: Any space.
@@ -242,12 +252,12 @@ class VonMisesDensity(Density, kind="von-mises"):
         if not real or not concentration > 0 or not math.isfinite(concentration):
             raise OrbiflowError(f"concentration must be positive, got {concentration!r}")
         self.concentration = float(concentration)
-        self.periods = rectangle(space)
 
     def log_chart(self, points: Tensor) -> Tensor:
-        images = self.space.group.images(points)
-        periods = self.periods.to(points)
-        angle = 2 * math.pi * (images - 0.5) / periods
+        frame = self.space.frame.group
+        images = frame.images(points)
+        periods = rectangle(self.space).to(points)
+        angle = 2 * math.pi * ((images - 0.5) @ cast_like(frame.inverse_lattice, points).T)
         kappa = self.concentration
         log_normal = torch.log(special.i0e(torch.tensor(kappa, dtype=torch.float64))) + kappa
         terms = kappa * angle.cos() - log_normal.to(points) - periods.log()
@@ -258,7 +268,7 @@ class VonMisesDensity(Density, kind="von-mises"):
         angle = np.random.default_rng(seed).vonmises(
             0.0, self.concentration, (count, self.space.dim)
         )
-        return self.space.project(0.5 + torch.tensor(angle) / (2 * math.pi) * self.periods.cpu())
+        return self.space.project(0.5 + self.space.from_turns(torch.tensor(angle) / (2 * math.pi)))
 
     def header(self) -> dict[str, Any]:
         return {"concentration": self.concentration}

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Self, cast
+from typing import Any, Self
 
 import numpy as np
 import torch
+from scipy.special import ive
 from torch import Tensor
 
 from orbiflow.arguments import as_tensor
@@ -15,7 +16,7 @@ from orbiflow.arrays import Array
 from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.near_sums import TOLERANCE, near_log_sum
 from orbiflow.density.models.terms import Terms, log_sum_exp, shares_of
-from orbiflow.density.spaces import RoundSpace, Space, Torus, rectangle
+from orbiflow.density.spaces import Space, Torus, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import special
 
@@ -29,12 +30,12 @@ BLOCK_ENTRIES = 250_000
 class AdaptiveKernels(Density, kind="kernels"):
     """A mixture of kernels made invariant under the space's group.
 
-    Products of von Mises kernels in the angles of the lattice on torus and Klein bottle, summed over
-    coset representatives; von Mises-Fisher kernels on sphere and projective plane, there summed over
-    both ends of the axis.
+    Products of von Mises kernels in the coordinates of the space's frame on flat spaces, summed over
+    images under the group; von Mises-Fisher kernels on spheres of any dimension and their quotients,
+    summed over the images of a unit vector, such as both ends of an axis.
 
     Args:
-        space: Any space; with a rectangular lattice if it is flat.
+        space: Any space.
         centers: The chart points (N, d) that the kernels are about.
         concentrations: Concentrations kappa > 0, (N, d) on flat spaces and (N, 1) on round ones.
         weights: Weights (N,) of sum 1.
@@ -51,7 +52,7 @@ class AdaptiveKernels(Density, kind="kernels"):
         width = 1 if space.is_round else space.dim
         shapes = [tuple(t.shape) for t in (centers, concentrations, weights)]
         count = len(centers) if centers.dim() else 0
-        if shapes != [(count, space.dim), (count, width), (count,)] or not count:
+        if shapes != [(count, space.chart_dim), (count, width), (count,)] or not count:
             raise OrbiflowError(f"kernels of shapes {shapes} do not fit a {space.name}")
         if not (
             bool(torch.isfinite(centers).all())
@@ -64,7 +65,7 @@ class AdaptiveKernels(Density, kind="kernels"):
         self.centers, self.concentrations, self.weights = (
             t.double() for t in (centers, concentrations, weights)
         )
-        images = space.features(self.centers)
+        images = space.features(self.centers, slice(space.kernel_images))
         self._center_features = images[0]
         self._terms = _terms(space, images, self.concentrations, self.weights)
 
@@ -84,12 +85,16 @@ class AdaptiveKernels(Density, kind="kernels"):
         `tolerance` is the share of the sum of both that far kernels that are left out may add, at most,
         and by which smooth ones that are interpolated may be off.
         """
-        flat = points.reshape(-1, self.space.dim).double()
-        features = self.space.features(flat)[0].mT
+        flat = points.reshape(-1, self.space.chart_dim).double()
+        # images that turn the axes are of points, all others of kernels
+        images = self.space.features(flat, slice(None, None, self.space.kernel_images))
+        features = images.flatten(0, 1).mT
         if features.device.type == "cpu":
             values = near_log_sum(self._terms, features.contiguous(), beside, tolerance)
         else:
             values = self._terms.plain_log_sum(features)
+        if len(images) > 1:
+            values = values.reshape(len(images), -1).logsumexp(dim=0)
         return values.reshape(points.shape[:-1]).to(points.dtype)
 
     def parted(self, wide: Tensor) -> tuple[AdaptiveKernels | None, AdaptiveKernels | None, float]:
@@ -113,10 +118,10 @@ class AdaptiveKernels(Density, kind="kernels"):
         if self.space.is_round:
             centers = self._center_features.cpu().numpy()[chosen]
             vectors = _von_mises_fisher(centers, kappa[:, 0], rng)
-            return cast(RoundSpace, self.space).vectors_to_chart(vectors)
+            return self.space.from_features(torch.tensor(vectors))
         angle = torch.tensor(rng.vonmises(0.0, kappa))
         return self.space.project(
-            self.centers.cpu()[chosen] + angle / (2 * math.pi) * rectangle(self.space)
+            self.centers.cpu()[chosen] + self.space.from_turns(angle / (2 * math.pi))
         )
 
     @classmethod
@@ -175,18 +180,24 @@ def _terms(space: Space, images: Tensor, kappa: Tensor, weights: Tensor) -> Term
     """Return kernels about all images (E, N, m) of their centers: then points need no images."""
     if space.is_round:
         every = kappa.mT.repeat(1, len(images))
-        peaks = _round_peaks(kappa[:, 0])
+        peaks = _round_peaks(kappa[:, 0], space.dim)
     else:
-        # the lattice's rectangle leaves signed permutations of the axes
-        turns = [torch.as_tensor(np.abs(g.linear)).to(kappa) for g in space.group.cosets]
+        # these images permute and flip the axes of the frame
+        own, frame = space.frame.own, space.frame.group
+        moved = np.abs(frame.inverse_lattice @ frame.linear_parts[:own] @ frame.lattice).round()
+        turns = torch.as_tensor(moved).to(kappa)
         every = torch.cat([turn @ kappa.mT for turn in turns], dim=1)
         peaks = -(special.i0e(kappa) * rectangle(space).to(kappa)).log().sum(dim=1)
     centers = images.flatten(0, 1).mT.contiguous()
     return Terms(centers, every, (peaks + weights.log()).repeat(len(images)))
 
 
-def _round_peaks(kappa: Tensor) -> Tensor:
-    """Return logarithms of the largest values of von Mises-Fisher kernels, per round area."""
+def _round_peaks(kappa: Tensor, dim: int) -> Tensor:
+    """Return logarithms of the largest values of von Mises-Fisher kernels on S^dim, per its area."""
+    if dim != 2:
+        order = (dim - 1) / 2
+        scaled = as_tensor(ive(order, kappa.cpu().numpy()), "ive").to(kappa)
+        return order * kappa.log() - (order + 1) * math.log(2 * math.pi) - scaled.log()
     return (kappa / (2 * math.pi)).log() - (-torch.expm1(-2 * kappa)).log()
 
 
@@ -197,17 +208,36 @@ def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, T
     """
     if space.is_round:
         k = kappa[:, 0]
-        return kappa * centers, _round_peaks(k) - k
+        return kappa * centers, _round_peaks(k, space.dim) - k
     scaled = special.i0e(kappa) * rectangle(space).to(kappa)
     return torch.cat([kappa, kappa], dim=1) * centers, -(scaled.log() + kappa).sum(dim=1)
 
 
 def _von_mises_fisher(centers: Array, kappa: Array, rng: np.random.Generator) -> Array:
-    """Return one draw (N, 3) about each of `centers` (Wood, 1994; closed form on the sphere)."""
-    u = rng.uniform(size=len(centers))
-    height = 1 + np.log(u + (1 - u) * np.exp(-2 * kappa)) / kappa
+    """Return one draw (N, m) about each of `centers` (Wood, Simulation of the von Mises Fisher
+    distribution, 1994; closed form on the sphere)."""
+    if centers.shape[1] == 3:
+        u = rng.uniform(size=len(centers))
+        height = 1 + np.log(u + (1 - u) * np.exp(-2 * kappa)) / kappa
+    else:
+        height = 1 - _wood(kappa, centers.shape[1] - 1, rng)
     across = rng.normal(size=centers.shape)
     across -= (across * centers).sum(axis=1, keepdims=True) * centers
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     vectors = height[:, None] * centers + np.sqrt(np.clip(1 - height**2, 0, 1))[:, None] * across
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def _wood(kappa: Array, dim: int, rng: np.random.Generator) -> Array:
+    """Return 1 - cos (N,) of the angle between draws on S^dim and their centers, by rejection."""
+    slope = dim / (2 * kappa + np.sqrt(4 * kappa**2 + dim**2))
+    best = (1 - slope) / (1 + slope)
+    most = kappa * best + dim * np.log1p(-(best**2))
+    found, left = np.zeros_like(kappa), np.arange(len(kappa))
+    while len(left):
+        z, b = rng.beta(dim / 2, dim / 2, size=len(left)), slope[left]
+        below = 2 * b * z / (1 - (1 - b) * z)
+        odds = kappa[left] * (1 - below) + dim * np.log1p(-best[left] * (1 - below)) - most[left]
+        found[left] = below
+        left = left[odds < np.log(rng.uniform(size=len(left)))]
+    return found

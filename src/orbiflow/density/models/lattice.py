@@ -65,9 +65,9 @@ def joined_tables(tables: Iterable[Tensor]) -> list[Tensor]:
 
 def _on_finer_grid(values: Tensor, size: int) -> Tensor:
     """Return a periodic function on a grid with `size` points a side, by its waves."""
-    spectrum = fft.fftn(values)
+    spectrum: Tensor = fft.fftn(values)
     for axis, count in enumerate(values.shape):
-        low, high = spectrum.split([count - count // 2, count // 2], dim=axis)
+        low, high = torch.split(spectrum, [count - count // 2, count // 2], dim=axis)
         shape = list(low.shape)
         shape[axis] = size - count
         spectrum = torch.cat([low, low.new_zeros(shape), high], dim=axis) * (size / count)

@@ -118,7 +118,7 @@ class Mixture(Density, kind="mixture"):
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         chosen = torch.multinomial(self.weights, count, replacement=True, generator=generator)
         counts: list[int] = listed(torch.bincount(chosen, minlength=len(self.components)))
-        drawn = torch.empty(count, self.space.dim, dtype=self.dtype, device=self.device)
+        drawn = torch.empty(count, self.space.chart_dim, dtype=self.dtype, device=self.device)
         for index, (number, own) in enumerate(zip(counts, self.components, strict=True)):
             if number:
                 at = torch.nonzero(chosen == index)[:, 0].to(drawn.device)

@@ -217,7 +217,7 @@ class Tile:
     @property
     def has_chart(self) -> bool:
         """Whether it can have a `Chart`: two dimensions at most, less than a third of a turn."""
-        dims = 2 if len(self.middle) > 2 * self.factors else self.factors
+        dims = len(self.middle) - self.factors
         return dims <= 2 and bool((self.radius < 0.85).all())
 
 

@@ -127,17 +127,21 @@ def region(
     density, _ = model_at(model)
     kind, space = out.suffix.lower(), density.space
     _require_format(out, kind, space)
+    if settings.min_mass is not None and space.dim != 2:
+        raise SettingError("{min_mass} is of islands, which are outlined in two dimensions alone")
     samples = regions.samples_for(settings.masses, settings.samples)
     progress = runtime.progress_events(on_event, cancel)
     progress(0.0, f"drawing {samples} samples")
     with runtime.one_thread():
-        levels = regions.DensityLevels(density, samples=samples, seed=settings.seed)
+        levels = regions.DensityLevels(
+            density, samples=samples, seed=settings.seed, smooth=settings.smooth
+        )
         found = [levels.highest(mass) for mass in settings.masses]
         found += [levels.above(level) for level in settings.level or ()]
         drawn: list[Outline] = []
-        if space.dim == 2:
+        if space.is_planar:
             drawn = regions.outlines(
-                levels, found, budget=settings.budget, seed=settings.seed,
+                levels, found, budget=settings.budget, seed=settings.seed, min_mass=settings.min_mass,
                 told=lambda share, what: progress(0.1 + 0.9 * share, what),
             )  # fmt: skip
     if kind == ".geojson":
@@ -154,15 +158,17 @@ def region(
 
 def _require_format(out: Path, kind: str, space: Space) -> None:
     """Check that regions of a space can be written in a format."""
-    if kind == ".geojson" and not space.is_round:
+    if kind == ".geojson" and not (space.is_round and space.is_planar):
+        points = "the angles of a" if space.has_chart else "points of the"
         raise OrbiflowError(
-            f"{out}: GeoJSON is for places on a globe, not for the angles of a {space.name}: write "
-            ".json or .csv"
+            f"{out}: GeoJSON is for places on a globe, not for {points} {space.name}: write .json"
+            + " or .csv" * space.is_planar
         )
-    if kind == ".csv" and space.dim != 2:
+    if kind == ".csv" and not space.is_planar:
         raise OrbiflowError(
             f"{out}: a table holds outlines, which are drawn in two dimensions; this {space.name} has "
-            f"{space.dim}: write .json, and use `orbiflow density score --region` for the rows inside"
+            f"{space.dimensions}: write .json, and use `orbiflow density score --region` for the rows "
+            "inside"
         )
 
 
@@ -172,7 +178,7 @@ def _region_notes(found: list[DensityRegion], drawn: list[Outline]) -> list[str]
     if drawn:
         return [note for one in drawn for note in (_described(one.region, one), *one.notes)]
     return [
-        f"outlines are drawn in two dimensions, this {space.name} has {space.dim}: there are "
+        f"outlines are drawn in two dimensions, this {space.name} has {space.dimensions}: there are "
         "thresholds and sizes alone; `orbiflow density score --region` says of each row how far "
         "inside it is",
         *(_described(one, None) for one in found),
@@ -185,8 +191,9 @@ def _described(found: DensityRegion, outline: Outline | None) -> str:
         count = len(outline.shape.geoms)
         polygons = f"; {_counted(count, 'polygon')}, which {'holds' if count == 1 else 'hold'} "
         polygons += _with_error(outline.mass, outline.error)
+    of = "log density" if found.smooth is None else "smoothed log density"
     return (
-        f"mass {_with_error(found.held, found.error)}: log density of at least "
+        f"mass {_with_error(found.held, found.error)}: {of} of at least "
         f"{found.log_prob:.4f} ({found.log_prob_low:.4f} to {found.log_prob_high:.4f}), "
         f"{drawn.size:.6g} {regions.size_unit(found.density.space)}, "
         f"{_percentage(drawn.fraction)} of the space{polygons}"

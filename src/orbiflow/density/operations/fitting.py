@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from orbiflow import runtime
 from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
-from orbiflow.density import comparing, models, pictures, tables
+from orbiflow.density import comparing, models, pictures, spaces, tables
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
 from orbiflow.density.run_folder import write_files, written_files
-from orbiflow.density.tables import RowSettings, SpaceSettings, TableSettings
-from orbiflow.settings import Group, Hidden, Option, SettingError
+from orbiflow.density.tables import GroupedRowSettings, RowSettings, SpaceSettings
+from orbiflow.settings import Hidden, Option, SettingError
 
 if TYPE_CHECKING:
     from orbiflow.density.estimator import DensityEstimator
@@ -36,10 +36,9 @@ def fit(
     data: Path,
     where: SpaceSettings,
     settings: DensitySettings = DensitySettings(),
-    reading: RowSettings = RowSettings(),
+    reading: GroupedRowSettings = GroupedRowSettings(),
     *,
     out: Annotated[Path, Option("--out", "-o")] = Path("density"),
-    group: Annotated[str | None, Group("Reading the table")] = None,
     picture: Annotated[bool, Hidden()] = False,
     on_event: runtime.Sink = runtime.ignore,
     cancel: runtime.Cancel = runtime.Cancel(),
@@ -51,21 +50,17 @@ def fit(
     Args:
         data: CSV, TSV, NPY or Parquet.
         out: Folder for the results, made if need be.
-        group: Column that names what rows belong to (a protein, a station, an event): those of one are
-            not independent.
         picture: Also draw a small picture, thumbnail.png.
     """
     begin = time.perf_counter()
-    settings.check_rows("refuse", None if group is None else "group")
-    if reading.missing == "marginalise":
-        check_marginalised(where, settings)
+    _check(where, settings, reading)
     with runtime.one_thread():
-        rows = tables.read_rows(data, reading, on_event, width=where.width, group=group)
+        rows = tables.read_rows(data, reading, on_event, width=where.width, group=reading.group)
         values = rows.table.values
         folder = runtime.ResultFolder(out, written_files)
         runtime.check_output_folder(out, data)
         estimator = fit_rows(rows, where, settings, reading, on_event, cancel)
-        asked = {**settings.values(), **reading.values(), "group": group}
+        asked = {**settings.values(), **reading.values()}
         document = _document(estimator, rows, asked, settings.seed)
         document["seconds"] = time.perf_counter() - begin
         known = comparing.RowSketch.of(estimator.space_, values[rows.whole]).to_json()
@@ -98,9 +93,17 @@ def fit_rows(
     values, labels = rows.table.values, rows.labels
     unit = tables.angle_unit(where.space, where.unit, rows.table, tell)
     given = {name: getattr(settings, name) for name in settings.fields_given}
-    estimator = DensityEstimator(where.space, unit=unit, missing=reading.kept_missing, **given)
+    space = spaces.make_space(where.space, cell=where.cell) if where.cell else where.space
+    estimator = DensityEstimator(space, unit=unit, missing=reading.kept_missing, **given)
     progress = runtime.progress_events(tell, cancel)
     return estimator.fit(values, sample_weight=rows.weights, groups=labels, progress=progress)
+
+
+def _check(where: SpaceSettings, settings: DensitySettings, reading: GroupedRowSettings) -> None:
+    """Refuse rows that such a density cannot be fitted to, before they are read."""
+    settings.check_rows("refuse", None if reading.group is None else "group")
+    if reading.missing == "marginalise":
+        check_marginalised(where, settings)
 
 
 def check_marginalised(where: SpaceSettings, settings: DensitySettings) -> None:
@@ -156,9 +159,9 @@ def _words(document: Mapping[str, Any], rows: int, out: Path) -> tuple[str, str]
 def batch(
     folder: Path,
     where: SpaceSettings,
-    density: ComponentSettings = ComponentSettings(),
+    settings: DensitySettings = DensitySettings(),
+    reading: GroupedRowSettings = GroupedRowSettings(),
     out: Annotated[Path, Option("-o")] = Path("batch"),
-    table: TableSettings = TableSettings(),
     work: WorkSettings = WorkSettings(),
     *,
     match: str | None = None,
@@ -176,7 +179,8 @@ def batch(
         out: Folder for the results; an earlier batch there is resumed.
         match: Only files whose names fit a pattern, such as "*.csv".
     """
-    given = {**where.to_json(), **density.to_json(), **table.to_json(), "picture": True}
+    _check(where, settings, reading)
+    given = {**where.to_json(), **settings.to_json(), **reading.to_json(), "picture": True}
 
     def call_of(name: str, _results: str) -> runtime.Call:
         return runtime.find("density fit").call({**given, "data": name, "out": "out"})

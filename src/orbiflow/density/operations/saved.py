@@ -31,9 +31,6 @@ if TYPE_CHECKING:
 FEW_ROWS = 10
 """Fewer may all be within 2 pi degrees without a word."""
 
-DIRECTIONS = (2, 3)
-"""Columns of directions: latitude and longitude, or a vector."""
-
 
 def model_at(path: Path) -> tuple[Density, dict[str, Any]]:
     """Return the density in a file or in the folder of a fit, and what was saved with it."""
@@ -85,9 +82,7 @@ def with_columns_of(
 def check_fits(data: Path, table: Table, space: Space, extra: dict[str, Any], tell: Sink) -> None:
     """Check that a table can be of a model, and warn of angles that seem to be in another unit."""
     wanted: list[str] = list(extra.get("columns") or space.columns)
-    # directions are known by their number of columns
-    widths = DIRECTIONS if space.is_round else (len(space.columns),)
-    if len(table.columns) not in widths:
+    if len(table.columns) not in space.widths:
         count = len(table.columns)
         raise TableError(
             literal(

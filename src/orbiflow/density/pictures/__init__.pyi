@@ -16,6 +16,9 @@ from .plots import THUMBNAIL as THUMBNAIL
 from .plots import Plotted as Plotted
 from .plots import is_one_file as is_one_file
 from .plots import plot_density as plot_density
+from .roses import Rose as Rose
+from .roses import rose_picture as rose_picture
+from .roses import roses_picture as roses_picture
 from .settings import PlotSettings as PlotSettings
 from .square import edge_pairs as edge_pairs
 from .surfaces import density_page as density_page

@@ -84,9 +84,11 @@ def view_of(
 
 
 def require_plane(space: Space) -> None:
-    """Check that a space has two dimensions."""
-    if space.dim != 2:
-        raise OrbiflowError(f"a picture needs two dimensions, this {space.name} has {space.dim}")
+    """Check that a space has two dimensions, and a chart of the square."""
+    if not space.is_planar:
+        raise OrbiflowError(
+            f"a picture needs two dimensions, this {space.name} has {space.dimensions}"
+        )
 
 
 def space_title(space: Space) -> str:

@@ -361,8 +361,11 @@ def chosen_map(space: Space, points: Tensor, settings: PlotSettings | None = Non
     >>> chosen_map(Sphere(), here)
     Lambert(center=(42.0, 141.0), radius=5.0, flipped=False)
     """
-    if not space.is_round:
-        raise OrbiflowError(f"maps are of the sphere and the projective plane, not of {space!r}")
+    if not (space.is_round and space.has_chart):
+        raise OrbiflowError(
+            f"maps are of the sphere and the projective plane, not of {space!r}: draw columns of "
+            "`orbiflow density sample` beside those of the data"
+        )
     settings = settings or PlotSettings()
     projection, radius, middle = settings.projection, settings.radius, settings.center
     if middle is not None and not (len(middle) in (1, 2) and all(map(math.isfinite, middle))):

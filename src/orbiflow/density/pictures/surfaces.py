@@ -103,7 +103,7 @@ def immersion(space: Space) -> Callable[[Tensor], Array]:
     The torus is a ring, the sphere the unit sphere in the user's frame (`Sphere.vectors`), the Klein
     bottle a figure-8 immersion, the projective plane Boy's surface.
     """
-    if space.dim != 2:
+    if not space.is_planar:
         raise OrbiflowError(f"only spaces of two dimensions have a surface, not {space!r}")
     if isinstance(space, RoundSpace):
         return lambda points: _of_vectors(space, space.vectors(points))

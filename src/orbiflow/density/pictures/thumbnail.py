@@ -48,7 +48,12 @@ def density_thumbnail(density: Density, data: ArrayLike) -> bytes:
     """
     space, table = density.space, np.asarray(data, dtype=np.float64)
     whole = table[~np.isnan(table).any(axis=1)]
-    if space.is_round:
+    if not space.has_chart:
+        drawn = density.sample((SAMPLES,), torch.Generator().manual_seed(SEED)).numpy()
+        picture = (
+            _pairs((drawn + 1) / 2) if len(drawn[0]) <= MAX_PAIRS else _stripes((drawn + 1) / 2)
+        )
+    elif space.is_round:
         picture = _map(density, whole)
     elif space.dim == 2:
         picture = _square(density)

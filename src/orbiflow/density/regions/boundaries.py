@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import shapely
 import torch
+from numpy.typing import NDArray
 from shapely.geometry.polygon import orient
 from torch import Tensor
 
@@ -99,6 +100,7 @@ def outlines(
     *,
     budget: int = BUDGET,
     seed: int = 0,
+    min_mass: float | None = None,
     told: Callable[[float, str], None] = lambda _share, _what: None,
 ) -> list[Outline]:
     """Return the boundaries of regions of one density of two dimensions.
@@ -106,10 +108,11 @@ def outlines(
     A grid is made finer three times where a threshold is crossed. Samples on the other side of a
     threshold than all of their cell show islands between its nodes, and get a grid of their own. Each
     vertex is moved along its cell's side to where the density itself is at the threshold. The mass
-    inside the polygons is measured with new samples.
+    inside the polygons is measured with new samples. Islands that hold less than `min_mass` of it are
+    left out.
     `told` is called with the share of the work done, and what is being done.
     """
-    density = levels.density
+    density = levels.surface
     window = window_of(density.space)
     if not regions:
         return []
@@ -128,7 +131,7 @@ def outlines(
     )
     spent = grid.evaluations + len(peaks)
     generator = torch.Generator().manual_seed(seed + 1)
-    fresh = window.from_chart(density.sample((CHECKED,), generator).double())
+    fresh = window.from_chart(levels.density.sample((CHECKED,), generator).double())
     found: list[Outline] = []
     for number, region in enumerate(regions):
         told(min(0.9, spent / budget), "drawing outlines")
@@ -137,12 +140,58 @@ def outlines(
         shape, more, missed = with_islands(shape, grid, region.log_prob, left)
         spent += more
         shape = _polygons(shape, float(grid.step.min()), MAX_SIDE if window.on_globe else np.inf)
-        shapely.prepare(shape)
-        inside = float(np.mean(shapely.intersects_xy(shape, fresh[:, 0], fresh[:, 1])))
+        shape, inside, held = _large(shape, window, fresh, min_mass or 0.0)
         error = float(np.sqrt(max(inside * (1 - inside), 1 / CHECKED) / CHECKED))
-        size, notes = window.area(shape), _notes(region, inside, error, missed)
+        notes = _notes(region, held[0], error, missed)
+        if held[1]:
+            islands = f"island{'s' * (held[1] > 1)} of less than {min_mass:g} of the mass"
+            notes += (f"left out {held[1]} {islands}, which held {held[0] - inside:.4f} in all",)
+        size = window.area(shape)
         found.append(Outline(region, window, shape, size, inside, error, off, notes))
     return found
+
+
+def _large(
+    shape: shapely.MultiPolygon, window: Window, points: Array, least: float
+) -> tuple[shapely.MultiPolygon, float, tuple[float, int]]:
+    """Return the islands that hold a share of points (N, 2), and how much they hold together.
+
+    Last come the share that all hold, and the number of islands that are left out.
+    """
+    parts = list(shape.geoms)
+    tree = shapely.STRtree(parts)
+    of = tree.query(shapely.points(points), predicate="intersects")[1]
+    islands = _islands(parts, tree, window)
+    shares = np.bincount(islands[of], minlength=islands.max(initial=-1) + 1) / len(points)
+    kept = shapely.MultiPolygon(
+        [p for p, k in zip(parts, islands, strict=True) if shares[k] >= least]
+    )
+    large = shares >= least
+    return kept, float(shares[large].sum()), (float(shares.sum()), int((~large).sum()))
+
+
+def _islands(
+    parts: list[shapely.Polygon], tree: shapely.STRtree, window: Window
+) -> NDArray[np.int64]:
+    """Return the island of each polygon: those that meet across the window's edges are one."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    pairs = [np.empty((2, 0), dtype=np.int64)]
+    step = 1e-6 * (window.high - window.low)
+    for number, part in enumerate(parts):
+        ring = np.asarray(part.exterior.coords)
+        middles, beyond = (ring[1:] + ring[:-1]) / 2, np.zeros((len(ring) - 1, 2))
+        for edge, sign in ((window.low, -1), (window.high, 1)):
+            beyond += sign * (np.diff(ring, axis=0) == 0) * (abs(middles - edge) < step)
+        cut = (beyond != 0).any(axis=1)
+        if cut.any():
+            places = window.canonical(middles[cut] + step * beyond[cut])
+            others = tree.query(shapely.points(places), predicate="intersects")[1]
+            pairs.append(np.stack([np.full(len(others), number), others]))
+    rows, columns = np.concatenate(pairs, axis=1)
+    graph = coo_array((np.ones(len(rows)), (rows, columns)), (len(parts), len(parts)))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _peaks(density: Density) -> Tensor:
@@ -197,6 +246,12 @@ class Window:
     to_chart: Callable[[Array], Tensor]
     from_chart: Callable[[Tensor], Array]
 
+    def canonical(self, points: Array) -> Array:
+        """Return points (N, 2) beside the rectangle as points of it."""
+        if self.on_globe:
+            points = np.stack([points[:, 0], np.clip(points[:, 1], -90, 90)], axis=1)
+        return self.from_chart(self.to_chart(points))
+
     def area(self, shape: shapely.MultiPolygon) -> float:
         """Return the natural area; on the globe, of sides straight in longitude and latitude."""
         return sum(map(_steradians, shape.geoms)) if self.on_globe else shape.area
@@ -204,10 +259,10 @@ class Window:
 
 def window_of(space: Space) -> Window:
     """Return the window in which regions of a space are drawn."""
-    if space.dim != 2:
+    if not space.is_planar:
         raise OrbiflowError(
-            f"outlines are drawn in two dimensions, this {space.name} has {space.dim}; thresholds, "
-            "sizes and which rows are inside can be found all the same"
+            f"outlines are drawn in two dimensions, this {space.name} has {space.dimensions}; "
+            "thresholds, sizes and which rows are inside can be found all the same"
         )
     return _round(space) if isinstance(space, RoundSpace) else _flat(space)
 
@@ -265,10 +320,10 @@ def to_geojson(outlines: Sequence[Outline]) -> dict[str, Any]:
     map there. Sides are straight in longitude and latitude (3.1.1). Axes are drawn at their northern
     ends.
 
-    The properties of each are `mass` (asked for, or null), `held` and `held_error` (from samples of
-    the density), `log_prob` (the threshold, nats per steradian) and its interval of 95 %, `area` in
-    steradians, `fraction` of the space, `polygons_mass` and `polygons_mass_error` (from new samples
-    inside the polygons).
+    The properties of each are `mass` (asked for, or null), `smooth` (degrees of arc, or null), `held`
+    and `held_error` (from samples of the density), `log_prob` (the threshold, nats per steradian) and
+    its interval of 95 %, `area` in steradians, `fraction` of the space,
+    `polygons_mass` and `polygons_mass_error` (from new samples inside the polygons).
     """
     features: list[dict[str, Any]] = []
     for outline in outlines:
@@ -278,7 +333,7 @@ def to_geojson(outlines: Sequence[Outline]) -> dict[str, Any]:
                 "GeoJSON is for places on a globe, not for the angles of a "
                 f"{region.density.space.name}: write .json or .csv"
             )
-        names = ("mass", "held", "log_prob", "log_prob_low", "log_prob_high")
+        names = ("mass", "smooth", "held", "log_prob", "log_prob_low", "log_prob_high")
         properties = {
             **{name: getattr(region, name) for name in names},
             "held_error": region.error,
@@ -336,5 +391,5 @@ def size_unit(space: Space) -> str:
     'degrees^2'
     """
     if space.is_round:
-        return "steradians"
+        return "steradians" if space.dim == 2 else f"radians^{space.dim} of the unit sphere"
     return str(space.unit) if space.dim == 1 else f"{space.unit}^{space.dim}"

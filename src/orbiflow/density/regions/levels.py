@@ -15,12 +15,20 @@ from orbiflow.arguments import as_number, as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.comparing import density_of, scores_of
 from orbiflow.density.estimator import DensityEstimator
-from orbiflow.density.models import Density
+from orbiflow.density.models import AdaptiveKernels, Density
 from orbiflow.density.regions.settings import MAX_SAMPLES, MIN_SAMPLES, SAMPLES, samples_for
+from orbiflow.density.spaces import whole_turn
+from orbiflow.errors import SettingError
 from orbiflow.runtime import one_thread
 
 SAMPLES_PER_EVEN_POINT = 4
 """Ratio of samples to points drawn evenly, which tell the sizes of regions of hardly any mass, too."""
+
+KERNELS = 20_000
+"""Number of samples of a density about which kernels stand that smooth it."""
+
+MAX_CONCENTRATION = 1e7
+"""Concentration of the narrowest of these kernels."""
 
 SIGMAS_95 = 1.96
 """Standard errors on either side in an interval of 95 %."""
@@ -36,6 +44,8 @@ class DensityRegion:
     - `log_prob`: The threshold in nats. `log_prob_low`, `log_prob_high`: Its interval of 95 %.
     - `size`, `size_error`: The size in natural measure (steradians, or the product of the angles'
       units), from samples, and its standard error.
+    - `smooth`: The width of the smoothing. Then `density` and `log_prob` are of the smoothed density,
+      and `held` is the mass of the density itself.
     """
 
     density: Density
@@ -47,6 +57,7 @@ class DensityRegion:
     log_prob_high: float
     size: float
     size_error: float
+    smooth: float | None = None
 
     @property
     def fraction(self) -> float:
@@ -70,22 +81,38 @@ class DensityLevels:
         density: A density or a fitted estimator.
         samples: Number of samples, 1000 to 10 million; `samples_for` says how many masses need.
         seed: Seed of the samples.
+        smooth: Standard deviation of kernels with which the density is smoothed, in the data's unit of
+            angles, or degrees of arc. Regions are then those of the smoothed density, which hold the
+            masses of the density itself.
     """
 
     @one_thread()
     @torch.no_grad()
     def __init__(
-        self, density: Density | DensityEstimator, *, samples: int = SAMPLES, seed: int = 0
+        self,
+        density: Density | DensityEstimator,
+        *,
+        samples: int = SAMPLES,
+        seed: int = 0,
+        smooth: float | None = None,
     ) -> None:
-        self.density = density_of(density)
+        self.density, self.smooth = density_of(density), smooth
         count = as_whole(samples, "samples", MIN_SAMPLES, MAX_SAMPLES)
         generator = torch.Generator().manual_seed(as_whole(seed, "seed", 0, 2**63 - 1))
         self.points: Tensor = self.density.sample((count,), generator).double()
-        self.log_probs = self.density.log_prob(self.points, measure="natural").numpy()
-        self._sorted = np.sort(self.log_probs)
         evenly = max(MIN_SAMPLES, count // SAMPLES_PER_EVEN_POINT)
         even = self.density.space.uniform(evenly, generator)
-        self._even = self.density.log_prob(even, measure="natural").numpy()
+        self.surface = self.density
+        if smooth is not None:
+            self.surface = smoothed(self.density, smooth, generator)
+        self.log_probs, self._even = (self._logs(points) for points in (self.points, even))
+        self._of_surface = self.log_probs
+        if smooth is not None:
+            self._of_surface = self._logs(self.surface.sample((count,), generator).double())
+        self._sorted = np.sort(self.log_probs)
+
+    def _logs(self, points: Tensor) -> Array:
+        return self.surface.log_prob(points, measure="natural").numpy()
 
     def highest(self, mass: float) -> DensityRegion:
         """Return the smallest region that holds a mass between 0 and 1, as these samples tell."""
@@ -121,7 +148,8 @@ class DensityLevels:
         low = high = level
         if mass is not None:
             low, high = (self._threshold(min(1.0, max(0.0, mass + s))) for s in (spread, -spread))
-        return DensityRegion(self.density, mass, held, error, level, low, high, *self._size(level))
+        size = self._size(level)
+        return DensityRegion(self.surface, mass, held, error, level, low, high, *size, self.smooth)
 
     def _size(self, level: float) -> tuple[float, float]:
         """Return the natural measure above a level, and its standard error.
@@ -129,7 +157,7 @@ class DensityLevels:
         Samples and even points are weighted by the mixture that they are drawn from (balance
         heuristic: Veach and Guibas, Optimally combining sampling techniques, 1995).
         """
-        volume, kinds = self.density.space.volume, (self.log_probs, self._even)
+        volume, kinds = self.density.space.volume, (self._of_surface, self._even)
         floor = math.log(len(self._even)) - math.log(volume)
         size, variance = 0.0, 0.0
         for logs in kinds:
@@ -138,6 +166,25 @@ class DensityLevels:
             size += float(shares.sum())
             variance += float(shares.var()) * len(shares)
         return min(size, volume), math.sqrt(variance)
+
+
+def smoothed(density: Density, width: float, generator: torch.Generator) -> AdaptiveKernels:
+    """Return a density smoothed by kernels: of one width, about samples of it.
+
+    Args:
+        density: A density.
+        width: Standard deviation of the kernels, in the data's unit of angles, or degrees of arc.
+        generator: Source of the samples.
+    """
+    space = density.space
+    turn = 360.0 if space.is_round else whole_turn(str(space.unit))
+    least = turn / (2 * math.pi) * MAX_CONCENTRATION**-0.5
+    if not width >= least:
+        raise SettingError(f"{{smooth}} must be at least {least:.2g}, got {width:g}")
+    kappa = (2 * math.pi * width / turn) ** -2
+    centers = density.sample((KERNELS,), generator).double()
+    like = centers.new_ones(KERNELS, 1 if space.is_round else space.dim)
+    return AdaptiveKernels(space, centers, kappa * like, like[:, 0] / KERNELS)
 
 
 def highest_density_region(

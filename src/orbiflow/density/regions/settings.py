@@ -48,6 +48,13 @@ class RegionSettings(Settings, group="Regions"):
     level: tuple[float, ...] | None = None
     """Log densities in natural measure, as `score` gives them, above which regions lie."""
 
+    smooth: Annotated[float | None, Range(above=0), DefaultText("not smoothed")] = None
+    """Standard deviation of kernels that smooth the density, in the unit of its angles, or degrees of
+    arc. The regions are smoother, and hold the same masses."""
+
+    min_mass: Annotated[Mass | None, DefaultText("all are drawn")] = None
+    """Least mass of an island that is drawn, in two dimensions. What is left is measured again."""
+
     samples: SampleCount = None
     """Number of samples from which the masses are told. 20000 tell a half within 0.35 %, and masses up
     to 0.9995."""

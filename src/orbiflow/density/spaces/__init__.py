@@ -1,4 +1,4 @@
-"""The four identification spaces: charts, measures and units."""
+"""Spaces: charts, measures and units."""
 
 import lazy_loader
 

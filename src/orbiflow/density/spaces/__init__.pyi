@@ -1,8 +1,11 @@
 from .flat import KleinBottle as KleinBottle
 from .flat import Torus as Torus
 from .flat import whole_turn as whole_turn
+from .frame import Frame as Frame
+from .frame import frame_of as frame_of
 from .patches import KleinCoordinates as KleinCoordinates
 from .patches import to_klein as to_klein
+from .quotient import QuotientSpace as QuotientSpace
 from .round import ProjectivePlane as ProjectivePlane
 from .round import RoundSpace as RoundSpace
 from .round import Sphere as Sphere
@@ -19,3 +22,10 @@ from .space import make_space as make_space
 from .space import rectangle as rectangle
 from .space import row_count as row_count
 from .space import space_class as space_class
+from .space import space_for as space_for
+from .unit_vectors import CubicOrientations as CubicOrientations
+from .unit_vectors import HexagonalOrientations as HexagonalOrientations
+from .unit_vectors import Hypersphere as Hypersphere
+from .unit_vectors import ProjectiveSpace as ProjectiveSpace
+from .unit_vectors import RotationSpace as RotationSpace
+from .unit_vectors import UnitVectorSpace as UnitVectorSpace

@@ -35,12 +35,17 @@ def _lattice_group(dim: int) -> CrystallographicGroup:
 class _AngleSpace(Space):
     """A space whose data are angles, all in one unit."""
 
+    has_square = True
+
     def __init__(self, *, unit: str = "radians") -> None:
         self.period = whole_turn(unit)
         self.unit = unit
 
     def to_chart(self, data: ArrayLike) -> Tensor:
         return self.project(self.cover(data))
+
+    def step_angle(self, step: float) -> float:
+        return 2 * math.pi * step / self.period
 
     def settings(self) -> dict[str, Any]:
         return {"unit": self.unit}
@@ -96,10 +101,6 @@ class Torus(_AngleSpace):
         # exact in any dimension, where the images are 3^d
         difference = end - start
         return difference - difference.detach().round()
-
-    def squared_distances(self, start: Tensor, end: Tensor) -> Tensor:
-        table = self.displacement(start[:, None], end[None])
-        return (table**2).sum(dim=-1)
 
     def settings(self) -> dict[str, Any]:
         return {"dim": self.dim, **super().settings()}

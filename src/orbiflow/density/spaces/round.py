@@ -37,20 +37,12 @@ def to_vectors(data: ArrayLike) -> Array:
     """
     table = checked_table(data, (2, 3), "directions")
     if table.shape[1] == 3:
-        length = np.linalg.norm(table, axis=1)
-        _refuse(
-            abs(length - 1) > UNIT_TOLERANCE,
-            lambda row: (
-                f"the vector {table[row].tolist()} has length {length[row]:.4g}, not 1: "
-                "divide each by its length"
-            ),
-        )
-        return table / length[:, None]
-    _refuse(
+        return to_unit(table)
+    refuse_rows(
         abs(table[:, 0]) > 90,
         lambda row: f"latitude {table[row, 0]:g} is beyond 90 degrees: are the columns lat, lon?",
     )
-    _refuse(
+    refuse_rows(
         abs(table[:, 1]) > 360, lambda row: f"longitude {table[row, 1]:g} is beyond 360 degrees"
     )
     lat, lon = np.radians(table.T)
@@ -65,7 +57,21 @@ def to_latlon(vectors: Array) -> Array:
     return np.stack([lat, np.where(lon >= 180, lon - 360, lon)], axis=-1)
 
 
-def _refuse(wrong: NDArray[np.bool_], message: Callable[[int], str]) -> None:
+def to_unit(table: Array) -> Array:
+    """Return vectors (N, k), whose lengths must be 1 within a thousandth, at length 1."""
+    length = np.linalg.norm(table, axis=1)
+    refuse_rows(
+        abs(length - 1) > UNIT_TOLERANCE,
+        lambda row: (
+            f"the vector {table[row].tolist()} has length {length[row]:.4g}, not 1: "
+            "divide each by its length"
+        ),
+    )
+    return table / length[:, None]
+
+
+def refuse_rows(wrong: NDArray[np.bool_], message: Callable[[int], str]) -> None:
+    """Refuse data some of whose rows are wrong, with what there is to say of the first."""
     rows = np.flatnonzero(wrong)
     if len(rows):
         raise OrbiflowError(f"row {rows[0] + 1}: {message(int(rows[0]))}{row_count(len(rows))}")
@@ -82,7 +88,7 @@ class RoundSpace(Space):
     """
 
     power: int
-    is_round = True
+    is_round = has_square = True
 
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
@@ -123,8 +129,18 @@ class RoundSpace(Space):
         """Return `unit_vectors` as a NumPy array, float64."""
         return self.unit_vectors(self._checked(points).detach().double().cpu()).numpy()
 
-    def features(self, points: Tensor) -> Tensor:
-        return self.unit_vectors(points)[None]
+    def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
+        return self.unit_vectors(points)[None][which]
+
+    def step_angle(self, step: float) -> float:
+        return math.radians(step) if self.form == "latlon" else step
+
+    def from_features(self, features: Tensor) -> Tensor:
+        return self.vectors_to_chart(features.numpy())
+
+    @property
+    def widths(self) -> tuple[int, ...]:
+        return (2, 3)
 
     def to_chart(self, data: ArrayLike) -> Tensor:
         return self.vectors_to_chart(to_vectors(data))
@@ -198,9 +214,9 @@ class ProjectivePlane(RoundSpace):
     name = "projective-plane"
     power = 2
 
-    def features(self, points: Tensor) -> Tensor:
+    def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
         vectors = self.unit_vectors(points)
-        return torch.stack([vectors, -vectors])
+        return torch.stack([vectors, -vectors])[which]
 
     def _representatives(self, vectors: Array) -> Array:
         return np.where(vectors[:, 2:] < 0, -1.0, 1.0) * vectors

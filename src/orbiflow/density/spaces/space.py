@@ -1,10 +1,12 @@
-"""The base of the four identification spaces: a chart, a group, measures, distances."""
+"""The base of all spaces: a chart, a group, measures, distances."""
 
 from __future__ import annotations
 
 import inspect
+import itertools
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Self
 
@@ -13,10 +15,17 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from orbiflow.arguments import as_choice, as_tensor, is_a
+from orbiflow.arguments import as_choice, as_tensor, as_whole, is_a
 from orbiflow.arrays import Array
+from orbiflow.density.spaces.frame import Frame, frame_of
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry import CrystallographicGroup, DirichletDomain, identification_group
+from orbiflow.symmetry import (
+    CrystallographicGroup,
+    DirichletDomain,
+    cast_like,
+    identification_group,
+    is_group_name,
+)
 from orbiflow.typed_torch import linalg
 
 MEASURES = ("natural", "square", "uniform")
@@ -31,21 +40,42 @@ pictures use the natural measure."""
 CHART = "square"
 """The default measure of functions of chart points."""
 
+MOST_MIDPOINTS = 10**8
+"""The most points of a grid."""
+
 named_group = lru_cache(maxsize=4)(identification_group)
 """The group of a space by its name, made once."""
 
 
-class Space(ABC):
-    """An identification space: the unit cube modulo a crystallographic group (design point 12).
+SPACE_CLASSES: dict[str, type[Space]] = {}
+"""The classes of spaces that `make_space` and files know, by their names."""
 
-    Points in the chart are float tensors (..., d); `project` brings them to the canonical cube
-    [0, 1)^d. Data are arrays (N, k) in the user's units.
+
+class Space(ABC):
+    """R^d modulo a crystallographic group (design points 12 and 20), or a sphere modulo a finite one.
+
+    Points in the chart are float tensors (..., d), and any point of an orbit stands for it. Data are
+    arrays (N, k) in the user's units.
+
+    **The chart.** Its unit of length is such that the quotient has volume 1: the lattice's cell has the
+    volume |G|. `domain` holds one point of each orbit, to which `project` brings all others. It is a
+    Dirichlet domain, which is a convex polytope of volume 1 and not, in general, a cube: nothing may
+    assume that coordinates are between 0 and 1, unless `has_square` says so. An integral over the space
+    is one over the lattice's cell, divided by |G|: no domain is needed for it. Spheres of any dimension
+    have no such chart (`UnitVectorSpace`): their chart points are unit vectors.
+
+    **A space of your own** is a subclass with a `group`, the names of its `columns` and what is
+    abstract below. With a `name` in its class body it can be saved, as `make_space(name,
+    **space.settings())` makes it again.
 
     - `name`: Its name, such as "klein-bottle".
     - `group`: The group that acts on R^d, under which densities are invariant.
     - `columns`: Names of the data's columns.
-    - `unit`: Unit of angles, None if the natural measure is in steradians.
+    - `unit`: Unit of the data, None if the natural measure is in steradians.
     - `is_round`: Whether the natural measure is the area of the unit sphere.
+    - `has_square`: Whether the domain is the unit cube, with the site (1/2, ..., 1/2).
+    - `has_chart`: Whether chart points are in R^d. On spheres of any dimension they are unit vectors
+      (`UnitVectorSpace`).
 
     Spaces of the same class, settings and group are equal.
     """
@@ -55,6 +85,19 @@ class Space(ABC):
     columns: tuple[str, ...]
     unit: str | None = None
     is_round: ClassVar[bool] = False
+    has_square: ClassVar[bool] = False
+    has_chart: ClassVar[bool] = True
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if not isinstance(cls.__dict__.get("name"), str):
+            return
+        known = SPACE_CLASSES.setdefault(cls.name, cls)
+        if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
+            raise OrbiflowError(
+                f"the space {cls.name!r} is a {known.__name__}: choose another name"
+            )
+        SPACE_CLASSES[cls.name] = cls
 
     @classmethod
     @abstractmethod
@@ -67,17 +110,44 @@ class Space(ABC):
         return self.group.dim
 
     @property
+    def chart_dim(self) -> int:
+        """The number of a chart point's coordinates."""
+        return self.dim
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether the chart is the square, on which densities are drawn and tabulated."""
+        return self.has_square and self.dim == 2
+
+    @property
+    def dimensions(self) -> str:
+        """The dimension, as a message says it that asks for two."""
+        return str(self.dim) if self.has_square else f"{self.dim} and no chart of the square"
+
+    @property
+    def widths(self) -> tuple[int, ...]:
+        """The numbers of columns that data may have."""
+        return (len(self.columns),)
+
+    @property
     def is_torus(self) -> bool:
         """Whether the group is that of the integer translations alone."""
-        return self.group.order == 1 and np.array_equal(self.group.lattice, np.eye(self.dim))
+        if not self.has_chart or self.group.order > 1:
+            return False
+        return np.array_equal(self.group.lattice, np.eye(self.dim))
 
     @cached_property
     def domain(self) -> DirichletDomain:
-        """The canonical cube, as the Dirichlet domain of its centre."""
-        return DirichletDomain(self.group, np.full(self.dim, 0.5))
+        """The fundamental domain: the unit cube or, where that is none, a round one."""
+        return DirichletDomain(self.group, np.full(self.dim, 0.5) if self.has_square else None)
+
+    @cached_property
+    def frame(self) -> Frame:
+        """The group on a lattice whose coordinates kernels are products in."""
+        return frame_of(self.group)
 
     def project(self, points: Tensor) -> Tensor:
-        """Return canonical representatives in [0, 1]^d of points (..., d).
+        """Return the canonical representatives, in `domain`, of points (..., d).
 
         The function is differentiable almost everywhere.
         """
@@ -85,8 +155,10 @@ class Space(ABC):
 
     def _checked(self, points: Tensor) -> Tensor:
         points = as_tensor(points, "points")
-        if not points.dim() or points.shape[-1] != self.dim:
-            raise OrbiflowError(f"expected points (..., {self.dim}), got {tuple(points.shape)}")
+        if not points.dim() or points.shape[-1] != self.chart_dim:
+            raise OrbiflowError(
+                f"expected points (..., {self.chart_dim}), got {tuple(points.shape)}"
+            )
         return points
 
     def log_area(self, points: Tensor) -> Tensor:
@@ -134,9 +206,30 @@ class Space(ABC):
 
     def displacement(self, start: Tensor, end: Tensor) -> Tensor:
         """Return the shortest flat displacement (..., d) from `start` to an image of `end`."""
-        images = self._images_of(end) - start
-        nearest = (images**2).sum(dim=-1).argmin(dim=0)
-        return torch.take_along_dim(images, nearest[None, ..., None], dim=0)[0]
+        found: tuple[Tensor, Tensor] | None = None
+        for move in self._moves(start, self.project(end)):
+            square = (move**2).sum(dim=-1)
+            if found is None:
+                found = move, square
+                continue
+            nearer = square < found[1]
+            best = torch.where(nearer[..., None], move, found[0])
+            found = best, torch.minimum(square, found[1])
+        assert found is not None
+        return found[0]
+
+    def _moves(self, start: Tensor, end: Tensor) -> Iterator[Tensor]:
+        """Yield displacements (..., d) to images of `end`, the shortest one among them."""
+        frame = self.frame.group
+        lattice, inverse = (cast_like(a, end).T for a in (frame.lattice, frame.inverse_lattice))
+        # with orthogonal vectors rounding finds the nearest image, else a neighbour of it
+        near = (0.0,) if self.frame.is_rectangular else (-1.0, 0.0, 1.0)
+        for g in frame.cosets:
+            turned, shift = g.push(end), cast_like(g.translation, end)
+            steps = ((turned + shift - start).detach() @ inverse).round()
+            for beside in itertools.product(near, repeat=self.dim):
+                # lattice vectors first: where they are whole numbers no digit is lost
+                yield turned + (shift - (steps + steps.new_tensor(beside)) @ lattice) - start
 
     def distance(self, start: Tensor, end: Tensor) -> Tensor:
         """Return the geodesic distance (...,) in the flat metric of the chart, over group images."""
@@ -144,23 +237,66 @@ class Space(ABC):
 
     def squared_distances(self, start: Tensor, end: Tensor) -> Tensor:
         """Return squares (N, M) of `distance` between all of `start` (N, d) and `end` (M, d)."""
-        images = self._images_of(end)
-        dot = images @ start.mT
-        square = (images**2).sum(dim=-1, keepdim=True) - 2 * dot
-        return (square.amin(dim=0).mT + (start**2).sum(dim=-1, keepdim=True)).clamp_min(0.0)
+        table = self.displacement(start[:, None], end[None])
+        return (table**2).sum(dim=-1)
 
-    def features(self, points: Tensor) -> Tensor:
+    def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
         """Return what kernels see of the E images of points (N, d), themselves first: (E, N, m).
 
-        They are cosines and sines of the lattice's angles, or unit vectors on round spaces. The
-        function is differentiable.
+        They are cosines and sines of the coordinates in the frame's basis, or unit vectors on round
+        spaces; `which` chooses among the images. The function is differentiable.
         """
-        angles = 2 * math.pi * self.group.images(points) / rectangle(self).to(points)
+        frame = self.frame.group
+        linear, shift, inverse = (
+            cast_like(a, points)
+            for a in (frame.linear_parts[which], frame.translations[which], frame.inverse_lattice)
+        )
+        images = points @ linear.mT + shift[:, None]
+        angles = 2 * math.pi * (images @ inverse.T)
         return torch.cat([angles.cos(), angles.sin()], dim=-1)
+
+    @property
+    def kernel_images(self) -> int:
+        """The number of images, the first ones, that kernels have; the others are those of points."""
+        return self.frame.own
+
+    def from_features(self, features: Tensor) -> Tensor:
+        """Return the canonical points (N, d) that have these features (N, m)."""
+        cos, sin = features.chunk(2, dim=-1)
+        return self.project(self.from_turns(torch.atan2(sin, cos) / (2 * math.pi)))
+
+    def from_turns(self, turns: Tensor) -> Tensor:
+        """Return chart vectors (..., d) of coordinates in the basis of the frame."""
+        return turns @ cast_like(self.frame.group.lattice, turns).T
+
+    def step_angle(self, step: float) -> float:
+        """Return, in radians of the kernels, a step in the unit of the data."""
+        return 2 * math.pi * step / (self.volume ** (1 / self.dim) * max(self.sides))
+
+    def midpoints(self, resolution: int) -> Tensor:
+        """Return points (resolution^d, d) at which a mean is an integral over the space, float64.
+
+        They are the midpoints of an even grid on the unit cube or, where that is not the domain, on the
+        lattice's cell.
+        """
+        as_whole(resolution, "resolution", 1, 10**6)
+        if resolution**self.dim > MOST_MIDPOINTS:
+            raise OrbiflowError(
+                f"a grid of {resolution} points along each of {self.dim} axes has too many: take a "
+                f"resolution of {int(MOST_MIDPOINTS ** (1 / self.dim))} at most"
+            )
+        t = (torch.arange(resolution, dtype=torch.float64) + 0.5) / resolution
+        grid = torch.stack(torch.meshgrid(*[t] * self.dim, indexing="ij"), dim=-1)
+        return self._of_cell(grid.reshape(-1, self.dim))
 
     def uniform(self, count: int, generator: torch.Generator) -> Tensor:
         """Draw chart points that are uniform in natural measure."""
-        return torch.rand(count, self.dim, dtype=torch.float64, generator=generator)
+        drawn = torch.rand(count, self.dim, dtype=torch.float64, generator=generator)
+        return drawn if self.has_square else self.project(self._of_cell(drawn))
+
+    def _of_cell(self, shares: Tensor) -> Tensor:
+        """Return points (N, d) of the cube, or of the lattice's cell, from numbers between 0 and 1."""
+        return shares if self.has_square else shares @ cast_like(self.group.lattice, shares).T
 
     def __eq__(self, other: object) -> bool:
         """Return whether both have the same class, settings and group."""
@@ -169,7 +305,7 @@ class Space(ABC):
         return (
             type(other) is type(self)
             and other.settings() == self.settings()
-            and other.group == self.group
+            and (not self.has_chart or other.group == self.group)
         )
 
     def __hash__(self) -> int:
@@ -177,29 +313,13 @@ class Space(ABC):
 
     @cached_property
     def sides(self) -> list[float]:
-        """The lengths of the sides of the lattice's rectangle, in sides of the square."""
-        lattice = self.group.lattice
-        sides = np.diag(lattice)
-        if not np.allclose(lattice, np.diag(sides)):
-            raise OrbiflowError(f"the lattice of this {self.name} is not rectangular")
-        return sides.tolist()
+        """The lengths of the frame's sides, all made shorter alike if it is oblique.
 
-    @cached_property
-    def _near(self) -> tuple[Array, Array]:
-        # an image of one point is within a diagonal of any other, and both of their cube's centre
-        diagonal = math.sqrt(self.dim)
-        center = np.full(self.dim, 0.5)
-        elements = self.group.elements_near(center, 2 * diagonal, source=center)
-        return (np.stack([g.linear for g in elements]), np.stack([g.translation for g in elements]))
-
-    def _images_of(self, points: Tensor) -> Tensor:
-        """Return all images (E, ..., d) of canonical points that can be nearest to one of the cube."""
-        linear, shift = (
-            torch.as_tensor(a, dtype=points.dtype, device=points.device) for a in self._near
-        )
-        flat = self.project(points).reshape(1, -1, self.dim)
-        moved = flat @ linear.mT + shift[:, None, :]
-        return moved.reshape(len(linear), *points.shape)
+        Their product is the volume of its cell.
+        """
+        lengths: Array = np.linalg.norm(self.frame.group.lattice, axis=0)
+        share = self.frame.group.cell_volume / float(np.prod(lengths))
+        return (lengths * share ** (1 / self.dim)).tolist()
 
     def __repr__(self) -> str:
         options = ", ".join(f"{k}={v!r}" for k, v in self.settings().items())
@@ -207,30 +327,49 @@ class Space(ABC):
 
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
-"""Names of the four spaces."""
+"""Names of the four spaces with a canonical square."""
 
 
 def space_class(name: str) -> type[Space]:
     """Return the class of a space, by its name."""
     from orbiflow.density import spaces  # whose classes import this file
 
-    if not is_a(name, str) or name not in SPACES:
-        raise OrbiflowError(f"unknown space {name!r}; the four are {', '.join(SPACES)}")
-    four = (spaces.Torus, spaces.Sphere, spaces.KleinBottle, spaces.ProjectivePlane)
-    return dict(zip(SPACES, four, strict=True))[name]
+    # whose files hold all classes
+    _ = spaces.Torus, spaces.Sphere, spaces.Hypersphere, spaces.QuotientSpace
+    if not is_a(name, str) or name not in SPACE_CLASSES:
+        raise OrbiflowError(
+            f"unknown space {name!r}; there are {', '.join(SPACE_CLASSES)}, and groups such as p4m, "
+            "hantzsche-wendt or 'P 21 21 21'"
+        )
+    return SPACE_CLASSES[name]
 
 
 def make_space(name: str, **options: Any) -> Space:
     """Return a space by its name, with the options of its class.
 
+    The name may also be that of a group (`orbiflow.symmetry.group_by_name`), with its `cell`.
+
     >>> make_space("torus", dim=2, unit="degrees")
     Torus(dim=2, unit='degrees')
+    >>> make_space("hantzsche-wendt").dim
+    3
     """
+    if is_group_name(name) and name not in SPACE_CLASSES:
+        name, options = "quotient", {"group": name, **options}
     kind = space_class(name)
     wrong = [key for key in options if key not in inspect.signature(kind).parameters]
     if wrong:
         raise OrbiflowError(f"the {name} has no option {', '.join(wrong)}")
     return kind(**options)
+
+
+def space_for(
+    name: str, data: Array, *, unit: str = "radians", seed: int = 0, cell: Any = None
+) -> Space:
+    """Return the space of a name that suits data (N, k); `cell` is that of a group."""
+    if name in SPACE_CLASSES or not is_group_name(name):
+        return space_class(name).for_data(data, unit=unit, seed=seed)
+    return make_space(name, cell=cell)
 
 
 def check_measure(measure: str) -> None:
@@ -239,8 +378,8 @@ def check_measure(measure: str) -> None:
 
 
 def rectangle(space: Space) -> Tensor:
-    """Return the lengths (d,) of the sides of the lattice's rectangle, in sides of the square."""
-    return torch.tensor(space.sides)
+    """Return `space.sides`, the lengths (d,) of the kernels' periods, float64."""
+    return torch.tensor(space.sides, dtype=torch.float64)
 
 
 def row_count(count: int) -> str:

@@ -8,12 +8,14 @@ from .rows import TableRows as TableRows
 from .rows import angle_unit as angle_unit
 from .rows import check_order as check_order
 from .rows import read_rows as read_rows
+from .settings import GroupedRowSettings as GroupedRowSettings
 from .settings import RowSettings as RowSettings
 from .settings import SpaceName as SpaceName
 from .settings import SpaceSettings as SpaceSettings
 from .settings import TableSettings as TableSettings
 from .settings import Unit as Unit
 from .settings import check_table_name as check_table_name
+from .settings import is_angular as is_angular
 from .table import MissingCellsError as MissingCellsError
 from .table import Table as Table
 from .table import TableError as TableError

@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.density.tables.files import column_names, is_identifier, read_labels, read_table
-from orbiflow.density.tables.settings import RowSettings, TableSettings, Unit, check_unit
+from orbiflow.density.tables.settings import (
+    RowSettings,
+    TableSettings,
+    Unit,
+    check_unit,
+    is_angular,
+)
 from orbiflow.density.tables.table import MissingCellsError, Table, TableError, find, quote
 from orbiflow.errors import SettingError, literal
 from orbiflow.runtime import Note, Sink
@@ -157,7 +163,7 @@ def _name(path: Path, column: str, header: bool | None) -> str:
 
 def angle_unit(space: str, unit: Unit | None, table: Table, tell: Sink) -> Unit:
     """Return the unit of angles: the given one, or else radians if all values are within 2 pi."""
-    if space not in ("torus", "klein-bottle"):
+    if not is_angular(space, len(table.columns)):
         check_order(table.columns, space)
         check_unit(space, unit)
         return "radians"

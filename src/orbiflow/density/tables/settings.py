@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 from orbiflow.errors import literal
 from orbiflow.settings import DefaultText, SettingError, Settings
+
+if TYPE_CHECKING:
+    from orbiflow.symmetry import CrystallographicGroup
 
 TABLES = (".csv", ".tsv", ".txt", ".dat")
 """What names of tables end in. Others may end in anything that is not among these:"""
@@ -19,32 +22,75 @@ OTHER_FORMATS = frozenset((
 ))
 # fmt: on
 
-SpaceName = Literal["torus", "sphere", "klein-bottle", "projective-plane"]
+SpaceName = Literal[
+    "torus", "sphere", "klein-bottle", "projective-plane",
+    "hypersphere", "projective-space",
+    "rotation-space", "cubic-orientations", "hexagonal-orientations",
+]  # fmt: skip
+SPACES: tuple[str, ...] = get_args(SpaceName)
 Unit = Literal["radians", "degrees", "turns"]
 
 
 class SpaceSettings(Settings, group="Density"):
     """Where the data live."""
 
-    space: SpaceName
-    """Where the data live."""
+    space: str
+    """Where the data live: torus, sphere, klein-bottle or projective-plane; unit vectors of any
+    dimension on a hypersphere or in a projective-space; a rotation-space, cubic-orientations or
+    hexagonal-orientations; or a group whose quotient it is: a plane group such as p4m, a flat manifold
+    such as hantzsche-wendt, or a space group such as "P 21 21 21"."""
+
+    cell: Annotated[
+        tuple[float, ...] | None, DefaultText("lengths about 1 that suit the group")
+    ] = None
+    """Lengths and angles in degrees of the group's cell: a,b,c,alpha,beta,gamma, in the plane
+    a,b,gamma. Right angles may be left out."""
 
     unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None
-    """Unit of angles on the torus and the Klein bottle."""
+    """Unit of angles on the torus and the Klein bottle, and of rotations in three columns."""
 
     def check(self) -> None:
-        """Check that only angles have a unit."""
+        """Check that there is such a space, and that only angles have a unit."""
+        if self.cell is not None and self.space in SPACES:
+            raise SettingError(f"{{cell}} applies to groups, not to the {self.space}")
+        _ = self.width  # which makes the group
         check_unit(self.space, self.unit)
 
     @property
     def width(self) -> int | None:
         """The number of columns that the space takes, None if there may be several."""
-        return 2 if self.space == "klein-bottle" else None
+        if self.space in SPACES:
+            return 2 if self.space == "klein-bottle" else None
+        return group_of(self.space, self.cell).dim
+
+
+def group_of(space: str, cell: tuple[float, ...] | None) -> CrystallographicGroup:
+    """Return the group whose quotient a space is."""
+    from orbiflow.symmetry import group_by_name, is_group_name
+
+    if not is_group_name(space):
+        raise SettingError(
+            f"{{space}} must be {', '.join(SPACES)} or a group, such as p4m, hantzsche-wendt or "
+            f"'P 21 21 21', got {literal(repr(space))}"
+        )
+    return group_by_name(space, cell)
+
+
+def is_angular(space: str, columns: int) -> bool:
+    """Return whether data of so many columns are angles, which have a unit."""
+    rotations = ("rotation-space", "cubic-orientations", "hexagonal-orientations")
+    return space in ("torus", "klein-bottle") or (space in rotations and columns == 3)
 
 
 def check_unit(space: str, unit: Unit | None) -> None:
     """Refuse a unit of data that are not angles."""
-    if space in ("sphere", "projective-plane") and unit in ("radians", "turns"):
+    if unit is not None and space not in SPACES:
+        raise SettingError(
+            "{unit} applies only to angles: points of a quotient are in the unit of its cell; leave it "
+            "out"
+        )
+    vectors = ("sphere", "projective-plane", "hypersphere", "projective-space")
+    if space in vectors and unit in ("radians", "turns"):
         raise SettingError(
             f"{{unit}} {unit} applies only to angles on the torus and the Klein bottle: latitude and "
             "longitude are degrees; convert them, or give unit vectors x,y,z"
@@ -85,6 +131,14 @@ class RowSettings(TableSettings, group="Reading the table"):
             raise SettingError(
                 "{drop_missing} leaves out the rows that {missing} marginalise would use; give one"
             )
+
+
+class GroupedRowSettings(RowSettings, group="Reading the table"):
+    """Which columns and rows of a table are read, how much each counts, and which belong together."""
+
+    group: str | None = None
+    """Column that names what rows belong to (a protein, a station, an event): those of one are not
+    independent."""
 
 
 def check_table_name(out: Path) -> None:

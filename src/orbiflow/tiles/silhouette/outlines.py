@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import as_array
 from orbiflow.arrays import Array
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.tiles.geometry import (
     arc_lengths,
     kept_vertices,
@@ -220,9 +220,9 @@ def sampled(
             if 2 * len(corners) <= len(points):
                 break
     if fine is None:
-        raise OrbiflowError(
+        raise SettingError(
             "parts of the silhouette are too thin to be followed: draw them thicker, round them off "
-            "with --smooth 0.01, or, if a photograph was read badly, cut it out or set --threshold"
+            "with {smooth} 0.01, or, if a photograph was read badly, cut it out or set {threshold}"
         )
     middle = with_corners(ring, corners, MIDDLE_MULTIPLE * len(coarse), phase * MIDDLE_MULTIPLE)
     if len(fine) % len(middle) or not shapely.Polygon(middle).is_valid:

@@ -1,0 +1,158 @@
+"""Rose diagrams: circular histograms whose areas are shares, with a density's curve or a mean."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from orbiflow.arrays import Array
+from orbiflow.density.models import Density
+from orbiflow.density.pictures import frames
+from orbiflow.density.pictures.colours import density_at
+from orbiflow.density.pictures.settings import PlotSettings
+from orbiflow.drawing import Picture, Sheet
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from matplotlib.projections.polar import PolarAxes
+
+COMPASS = frozenset(
+    {
+        "azimuth",
+        "bearing",
+        "course",
+        "declination",
+        "direction",
+        "heading",
+        "strike",
+        "trend",
+        "wind",
+    }
+)
+"""First words of names of angles that run clockwise from north."""
+
+SECTORS = {0: 12, 60: 18, 150: 24, 400: 36}
+"""Number of sectors from so many values on."""
+
+MAX_ROW = 4
+"""Number of roses side by side."""
+
+_DATA = "#d95f02"
+
+
+class Rose(NamedTuple):
+    """Angles to be drawn as a rose.
+
+    - `name`: Name of the column. `turns`: Its angles (N,). `weights`: What each counts, (N,), or None.
+    - `curve`: Values of a density per turn, at even steps from 0 to 1.
+    - `mean`: Mean direction, resultant length, and half the width of the mean's interval, in turns.
+    """
+
+    name: str
+    turns: Array
+    weights: Array | None = None
+    curve: Array | None = None
+    mean: tuple[float | None, float, float | None] = (None, 0.0, None)
+
+
+def rose_picture(
+    density: Density, points: Tensor, settings: PlotSettings | None = None, *, what: str = "data"
+) -> Picture:
+    """Draw chart points (N, 1) of one angle as a rose, under the curve of its density."""
+    settings = settings or PlotSettings()
+    view = frames.view_of(density.space, settings.names, settings.center)
+    line = torch.linspace(0, 1, 721, dtype=torch.float64)[:, None]
+    curve = density_at(density, line, "square")
+    rose = Rose(
+        view.names[0], frames.chart_points(density.space, points)[:, 0].numpy(), None, curve
+    )
+    words = f"{len(points)} {what}, and the density as a line"
+    return roses_picture([rose], view.space.unit or "", words, settings.sheet)
+
+
+def roses_picture(roses: Sequence[Rose], unit: str, words: str, sheet: Sheet) -> Picture:
+    """Draw roses side by side, at most `MAX_ROW` in a row; the caption begins with `words`."""
+    across = min(MAX_ROW, max(2, len(roses)))
+    down = -(-len(roses) // across)
+    cell = sheet.width / across
+    caption = f"{words}. Areas are shares, so that radii are their square roots."
+    room = (
+        0.0 if sheet.printed else 1.3 * sheet.em * (len(frames.caption_lines(caption, sheet)) + 1)
+    )
+    figure = sheet.figure(down * (cell + 1.5 * sheet.em) + room)
+    for k, rose in enumerate(roses):
+        row, column = divmod(k, across)
+        alone = (across - len(roses)) / 2 * cell if len(roses) < across else 0.0
+        below = room + (down - 1 - row) * (cell + 1.5 * sheet.em)
+        _draw(_polar(figure, alone + column * cell, below, cell, sheet), rose, unit, sheet)
+    if not sheet.printed:
+        frames.write_caption(figure, caption, sheet)
+    return Picture(figure, sheet, "Rose diagram" + "s" * (len(roses) > 1), caption)
+
+
+def _polar(figure: Figure, left: float, below: float, cell: float, sheet: Sheet) -> PolarAxes:
+    margin = 2.6 * sheet.em
+    wide, high = figure.get_size_inches()
+    side = cell - 2 * margin
+    box = ((left + margin) / wide, (below + margin) / high, side / wide, side / high)
+    return figure.add_axes(box, projection="polar")  # pyright: ignore[reportReturnType]
+
+
+def _draw(axes: PolarAxes, rose: Rose, unit: str, sheet: Sheet) -> None:
+    count = max(sectors for least, sectors in SECTORS.items() if len(rose.turns) >= least)
+    shares, edges = np.histogram(
+        rose.turns % 1.0, count, (0.0, 1.0), density=True, weights=rose.weights
+    )
+    around = 2 * np.pi
+    axes.bar(
+        around * edges[:-1], np.sqrt(shares), around / count, align="edge", color=_DATA, alpha=0.45,
+        edgecolor="#ffffff", linewidth=sheet.pen(0.5),
+    )  # fmt: skip
+    most = float(shares.max())
+    if rose.curve is not None:
+        at = np.linspace(0, around, len(rose.curve))
+        axes.plot(at, np.sqrt(rose.curve), color=frames.INK, linewidth=sheet.pen(1.6, 0.6))
+        most = max(most, float(rose.curve.max()))
+    rim = 1.05 * math.sqrt(most)
+    _draw_mean(axes, rose, rim, sheet)
+    axes.set_ylim(0, rim)
+    axes.set_yticks([rim / 2], [""])
+    quarters = [0.0, 0.25, 0.5, 0.75]
+    axes.set_xticks([around * t for t in quarters], [frames.angle_text(t, unit) for t in quarters])
+    axes.tick_params(labelsize=sheet.small, pad=0.1 * sheet.text, colors=frames.INK)
+    axes.grid(color="#c8c8c4", linewidth=sheet.pen(0.6))
+    axes.spines["polar"].set(color="#8a8a86", linewidth=sheet.pen(0.8))
+    axes.set_axisbelow(True)
+    if _is_compass(rose.name):
+        axes.set_theta_zero_location("N")
+        axes.set_theta_direction(-1)
+    name = frames.cut(rose.name, frames.MAX_NAME)
+    axes.set_title(name, fontsize=sheet.text, pad=0.9 * sheet.text, parse_math=False)
+
+
+def _draw_mean(axes: PolarAxes, rose: Rose, rim: float, sheet: Sheet) -> None:
+    """Draw the mean direction, as long as the resultant in radii, and its interval at the rim."""
+    mean, resultant, spread = rose.mean
+    if mean is None:
+        return
+    pen: dict[str, Any] = {"color": frames.INK, "solid_capstyle": "butt"}
+    axes.plot([2 * np.pi * mean] * 2, [0, resultant * rim], linewidth=sheet.pen(1.5, 0.6), **pen)
+    if spread is not None:
+        arc = np.linspace(mean - spread, mean + spread, 50)
+        axes.plot(2 * np.pi * arc, np.full(50, 0.98 * rim), linewidth=sheet.pen(3.5, 1.0), **pen)
+
+
+def _is_compass(name: str) -> bool:
+    """Return whether angles of a name run clockwise from north.
+
+    >>> _is_compass("wind direction"), _is_compass("phi")
+    (True, False)
+    """
+    word = re.search(r"[^\W\d_]+", name)
+    return bool(word) and word[0].casefold() in COMPASS

@@ -1,0 +1,122 @@
+"""R^d modulo any crystallographic group: plane orbifolds, flat manifolds, crystals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Self
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+from torch import Tensor
+
+from orbiflow.arrays import Array
+from orbiflow.density.spaces.frame import frame_of
+from orbiflow.density.spaces.space import Space, checked_table
+from orbiflow.errors import OrbiflowError
+from orbiflow.symmetry import (
+    CrystallographicGroup,
+    checked_group,
+    group_by_name,
+    group_from_header,
+    group_header,
+)
+
+COLUMNS = ("x", "y", "z")
+MAX_DIM = 8
+"""The most dimensions, for lists of 3^d neighbours."""
+
+
+class QuotientSpace(Space):
+    """R^d modulo a crystallographic group; its natural measure is volume in the data's unit.
+
+    Data are points (N, d) in the coordinates in which the group acts; any point of an orbit may be
+    given. `from_chart` returns points of one fundamental domain, the Dirichlet domain of a point far
+    from its own images.
+
+    A group without fixed points makes a manifold. Elsewhere the points that some elements fix are cone
+    points, axes or mirrors. Densities are exact there as well, but no flow moves points off them.
+
+    Args:
+        group: A group, or its name (`orbiflow.symmetry.group_by_name`): one of the 17 plane groups, a
+            flat 3-manifold such as "hantzsche-wendt", or a space group such as "P 21 21 21". Or its
+            header (`group_header`), as files have it.
+        cell: The lengths and angles of the cell of a group given by its name. Default: that of
+            `group_by_name`.
+
+    Raises `OrbiflowError` if there is no such group, or the cell does not suit it.
+
+    >>> space = QuotientSpace("p4", cell=(2.0, 2.0))
+    >>> space.volume
+    1.0
+    >>> quarter_turn = [[0.3, 0.1], [-0.1, 0.3]]
+    >>> bool(np.ptp(space.from_chart(space.to_chart(quarter_turn)), axis=0).max() < 1e-12)
+    True
+    """
+
+    name = "quotient"
+    unit = "units"
+
+    def __init__(
+        self,
+        group: CrystallographicGroup | str | Mapping[str, Any],
+        *,
+        cell: ArrayLike | None = None,
+    ) -> None:
+        if isinstance(group, str):
+            group = group_by_name(group, cell)
+        elif cell is not None:
+            raise OrbiflowError("a cell is for a group that is given by its name: leave it out")
+        elif isinstance(group, Mapping):
+            group = group_from_header(group, str(group.get("name", "")))
+        self.given = checked_group(group)
+        if self.given.dim > MAX_DIM:
+            raise OrbiflowError(
+                f"a quotient has {MAX_DIM} dimensions at most, not {self.given.dim}"
+            )
+        size = (self.given.cell_volume / self.given.order) ** (1 / self.given.dim)
+        frame = frame_of(self.given)
+        basis = frame.group.lattice
+        turn = basis / np.linalg.norm(basis, axis=0) if frame.is_rectangular else np.eye(len(basis))
+        self._to_chart = turn.T / size
+        # on a rectangle whose axes the group keeps, fields can be splines
+        keeps_axes = frame.own == frame.group.order
+        self.group = (frame.group if keeps_axes else self.given).conjugate(self._to_chart)
+        self.columns = (
+            COLUMNS[: self.dim] if self.dim <= 3 else tuple(f"x{k + 1}" for k in range(self.dim))
+        )
+
+    @classmethod
+    def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
+        del data, unit, seed
+        raise OrbiflowError("a quotient needs its group: give it by name, or QuotientSpace(group)")
+
+    @property
+    def is_torus(self) -> bool:
+        """False: its data are places, not angles."""
+        return False
+
+    @property
+    def volume(self) -> float:
+        return self.given.cell_volume / self.given.order
+
+    def cover(self, data: ArrayLike) -> Tensor:
+        what = f"points of {self.dim} coordinates"
+        return torch.tensor(checked_table(data, (self.dim,), what) @ self._to_chart.T)
+
+    def to_chart(self, data: ArrayLike) -> Tensor:
+        return self.project(self.cover(data))
+
+    def from_chart(self, points: Tensor) -> Array:
+        own: Array = self.project(points).detach().double().cpu().numpy()
+        return np.linalg.solve(self._to_chart, own.T).T
+
+    def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
+        del data, points
+        return gradient.numpy() @ self._to_chart
+
+    def settings(self) -> dict[str, Any]:
+        return {"group": {**group_header(self.given), "name": self.given.name}}
+
+    def __repr__(self) -> str:
+        return f"QuotientSpace({self.given!r})"

@@ -1,0 +1,467 @@
+"""Summaries of angles, directions and axes: means with their uncertainty, spread, correlations, tests.
+
+Angles are unit vectors (n, 2) here and directions (n, 3), so that one formula serves both. Rows may
+have weights. Rows of one group are not independent: errors and tests then count groups, and tests of
+which only the form for independent rows is known are left out (None).
+
+Sources: Fisher, Statistical Analysis of Circular Data (1993); Fisher, Lewis and Embleton, Statistical
+Analysis of Spherical Data (1987); Mardia and Jupp, Directional Statistics (2000); Jammalamadaka and
+SenGupta, Topics in Circular Statistics (2001).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import optimize, special
+
+from orbiflow.arguments import as_array, as_number
+from orbiflow.arrays import Array
+from orbiflow.density.spaces import to_vectors, whole_turn
+from orbiflow.errors import OrbiflowError
+
+MIN_ROWS = 25
+"""Rows or groups below which an interval is rough (Fisher, 1993, section 4.4.4)."""
+
+MAX_CONCENTRATION = 1e9
+
+
+@dataclass(frozen=True)
+class AngleSummary:
+    """A column of angles, in its unit.
+
+    - `rows`: Number of rows that have a value and a weight.
+    - `mean`, `half_width`: Mean direction, and what to add on both sides for its interval. None where
+      the resultant is too short to tell (Fisher, 1993, equation 4.22). The mean is from 0 to one turn,
+      or to half a turn either way if the column has negative angles.
+    - `resultant`: Mean resultant length, from 0 (no direction) to 1.
+    - `concentration`: Likeliest concentration of a von Mises distribution, None if all rows are equal.
+    - `deviation`: Circular standard deviation, sqrt(-2 log resultant), None without a resultant.
+    - `rayleigh_p`, `kuiper_p`, `watson_p`: Probabilities of such data if all angles are equally likely.
+      Rayleigh's test looks for one mode, the others for anything.
+    """
+
+    name: str
+    rows: int
+    mean: float | None
+    half_width: float | None
+    resultant: float
+    concentration: float | None
+    deviation: float | None
+    rayleigh_p: float | None
+    kuiper_p: float | None
+    watson_p: float | None
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """How two columns of angles depend on each other, from -1 to 1.
+
+    - `sine`: The correlation of sines about the mean directions (Jammalamadaka and SenGupta, 2001,
+      section 8.2). It means little if a column has no mean direction.
+    - `sine_p`: Probability of one so far from 0 if the columns are independent.
+    - `pairs`: Fisher and Lee's correlation of differences between rows (Fisher, 1993, section 6.3.3),
+      which needs no mean directions.
+    """
+
+    first: str
+    second: str
+    rows: int
+    sine: float | None
+    sine_p: float | None
+    pairs: float | None
+
+
+@dataclass(frozen=True)
+class DirectionSummary:
+    """Directions on the sphere; angles are in degrees.
+
+    - `mean`: Mean direction as the data write it, latitude and longitude or a vector.
+    - `cone`: Half the angle of a cone about it that holds the true one, without a model of the data.
+    - `resultant`: Mean resultant length. `concentration`: The likeliest one of a Fisher distribution.
+    - `k`, `fisher_cone`: (n - 1) / (n - R) and the half angle (alpha95 at a level of 95 %) of a Fisher
+      distribution (Fisher, 1953); None with weights or groups.
+    - `rayleigh_p`: Probability of such data if all directions are equally likely.
+    """
+
+    rows: int
+    mean: tuple[float, ...] | None
+    cone: float | None
+    resultant: float
+    concentration: float | None
+    k: float | None
+    fisher_cone: float | None
+    rayleigh_p: float | None
+
+
+@dataclass(frozen=True)
+class AxisSummary:
+    """Axes, by their orientation tensor, the mean of the products of their components.
+
+    - `eigenvalues`: The three eigenvalues, largest first; their sum is 1.
+    - `principal`: The axis about which they crowd, as the data write it, at its northern end.
+    - `cone`: Half the angle in degrees of a cone about it that holds the true one.
+    - `pole`: The axis of the least eigenvalue, the pole of a girdle.
+    - `bingham_p`: Probability of such data if all axes are equally likely.
+    """
+
+    rows: int
+    eigenvalues: tuple[float, ...]
+    principal: tuple[float, ...]
+    cone: float | None
+    pole: tuple[float, ...]
+    bingham_p: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Weights (n,) of sum 1, and the number of each row's group (n,), None if all are independent.
+
+    - `even`: Whether all rows count the same. `level`: The level of intervals.
+    """
+
+    weights: Array
+    groups: NDArray[np.int64] | None
+    even: bool
+    level: float
+
+    def mean(self, values: Array) -> Array:
+        return self.weights @ values
+
+    def sums(self, values: Array) -> Array:
+        """Return weighted sums (G, q) of values (n, q) over what is independent."""
+        weighted = self.weights[:, None] * values
+        if self.groups is None:
+            return weighted
+        found = np.zeros((int(self.groups.max()) + 1, values.shape[1]))
+        np.add.at(found, self.groups, weighted)
+        return found
+
+    @property
+    def units(self) -> int:
+        """The number of rows or groups."""
+        return len(self.weights) if self.groups is None else int(self.groups.max()) + 1
+
+    @property
+    def alike(self) -> bool:
+        """Whether rows are independent and count the same."""
+        return self.groups is None and self.even
+
+
+def summarize_angles(
+    data: ArrayLike,
+    names: tuple[str, ...] | None = None,
+    *,
+    unit: str = "radians",
+    weights: ArrayLike | None = None,
+    groups: ArrayLike | None = None,
+    level: float = 0.95,
+) -> tuple[list[AngleSummary], list[Correlation]]:
+    """Summarise columns of angles, and each pair of columns.
+
+    Args:
+        data: Angles (n, d); a row counts in the columns in which it has a number.
+        names: Names of the columns.
+        unit: "radians", "degrees" or "turns".
+        weights: How much each row counts (n,); only ratios matter.
+        groups: What each row belongs to, (n,); rows of one group are not independent.
+        level: Level of the intervals.
+
+    >>> one, _ = summarize_angles([43, 45, 52, 61, 75, 88, 88, 279, 357], unit="degrees")
+    >>> round(one[0].mean), round(one[0].resultant, 3)  # Mardia and Jupp, example 1.1
+    (51, 0.711)
+    """
+    values = as_array(data, "data", (...,), finite=False)
+    values = as_array(
+        values[:, None] if values.ndim == 1 else values, "data", ("n", "d"), finite=False
+    )
+    names = names or tuple(f"column{k}" for k in range(1, values.shape[1] + 1))
+    turn = whole_turn(unit)
+    columns: list[AngleSummary] = []
+    for name, column in zip(names, values.T, strict=True):
+        own, rows = _chosen(column[:, None], weights, groups, level)
+        columns.append(_angle_summary(name, own[:, 0] / turn, turn, rows))
+    pairs: list[Correlation] = []
+    for i, j in combinations(range(len(names)), 2):
+        own, rows = _chosen(values[:, [i, j]], weights, groups, level)
+        pairs.append(_correlation(names[i], names[j], own * (2 * np.pi / turn), rows))
+    return columns, pairs
+
+
+def _chosen(
+    values: Array, weights: ArrayLike | None, groups: ArrayLike | None, level: float
+) -> tuple[Array, _Rows]:
+    """Return the rows that have all values and a weight."""
+    whole = np.isfinite(values).all(axis=1)
+    given = np.ones(len(values)) if weights is None else np.asarray(weights, dtype=np.float64)
+    if given.shape != whole.shape or not (np.isfinite(given).all() and (given >= 0).all()):
+        raise OrbiflowError(f"weights must be {len(values)} numbers, none below 0")
+    whole &= given > 0
+    if not whole.any():
+        raise OrbiflowError("there is no row with a value and a weight")
+    own, numbers = given[whole], None
+    if groups is not None:
+        labels = np.asarray(groups)
+        if labels.shape != whole.shape:
+            raise OrbiflowError(f"groups must be {len(values)} labels, one for each row")
+        numbers = np.unique(labels[whole], return_inverse=True)[1].astype(np.int64)
+    even = bool((own == own[0]).all())
+    level = as_number(level, "level", 0.5, 0.999)
+    return values[whole], _Rows(own / own.sum(), numbers, even, level)
+
+
+def _angle_summary(name: str, turns: Array, turn: float, rows: _Rows) -> AngleSummary:
+    angles = 2 * np.pi * turns
+    vectors = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    mean, resultant, spread = _mean_direction(vectors, rows)
+    per_radian = turn / (2 * np.pi)
+    middle = deviation = None
+    if mean is not None:
+        least = -0.5 * turn if (turns < 0).any() else 0.0
+        middle = (math.atan2(mean[1], mean[0]) * per_radian - least) % turn + least
+        deviation = math.sqrt(-2 * math.log(resultant)) * per_radian
+    return AngleSummary(
+        name=name,
+        rows=len(turns),
+        mean=middle,
+        half_width=None if spread is None else spread * per_radian,
+        resultant=resultant,
+        concentration=concentration(resultant, 2),
+        deviation=deviation,
+        rayleigh_p=rayleigh_p(vectors, rows),
+        kuiper_p=kuiper_p(turns) if rows.alike else None,
+        watson_p=watson_p(turns) if rows.alike else None,
+    )
+
+
+def _mean_direction(vectors: Array, rows: _Rows) -> tuple[Array | None, float, float | None]:
+    """Return the mean direction (p,) of unit vectors (n, p), the resultant and the half angle."""
+    total = rows.mean(vectors)
+    resultant = min(1.0, float(np.linalg.norm(total)))
+    if resultant < 1e-12:
+        return None, 0.0, None
+    mean = total / resultant
+    across = vectors - (vectors @ mean)[:, None] * mean
+    return mean, resultant, _half_angle(across / resultant, rows)
+
+
+def _tail(of: Any, *arguments: float) -> float:
+    """Return a value of a distribution, from a function of SciPy's."""
+    return float(of(*arguments))
+
+
+def _half_angle(errors: Array, rows: _Rows) -> float | None:
+    """Return the half angle in radians of a cone that holds the true direction, None if none does.
+
+    `errors` (n, p) are each row's part in the error of the estimate, across it: their linearised sum
+    is the error. For independent rows these are Fisher (1993), equation 4.22, and Fisher, Lewis and
+    Embleton (1987), section 5.3.1; for groups the sums over a group take the place of rows.
+    """
+    free, units = errors.shape[1] - 1, rows.units
+    variance = float((rows.sums(errors) ** 2).sum()) / free
+    if rows.groups is None:
+        quantile = _tail(special.chdtri, free, 1 - rows.level)
+    elif units > 1:
+        variance *= units / (units - 1)
+        quantile = free * _tail(special.fdtri, free, units - 1, rows.level)
+    else:
+        return None
+    sine = math.sqrt(quantile * variance)
+    return math.asin(sine) if sine < 1 else None
+
+
+def concentration(resultant: float, dimension: int) -> float | None:
+    """Return the likeliest concentration of a von Mises-Fisher distribution, None if it is infinite.
+
+    >>> round(concentration(0.5, 2), 3), round(concentration(0.5, 3), 3)
+    (1.159, 1.797)
+    """
+
+    def excess(kappa: float) -> float:
+        ratio = special.ive(dimension / 2, kappa) / special.ive(dimension / 2 - 1, kappa)
+        return float(ratio) - resultant
+
+    if resultant <= 1e-12:
+        return 0.0
+    if excess(MAX_CONCENTRATION) <= 0:
+        return None
+    return float(optimize.brentq(excess, 1e-12, MAX_CONCENTRATION, xtol=1e-12, rtol=1e-12))
+
+
+def rayleigh_p(vectors: Array, rows: _Rows) -> float | None:
+    """Return Rayleigh's probability of unit vectors (n, p) if all directions are equally likely.
+
+    For angles, the approximation of Wilkie (1983); for directions, Jupp's correction of the score
+    (Mardia and Jupp, 2000, equation 10.4.6). With weights, n is their effective number (Kish).
+    """
+    width = vectors.shape[1]
+    if rows.groups is not None:
+        return _groups_p(vectors, rows)
+    count = 1 / float(rows.weights @ rows.weights)
+    square = float((rows.mean(vectors) ** 2).sum())
+    if width == 2:
+        root = math.sqrt(1 + 4 * count + 4 * count**2 * max(0.0, 1 - square))
+        return min(1.0, math.exp(root - 1 - 2 * count))
+    score = width * count * square
+    score = (1 - 1 / (2 * count)) * score + score**2 / (2 * count * (width + 2))
+    return _tail(special.chdtrc, width, score)
+
+
+def _groups_p(values: Array, rows: _Rows) -> float | None:
+    """Return Hotelling's probability that sums of values (n, q) over groups have mean 0."""
+    sums, width = rows.sums(values), values.shape[1]
+    free = len(sums) - width
+    if free < 1:
+        return None
+    mean = sums.mean(axis=0)
+    covariance: Array = np.cov(sums.T)
+    if np.linalg.matrix_rank(covariance) < width:
+        return None
+    inverse: Array = np.linalg.inv(covariance)
+    square = len(sums) / (len(sums) - 1) * float(mean @ inverse @ mean)
+    return _tail(special.fdtrc, width, free, square * free / width)
+
+
+def kuiper_p(turns: NDArray[np.float64]) -> float:
+    """Return Kuiper's probability of independent angles (n,), in turns, if all are equally likely.
+
+    Stephens' (1970) modification of the statistic (Mardia and Jupp, 2000, section 6.3.2).
+    """
+    x, count = np.sort(turns % 1.0), len(turns)
+    steps = np.arange(1, count + 1) / count
+    range_of = float((steps - x).max() + (x - steps + 1 / count).max())
+    value = range_of * (math.sqrt(count) + 0.155 + 0.24 / math.sqrt(count))
+    if value < 0.4:  # the series is slow, and its sum 1
+        return 1.0
+    squares = (np.arange(1, 30) * value) ** 2
+    return float(np.clip(2 * ((4 * squares - 1) * np.exp(-2 * squares)).sum(), 0.0, 1.0))
+
+
+def watson_p(turns: NDArray[np.float64]) -> float:
+    """Return Watson's probability (U^2) of independent angles (n,), in turns, if all are as likely.
+
+    Stephens' (1970) modification of the statistic (Mardia and Jupp, 2000, section 6.3.3).
+    """
+    x, count = np.sort(turns % 1.0), len(turns)
+    off = x - (np.arange(1, count + 1) - 0.5) / count
+    value = float(((off - off.mean()) ** 2).sum()) + 1 / (12 * count)
+    value = (value - 0.1 / count + 0.1 / count**2) * (1 + 0.8 / count)
+    if value < 0.005:
+        return 1.0
+    steps = np.arange(1, 60)
+    terms = (-1.0) ** (steps - 1) * np.exp(-2 * (np.pi * steps) ** 2 * value)
+    return float(np.clip(2 * terms.sum(), 0.0, 1.0))
+
+
+def _correlation(first: str, second: str, angles: Array, rows: _Rows) -> Correlation:
+    """Return the correlations of angles (n, 2) in radians."""
+    p, q = np.sin(angles - np.angle(rows.mean(np.exp(1j * angles)))).T
+    a, b = angles.T
+    below = math.sqrt(float(rows.mean(p * p) * rows.mean(q * q)))
+    sine = float(rows.mean(p * q)) / below if below > 0 else None
+    sine_p = None if sine is None else _sine_p(p * q, rows)
+    return Correlation(first, second, len(angles), sine, sine_p, _fisher_lee(a, b, rows))
+
+
+def _sine_p(products: Array, rows: _Rows) -> float | None:
+    """Return how likely so large a mean of products (n,) is if the columns are independent.
+
+    For independent rows it is Jammalamadaka and SenGupta (2001), equation 8.2.5.
+    """
+    sums = rows.sums(products[:, None])[:, 0]
+    size = math.sqrt(float(sums @ sums))
+    if size == 0 or len(sums) < 2:
+        return None
+    score = abs(float(sums.sum())) / size
+    if rows.groups is None:
+        return math.erfc(score / math.sqrt(2))
+    return _tail(special.fdtrc, 1, len(sums) - 1, score**2)
+
+
+def _fisher_lee(a: Array, b: Array, rows: _Rows) -> float | None:
+    """Return Fisher and Lee's correlation, by sums over rows (Fisher, 1993, equation 6.36)."""
+    sums = [complex(rows.mean(np.exp(1j * x))) for x in (a - b, a + b, 2 * a, 2 * b)]
+    minus, plus, one, two = (abs(s) ** 2 for s in sums)
+    below = math.sqrt(max(0.0, (1 - one) * (1 - two)))
+    return (minus - plus) / below if below > 1e-12 else None
+
+
+def summarize_directions(
+    data: ArrayLike,
+    *,
+    weights: ArrayLike | None = None,
+    groups: ArrayLike | None = None,
+    level: float = 0.95,
+) -> DirectionSummary:
+    """Summarise directions, (n, 2) of latitude and longitude in degrees or (n, 3) of unit vectors.
+
+    `weights`, `groups` and `level` are those of `summarize_angles`.
+    """
+    table = np.asarray(data, dtype=np.float64)
+    vectors, rows = _chosen(to_vectors(table), weights, groups, level)
+    mean, resultant, cone = _mean_direction(vectors, rows)
+    count, k, fisher_cone = len(vectors), None, None
+    away = count * (1 - resultant)
+    if rows.alike and count > 1 and away > 1e-12:
+        k = (count - 1) / away
+        cosine = 1 - away / max(count * resultant, 1e-300) * ((1 - level) ** (-1 / (count - 1)) - 1)
+        fisher_cone = math.degrees(math.acos(cosine)) if cosine > -1 else None
+    return DirectionSummary(
+        count, None if mean is None else _written(mean, table), _degrees(cone), resultant,
+        concentration(resultant, 3), k, fisher_cone, rayleigh_p(vectors, rows),
+    )  # fmt: skip
+
+
+def summarize_axes(
+    data: ArrayLike,
+    *,
+    weights: ArrayLike | None = None,
+    groups: ArrayLike | None = None,
+    level: float = 0.95,
+) -> AxisSummary:
+    """Summarise axes, either end of each as in `summarize_directions`."""
+    table = np.asarray(data, dtype=np.float64)
+    vectors, rows = _chosen(to_vectors(table), weights, groups, level)
+    products = vectors[:, :, None] * vectors[:, None, :]
+    tensor = np.tensordot(rows.weights, products, axes=1)
+    values, axes = np.linalg.eigh(tensor)
+    values, axes = np.clip(values[::-1], 0.0, 1.0), axes.T[::-1]
+    along, gaps = vectors @ axes.T, values[0] - values[1:]
+    cone = None
+    if gaps[0] > 1e-9:
+        errors = np.zeros_like(vectors)
+        errors[:, 1:] = along[:, :1] * along[:, 1:] / gaps
+        cone = _half_angle(errors, rows)
+    return AxisSummary(
+        len(vectors), tuple(values.tolist()), _written(axes[0], table, end=True), _degrees(cone),
+        _written(axes[2], table, end=True),
+        _bingham_p(vectors, rows),
+    )  # fmt: skip
+
+
+def _bingham_p(vectors: Array, rows: _Rows) -> float | None:
+    """Return Bingham's probability of axes if all are equally likely (Mardia and Jupp, 10.7.3)."""
+    x, y, z = vectors.T
+    parts = [x * y * 2, x * z * 2, y * z * 2, x * x - y * y, (3 * z * z - 1) / math.sqrt(3)]
+    values = np.stack(parts, axis=1) / math.sqrt(2)  # coordinates of the traceless tensor
+    if rows.groups is not None:
+        return _groups_p(values, rows)
+    count = 1 / float(rows.weights @ rows.weights)
+    return _tail(special.chdtrc, 5, 7.5 * count * float((rows.mean(values) ** 2).sum()))
+
+
+def _written(vector: Array, table: Array, *, end: bool = False) -> tuple[float, ...]:
+    """Return a direction as the data are written; of an axis its northern end."""
+    x, y, z = -vector if end and vector[2] < 0 else vector
+    if table.shape[1] == 3:
+        return float(x), float(y), float(z)
+    return math.degrees(math.asin(max(-1.0, min(1.0, z)))), math.degrees(math.atan2(y, x))
+
+
+def _degrees(angle: float | None) -> float | None:
+    return None if angle is None else math.degrees(angle)

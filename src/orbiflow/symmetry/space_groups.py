@@ -1,0 +1,156 @@
+"""Space groups by number, Hermann-Mauguin or Hall symbol, from CIFs and as CIFs."""
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from orbiflow.arguments import as_path, described
+from orbiflow.errors import GroupError, InputFileError, OrbiflowError, system_errors
+from orbiflow.symmetry.cells import cell_lattice, cell_parameters, default_lattice
+from orbiflow.symmetry.group import CrystallographicGroup, checked_lattice
+from orbiflow.symmetry.triplets import group_from_operators, operators, parse_operator
+
+MAX_CIF_BYTES = 64 * 2**20
+MAX_SYMBOL = 80
+_LENGTHS, _ANGLES = ("a", "b", "c"), ("alpha", "beta", "gamma")
+_CELL = [*(f"_cell_length_{x}" for x in _LENGTHS), *(f"_cell_angle_{x}" for x in _ANGLES)]
+_OPERATORS = ("_space_group_symop_operation_xyz", "_symmetry_equiv_pos_as_xyz")
+_SYMBOLS = (
+    *("_space_group_name_hall", "_symmetry_space_group_name_hall"),
+    *("_space_group_name_h-m_alt", "_symmetry_space_group_name_h-m"),
+    *("_space_group_it_number", "_symmetry_int_tables_number"),
+)
+
+
+def space_group(name: int | str, cell: ArrayLike | None = None) -> CrystallographicGroup:
+    """Return a space group by its number or symbol, on its primitive lattice.
+
+    Needs the package gemmi, whose tables have 564 settings: `pip install "orbiflow[crystals]"`.
+
+    Args:
+        name: A number from 1 to 230; a Hermann-Mauguin symbol, short or full ("P 21 21 21", "P21/c"),
+            with the choice of origin or axes where there are two ("F d -3 m:2", "R -3 m:R"); or a
+            Hall symbol ("-P 2ybc"). A symbol that could be either is the Hermann-Mauguin one; write
+            "Hall: P 2" for the other. A number, or a symbol without a choice, means origin 1,
+            hexagonal axes and the unique axis b.
+        cell: The conventional cell as a, b, c and alpha, beta, gamma in degrees, as lengths alone if
+            the angles are right, or as a lattice (3, 3) with basis vectors as columns. Default: one of
+            the group's system with a = 1.
+
+    Raises `GroupError` for an unknown name, or a cell that the group does not fit.
+
+    >>> space_group("P 21 21 21", (5.0, 6.0, 7.0)).order
+    4
+    >>> diamond = space_group(227)
+    >>> diamond.name, diamond.order, diamond.cell_volume
+    ('F d -3 m:1', 48, 0.25)
+    """
+    label, operators = _operators(name)
+    if cell is None:
+        cell = default_lattice(np.array([parse_operator(text, 3)[0] for text in operators]))
+    return group_from_operators(operators, cell_lattice(cell), name=label)
+
+
+def _operators(name: int | str) -> tuple[str, list[str]]:
+    """Return the name that a group goes by, and all its operators in the conventional cell."""
+    gemmi = _gemmi()
+    text = str(name)[: MAX_SYMBOL + 1].strip()
+    if not text.isprintable() or len(text) > MAX_SYMBOL:
+        text = ""
+    if text.isdecimal():
+        known = gemmi.find_spacegroup_by_number(int(text)) if 1 <= int(text) <= 230 else None
+    else:
+        known = gemmi.find_spacegroup_by_name(text)
+    if known is not None:
+        return known.xhm(), [op.triplet() for op in known.operations()]
+    try:
+        hall = text.removeprefix("Hall:").strip()
+        return hall, [op.triplet() for op in gemmi.symops_from_hall(hall)]
+    except (RuntimeError, ValueError) as error:
+        raise GroupError(
+            f"unknown space group {described(name)}: give a number from 1 to 230, a Hermann-Mauguin "
+            'symbol such as "P 21 21 21" or "R -3 m:H", or a Hall symbol such as "-P 2ybc"'
+        ) from error
+
+
+def group_from_cif(path: str | Path, cell: ArrayLike | None = None) -> CrystallographicGroup:
+    """Return the group of the first structure of a CIF or mmCIF, on its primitive lattice.
+
+    It is that of the operators, or else of the Hall symbol, the Hermann-Mauguin symbol or the number.
+    `cell`, as for `space_group`, is used in the place of the file's. Needs gemmi.
+
+    Raises `InputFileError` for a file that cannot be read or describes no group.
+    """
+    path = as_path(path, "path")
+    with system_errors(InputFileError, f"{path}: cannot be read"):
+        if path.stat().st_size > MAX_CIF_BYTES:
+            raise InputFileError(f"{path}: over {MAX_CIF_BYTES:,} bytes, too large for a CIF")
+        text = path.read_bytes().decode("latin-1")
+    cif = _gemmi().cif
+    try:
+        blocks = (_values_by_tag(block, cif) for block in cif.read_string(text))
+        values = next(table for table in blocks if table.keys() & {*_OPERATORS, *_SYMBOLS})
+        if cell is None:
+            cell = [cif.as_number(values.get(tag, "?")[0]) for tag in _CELL]
+        if not np.isfinite(cell).all():
+            raise GroupError("its cell is not complete: give one as the argument cell")
+        symbols = [values[tag][0] for tag in _SYMBOLS if tag in values]
+        listed = next((values[tag] for tag in _OPERATORS if tag in values), None)
+        if listed is None:
+            return space_group(symbols[0], cell)
+        return group_from_operators(listed, cell_lattice(cell), name="".join(symbols[:1]))
+    except StopIteration:
+        raise InputFileError(f"{path}: it has neither operators nor a symbol of a group") from None
+    except (RuntimeError, ValueError) as error:
+        raise InputFileError(f"{path}: {error}") from error
+
+
+def _values_by_tag(block: Any, cif: Any) -> dict[str, list[str]]:
+    """Return the values in a block of a CIF, unquoted; the dots in mmCIF's tags become "_"."""
+    columns: dict[str, list[str]] = {}
+    for item in block:
+        if item.pair:
+            columns[item.pair[0]] = [item.pair[1]]
+        elif item.loop:
+            width, values = item.loop.width(), item.loop.values
+            columns |= {tag: values[i::width] for i, tag in enumerate(item.loop.tags)}
+    columns = {tag.lower().replace(".", "_"): values for tag, values in columns.items()}
+    wanted = columns.keys() & {*_CELL, *_OPERATORS, *_SYMBOLS}
+    known = {tag: [cif.as_string(text) for text in columns[tag]] for tag in wanted}
+    return {tag: values for tag, values in known.items() if any(values)}
+
+
+def cif_text(group: CrystallographicGroup, lattice: ArrayLike | None = None) -> str:
+    """Return a CIF with the cell and the operators of a space group, which other programs read.
+
+    The lattice is as for `operators`. A CIF has lengths and angles only: the orientation is lost.
+
+    >>> print(cif_text(space_group("P -1", (1, 2, 3))))  # doctest: +ELLIPSIS
+    data_group
+    _cell_length_a 1
+    ...
+    loop_
+    _space_group_symop_operation_xyz
+    'x,y,z'
+    '-x,-y,-z'
+    <BLANKLINE>
+    """
+    if group.dim != 3:
+        raise GroupError(f"a CIF needs a group of 3 dimensions, got {group.dim}")
+    basis = group.lattice if lattice is None else checked_lattice(lattice)
+    cell = [f"{tag} {x:.12g}" for tag, x in zip(_CELL, cell_parameters(basis), strict=True)]
+    loop = ["loop_", "_space_group_symop_operation_xyz"]
+    quoted = [f"'{operator}'" for operator in operators(group, basis)]
+    return "\n".join(["data_group", *cell, *loop, *quoted, ""])
+
+
+def _gemmi() -> Any:
+    try:
+        return importlib.import_module("gemmi")
+    except ImportError as error:
+        raise OrbiflowError(
+            'space groups by name and CIFs need the package gemmi: pip install "orbiflow[crystals]"'
+        ) from error

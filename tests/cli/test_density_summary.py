@@ -1,0 +1,75 @@
+"""`orbiflow density summary`: tables, files and mistakes."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+
+@pytest.fixture(name="angles")
+def angles_fixture(tmp_path: Path) -> Path:
+    rng = np.random.default_rng(0)
+    rows = np.column_stack([rng.vonmises(1, 2, (60, 2)), rng.uniform(1, 2, 60), np.arange(60) // 2])
+    rows[0, 1] = np.nan
+    path = tmp_path / "angles.csv"
+    np.savetxt(path, rows, delimiter=",", header="phi,wind direction,w,chain", comments="")
+    return path
+
+
+def test_angles(angles: Path, tmp_path: Path, orbiflow) -> None:
+    columns = ("--space", "torus", "--columns", "phi,wind direction", "--unit", "radians")
+    out, picture = tmp_path / "s.json", tmp_path / "roses.png"
+    command = ("density", "summary", angles, *columns, "--missing", "marginalise")
+    done = orbiflow(*command, "--out", out, "--picture", picture)
+    assert done.status == 0, done.err
+    for text in ("Tests of uniformity", "Fisher-Lee", "± (95 %)", f"written to {out}"):
+        assert text in " ".join(done.out.split())
+    document = json.loads(out.read_text())
+    assert [column["rows"] for column in document["columns"]] == [60, 59]
+    assert abs(document["columns"][0]["mean"] - 1) < document["columns"][0]["half_width"]
+    with Image.open(picture) as image:
+        assert image.width == 1600
+    more = ("--weights", "w", "--group", "chain", "--level", "0.9", "--out", tmp_path / "s.csv")
+    done = orbiflow(*command, *more)
+    assert "count 30 groups" in done.out
+    assert "independent rows of equal weight alone are left out" in done.out
+    rows = list(csv.DictReader((tmp_path / "s.csv").read_text().splitlines()))
+    assert [row["name"] for row in rows] == ["phi", "wind direction"]
+    assert [row["kuiper_p"] for row in rows] == ["", ""]
+    assert float(rows[0]["rayleigh_p"]) < 1e-3
+
+
+@pytest.mark.parametrize("space", ["sphere", "projective-plane"])
+def test_directions_and_axes(space: str, tmp_path: Path, orbiflow) -> None:
+    places = np.random.default_rng(0).normal([30, 140], 8, (20, 2))
+    np.savetxt(tmp_path / "p.csv", places, delimiter=",", header="lat,lon", comments="")
+    command = ("density", "summary", tmp_path / "p.csv", "--space", space)
+    done = orbiflow(*command, "--out", tmp_path / "s.csv")
+    assert done.status == 0, done.err
+    assert "rough with fewer than 25 rows, there are 20" in done.out
+    (row,) = csv.DictReader((tmp_path / "s.csv").read_text().splitlines())
+    name = "mean" if space == "sphere" else "principal"
+    assert float(row[f"{name}_1"]) == pytest.approx(30, abs=6)
+    assert float(row[f"{name}_2"]) == pytest.approx(140, abs=6)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--space", "klein-bottle"), "with --space torus"),
+        (("--space", "sphere", "--picture", "a.png"), "--picture is for angles on a torus"),
+        (("--space", "sphere", "--missing", "marginalise"), "use --missing drop"),
+        (("--space", "torus", "--out", "a.txt"), "--out must be a file that ends in .json or .csv"),
+        (("--space", "torus", "--level", "1"), "--level must be"),
+        (("--space", "torus", "--group", "none"), "no column 'none'"),
+    ],
+)
+def test_mistakes(options: tuple[str, ...], message: str, angles: Path, orbiflow) -> None:
+    done = orbiflow("density", "summary", angles, "--columns", "phi", *options)
+    assert done.status == 2
+    assert message in " ".join(done.err.split())

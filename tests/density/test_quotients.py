@@ -1,0 +1,311 @@
+"""R^d modulo any crystallographic group: plane orbifolds, flat manifolds, crystals."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import ArrayLike
+from torch import Tensor
+
+from orbiflow.density import (
+    AdaptiveKernels,
+    DensityEstimator,
+    FlowDensity,
+    Mixture,
+    QuotientSpace,
+    Space,
+    TabulatedDensity,
+    UniformDensity,
+    VonMisesDensity,
+    density_to_bytes,
+    log_density_gradient,
+    make_space,
+    midpoints,
+    read_density,
+)
+from orbiflow.errors import GroupError, OrbiflowError
+from orbiflow.fields import FourierField, SplineField, has_even_grid
+from orbiflow.flows import Flow
+from orbiflow.symmetry import (
+    FLAT_MANIFOLDS,
+    WALLPAPER_GROUPS,
+    CrystallographicGroup,
+    Isometry,
+    flat_manifold,
+    group_by_name,
+    rotation_matrix,
+    wallpaper_group,
+)
+
+NAMES = (*WALLPAPER_GROUPS, *FLAT_MANIFOLDS)
+names = st.sampled_from(NAMES)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def some_kernels(space: Space, seed: int = 0, count: int = 5) -> AdaptiveKernels:
+    generator = torch.Generator().manual_seed(seed)
+    kappa = 0.5 + 4 * torch.rand(count, space.dim, generator=generator, dtype=torch.float64)
+    weights = torch.rand(count, generator=generator, dtype=torch.float64)
+    return AdaptiveKernels(space, space.uniform(count, generator), kappa, weights / weights.sum())
+
+
+def some_flow(space: Space, seed: int = 0) -> Flow:
+    torch.manual_seed(seed)
+    field = (SplineField if has_even_grid(space.group) else FourierField)(space.group, 1)
+    torch.nn.init.normal_(field.parameters_, std=0.15 / field.size**0.5)
+    return Flow(field, steps=4, warn=False)
+
+
+def points_of(space: Space, seed: int, count: int = 20) -> Tensor:
+    return space.uniform(count, torch.Generator().manual_seed(seed))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_densities_integrate_to_one(name: str) -> None:
+    space = QuotientSpace(name)
+    assert space.group.cell_volume == pytest.approx(space.group.order)
+    grid = midpoints(space, 64 if space.dim == 2 else 16)
+    for density in (some_kernels(space), VonMisesDensity(space), UniformDensity(space)):
+        assert float(density.log_prob(grid).exp().mean()) == pytest.approx(1, abs=1e-6)
+
+
+@given(name=names, seed=seeds)
+@settings(max_examples=8)
+def test_densities_are_functions_of_orbits(name: str, seed: int) -> None:
+    space = QuotientSpace(name)
+    points, rng = points_of(space, seed, 8), np.random.default_rng(seed)
+    steps = rng.integers(-3, 4, (space.group.order, 1, space.dim)) @ space.group.lattice.T
+    images = space.group.images(points) + torch.tensor(steps)
+    for density in (some_kernels(space, seed), FlowDensity(space, some_flow(space))):
+        with torch.no_grad():
+            expected = density.log_prob(points).expand(len(images), -1)
+            torch.testing.assert_close(density.log_prob(images), expected, rtol=0, atol=1e-9)
+    assert float(space.distance(space.project(images), points.expand_as(images)).max()) < 1e-9
+
+
+@given(name=names, seed=seeds)
+@settings(max_examples=8)
+def test_distances_are_the_least_over_many_images(name: str, seed: int) -> None:
+    space = QuotientSpace(name)
+    start, end = points_of(space, seed), points_of(space, seed + 1)
+    near = space.group.elements_near(space.domain.site, 3.5)
+    brute = torch.stack([(g(end) - start).norm(dim=-1) for g in near]).amin(dim=0)
+    torch.testing.assert_close(space.distance(start, end), brute, rtol=0, atol=1e-9)
+    table = space.squared_distances(start, end)
+    torch.testing.assert_close(table.diagonal().sqrt(), brute, rtol=0, atol=1e-9)
+
+
+@given(name=names, seed=seeds)
+@settings(max_examples=8)
+def test_the_domain_holds_the_nearest_of_each_orbit(name: str, seed: int) -> None:
+    space = QuotientSpace(name)
+    rng = np.random.default_rng(seed)
+    points = space.domain.project(rng.uniform(-5, 5, (40, space.dim)))
+    own = np.linalg.norm(points - space.domain.site, axis=1)
+    for g in space.group.elements_near(space.domain.site, 4.0):
+        assert (np.linalg.norm(points - g(space.domain.site), axis=1) >= own - 1e-9).all()
+
+
+@pytest.mark.parametrize("name", ["p3", "p4g", "p2", "tricosm", "second-amphicosm"])
+def test_samples_follow_the_density(name: str) -> None:
+    space = QuotientSpace(name)
+    density = Mixture([some_kernels(space), UniformDensity(space)], [0.7, 0.3])
+    grid = midpoints(space, 64 if space.dim == 2 else 16)
+    waves = some_kernels(space, 1)  # an invariant function
+    values = waves.log_prob(grid).exp()
+    expected = float((values * density.log_prob(grid).exp()).mean())
+    drawn = waves.log_prob(density.sample(4000, torch.Generator().manual_seed(0))).exp()
+    assert abs(float(drawn.mean()) - expected) < 4 * float(drawn.std()) / 4000**0.5
+    even = waves.log_prob(points_of(space, 0, 4000)).exp()
+    assert abs(float(even.mean()) - 1) < 4 * float(even.std()) / 4000**0.5
+
+
+@pytest.mark.parametrize("name", ["p6m", "p2", "3-torus", "second-amphidicosm"])
+def test_the_mass_of_a_flow_in_any_dimension(name: str) -> None:
+    space = QuotientSpace(name)
+    density = FlowDensity(space, some_flow(space), some_kernels(space))
+    assert density.mass(24 if space.dim == 2 else 8) == pytest.approx(1, abs=1e-3)
+    larger = FlowDensity(space, Flow(lambda x: 0.1 * x, steps=4), UniformDensity(space))
+    assert larger.mass(3) == pytest.approx(1, abs=1e-3)  # a dilation: the Jacobian is counted
+
+
+HOMOLOGY = {
+    "3-torus": (0, 0, 0), "dicosm": (0, 2, 2), "tricosm": (0, 3), "tetracosm": (0, 2),
+    "hexacosm": (0,), "didicosm": (4, 4), "first-amphicosm": (0, 0, 2), "second-amphicosm": (0, 0),
+    "first-amphidicosm": (0, 2, 2), "second-amphidicosm": (0, 4),
+}  # fmt: skip
+"""First homology: the orders of cyclic factors, 0 for Z (Wolf, Spaces of constant curvature, 1967)."""
+
+
+@pytest.mark.parametrize("name", FLAT_MANIFOLDS)
+def test_the_manifolds_are_what_they_are_called(name: str) -> None:
+    group = flat_manifold(name)
+    for g in group.cosets[
+        1:
+    ]:  # without fixed points: the shift along its axis is no lattice vector
+        turned = np.eye(3) - g.linear
+        for step in itertools.product((-1, 0, 1), repeat=3):
+            shift = g.translation + group.lattice @ step
+            place = np.linalg.lstsq(turned, shift, rcond=None)[0]
+            assert np.linalg.norm(turned @ place - shift) > 1e-3
+    orientable = all(g.determinant > 0 for g in group.cosets)
+    assert orientable == (name in list(FLAT_MANIFOLDS)[:6])
+    assert homology(group) == HOMOLOGY[name]
+
+
+def homology(group: CrystallographicGroup) -> tuple[int, ...]:
+    """The group made abelian: generators are the lattice's and the cosets, relations their products."""
+    from sympy import ZZ, Matrix
+    from sympy.matrices.normalforms import smith_normal_form
+
+    size = group.order
+
+    def row(isometry: Isometry) -> Any:
+        """An element as a lattice vector and a coset."""
+        for k, coset in enumerate(group.cosets):
+            if np.allclose(coset.linear, isometry.linear):
+                vector = np.round(
+                    group.inverse_lattice @ (isometry.translation - coset.translation)
+                )
+                return np.concatenate([vector, np.eye(size)[k]])
+        raise AssertionError
+
+    lattice = [Isometry(np.eye(3), vector) for vector in group.lattice.T]
+    relations = [row(group.cosets[0])]
+    for g, h in itertools.product([*lattice, *group.cosets], repeat=2):
+        relations.append(row(g @ h) - row(g) - row(h) + row(group.cosets[0]))
+    table = Matrix(np.unique(np.array(relations).astype(int), axis=0).tolist())
+    factors = [abs(int(x)) for x in smith_normal_form(table, domain=ZZ).diagonal()]
+    factors += [0] * (3 + size - len(factors))
+    return tuple(sorted(factor for factor in factors if factor != 1))
+
+
+def test_a_density_is_saved_by_its_group_alone(tmp_path: Path) -> None:
+    turn = rotation_matrix(0.4) * 2.5  # neither the axes nor the unit are the chart's
+    for group in (wallpaper_group("cm").conjugate(turn, [0.3, 0.7]), group_by_name("hexacosm")):
+        space = QuotientSpace(group)
+        both = [some_kernels(space), FlowDensity(space, some_flow(space))]
+        density = Mixture(both, [0.6, 0.4])
+        path = tmp_path / "density.safetensors"
+        path.write_bytes(density_to_bytes(density))
+        again, _ = read_density(path)
+        assert again.space == space
+        assert again.space.settings()["group"]["name"] == group.name
+        at = points_of(space, 1)
+        assert torch.equal(again.log_prob(at), density.log_prob(at))
+        data = space.from_chart(at)
+        images = np.concatenate([g(data) for g in group.cosets])
+        logs = density.log_prob(space.to_chart(images), measure="natural").reshape(group.order, -1)
+        torch.testing.assert_close(logs, logs[:1].expand_as(logs), rtol=0, atol=1e-9)
+        values, slopes = log_density_gradient(density, data)
+        step = np.random.default_rng(0).normal(size=data.shape) * 1e-5
+        ahead, behind = (log_density_gradient(density, data + s)[0] for s in (step, -step))
+        np.testing.assert_allclose((ahead - behind) / 2, (slopes * step).sum(axis=1), atol=1e-9)
+        torch.testing.assert_close(torch.tensor(values), logs[0].detach(), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["p31m", "hantzsche-wendt"])
+def test_a_fit_finds_a_known_density(name: str) -> None:
+    space = QuotientSpace(name)
+    generator = torch.Generator().manual_seed(0)
+    truth = Mixture([some_kernels(space, 3), UniformDensity(space)], [0.8, 0.2])
+    data = space.from_chart(truth.sample(150, generator))
+    fresh = space.from_chart(truth.sample(2000, generator))
+    estimator = DensityEstimator(name, components="mixture").fit(data)
+    logs = truth.log_prob(space.to_chart(fresh), measure="natural").numpy()
+    assert -0.02 < float((logs - estimator.score_samples(fresh)).mean()) < 0.15
+    assert estimator.sample(5, random_state=1).shape == (5, space.dim)
+
+
+@pytest.mark.parametrize("name", ["pgg", "p3"])
+def test_a_flow_is_fitted_where_the_domain_is_no_cube(name: str) -> None:
+    space = QuotientSpace(name)
+    generator = torch.Generator().manual_seed(0)
+    data = space.from_chart(some_kernels(space, 3).sample(400, generator))
+    options: dict[str, Any] = {"components": "flow", "segments": 1, "iterations": 4}
+    estimator = DensityEstimator(space, max_frequency=2, **options).fit(data)
+    assert estimator.report_.mass == pytest.approx(1, abs=1e-3)
+    uniform = -math.log(space.volume)
+    assert estimator.score(data) > uniform + 0.02
+
+
+class Moebius(Space):
+    """A user's own space: a strip between mirrors whose ends are joined with a half turn."""
+
+    name = "test-moebius"
+    columns = ("along", "across")
+
+    def __init__(self, length: float = 3.0) -> None:
+        self.length = length
+        flip = np.diag([1.0, -1.0])
+        glide = Isometry(flip, np.array([length, 0.0]) / length**0.5)
+        mirror = Isometry(flip, np.array([0.0, 1.0]) / length**0.5)
+        lattice = np.diag([2 * length, 2.0]) / length**0.5
+        self.group = CrystallographicGroup.generate(lattice, [glide, mirror])
+
+    @classmethod
+    def for_data(cls, data: Any, *, unit: str = "radians", seed: int = 0) -> Self:
+        del data, unit, seed
+        return cls()
+
+    @property
+    def volume(self) -> float:
+        return self.length / 2
+
+    def to_chart(self, data: ArrayLike) -> Tensor:
+        return self.project(torch.tensor(np.asarray(data) / self.length**0.5))
+
+    def from_chart(self, points: Tensor) -> Any:
+        return self.project(points).numpy() * self.length**0.5
+
+    def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Any:
+        del data, points
+        return gradient.numpy() / self.length**0.5
+
+    def settings(self) -> dict[str, Any]:
+        return {"length": self.length}
+
+
+def test_a_space_of_your_own_is_fitted_and_saved(tmp_path: Path) -> None:
+    space = Moebius(2.0)
+    data = np.random.default_rng(0).normal([0.5, 0.2], 0.2, (24, 2))
+    estimator = DensityEstimator(space, components="mixture").fit(data)
+    grid = midpoints(space, 64)
+    assert float(estimator.density_.log_prob(grid).exp().mean()) == pytest.approx(1, abs=1e-6)
+    path = tmp_path / "density.safetensors"
+    path.write_bytes(density_to_bytes(estimator.density_))
+    again, _ = read_density(path)
+    assert again.space == space
+    assert make_space("test-moebius", length=2.0) == space
+    with pytest.raises(OrbiflowError, match="choose another name"):
+        type("Other", (Moebius,), {"name": "torus"})
+
+
+def test_what_is_refused() -> None:
+    for make, message in (
+        (lambda: QuotientSpace("p5"), "unknown group 'p5': give a plane group"),
+        (lambda: QuotientSpace("p4", cell=(1.0, 2.0)), "p4 needs a square lattice"),
+        (lambda: QuotientSpace("tricosm", cell=(1, 1, 1)), "the nearest that fits has"),
+        (lambda: QuotientSpace("p4", cell=(1, 2, 3, 4)), "cell must be a, b and gamma"),
+        (lambda: QuotientSpace(wallpaper_group("p4"), cell=(1, 1)), "a cell is for a group"),
+        (lambda: QuotientSpace({"lattice": [[1.0]]}), "numbers are missing or invalid"),
+        (lambda: QuotientSpace("p4").to_chart([[1.0, 2.0, 3.0]]), "points of 2 coordinates"),
+        (
+            lambda: TabulatedDensity(UniformDensity(QuotientSpace("p4")), 16),
+            "with a canonical square",
+        ),
+        (lambda: make_space("quotient"), "group"),
+        (lambda: DensityEstimator("quotient").fit(np.zeros((20, 2))), "needs its group"),
+    ):
+        with pytest.raises((OrbiflowError, TypeError), match=message):
+            make()
+    with pytest.raises(GroupError):
+        flat_manifold("bottle")

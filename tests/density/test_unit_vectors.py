@@ -1,0 +1,370 @@
+"""Spheres of any dimension, axes, rotations and crystals: kernels, groups, forms, fits and commands."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any, cast
+
+import mpmath
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad
+from scipy.spatial.transform import Rotation
+from scipy.stats import kstest
+
+from density.quick_fits import quick_search
+from orbiflow.density import (
+    AdaptiveKernels,
+    CubicOrientations,
+    DensityEstimator,
+    Hypersphere,
+    ProjectivePlane,
+    ProjectiveSpace,
+    RotationSpace,
+    Space,
+    Sphere,
+    TabulatedDensity,
+    Torus,
+    UniformDensity,
+    VonMisesDensity,
+    density_picture,
+    density_to_bytes,
+    make_space,
+    read_density,
+)
+from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates, round_concentration
+from orbiflow.density.fitting.rows import Rows
+from orbiflow.density.spaces import UnitVectorSpace
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.runtime import find, tensor_bytes
+from strategies import seeds
+
+SPACES: tuple[UnitVectorSpace, ...] = (
+    Hypersphere(1),
+    Hypersphere(2),
+    Hypersphere(3),
+    Hypersphere(9),
+    ProjectiveSpace(1),
+    ProjectiveSpace(4),
+    RotationSpace(),
+    RotationSpace(form="ZXZ", unit="degrees", symmetry="D6"),
+    CubicOrientations(form="vector"),
+)
+every = pytest.mark.parametrize("space", SPACES, ids=repr)
+spaces = st.sampled_from(SPACES)
+dims = st.integers(1, 64)
+logs = st.floats(math.log(0.005), math.log(1e7))
+
+
+def source(seed: int) -> torch.Generator:
+    return torch.Generator().manual_seed(seed)
+
+
+def kernels(space: Space, seed: int, low: float = 1.0, high: float = 60.0) -> AdaptiveKernels:
+    """Four random kernels."""
+    generator = source(seed)
+    kappa = low + (high - low) * torch.rand(4, 1, dtype=torch.float64, generator=generator)
+    weights = torch.rand(4, dtype=torch.float64, generator=generator) + 0.1
+    return AdaptiveKernels(space, space.uniform(4, generator), kappa, weights / weights.sum())
+
+
+def one_kernel(dim: int, kappa: float) -> AdaptiveKernels:
+    space = Hypersphere(dim)
+    pole = torch.eye(dim + 1, dtype=torch.float64)[-1:]
+    one = torch.ones(1, dtype=torch.float64)
+    return AdaptiveKernels(space, pole, kappa * one[:, None], one)
+
+
+@settings(max_examples=50)
+@given(dim=dims, log=logs)
+def test_the_peak_of_a_kernel_is_exact_at_any_concentration(dim: int, log: float) -> None:
+    kappa = math.exp(log)
+    found = float(one_kernel(dim, kappa).log_prob(torch.eye(dim + 1, dtype=torch.float64)[-1]))
+    with mpmath.workdps(40):
+        order = mpmath.mpf(dim - 1) / 2
+        bessel = mpmath.log(mpmath.besseli(order, kappa))
+        wanted = (
+            order * mpmath.log(kappa) - (order + 1) * mpmath.log(2 * mpmath.pi) - bessel + kappa
+        )
+    assert found == pytest.approx(float(wanted), rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("dim", [1, 3, 20])
+@pytest.mark.parametrize("kappa", [0.01, 3.0, 400.0])
+def test_a_kernel_integrates_to_one(dim: int, kappa: float) -> None:
+    density, belt = one_kernel(dim, kappa), Hypersphere(dim - 1).volume if dim > 1 else 2.0
+
+    def ring(angle: float) -> float:
+        at = torch.zeros(dim + 1, dtype=torch.float64)
+        at[0], at[-1] = math.sin(angle), math.cos(angle)
+        return float(density.log_prob(at).exp()) * belt * math.sin(angle) ** (dim - 1)
+
+    total = quad(ring, 0, min(math.pi, 12 * (dim / kappa) ** 0.5), limit=200)[0]
+    assert total == pytest.approx(1, abs=1e-9)
+
+
+@given(space=spaces, seed=seeds)
+@settings(max_examples=25)
+def test_densities_are_invariant_and_projecting_finds_one_of_the_images(
+    space: UnitVectorSpace, seed: int
+) -> None:
+    points, density = space.uniform(20, source(seed)), kernels(space, seed)
+    images = space.features(points)
+    assert len(images) == len(space.elements)
+    for image in images:
+        assert torch.allclose(space.project(image), points, atol=1e-12)
+        assert torch.allclose(density.log_prob(image), density.log_prob(points), atol=1e-10)
+    assert bool((images[..., -1].amax(dim=0) <= points[..., -1] + 1e-5).all())
+
+
+@every
+def test_the_elements_are_a_group_and_the_volume_is_that_of_the_sphere_among_them(
+    space: UnitVectorSpace,
+) -> None:
+    elements = space.elements
+    products = torch.einsum("aij,bjk->abik", elements, elements).flatten(0, 1)
+    apart = (products[:, None] - elements).abs().amax(dim=(2, 3))
+    assert bool(((apart < 1e-9).sum(dim=1) == 1).all())
+    p = space.dim + 1
+    wanted = 2 * math.pi ** (p / 2) / math.gamma(p / 2) / len(elements)
+    assert space.volume == pytest.approx(wanted)
+
+
+@every
+def test_samples_follow_the_density(space: UnitVectorSpace) -> None:
+    density = kernels(space, 7, 2.0, 12.0)
+    drawn = density.sample(20_000, source(0))
+    assert torch.allclose(space.project(drawn), drawn, atol=1e-15)
+    # where samples are, the uniform density over this one has the mean 1
+    ratio = (-density.log_prob(drawn, measure="uniform")).exp().numpy()
+    error = ratio.std() / len(ratio) ** 0.5
+    assert ratio.mean() == pytest.approx(1, abs=5 * error)
+    even = density.log_prob(space.uniform(20_000, source(1)), measure="uniform").exp().numpy()
+    assert even.mean() == pytest.approx(1, abs=5 * even.std() / len(even) ** 0.5)
+
+
+@settings(max_examples=25)
+@given(dim=st.integers(1, 12), log=st.floats(-2, math.log(1e7)), seed=seeds)
+def test_heights_of_samples_have_their_distribution(dim: int, log: float, seed: int) -> None:
+    kappa = math.exp(log)
+    drawn = one_kernel(dim, kappa).sample(300, source(seed))
+    angle = np.asarray(2 * torch.asin((drawn - torch.eye(dim + 1)[-1]).norm(dim=1) / 2))
+    grid = np.linspace(0, min(math.pi, 12 * (dim / kappa) ** 0.5), 20_001)[1:]
+    logs = -2 * kappa * np.sin(grid / 2) ** 2 + (dim - 1) * np.log(np.sin(grid).clip(1e-300))
+    mass = np.cumsum(np.exp(logs - logs.max()))
+    assert kstest(angle, lambda t: np.interp(t, grid, mass / mass[-1])).pvalue > 1e-7
+
+
+@given(dim=dims, log=st.floats(-2, math.log(1e6)))
+def test_concentrations_come_back_from_mean_cosines(dim: int, log: float) -> None:
+    kappa = math.exp(log)
+    with mpmath.workdps(40):
+        half = mpmath.mpf(dim + 1) / 2
+        cosine = float(mpmath.besseli(half, kappa) / mpmath.besseli(half - 1, kappa))
+    if 1e-4 <= cosine <= 1 - 1e-8:  # beyond, they are held
+        found = float(round_concentration(torch.tensor([cosine], dtype=torch.float64), dim))
+        assert found == pytest.approx(kappa, rel=1e-6 + 1e-15 * kappa)
+
+
+def test_two_dimensions_are_the_sphere_and_rotations_are_projective_space() -> None:
+    noise = np.random.default_rng(0).normal(size=(120, 4)) + np.array([1.5, 0.0, 0.5, 1.0])
+    four = noise / np.linalg.norm(noise, axis=1, keepdims=True)
+    three = noise[:, :3] / np.linalg.norm(noise[:, :3], axis=1, keepdims=True)
+    pairs: list[tuple[Space, Space, np.ndarray]] = [
+        (Hypersphere(2), Sphere(form="vector"), three),
+        (ProjectiveSpace(2), ProjectivePlane(form="vector"), three),
+        (ProjectiveSpace(3), RotationSpace(), four),
+    ]
+    for one, other, data in pairs:
+        scores: list[torch.Tensor] = []
+        for space in (one, other):
+            points = space.to_chart(data)
+            near = kernel_estimates(space, Rows(points))["near 8, 0.4, 1"]
+            few = fit_mixture(space, Rows(points), 3, generator=source(0))
+            found = [part.log_prob(points, measure="natural") for part in (near, few)]
+            scores.append(torch.cat(found))
+        assert torch.allclose(scores[0], scores[1], atol=1e-6)
+        assert one.volume == pytest.approx(other.volume)
+
+
+@pytest.mark.parametrize("dim", [2, 3, 5, 7, 9])
+def test_kernels_are_neither_spikes_nor_flat_in_any_dimension(
+    dim: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    quick_search(monkeypatch)
+    truth = one_kernel(dim, 8.0 * dim)
+    data, fresh = truth.sample(300, source(dim)), truth.sample(500, source(99))
+    fit = DensityEstimator(truth.space, components="kernels").fit(data.numpy())
+    gain = float(truth.log_prob(fresh, measure="uniform").mean())
+    found = float(fit.density_.log_prob(fresh, measure="uniform").mean())
+    assert 0.8 * gain < found < gain
+    # Silverman's rule for a Gaussian of this width and this many rows
+    rule = 8 * dim * (300 * (dim + 2) / 4) ** (2 / (dim + 4))
+    weight, part = fit.density_.kernel_part or (0.0, truth)
+    typical = float((part.weights * part.concentrations[:, 0].log()).sum().exp())
+    assert weight > 0.9
+    assert rule / 4 < typical < 4 * rule
+
+
+@every
+def test_what_is_saved_comes_back(space: UnitVectorSpace, tmp_path: Path) -> None:
+    density, path = kernels(space, 3), tmp_path / "density.safetensors"
+    path.write_bytes(density_to_bytes(density))
+    again, _ = read_density(path)
+    points = space.uniform(50, source(0))
+    assert again.space == space
+    assert torch.equal(again.log_prob(points), density.log_prob(points))
+    assert space != Torus(2)
+    assert space != type(space)(**{**space.settings(), **_other(space)})
+
+
+def _other(space: Space) -> dict[str, object]:
+    return {"dim": 5} if isinstance(space, Hypersphere) else {"symmetry": "T"}
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"name": "hypersphere", "dim": 10**9}, "dim must be from 1 to 64"),
+        ({"name": "hypersphere", "dim": 4}, "do not fit a hypersphere"),
+        ({"name": "rotation-space", "form": "ZZZ"}, "form must be"),
+        ({"name": "rotation-space", "symmetry": "C999999"}, "symmetry must be"),
+    ],
+)
+def test_hostile_files_are_refused(
+    options: dict[str, object], message: str, tmp_path: Path
+) -> None:
+    header = {
+        "format": "orbiflow-density/5",
+        "space": options,
+        "group": None,
+        "density": {"kind": "kernels", "kernels": 1},
+        "extra": {},
+    }
+    one = torch.ones(1, dtype=torch.float64)
+    tensors = {"centers": torch.eye(4)[:1], "concentrations": one[:, None], "weights": one}
+    path = tmp_path / "x.safetensors"
+    path.write_bytes(tensor_bytes(header, {k: v.double() for k, v in tensors.items()}, "a density"))
+    with pytest.raises(InputFileError, match=message):
+        read_density(path)
+
+
+@settings(max_examples=10)
+@given(seed=seeds, symmetry=st.sampled_from(["C1", "D2", "D6", "T", "O"]))
+def test_forms_of_rotations_agree_and_symmetry_acts_from_the_right(
+    seed: int, symmetry: str
+) -> None:
+    turns, group = (
+        Rotation.random(20, random_state=seed),
+        Rotation.create_group(cast(Any, symmetry)),
+    )
+    spaces = {
+        form: RotationSpace(form=form, unit="degrees", symmetry=symmetry)
+        for form in ("quaternion", "vector", "matrix", "ZXZ", "xyz")
+    }
+    wanted = spaces["quaternion"].to_chart(turns.as_quat())
+    for data in (turns.as_matrix().reshape(-1, 9), turns.as_rotvec(degrees=True)):
+        assert torch.allclose(spaces["vector"].to_chart(data), wanted, atol=1e-9)
+    euler = turns.as_euler("ZXZ", degrees=True)
+    assert torch.allclose(spaces["ZXZ"].to_chart(euler), wanted, atol=1e-9)
+    for space in spaces.values():
+        assert torch.allclose(space.to_chart(space.from_chart(wanted)), wanted, atol=1e-9)
+        assert space.from_chart(wanted).shape == (20, len(space.columns))
+    for element in group:
+        turned = spaces["quaternion"].to_chart((turns * element).as_quat())
+        assert torch.allclose(turned, wanted, atol=1e-9)
+    # of all images, the one that is kept has the smallest angle
+    least = np.min([(turns * element).magnitude() for element in group], axis=0)
+    assert Rotation.from_quat(wanted.numpy()).magnitude() == pytest.approx(least, abs=1e-4)
+
+
+@given(space=spaces, seed=seeds)
+def test_gradients_are_slopes_along_the_sphere(space: UnitVectorSpace, seed: int) -> None:
+    density = kernels(space, seed)
+    estimator = DensityEstimator.fitted(density)
+    noise = torch.randn(2, 5, space.chart_dim, dtype=torch.float64, generator=source(seed))
+    at, side = noise / noise.norm(dim=-1, keepdim=True)
+    slope = estimator.score_gradient(at)
+    side = side - (side * at).sum(dim=1, keepdim=True) * at
+    side = side / side.norm(dim=1, keepdim=True)
+    step = 1e-5
+    ahead, behind = (
+        density.log_prob(at * math.cos(step) + sign * side * math.sin(step)) for sign in (1, -1)
+    )
+    wanted = ((ahead - behind) / (2 * step)).numpy()
+    assert (slope * side.numpy()).sum(axis=1) == pytest.approx(wanted, rel=1e-5, abs=1e-5)
+    assert (slope * at.numpy()).sum(axis=1) == pytest.approx(0, abs=1e-9)
+
+
+space3, quarter = Hypersphere(3), [[0.0, 0.0, math.pi / 2]]
+REFUSED = {
+    r"row 2: the vector .* has length 2": lambda: space3.to_chart([[0, 0, 0, 1.0], [0, 0, 0, 2.0]]),
+    r"expected an array \(N, 4\)": lambda: space3.to_chart([[0.0, 0.0, 1.0]]),
+    "must be unit vectors": lambda: kernels(space3, 0).log_prob(torch.zeros(1, 4)),
+    "row 1: .* is no rotation matrix": lambda: RotationSpace().to_chart([[1.0] * 9]),
+    "row 1: .* more than a turn in radians": lambda: RotationSpace().to_chart([[0.0, 0.0, 90.0]]),
+    "more than a turn in degrees": lambda: CubicOrientations(form="ZXZ", unit="degrees").to_chart(
+        [[400.0, 0.0, 0.0]]
+    ),
+    "gradients of rotations need unit quaternions": lambda: DensityEstimator.fitted(
+        kernels(RotationSpace(), 0)
+    ).score_gradient(quarter),
+    "a flow has 3 dimensions at most, this hypersphere has 3 and no": lambda: DensityEstimator(
+        space3, components=("flow", "kernels")
+    ).fit(space3.uniform(20, source(0))),
+    "max_frequency would have no effect on the hypersphere": lambda: DensityEstimator(
+        space3, max_frequency=3
+    ).fit(np.eye(4)),
+    "no crystallographic group": lambda: VonMisesDensity(space3).entropy(),
+    "a table needs .* a canonical square, which this hypersphere of 2 is not": lambda: (
+        TabulatedDensity(UniformDensity(Hypersphere(2)))
+    ),
+    "a picture needs two dimensions, this hypersphere has 2 and no": lambda: density_picture(
+        kernels(Hypersphere(2), 0)
+    ),
+    "hypersphere has no option": lambda: make_space("hypersphere", unit="degrees"),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_what_has_no_meaning_is_refused(message: str) -> None:
+    with pytest.raises(OrbiflowError, match=message):
+        REFUSED[message]()
+
+
+def test_the_commands_fit_score_sample_and_find_regions_of_rotations(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    quick_search(monkeypatch)
+    turns = Rotation.from_rotvec(np.random.default_rng(0).normal(0, 0.3, (80, 3)))
+    table, folder = tmp_path / "turns.csv", tmp_path / "fit"
+    np.savetxt(table, turns.as_rotvec(degrees=True), delimiter=",", header="rx,ry,rz", comments="")
+
+    def run(name: str, **given: object) -> dict[str, object]:
+        call = find(f"density {name}").call(given)
+        return dict(call.run().summary)
+
+    where = {"space": "rotation-space", "data": table}
+    with pytest.raises(OrbiflowError, match="beyond 2 pi"):
+        run("fit", **where, out=folder)
+    run("fit", **where, unit="degrees", out=folder, picture=True)
+    assert (folder / "thumbnail.png").exists()
+    scored = run("score", data=table, model=folder, out=tmp_path / "scores.csv")
+    density, extra = read_density(folder / "density.safetensors")
+    assert extra["columns"] == ["rx", "ry", "rz"]
+    points = density.space.to_chart(turns.as_quat())
+    assert scored["mean"] == pytest.approx(float(density.log_prob(points).mean()))
+    run("sample", model=folder, out=tmp_path / "drawn.csv", count=30)
+    assert np.loadtxt(tmp_path / "drawn.csv", delimiter=",", skiprows=1).shape == (30, 3)
+    found = run("region", model=folder, out=tmp_path / "regions.json", samples=1000)
+    assert len(found["regions"]) == 2  # pyright: ignore[reportArgumentType]
+    for name, message in (("plot", "maps are of the sphere"), ("marginal", "angles on a torus")):
+        more = {"columns": ("rx",)} if name == "marginal" else {}
+        with pytest.raises(OrbiflowError, match=message):
+            find(f"density {name}").call({"model": folder, "out": tmp_path / name, **more}).run()
+    with pytest.raises(OrbiflowError, match="GeoJSON is for places on a globe"):
+        run("region", model=folder, out=tmp_path / "regions.geojson")

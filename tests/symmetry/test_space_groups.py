@@ -1,0 +1,217 @@
+"""Space groups by name, on the cells that they fit."""
+
+from __future__ import annotations
+
+import sys
+
+import gemmi
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import strategies as own
+from orbiflow.errors import (
+    GroupError,
+    InputFileError,
+    LatticeMismatchError,
+    OrbiflowError,
+    SettingError,
+)
+from orbiflow.symmetry import (
+    cell_lattice,
+    cell_parameters,
+    cif_text,
+    group_from_cif,
+    group_from_operators,
+    operators,
+    space_group,
+)
+
+SETTINGS = {row.xhm(): row for row in gemmi.spacegroup_table()}
+
+
+@settings(max_examples=8)
+@given(st.sampled_from(sorted(SETTINGS)))
+def test_every_setting_is_the_group_of_the_tables_on_its_primitive_lattice(name):
+    group, listed = space_group(name), SETTINGS[name].operations()
+    assert group.name == name
+    assert group.order == len(listed.sym_ops)
+    assert len(np.unique(np.round(group.linear_parts, 6), axis=0)) == group.order
+    assert space_group(f"Hall: {SETTINGS[name].hall}") == group
+
+
+SYMBOLS = {"P1": "P 1", "P2_1/c": "P 1 21/c 1", "P4_1": "P41", "P3_1": "P 31"}
+
+
+@settings(max_examples=5)
+@given(st.sampled_from(sorted(SYMBOLS)), own.seeds)
+def test_groups_by_name_are_those_that_were_written_by_hand(name, seed):
+    lattice = own.space_lattice(np.random.default_rng(seed), own.SPACE_GROUPS[name][0])
+    assert space_group(SYMBOLS[name], lattice) == own.space_group(name, seed)
+
+
+@pytest.mark.parametrize(
+    ("symbol", "centring"), [("P 2 3", 1), ("C 2 2 2", 2), ("I 2 3", 2), ("R 3", 3), ("F 2 3", 4)]
+)
+def test_centred_cells_become_primitive(symbol, centring):
+    cell = (2, 2, 2, 90, 90, 120 if symbol == "R 3" else 90)
+    whole = abs(np.linalg.det(cell_lattice(cell)))
+    assert space_group(symbol, cell).cell_volume == pytest.approx(whole / centring, rel=1e-12)
+
+
+def test_the_primitive_cells_are_the_textbooks():
+    face, body = space_group("F m -3 m", (2, 2, 2)), space_group("I m -3 m", (2, 2, 2))
+    np.testing.assert_allclose(cell_parameters(face.lattice)[:3], np.sqrt(2))
+    np.testing.assert_allclose(cell_parameters(body.lattice)[:3], np.sqrt(3))
+
+
+@pytest.mark.parametrize(
+    ("name", "same"),
+    [(19, "P 21 21 21"), ("19", "P212121"), (14, "P 21/c"), (148, "R -3:H"), (227, "Fd-3m:1")],
+)
+def test_numbers_and_short_symbols(name, same):
+    assert space_group(name) == space_group(same)
+
+
+def test_the_hall_symbol_is_meant_only_if_it_is_said():
+    cell = (1, 2, 3)
+    assert space_group("P 2", cell) == space_group("P 1 2 1", cell)
+    assert space_group("Hall: P 2", cell) == space_group("P 1 1 2", cell)
+    assert space_group("-P 2ybc", cell) == space_group("P 21/c", cell)
+
+
+@settings(max_examples=8)
+@given(st.sampled_from(sorted(SETTINGS)))
+def test_the_cure_of_a_wrong_cell_is_one(name):
+    # without symmetry, so that only triclinic groups fit
+    cell = (2.0, 3.0, 4.0, 70.0, 80.0, 100.0)
+    try:
+        group = space_group(name, cell)
+        assert SETTINGS[name].number <= 2
+    except LatticeMismatchError as error:
+        numbers = str(error).split("has ")[-1].split(", ")
+        cure = [float(text.split(" = ")[1]) for text in numbers]
+        group = space_group(name, cure)
+    assert group.order == len(SETTINGS[name].operations().sym_ops)
+
+
+@pytest.mark.parametrize(
+    "name", [0, 231, -1, 1.5, True, None, "P 5", "", "Hall:", "9" * 99, "x" * 999, "P\0 1", "é"]
+)
+def test_unknown_names_are_refused_with_examples(name):
+    with pytest.raises(GroupError, match=r'unknown space group .* such as "P 21 21 21"'):
+        space_group(name)
+
+
+@pytest.mark.parametrize(
+    "cell", [1, "abc", (1, 2), (1, 1, 1, 90, 90), np.eye(2), (1, 2, np.nan), (0, 1, 1), (1, -1, 1)]
+)
+def test_cells_that_are_none_are_refused(cell):
+    with pytest.raises(SettingError, match="cell must be"):
+        space_group(1, cell)
+
+
+@pytest.mark.parametrize("cell", [(1, 1, 1, 10, 20, 90), (1, 1, 1, 90, 90, 180), np.zeros((3, 3))])
+def test_cells_without_volume_are_refused(cell):
+    with pytest.raises(GroupError):
+        space_group(1, cell)
+
+
+def test_without_gemmi_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "gemmi", None)
+    with pytest.raises(OrbiflowError, match=r'pip install "orbiflow\[crystals\]"'):
+        space_group(1)
+
+
+CORE = """data_quartz
+_cell_length_a 4.9134(2)
+_cell_length_b 4.9134(2)
+_cell_length_c 5.4052(1)
+_cell_angle_alpha 90
+_cell_angle_beta 90
+_cell_angle_gamma 120
+"""
+OPERATORS = "loop_\n_space_group_symop_operation_xyz\n" + "\n".join(
+    f"'{op.triplet()}'" for op in SETTINGS["P 32 2 1"].operations()
+)
+
+
+@pytest.mark.parametrize(
+    "symmetry",
+    [
+        OPERATORS,
+        "loop_\n_symmetry_equiv_pos_site_id\n_symmetry_equiv_pos_as_xyz\n1 x,y,z\n2 -y,x-y,z+2/3\n"
+        "3 y,x,-z",
+        "_space_group_name_Hall 'P 32 2\"'",
+        "_symmetry_space_group_name_H-M 'P 32 2 1'",
+        "_symmetry_space_group_name_H-M ?\n_space_group_IT_number 154",
+    ],
+)
+@pytest.mark.parametrize("dotted", [False, True])
+def test_cifs_with_operators_symbols_or_numbers(tmp_path, symmetry, dotted):
+    text = f"data_first\n_audit_author_name me\n{CORE}{symmetry}\n"
+    if dotted:  # mmCIF
+        for category in ("_cell_", "_space_group_symop_", "_symmetry_", "_space_group_"):
+            text = text.replace(category, f"{category[:-1]}.")
+    path = tmp_path / "quartz.cif"
+    path.write_text(text, "utf-8")
+    assert group_from_cif(path) == space_group(154, (4.9134, 4.9134, 5.4052, 90, 90, 120))
+    assert group_from_cif(path, (1, 1, 3, 90, 90, 120)).cell_volume == pytest.approx(
+        2.598, abs=1e-3
+    )
+
+
+@settings(max_examples=5)
+@given(name=st.sampled_from(sorted(SETTINGS)))
+def test_a_group_is_read_from_its_own_cif(tmp_path_factory, name):
+    group = space_group(name)
+    path = tmp_path_factory.mktemp("cif") / "group.cif"
+    path.write_text(cif_text(group), "utf-8")
+    assert group_from_cif(path) == group_from_operators(
+        operators(group), cell_lattice(cell_parameters(group.lattice))
+    )
+    assert gemmi.cif.read(str(path))[0].name == "group"
+
+
+def test_a_cif_in_the_conventional_cell_names_the_group_to_other_programs():
+    group = space_group("F d -3 m:2", (3, 3, 3))
+    block = gemmi.cif.read_string(cif_text(group, 3 * np.eye(3)))[0]
+    structure = gemmi.make_small_structure_from_block(block)
+    assert structure.spacegroup.xhm() == "F d -3 m:2"
+    assert structure.cell.a == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "neither operators nor a symbol"),
+        ("rubbish", "expected block header"),
+        (CORE, "neither operators nor a symbol"),
+        ("data_a\n_symmetry_space_group_name_H-M 'P 1'", "its cell is not complete"),
+        (CORE + "_space_group_name_H-M_alt 'P 5'", "unknown space group 'P 5'"),
+        (CORE + "_space_group_name_H-M_alt 'P 4'", "a = 4.9134, b = 4.9134, c = 5.4052"),
+        (CORE + "loop_\n_space_group_symop_operation_xyz\nx,y,z\nx,y", "'x,y' is no operator"),
+        (CORE + "loop_\n_space_group_symop_operation_xyz\nx+z,y,z\n", "no cell fits them all"),
+        (CORE.replace("4.9134(2)", "-4") + "_space_group_IT_number 1", "lengths above 0"),
+        (CORE.replace("120", "180") + "_space_group_IT_number 1", "it would be flat"),
+        (CORE + "_space_group_IT_number 1\0", "string"),
+    ],
+)
+def test_files_that_are_no_cifs_of_a_group_are_refused(tmp_path, text, reason):
+    path = tmp_path / "bad.cif"
+    path.write_text(text, "utf-8")
+    with pytest.raises(InputFileError, match=reason) as caught:
+        group_from_cif(path)
+    assert str(path) in str(caught.value)
+
+
+def test_files_that_are_none_or_too_large_are_refused(tmp_path, monkeypatch):
+    with pytest.raises(InputFileError, match="cannot be read"):
+        group_from_cif(tmp_path / "none.cif")
+    monkeypatch.setattr("orbiflow.symmetry.space_groups.MAX_CIF_BYTES", 10)
+    (tmp_path / "large.cif").write_text(CORE)
+    with pytest.raises(InputFileError, match="too large for a CIF"):
+        group_from_cif(tmp_path / "large.cif")
+    with pytest.raises(GroupError, match="needs a group of 3 dimensions"):
+        cif_text(own.identification_group("torus"))
