@@ -15,13 +15,6 @@ from .comparing.resampling import TestResult as TestResult
 from .comparing.resampling import cross_validation_folds as cross_validation_folds
 from .comparing.resampling import mmd_test as mmd_test
 from .comparing.settings import ComparisonSettings as ComparisonSettings
-from .conditionals import at_observed as at_observed
-from .conditionals import axes_named as axes_named
-from .conditionals import chart_of_observed as chart_of_observed
-from .conditionals import conditional as conditional
-from .conditionals import given_named as given_named
-from .conditionals import log_prob_observed as log_prob_observed
-from .conditionals import marginal as marginal
 from .estimator import DensityEstimator as DensityEstimator
 from .fitting.automatic import fit_automatic as fit_automatic
 from .fitting.flow import fit_density as fit_density
@@ -36,6 +29,15 @@ from .fitting.rows import weighed as weighed
 from .fitting.settings import ComponentSettings as ComponentSettings
 from .fitting.settings import DensitySettings as DensitySettings
 from .fitting.settings import FlowSettings as FlowSettings
+from .inference.angles import axes_named as axes_named
+from .inference.angles import given_named as given_named
+from .inference.observed import at_observed as at_observed
+from .inference.observed import chart_of_observed as chart_of_observed
+from .inference.observed import log_prob_observed as log_prob_observed
+from .inference.partial import ACCURACY as ACCURACY
+from .inference.partial import conditional as conditional
+from .inference.partial import marginal as marginal
+from .models.chains import Factor as Factor
 from .models.chains import VonMisesChains as VonMisesChains
 from .models.density import Density as Density
 from .models.evaluation import CHECKED as CHECKED
@@ -50,7 +52,6 @@ from .models.flow import UniformDensity as UniformDensity
 from .models.flow import VonMisesDensity as VonMisesDensity
 from .models.kernels import AdaptiveKernels as AdaptiveKernels
 from .models.mixture import Mixture as Mixture
-from .models.network import Factor as Factor
 from .models.network import VonMisesNetwork as VonMisesNetwork
 from .pictures.coastlines import read_coastlines as read_coastlines
 from .pictures.colours import COLOURS as COLOURS

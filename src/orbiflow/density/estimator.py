@@ -13,14 +13,6 @@ from numpy.typing import ArrayLike
 
 from orbiflow.arguments import as_instance, as_whole, refusal
 from orbiflow.arrays import Array
-from orbiflow.density.conditionals import (
-    at_observed,
-    axes_named,
-    chart_of_observed,
-    conditional,
-    given_named,
-    marginal,
-)
 from orbiflow.density.fitting import (
     DensitySettings,
     FitReport,
@@ -30,6 +22,14 @@ from orbiflow.density.fitting import (
     fit_density,
     mean_of,
     weighed,
+)
+from orbiflow.density.inference import (
+    at_observed,
+    axes_named,
+    chart_of_observed,
+    conditional,
+    given_named,
+    marginal,
 )
 from orbiflow.density.models import Density, flow_obstacle, log_density_gradient
 from orbiflow.density.spaces import Space, space_for

@@ -5,12 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from orbiflow.runtime import Note, ResultFolder, Sink, Written, write_atomic
+
+SAMPLES = "samples.csv"
+"""Samples beside the density that they are of."""
 
 
 def written_files(folder: Path) -> set[str]:
     """Return the names of the files that a fit wrote into a folder, and of pictures of its model."""
+    document: Any = {}
     try:
         document = json.loads((folder / "report.json").read_text(encoding="utf-8"))
         ours = "space" in document and "report" in document
@@ -21,7 +26,8 @@ def written_files(folder: Path) -> set[str]:
 
     from orbiflow.density.pictures import MODEL, PICTURES, REPORT, TABLE, THUMBNAIL
 
-    return {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES}
+    samples = {SAMPLES} if "samples" in document else set[str]()
+    return {MODEL, REPORT, TABLE, THUMBNAIL, *PICTURES, *samples}
 
 
 def write_files(folder: ResultFolder, files: Mapping[str, str | bytes], tell: Sink) -> None:

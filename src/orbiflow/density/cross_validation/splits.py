@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array
 from orbiflow.batch import Entry
 from orbiflow.density import comparing
-from orbiflow.density.conditionals import chart_of_observed
 from orbiflow.density.cross_validation.operations import SCORES, UNIFORM, CrossValidation
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
+from orbiflow.density.inference import chart_of_observed
 from orbiflow.density.spaces import Space, space_for
 from orbiflow.density.tables import TableRows, Unit, angle_unit, read_rows, read_table
 from orbiflow.errors import InputFileError, OrbiflowError

@@ -14,7 +14,6 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from orbiflow.density.conditionals import at_observed
 from orbiflow.density.fitting.families import Family
 from orbiflow.density.fitting.flow import fit_density
 from orbiflow.density.fitting.folds import Folds
@@ -22,6 +21,7 @@ from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence, FitReport, Progress
 from orbiflow.density.fitting.rows import Gain, Rows, gain_of, mean_of
 from orbiflow.density.fitting.settings import FlowSettings
+from orbiflow.density.inference import at_observed
 from orbiflow.density.models import MOST_DIM, Density, Mixture, UniformDensity, mixture_of
 from orbiflow.density.spaces import Space
 from orbiflow.fields import has_even_grid

@@ -11,7 +11,6 @@ from typing import Any, cast
 import torch
 from torch import Tensor
 
-from orbiflow.density.conditionals import at_observed
 from orbiflow.density.fitting.chains import (
     Shape,
     fit_chain_mixture,
@@ -21,6 +20,7 @@ from orbiflow.density.fitting.chains import (
 )
 from orbiflow.density.fitting.kernels import NARROWEST, fit_mixture, kernel_estimates
 from orbiflow.density.fitting.rows import Rows, gain_of, is_whole, with_incomplete
+from orbiflow.density.inference import at_observed
 from orbiflow.density.models import Density, averaged_networks
 from orbiflow.density.spaces import Space, Torus
 

@@ -11,10 +11,10 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance, as_points
-from orbiflow.density.conditionals import at_observed
 from orbiflow.density.fitting.folds import LEAST_PLACES, Repeats, places
 from orbiflow.density.fitting.likelihood import Refinement
 from orbiflow.density.fitting.rows import mean_of
+from orbiflow.density.inference import at_observed
 from orbiflow.density.models import Density, FlowDensity
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError

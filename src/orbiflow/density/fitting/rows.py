@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
 from orbiflow.arguments import as_choice, as_instance, as_tensor, described
-from orbiflow.density.conditionals import check_torus, observed_rows
+from orbiflow.density.inference import check_torus, observed_rows
 from orbiflow.density.models import AdaptiveKernels
 from orbiflow.density.spaces import Space, row_count
 from orbiflow.errors import OrbiflowError

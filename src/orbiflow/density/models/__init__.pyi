@@ -1,7 +1,9 @@
 from .chains import SCALES as SCALES
+from .chains import Factor as Factor
 from .chains import VonMisesChains as VonMisesChains
 from .chains import chained as chained
 from .chains import waves as waves
+from .density import LEVELS as LEVELS
 from .density import Density as Density
 from .density import Split as Split
 from .evaluation import CHECKED as CHECKED
@@ -20,10 +22,10 @@ from .kernels import AdaptiveKernels as AdaptiveKernels
 from .kernels import kernel_rows as kernel_rows
 from .mixture import Mixture as Mixture
 from .mixture import mixture_of as mixture_of
-from .network import Factor as Factor
 from .network import VonMisesNetwork as VonMisesNetwork
 from .network import averaged_networks as averaged_networks
 from .network import log_conditional as log_conditional
+from .part import PartialDensity as PartialDensity
 from .terms import FAINT as FAINT
 from .terms import log_sum_exp as log_sum_exp
 from .terms import shares_of as shares_of

@@ -6,15 +6,15 @@ Marginals are taken by quadrature over the angles that come before others.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import Any, Self
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_tensor
-from orbiflow.density.models.density import Density, Restriction, Split, in_blocks
+from orbiflow.density.models.density import Density, Restriction, Split, Weighted, in_blocks
 from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
@@ -39,6 +39,10 @@ the nodes are quasi-random."""
 TABLE = 2048
 """Points of the distribution function whose inverse gives quasi-random nodes."""
 
+
+PILOTS, SPARED = 64, 1e-3
+"""Draws of each component by which it is judged where angles are given, and the share of draws that
+goes by weight alone."""
 
 BLOCK = 256
 """Points at a time: few enough for the cache."""
@@ -123,15 +127,41 @@ class VonMisesChains(Density, kind="chains"):
         own = self.to("cpu")
         weights = own.log_weights.exp().flatten()
         chosen = torch.multinomial(weights, count, replacement=True, generator=generator)
+        return self.space.project(own._walk(chosen, {}, generator)[0])
+
+    def draw_given(
+        self, count: int, given: Mapping[int, float], generator: torch.Generator
+    ) -> tuple[Tensor, Tensor]:
+        """Choose components by what they make of the given angles in a few draws each."""
+        own = self.to("cpu")
+        logs = own.log_weights.flatten()
+        every = torch.arange(len(logs)).repeat_interleave(PILOTS)
+        pilots = own._walk(every, given, generator)[1].reshape(-1, PILOTS)
+        likely = logs + log_sum_exp(pilots) - math.log(PILOTS)
+        proposed = shares_of(torch.logaddexp(likely, logs + log_sum_exp(likely) + math.log(SPARED)))
+        chosen = torch.multinomial(proposed, count, replacement=True, generator=generator)
+        points, weights = own._walk(chosen, given, generator)
+        return self.space.project(points), weights + (logs - proposed.log())[chosen]
+
+    def _walk(
+        self, chosen: Tensor, given: Mapping[int, float], generator: torch.Generator
+    ) -> tuple[Tensor, Tensor]:
+        """Return draws (N, d) of components, and log densities (N,) of the given angles."""
         component = chosen // len(SCALES)
-        kappa = own.concentrations[component] / torch.tensor(SCALES)[chosen % len(SCALES), None]
+        kappa = self.concentrations[component] / torch.tensor(SCALES)[chosen % len(SCALES), None]
         rng = np.random.default_rng(int(torch.randint(2**31, (), generator=generator)))
         noise = torch.tensor(rng.vonmises(0.0, kappa.numpy()))
-        angle, rows = torch.zeros(count, self.space.dim, dtype=torch.float64), torch.arange(count)
-        for now in own.order[component].mT:
-            mean = (waves(angle) * own.means[component, now]).sum(dim=-1)
-            angle[rows, now] = mean + noise[rows, now]
-        return self.space.project(angle / (2 * math.pi))
+        angle, rows = torch.zeros(noise.shape, dtype=torch.float64), torch.arange(len(noise))
+        known = angle.new_full((self.space.dim,), math.nan)
+        known[list(given)] = 2 * math.pi * torch.tensor([*given.values()], dtype=torch.float64)
+        logs = angle.new_zeros(len(angle))
+        for now in self.order[component].mT:
+            mean = (waves(angle) * self.means[component, now]).sum(dim=-1)
+            fixed, sharp = ~known[now].isnan(), kappa[rows, now]
+            off = (known[now] - mean).nan_to_num()
+            logs += torch.where(fixed, sharp * (off.cos() - 1) - special.i0e(sharp).log(), 0.0)
+            angle[rows, now] = torch.where(fixed, mean + off, mean + noise[rows, now])
+        return angle / (2 * math.pi), logs
 
     @classmethod
     def joined(cls, components: Sequence[Any], weights: Tensor) -> Self:
@@ -160,11 +190,24 @@ class VonMisesChains(Density, kind="chains"):
             closed &= place[:, given].amax(dim=1) < first
         if hidden:
             closed &= place[:, hidden].amin(dim=1) > last
-        parts: list[tuple[float, Density]] = []
+        parts: list[Weighted] = []
         for log, chains in self._some(closed):
             evidence, some = chains._closed(split, space)
             parts.append((log + evidence, some))
-        return Restriction(parts, [*self._some(~closed)])
+        return Restriction(parts, [(log, some, split) for log, some in self._some(~closed)])
+
+    def approximated(
+        self, split: Split, space: Torus, level: int, tick: Callable[[], None]
+    ) -> list[Weighted]:
+        from orbiflow.density.models.chain_tables import chain_tables
+        from orbiflow.density.models.lattice import lattice_kernels
+
+        log_scale, tables = chain_tables(self, split, 8 * 4**level, level, tick)
+        found: list[Weighted] = []
+        for table in tables:
+            log, kernels = lattice_kernels(table, space)
+            found.append((log_scale + log, kernels))
+        return found
 
     def _some(self, chosen: Tensor) -> list[tuple[float, VonMisesChains]]:
         """Return the chains of a mask (K,), with the logarithm of their weight, if they have any."""
@@ -201,6 +244,17 @@ class VonMisesChains(Density, kind="chains"):
 
     def header(self) -> dict[str, Any]:
         return {"components": len(self.concentrations), "scales": list(SCALES)}
+
+
+class Factor(NamedTuple):
+    """An angle given others, its parents: a mixture over all of them, divided by that of the parents.
+
+    - `axes`: The numbers of the parents, and of the angle, last.
+    - `chains`: The mixture, on the torus of those angles, in this order.
+    """
+
+    axes: tuple[int, ...]
+    chains: VonMisesChains
 
 
 def chained(order: Tensor) -> Tensor:

@@ -24,6 +24,12 @@ if TYPE_CHECKING:
     from orbiflow.density.models.flow import FlowDensity
     from orbiflow.density.models.kernels import AdaptiveKernels
 
+LEVELS = 4
+"""Levels of accuracy of kernels that stand for a density; each has a quarter of the error or less."""
+
+FIRST_GRID, GRID_BLOCK = {1: 256, 2: 48}, 2**12
+"""Points along an angle at first, by the number of angles, and points evaluated at a time."""
+
 BLOCK = 2**17
 """Points evaluated by a thread at a time where no gradient is asked for: bounds the memory."""
 
@@ -138,7 +144,7 @@ class Density(Distribution):
         del resolution
         return 1.0
 
-    # Marginal and conditional densities on tori: see orbiflow.density.conditionals.
+    # Marginal and conditional densities on tori: see orbiflow.density.inference.
 
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
         """Return log densities (N,) of some angles alone, at points (N, len(axes)) of these in turns.
@@ -150,13 +156,49 @@ class Density(Distribution):
 
     def restricted(self, split: Split, space: Torus) -> Restriction:
         """Return the density of the angles kept, given others, as far as there is a closed form."""
-        del split, space
-        return Restriction([], [(0.0, self)])
+        del space
+        return Restriction([], [(0.0, self, split)])
 
-    def is_costly(self, split: Split) -> bool:
-        """Return whether each value of the density of the angles kept takes an integral of its own."""
-        del split
-        return False
+    def approximated(
+        self, split: Split, space: Torus, level: int, tick: Callable[[], None]
+    ) -> list[Weighted]:
+        """Return kernels that together stand for the density of the angles kept and those given.
+
+        One or two angles are kept. Each level, from 0 to `LEVELS` - 1, is finer than the one before
+        it, so that their difference tells the error. `tick` is called now and then.
+        """
+        from orbiflow.density.models.lattice import lattice_kernels
+
+        count = FIRST_GRID[space.dim] * 2**level
+        line = (torch.arange(count, dtype=torch.float64)) / count
+        grid = torch.cartesian_prod(*[line] * space.dim).reshape(-1, space.dim)
+        values = grid.new_tensor(split.values)
+        parts: list[Tensor] = []
+        for block in torch.split(grid, GRID_BLOCK):
+            tick()
+            whole = torch.cat([block, values.expand(len(block), -1)], dim=1)
+            parts.append(self.log_marginal(whole, list(split.observed), level))
+        logs = torch.cat(parts)
+        log, kernels = lattice_kernels(
+            (logs - logs.max()).exp().reshape([count] * space.dim), space
+        )
+        return [(float(logs.max()) + log, kernels)]
+
+    def draw_given(
+        self, count: int, given: Mapping[int, float], generator: torch.Generator
+    ) -> tuple[Tensor, Tensor]:
+        """Return points (count, d) at given angles, and the logarithms (count,) of their weights.
+
+        The mean of the weights is the density of what is given.
+        """
+        del count, given, generator
+        raise OrbiflowError(
+            f"a {type(self).__name__} cannot be sampled where some angles are given"
+        )
+
+    def effective_share(self) -> float:
+        """Return how many weighed draws count, as a share, where samples are chosen among such."""
+        return 1.0
 
     # Saving and loading: see orbiflow.density.models.files.
 
@@ -337,16 +379,21 @@ class Split:
         return (*self.kept, *self.given)
 
 
+Weighted = tuple[float, Density]
+"""A density with the logarithm of its weight."""
+
+
 class Restriction(NamedTuple):
     """A density of some angles, given others, as far as there is a closed form.
 
     - `closed`: Densities of the angles kept, each with the logarithm of its weight; what is given
       makes these weights, whose sum is the density of what is given.
-    - `left`: Densities of all angles that have no closed form, with the logarithms of their weights.
+    - `left`: Densities of all angles that have no closed form, with the logarithms of their weights,
+      and how their own angles are split.
     """
 
-    closed: list[tuple[float, Density]]
-    left: list[tuple[float, Density]]
+    closed: list[Weighted]
+    left: list[tuple[float, Density, Split]]
 
 
 def in_blocks(function: Callable[[Tensor], Tensor], points: Tensor, size: int) -> Tensor:

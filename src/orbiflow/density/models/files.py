@@ -82,7 +82,7 @@ def read_density(path: str | Path) -> tuple[Density, dict[str, Any]]:
 
 
 def _restored(header: dict[str, Any], tensors: dict[str, Tensor]) -> Density:
-    for module in ("mixture", "network"):  # afterwards all kinds are known; they import this file
+    for module in ("mixture", "network", "part"):  # now all kinds are known
         import_module(f"orbiflow.density.models.{module}")
     options = dict(header["space"])
     space = make_space(str(options.pop("name")), **options)
@@ -157,7 +157,8 @@ def density_parts(
             f"the {name} is on {own!r}, the density on {space!r}: make both on one space"
         )
     tensors = {prefix + key: tensor for key, tensor in density.tensors().items()}
-    return {"kind": kind, **density.header()}, tensors
+    error = {"error": density.error} if density.error else {}
+    return {"kind": kind, **error, **density.header()}, tensors
 
 
 def density_from(space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Density:
@@ -167,7 +168,9 @@ def density_from(space: Space, header: Mapping[str, Any], tensors: Mapping[str, 
         raise OrbiflowError(
             f"a density of the kind {kind!r} is not known here: import the module that defines it"
         )
-    return KINDS[kind].from_header(space, header, tensors)
+    made = KINDS[kind].from_header(space, header, tensors)
+    made.error = as_number(header.get("error", 0.0), "error")
+    return made
 
 
 def within(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:

@@ -174,9 +174,6 @@ class FlowDensity(Density, kind="flow"):
                 parts.append(self.log_prob(whole))
         return torch.cat(parts)
 
-    def is_costly(self, split: Split) -> bool:
-        return split.dim > len(split.observed)
-
     def header(self) -> dict[str, Any]:
         return {
             "flow": series_parts(self.flow, self.space)[0],

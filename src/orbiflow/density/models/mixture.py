@@ -139,11 +139,8 @@ class Mixture(Density, kind="mixture"):
         for log, own in self._weighted():
             closed, left = own.restricted(split, space)
             found.closed.extend((log + more, density) for more, density in closed)
-            found.left.extend((log + more, density) for more, density in left)
+            found.left.extend((log + more, part, own_split) for more, part, own_split in left)
         return found
-
-    def is_costly(self, split: Split) -> bool:
-        return any(own.is_costly(split) for own in self.components)
 
     def to(self, *wanted: Any) -> Self:
         new = copy.copy(self)

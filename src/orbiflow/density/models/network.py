@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -11,9 +12,12 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance
-from orbiflow.density.models.chains import BLOCK, SCALES, VonMisesChains, quantiles, waves
-from orbiflow.density.models.density import Density, Split, in_blocks
+from orbiflow.density.models.chains import BLOCK, SCALES, Factor, VonMisesChains, quantiles, waves
+from orbiflow.density.models.density import Density, Split, Weighted, in_blocks
+from orbiflow.density.models.elimination import eliminated, grids_for
 from orbiflow.density.models.files import within
+from orbiflow.density.models.kernels import AdaptiveKernels
+from orbiflow.density.models.lattice import lattice_kernels
 from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
@@ -23,22 +27,14 @@ from orbiflow.typed_torch import broadcast, listed, special, unique
 DRAWS = 4096
 """Quasi-random draws of the hidden angles."""
 
+BANDWIDTH = 0.25
+"""Deviation of kernels about draws, relative to the noise of an angle on which others depend."""
+
 AT_ONCE = 2**17
 """Points times draws worked on at a time."""
 
 ROWS, ENTRIES = 256, 2**18
 """Rows of angles, and terms of a sum, at a time: few enough for the cache."""
-
-
-class Factor(NamedTuple):
-    """An angle given others, its parents: a mixture over all of them, divided by that of the parents.
-
-    - `axes`: The numbers of the parents, and of the angle, last.
-    - `chains`: The mixture, on the torus of those angles, in this order.
-    """
-
-    axes: tuple[int, ...]
-    chains: VonMisesChains
 
 
 class VonMisesNetwork(Density, kind="network"):
@@ -93,10 +89,25 @@ class VonMisesNetwork(Density, kind="network"):
         return torch.stack(logs).sum(dim=0)
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
+        return self.space.project(self._drawn(count, {}, generator).points)
+
+    def draw_given(
+        self, count: int, given: Mapping[int, float], generator: torch.Generator
+    ) -> tuple[Tensor, Tensor]:
+        """Draw each angle given its parents, and weigh by the angles given (Fung and Chang, 1990)."""
+        drawn = self._drawn(count, given, generator)
+        return self.space.project(drawn.points), drawn.logs
+
+    def _drawn(self, count: int, given: Mapping[int, float], generator: torch.Generator) -> _Draws:
         rng = np.random.default_rng(int(torch.randint(2**31, (), generator=generator)))
         points = torch.zeros(count, self.space.dim, dtype=torch.float64)
+        means, sharp, logs = points.clone(), points.clone(), points.new_zeros(count)
         for axes, chains in self.factors:
             own = chains.to("cpu")
+            if axes[-1] in given:
+                points[:, axes[-1]] = given[axes[-1]]
+                logs += in_blocks(partial(log_conditional, own), points[:, list(axes)], BLOCK)
+                continue
             angle = 2 * math.pi * points[:, list(axes)]
             chosen = [angle.new_zeros(0).long()]
             for block in torch.split(points[:, list(axes)], BLOCK):
@@ -108,7 +119,50 @@ class VonMisesNetwork(Density, kind="network"):
             kappa = own.concentrations[component, -1] / torch.tensor(SCALES)[scale]
             drawn = mean + torch.tensor(rng.vonmises(0.0, kappa.numpy()))
             points[:, axes[-1]] = drawn / (2 * math.pi)
-        return self.space.project(points)
+            means[:, axes[-1]], sharp[:, axes[-1]] = mean / (2 * math.pi), kappa
+        return _Draws(points, means, sharp, logs)
+
+    def approximated(
+        self, split: Split, space: Torus, level: int, tick: Callable[[], None]
+    ) -> list[Weighted]:
+        """Eliminate the hidden angles on grids, or draw them where too many depend on each other."""
+        factors = self._leading_to(list(split.observed))
+        grids = grids_for(factors, split, level)
+        if grids is None:
+            return [self._kernels_drawn(factors, split, space, level, tick)]
+        log_scale, table = eliminated(factors, grids, split.kept, tick)
+        log, kernels = lattice_kernels(table, space)
+        return [(log_scale + log, kernels)]
+
+    def _kernels_drawn(
+        self,
+        factors: Sequence[Factor],
+        split: Split,
+        space: Torus,
+        level: int,
+        tick: Callable[[], None],
+    ) -> Weighted:
+        """Return kernels about draws of the angles kept, weighed by those given.
+
+        An angle is its mean given its parents and noise, of which the kernel is a part: all of it if no
+        other angle depends on it. The draw keeps the rest, so that the spread is right.
+        """
+        given = dict(zip(split.given, split.values, strict=True))
+        generator = torch.Generator().manual_seed(level)
+        parts: list[_Draws] = []
+        for _ in range(4**level):
+            tick()
+            parts.append(self._drawn(DRAWS, given, generator))
+        drawn = _Draws(*(torch.cat(column) for column in zip(*parts, strict=True)))
+        parents = {axis for axes, _ in factors for axis in axes[:-1]}
+        share = torch.tensor(
+            [BANDWIDTH if axis in parents else 1.0 for axis in split.kept]
+        ).double()
+        points, means, sharp = (own[:, list(split.kept)] for own in drawn[:3])
+        noise = (points - means + 0.5) % 1 - 0.5
+        centers = means + (1 - share**2).sqrt() * noise
+        own = AdaptiveKernels(space, centers % 1, sharp / share**2, shares_of(drawn.logs))
+        return float(log_sum_exp(drawn.logs)) - math.log(len(points)), own
 
     @property
     def device(self) -> torch.device | None:
@@ -148,14 +202,6 @@ class VonMisesNetwork(Density, kind="network"):
             logs = total + _taken(left, {**known, **at}, even, given)[0]
             found.append(log_sum_exp(logs.expand(len(block), count)) - math.log(count))
         return torch.cat(found)
-
-    def is_costly(self, split: Split) -> bool:
-        """Return whether hidden angles depend on angles that are kept: then each point draws anew."""
-        moving, observed = set(split.kept), list(split.observed)
-        return any(
-            axes[-1] not in observed and moving & set(axes[:-1])
-            for axes, _ in self._leading_to(observed)
-        )
 
     def _leading_to(self, observed: list[int]) -> list[Factor]:
         """Return the factors of the observed angles, and of all from which arrows lead to them."""
@@ -203,6 +249,15 @@ class VonMisesNetwork(Density, kind="network"):
             f"{listed(torch.tensor(axes[:-1]))} -> {axes[-1]}" for axes, _ in self.factors
         )
         return f"VonMisesNetwork({self.space!r}, {arrows})"
+
+
+class _Draws(NamedTuple):
+    """Draws (N, d) in turns, the means and concentrations that they were drawn by, and log weights."""
+
+    points: Tensor
+    means: Tensor
+    kappa: Tensor
+    logs: Tensor
 
 
 def log_conditional(chains: VonMisesChains, points: Tensor) -> Tensor:

@@ -112,10 +112,10 @@ def score_rows(
     These are the weighted mean log density, in nats, of the rows that lack nothing, which rows they are
     in words, and notes.
     """
-    from orbiflow.density import conditionals
+    from orbiflow.density import inference
 
     space, values = density.space, rows.table.values
-    points = conditionals.chart_of_observed(space, values) if may_lack else space.to_chart(values)
+    points = inference.chart_of_observed(space, values) if may_lack else space.to_chart(values)
     known = ~points.isnan()
     whole = known.all(dim=1).numpy()
     name = "log_prob" if whole.all() else "log_prob_marginal"
@@ -146,7 +146,7 @@ def _log_densities(
     import numpy as np
     import torch
 
-    from orbiflow.density import conditionals
+    from orbiflow.density import inference
 
     if settings.table:
         progress(0.0, "making a table")
@@ -157,7 +157,7 @@ def _log_densities(
         )
         log_prob: Callable[..., Tensor] = source.log_prob
     else:
-        log_prob = partial(conditionals.at_observed, density)
+        log_prob = partial(inference.at_observed, density)
     found: list[Array] = []
     end = SCORED if settings.gradient else 1.0
     for start in range(0, len(points), BLOCK):
@@ -259,8 +259,23 @@ def sample(
     return runtime.Outcome({"file": str(out), "rows": settings.count})
 
 
+class PartialSettings(Settings, group="Densities of some angles"):
+    """How well they are found, and what is written of them."""
+
+    accuracy: Annotated[float, Range(1e-6, 0.5)] = 0.01
+    """Error of the log density that is asked for, in nats (root mean square). What has a closed form is
+    exact; the rest takes some seconds at 0.01, and up to a minute at 0.001."""
+
+    sample: Annotated[int | None, Range(1, 1_000_000), DefaultText("none")] = None
+    """Number of samples to write as samples.csv, in the units of the data."""
+
+    seed: Annotated[int, Range(-(2**63), 2**64 - 1), Needs("sample")] = 0
+    """Seed of the samples."""
+
+
 @runtime.operation("density marginal")
 def marginal(
+    settings: PartialSettings = PartialSettings(),
     *,
     model: Model,
     columns: tuple[str, ...],
@@ -281,8 +296,14 @@ def marginal(
     if not columns:
         raise SettingError("{columns} names no column; give names or numbers, as in phi,psi")
 
-    from orbiflow.density import conditionals
-    from orbiflow.density.operations.saved import axes_of, model_at, names_of, write_derived
+    from orbiflow.density import inference
+    from orbiflow.density.operations.saved import (
+        axes_of,
+        in_first_part,
+        model_at,
+        names_of,
+        write_derived,
+    )
 
     runtime.check_output_folder(out, model, what="model")
     with runtime.one_thread():
@@ -290,15 +311,19 @@ def marginal(
         names = names_of(density, extra)
         axes = axes_of(columns, names)
         folder = runtime.ResultFolder(out, written_files)
-        on_event(runtime.Progress(0.0, "integrating"))
-        found = conditionals.marginal(density, axes)
+        progress = runtime.progress_events(on_event, cancel)
+        progress(0.0, "integrating")
+        found = inference.marginal(
+            density, axes, accuracy=settings.accuracy, progress=in_first_part(progress)
+        )
         kept = [names[axis] for axis in axes]
         origin = {"marginal": kept, "model": str(model)}
-        return write_derived(found, kept, origin, folder, on_event, cancel)
+        return write_derived(found, kept, origin, folder, settings, progress, on_event)
 
 
 @runtime.operation("density conditional")
 def conditional(
+    settings: PartialSettings = PartialSettings(),
     *,
     model: Model,
     given: tuple[str, ...],
@@ -322,7 +347,7 @@ def conditional(
         raise SettingError("{given} says nothing; give what is known, as in psi=-45")
     pairs = [_angle(text) for text in given]
 
-    from orbiflow.density import conditionals
+    from orbiflow.density import inference
     from orbiflow.density.operations import saved
 
     runtime.check_output_folder(out, model, what="model")
@@ -331,8 +356,11 @@ def conditional(
         names = saved.names_of(density, extra)
         known, turns, kept = saved.condition_of(density.space, names, pairs, columns, on_event)
         folder = runtime.ResultFolder(out, written_files)
-        on_event(runtime.Progress(0.0, "integrating"))
-        found = conditionals.conditional(density, turns, kept)
+        progress = runtime.progress_events(on_event, cancel)
+        progress(0.0, "integrating")
+        found = inference.conditional(
+            density, turns, kept, accuracy=settings.accuracy, progress=saved.in_first_part(progress)
+        )
         evidence = saved.evidence_of(density, turns)
         rare = "; few data lie there, or none" if evidence < -3 else ""
         words = ", ".join(f"{name} = {value:g}" for name, value in known.items())
@@ -341,7 +369,7 @@ def conditional(
         over_uniform = {"log_density_of_given_over_uniform": evidence}
         origin = {"given": known, **over_uniform, "model": str(model)}
         kept_names = [names[k] for k in kept]
-        return saved.write_derived(found, kept_names, origin, folder, on_event, cancel)
+        return saved.write_derived(found, kept_names, origin, folder, settings, progress, on_event)
 
 
 def _angle(text: str) -> tuple[str, float]:

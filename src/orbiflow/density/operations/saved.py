@@ -10,19 +10,23 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
 
 from orbiflow.arrays import Array
-from orbiflow.density import conditionals, pictures
-from orbiflow.density.models import Density, density_to_bytes, read_density
-from orbiflow.density.run_folder import write_files
+from orbiflow.density import inference, pictures
+from orbiflow.density.fitting import Progress as InProgress
+from orbiflow.density.models import Density, Mixture, density_to_bytes, read_density
+from orbiflow.density.run_folder import SAMPLES, write_files
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.density.tables import Table, TableError, TableSettings, column_names, listing, to_csv
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError, literal
-from orbiflow.runtime import Cancel, Note, Outcome, Progress, ResultFolder, Sink
+from orbiflow.runtime import Note, Outcome, ResultFolder, Sink
+
+if TYPE_CHECKING:
+    from orbiflow.density.operations.queries import PartialSettings
 
 FEW_ROWS = 10
 """Fewer may all be within 2 pi degrees without a word."""
@@ -114,6 +118,9 @@ PICTURE = "density.png"
 ROWS = {1: 720, 2: 120}
 """Rows of the table along an angle, by the number of angles."""
 
+BEFORE_FILES = 0.7
+"""Share of the work that is done when a density is found, and its files are to be made."""
+
 DRAWN = 20_000
 """Samples in the picture of one angle."""
 
@@ -127,7 +134,7 @@ def axes_of(wanted: Sequence[str], names: Sequence[str]) -> list[int]:
     lower = {name.casefold() for name in names}
     numbers = {str(number): number - 1 for number in range(1, len(names) + 1)}
     asked = [one if one.casefold() in lower else numbers.get(one, one) for one in wanted]
-    return conditionals.axes_named(asked, names)
+    return inference.axes_named(asked, names)
 
 
 def condition_of(
@@ -144,7 +151,7 @@ def condition_of(
     """
     axes = axes_of([name for name, _ in pairs], names)
     values = list(zip(axes, (value for _, value in pairs), strict=True))
-    given = conditionals.given_named(space, values, names)
+    given = inference.given_named(space, values, names)
     known = {names[axis]: value for axis, value in values}
     kept = [axis for axis in range(len(names)) if axis not in given]
     if columns is not None:
@@ -165,35 +172,64 @@ def evidence_of(density: Density, given: dict[int, float]) -> float:
     """Return the log density of known angles, in turns, relative to the uniform one."""
     at = [[given.get(axis, math.nan) for axis in range(density.space.dim)]]
     points = torch.tensor(at, dtype=torch.float64)
-    return float(conditionals.log_prob_observed(density, points, measure="uniform"))
+    return float(inference.log_prob_observed(density, points, measure="uniform"))
+
+
+def in_first_part(progress: InProgress) -> InProgress:
+    """Return a function that tells the same progress, as that of the work before files are made."""
+    return lambda share, what: progress(BEFORE_FILES * share, what)
 
 
 def write_derived(
-    density: Density,
+    density: Mixture,
     names: list[str],
     origin: dict[str, Any],
     folder: ResultFolder,
+    settings: PartialSettings,
+    progress: InProgress,
     tell: Sink,
-    cancel: Cancel,
 ) -> Outcome:
     """Write the folder of a density of fewer angles; `origin` says in the report where it is from."""
-    cancel.check()
     space = density.space
     named = {"space": {"name": space.name, **space.settings()}, "columns": names}
     document = {**named, "report": {"error": density.error}, **origin}
+    if settings.sample is not None:
+        document["samples"] = settings.sample
     files: dict[str, str | bytes] = {
         pictures.MODEL: density_to_bytes(density, columns=names),
         pictures.REPORT: json.dumps(document, allow_nan=False, indent=1),
     }
+    if settings.sample is not None:
+        progress(BEFORE_FILES, "drawing samples")
+        drawn = density.sample((settings.sample,), torch.Generator().manual_seed(settings.seed))
+        files[SAMPLES] = to_csv(names, space.from_chart(drawn))
+        for text in _sample_notes(density):
+            tell(Note(text))
     if space.dim in ROWS:
-        tell(Progress(0.5, "drawing"))
+        progress(0.8, "drawing")
         files[pictures.TABLE] = to_csv((*names, "density"), _table(density))
+        progress(0.9, "drawing")
         files[PICTURE] = _picture(density, names)
-    cancel.check()
+    progress(1.0, "writing")
     write_files(folder, files, tell)
+    if density.error > settings.accuracy:
+        tell(Note(f"WARNING: an error of {settings.accuracy:g} nats cannot be had here"))
     tell(Note(_words(density, names, folder.path)))
     summary = {"folder": str(folder.path), "files": list(files), "columns": names}
     return Outcome({**summary, "error": density.error})
+
+
+def _sample_notes(density: Mixture) -> list[str]:
+    """Return of what is drawn with weights how many draws count, in words."""
+    found: list[str] = []
+    for own, weight in zip(density.components, density.weights.tolist(), strict=True):
+        share = own.effective_share()
+        if share < 1:
+            found.append(
+                f"{100 * weight:.1f}% of the samples are chosen among weighed draws, of which "
+                f"{100 * share:.2g}% count (effective sample size)"
+            )
+    return found
 
 
 def _words(density: Density, names: list[str], out: Path) -> str:

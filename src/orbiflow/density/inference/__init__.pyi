@@ -1,0 +1,10 @@
+from .angles import axes_named as axes_named
+from .angles import check_torus as check_torus
+from .angles import given_named as given_named
+from .observed import at_observed as at_observed
+from .observed import chart_of_observed as chart_of_observed
+from .observed import log_prob_observed as log_prob_observed
+from .observed import observed_rows as observed_rows
+from .partial import ACCURACY as ACCURACY
+from .partial import conditional as conditional
+from .partial import marginal as marginal

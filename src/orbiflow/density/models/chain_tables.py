@@ -1,0 +1,240 @@
+"""Mixtures of von Mises chains, seen at some angles: tables of each component about its own place.
+
+A component is sharp and covers little of the circle, so its table is as fine as it is sharp and no
+wider than it reaches. What a component hides is integrated at nodes, which all of its table share.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.models.chains import REACH, SCALES, VonMisesChains, quantiles
+from orbiflow.density.models.density import Split
+from orbiflow.density.models.lattice import KERNEL_STEP, joined_tables, sharpest_on
+from orbiflow.density.models.terms import FAINT
+from orbiflow.typed_torch import broadcast, listed, special, unique
+
+SIZES = (24, 48, 96, 192, 384, 768, 1536, 3072)
+"""Numbers of points of a grid along an angle."""
+
+FINEST = {1: 3072, 2: 768}
+"""The most of them, by the number of angles kept."""
+
+FAINTEST = 25.0
+"""Components whose logarithm is further than this below that of the largest are left out."""
+
+ALONE = 48
+"""The fewest nodes of an angle that is the only one hidden."""
+
+AT_ONCE = 2**18
+"""Entries worked on at a time: few enough for the cache."""
+
+
+WIDE = 8.0
+"""Concentration below which a given angle does not tell how likely a component is."""
+
+
+def chain_tables(
+    chains: VonMisesChains, split: Split, nodes: int, seed: int, tick: Callable[[], None]
+) -> tuple[float, list[Tensor]]:
+    """Return tables (n,) or (n, n) on even grids whose sum is the density of what is kept and given.
+
+    First comes the logarithm of their scale. `nodes` are those of the hidden angles.
+    """
+    scale = torch.tensor(SCALES, dtype=torch.float64)
+    kappa = (chains.concentrations[:, None] / scale[:, None]).flatten(0, 1)
+    means, logs = chains.means.repeat_interleave(len(SCALES), dim=0), chains.log_weights.flatten()
+    orders, number = unique(chains.order, dim=0, return_inverse=True)
+    number = number.repeat_interleave(len(SCALES))
+    walks: list[_Walk] = []
+    for k, order in enumerate(listed(orders)):
+        last = max(order.index(axis) for axis in split.observed)
+        own = number == k
+        walks.append(_Walk(order[: last + 1], split, logs[own], means[own], kappa[own]))
+    top = max(float(walk.likely.max()) for walk in walks)
+    tables: dict[tuple[int, ...], Tensor] = {}
+    for walk in walks:
+        tick()
+        walk.add_to(tables, top, nodes, seed)
+    return top, joined_tables(tables.values())
+
+
+class _Walk:
+    """Components (C,) of one order, walked from the first angle to the last that is observed.
+
+    To first order an angle is the sum of its own noise and that of the angles before it.
+
+    - `middle`, `reach`: The angles (C, d) where all noise is 0, and how far they reach from there.
+    - `likely`: The logarithm (C,) of weight times the density of what is given, roughly.
+    - `wanted`: Sizes (C, K) of grids that resolve the angles kept.
+    """
+
+    def __init__(
+        self, order: list[int], split: Split, logs: Tensor, means: Tensor, kappa: Tensor
+    ) -> None:
+        self.order, self.split = order, split
+        self.logs, self.means, self.kappa = logs, means, kappa
+        d = split.dim
+        self.hidden = [axis for axis in order if axis not in split.observed]
+        given = dict(zip(split.given, split.values, strict=True))
+        self.middle = means[:, :, 0].clone()
+        noise = torch.diag_embed(
+            kappa.clamp_min(1e-12).rsqrt()
+        )  # (C, d, d): of each angle, from each
+        bend = torch.zeros_like(kappa)
+        self.reach = torch.zeros_like(kappa)
+        self.likely = logs.clone()
+        for place, axis in enumerate(order):
+            for j in order[:place]:
+                sin, cos = means[:, axis, 1 + j], means[:, axis, 1 + d + j]
+                at = self.middle[:, j]
+                slope, most = sin * at.cos() - cos * at.sin(), torch.hypot(sin, cos)
+                self.middle[:, axis] += sin * at.sin() + cos * at.cos()
+                noise[:, axis] += slope[:, None] * noise[:, j]
+                curved = slope.abs() * bend[:, j] + most * (self.reach[:, j] / 2) ** 2 / 2
+                bend[:, axis] += torch.minimum(curved, 2 * most)
+            self.reach[:, axis] = REACH * noise[:, axis].square().sum(dim=1).sqrt() + bend[:, axis]
+            if axis in given:
+                at = torch.tensor(2 * math.pi * given[axis], dtype=torch.float64)
+                rough = 1 / (
+                    noise[:, axis].square().sum(dim=1) + bend[:, axis].square() + 1 / WIDE**2
+                )
+                self.likely += rough * ((at - self.middle[:, axis]).cos() - 1) + rough.log() / 2
+                self.middle[:, axis] = at
+                noise[:, axis], bend[:, axis], self.reach[:, axis] = 0, 0, 0
+        sharp = kappa.clone()
+        for axis in split.observed:
+            for j in split.kept:
+                slope = means[:, axis, 1 + j].square() + means[:, axis, 1 + d + j].square()
+                sharp[:, j] += kappa[:, axis] * slope
+        self.kappa = kappa.clone()
+        count = (2 * math.pi / KERNEL_STEP * sharp[:, list(split.kept)].sqrt()).contiguous()
+        sizes = torch.tensor([size for size in SIZES if size <= FINEST[len(split.kept)]])
+        self.wanted = sizes[torch.searchsorted(sizes, count).clamp_max(len(sizes) - 1)]
+
+    def add_to(
+        self, tables: dict[tuple[int, ...], Tensor], top: float, nodes: int, seed: int
+    ) -> None:
+        """Add the components' densities, relative to exp(top), to tables of their sizes."""
+        likely = torch.nonzero(self.likely > top - FAINTEST)[:, 0]
+        sizes, number = unique(self.wanted[likely], dim=0, return_inverse=True)
+        for k, size in enumerate(listed(sizes)):
+            table = tables.setdefault(tuple(size), torch.zeros(*size, dtype=torch.float64))
+            self._add(table, likely[number == k], top, nodes, seed)
+
+    def _add(self, table: Tensor, chosen: Tensor, top: float, nodes: int, seed: int) -> None:
+        kept, sizes = list(self.split.kept), torch.tensor(table.shape)
+        reach = (self.reach[chosen][:, kept] / (2 * math.pi) * sizes).ceil().long().amax(dim=0) + 1
+        widths = torch.minimum(2 * reach + 1, sizes)
+        middle = (self.middle[chosen][:, kept] / (2 * math.pi) * sizes).round().long()
+        count = (1, max(nodes, ALONE))[len(self.hidden)] if len(self.hidden) < 2 else nodes
+        block = max(1, AT_ONCE // (count * int(widths.prod())))
+        for some, at in zip(torch.split(chosen, block), torch.split(middle, block), strict=True):
+            places = [
+                (at[:, i, None] - width // 2 + torch.arange(width)) % size
+                for i, (width, size) in enumerate(zip(listed(widths), table.shape, strict=True))
+            ]
+            angles = [
+                2 * math.pi * p.double() / size for p, size in zip(places, table.shape, strict=True)
+            ]
+            values = self._values(some, angles, top, self._nodes(some, count, seed), table.shape)
+            flat = (
+                places[0]
+                if len(places) == 1
+                else (places[0][:, :, None] * table.shape[1] + places[1][:, None])
+            )
+            table.view(-1).index_add_(0, flat.flatten(), values.flatten())
+
+    def _nodes(self, rows: Tensor, count: int, seed: int) -> dict[int, tuple[Tensor, Tensor]]:
+        """Return offsets (C, Q) of each hidden angle from its mean, and logarithms of their weights.
+
+        They spread as the angle does, the angles kept before it being free.
+        """
+        found: dict[int, tuple[Tensor, Tensor]] = {}
+        d = self.split.dim
+        if not self.hidden:
+            return found
+        engine = torch.quasirandom.SobolEngine(len(self.hidden), scramble=True, seed=seed)
+        even = engine.draw(count, dtype=torch.float64)
+        for i, axis in enumerate(self.hidden):
+            spread = 1 / self.kappa[rows, axis].clamp_min(1e-12)
+            for j in self.split.kept:
+                most = self.means[rows, axis, 1 + j].square()
+                most = most + self.means[rows, axis, 1 + d + j].square()
+                spread = spread + most * (self.reach[rows, j] / REACH).clamp_max(1).square()
+            kappa = 1 / spread[:, None]
+            if len(self.hidden) == 1:
+                reach = (REACH * spread.sqrt()).clamp_max(math.pi)[:, None]
+                offset = reach * ((2 * torch.arange(count) + 1) / count - 1)
+                logs = (reach / (math.pi * count)).log().expand(-1, count)
+            else:
+                offset = quantiles(kappa[:, 0], even[:, i])
+                logs = -(_bump(kappa, offset) + math.log(count) * (i == 0))
+            found[axis] = offset, logs
+        return found
+
+    def _values(
+        self,
+        rows: Tensor,
+        angles: list[Tensor],
+        top: float,
+        nodes: dict[int, tuple[Tensor, Tensor]],
+        shape: tuple[int, ...],
+    ) -> Tensor:
+        """Return the densities (C, A) or (C, A, B), relative to exp(top), of components at angles."""
+        kept, given = self.split.kept, dict(zip(self.split.given, self.split.values, strict=True))
+        first_last = sorted(kept, key=self.order.index)
+        middle = self.middle[rows]
+        total = (self.logs[rows] - top)[:, None, None, None]
+        # sines and cosines over components, nodes and grids; of those kept also at their middle
+        seen, rough = dict[int, tuple[Tensor, Tensor]](), dict[int, tuple[Tensor, Tensor]]()
+        for axis in self.order:
+            kappa = self.kappa[rows, axis, None, None, None]
+            if axis in kept:
+                kappa = kappa.clamp_max(sharpest_on(shape[kept.index(axis)]))
+                at = angles[kept.index(axis)]
+                mean = self._mean(rows, axis, seen)
+                if axis == first_last[-1]:
+                    images = torch.stack([at.cos(), at.sin(), torch.ones_like(at)], dim=1)
+                    total = total - kappa - special.i0e(kappa).log()
+                    linear = [kappa * mean.cos(), kappa * mean.sin(), total]
+                    table = torch.stack(broadcast(*linear), dim=-1)[:, :, :, 0]
+                    total = (table.flatten(1, 2) @ images).reshape(*table.shape[:3], -1)
+                    at = at[:, None, None]
+                else:
+                    at = at[:, None, :, None]
+                    total = total + _bump(kappa, at - mean)
+                seen[axis] = at.sin(), at.cos()
+                own = middle[:, axis, None, None, None]
+                rough[axis] = own.sin(), own.cos()
+                continue
+            mean = self._mean(rows, axis, seen)
+            if axis in given:
+                at = torch.full((1, 1, 1, 1), 2 * math.pi * given[axis], dtype=torch.float64)
+            else:
+                offset, logs = (value[:, :, None, None] for value in nodes[axis])
+                at = self._mean(rows, axis, rough) + offset
+                total = total + logs
+            total = total + _bump(kappa, at - mean)
+            seen[axis] = rough[axis] = at.sin(), at.cos()
+        values = total.clamp_min_(FAINT).exp_().sum(dim=1)
+        if len(kept) == 1:
+            return values[:, 0]
+        return values if first_last[0] == kept[0] else values.mT
+
+    def _mean(self, rows: Tensor, axis: int, seen: dict[int, tuple[Tensor, Tensor]]) -> Tensor:
+        """Return the mean of an angle given those before it, whose sines and cosines are seen."""
+        own = self.means[rows, axis][:, :, None, None, None]
+        mean = own[:, 0]
+        for j, (sin, cos) in seen.items():
+            mean = mean + own[:, 1 + j] * sin + own[:, 1 + self.split.dim + j] * cos
+        return mean
+
+
+def _bump(kappa: Tensor, angle: Tensor) -> Tensor:
+    """Return the logarithm of a von Mises density relative to the uniform one."""
+    return kappa * (angle.cos() - 1) - special.i0e(kappa).log()

@@ -1,0 +1,74 @@
+"""Von Mises kernels on an even grid that stand for a smooth function of one or two angles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import torch
+from torch import Tensor
+
+from orbiflow.density.models.kernels import AdaptiveKernels
+from orbiflow.density.spaces import Torus
+from orbiflow.typed_torch import fft, special
+
+KERNEL_STEP = 0.75
+"""Deviations of the sharpest bumps of a function between two points of a grid that resolves it."""
+
+DROPPED = 1e-7
+"""The weight that the lightest kernels may have together, to be left out."""
+
+
+def sharpest_on(count: int, step: float = KERNEL_STEP) -> float:
+    """Return the largest concentration that `count` points on a circle resolve."""
+    return (count * step / (2 * math.pi)) ** 2
+
+
+def lattice_kernels(values: Tensor, space: Torus) -> tuple[float, AdaptiveKernels]:
+    """Return kernels through values (n,) or (n, m) on an even grid that begins at 0.
+
+    The logarithm of the values' mean comes first. Kernels whose deviation is one step interpolate what
+    is smooth over a few steps nearly to rounding: their weights are one deconvolution by Fourier
+    transform.
+    """
+    spectrum = fft.fftn(values)
+    lines: list[Tensor] = []
+    kappas: list[float] = []
+    for axis, count in enumerate(values.shape):
+        line = torch.arange(count, dtype=torch.float64) / count
+        kappa = sharpest_on(count, 1.0)
+        scaled = special.i0e(torch.tensor(kappa, dtype=torch.float64))
+        kernel = (kappa * ((2 * math.pi * line).cos() - 1)).exp() / scaled
+        shape = [-1 if i == axis else 1 for i in range(space.dim)]
+        spectrum = spectrum / fft.fft(kernel).real.reshape(shape)
+        lines.append(line)
+        kappas.append(kappa)
+    weights = fft.ifftn(spectrum).real.flatten().clamp_min(0)
+    weights = weights / weights.sum()
+    ordered, order = weights.sort()
+    kept = order[ordered.cumsum(0) >= DROPPED].sort().values
+    grid = torch.cartesian_prod(*lines).reshape(-1, space.dim)[kept]
+    concentrations = torch.tensor(kappas, dtype=torch.float64).expand(len(kept), -1)
+    own = AdaptiveKernels(space, grid, concentrations, weights[kept] / weights[kept].sum())
+    return math.log(float(values.mean())), own
+
+
+def joined_tables(tables: Iterable[Tensor]) -> list[Tensor]:
+    """Return sums of periodic tables whose finest sides are equal, all sides as fine as those."""
+    found: dict[int, Tensor] = {}
+    for table in tables:
+        size = max(table.shape)
+        fine = _on_finer_grid(table, size)
+        found[size] = found[size] + fine if size in found else fine
+    return [*found.values()]
+
+
+def _on_finer_grid(values: Tensor, size: int) -> Tensor:
+    """Return a periodic function on a grid with `size` points a side, by its waves."""
+    spectrum: Tensor = fft.fftn(values)
+    for axis, count in enumerate(values.shape):
+        low, high = torch.split(spectrum, [count - count // 2, count // 2], dim=axis)
+        shape = list(low.shape)
+        shape[axis] = size - count
+        spectrum = torch.cat([low, low.new_zeros(shape), high], dim=axis) * (size / count)
+    return fft.ifftn(spectrum).real.clamp_min(0)
