@@ -20,6 +20,7 @@ lint: $(VENV)/.installed-dev
 
 bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/field.py --quick
+	$(BIN)/python benchmarks/space_groups.py --quick
 	$(BIN)/python benchmarks/nine_classes.py --quick
 	$(BIN)/python benchmarks/tilings.py --quick
 	$(BIN)/python benchmarks/export.py --quick

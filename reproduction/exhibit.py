@@ -34,10 +34,10 @@ class Extent(NamedTuple):
 
 # everything, in about ten minutes on two cores
 FULL = Extent()
-# A preview of a minute: every exhibit, with less work in each
+# A preview of two minutes: every exhibit, with less work in each
 FAST = Extent(
     name="fast", frequencies=(0, 2, 5), affine=30, iterations=30, effort="fast", classes=("IH6",),
-    points=2_048, evaluations=24, grid=100, resolution=100,
+    points=16_384, evaluations=24, grid=100, resolution=100,
 )  # fmt: skip
 
 

@@ -61,7 +61,8 @@ def test_directions_and_axes(space: str, tmp_path: Path, orbiflow) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--space", "klein-bottle"), "with --space torus"),
+        (("--space", "klein-bottle"), "--space must be torus, sphere or projective-plane"),
+        (("--space", "hypersphere"), "no summary of points of the hypersphere"),
         (("--space", "sphere", "--picture", "a.png"), "--picture is for angles on a torus"),
         (("--space", "sphere", "--missing", "marginalise"), "use --missing drop"),
         (("--space", "torus", "--out", "a.txt"), "--out must be a file that ends in .json or .csv"),

@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 import pytest
+import shapely
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -18,19 +19,25 @@ from torch import Tensor
 from orbiflow.density import (
     AdaptiveKernels,
     DensityEstimator,
+    DensityLevels,
     FlowDensity,
     Mixture,
+    PlotSettings,
     QuotientSpace,
     Space,
     TabulatedDensity,
     UniformDensity,
     VonMisesDensity,
+    density_thumbnail,
     density_to_bytes,
     log_density_gradient,
     make_space,
     midpoints,
+    outlines,
+    plot_density,
     read_density,
 )
+from orbiflow.density.pictures.cell import Cell
 from orbiflow.errors import GroupError, OrbiflowError
 from orbiflow.fields import FourierField, SplineField, has_even_grid
 from orbiflow.flows import Flow
@@ -298,10 +305,7 @@ def test_what_is_refused() -> None:
         (lambda: QuotientSpace(wallpaper_group("p4"), cell=(1, 1)), "a cell is for a group"),
         (lambda: QuotientSpace({"lattice": [[1.0]]}), "numbers are missing or invalid"),
         (lambda: QuotientSpace("p4").to_chart([[1.0, 2.0, 3.0]]), "points of 2 coordinates"),
-        (
-            lambda: TabulatedDensity(UniformDensity(QuotientSpace("p4")), 16),
-            "with a canonical square",
-        ),
+        (lambda: TabulatedDensity(UniformDensity(QuotientSpace("p4")), 16), "square"),
         (lambda: make_space("quotient"), "group"),
         (lambda: DensityEstimator("quotient").fit(np.zeros((20, 2))), "needs its group"),
     ):
@@ -309,3 +313,28 @@ def test_what_is_refused() -> None:
             make()
     with pytest.raises(GroupError):
         flat_manifold("bottle")
+
+
+def test_a_plane_orbifold_is_drawn_in_the_units_of_its_data(tmp_path: Path) -> None:
+    space = QuotientSpace("p31m", cell=(20.0, 20.0))
+    density = Mixture([some_kernels(space), UniformDensity(space)], [0.7, 0.3])
+    cell = Cell(space, PlotSettings())
+    ring = cell.domain.corners()
+    x, y = ring.T
+    area = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
+    assert area == pytest.approx(space.volume)
+    dots = cell.places(points_of(space, 0, 50))
+    assert shapely.Polygon(ring).buffer(1e-9).contains(shapely.MultiPoint(dots))
+    colouring = cell.colouring(density, PlotSettings())
+    assert colouring.extent == pytest.approx((cell.low[0], cell.high[0], cell.low[1], cell.high[1]))
+    drawn = plot_density(density, tmp_path / "p31m", PlotSettings(width=85.0))
+    assert [path.name for path in drawn.files] == ["density.pdf"]
+    assert density_thumbnail(density, np.zeros((0, 2))).startswith(b"\x89PNG")
+    levels = DensityLevels(density, samples=1000)
+    assert 0.4 < levels.highest(0.5).held < 0.6
+    solid = UniformDensity(QuotientSpace("hantzsche-wendt"))
+    assert density_thumbnail(solid, np.zeros((0, 3))).startswith(b"\x89PNG")
+    with pytest.raises(OrbiflowError, match="other pictures in two dimensions"):
+        plot_density(solid, tmp_path / "solid")
+    with pytest.raises(OrbiflowError, match="drawn in two dimensions"):
+        outlines(levels, [levels.highest(0.5)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any, cast
 
@@ -222,6 +223,47 @@ def test_what_is_saved_comes_back(space: UnitVectorSpace, tmp_path: Path) -> Non
     assert space != type(space)(**{**space.settings(), **_other(space)})
 
 
+class HalfTurns(UnitVectorSpace):
+    """The sphere modulo half turns about its axis."""
+
+    name, columns = "half-turns", ("x", "y", "z")
+
+    def __init__(self) -> None:
+        super().__init__(np.stack([np.eye(3), np.diag([-1.0, -1.0, 1.0])]))
+
+    @classmethod
+    def for_data(cls, data: np.ndarray, *, unit: str = "radians", seed: int = 0) -> HalfTurns:
+        del data, unit, seed
+        return cls()
+
+    def settings(self) -> dict[str, Any]:
+        return {}
+
+
+def test_the_quotient_by_a_group_of_ones_own_is_fitted_and_saved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    quick_search(monkeypatch)
+    truth, path = kernels(HalfTurns(), 1), tmp_path / "density.safetensors"
+    data = truth.sample(60, source(0)).numpy()
+    fit = DensityEstimator("half-turns", components="mixture").fit(data)
+    scores = fit.score_samples(data)
+    assert fit.score_samples(data * [-1, -1, 1]) == pytest.approx(scores)
+    path.write_bytes(density_to_bytes(fit.density_))
+    again = DensityEstimator.fitted(read_density(path)[0])
+    assert isinstance(again.space_, HalfTurns)
+    assert (again.score_samples(data) == scores).all()
+
+
+def test_the_example_of_the_page_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    quick_search(monkeypatch)
+    page = (Path(__file__).parents[2] / "docs" / "densities.md").read_text(encoding="utf-8")
+    (snippet,) = re.findall(r"```python\n([^`]*RotationSpace[^`]*)```", page)
+    names: dict[str, Any] = {}
+    exec(compile(snippet, "densities.md", "exec"), names)
+    assert names["texture"].space_.symmetry == "D2"
+
+
 def _other(space: Space) -> dict[str, object]:
     return {"dim": 5} if isinstance(space, Hypersphere) else {"symmetry": "T"}
 
@@ -366,5 +408,7 @@ def test_the_commands_fit_score_sample_and_find_regions_of_rotations(
         more = {"columns": ("rx",)} if name == "marginal" else {}
         with pytest.raises(OrbiflowError, match=message):
             find(f"density {name}").call({"model": folder, "out": tmp_path / name, **more}).run()
+    with pytest.raises(OrbiflowError, match="not of points of a rotation-space"):
+        run("summary", data=table, space="rotation-space")
     with pytest.raises(OrbiflowError, match="GeoJSON is for places on a globe"):
         run("region", model=folder, out=tmp_path / "regions.geojson")

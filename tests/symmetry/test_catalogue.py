@@ -119,6 +119,34 @@ def test_lattices_that_are_none_are_refused(lattice):
         wallpaper_group("p2", lattice)
 
 
+ORBIFOLDS = {
+    **{"o": "p1", "2222": "p2", "**": "pm", "××": "pg", "*×": "cm", "*2222": "pmm", "22*": "pmg"},
+    **{"22×": "pgg", "2*22": "cmm", "442": "p4", "*442": "p4m", "4*2": "p4g", "333": "p3"},
+    **{"*333": "p3m1", "3*3": "p31m", "632": "p6", "*632": "p6m"},
+}
+
+
+@pytest.mark.parametrize("symbol", ORBIFOLDS)
+def test_orbifolds_have_the_cones_corners_and_mirrors_of_their_symbols(symbol):
+    group = wallpaper_group(symbol)
+    assert group.name == ORBIFOLDS[symbol]
+    # Conway's count: what the features cost is 2, less the Euler characteristic 0
+    cones, _, corners = symbol.partition("*")
+    cost = sum((int(n) - 1) / int(n) for n in cones if n.isdigit())
+    cost += sum((int(n) - 1) / (2 * int(n)) for n in corners if n.isdigit())
+    assert cost + symbol.count("*") + symbol.count("×") + 2 * symbol.count("o") == 2
+    assert mirror_exists(group) == ("*" in symbol)
+    assert (group.order > 1 and max(map(int, filter(str.isdigit, symbol)), default=1)) == (
+        group.order > 1 and POINT_GROUPS[group.name][0]
+    )
+
+
+def test_full_symbols_name_the_same_groups():
+    full = {"p211": "p2", "p1g1": "pg", "c1m1": "cm", "p2gg": "pgg", "c2mm": "cmm", "p4gm": "p4g"}
+    full |= {"p1m1": "pm", "p2mm": "pmm", "p2mg": "pmg", "p4mm": "p4m", "p6mm": "p6m"}
+    assert all(wallpaper_group(symbol).name == name for symbol, name in full.items())
+
+
 def test_unknown_names_are_refused_with_the_known_ones():
     with pytest.raises(GroupError, match="unknown wallpaper group 'p5'; the 17 are p1, "):
         wallpaper_group("p5")

@@ -26,7 +26,7 @@ from orbiflow.typed_torch import applied, linalg
 # the size of the working arrays for one block of points; 1 to 3 MiB measured fastest
 BLOCK_BYTES = 2**21
 # of the grid on which a Jacobian is bounded: the points of the shortest wave, and the most values
-POINTS_PER_WAVE, MAX_GRID_VALUES = 8, 2**18
+POINTS_PER_WAVE, MAX_GRID_VALUES = 8, 2**20
 
 
 def trigonometric_table(u: Tensor, order: int, out: Tensor) -> Tensor:

@@ -164,9 +164,9 @@ def symmetrize(
 
     Raises:
         OrbiflowError: if `field` is no function or `group` no group, or none that is periodic along
-            these axes alone (`lattice_along`); for a field that gives anything
-            but one vector for each point, or cannot take the points, which it is tried on at once
-            and checked for at each call; when called, for points of another dimension.
+            these axes alone (`lattice_along`); for a field that gives anything but one vector for each
+            point, or cannot take the points, which it is tried on at once and checked for at each
+            call; when called, for points of another dimension.
 
     >>> import torch
     >>> from orbiflow.symmetry import wallpaper_group
@@ -214,11 +214,12 @@ def _translates(lattice: ArrayLike, points: Tensor) -> tuple[Tensor, Tensor]:
     """Return u - n for the 2^r corners n of the cell, fractional (2^r, ..., r), and as points."""
     basis = torch.as_tensor(np.array(lattice), dtype=points.dtype, device=points.device)
     u = points @ _inverse(lattice, points).mT
-    across = points - u @ basis.mT if basis.shape[0] > basis.shape[1] else 0.0
+    across = points - u @ basis.mT
     u = u - u.detach().floor()
     corners = itertools.product((0.0, 1.0), repeat=basis.shape[1])
     shifted = torch.stack([u - u.new_tensor(corner) for corner in corners])
-    return shifted, shifted @ basis.mT + across
+    at = shifted @ basis.mT
+    return shifted, at + across if basis.shape[0] > basis.shape[1] else at
 
 
 def _inverse(lattice: ArrayLike, like: Tensor) -> Tensor:

@@ -60,16 +60,26 @@ WALLPAPER_GROUPS: dict[str, WallpaperGroup] = {
 }
 """Generators after International Tables for Crystallography, volume A, plane groups."""
 
+_OTHER_SYMBOLS = {
+    **{"o": "p1", "2222": "p2", "**": "pm", "xx": "pg", "*x": "cm", "*2222": "pmm", "22*": "pmg"},
+    **{"22x": "pgg", "2*22": "cmm", "442": "p4", "*442": "p4m", "4*2": "p4g", "333": "p3"},
+    **{"*333": "p3m1", "3*3": "p31m", "632": "p6", "*632": "p6m", "p211": "p2", "p1m1": "pm"},
+    **{"p1g1": "pg", "c1m1": "cm", "p2mm": "pmm", "p2mg": "pmg", "p2gg": "pgg", "c2mm": "cmm"},
+    **{"p4mm": "p4m", "p4gm": "p4g", "p6mm": "p6m"},
+}
+
 
 def wallpaper_group(name: str, lattice: ArrayLike | None = None) -> CrystallographicGroup:
     """Return the wallpaper group `name`, one of `WALLPAPER_GROUPS`.
 
+    The full symbol of the IUC ("p2mg") and the orbifold's ("22*") name the same group as the short one.
     The lattice has basis vectors as columns, (2, 2); by default it is one of the group's system.
     Raises `GroupError` for an unknown name, or a lattice that is not of the group's system.
 
     >>> wallpaper_group("p6m").order
     12
     """
+    name = _OTHER_SYMBOLS.get(str(name).replace("×", "x"), name)
     if name not in WALLPAPER_GROUPS:
         raise GroupError(
             f"unknown wallpaper group {name!r}; the 17 are {', '.join(WALLPAPER_GROUPS)}"

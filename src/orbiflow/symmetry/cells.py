@@ -1,18 +1,14 @@
 """Cells: the lengths and angles of a lattice's basis, and the cells that operators fit."""
 
 import itertools
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from orbiflow.arguments import as_array, refusal
 from orbiflow.arrays import Array
-from orbiflow.errors import GroupError, LatticeMismatchError
+from orbiflow.errors import GroupError
 from orbiflow.symmetry.group import checked_lattice
-
-_WANTED = "a, b, c and alpha, beta, gamma in degrees, three lengths alone, or a (3, 3) lattice"
-_TYPICAL = (1.0, 1.1, 1.3, 80.0, 100.0, 95.0)  # without symmetry; all default cells come from it
 
 
 def cell_lattice(cell: ArrayLike) -> Array:
@@ -24,11 +20,12 @@ def cell_lattice(cell: ArrayLike) -> Array:
     >>> cell_lattice((2, 2, 3, 90, 90, 120)).round(3).tolist()
     [[2.0, -1.0, 0.0], [0.0, 1.732, 0.0], [0.0, 0.0, 3.0]]
     """
-    if np.shape(cell) == (3, 3):
+    shape = np.shape(cell)
+    if shape == (3, 3):
         return checked_lattice(as_array(cell, "cell", (3, 3)))
-    if np.shape(cell) not in ((3,), (6,)):
-        raise refusal("cell", _WANTED, cell)
-    lengths, angles = (*as_array(cell, "cell", np.shape(cell)).reshape(-1, 3), np.full(3, 90.0))[:2]
+    if shape not in ((3,), (6,)):
+        raise refusal("cell", "a, b, c, alpha, beta, gamma in degrees, or a (3, 3) lattice", cell)
+    lengths, angles = (*as_array(cell, "cell", shape).reshape(-1, 3), np.full(3, 90.0))[:2]
     if lengths.min() <= 0:
         raise refusal("cell", "three lengths above 0, and angles", f"{lengths.tolist()}")
     cosines = np.cos(np.radians(angles))
@@ -42,9 +39,9 @@ def cell_lattice(cell: ArrayLike) -> Array:
 
 
 def cell_parameters(lattice: Array) -> tuple[float, ...]:
-    """Return the lengths of basis vectors and, in degrees, their angles.
+    """Return the lengths of basis vectors, a, b, c, and the angles alpha, beta, gamma in degrees.
 
-    They are a, b, c, alpha, beta, gamma in three dimensions and a, b, gamma in two.
+    Of a plane lattice they are a, b and gamma.
     """
     lengths = np.linalg.norm(lattice, axis=0)
     cosines = lattice.T @ lattice / np.outer(lengths, lengths)
@@ -52,10 +49,10 @@ def cell_parameters(lattice: Array) -> tuple[float, ...]:
     return (*lengths.tolist(), *(float(np.degrees(np.arccos(cosines[p]))) for p in pairs))
 
 
-def _fitting(linear: Array, lattice: Array) -> tuple[float, ...] | None:
+def fitting_cell(linear: Array, lattice: Array) -> tuple[float, ...] | None:
     """Return the parameters of the cell nearest to `lattice` that operators map to itself.
 
-    Its metric is the mean over the group of their matrices (n, d, d); None if they make no finite one.
+    Its metric is the mean over the group of their matrices (n, d, d); None if that is not finite.
     """
     before, metric = 0.0, lattice.T @ lattice
     for _ in range(64):  # generators are enough: repeated, their mean comes to that over the group
@@ -64,30 +61,3 @@ def _fitting(linear: Array, lattice: Array) -> tuple[float, ...] | None:
     if not np.allclose(before, metric, rtol=1e-9, atol=1e-9 * np.trace(metric)):
         return None
     return cell_parameters(np.linalg.cholesky(metric).T)
-
-
-def default_lattice(linear: Array) -> Array:
-    """Return the lattice of a cell of round numbers, with a = 1, that operators (n, 3, 3) fit."""
-    a, b, c, *angles = _fitting(linear, cell_lattice(_TYPICAL)) or _TYPICAL
-    return cell_lattice([1.0, round(b / a, 2), round(c / a, 2), *(round(x) for x in angles)])
-
-
-def check_cell(lattice: Array, linear: Array, texts: Sequence[str]) -> None:
-    """Raise `LatticeMismatchError`, with a cell that would do, unless operators (n, d, d) fit."""
-    metric = lattice.T @ lattice
-    off = np.abs(linear.swapaxes(1, 2) @ metric @ linear - metric).max(axis=(1, 2))
-    wrong = np.flatnonzero(~(off <= 1e-10 * np.trace(metric)))
-    if not len(wrong):
-        return
-    nearest = _fitting(linear, lattice)
-    cure = f"the nearest that fits has {_in_words(nearest)}" if nearest else "no cell fits them all"
-    raise LatticeMismatchError(
-        f"the operator {texts[wrong[0]]!r} does not map the lattice of the cell with "
-        f"{_in_words(cell_parameters(lattice))} to itself; {cure}"
-    )
-
-
-def _in_words(cell: Sequence[float]) -> str:
-    """Return "a = 1, b = 1.2, gamma = 90"."""
-    names = {6: ("a", "b", "c", "alpha", "beta", "gamma")}.get(len(cell), ("a", "b", "gamma"))
-    return ", ".join(f"{name} = {x:.8g}" for name, x in zip(names, cell, strict=False))

@@ -220,6 +220,25 @@ class DirichletDomain:
     def _sites(self) -> Array:
         return np.stack([g(self.site) for g in self._candidates])
 
+    def corners(self) -> Array:
+        """Return the domain's vertices (M, d), in the plane as a counter-clockwise ring.
+
+        >>> from orbiflow.symmetry import wallpaper_group
+        >>> DirichletDomain(wallpaper_group("p4"), [0.5, 0.25]).corners().round(9).tolist()
+        [[0.0, 0.0], [1.0, 0.0], [0.5, 0.5]]
+        """
+        from scipy.spatial import Voronoi
+
+        # neighbours are at most twice as far as the domain's farthest point
+        reach = 2 * float(np.linalg.norm(self.group.lattice)) * (1 + 1e-9)
+        sites = [g(self.site) for g in self.group.elements_near(self.site, reach)]
+        found = Voronoi(np.stack(sites))
+        place = found.vertices[found.regions[found.point_region[0]]]
+        _, first = np.unique(place.round(9), axis=0, return_index=True)
+        offset = place[first] - self.site
+        order = np.arctan2(offset[:, 1], offset[:, 0]).argsort() if self.group.dim == 2 else ...
+        return offset[order] + self.site
+
     def project(self, points: Points) -> Points:
         """Return the points (..., d) of the domain in the orbits of `points` (..., d).
 

@@ -9,18 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orbiflow.arrays import Array
-from orbiflow.errors import GroupError
-from orbiflow.symmetry.cells import check_cell
+from orbiflow.errors import GroupError, LatticeMismatchError, NotAnIsometryError
+from orbiflow.symmetry.cells import cell_parameters, fitting_cell
 from orbiflow.symmetry.group import MAX_ORDER, CrystallographicGroup, checked_lattice, generated
 from orbiflow.symmetry.isometry import TOLERANCE, Isometry, translation
 
-Operator = tuple[Array, Array]
-"""The matrix W (d, d) and the shift w (d,) of x' = W x + w."""
-
 AXES = "xyz"
 MAX_LENGTH = 200
-_NUMBER = r"\d{1,9}(?:/\d{1,9}|\.\d{0,20})?|\.\d{1,20}"
-_TERM = re.compile(rf"([+-])(?:({_NUMBER})\*?)?([xyz])?")
+_NUMBER = r"(?:\d{1,9}(?:/0*[1-9]\d{0,8}|\.\d{0,20})?|\.\d{1,20})"
+_TERM = re.compile(rf"([+-]?)({_NUMBER})?\*?([xyz]?)")
 
 
 def group_from_operators(
@@ -28,13 +25,9 @@ def group_from_operators(
 ) -> CrystallographicGroup:
     """Return the group that operators in fractional coordinates generate on a lattice.
 
-    The operators may be all of the group's, modulo the lattice, or generators alone. If there are pure
-    translations among them or their products, the group's lattice is the finer one (`primitive`).
-
-    Args:
-        operators: Texts such as "-x,y+1/2,-z", with as many parts as there are dimensions, 1 to 3.
-        lattice: The basis vectors as columns (d, d) of the cell that the coordinates refer to.
-        name: A name for people to read.
+    The operators are texts such as "-x,y+1/2,-z" with d parts, 1 to 3: all of the group's modulo the
+    lattice, or generators. `lattice` has the basis vectors of their cell as columns (d, d); if pure
+    translations make it finer, the group is on the primitive one.
 
     Raises `GroupError` for a text that is no operator, or one that does not map the lattice to itself.
 
@@ -45,53 +38,48 @@ def group_from_operators(
     texts = list(itertools.islice(operators, MAX_ORDER + 1))
     if len(texts) > MAX_ORDER:
         raise GroupError(f"more than {MAX_ORDER} operators were given; generators are enough")
-    parsed = [parse_operator(text, len(basis)) for text in texts]
-    check_cell(basis, np.array([w for w, _ in parsed]).reshape(-1, *basis.shape), texts)
-    inverse = np.linalg.inv(basis)
-    isometries = [Isometry(basis @ w @ inverse, basis @ shift) for w, shift in parsed]
+    d, inverse = len(basis), np.linalg.inv(basis)
+    tables = [parse_operator(text, d) for text in texts]
+    try:
+        isometries = [Isometry(basis @ t[:, :d] @ inverse, basis @ t[:, d]) for t in tables]
+    except NotAnIsometryError as error:
+        nearest = fitting_cell(np.stack(tables)[:, :, :d], basis)
+        own, other = (np.round(cell, 6).tolist() for cell in (cell_parameters(basis), nearest or 0))
+        cure = f"the nearest that fits has {other}" if nearest else "they fit no cell"
+        raise LatticeMismatchError(
+            f"the operators do not fit a cell with lengths and angles {own}; {cure}"
+        ) from error
     return generated(basis, isometries, name).primitive()
 
 
-def parse_operator(text: str, dim: int) -> Operator:
-    """Return the matrix (d, d) and the shift (d,) of an operator such as "x-y,x,z+1/3".
+def parse_operator(text: str, dim: int) -> Array:
+    """Return the table (d, d + 1) of an operator: its matrix and its shift.
 
-    Raises `GroupError` for any other text.
-
-    >>> parse_operator("-y, x-y, z+1/3", 3)[0].tolist()
-    [[0.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 1.0]]
+    >>> parse_operator("-y, x-y, z+1/3", 3).round(3).tolist()
+    [[0.0, -1.0, 0.0, 0.0], [1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.333]]
     """
-    parts = text.lower().split(",") if len(text) <= MAX_LENGTH else []
-    rows = [_row(part.replace(" ", ""), dim) for part in parts]
-    if len(rows) != dim or None in rows:
+    parts = text.lower().replace(" ", "").split(",") if len(text) <= MAX_LENGTH else []
+    term = rf"(?:(?:{_NUMBER}\*?)?[{AXES[:dim]}]|{_NUMBER})"
+    whole = re.compile(rf"[+-]?{term}(?:[+-]{term})*")
+    if len(parts) != dim or not all(map(whole.fullmatch, parts)):
         example = ",".join(("-x", "y+1/2", "-z")[:dim])
         raise GroupError(f'{text[:60]!r} is no operator in {dim} dimensions, such as "{example}"')
-    table = np.array(rows, dtype=np.float64)
-    return table[:, :dim], table[:, dim]
-
-
-def _row(text: str, dim: int) -> list[float] | None:
-    """Return the coefficients of the axes and the constant of one part of an operator."""
-    signed = text if text[:1] in ("+", "-") else f"+{text}"
-    terms = list(_TERM.finditer(signed))
-    if "".join(term[0] for term in terms) != signed:
-        return None
-    row = [Fraction(0)] * (dim + 1)
-    for sign, number, axis in (term.groups() for term in terms):
-        place = AXES.index(axis) if axis else dim
-        if not (number or axis) or place > dim - bool(axis) or re.search("/0+$", number or ""):
-            return None
-        row[place] += Fraction(f"{sign}{number or 1}")
-    return [float(entry) for entry in row]
+    table = np.zeros((dim, dim + 1))
+    for row, part in zip(table, parts, strict=True):
+        for sign, number, axis in _TERM.findall(part):
+            place = AXES.index(axis) if axis else dim
+            row[place] += float(Fraction(f"{sign}{number or 1}")) if number or axis else 0.0
+    return table
 
 
 def operators(group: CrystallographicGroup, lattice: ArrayLike | None = None) -> list[str]:
     """Return the operators of a group, one for each coset, in fractional coordinates of a lattice.
 
-    The lattice, basis vectors as columns (d, d), is by default the group's; with a coarser one, such as
-    a conventional cell, there are more. `group_from_operators` makes the group again of them.
+    The lattice, basis vectors as columns (d, d), is by default the group's; a coarser one, such as a
+    conventional cell, has more cosets. `group_from_operators` makes the group again of them.
 
-    Raises `GroupError` for a group of over 3 dimensions, or a lattice whose vectors are no translations
-    of the group or that it does not map to itself.
+    Raises `GroupError` for over 3 dimensions, or a lattice whose vectors are no translations of the
+    group or that it does not map to itself.
 
     >>> from orbiflow.symmetry import wallpaper_group
     >>> operators(wallpaper_group("pgg"))
@@ -107,16 +95,13 @@ def operators(group: CrystallographicGroup, lattice: ArrayLike | None = None) ->
             raise GroupError("the vectors of the lattice are no translations of the group")
     shifts = coarse.translations @ coarse.inverse_lattice.T
     tables = np.concatenate([coarse.integral_parts, shifts[:, :, None]], axis=2)
-    return [",".join(_part(row) for row in table) for table in tables.tolist()]
+    return [",".join(map(_part, table)) for table in tables.tolist()]
 
 
 def _part(row: list[float]) -> str:
     """Return one part of an operator as text: "x-y+1/3"."""
-    terms = [
-        f"{x:+.0f}*{axis}" if abs(x) > 1 else f"{x:+.0f}"[0] + axis
-        for x, axis in zip(row[:-1], AXES, strict=False)
-        if x
-    ]
     fraction = Fraction(row[-1]).limit_denominator(48)
-    shift = f"{row[-1]:+.12g}" if abs(fraction - row[-1]) > TOLERANCE else f"+{fraction}"
-    return "".join([*terms, shift if row[-1] > TOLERANCE or not terms else ""]).removeprefix("+")
+    shift = f"{row[-1]:.12g}" if abs(fraction - row[-1]) > TOLERANCE else str(fraction)
+    terms = [f"{x:+.0f}*{axis}" for x, axis in zip(row[:-1], AXES, strict=False) if x]
+    terms += [f"+{shift}"] if row[-1] > TOLERANCE or not terms else []
+    return re.sub(r"(?<!\d)1\*", "", "".join(terms)).removeprefix("+")

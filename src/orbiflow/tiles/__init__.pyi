@@ -112,6 +112,7 @@ from .search.occupancy import fit_occupancy as fit_occupancy
 from .search.occupancy import occupancy_loss as occupancy_loss
 from .search.overlap_search import OccupancySearch as OccupancySearch
 from .search.overlap_search import OverlapSearch as OverlapSearch
+from .search.refinement import refine as refine
 from .search.search_method import SearchMethod as SearchMethod
 from .search.tile_model import TileModel as TileModel
 from .search.tile_model import as_map as as_map

@@ -93,7 +93,7 @@ def test_colour_bars_are_in_short_numbers():
 def test_angles_of_a_torus_run_round_the_centre():
     space = SPACES[0]
     label, places, texts = angle_axis(view_of(space, ("phi", "psi")), 1)
-    assert label == "psi (degrees)"
+    assert label == "ψ (degrees)"
     assert places == [0, 0.25, 0.5, 0.75, 1]
     assert texts == ["−180°", "−90°", "0°", "90°", "180°"]
     assert angle_axis(view_of(space, center=(180, 0)), 0)[2][-1] == "360°"

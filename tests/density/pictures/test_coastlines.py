@@ -11,9 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density import read_coastlines
+from orbiflow.density import PlotSettings, Sphere, make_space, read_coastlines
 from orbiflow.density.pictures import coastlines
 from orbiflow.density.pictures.coastlines import simplified
+from orbiflow.density.spaces import Space
 from orbiflow.errors import InputFileError
 
 SQUARE = [[10, 20], [30, 20], [30, 40], [10, 20]]
@@ -143,3 +144,35 @@ def test_simplified_lines_are_few_and_near(seed: int) -> None:
     back = np.interp(line[:, 1], few[:, 1], few[:, 0])
     assert np.abs(back - line[:, 0]).max() < 1.0
     assert simplified([line], 5000)[0] is line
+
+
+def test_the_earth() -> None:
+    lines = coastlines.earth()
+    points = np.concatenate(lines)
+    assert len(lines) > 100
+    assert (abs(points) <= (90, 180)).all()
+    for name, place in {"Cape of Good Hope": (-34.4, 18.5), "Gibraltar": (36.0, -5.4)}.items():
+        assert np.hypot(*(points - place).T).min() < 1, name
+    inland = {"Chad": (15.0, 19.0), "Pacific": (0.0, -150.0)}
+    for name, place in inland.items():
+        assert np.hypot(*(points - place).T).min() > 9, name
+    for line in lines:  # nothing runs along the edges of a flat map
+        at_cut = abs(abs(line[:, 1]) - 180) < 1e-6
+        assert not (at_cut[1:] & at_cut[:-1]).any()
+
+
+@pytest.mark.parametrize(
+    ("space", "names", "drawn"),
+    [
+        (Sphere(), None, True),
+        (Sphere(), ("Latitude (deg)", "Longitude (deg)"), True),
+        (Sphere(), ("column1", "column2"), True),
+        (Sphere(), ("dec", "ra"), False),
+        (Sphere(), ("inclination", "declination"), False),
+        (Sphere(form="vector"), None, False),
+        (make_space("projective-plane"), None, False),
+    ],
+)
+def test_where_the_earth_is_drawn(space: Space, names: tuple | None, drawn: bool) -> None:
+    assert bool(coastlines.coastlines_for(space, PlotSettings(names=names))) == drawn
+    assert coastlines.coastlines_for(space, PlotSettings(names=names, earth=False)) == []

@@ -226,8 +226,8 @@ def test_axes_have_the_users_names():
     assert density_png(example(SPACES[0]), names=("$x_", "a^$"), width_px=200)
     names = PlotSettings(names=("phi", "psi<b>"))
     page = density_page(example(SPACES[0]), names, resolution=4)
-    assert "phi (degrees) runs round the ring, psi&lt;b&gt; (degrees) round its tube" in page
-    assert {"phi 90°", "phi −90°"} <= {label["text"] for label in page_data(page)["labels"]}
+    assert "φ (degrees) runs round the ring, psi&lt;b&gt; (degrees) round its tube" in page
+    assert {"φ 90°", "φ −90°"} <= {label["text"] for label in page_data(page)["labels"]}
     with pytest.raises(OrbiflowError, match="2 names"):
         density_png(example(SPACES[0]), names=("a",))
 

@@ -326,12 +326,14 @@ def _flipped(first: Array, groups: Groups, permutations: int, rng: np.random.Gen
     equal, and its sign is drawn. A group with the share h of the rows draws that mean nearer, which
     shrinks its distance by sqrt(1 - h): this is undone, as in HC2 (MacKinnon and White, 1985).
     """
-    sizes, signed = np.bincount(groups.index), np.where(first, 1 / first.sum(), -1 / (~first).sum())
+    sizes, rows = np.bincount(groups.index), len(first)
+    signed: Array = np.where(first, 1.0, -first.sum() / (~first).sum()) / first.sum()
     lean = groups.sums(signed) / sizes
-    away = lean / np.sqrt(1 - sizes / len(first))
+    away = lean / np.sqrt(1 - sizes / rows)
     signs = rng.choice([-1.0, 1.0], size=(groups.count, permutations))
-    drawn = (signed + (away - lean)[groups.index])[:, None] * signs[groups.index]
-    return torch.as_tensor(np.column_stack([signed, drawn - (away * sizes) @ signs / len(first)]))
+    drawn: Array = (signed + (away - lean)[groups.index])[:, None] * signs[groups.index]
+    moved = drawn - (away * sizes) @ signs / rows
+    return torch.as_tensor(np.concatenate([signed[:, None], moved], axis=1))
 
 
 def _squares(kernel: Tensor, weights: Tensor) -> Array:

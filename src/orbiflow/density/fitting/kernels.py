@@ -76,7 +76,7 @@ def kernel_estimates(
     the nearest neighbours, on tori axis by axis (Breiman, Meisel, Purcell, 1977); "repeated" are the
     narrowest kernels, about the places of several points alone, if `repeats` are real.
     """
-    rows = rows[: min(MOST_CENTERS, MOST_IMAGES // len(space.features(rows.points[:1])))]
+    rows = rows[: min(MOST_CENTERS, MOST_IMAGES // space.kernel_images)]
     train, own = rows.points, torch.full((len(rows),), 1 / len(rows), dtype=torch.float64)
     if rows.weights is not None:
         own = rows.weights / rows.weights.sum()

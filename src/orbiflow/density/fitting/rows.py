@@ -129,7 +129,7 @@ def lone_groups_note(groups: Tensor | None) -> list[str]:
     >>> len(lone_groups_note(torch.tensor([0, 1, 2]))), lone_groups_note(torch.tensor([0, 1, 0]))
     (1, [])
     """
-    if groups is None or len(groups.unique()) < len(groups):
+    if groups is None or len(unique(groups)) < len(groups):
         return []
     return [
         "each row has a group of its own, as if there were no groups: does the column say what rows "

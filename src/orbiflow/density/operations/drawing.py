@@ -48,7 +48,7 @@ def plot(
 
     Directions and axes are drawn on maps (density, latlon) and on the square.
 
-    On a torus of more or fewer than two angles there are samples alone, all pairs of angles.
+    On a torus of more angles there are samples alone, all pairs of angles; of one, a rose, too.
 
     Args:
         model: Folder that `fit` wrote.
@@ -97,6 +97,8 @@ def _where_pictures_are(out: Path, single: bool, space: Space) -> str:
             f"density, flow and surface are drawn in two dimensions, this {space.name} has "
             f"{space.dim}: {where} shows samples, angle by angle"
         )
+    if not space.is_planar:
+        return f"written to {out}"
     if single:
         return f"written {out}, a page for each figure; a folder gets the surface to turn, too"
     return f"written to {out}; open {out / 'surface.html'} in a browser"
@@ -127,7 +129,7 @@ def region(
     density, _ = model_at(model)
     kind, space = out.suffix.lower(), density.space
     _require_format(out, kind, space)
-    if settings.min_mass is not None and space.dim != 2:
+    if settings.min_mass is not None and not space.is_planar:
         raise SettingError("{min_mass} is of islands, which are outlined in two dimensions alone")
     samples = regions.samples_for(settings.masses, settings.samples)
     progress = runtime.progress_events(on_event, cancel)

@@ -13,7 +13,7 @@ from orbiflow.batch import csv_bytes
 from orbiflow.density import tables
 from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import GroupedRowSettings, SpaceSettings
-from orbiflow.errors import SettingError
+from orbiflow.errors import SettingError, literal
 from orbiflow.settings import DefaultText, Ending, Option, Range, Settings
 
 if TYPE_CHECKING:
@@ -86,10 +86,15 @@ def _csv(found: dict[str, Any]) -> bytes:
 
 def _check(where: SpaceSettings, reading: GroupedRowSettings, picture: Path | None) -> None:
     """Refuse what has no summary before the table is read."""
-    if where.space == "klein-bottle":
+    if where.space not in ("torus", "sphere", "projective-plane"):
         raise SettingError(
-            "a klein-bottle has no mean direction, as its points have several angles: summarise theta "
-            "and phi with {space} torus, if that is what you mean"
+            "{space} must be torus, sphere or projective-plane: there is no summary of points of the "
+            + literal(where.space)
+        )
+    if where.space not in ("torus", "sphere", "projective-plane"):
+        raise SettingError(
+            "{space} must be torus, sphere or projective-plane: summaries are of angles, directions "
+            f"and axes, not of points of a {literal(where.space)}"
         )
     if where.space != "torus":
         if reading.missing == "marginalise":

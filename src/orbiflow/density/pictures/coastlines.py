@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterator
+from functools import cache
+from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -40,10 +43,24 @@ _ROUNDING = 1e-3
 def coastlines_for(space: Space, settings: PlotSettings) -> list[Array]:
     """Return the lines that settings ask for, which only the sphere can have."""
     if settings.coastlines is None:
-        return []
+        return earth() if settings.earth and _is_earth(space, settings) else []
     if space.name != "sphere":
         raise SettingError(f"{{coastlines}} apply to the sphere, not to the {space.name}")
     return read_coastlines(settings.coastlines)
+
+
+def _is_earth(space: Space, settings: PlotSettings) -> bool:
+    """Return whether columns are latitude and longitude, by their names or without names."""
+    name = (settings.names or space.columns)[0].casefold()
+    on_earth = space.name == "sphere" and space.columns[0] == "lat"
+    return on_earth and bool(re.match(r"lat|column\d", name))
+
+
+@cache
+def earth() -> list[Array]:
+    """Return the Earth's coastlines (M, 2), of Natural Earth at 1:110 million."""
+    with files("orbiflow.density.pictures").joinpath("coastlines.npy").open("rb") as file:
+        return _parted(np.load(file, allow_pickle=False) / 100)
 
 
 def read_coastlines(path: Path) -> list[Array]:
@@ -78,10 +95,16 @@ def read_coastlines(path: Path) -> list[Array]:
 
 
 def _table(path: Path) -> list[Array]:
-    values = read_table(path, columns=None, width=2).values
+    return [
+        _checked(path, line) for line in _parted(read_table(path, columns=None, width=2).values)
+    ]
+
+
+def _parted(values: Array) -> list[Array]:
+    """Return the lines in values (N, 2), of which a latitude beyond 90 ends one."""
     parts = np.split(values, np.flatnonzero(abs(values[:, 0]) > 90))
-    found = [_checked(path, part[abs(part[:, 0]) <= 90]) for part in parts]
-    return [part for part in found if len(part) > 1]
+    lines = [part[abs(part[:, 0]) <= 90] for part in parts]
+    return [line for line in lines if len(line) > 1]
 
 
 def _geojson(path: Path) -> list[Array]:
@@ -113,7 +136,7 @@ def _lines(path: Path, item: Any, depth: int) -> Iterator[Array]:
             yield from _lines(path, item["geometry"], depth + 1)
     elif kind in _SHAPES:
         for line in _positions(path, kind, item.get("coordinates"), _SHAPES[kind]):
-            parts = _without_cuts(line) if kind.endswith("Polygon") else [line]
+            parts = without_cuts(line) if kind.endswith("Polygon") else [line]
             yield from (part for part in parts if len(part) > 1)
     elif kind not in _POINTS:
         raise InputFileError(
@@ -151,7 +174,7 @@ def _checked(path: Path, line: Array) -> Array:
     return line
 
 
-def _without_cuts(ring: Array) -> list[Array]:
+def without_cuts(ring: Array) -> list[Array]:
     """Return a polygon's ring in pieces, without the edges along which a flat map was cut."""
     lat, lon = abs(ring).T
     at_pole, at_cut = abs(lat - 90) < _EDGE, abs(lon - 180) < _EDGE

@@ -68,14 +68,27 @@ def density_on_map(density: Density, points: Tensor, measure: str, angle: float)
     return _averaged(density, points, measure, torch.tensor(angle / 2))
 
 
+@torch.no_grad()
+def density_at_pixels(density: Density, points: Tensor, measure: str, pixel: float) -> Array:
+    """Return the density (N,) at chart points (N, 2) of a flat space, averaged over pixels."""
+    if density.kernel_part is None:
+        return density_at(density, points, measure)
+    half = _half_pixels(density.kernel_part[1], pixel)
+    return _averaged(density, points, measure, half)
+
+
 def chosen_scale(density: Density, measure: str, scale: str) -> tuple[bool, str]:
     """Return whether colours are by logarithms, the same in all pictures of a density, and why."""
     if scale != "auto":
         log = scale == "log"
         return log, f"colours are {'logarithmic' if log else 'linear'}, as asked for"
-    t = (torch.arange(_COARSE, dtype=torch.float64) + 0.5) / _COARSE
-    values = density_on_grid(density, t, t, measure, pixel=0.5 / _COARSE).ravel()
-    areas = density.space.log_area(midpoints(density.space, _COARSE)).exp().numpy()
+    even, pixel = midpoints(density.space, _COARSE), 0.5 / _COARSE
+    if density.space.has_square:
+        t = (torch.arange(_COARSE, dtype=torch.float64) + 0.5) / _COARSE
+        values = density_on_grid(density, t, t, measure, pixel=pixel).ravel()
+    else:
+        values = density_at_pixels(density, even, measure, pixel)
+    areas = density.space.log_area(even).exp().numpy()
     dark = dark_share(values, areas)
     log = dark > DARK_SHARE
     # never more than what is true: 99.6 % are not all
@@ -112,7 +125,10 @@ def _averaged(
         sums = (widened.log_density(points, tolerance=_TOLERANCE) + areas).exp()
     else:
         logs = density.log_density_without_kernels(points)
-        sums = _flat_sums(widened, *sides).reshape(-1)
+        if sides:
+            sums = _flat_sums(widened, *sides).reshape(-1)
+        else:
+            sums = widened.log_density(points, tolerance=_TOLERANCE).exp()
     values = logs.exp() + weight * sums
     return (values * density.space.log_density_factor(points, measure).exp()).numpy()
 

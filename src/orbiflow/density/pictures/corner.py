@@ -45,8 +45,8 @@ def corner_picture(
     Args:
         density: A density on a torus of 1 to `MAX_COLUMNS` angles.
         data: Chart points (N, d). Without data the samples are below the diagonal, too.
-        samples: Chart points (M, d). Of too many points some are drawn as dots, all are counted in
-            the histograms.
+        samples: Chart points (M, d). No more are drawn than there are data. Of too many points some are
+            drawn as dots, as many of each, and all are counted in the histograms.
         settings: How it is drawn.
         sheet: The sheet. Default: that of the settings.
 
@@ -57,11 +57,17 @@ def corner_picture(
     settings, space = settings or PlotSettings(), density.space
     sheet, most = sheet or settings.sheet, settings.samples or MAX_DOTS
     if not space.is_torus or space.dim > MAX_COLUMNS:
-        raise OrbiflowError(f"pairs are drawn of 1 to {MAX_COLUMNS} angles, not of {space!r}")
+        raise OrbiflowError(
+            f"pairs are drawn of 1 to {MAX_COLUMNS} angles on a torus, and other pictures in two "
+            f"dimensions; this {space.name} has {space.dim}: draw columns of `orbiflow density sample`"
+        )
     dim = space.dim
     panels = _Panels(sheet, frames.view_of(space, settings.names, settings.center))
     above = panels.view.places(samples)
     below = None if data is None else panels.view.places(data)
+    if below is not None:  # as many of each
+        above = above[: len(below)]
+        most = min(most, len(above))
     for row, column in np.ndindex(dim, dim):
         axes = panels.axes(row, column)
         if row == column:
@@ -167,10 +173,8 @@ class _Panels:
             color="#8a8a86",
         )  # fmt: skip
         label, at, texts = frames.angle_axis(self.view, column)
-        if sheet.printed:
-            texts = frames.legible(at, texts, self.side, sheet)
         axes.set_xlim(0, 1)
-        axes.set_xticks(at, self._apart(at, texts, row == last, column == last))
+        axes.set_xticks(at, self._apart(at, texts, row == last))
         if row == last:
             axes.set_xlabel(frames.shortened(label, self.side, sheet), **style)
         if row == column:
@@ -178,13 +182,17 @@ class _Panels:
             return
         label, at, texts = frames.angle_axis(self.view, row)
         axes.set_ylim(0, 1)
-        axes.set_yticks(at, self._apart(at, texts, column == 0, row == 1))
+        axes.set_yticks(at, self._apart(at, texts, column == 0))
         if column == 0:
             axes.set_ylabel(frames.shortened(label, self.side, sheet), **style)
 
-    def _apart(self, at: list[float], texts: list[str], wanted: bool, last: bool) -> list[str]:
-        """Return texts of ticks without those that would touch others in the next panel."""
-        return [
-            text if wanted and (last or place < 0.9) and (self.dim < 4 or k % 2 == 0) else ""
-            for k, (place, text) in enumerate(zip(at, texts, strict=True))
-        ]
+    def _apart(self, at: list[float], texts: list[str], wanted: bool) -> list[str]:
+        """Return texts of ticks without those that would touch others, or those of the next panel."""
+        shown = [""] * len(at)
+        if not wanted:
+            return shown
+        inner = [k for k, place in enumerate(at) if self.dim == 1 or 0.05 < place < 0.95]
+        some = [at[k] for k in inner], [texts[k] for k in inner]
+        for k, text in zip(inner, frames.legible(*some, self.side, self.small), strict=True):
+            shown[k] = text
+        return shown

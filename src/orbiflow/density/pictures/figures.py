@@ -13,6 +13,7 @@ from torch import Tensor
 
 from orbiflow.density.models import Density, FlowDensity
 from orbiflow.density.pictures import frames, overlays
+from orbiflow.density.pictures.cell import Cell
 from orbiflow.density.pictures.coastlines import coastlines_for
 from orbiflow.density.pictures.colours import bar_label, bar_ticks
 from orbiflow.density.pictures.frames import INK, chart_points, require_plane, space_title, view_of
@@ -29,10 +30,15 @@ from orbiflow.symmetry import CrystallographicGroup
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Ground: TypeAlias = Square | Map
+Ground: TypeAlias = Square | Map  # a `Cell` is a square
 """What densities and points of a space are drawn on."""
 
 GroundName = Literal["square", "map"]
+
+
+def plane_ground(space: Space, settings: PlotSettings) -> Square:
+    """Return the canonical square or, where there is none, the lattice's cell."""
+    return (Square if space.has_square else Cell)(space, settings)
 
 
 def _ground(
@@ -40,7 +46,7 @@ def _ground(
 ) -> Ground:
     """Return the ground of a name; a map is the one that suits the points (N, 2)."""
     if ground == "square":
-        return Square(space, settings)
+        return plane_ground(space, settings)
     if ground != "map":
         return ground
     about = chart_points(space, torch.empty(0, 2) if points is None else points)
@@ -56,7 +62,7 @@ def density_picture(
     ground: Ground | GroundName = "square",
     regions: Sequence[DensityRegion] | None = None,
 ) -> Picture:
-    """Draw a density on the canonical square, or directions and axes on a map.
+    """Draw a density on the canonical square, on a lattice cell, or directions and axes on a map.
 
     Edges of the square of one colour and number of arrow heads are one edge, in the sense of the
     arrows. Ticks are in the user's units where the chart is a plain rescaling of them (torus, Klein

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 import textwrap
+import unicodedata
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
@@ -62,7 +64,7 @@ def view_of(
     space: Space, names: Sequence[str] | None = None, center: Sequence[float] | None = None
 ) -> View:
     """Return the window of a space's flat pictures."""
-    names = tuple(space.columns if names is None else names)
+    names = tuple(map(symbol, space.columns if names is None else names))
     if len(names) != len(space.columns):
         raise OrbiflowError(f"expected {len(space.columns)} names of columns, got {list(names)}")
     if not space.is_torus:
@@ -98,12 +100,31 @@ def space_title(space: Space) -> str:
     >>> space_title(make_space("klein-bottle"))
     'Klein bottle'
     """
+    if space.data_group is not None and space.data_group.name:
+        return f"plane modulo {space.data_group.name}"
     return space.name.replace("-", " ").replace("klein", "Klein")
 
 
 def cut(name: str, most: int) -> str:
     """Return a name of at most so many letters."""
     return name if len(name) <= most else f"{name[: most - 1]}…"
+
+
+SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+
+
+def symbol(name: str) -> str:
+    """Return a name as it is printed: that of a Greek letter, with a number or without, as the letter.
+
+    >>> symbol("phi"), symbol("Chi1"), symbol("chi_2"), symbol("phi angle")
+    ('φ', 'χ₁', 'χ₂', 'phi angle')
+    """
+    found = re.fullmatch(r"([a-z]+?)_?(\d*)", name.strip().casefold())
+    try:
+        letter = unicodedata.lookup(f"GREEK SMALL LETTER {found[1]}") if found else ""
+    except KeyError:
+        return name
+    return f"{letter}{found[2].translate(SUBSCRIPTS)}" if found else name
 
 
 def axis_label(view: View, column: int) -> str:
@@ -125,9 +146,9 @@ def shortened(label: str, side: float, sheet: Sheet) -> str:
     return cut(name, room - len(ending)) + ending
 
 
-def legible(at: list[float], texts: list[str], side: float, sheet: Sheet) -> list[str]:
-    """Return the texts of ticks along `side` inches, every second one left out if they would touch."""
-    widest = max(map(len, texts)) * LETTER * sheet.small / 72
+def legible(at: list[float], texts: list[str], side: float, size: float) -> list[str]:
+    """Return texts of `size` points along `side` inches, every second one left out if they touch."""
+    widest = max(map(len, texts)) * LETTER * size / 72
     if len(at) < 3 or 1.3 * widest < (at[1] - at[0]) * side:
         return texts
     return [text if k % 2 == 0 else "" for k, text in enumerate(texts)]

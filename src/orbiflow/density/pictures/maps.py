@@ -124,7 +124,7 @@ class Map:
         fine = [np.array(LineString(piece).simplify(apart).coords) for piece in pieces]
         drawn = LineCollection(
             fine, colors="#85857f" if light else COAST, zorder=4, capstyle="round",
-            linewidths=sheet.pen(0.7 if light else 0.9, 0.25),
+            linewidths=sheet.pen(0.7, 0.25),
         )  # fmt: skip
         axes.add_collection(drawn, autolim=False)
 

@@ -21,8 +21,8 @@ from orbiflow.density.pictures.frames import view_of
 from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.overlays import region_lines
 from orbiflow.density.pictures.projections import PlateCarree, chosen_map
+from orbiflow.density.pictures.roses import rose_picture
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.density.pictures.square import Square
 from orbiflow.density.pictures.surfaces import density_page
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import FORMATS, Picture, pdf_pages
@@ -38,7 +38,7 @@ THUMBNAIL = "thumbnail.png"
 """The small picture beside the model of a fit in a batch."""
 
 PAGE = "surface.html"
-NAMES = ("density", "latlon", "square", "flow", "samples")
+NAMES = ("density", "latlon", "square", "flow", "samples", "rose")
 PICTURES = (*(f"{name}.{form}" for form in FORMATS for name in NAMES), PAGE)
 """The files that a plot may write into a folder, and that go when another one is written there."""
 
@@ -69,7 +69,7 @@ def plot_density(
     The density of angles is drawn on its square; that of directions or axes on a map ("density"), on
     the sphere also in plain latitude and longitude ("latlon"), and on its square ("square"). A flow
     that has no part in the density is left out. On a torus of more or fewer than two angles there are
-    samples alone, all pairs of angles. All is drawn before anything is written.
+    samples alone, all pairs of angles, and of one angle a rose. All is drawn before any is written.
 
     Args:
         density: A density or a fitted estimator.
@@ -98,7 +98,7 @@ def plot_density(
         told(k / (len(makers) + 1), f"drawing {name}.{form}")
         pictures[name] = make()
     captions = tuple(f"{own.title}. {own.caption}".strip() for own in pictures.values())
-    flowless = shown.space.dim == 2 and shown.density.flow_part is None
+    flowless = shown.space.is_planar and shown.density.flow_part is None
     notes = ("the flow has no part in this density, so that there is no picture of it",) * flowless
     if single:
         path = write_atomic(out, pdf_pages(list(pictures.values())))
@@ -107,7 +107,7 @@ def plot_density(
     if "flow.png" in files and not settings.sheet.printed:
         files["flow.png"] = figures.few_colours(files["flow.png"])
     contents: dict[str, str | bytes] = {**files}
-    if shown.space.dim == 2:
+    if shown.space.is_planar:
         told(0.75, f"drawing {PAGE}")
         lines = simplified(shown.coastlines, PAGE_POINTS)
         contents[PAGE] = density_page(
@@ -162,12 +162,16 @@ class _Shown:
         """Return functions that draw the figures, by the names of their files without the ending."""
         density, settings, data, samples = self.density, self.settings, self.data, self.samples
         if self.space.dim != 2:
-            return {"samples": partial(corner_picture, density, data, samples, settings)}
+            made = {"samples": partial(corner_picture, density, data, samples, settings)}
+            if self.space.dim == 1:
+                what = "samples" if data is None else "data"
+                made["rose"] = partial(rose_picture, density, self.points, settings, what=what)
+            return made
         grounds = self._grounds()
         dots = self.points if settings.dots else None
         draw = partial(figures.density_picture, density, dots, settings, regions=self.regions)
         makers = {name: partial(draw, ground=ground) for name, ground in grounds.items()}
-        if density.flow_part is not None:
+        if density.flow_part is not None and self.space.has_square:
             makers["flow"] = partial(figures.flow_picture, density, settings)
         if data is not None or settings.samples is not None:
             draw = partial(figures.samples_picture, density, data, samples, settings)
@@ -176,7 +180,7 @@ class _Shown:
 
     def _grounds(self) -> dict[str, figures.Ground]:
         """Return what the density is drawn on, by the names of the figures."""
-        space, square = self.space, Square(self.space, self.settings)
+        space, square = self.space, figures.plane_ground(self.space, self.settings)
         if self.map is None:
             return {"density": square}
         grounds: dict[str, figures.Ground] = {"density": Map(space, self.map, self.coastlines)}

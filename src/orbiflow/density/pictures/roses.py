@@ -132,7 +132,7 @@ def _draw(axes: PolarAxes, rose: Rose, unit: str, sheet: Sheet) -> None:
     if _is_compass(rose.name):
         axes.set_theta_zero_location("N")
         axes.set_theta_direction(-1)
-    name = frames.cut(rose.name, frames.MAX_NAME)
+    name = frames.cut(frames.symbol(rose.name), frames.MAX_NAME)
     axes.set_title(name, fontsize=sheet.text, pad=0.9 * sheet.text, parse_math=False)
 
 

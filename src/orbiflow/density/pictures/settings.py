@@ -9,7 +9,17 @@ from typing import Annotated, Literal
 from orbiflow.density.regions import Mass, SampleCount, samples_for
 from orbiflow.drawing import NARROWEST, WIDEST, FigureFormat, Sheet, column_width
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.settings import DefaultText, Group, Hidden, Needs, Parsed, Range, Settings, Unit
+from orbiflow.settings import (
+    DefaultText,
+    Group,
+    Hidden,
+    Needs,
+    Option,
+    Parsed,
+    Range,
+    Settings,
+    Unit,
+)
 
 MAX_REGIONS = 4
 """Number of styles of lines that can be told apart."""
@@ -86,8 +96,11 @@ class PlotSettings(Settings, group="Figures"):
     """Radius of what lambert, stereographic and nets show around the centre."""
 
     coastlines: Annotated[Path | None, MAPS] = None
-    """Lines to draw over maps of the sphere: GeoJSON, or a table of lat,lon where a lat beyond 90 ends
-    a line."""
+    """Other lines to draw over maps of the sphere: GeoJSON, or a table of lat,lon where a lat beyond 90
+    ends a line."""
+
+    earth: Annotated[bool, Option("--earth", off="--no-coastlines"), MAPS] = True
+    """Draw the Earth's coastlines where the data are lat,lon, unless there are others."""
 
     regions: Annotated[tuple[Mass, ...] | None, POINTS] = None
     """Masses such as 0.5,0.9: lines are drawn around the smallest regions that hold them."""

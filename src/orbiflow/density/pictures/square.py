@@ -167,7 +167,7 @@ class Square:
             return
         style: dict[str, Any] = {"fontsize": size, "color": frames.INK, "parse_math": False}
         label, at, texts = frames.angle_axis(self.view, 0)
-        axes.set_xticks(at, frames.legible(at, texts, side, sheet))
+        axes.set_xticks(at, frames.legible(at, texts, side, sheet.small))
         axes.set_xlabel(frames.shortened(label, side, sheet), **style)
         label, at, texts = frames.angle_axis(self.view, 1)
         axes.set_yticks(at, texts if labelled else [""] * len(at))

@@ -18,10 +18,12 @@ from PIL import Image, ImageDraw
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, midpoints
+from orbiflow.density.pictures.cell import Cell
 from orbiflow.density.pictures.colours import COLOURS, density_on_grid, density_on_map, shading
 from orbiflow.density.pictures.frames import view_of
 from orbiflow.density.pictures.maps import pixels_of
 from orbiflow.density.pictures.projections import chosen_map
+from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import RoundSpace, to_vectors
 
 SIZE = (360, 240)
@@ -56,12 +58,14 @@ def density_thumbnail(density: Density, data: ArrayLike) -> bytes:
     elif space.is_round:
         picture = _map(density, whole)
     elif space.dim == 2:
-        picture = _square(density)
-    elif space.dim == 1:
+        picture = _square(density) if space.has_square else _cell(density)
+    elif space.dim == 1 and space.has_square:
         picture = _histogram(density, whole)
     else:
         drawn = density.sample((SAMPLES,), torch.Generator().manual_seed(SEED))
         places = view_of(space).places(drawn)
+        if not space.has_square:
+            places = (places - places.min(axis=0)) / np.ptp(places, axis=0)
         picture = _pairs(places) if space.dim <= MAX_PAIRS else _stripes(places)
     sheet = Image.new("RGB", SIZE, PAPER)
     sheet.paste(picture, ((SIZE[0] - picture.width) // 2, (SIZE[1] - picture.height) // 2))
@@ -85,6 +89,13 @@ def _square(density: Density) -> Image.Image:
     areas = space.log_area(midpoints(space, COARSE)).exp().numpy().reshape(COARSE, COARSE)
     picture = _coloured(shading(values, areas, log=None).places(values).T[::-1])
     return picture.resize((SIZE[1], SIZE[1]), Image.Resampling.BICUBIC)
+
+
+def _cell(density: Density) -> Image.Image:
+    ground = Cell(density.space, PlotSettings())
+    picture = _coloured(ground.colouring(density, PlotSettings()).places[::-1])
+    picture.thumbnail(SIZE)
+    return picture
 
 
 def _map(density: Density, data: Array) -> Image.Image:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 import torch
@@ -69,19 +69,20 @@ class QuotientSpace(Space):
             raise OrbiflowError("a cell is for a group that is given by its name: leave it out")
         elif isinstance(group, Mapping):
             group = group_from_header(group, str(group.get("name", "")))
-        self.given = checked_group(group)
-        if self.given.dim > MAX_DIM:
+        self._given = checked_group(group)
+        if self._given.dim > MAX_DIM:
             raise OrbiflowError(
-                f"a quotient has {MAX_DIM} dimensions at most, not {self.given.dim}"
+                f"a quotient has {MAX_DIM} dimensions at most, not {self._given.dim}"
             )
-        size = (self.given.cell_volume / self.given.order) ** (1 / self.given.dim)
-        frame = frame_of(self.given)
+        self.data_group = self._given
+        size = (self._given.cell_volume / self._given.order) ** (1 / self._given.dim)
+        frame = frame_of(self._given)
         basis = frame.group.lattice
         turn = basis / np.linalg.norm(basis, axis=0) if frame.is_rectangular else np.eye(len(basis))
         self._to_chart = turn.T / size
         # on a rectangle whose axes the group keeps, fields can be splines
         keeps_axes = frame.own == frame.group.order
-        self.group = (frame.group if keeps_axes else self.given).conjugate(self._to_chart)
+        self.group = (frame.group if keeps_axes else self._given).conjugate(self._to_chart)
         self.columns = (
             COLUMNS[: self.dim] if self.dim <= 3 else tuple(f"x{k + 1}" for k in range(self.dim))
         )
@@ -98,7 +99,7 @@ class QuotientSpace(Space):
 
     @property
     def volume(self) -> float:
-        return self.given.cell_volume / self.given.order
+        return self._given.cell_volume / self._given.order
 
     def cover(self, data: ArrayLike) -> Tensor:
         what = f"points of {self.dim} coordinates"
@@ -109,14 +110,15 @@ class QuotientSpace(Space):
 
     def from_chart(self, points: Tensor) -> Array:
         own: Array = self.project(points).detach().double().cpu().numpy()
-        return np.linalg.solve(self._to_chart, own.T).T
+        data = cast(Array, np.linalg.solve(self._to_chart, own.T))
+        return data.T
 
     def data_gradient(self, data: ArrayLike, points: Tensor, gradient: Tensor) -> Array:
         del data, points
         return gradient.numpy() @ self._to_chart
 
     def settings(self) -> dict[str, Any]:
-        return {"group": {**group_header(self.given), "name": self.given.name}}
+        return {"group": {**group_header(self._given), "name": self._given.name}}
 
     def __repr__(self) -> str:
-        return f"QuotientSpace({self.given!r})"
+        return f"QuotientSpace({self._given!r})"

@@ -70,6 +70,7 @@ class Space(ABC):
 
     - `name`: Its name, such as "klein-bottle".
     - `group`: The group that acts on R^d, under which densities are invariant.
+    - `data_group`: The same group in the data's own coordinates, if data are points that it moves.
     - `columns`: Names of the data's columns.
     - `unit`: Unit of the data, None if the natural measure is in steradians.
     - `is_round`: Whether the natural measure is the area of the unit sphere.
@@ -82,6 +83,7 @@ class Space(ABC):
 
     name: str
     group: CrystallographicGroup
+    data_group: CrystallographicGroup | None = None
     columns: tuple[str, ...]
     unit: str | None = None
     is_round: ClassVar[bool] = False

@@ -17,6 +17,8 @@ from .occupancy import fit_occupancy as fit_occupancy
 from .occupancy import occupancy_loss as occupancy_loss
 from .overlap_search import OccupancySearch as OccupancySearch
 from .overlap_search import OverlapSearch as OverlapSearch
+from .refinement import TileVariations as TileVariations
+from .refinement import refine as refine
 from .search_method import Goal as Goal
 from .search_method import SearchMethod as SearchMethod
 from .tile_model import TileModel as TileModel

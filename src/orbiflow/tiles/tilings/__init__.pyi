@@ -5,6 +5,7 @@ from .colourings import colouring as colouring
 from .isohedral import CLASSES as CLASSES
 from .isohedral import IsohedralClass as IsohedralClass
 from .isohedral import PaperOperator as PaperOperator
+from .isohedral import commutant as commutant
 from .isohedral import isohedral_class as isohedral_class
 from .prototile import Prototile as Prototile
 from .prototile import Stabiliser as Stabiliser

@@ -1,0 +1,288 @@
+"""Tiles by a loss of one's own: descent in the linear space of the polygons that tile as one does.
+
+The images of a tile's vertices under its group meet its vertices. So a vertex is free, or the image
+of a free one; what elements of the group hold lies at their centre or on their mirror. If the group is
+moved by p -> M p + b, where M commutes with the point group (design point 7), all this is linear in
+the free vertices, M and b. Every simple polygon of that space tiles: sides match by construction, and
+the number of tiles over a point (`certify`) cannot jump on the way from the first one.
+"""
+
+import contextlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+import shapely
+import torch
+from scipy.spatial import KDTree
+from torch import Tensor
+
+from orbiflow.arguments import as_number, as_whole, described, is_tensor
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import NEVER, Cancel, one_blas_thread, one_thread
+from orbiflow.tiles.geometry import arc_lengths, signed_area
+from orbiflow.tiles.likeness import narrowest_neck
+from orbiflow.tiles.tile import EscherTile, TileSource
+from orbiflow.tiles.tilings import Tile, certify, commutant, edge_to_edge
+
+Loss = Callable[[Tensor], Tensor]
+"""A differentiable function of a polygon (N, 2), float64, that gives one number."""
+
+MAX_POINTS = 2000  # vertices, since matrices are dense
+SAME_POINT = 1e-6  # distance, in the lattice's basis, below which images of vertices are vertices
+HALVINGS = 25  # of a step, until it lowers the loss and the outline does not touch itself
+LEAST_GAIN = 1e-5  # of eight steps, as a share of what all gained, for the descent to go on
+# in square roots of the area
+SMOOTHING = 0.6  # wavelength below which moves are damped
+LONGEST_MOVE = 0.1  # of a vertex in one step
+CLEARANCE = 2e-3  # least width of gaps and necks
+LEAST_SIDE = 1e-6  # least distance of vertices that follow each other
+
+
+def refine(
+    tile: TileSource,
+    loss: Loss,
+    *,
+    pull: float = 0.0,
+    steps: int = 200,
+    points: int = 240,
+    cancel: Cancel = NEVER,
+) -> EscherTile:
+    """Change a tile so that a loss of your own becomes small, and return the certified tile.
+
+    There is no flow and no prototile: what changes is the polygon with its group, namely free vertices,
+    whose images the others are, and the lattice as far as the point group lets it. The area stays. A
+    step that would make the outline cross itself, or leave a gap or neck of less than 0.2 % of the
+    tile's size, is halved until it does not, and short waves are damped (Sobolev descent): the outline
+    cannot fold. The descent ends in a minimum, after `steps`, or where it cannot go on without a fold;
+    the notes of the tile say so.
+
+    Args:
+        tile: A certified tile to start from: an `EscherTile`, a `Tile` or the folder of a result.
+        loss: A differentiable function of the polygon (N, 2), a float64 tensor in the coordinates of
+            the tile. Vertices keep their order, so it may compare them one by one.
+        pull: The weight of likeness: of a term added to the loss, the mean squared distance of the
+            outline from where it was, in units of the tile's area.
+        steps: The largest number of steps.
+        points: About how many vertices there are, at most 2,000: longer sides are divided.
+        cancel: A token that stops the descent.
+
+    Raises:
+        OrbiflowError: for settings out of range, a tile with more than 2,000 vertices, or a loss that
+            does not give one finite, differentiable number for the tile.
+        CertificationError: if the tile is not certified to begin with.
+
+    >>> from orbiflow.tiles import isohedral_class
+    >>> ih4, wide = isohedral_class("IH4"), np.diag([1.2, 1 / 1.2])
+    >>> skewed = Tile(ih4.template() @ wide, ih4.group().conjugate(wide))
+    >>> regular = refine(skewed, lambda p: (p - p.roll(1, 0)).norm(dim=1).sum(), points=24)
+    >>> regular.certificate.valid, float(np.linalg.norm(regular.tile.polygon, axis=1).max().round(3))
+    (True, 1.0)
+    """
+    as_number(pull, "pull", 0)
+    as_whole(steps, "steps", 1)
+    as_whole(points, "points", 3, MAX_POINTS)
+    if not callable(loss):
+        how = "the loss must be a function of the polygon (N, 2), a tensor"
+        raise OrbiflowError(f"{how}, got {described(loss)}")
+    start = EscherTile.of(tile)
+    start.require_certified(otherwise="so no loss can be lowered from it: give a tile that is")
+    with one_thread(), one_blas_thread():
+        space = TileVariations(_divided(start.tile, points))
+        descent = _Descent(space, loss, pull)
+        for _ in range(steps):
+            cancel.check()
+            if not descent.step():
+                break
+        found = next(t for t in map(space.tile, reversed(descent.path)) if _is_certified(t))
+    return EscherTile(
+        found,
+        name=start.name,
+        y_down=start.y_down,
+        silhouette=start.silhouette,
+        no_map="its outline was changed by a loss of one's own",
+        notes=(descent.note(),),
+        thinnest=narrowest_neck(found.polygon),
+    )
+
+
+def _is_certified(tile: Tile) -> bool:
+    with contextlib.suppress(shapely.GEOSException):  # needles finer than rounding
+        return certify(tile).valid
+    return False
+
+
+def _divided(tile: Tile, points: int) -> Tile:
+    """Return the tile with a vertex where a neighbour has one, and its longer sides divided."""
+    own = edge_to_edge(tile).prototiles[0]
+    ring, along = own.ring, arc_lengths(own.ring)
+    if len(ring) > MAX_POINTS:
+        raise OrbiflowError(
+            f"the tile has {len(ring)} vertices, more than {MAX_POINTS}: simplify it"
+        )
+    # matching sides have lengths that differ by rounding, and are divided alike
+    pieces = np.ceil(np.diff(along) * (points / along[-1]) * (1 - 1e-6)).astype(np.int64)
+    first, side = np.cumsum(pieces) - pieces, np.repeat(np.arange(len(pieces)), pieces)
+    share = (np.arange(len(side)) - first[side]) / pieces[side]
+    polygon = ring[side] + share[:, None] * (np.roll(ring, -1, axis=0) - ring)[side]
+    corners = first[np.searchsorted(own.kept, own.corners)] if own.corners else ()
+    return Tile(polygon, tile.group, tile.isohedral_class, tuple(int(c) for c in corners))
+
+
+class TileVariations:
+    """The linear space of the polygons that tile as a given tile does, vertex by vertex.
+
+    Parameters are the free vertices, M over a basis of what commutes with the point group, and b;
+    `matrix` (2 N, P) takes them to the vertices.
+    """
+
+    def __init__(self, tile: Tile) -> None:
+        self.first, ring, group = tile, tile.polygon, tile.group
+        maps = [np.eye(2), *(np.array([[a, b], [b, -a]]) for a, b in commutant(group.linear_parts))]
+        if all(g.determinant > 0 for g in group.cosets):
+            maps.append(np.array([[0.0, -1.0], [1.0, 0.0]]))
+        self.maps = np.stack(maps)
+        vertex, source, linear, shift = self._images()
+        kept, place = np.unique(source, return_inverse=True)
+        # the mean over all elements that take a free vertex to a vertex
+        weight = 1 / np.bincount(vertex)[vertex, None, None]
+        matrix = np.zeros((len(ring), 2, 2 * len(kept) + len(maps) + 2))
+        free, lattice = np.split(matrix[..., :-2], [2 * len(kept)], axis=2)
+        pairs = free.reshape(len(ring), 2, -1, 2)
+        np.add.at(pairs.swapaxes(1, 2), (vertex, place), weight * linear)
+        np.add.at(lattice, vertex, weight * np.einsum("mij,kj->kim", self.maps, shift))
+        np.add.at(matrix[..., -2:], vertex, weight * (np.eye(2) - linear))
+        self.matrix = matrix.reshape(2 * len(ring), -1)
+        self.start = np.concatenate([ring[kept].ravel(), [1.0], np.zeros(len(maps) + 1)])
+
+    def _images(self) -> tuple[Array, Array, Array, Array]:
+        """Return (K,) vertices, the first vertices of their orbits, and R and t of p -> R p + t.
+
+        All elements of the group that take the latter to the former.
+        """
+        ring, group = self.first.polygon, self.first.group
+
+        def within_cell(points: Array) -> Array:
+            share = points @ group.inverse_lattice.T
+            return (share - np.floor(share)) % 1.0  # what is just below 0 ends up at 1
+
+        moved = np.stack([g(ring) for g in group.cosets])
+        around: dict[str, Any] = {"boxsize": 1.0}  # which the stubs believe to be a matrix
+        tree = KDTree(within_cell(ring), **around)
+        found: Any = tree.query_ball_point(within_cell(moved.reshape(-1, 2)), SAME_POINT)
+        pairs = np.array([(i, k) for k, near in enumerate(found) for i in near], dtype=np.int64)
+        vertex, coset, source = pairs[:, 0], *np.divmod(pairs[:, 1], len(ring))
+        first = np.full(len(ring), len(ring))
+        np.minimum.at(first, vertex, source)
+        vertex, coset, source = (part[source == first[vertex]] for part in (vertex, coset, source))
+        steps = np.round((ring[vertex] - moved[coset, source]) @ group.inverse_lattice.T)
+        shift = group.translations[coset] + steps @ group.lattice.T
+        return vertex, source, group.linear_parts[coset], shift
+
+    def polygon(self, parameters: Array) -> Array:
+        """Return the vertices (N, 2) for parameters (P,)."""
+        return (self.matrix @ parameters).reshape(-1, 2)
+
+    def tile(self, parameters: Array) -> Tile:
+        """Return the tile for parameters (P,), with the first tile's area."""
+        own, polygon = self.first, self.polygon(parameters)
+        linear = np.tensordot(parameters[-2 - len(self.maps) : -2], self.maps, 1)
+        group = own.group.conjugate(linear, parameters[-2:])
+        scale = np.sqrt(own.signed_area / signed_area(polygon))
+        tile = Tile(polygon, group, own.isohedral_class, own.corners)
+        return tile.transformed(scale * np.eye(2), (1 - scale) * own.center)
+
+
+class _Descent:
+    """Gradient descent in the space of a tile, with backtracking.
+
+    Moves are measured by their values and their slopes along the outline, and the length of a step is
+    that of Barzilai and Borwein (Two-Point Step Size Gradient Methods, 1988).
+    """
+
+    def __init__(self, space: TileVariations, loss: Loss, pull: float) -> None:
+        self.space, self.loss, self.pull = space, loss, pull
+        ring = space.first.polygon
+        self.size = float(np.sqrt(abs(space.first.signed_area)))
+        sides = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+        self.shares = (sides + np.roll(sides, 1)) / (2 * sides.sum())
+        moves = space.matrix.reshape(len(ring), 2, -1)
+        width = SMOOTHING * self.size / np.sqrt(sides * sides.sum())
+        slopes = (np.roll(moves, -1, axis=0) - moves) * width[:, None, None]
+        values = moves * np.sqrt(self.shares)[:, None, None]
+        flat = np.concatenate([values, slopes]).reshape(-1, moves.shape[2])
+        metric = flat.T @ flat
+        # what moves no vertex, such as a free one that a centre holds
+        metric[np.diag_indices_from(metric)] += 1e-10 * np.trace(metric) / len(metric)
+        self.metric = scipy.linalg.cho_factor(metric)
+        self.clearance = min(CLEARANCE, 0.5 * _clearance(shapely.Polygon(ring)))
+        value, self.gradient = self.evaluated(space.start)
+        if not np.isfinite([value, *self.gradient]).all():
+            raise OrbiflowError("the loss of the tile, or its gradient, is not a finite number")
+        self.path, self.values = [space.start], [value]
+        self.length, self.blocked = np.inf, False
+
+    def evaluated(self, parameters: Array) -> tuple[float, Array]:
+        """Return the loss of the tile for parameters (P,), and its gradient."""
+        first, own = self.space.first, torch.tensor(parameters, requires_grad=True)
+        polygon = (torch.tensor(self.space.matrix) @ own).reshape(-1, 2)
+        center, scale = torch.tensor(first.center), self.size / signed_area(polygon).abs().sqrt()
+        polygon = center + scale * (polygon - center)
+        value = self.loss(polygon)
+        if not is_tensor(value) or value.numel() != 1 or not value.requires_grad:
+            how = "one number that depends on the polygon by torch's operations"
+            raise OrbiflowError(f"the loss must give {how}, got {described(value)}")
+        away = (polygon - torch.tensor(first.polygon)).square().sum(dim=1) / self.size**2
+        total = value.reshape(()).double() + self.pull * (away @ torch.tensor(self.shares))
+        (gradient,) = torch.autograd.grad(total, own)
+        return float(total.detach()), gradient.numpy()
+
+    def step(self) -> bool:
+        """Take one step, halved until it is allowed; return whether it was worth it."""
+        here, last, before = self.path[-1], self.values[-1], self.gradient
+        move: Array = -scipy.linalg.cho_solve(self.metric, before)
+        longest = float(np.linalg.norm(self.space.polygon(move), axis=1).max())
+        slope = float(before @ move)
+        if not (slope < 0 and longest > 0):
+            return False
+        self.blocked = False
+        length = min(self.length, LONGEST_MOVE * self.size / longest)
+        for _ in range(HALVINGS):
+            there = here + length * move
+            outline = shapely.Polygon(self.space.polygon(there))
+            if not outline.is_valid or _clearance(outline) < self.clearance:
+                self.blocked = True
+            else:
+                value, gradient = self.evaluated(there)
+                if value <= last + 1e-4 * length * slope and np.isfinite(gradient).all():
+                    break
+            length /= 2
+        else:
+            return False
+        bend = float(move @ (gradient - before))
+        self.length = -length * slope / bend if bend > 0 else np.inf
+        self.gradient = gradient
+        self.path.append(there)
+        self.values.append(value)
+        return self.values[-8:][0] - value > LEAST_GAIN * (self.values[0] - value)
+
+    def note(self) -> str:
+        """Return in words what the descent did."""
+        first, last, count = self.values[0], self.values[-1], len(self.path) - 1
+        cut = ", the last of them cut short, as the outline would have touched itself"
+        done = f"a loss of one's own was lowered from {first:.4g} to {last:.4g} in {count} steps"
+        return done + cut * self.blocked
+
+
+def _clearance(outline: shapely.Polygon) -> float:
+    """Return the least distance of parts of an outline from others, in square roots of its area.
+
+    Vertices that crowd together count as one, unless they come so near that rounding matters.
+    """
+    size = float(np.sqrt(outline.area))
+    if outline.minimum_clearance < LEAST_SIDE * size:
+        return 0.0
+    thinned = shapely.remove_repeated_points(outline, 3 * CLEARANCE * size)
+    return float(thinned.minimum_clearance) / size

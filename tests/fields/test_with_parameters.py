@@ -1,0 +1,81 @@
+"""Fields whose parameters come from elsewhere, such as a network that knows a context."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from hypothesis import given, settings
+from torch import Tensor
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import FourierField, SplineField
+from orbiflow.flows import Flow
+from orbiflow.symmetry import CrystallographicGroup, wallpaper_group
+from strategies import (
+    largest,
+    map_equivariance_error,
+    plane_groups,
+    random_field,
+    random_tensor,
+    seeds,
+)
+
+SQUARE = wallpaper_group("p1", [[1.0, 0.0], [0.0, 1.0]])
+
+
+@settings(max_examples=10)
+@given(plane_groups, seeds)
+def test_every_context_has_the_symmetry(group: CrystallographicGroup, seed: int) -> None:
+    field = FourierField(group, 2)
+    network = torch.nn.Linear(2, 2 * field.size).double()
+    context, points = random_tensor(seed, 3, 2), random_tensor(seed, 4, 2)
+    rows = [gentle(field, own) for own in network(context).chunk(2, dim=-1)]
+    flow = Flow([field.with_parameters(own) for own in rows], steps=2)
+    together = flow(points.expand(3, -1, -1))
+    for index in range(3):
+        alone = Flow([field.with_parameters(own[index]) for own in rows], steps=2)
+        assert largest(alone(points) - together[index]) < 1e-10
+        assert map_equivariance_error(alone, group, points) < 1e-9
+
+
+def gentle(field: FourierField, rows: Tensor) -> Tensor:
+    """The parameters, made smaller where their fields are steep."""
+    bounds = field.with_parameters(rows).lipschitz_bound()
+    return rows / bounds.clamp(min=1.0)[:, None]
+
+
+def test_the_network_learns_and_the_field_stays() -> None:
+    field = random_field(SQUARE, 2, 0)
+    before = field.parameters_.detach().clone()
+    network = torch.nn.Linear(1, field.size).double()
+    flow = Flow(field.with_parameters(network(random_tensor(0, 5, 1))), bijective=True)
+    flow.inverse_and_log_det(random_tensor(1, 5, 3, 2))[1].sum().backward()
+    assert network.weight.grad is not None
+    assert largest(network.weight.grad) > 0
+    assert field.parameters_.grad is None
+    assert torch.equal(field.parameters_, before)
+    assert list(field.with_parameters(before).parameters()) == []
+
+
+def test_a_spline_takes_one_row() -> None:
+    spline, own = SplineField(SQUARE, 2), random_field(SQUARE, 2, 3).parameters_
+    points = random_tensor(0, 5, 2)
+    expected = SplineField(SQUARE, 2)
+    with torch.no_grad():
+        expected.parameters_.copy_(own)
+    assert torch.equal(spline.with_parameters(own)(points), expected(points))
+    with pytest.raises(OrbiflowError, match=r"of shape \(\d+,\), got \(2, \d+\)"):
+        spline.with_parameters(own.expand(2, -1))
+
+
+@pytest.mark.parametrize("shape", [(), (3,), (2, 3), (2, 2, 50)])
+def test_other_shapes_are_refused(shape: tuple[int, ...]) -> None:
+    field = FourierField(SQUARE, 2)
+    with pytest.raises(OrbiflowError, match=r"shape \(50,\) or \(S, 50\), got"):
+        field.with_parameters(torch.zeros(shape, dtype=torch.float64))
+
+
+def test_another_dtype_is_refused() -> None:
+    field = FourierField(SQUARE, 2)
+    with pytest.raises(OrbiflowError, match=r"dtype, torch.float64, got torch.float32"):
+        field.with_parameters(torch.zeros(field.size))
