@@ -21,7 +21,7 @@ from orbiflow.density.fitting.chains import (
 from orbiflow.density.fitting.kernels import NARROWEST, fit_mixture, kernel_estimates
 from orbiflow.density.fitting.rows import Rows, gain_of, is_whole, with_incomplete
 from orbiflow.density.inference import at_observed
-from orbiflow.density.models import Density, averaged_networks
+from orbiflow.density.models import MOST_DIM, Density, averaged_networks
 from orbiflow.density.spaces import Space, Torus
 
 SIZES = (1, 2, 4, 8, 16, 32, 64)
@@ -37,7 +37,8 @@ MOST_MIXED, MOST_CHAINED = 20_000, 12_000
 """Rows that mixtures and chains are fitted to at most."""
 
 TELLING = 500
-"""Rows held out by which kernels without a weight, and without a neighbour of any, are left out."""
+"""Rows held out by which kernels without a weight, and without a neighbour of any, are left out; in
+more than `MOST_DIM` dimensions all are of use."""
 
 CLEARLY = 2.0
 """Standard errors by which a larger mixture must be worse to be the last that is tried."""
@@ -88,7 +89,7 @@ class KernelFamily(Family):
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
         say("kernels")
         found = self._estimates(train, self._names)
-        if number == 0 and len(held) >= TELLING:
+        if number == 0 and len(held) >= TELLING and self.space.dim <= MOST_DIM:
             self._names = list(found)
         return found
 
