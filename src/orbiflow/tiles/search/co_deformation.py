@@ -105,11 +105,14 @@ class _Reduced:
         return self.real @ self.parameters + 1j * (self.imaginary @ self.parameters)
 
 
-# Of the search: bodies and heads are stiff; thin parts are not, and keep their places. Tiles bent so
-# are seen to be more like the silhouette: docs/likeness.md has the comparison.
-FIRM = Stiffness(salience=-0.5, pose=60.0)
-# Of the search where too few tiles of a firm body are simple: many long limbs, which cross
-SOFT = Stiffness(salience=0.0)
+# Thin parts of a soft body are as stiff as others, and it may leave its pose: long limbs find a way
+# where those of firmer bodies cross. In firmer ones bodies and heads are stiff, thin parts are not, and
+# all keep their places, the more the stiffer. docs/likeness.md has the comparison.
+BODIES = {
+    "soft": Stiffness(salience=0.0),
+    "firm": Stiffness(salience=-0.5, pose=60.0),
+    "stiff": Stiffness(salience=-0.5, pose=600.0),
+}
 
 
 @dataclass(frozen=True, eq=False)

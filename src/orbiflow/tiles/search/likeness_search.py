@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.settings import Range, Settings
@@ -17,11 +17,30 @@ from orbiflow.tiles.tilings import IsohedralClass
 if TYPE_CHECKING:
     from orbiflow.tiles.search.co_deformation import Hand
 
+Body = Literal["soft", "firm", "stiff"]
+ALL_BODIES: tuple[Body, ...] = ("soft", "firm", "stiff")
+
 # Settings of the preview
 SKETCH = {"placements": 60, "held": 6, "starts": 1, "share": 0.1, "finalists": 1, "rounds": 10}
 
-FAST = {"placements": 80, "held": 20, "starts": 8, "share": 0.15, "finalists": 2, "rounds": 12}
-BEST = {"placements": 1500, "held": 300, "starts": 128, "share": 1.0, "finalists": 12, "rounds": 40}
+FAST = {
+    "placements": 80,
+    "held": 12,
+    "starts": 5,
+    "share": 0.15,
+    "finalists": 2,
+    "rounds": 12,
+    "bodies": ALL_BODIES,
+}
+BEST = {
+    "placements": 800,
+    "held": 160,
+    "starts": 64,
+    "share": 0.6,
+    "finalists": 8,
+    "rounds": 40,
+    "bodies": ALL_BODIES,
+}
 
 
 class LikenessSearch(Settings, SearchMethod):
@@ -34,6 +53,7 @@ class LikenessSearch(Settings, SearchMethod):
     - `finalists`: of what comes of it, the best that are worked out with all of the outline's detail,
       a class and hand.
     - `rounds`: steps of the minimisation for finalists.
+    - `bodies`: how stiff the silhouette is, from soft to stiff; each is searched, with all of the above.
     - `below`: levels of effort below that are searched, too, so that more effort never finds less.
     - `multiples`: points of a tile for each point of the search, the first that holds the corners.
     - `min_neck`: width of necks below which a tile's score falls, in square roots of the area; if
@@ -56,6 +76,7 @@ class LikenessSearch(Settings, SearchMethod):
     share: Annotated[float, Range(above=0, most=1)] = 0.3
     finalists: Count = 5
     rounds: Count = 20
+    bodies: tuple[Body, ...] = ("firm",)
     below: Annotated[int, Range(0, 2)] = 0
     multiples: tuple[Count, ...] = (4, 6)
     min_neck: Annotated[float, Range(0, 0.2)] = 0.01
@@ -97,7 +118,7 @@ class LikenessSearch(Settings, SearchMethod):
         Each has twice as many starts as finalists at least, where more are wanted.
 
         >>> [own.starts for own in LikenessSearch.for_effort("best").searches()]
-        [8, 32, 128]
+        [5, 32, 64]
         """
         normal = {name: getattr(LikenessSearch, name) for name in FAST}
         found: list[LikenessSearch] = []
