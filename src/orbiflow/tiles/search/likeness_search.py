@@ -43,6 +43,7 @@ class LikenessSearch(Settings, SearchMethod):
 
     objective: ClassVar[str] = "likeness"
     takes_pins: ClassVar[bool] = True
+    takes_symmetric: ClassVar[bool] = True
     modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.bending",)
     efforts: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "fast": FAST,

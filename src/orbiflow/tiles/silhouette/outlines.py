@@ -241,7 +241,7 @@ def _simple_coarse(ring: Array, count: int, phase: float) -> Array:
             thick = thick[::-1] if not grown.exterior.is_ccw else thick
             start = int(np.argmin(np.linalg.norm(thick - ring[0], axis=1)))
             thick = np.roll(thick, -start, axis=0)
-        for points in dict.fromkeys((count, min(MAX_POINTS, 3 * count // 2), MAX_POINTS)):
+        for points in dict.fromkeys((count, min(MAX_POINTS, 6 * (count // 4)), MAX_POINTS)):
             coarse = resampled(thick, points, phase)
             if shapely.Polygon(coarse).is_valid:
                 return coarse
