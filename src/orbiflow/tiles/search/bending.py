@@ -80,7 +80,8 @@ def bent_tiles(
     found: list[Bent] = []
     dropped = done = 0
     sides = both[:1] if template_symmetries(kind)[1] else both
-    tasks = [(hand, own) for own in settings.searches(wanted) for hand in sides]
+    searches = settings.searches(wanted, symmetric=len(kind.stabiliser) > 1)
+    tasks = [(hand, own) for own in searches for hand in sides]
     work = sum(own.starts for _, own in tasks)
     for hand, own in tasks:
         sound, crossed = _finalists(hand, FIRM, kind, own, cancel)

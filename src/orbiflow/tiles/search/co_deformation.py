@@ -134,18 +134,19 @@ class Hand:
         return self.made("coarse", stiffness), self.made(middle, stiffness), fine
 
 
-@lru_cache(maxsize=2)  # one serves all classes
+@lru_cache(maxsize=4)  # one serves most classes
 def hands(
     target: Target,
     settings: LikenessSearch,
     *,
     emphasis: Emphasis | None = None,
     pins: Pins | None = None,
+    step: int = 6,
 ) -> tuple[Hand, Hand]:
-    """The silhouette and its mirror image in the x axis, ready to be bent."""
+    """The silhouette and its mirror image in the x axis, with a multiple of `step` points."""
     phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
     outline = np.asarray(target.normal)
-    samples = sampled(outline, phase, settings.multiples)
+    samples = sampled(outline, phase, settings.multiples, step)
     # read backwards from the same first point: every k-th fine point stays beside a coarse one
     mirror = Samples(*(reverse(part) * (1.0, -1.0) for part in samples))
 

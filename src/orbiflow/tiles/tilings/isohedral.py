@@ -255,6 +255,11 @@ class IsohedralClass:
         return edge_classes(self._edges)
 
     @property
+    def divisor(self) -> int:
+        """A divisor of the number of steps round a tile whose edges of one class have as many each."""
+        return math.gcd(*(len(own.edges) for own in self.edge_classes))
+
+    @property
     def shape_dim(self) -> int:
         """Number of shape parameters of the template: 2 for the pentagons of the nine, else 0."""
         return 0
