@@ -17,6 +17,8 @@ from .metrics import hausdorff as hausdorff
 from .metrics import iou as iou
 from .metrics import pixel_accuracy as pixel_accuracy
 from .metrics import prepared_region as prepared_region
+from .near_symmetry import NearSymmetry as NearSymmetry
+from .near_symmetry import near_symmetry as near_symmetry
 from .necks import Thinnest as Thinnest
 from .necks import hair_share as hair_share
 from .necks import least_neck as least_neck

@@ -79,7 +79,7 @@ def bent_tiles(
     found: list[Bent] = []
     dropped = done = 0
     sides = both[:1] if template_symmetries(kind)[1] else both
-    searches = settings.searches(wanted)
+    searches = settings.searches(wanted, symmetric=len(kind.stabiliser) > 1)
     tasks = [(hand, own, body) for own in searches for body in own.bodies for hand in sides]
     work = sum(own.starts for _, own, _ in tasks)
     for hand, own, body in tasks:

@@ -3,6 +3,7 @@ from .certificate import certify as certify
 from .colourings import Colouring as Colouring
 from .colourings import colouring as colouring
 from .isohedral import CLASSES as CLASSES
+from .isohedral import ISOHEDRAL_TYPES as ISOHEDRAL_TYPES
 from .isohedral import IsohedralClass as IsohedralClass
 from .isohedral import PaperOperator as PaperOperator
 from .isohedral import commutant as commutant
