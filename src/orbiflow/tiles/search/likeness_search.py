@@ -124,13 +124,9 @@ class LikenessSearch(Settings, SearchMethod):
         which have half the freedom, half as much is tried, and level "fast" alone if nothing is above.
 
         >>> [own.starts for own in LikenessSearch.for_effort("best").searches()]
-<<<<<<< HEAD
         [5, 32, 64]
-=======
-        [8, 32, 128]
         >>> [own.starts for own in LikenessSearch.for_effort("best").searches(symmetric=True)]
-        [16, 64]
->>>>>>> symtiles
+        [16, 32]
         """
         normal = {name: getattr(LikenessSearch, name) for name in FAST}
         found: list[LikenessSearch] = []
