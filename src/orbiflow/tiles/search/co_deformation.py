@@ -264,7 +264,7 @@ def _neighbours(
     options = Placements(lengths, starts, own.turns[owners], own.gains[owners])
     if share >= 1 or not len(owners):
         return owners, options
-    apart = TileSpace(kind, options).nearest(drawn.points[: body.size, owners].T).distance
+    apart = TileSpace(kind, options).distances(drawn.points[: body.size, owners].T)
     order = np.lexsort((apart, owners))
     rank = np.arange(len(order)) - np.searchsorted(owners[order], owners[order])
     count = np.bincount(owners, minlength=len(drawn.costs))[owners[order]]
