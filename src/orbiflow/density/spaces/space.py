@@ -123,8 +123,8 @@ class Space(ABC):
 
     @property
     def dimensions(self) -> str:
-        """The dimension, as a message says it that asks for two."""
-        return str(self.dim) if self.has_square else f"{self.dim} and no chart of the square"
+        """The dimension, as a message says it that asks for a chart of the square."""
+        return str(self.dim) if self.has_square else f"{self.dim}, but no square for a chart"
 
     @property
     def widths(self) -> tuple[int, ...]:
