@@ -49,7 +49,10 @@ def axes_named(wanted: Sequence[str | int], names: Sequence[str]) -> list[int]:
     >>> axes_named(["psi", 0], ["phi", "psi"])
     [1, 0]
     """
-    return [_named_axis(one, names) for one in wanted]
+    axes = [_named_axis(one, names) for one in wanted]
+    for twice in [axis for k, axis in enumerate(axes) if axis in axes[:k]]:
+        raise OrbiflowError(f"column {names[twice]!r} is given twice: name each once")
+    return axes
 
 
 def _named_axis(wanted: Any, names: Sequence[str]) -> int:
