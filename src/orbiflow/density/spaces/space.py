@@ -52,7 +52,7 @@ SPACE_CLASSES: dict[str, type[Space]] = {}
 
 
 class Space(ABC):
-    """R^d modulo a crystallographic group (design points 12 and 20), or a sphere modulo a finite one.
+    """R^d modulo a crystallographic group (design points 12 and 19), or a sphere modulo a finite one.
 
     Points in the chart are float tensors (..., d), and any point of an orbit stands for it. Data are
     arrays (N, k) in the user's units.
