@@ -295,6 +295,12 @@ def test_two_data_sets_on_a_quotient(tmp_path: Path, orbiflow: Any) -> None:
     assert done.status == 0, done.err
     assert "no cell was given" not in done.out
     assert re.search("one and other|the data cannot tell", done.out)
+    fit = ("density", "fit", one, *QUICK, "--space", "p4gm", "--out", tmp_path / "m")
+    fitted = orbiflow(*fit, "--cell", "10,10")
+    assert fitted.status == 0, fitted.err
+    report = json.loads((tmp_path / "m" / "report.json").read_text())
+    assert report["log_likelihood"]["uniform"] == pytest.approx(-np.log(12.5))
+    assert "no cell was given: its lengths are taken to be about 1" in orbiflow(*fit).out
     for given, message in (
         (("p4g", "--cell", "10"), "--cell must be a,b or a,b,gamma"),
         (("p4g", "--cell", "10,10", "--unit", "degrees"), "--unit applies only to angles"),

@@ -347,6 +347,7 @@ REFUSED = {
     r"row 2: the vector .* has length 2": lambda: space3.to_chart([[0, 0, 0, 1.0], [0, 0, 0, 2.0]]),
     r"expected an array \(N, 4\)": lambda: space3.to_chart([[0.0, 0.0, 1.0]]),
     "must be unit vectors": lambda: kernels(space3, 0).log_prob(torch.zeros(1, 4)),
+    "not 1: .*; latitude and longitude are for": lambda: Hypersphere(1).to_chart([[31.1, 35.5]]),
     "row 1: .* is no rotation matrix": lambda: RotationSpace().to_chart([[1.0] * 9]),
     "row 1: .* more than a turn in radians": lambda: RotationSpace().to_chart([[0.0, 0.0, 90.0]]),
     "more than a turn in degrees": lambda: CubicOrientations(form="ZXZ", unit="degrees").to_chart(
