@@ -298,6 +298,7 @@ def test_two_data_sets_on_a_quotient(tmp_path: Path, orbiflow: Any) -> None:
     fit = ("density", "fit", one, *QUICK, "--space", "p4gm", "--out", tmp_path / "m")
     fitted = orbiflow(*fit, "--cell", "10,10")
     assert fitted.status == 0, fitted.err
+    assert "-0.0000" not in fitted.out + done.out
     report = json.loads((tmp_path / "m" / "report.json").read_text())
     assert report["log_likelihood"]["uniform"] == pytest.approx(-np.log(12.5))
     assert "no cell was given: its lengths are taken to be about 1" in orbiflow(*fit).out

@@ -292,7 +292,12 @@ def cv_page(
 
 
 def _signed(value: float, sign: str = "-") -> str:
-    return f"{value:{sign}.4f}".replace("-", "\N{MINUS SIGN}")
+    """Return a figure, whose sign is no minus if it is rounded to 0.
+
+    >>> _signed(-1e-9, "+"), _signed(-0.5)
+    ('+0.0000', '−0.5000')
+    """
+    return f"{value:{sign}z.4f}".replace("-", "\N{MINUS SIGN}")
 
 
 Strip = tuple[str, Sequence[float], tuple[float, ...]]
@@ -322,7 +327,7 @@ def _pictures(
     )
 
 
-WIDTH, NAMES, MARGIN, STEP = 720, 300, 24, 34
+WIDTH, NAMES, MARGIN, STEP = 720, 300, 36, 34
 """Pixels: of the picture, of names at its left at most, of the free right margin, of a strip."""
 
 LETTER = 7.6

@@ -154,7 +154,7 @@ def _words(document: Mapping[str, Any], rows: int, out: Path) -> tuple[str, str]
     scored = likelihood["natural_rows"]
     which = "these rows" if scored == rows else f"{scored} of them"
     return (
-        f"{rows} rows: mean log density at {which} {likelihood['natural']:.4f} nats, {gain:.4f} more "
+        f"{rows} rows: mean log density at {which} {likelihood['natural']:.4f} nats, {gain:z.4f} more "
         f"than the uniform density; integral {'not checked' if mass is None else f'{mass:.5f}'}",
         f"written to {out} in {document['seconds']:.0f} s",
     )
