@@ -90,8 +90,7 @@ def shared_lengths(tiling: Tiling, placed: Sequence[Placed]) -> dict[tuple[int, 
     """The lengths of boundary that pairs of tiles share, by areas that shapely measures.
 
     A tile made wider by a little overlaps what it shares boundary with by that times the length. What
-    it meets at a small angle it overlaps by the square of that: twice as wide, it overlaps four times
-    as much.
+    it meets at a small angle it overlaps by the square of that: by four times as much if twice as wide.
     """
     little = 1e-8 * math.sqrt(tiling.tile_area)
     shapes = [shapely.Polygon(g(tiling.prototiles[g.prototile].polygon)) for g in placed]
