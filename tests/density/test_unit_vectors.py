@@ -408,7 +408,7 @@ def test_the_commands_fit_score_sample_and_find_regions_of_rotations(
         more = {"columns": ("rx",)} if name == "marginal" else {}
         with pytest.raises(OrbiflowError, match=message):
             find(f"density {name}").call({"model": folder, "out": tmp_path / name, **more}).run()
-    with pytest.raises(OrbiflowError, match="not of points of a rotation-space"):
+    with pytest.raises(OrbiflowError, match="no summary of points of the rotation-space"):
         run("summary", data=table, space="rotation-space")
     with pytest.raises(OrbiflowError, match="GeoJSON is for places on a globe"):
         run("region", model=folder, out=tmp_path / "regions.geojson")
