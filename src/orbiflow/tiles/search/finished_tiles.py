@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -15,16 +14,7 @@ from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import one_blas_thread, one_thread
-from orbiflow.tiles.geometry import ring_length, signed_area
-from orbiflow.tiles.likeness import (
-    Pinned,
-    Rating,
-    Recogniser,
-    compare,
-    iou,
-    likeness_ratings,
-    narrowest_neck,
-)
+from orbiflow.tiles.likeness import Pinned, Rating, Recogniser, compare, iou, narrowest_neck
 from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
 from orbiflow.tiles.search.candidates import Fit, StillTiles
@@ -122,12 +112,13 @@ def rated(tiles: Sequence[EscherTile], target: Target) -> list[EscherTile]:
     """Return the tiles of a run with their ratings, in the same order."""
     if is_hopeless(target):
         return [tile.changed(rating=Rating(1)) for tile in tiles]
-    length = ring_length(target.outline) / math.sqrt(abs(signed_area(target.outline)))
-    likeness = [tile.score for tile in tiles if tile.fidelity is not None]
-    found = iter(likeness_ratings(likeness, length))
     return [
         # no marks of tiles for overlap are kept: their scores are taken for marks
-        tile.changed(rating=next(found) if tile.fidelity else Rating.of_mark(10 * tile.score - 1))
+        tile.changed(
+            rating=Rating.of_likeness(tile.score)
+            if tile.fidelity
+            else Rating.of_mark(10 * tile.score - 1)
+        )
         for tile in tiles
     ]
 
