@@ -64,16 +64,17 @@ from orbiflow.tiles.likeness.elastic import POSE_WEIGHT
 from orbiflow.tiles.search import bending
 from orbiflow.tiles.search.bending import Bent, PlacedBent, placed_best, prototile
 from orbiflow.tiles.search.candidates import StillTiles
-from orbiflow.tiles.search.co_deformation import FIRM, SOFT, Hand, hands
+from orbiflow.tiles.search.co_deformation import BODIES as SEARCHED
+from orbiflow.tiles.search.co_deformation import Hand, hands
 from orbiflow.tiles.search.finished_tiles import recogniser
 from orbiflow.tiles.search.starts import template_symmetries
 
 SEED, COUNT, ALIKE, SAME = 25, 20, 0.9, 0.97
 BODIES = {
-    "soft": SOFT,
-    "firm": FIRM,
-    "firm-600": replace(FIRM, pose=600.0),
-    "firm-6000": replace(FIRM, pose=6000.0),
+    "soft": SEARCHED["soft"],
+    "firm": SEARCHED["firm"],
+    "firm-600": SEARCHED["stiff"],
+    "firm-6000": replace(SEARCHED["stiff"], pose=6000.0),
 }
 """Bodies by their pull to the pose, which is 3, 60, 600 and 6,000."""
 

@@ -4,6 +4,7 @@ import importlib
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -50,38 +51,65 @@ def test_agreement_is_of_what_both_have_marked(marks) -> None:
     assert whole < 0.9
 
 
-def test_marked_tiles_are_published(marks, tmp_path: Path, capsys, monkeypatch) -> None:
+@pytest.fixture(name="pool")
+def pool_fixture(tmp_path: Path) -> Path:
+    """A folder with three tiles of an elk, the worst first, and two readings of their marks."""
     ring = np.column_stack([np.cos(a := np.linspace(0, 6, 120)), np.sin(a)])
-    values = {"pieces": [0.12347, 0.2, 0.3], "cost": 0.5}
-    tiles = [
-        {
-            "method": "firm",
-            "class": "IH4",
-            "score": 0.5,
-            "values": values,
-            "bent": (k * ring).tolist(),
-        }
-        for k in (1, 2, 3)
-    ]
+    usual = {"notches": 0.3, "narrowed": 0.037, "necks": 0.0, "cost": 0.25}
+    usual |= {"energy": 0.2, "displacement": 0.05, "neck": 0.4, "iou": 0.7}
+
+    def tile(method: str, taller: float, damage: float) -> dict[str, Any]:
+        values = {name: damage * value for name, value in usual.items()}
+        values["pieces"] = [damage * x for x in (0.12, 0.16, 0.13)]
+        bent = (3 * ring * (1, taller)).tolist()
+        return {"method": method, "class": "IH4", "score": 0.8, "values": values, "bent": bent}
+
+    tiles = [tile("overlap", 1.6, 1), tile("est", 1.2, 0.8), tile("firm", 1, 0.6)]
     document = {"part": "learn", "least_neck": 0.01, "length": 8.0, "rest": ring.tolist()}
     (tmp_path / "tiles").mkdir()
     (tmp_path / "tiles" / "elk.json").write_text(json.dumps({**document, "tiles": tiles}))
     (tmp_path / "key.json").write_text(json.dumps(KEY))
     (tmp_path / "a.json").write_text(json.dumps({**FIRST, "marks": {"elk": [9, 1, 5]}}))
     (tmp_path / "b.json").write_text(json.dumps(SECOND))
-    words = ["marks", "publish", "--out", str(tmp_path), "--to", str(tmp_path / "all.json")]
-    monkeypatch.setattr(sys, "argv", [*words, str(tmp_path / "a.json"), str(tmp_path / "b.json")])
+    return tmp_path
+
+
+def test_marked_tiles_are_published(marks, pool: Path, capsys, monkeypatch) -> None:
+    words = ["marks", "publish", "--out", str(pool), "--to", str(pool / "all.json")]
+    monkeypatch.setattr(sys, "argv", [*words, str(pool / "a.json"), str(pool / "b.json")])
     marks.main()
     assert "1 silhouettes" in capsys.readouterr().out
-    found = json.loads((tmp_path / "all.json").read_text())["silhouettes"]["elk"]
+    found = json.loads((pool / "all.json").read_text())["silhouettes"]["elk"]
     assert [tile["marks"] for tile in found["tiles"]] == [
         {"A1": 1, "A2": 2},
         {"A1": 5, "A2": 5},
         {"A1": 9, "A2": 8},
     ]
-    assert found["tiles"][0]["values"]["pieces"] == [0.1235, 0.2, 0.3]
+    first, _, last = (tile["values"] for tile in found["tiles"])
+    assert last["pieces"] == [0, 0]  # measured anew
+    assert first["stretched"] > 0.01
+    assert last["length"] == pytest.approx(6 / np.sqrt(np.pi), rel=0.05)
+    assert first["before"] == 0.5  # the usual values of that order
+    assert ("overlap" in first, "overlap" in last) == (True, False)
     own = np.array(found["tiles"][2]["outline"]).reshape(-1, 2) / 3000
     assert own == pytest.approx(np.array(found["rest"]).reshape(-1, 2) / 1000, abs=1e-3)
-    monkeypatch.setattr(sys, "argv", [*words, *[str(tmp_path / "a.json")] * 2])
+    monkeypatch.setattr(sys, "argv", [*words, *[str(pool / "a.json")] * 2])
     with pytest.raises(SystemExit, match="A1 has marked elk before"):
         marks.main()
+
+
+def test_the_order_is_compared_with_what_was_published(
+    marks, pool: Path, capsys, monkeypatch
+) -> None:
+    document = json.loads((pool / "tiles" / "elk.json").read_text())
+    own = marks.published(document, {"A1": [1, 5, 9], "A2": [2, 5, 8]})
+    worse = marks.published(document, {"A1": [7, 2, 1], "A2": [7, 2, 2]})
+    both = {"silhouettes": {"elk": own, "owl": own, "bat": worse | {"part": "test"}}}
+    (pool / "all.json").write_text(json.dumps(both))
+    monkeypatch.setattr(sys, "argv", ["marks", "order", str(pool / "all.json")])
+    marks.main()
+    lines = capsys.readouterr().out.splitlines()
+    orders = [line.split()[-3:] for line in lines if line.startswith("the order  ")]
+    assert orders == [["1.00", "8.50", "0.00"], ["-1.00", "1.50", "5.50"]]
+    assert "learn: 6 tiles of 2 silhouettes" in lines
+    assert sum("fitted to the others" in line for line in lines) == 1

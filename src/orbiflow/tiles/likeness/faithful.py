@@ -11,9 +11,6 @@ The mark that people would give is foretold from four measures, none of which de
 - `thickness`: where limbs and bodies have become thin or fat, by the largest disc inside that touches
   the outline (the medial axis; found as by Ma, Bae and Choi, 3D medial axis point approximation, 2012).
 
-A fifth, `necks`, avoids threads that no cutter can make: how much narrower than half the inside has
-become at its worst place.
-
 Outlines correspond point by point: this compares a shape with the one that was bent into it.
 """
 
@@ -37,19 +34,24 @@ PIECE_LENGTHS = (0.08, 0.25)  # the lengths of the pieces, as shares of the outl
 WIDTH_OFFSET = 0.02
 LARGEST_STRETCH = 2.0  # the largest logarithm of a stretch that counts
 # Values of two pieces, `stretched` and `thickness`: those below which differences matter little, those
-# of a tile of medium likeness, and the weights of their logarithms
+# of a tile of medium likeness, and the marks that a unit of their logarithms costs
 NEGLIGIBLE = (0.05, 0.05, 0.02, 0.02)
-USUAL_VALUES = (0.14, 0.123, 0.022, 0.104)
-WEIGHTS = (2.1, 2.5, 0.4, 0.6)
-# Rough outlines forgive more: for the logarithm of the outline's length, in square roots of its area
-LENGTH_WEIGHT, USUAL_LENGTH = 2.7, 6.5
-LENGTHS = (4.2, 10.4)  # lengths that were marked
-USUAL_MARK = 5.8
-NECK_WEIGHT = 0.35
-GOOD_MARK, STEEPNESS = (
-    6.1,
-    2.0,
-)  # of people who give marks, half find it good, and how fast that grows
+USUAL_VALUES = (0.137, 0.12, 0.021, 0.105)
+WEIGHTS = (1.5, 1.9, 0.3, 0.5)
+# Rough outlines forgive more: marks for the logarithm of the outline's length, and lengths, in square
+# roots of the area: the usual one, and the extremes of those that were marked
+LENGTH_WEIGHT, USUAL_LENGTH, LENGTHS = 2.0, 6.5, (4.2, 10.9)
+USUAL_MARK = 5.9  # of a tile with usual values and of usual length
+# The foretold mark at which half of the people find a tile good, 6.5 or more, and how fast their log
+# odds grow with it
+GOOD_MARK, STEEPNESS = 6.1, 1.9
+# What has happened where each of the measures costs marks
+LOST = (
+    "small parts such as ears and feet have lost their shapes",
+    "heads and limbs are bent",
+    "some parts have shrunk while others have grown",
+    "limbs or body have become thinner or thicker",
+)
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,6 @@ class Fidelity:
     - `pieces`: The misfits of pieces of two lengths, short and long.
     - `stretched`: The mean square of the logarithm of the outline's stretch.
     - `thickness`: The mean square of the logarithm by which the inside became thinner or thicker.
-    - `necks`: See the module.
     - `cost`: The cost of bending (`Elastic.cost`). It has no part in the mark.
     - `length`: The length of the silhouette's outline, in square roots of its area.
     """
@@ -67,23 +68,32 @@ class Fidelity:
     pieces: tuple[float, float]
     stretched: float
     thickness: float
-    necks: float
     cost: float
     length: float
 
     @property
-    def mark(self) -> float:
-        """The mark that people would give on a scale from 0 to 10, not cut at its ends."""
+    def losses(self) -> tuple[float, ...]:
+        """The marks lost by the two pieces, `stretched` and `thickness`; below 0, better than usual."""
         values = (*self.pieces, self.stretched, self.thickness)
         parts = zip(WEIGHTS, values, USUAL_VALUES, NEGLIGIBLE, strict=True)
-        lost = sum(w * math.log((least + x) / (least + usual)) for w, x, usual, least in parts)
+        return tuple(w * math.log((least + x) / (least + usual)) for w, x, usual, least in parts)
+
+    @property
+    def lost(self) -> list[str]:
+        """What is worse than usual, in words: at most two things, the worst first."""
+        worst = sorted(zip(self.losses, LOST, strict=True), reverse=True)[:2]
+        return [words for loss, words in worst if loss > 0]
+
+    @property
+    def mark(self) -> float:
+        """The mark that people would give on a scale from 0 to 10, not cut at its ends."""
         length = min(max(self.length, LENGTHS[0]), LENGTHS[1])
         easier = LENGTH_WEIGHT * math.log(length / USUAL_LENGTH)
-        return USUAL_MARK + easier - lost - NECK_WEIGHT * self.necks
+        return USUAL_MARK + easier - sum(self.losses)
 
     @property
     def score(self) -> float:
-        """How probably people call it a good likeness, 0 to 1: a mark of 6 or more."""
+        """How probably people call it a good likeness, 0 to 1: a mark of 6.5 or more."""
         return 1 / (1 + math.exp(min(STEEPNESS * (GOOD_MARK - self.mark), 700.0)))
 
 
@@ -110,7 +120,6 @@ def fidelity(rest: Complex, bent: Complex, cost: float) -> Fidelity:
         (short, long),
         float(np.minimum(stretch**2, LARGEST_STRETCH**2) @ weight),
         float(weight @ thinner**2),
-        max(0.0, float(thinner.max()) - math.log(2.0)),
         cost,
         float(sides.sum()),
     )

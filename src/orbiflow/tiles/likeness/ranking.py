@@ -23,6 +23,7 @@ WORDS = {4.5: "excellent", 3.5: "good", 2.5: "fair", 1.0: "poor"}
 
 MOST_STARS = 5
 LOWEST_MARK, HIGHEST_MARK = 3.0, 8.5  # one star, and five
+OVERLAP_MARKS = (12.5, -4.8)  # the mark of a tile for overlap, foretold as a line in its score
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,16 @@ class Rating:
         """
         likely = min(max(score, 1e-9), 1 - 1e-9)
         return cls.of_mark(GOOD_MARK + math.log(likely / (1 - likely)) / STEEPNESS)
+
+    @classmethod
+    def of_overlap(cls, score: float) -> Rating:
+        """Return the rating of a tile by its `rank_score`.
+
+        >>> [str(Rating.of_overlap(score)) for score in (0.9, 0.8, 0.7)]
+        ['★★★½', '★★½', '★★']
+        """
+        slope, base = OVERLAP_MARKS
+        return cls.of_mark(slope * score + base)
 
     @property
     def word(self) -> str:

@@ -113,14 +113,32 @@ def rated(tiles: Sequence[EscherTile], target: Target) -> list[EscherTile]:
     if is_hopeless(target):
         return [tile.changed(rating=Rating(1)) for tile in tiles]
     return [
-        # no marks of tiles for overlap are kept: their scores are taken for marks
         tile.changed(
-            rating=Rating.of_likeness(tile.score)
-            if tile.fidelity
-            else Rating.of_mark(10 * tile.score - 1)
+            rating=(Rating.of_likeness if tile.fidelity else Rating.of_overlap)(tile.score)
         )
         for tile in tiles
     ]
+
+
+FEW_PEOPLE = 0.4  # the score below which a run is told what makes its best likeness poor
+LONG_OUTLINE = 8.5  # in square roots of the area: that of long thin limbs, such as a spider's
+
+
+def why_poor(best: EscherTile) -> str:
+    """Return why few people would find a run's best tile good, and what to try; "" if many would."""
+    kept = best.fidelity
+    share = best.score if kept else 1.0
+    if share >= FEW_PEOPLE and not (best.rating and best.rating.word == "poor"):
+        return ""
+    long = kept is not None and kept.length > LONG_OUTLINE
+    reasons = ["a tile fills the empty space around long thin limbs"] * long
+    reasons += kept.lost if kept else []
+    because = f": {', '.join(reasons)}" if reasons else ""
+    change = "thicker or shorter limbs, nearer to the body" if long else "another pose, fewer limbs"
+    return (
+        f"few people would call the first tile a good likeness{because}; {change}, all nine classes "
+        "or more effort may do better"
+    )
 
 
 def certified_tiles(
