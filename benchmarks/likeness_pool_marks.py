@@ -257,7 +257,7 @@ def print_calibration(found: list[Marked]) -> None:
     """Print the scores by tenths, and which share of the marks is good."""
     scores = np.concatenate([one.scores for one in found])
     good = np.concatenate([(one.readings >= GOOD).mean(axis=0) for one in found])
-    tenths = np.array_split(np.argsort(scores), 10)
+    tenths = np.array_split(np.argsort(scores), min(10, len(scores)))
     print("\nscore, mean of a tenth  " + "".join(f"{scores[own].mean():6.2f}" for own in tenths))
     print(f"marks of {GOOD} or more    " + "".join(f"{good[own].mean():6.2f}" for own in tenths))
 
