@@ -269,7 +269,7 @@ def print_words(found: list[Marked]) -> None:
     print_agreement("\nour stars and the judges' mean", ours, theirs)
     rows = [pair for one in found for pair in zip(one.values, one.marks, strict=True)]
     rigid = np.array([(own["overlap"], mark) for own, mark in rows if "overlap" in own]).T
-    if rigid.size:
+    if len(rigid.T) > 2:
         slope, base = np.polyfit(*rigid, 1)
         marks = f"marks are {slope:.1f} times their scores {base:+.1f}"
         print(f"tiles for overlap: {marks}, rank correlation {spearmanr(*rigid).statistic:.2f}")
