@@ -142,6 +142,7 @@ from .tilings.certificate import certify as certify
 from .tilings.colourings import Colouring as Colouring
 from .tilings.colourings import colouring as colouring
 from .tilings.isohedral import CLASSES as CLASSES
+from .tilings.isohedral import ISOHEDRAL_TYPES as ISOHEDRAL_TYPES
 from .tilings.isohedral import IsohedralClass as IsohedralClass
 from .tilings.isohedral import PaperOperator as PaperOperator
 from .tilings.isohedral import isohedral_class as isohedral_class

@@ -297,14 +297,16 @@ class TileSpace:
         width = np.where(mirror[free] == 0, 2, 1)
         position[free] = np.cumsum(width) - width
         columns, count = self._columns[index], int(width.sum())
-        whole = np.zeros((n, count + columns.shape[1]), dtype=complex)
+        whole: Complex = np.zeros((n, count + columns.shape[1]), dtype=complex)
         v = np.flatnonzero(~fixed)
         factor, flips, on_line = self._factor[index, v], orbits.flips[index, v], mirror[v] != 0
         along = np.where(on_line, np.sqrt(mirror[v]), 1.0)
         whole[v, position[source[v]]] = _turn(factor, flips, along)
-        whole[v[~on_line], position[source[v]][~on_line] + 1] = _turn(factor, flips, 1j)[~on_line]
+        across = _turn(factor, flips, np.full(len(v), 1j))
+        whole[v[~on_line], position[source[v]][~on_line] + 1] = across[~on_line]
         whole[:, count:] = columns
-        real, imaginary = whole.real, whole.imag
+        real: Array = whole.real
+        imaginary: Array = whole.imag
         return real[self._place[index]], imaginary[self._place[index]]
 
     def group(self, index: int, parameters: Array) -> tuple[Array, Array]:
