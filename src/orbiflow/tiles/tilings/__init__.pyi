@@ -10,6 +10,7 @@ from .isohedral import commutant as commutant
 from .isohedral import isohedral_class as isohedral_class
 from .prototile import Prototile as Prototile
 from .prototile import Stabiliser as Stabiliser
+from .prototile import free_subgroup as free_subgroup
 from .surroundings import Neighbours as Neighbours
 from .surroundings import arrangement as arrangement
 from .surroundings import aspects as aspects
