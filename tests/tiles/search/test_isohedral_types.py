@@ -1,32 +1,47 @@
 """The 81 isohedral types: their templates, the linear spaces of their tiles, and certificates."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 import shapely
 from hypothesis import assume, given, settings
 
-from orbiflow.errors import OrbiflowError
+from orbiflow.arrays import Array
+from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.fields import FourierField
+from orbiflow.runtime import Note
 from orbiflow.symmetry import wallpaper_group
 from orbiflow.tiles import (
     CLASSES,
     ISOHEDRAL_TYPES,
+    EscherTile,
     IsohedralClass,
     Tile,
     certify,
     complex_points,
+    escherize,
+    escherize_class,
     isohedral_class,
+    near_symmetry,
     plane_points,
     signed_area,
 )
 from orbiflow.tiles.geometry import subdivided
 from orbiflow.tiles.search.candidates import waves
+from orbiflow.tiles.search.escherize_settings import EscherizeSettings
+from orbiflow.tiles.search.likeness_search import LikenessSearch
+from orbiflow.tiles.search.overlap_search import OverlapSearch
 from orbiflow.tiles.search.tile_space import Placements, TileSpace, best_placements
+from orbiflow.tiles.silhouette import outlines, sampled
+from outlines import animal
 from strategies import seeds
 
 MARKED = (19, 35, 48, 60, 63, 65, 70, 75, 80, 87, 89, 92)
 SYMMETRIC = [name for name, kind in ISOHEDRAL_TYPES.items() if len(kind.stabiliser) > 1]
 PER_EDGE = 4
+NEAR = {"bat_60": "D1", "penguin_60": "D1", "camel_60": "C1", "spider_120": "C1"}
 
 
 def random_tile(kind: IsohedralClass, seed: int, size: float = 0.03) -> Tile:
@@ -141,3 +156,78 @@ def test_the_nearest_symmetric_tile_is_the_projection(name: str, seed: int) -> N
         parameters = np.linalg.lstsq(stacked, goal, rcond=None)[0]
         assert abs(real @ parameters + 1j * (imaginary @ parameters) - ring).max() < 1e-6
         assert found.distance[k] == pytest.approx((abs(ring - outline) ** 2).sum(), rel=1e-6)
+
+
+def test_symmetric_silhouettes_are_told_from_others() -> None:
+    goals = {name: near_symmetry(animal(f"nagata/{name}.dat").normal) for name in NEAR}
+    assert {name: near.stabiliser for name, near in goals.items()} == NEAR
+    letter = np.array([[1, 0], [1, 3], [3, 3], [3, 4], [0, 4], [0, 1], [-2, 1], [-2, 0]], float)
+    turned = near_symmetry(letter / np.sqrt(signed_area(letter)))
+    assert turned.half_turn > 0.95 > turned.mirror
+    assert turned.stabiliser == "C2"
+
+
+def test_a_silhouette_near_to_symmetric_gets_classes_of_symmetric_tiles(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[str] = []
+
+    def failing(self: LikenessSearch, _: object, kind: IsohedralClass, *__: object) -> object:
+        asked.append(kind.name)
+        raise CertificationError("no")
+
+    monkeypatch.setattr(LikenessSearch, "fit", failing)
+    monkeypatch.setattr(LikenessSearch, "sketch", failing)
+    notes: list[str] = []
+
+    def searched(name: str, **changes: Any) -> list[str]:
+        asked.clear()
+        notes.clear()
+        escherize(
+            animal(f"nagata/{name}.dat"),
+            EscherizeSettings(**changes),
+            on_event=lambda event: notes.append(event.text) if isinstance(event, Note) else None,
+        )
+        return asked[1:]  # the first is the preview's
+
+    assert searched("bat_60") == [*CLASSES, "IH13", "IH12", "IH16"]
+    assert "much like its mirror image (0.8" in notes[0]
+    assert searched("camel_60") == list(CLASSES)
+    assert notes == []
+    assert searched("camel_60", classes=("all",)) == [
+        *(*CLASSES, "IH13", "IH12", "IH16"),
+        *("IH8", "IH9"),
+    ]
+    assert searched("bat_60", classes=("IH26",)) == ["IH26"]
+    assert not OverlapSearch.takes_symmetric
+
+
+def test_the_search_gives_symmetric_tiles_that_are_saved_and_loaded(tmp_path: Path) -> None:
+    quick = LikenessSearch(placements=40, held=8, starts=4, finalists=1, rounds=8)
+    bat = animal("nagata/bat_60.dat")
+    tile = escherize_class(bat, "IH13", quick)
+    assert isinstance(tile, EscherTile)
+    assert tile.certificate.valid
+    assert tile.tile.tiling.stabilisers[0].order == 2
+    loaded = EscherTile.load(tile.save(tmp_path / "bat"))
+    assert loaded.isohedral_class == "IH13"
+    assert loaded.certificate.valid
+    assert tile.map is not None
+    assert loaded.tile.tiling.stabilisers[0].order == 2
+
+
+@pytest.mark.parametrize(("step", "points"), [(6, 114), (12, 108)])
+def test_every_class_divides_the_points_of_outlines_that_cross_themselves(
+    monkeypatch: pytest.MonkeyPatch, step: int, points: int
+) -> None:
+    """Those that 78 points make cross themselves had 117: too many by one for pairs of edges."""
+    resample = outlines.resampled
+
+    def crossing(ring: Array, count: int, phase: float) -> Array:
+        found = resample(ring, count, phase)
+        return np.roll(found[::-1], 1, axis=0)[[1, 0, *range(2, count)]] if count < 80 else found
+
+    monkeypatch.setattr(outlines, "resampled", crossing)
+    side = 5.1  # so long that 78 points are asked for, or 72
+    bar = np.array([[0.0, 0.0], [side, 0.0], [side, 1 / side], [0.0, 1 / side]])
+    assert len(sampled(bar, step=step).coarse) == points
