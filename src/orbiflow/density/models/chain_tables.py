@@ -30,7 +30,7 @@ FAINTEST = 25.0
 ALONE, FEWEST = 48, 8
 """The fewest nodes of an angle that is the only one hidden, and of several."""
 
-SHARPNESS = 1.2 ** torch.arange(-30, 100, dtype=torch.float64)
+SHARPNESS = 1.2 ** torch.arange(-30, 116, dtype=torch.float64)
 """Concentrations by which quasi-random nodes are spread."""
 
 AT_ONCE = 2**18
@@ -146,7 +146,7 @@ class _Walk:
                 2 * math.pi * (p.double() / size + start)
                 for p, size in zip(places, table.shape, strict=True)
             ]
-            values = self._values(some, angles, top, self._nodes(some, rule), table.shape)
+            values = self._values(some, angles, top, rule, table.shape)
             flat = (
                 places[0]
                 if len(places) == 1
@@ -154,66 +154,37 @@ class _Walk:
             )
             table.view(-1).index_add_(0, flat.flatten(), values.flatten())
 
-    def _nodes(self, rows: Tensor, rule: _Rule) -> dict[int, tuple[Tensor, Tensor]]:
-        """Return offsets (C, Q) of each hidden angle from its mean, and logarithms of their weights.
-
-        They spread as the angle does, the angles kept before it being free.
-        """
-        found: dict[int, tuple[Tensor, Tensor]] = {}
-        d = self.split.dim
-        for i, axis in enumerate(self.hidden):
-            spread = 1 / self.kappa[rows, axis].clamp_min(1e-12)
-            for j in self.split.kept:
-                most = self.means[rows, axis, 1 + j].square()
-                most = most + self.means[rows, axis, 1 + d + j].square()
-                spread = spread + most * (self.reach[rows, j] / REACH).clamp_max(1).square()
-            found[axis] = rule.nodes(i, spread)
-        return found
-
     def _values(
-        self,
-        rows: Tensor,
-        angles: list[Tensor],
-        top: float,
-        nodes: dict[int, tuple[Tensor, Tensor]],
-        shape: tuple[int, ...],
+        self, rows: Tensor, angles: list[Tensor], top: float, rule: _Rule, shape: tuple[int, ...]
     ) -> Tensor:
         """Return the densities (C, A) or (C, A, B), relative to exp(top), of components at angles."""
         kept, given = self.split.kept, dict(zip(self.split.given, self.split.values, strict=True))
         first_last = sorted(kept, key=self.order.index)
-        middle = self.middle[rows]
         total = (self.logs[rows] - top)[:, None, None, None]
-        # sines and cosines over components, nodes and grids; of those kept also at their middle
-        seen, rough = dict[int, tuple[Tensor, Tensor]](), dict[int, tuple[Tensor, Tensor]]()
+        # sines and cosines over components, nodes and grids
+        seen = dict[int, tuple[Tensor, Tensor]]()
         for axis in self.order:
-            kappa = self.kappa[rows, axis, None, None, None]
-            if axis in kept:
-                kappa = kappa.clamp_max(sharpest_on(shape[kept.index(axis)]))
-                at = angles[kept.index(axis)]
-                mean = self._mean(rows, axis, seen)
-                if axis == first_last[-1]:
-                    images = torch.stack([at.cos(), at.sin(), torch.ones_like(at)], dim=1)
-                    total = total - kappa - special.i0e(kappa).log()
-                    linear = [kappa * mean.cos(), kappa * mean.sin(), total]
-                    table = torch.stack(broadcast(*linear), dim=-1)[:, :, :, 0]
-                    total = (table.flatten(1, 2) @ images).reshape(*table.shape[:3], -1)
-                    at = at[:, None, None]
-                else:
-                    at = at[:, None, :, None]
-                    total = total + _bump(kappa, at - mean)
+            kappa, mean = self.kappa[rows, axis, None, None, None], self._mean(rows, axis, seen)
+            if axis in self.hidden:
+                offset, logs = rule.nodes(self.hidden.index(axis), self.kappa[rows, axis, None])
+                at, total = mean + offset[:, :, None, None], total + logs[:, :, None, None]
                 seen[axis] = at.sin(), at.cos()
-                own = middle[:, axis, None, None, None]
-                rough[axis] = own.sin(), own.cos()
                 continue
-            mean = self._mean(rows, axis, seen)
             if axis in given:
                 at = torch.full((1, 1, 1, 1), 2 * math.pi * given[axis], dtype=torch.float64)
             else:
-                offset, logs = (value[:, :, None, None] for value in nodes[axis])
-                at = self._mean(rows, axis, rough) + offset
-                total = total + logs
-            total = total + _bump(kappa, at - mean)
-            seen[axis] = rough[axis] = at.sin(), at.cos()
+                at = angles[kept.index(axis)][:, None, :, None]
+                kappa = kappa.clamp_max(sharpest_on(shape[kept.index(axis)]))
+            if axis == first_last[-1]:
+                at = at.mT
+                images = torch.cat([at.cos(), at.sin(), torch.ones_like(at)], dim=2)[:, 0]
+                total = total - kappa - special.i0e(kappa).log()
+                linear = [kappa * mean.cos(), kappa * mean.sin(), total]
+                table = torch.stack(broadcast(*linear), dim=-1)[:, :, :, 0]
+                total = (table.flatten(1, 2) @ images).reshape(*table.shape[:3], -1)
+            else:
+                total = total + kappa * ((at - mean).cos() - 1) - special.i0e(kappa).log()
+            seen[axis] = at.sin(), at.cos()
         values = total.clamp_min_(FAINT).exp_().sum(dim=1)
         if len(kept) == 1:
             return values[:, 0]
@@ -234,29 +205,25 @@ class _Rule:
     def __init__(self, hidden: int, level: int) -> None:
         self.count = (1, ALONE * 2**level, FEWEST * 4**level)[min(hidden, 2)]
         self.tables: list[Tensor] = []
-        if hidden < 2:
-            return
-        even = torch.quasirandom.SobolEngine(hidden, scramble=True, seed=level)
-        for own in even.draw(self.count, dtype=torch.float64).mT:
-            self.tables.append(quantiles(SHARPNESS, own) * SHARPNESS.sqrt()[:, None])
+        if hidden > 1:
+            even = torch.quasirandom.SobolEngine(hidden, scramble=True, seed=level)
+            nodes = even.draw(self.count, dtype=torch.float64)
+            self.tables = [
+                quantiles(SHARPNESS, own) * SHARPNESS.sqrt()[:, None] for own in nodes.mT
+            ]
 
-    def nodes(self, number: int, spread: Tensor) -> tuple[Tensor, Tensor]:
-        """Return offsets (C, Q) of a hidden angle, and the logarithms of their weights.
+    def nodes(self, number: int, kappa: Tensor) -> tuple[Tensor, Tensor]:
+        """Return offsets (C, Q) of a hidden angle from its mean, and the logarithms of their weights.
 
-        `spread` (C,) are its squared deviations.
+        For concentrations (C, 1).
         """
         if self.tables:
-            kappa = (1 / spread[:, None]).clamp(float(SHARPNESS[0]), float(SHARPNESS[-2]))
+            kappa = kappa.clamp(float(SHARPNESS[0]), float(SHARPNESS[-2]))
             row = torch.searchsorted(SHARPNESS, kappa[:, 0], right=True) - 1
-            part = (kappa[:, 0] / SHARPNESS[row] - 1) / (SHARPNESS[1] / SHARPNESS[0] - 1)
-            low, high = self.tables[number][row], self.tables[number][row + 1]
-            offset = torch.lerp(low, high, part[:, None]) / kappa.sqrt()
-            return offset, -_bump(kappa, offset) - math.log(self.count) * (number == 0)
-        reach = (REACH * spread.sqrt()).clamp_max(math.pi)[:, None]
-        even = (2 * torch.arange(self.count) + 1) / self.count - 1
-        return reach * even, (reach / (math.pi * self.count)).log().expand(-1, self.count)
-
-
-def _bump(kappa: Tensor, angle: Tensor) -> Tensor:
-    """Return the logarithm of a von Mises density relative to the uniform one."""
-    return kappa * (angle.cos() - 1) - special.i0e(kappa).log()
+            part = (kappa / SHARPNESS[row, None] - 1) / (SHARPNESS[1] / SHARPNESS[0] - 1)
+            offset = torch.lerp(self.tables[number][row], self.tables[number][row + 1], part)
+            weight = -math.log(self.count) if number == 0 else 0.0
+            return offset / kappa.sqrt(), kappa.new_tensor([[weight]])
+        reach = (REACH / kappa.clamp_min(1e-12).sqrt()).clamp_max(math.pi)
+        offset = reach * ((2 * torch.arange(self.count) + 1) / self.count - 1)
+        return offset, torch.log_softmax(kappa * (offset.cos() - 1), dim=1)
