@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from density.blends import even_grid, random_blend, random_chains, random_network
 from orbiflow.density import (
     Density,
+    Mixture,
     Torus,
     VonMisesChains,
     conditional,
@@ -119,3 +120,37 @@ def test_three_angles_ask_the_whole(tmp_path: Path, given: dict[int, float] | No
     axis = marginal(density, 2) if given is None else conditional(density, given, 2)
     twice, line = marginal(again, 1), even_grid(16, 1)
     assert float((twice.log_prob(line) - axis.log_prob(line)).abs().max()) < 0.05
+
+
+def test_samples_are_of_what_is_given() -> None:
+    """They are chosen among weighed draws: mean sines and cosines against quadrature."""
+    network = random_network(np.random.default_rng(4), Torus(3))
+    density = Mixture([network, sharp(4, 3, "chains")], [0.5, 0.5])
+    last = network.factors[-1].axes[-1]  # so that neither has a closed form
+    kept = [axis for axis in range(3) if axis != last]
+    drawn = conditional(density, {last: 0.6}).sample(4000, torch.Generator().manual_seed(1))
+    grid = even_grid(GRID, 2)
+    weights = torch.softmax(true_log(density, grid, kept, {last: 0.6}), dim=0)
+    for function in (torch.sin, torch.cos):
+        expected = weights @ function(2 * math.pi * grid)
+        found = function(2 * math.pi * drawn)
+        assert (
+            (found.mean(dim=0) - expected).abs() < 4 * found.std(dim=0) / 4000**0.5 + 0.01
+        ).all()
+
+
+def test_it_can_be_stopped_in_the_middle() -> None:
+    class Stopped(Exception):
+        pass
+
+    told: list[float] = []
+
+    def progress(share: float, what: str) -> None:
+        told.append(share)
+        if share > 0.2:
+            raise Stopped(what)
+
+    with pytest.raises(Stopped, match="integrating, level 2"):
+        marginal(sharp(0, 3, "chains"), [0, 1], accuracy=1e-6, progress=progress)
+    assert len(told) > 2
+    assert told == sorted(told)
