@@ -134,7 +134,7 @@ def test_it_can_be_cancelled_in_the_middle(tmp_path: Path, blend: Path) -> None:
         ("conditional --given ,", "--given says nothing"),
         ("marginal --columns ,", "--columns names no column"),
         ("marginal --columns 4", "no column '4'"),
-        ("marginal --columns phi,1", "each once"),
+        ("marginal --columns phi,1", "column 'phi' is given twice"),
     ],
 )
 def test_mistakes(words: str, message: str, tmp_path: Path, model: Path, orbiflow: Run) -> None:

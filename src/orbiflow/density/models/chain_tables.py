@@ -110,12 +110,18 @@ class _Walk:
                 self.middle[:, axis] = at
                 noise[:, axis], bend[:, axis], self.reach[:, axis] = 0, 0, 0
         sharp = kappa.clone()
+        joint = torch.zeros_like(kappa[:, 0])
         for axis in split.observed:
-            for j in split.kept:
-                slope = means[:, axis, 1 + j].square() + means[:, axis, 1 + d + j].square()
-                sharp[:, j] += kappa[:, axis] * slope
+            slopes = torch.hypot(means[:, axis, 1 : 1 + d], means[:, axis, 1 + d :])
+            sharp += kappa[:, axis, None] * slopes.square()
+            own = slopes.index_fill(1, torch.tensor(axis), 1.0)[:, list(split.kept)]
+            joint += kappa[:, axis] * own.prod(dim=1)
+        apart = sharp[:, list(split.kept)]
+        # kernels along the axes stand for a slanted bump only if they are narrower than its narrow side
+        slanted = joint / apart.prod(dim=1).sqrt() if apart.shape[1] > 1 else 0 * joint
+        apart = apart * (1 + slanted.clamp_max(1))[:, None]
         self.kappa = kappa.clone()
-        count = (2 * math.pi / KERNEL_STEP * sharp[:, list(split.kept)].sqrt()).contiguous()
+        count = 2 * math.pi / KERNEL_STEP * apart.sqrt()
         sizes = torch.tensor([size for size in SIZES if size <= FINEST[len(split.kept)]])
         self.wanted = sizes[torch.searchsorted(sizes, count).clamp_max(len(sizes) - 1)]
 
