@@ -35,7 +35,8 @@ def sharp(seed: int, dim: int, kind: str) -> Density:
     if kind == "network":
         return random_network(rng, space)
     own = random_chains(rng, space, 4)
-    return VonMisesChains(space, own.log_weights, own.means, 3 * own.concentrations, own.order)
+    sharper = own.concentrations * (3 if dim < 4 else 1)
+    return VonMisesChains(space, own.log_weights, own.means, sharper, own.order)
 
 
 def true_log(
@@ -82,11 +83,12 @@ def test_tables_are_the_integral_at_every_level(
 
 
 @given(seeds, st.data())
-@settings(deadline=None, max_examples=8)
+@settings(deadline=None, max_examples=6)
 def test_an_error_is_at_least_the_true_one(seed: int, data: st.DataObject) -> None:
     """Also that of a density which is derived from a derived one, where both are asked for roughly."""
-    first, second, third = data.draw(st.permutations(range(3)))
-    density = sharp(seed, 3, data.draw(st.sampled_from(["chains", "network"])))
+    kind, dim = data.draw(st.sampled_from([("chains", 4), ("chains", 4), ("network", 3)]))
+    density = sharp(seed, dim, kind)
+    first, second, third, *_ = data.draw(st.permutations(range(dim)))
     at, accuracy = data.draw(st.floats(0, 1)), data.draw(st.sampled_from([0.3, 0.02]))
     both = marginal(density, [first, second], accuracy=accuracy)
     for found, kept, known in (
@@ -95,8 +97,18 @@ def test_an_error_is_at_least_the_true_one(seed: int, data: st.DataObject) -> No
         (conditional(both, {0: at}, accuracy=accuracy), [second], {first: at}),
         (conditional(density, {third: at}, first, accuracy=accuracy), [first], {third: at}),
     ):
-        assert off(found, density, kept, known) < 1.1 * found.error + 5e-4
         assert found.error < accuracy * (1 + 2 * (kept == [second]))
+        if dim == 3 or [*kept, *known] != [second]:  # no quadrature over three hidden angles
+            assert off(found, density, kept, known) < 1.1 * found.error + 5e-4
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rough_error_is_seen(seed: int) -> None:
+    """Quasi-random nodes of two hidden angles are few at first."""
+    density = sharp(seed, 4, "chains")
+    found = marginal(density, [0, 1], accuracy=0.3)
+    assert 1e-3 < found.error < 0.3
+    assert 0.1 * found.error < off(found, density, [0, 1], {}) < 1.1 * found.error
 
 
 def test_the_error_of_the_first_step_is_kept(tmp_path: Path) -> None:
