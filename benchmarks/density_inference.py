@@ -21,7 +21,7 @@ import torch
 from common import DATA, needed
 from density_default_data import rotamers
 
-from orbiflow.density import DensityEstimator, Mixture, conditional, marginal
+from orbiflow.density import Density, DensityEstimator, conditional, marginal
 from orbiflow.runtime import one_blas_thread
 
 SEEDS, POINTS = 4, 40
@@ -45,7 +45,7 @@ def angles(name: str, rows: int) -> np.ndarray:
 
 
 def truth(
-    density: Mixture, points: torch.Tensor, kept: tuple[int, ...], given: dict[int, float]
+    density: Density, points: torch.Tensor, kept: tuple[int, ...], given: dict[int, float]
 ) -> tuple[torch.Tensor, float]:
     """Log densities at points (N, k), and their standard error."""
     known = points.new_tensor([*given.values()])
@@ -62,7 +62,7 @@ def truth(
 
 
 def line(
-    density: Mixture, kept: tuple[int, ...], degrees: dict[int, float], accuracy: float
+    density: Density, kept: tuple[int, ...], degrees: dict[int, float], accuracy: float
 ) -> str:
     """One row of the table."""
     given = {axis: value / 360 for axis, value in degrees.items()}
