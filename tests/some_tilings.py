@@ -89,14 +89,16 @@ def with_points(ring: Array, pieces: int) -> Array:
 def shared_lengths(tiling: Tiling, placed: Sequence[Placed]) -> dict[tuple[int, int], float]:
     """The lengths of boundary that pairs of tiles share, by areas that shapely measures.
 
-    A tile made wider by a little overlaps what it shares boundary with by that times the length.
+    A tile made wider by a little overlaps what it shares boundary with by that times the length. What
+    it meets at a small angle it overlaps by the square of that: by four times as much if twice as wide.
     """
     little = 1e-8 * math.sqrt(tiling.tile_area)
     shapes = [shapely.Polygon(g(tiling.prototiles[g.prototile].polygon)) for g in placed]
-    wide = [shape.buffer(little, join_style="mitre") for shape in shapes]
+    wide, wider = ([s.buffer(k * little, join_style="mitre") for s in shapes] for k in (1, 2))
     found: dict[tuple[int, int], float] = {}
     for i, j in itertools.permutations(range(len(shapes)), 2):
-        length = wide[i].intersection(shapes[j]).area / little
+        once, twice = (near[i].intersection(shapes[j]).area for near in (wide, wider))
+        length = (2 * once - twice / 2) / little
         if length > 20 * little:
             found[i, j] = length
     return found

@@ -217,6 +217,11 @@ class Field:
         """Whether it has no default."""
         return self.default is MISSING
 
+    def missing(self) -> SettingError:
+        """Return the error if it is required and not given."""
+        what = f"{self.kind.wanted}: {self.doc.rstrip('.')}" if self.doc else self.kind.wanted
+        return SettingError(f"{{{self.name}}} is missing; give {literal(what)}")
+
     @cached_property
     def metadata(self) -> tuple[Any, ...]:
         """What `Annotated` adds to its type."""
@@ -417,7 +422,7 @@ def check_names(given: Iterable[str], known: Iterable[Field], what: str) -> None
             raise SettingError(f"{literal(what)} has no setting {literal(described(name))}; {hint}")
     for name, entry in fields.items():
         if entry.required and name not in given:
-            raise SettingError(f"{{{name}}} is missing; give {literal(entry.kind.wanted)}")
+            raise entry.missing()
 
 
 def check_rules(fields: Iterable[Field], values: Mapping[str, Any], given: Iterable[str]) -> None:

@@ -161,7 +161,7 @@ def test_regions(folder: Path, orbiflow: Any) -> None:
     assert first.startswith("1,,-9,1,0,")
     refused = orbiflow("density", "region", "-m", folder / "good", "--out", folder / "r.geojson")
     assert refused.status == 2
-    assert "not for the angles of a torus" in refused.err
+    assert "not for points of the torus" in refused.err
     scored = folder / "s.csv"
     done = orbiflow(
         "density", "score", folder / "held.csv", "-m", folder / "good", "--region", "--out", scored
@@ -284,3 +284,30 @@ def test_mistakes(folder: Path, orbiflow: Any, monkeypatch: pytest.MonkeyPatch) 
         assert done.status == 2, case
         assert message in done.err, f"{case}: {done.err}"
         assert "Traceback" not in done.err
+
+
+def test_two_data_sets_on_a_quotient(tmp_path: Path, orbiflow: Any) -> None:
+    places = np.random.default_rng(0).uniform(0, 10, (80, 2))
+    one = write(tmp_path / "one.csv", "x,y", places[:40])
+    other = write(tmp_path / "other.csv", "x,y", places[40:])
+    command = ("density", "compare", "-d", one, "-d", other, "--permutations", 19, "--space")
+    done = orbiflow(*command, "4*2", "--cell", "10,10", "--bootstrap", 100)
+    assert done.status == 0, done.err
+    assert "no cell was given" not in done.out
+    assert re.search("one and other|the data cannot tell", done.out)
+    fit = ("density", "fit", one, *QUICK, "--space", "p4gm", "--out", tmp_path / "m")
+    fitted = orbiflow(*fit, "--cell", "10,10")
+    assert fitted.status == 0, fitted.err
+    assert "-0.0000" not in fitted.out + done.out
+    report = json.loads((tmp_path / "m" / "report.json").read_text())
+    assert report["log_likelihood"]["uniform"] == pytest.approx(-np.log(12.5))
+    assert "no cell was given: its lengths are taken to be about 1" in orbiflow(*fit).out
+    for given, message in (
+        (("p4g", "--cell", "10"), "--cell must be a,b or a,b,gamma"),
+        (("p4g", "--cell", "10,10", "--unit", "degrees"), "--unit applies only to angles"),
+        (("torus", "--cell", "10,10"), "--cell applies to groups, not to the torus"),
+        (("p5",), "--space must be torus"),
+    ):
+        refused = orbiflow(*command, *given)
+        assert refused.status == 2
+        assert message in " ".join(refused.err.split())

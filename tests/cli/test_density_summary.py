@@ -58,11 +58,38 @@ def test_directions_and_axes(space: str, tmp_path: Path, orbiflow) -> None:
     assert float(row[f"{name}_2"]) == pytest.approx(140, abs=6)
 
 
+def test_what_little_tells_is_said(tmp_path: Path, orbiflow) -> None:
+    for rows, said in (
+        (["10,20", "10,90", "10,5"], "same value of a"),
+        (["10,20"], "of a, b cannot"),
+    ):
+        (tmp_path / "few.csv").write_text("\n".join(["a,b", *rows]) + "\n")
+        out = ("--out", tmp_path / "s.json")
+        done = orbiflow(
+            "density",
+            "summary",
+            tmp_path / "few.csv",
+            "--space",
+            "torus",
+            "--unit",
+            "degrees",
+            *out,
+        )
+        assert done.status == 0, done.err
+        assert said in " ".join(done.out.split())
+        (first, _) = json.loads((tmp_path / "s.json").read_text())["columns"]
+        assert "-" not in str(first["deviation"]).partition("e")[0]
+    assert first["half_width"] is None  # of one row nothing is known
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         (("--space", "klein-bottle"), "--space must be torus, sphere or projective-plane"),
-        (("--space", "hypersphere"), "no summary of points of the hypersphere"),
+        (
+            ("--space", "hypersphere"),
+            "summaries are of angles, directions and axes; got 'hypersphere'",
+        ),
         (("--space", "sphere", "--picture", "a.png"), "--picture is for angles on a torus"),
         (("--space", "sphere", "--missing", "marginalise"), "use --missing drop"),
         (("--space", "torus", "--out", "a.txt"), "--out must be a file that ends in .json or .csv"),

@@ -32,6 +32,7 @@ from orbiflow.density import (
     density_to_bytes,
     log_density_gradient,
     make_space,
+    marginal,
     midpoints,
     outlines,
     plot_density,
@@ -301,7 +302,7 @@ def test_what_is_refused() -> None:
         (lambda: QuotientSpace("p5"), "unknown group 'p5': give a plane group"),
         (lambda: QuotientSpace("p4", cell=(1.0, 2.0)), "p4 needs a square lattice"),
         (lambda: QuotientSpace("tricosm", cell=(1, 1, 1)), "the nearest that fits has"),
-        (lambda: QuotientSpace("p4", cell=(1, 2, 3, 4)), "cell must be a, b and gamma"),
+        (lambda: QuotientSpace("p4", cell=(1, 2, 3, 4)), "cell must be a,b or a,b,gamma"),
         (lambda: QuotientSpace(wallpaper_group("p4"), cell=(1, 1)), "a cell is for a group"),
         (lambda: QuotientSpace({"lattice": [[1.0]]}), "numbers are missing or invalid"),
         (lambda: QuotientSpace("p4").to_chart([[1.0, 2.0, 3.0]]), "points of 2 coordinates"),
@@ -334,6 +335,10 @@ def test_a_plane_orbifold_is_drawn_in_the_units_of_its_data(tmp_path: Path) -> N
     assert 0.4 < levels.highest(0.5).held < 0.6
     solid = UniformDensity(QuotientSpace("hantzsche-wendt"))
     assert density_thumbnail(solid, np.zeros((0, 3))).startswith(b"\x89PNG")
+    with pytest.raises(OrbiflowError, match="smooth is for angles and directions"):
+        DensityLevels(density, samples=1000, smooth=1.0)
+    with pytest.raises(OrbiflowError, match="no coordinate has a meaning without"):
+        marginal(density, [0])
     with pytest.raises(OrbiflowError, match="other pictures in two dimensions"):
         plot_density(solid, tmp_path / "solid")
     with pytest.raises(OrbiflowError, match="drawn in two dimensions"):

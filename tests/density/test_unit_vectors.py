@@ -347,6 +347,7 @@ REFUSED = {
     r"row 2: the vector .* has length 2": lambda: space3.to_chart([[0, 0, 0, 1.0], [0, 0, 0, 2.0]]),
     r"expected an array \(N, 4\)": lambda: space3.to_chart([[0.0, 0.0, 1.0]]),
     "must be unit vectors": lambda: kernels(space3, 0).log_prob(torch.zeros(1, 4)),
+    "not 1: .*; latitude and longitude are for": lambda: Hypersphere(1).to_chart([[31.1, 35.5]]),
     "row 1: .* is no rotation matrix": lambda: RotationSpace().to_chart([[1.0] * 9]),
     "row 1: .* more than a turn in radians": lambda: RotationSpace().to_chart([[0.0, 0.0, 90.0]]),
     "more than a turn in degrees": lambda: CubicOrientations(form="ZXZ", unit="degrees").to_chart(
@@ -355,7 +356,7 @@ REFUSED = {
     "gradients of rotations need unit quaternions": lambda: DensityEstimator.fitted(
         kernels(RotationSpace(), 0)
     ).score_gradient(quarter),
-    "a flow has 3 dimensions at most, this hypersphere has 3 and no": lambda: DensityEstimator(
+    "a flow has 3 dimensions at most, this hypersphere has 3, but no": lambda: DensityEstimator(
         space3, components=("flow", "kernels")
     ).fit(space3.uniform(20, source(0))),
     "max_frequency would have no effect on the hypersphere": lambda: DensityEstimator(
@@ -365,7 +366,7 @@ REFUSED = {
     "a table needs .* a canonical square, which this hypersphere of 2 is not": lambda: (
         TabulatedDensity(UniformDensity(Hypersphere(2)))
     ),
-    "a picture needs two dimensions, this hypersphere has 2 and no": lambda: density_picture(
+    "a picture needs two dimensions, this hypersphere has 2, but no": lambda: density_picture(
         kernels(Hypersphere(2), 0)
     ),
     "hypersphere has no option": lambda: make_space("hypersphere", unit="degrees"),
@@ -408,7 +409,7 @@ def test_the_commands_fit_score_sample_and_find_regions_of_rotations(
         more = {"columns": ("rx",)} if name == "marginal" else {}
         with pytest.raises(OrbiflowError, match=message):
             find(f"density {name}").call({"model": folder, "out": tmp_path / name, **more}).run()
-    with pytest.raises(OrbiflowError, match="not of points of a rotation-space"):
+    with pytest.raises(OrbiflowError, match="directions and axes; got 'rotation-space'"):
         run("summary", data=table, space="rotation-space")
     with pytest.raises(OrbiflowError, match="GeoJSON is for places on a globe"):
         run("region", model=folder, out=tmp_path / "regions.geojson")

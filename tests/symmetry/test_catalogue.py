@@ -11,6 +11,7 @@ from orbiflow.symmetry import (
     LATTICES,
     WALLPAPER_GROUPS,
     Line,
+    group_by_name,
     identification_group,
     rotation,
     transflection,
@@ -130,6 +131,7 @@ ORBIFOLDS = {
 def test_orbifolds_have_the_cones_corners_and_mirrors_of_their_symbols(symbol):
     group = wallpaper_group(symbol)
     assert group.name == ORBIFOLDS[symbol]
+    assert group_by_name(symbol) == group
     # Conway's count: what the features cost is 2, less the Euler characteristic 0
     cones, _, corners = symbol.partition("*")
     cost = sum((int(n) - 1) / int(n) for n in cones if n.isdigit())
@@ -145,6 +147,7 @@ def test_full_symbols_name_the_same_groups():
     full = {"p211": "p2", "p1g1": "pg", "c1m1": "cm", "p2gg": "pgg", "c2mm": "cmm", "p4gm": "p4g"}
     full |= {"p1m1": "pm", "p2mm": "pmm", "p2mg": "pmg", "p4mm": "p4m", "p6mm": "p6m"}
     assert all(wallpaper_group(symbol).name == name for symbol, name in full.items())
+    assert all(group_by_name(symbol).name == name for symbol, name in full.items())
 
 
 def test_unknown_names_are_refused_with_the_known_ones():

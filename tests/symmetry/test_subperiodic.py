@@ -54,7 +54,7 @@ def whole(name: str):
         (1.0, 1.0, 2.0) if name[2] in "346" or name[2:4] in ("-3", "-4", "-6") else (1.0, 1.2, 2.0)
     )
     return space_group(
-        name.capitalize(), (*sides, 90, 90, 120 if set("36") & set(name[2:4]) else 90)
+        name.capitalize(), (*sides, 90, 90, 120 if name[2:4].strip("- ")[0] in "36" else 90)
     )
 
 

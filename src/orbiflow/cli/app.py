@@ -231,7 +231,7 @@ def _mistake(
     if isinstance(error, MissingArgumentError) and named in fields:
         if error.keyword:
             return _needs_value(fields[named])
-        return SettingError(f"{{{named}}} is missing; give {literal(fields[named].kind.wanted)}")
+        return fields[named].missing()
     if isinstance(error, CoercionError) and error.token and named in fields:
         try:
             fields[named].parse([error.token.value])

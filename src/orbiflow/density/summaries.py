@@ -224,7 +224,7 @@ def _angle_summary(name: str, turns: Array, turn: float, rows: _Rows) -> AngleSu
     if mean is not None:
         least = -0.5 * turn if (turns < 0).any() else 0.0
         middle = (math.atan2(mean[1], mean[0]) * per_radian - least) % turn + least
-        deviation = math.sqrt(-2 * math.log(resultant)) * per_radian
+        deviation = math.sqrt(max(0.0, -2 * math.log(resultant))) * per_radian
     return AngleSummary(
         name=name,
         rows=len(turns),
@@ -264,13 +264,13 @@ def _half_angle(errors: Array, rows: _Rows) -> float | None:
     """
     free, units = errors.shape[1] - 1, rows.units
     variance = float((rows.sums(errors) ** 2).sum()) / free
+    if units < 2:
+        return None
     if rows.groups is None:
         quantile = _tail(special.chdtri, free, 1 - rows.level)
-    elif units > 1:
+    else:
         variance *= units / (units - 1)
         quantile = free * _tail(special.fdtri, free, units - 1, rows.level)
-    else:
-        return None
     sine = math.sqrt(quantile * variance)
     return math.asin(sine) if sine < 1 else None
 

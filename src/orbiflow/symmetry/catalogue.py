@@ -69,6 +69,11 @@ _OTHER_SYMBOLS = {
 }
 
 
+def short_symbol(name: str) -> str:
+    """Return the short symbol of a wallpaper group, and any other name as it is."""
+    return _OTHER_SYMBOLS.get(str(name).replace("×", "x"), name)
+
+
 def wallpaper_group(name: str, lattice: ArrayLike | None = None) -> CrystallographicGroup:
     """Return the wallpaper group `name`, one of `WALLPAPER_GROUPS`.
 
@@ -79,7 +84,7 @@ def wallpaper_group(name: str, lattice: ArrayLike | None = None) -> Crystallogra
     >>> wallpaper_group("p6m").order
     12
     """
-    name = _OTHER_SYMBOLS.get(str(name).replace("×", "x"), name)
+    name = short_symbol(name)
     if name not in WALLPAPER_GROUPS:
         raise GroupError(
             f"unknown wallpaper group {name!r}; the 17 are {', '.join(WALLPAPER_GROUPS)}"

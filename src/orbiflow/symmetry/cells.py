@@ -24,10 +24,13 @@ def cell_lattice(cell: ArrayLike) -> Array:
     if shape == (3, 3):
         return checked_lattice(as_array(cell, "cell", (3, 3)))
     if shape not in ((3,), (6,)):
-        raise refusal("cell", "a, b, c, alpha, beta, gamma in degrees, or a (3, 3) lattice", cell)
+        wanted = (
+            "a,b,c or a,b,c,alpha,beta,gamma (lengths, and angles in degrees), or a (3, 3) lattice"
+        )
+        raise refusal("cell", wanted, cell)
     lengths, angles = (*as_array(cell, "cell", shape).reshape(-1, 3), np.full(3, 90.0))[:2]
     if lengths.min() <= 0:
-        raise refusal("cell", "three lengths above 0, and angles", f"{lengths.tolist()}")
+        raise refusal("cell", "of lengths above 0", lengths.min())
     cosines = np.cos(np.radians(angles))
     exact = np.where(np.isin(angles, (60, 90, 120)), np.round(2 * cosines) / 2, cosines)
     unit = np.eye(3)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from orbiflow.arguments import as_array, refusal
 from orbiflow.arrays import Array
 from orbiflow.errors import GroupError
-from orbiflow.symmetry.catalogue import WALLPAPER_GROUPS, wallpaper_group
+from orbiflow.symmetry.catalogue import WALLPAPER_GROUPS, short_symbol, wallpaper_group
 from orbiflow.symmetry.cells import cell_lattice
 from orbiflow.symmetry.group import CrystallographicGroup, checked_lattice
 from orbiflow.symmetry.space_groups import space_group
@@ -78,15 +78,15 @@ def is_group_name(name: object) -> bool:
     if not isinstance(name, str):
         return False
     tables = (WALLPAPER_GROUPS, FLAT_MANIFOLDS, ALIASES)
-    return any(name in table for table in tables) or bool(SYMBOL.fullmatch(name))
+    return any(short_symbol(name) in table for table in tables) or bool(SYMBOL.fullmatch(name))
 
 
 def group_by_name(name: str, cell: ArrayLike | None = None) -> CrystallographicGroup:
     """Return a plane group, the group of a flat 3-manifold, or a space group.
 
     Args:
-        name: "p1" to "p6m", as in `WALLPAPER_GROUPS`; a name of `flat_manifold`; or a number or symbol
-            of `space_group`, whose Hermann-Mauguin symbols begin with a capital letter.
+        name: A symbol of `wallpaper_group`, such as "p4g" or "4*2"; a name of `flat_manifold`; or a
+            number or symbol of `space_group`, where Hermann-Mauguin symbols begin with a capital.
         cell: The cell: a, b and gamma in the plane, else a, b, c and alpha, beta, gamma in degrees;
             the lengths alone, if the angles are right (120 in a hexagonal plane); or a lattice, basis
             vectors as columns. It is the conventional cell, for cm and cmm a centred rectangle.
@@ -103,8 +103,8 @@ def group_by_name(name: str, cell: ArrayLike | None = None) -> CrystallographicG
             f"manifold ({', '.join((*FLAT_MANIFOLDS, *ALIASES))}) or a space group, such as "
             "'P 21 21 21'"
         )
-    if name in WALLPAPER_GROUPS:
-        return wallpaper_group(name, None if cell is None else _plane_lattice(name, cell))
+    if (plane := short_symbol(name)) in WALLPAPER_GROUPS:
+        return wallpaper_group(plane, None if cell is None else _plane_lattice(plane, cell))
     if name in FLAT_MANIFOLDS or name in ALIASES:
         return flat_manifold(name, cell)
     return space_group(name, cell)
@@ -117,8 +117,9 @@ def _plane_lattice(name: str, cell: ArrayLike) -> Array:
     if shape == (2, 2):
         return checked_lattice(as_array(cell, "cell", (2, 2)))
     if shape not in ((2,), (3,)):
-        raise refusal("cell", "a, b and gamma in degrees, or a (2, 2) lattice", cell)
+        wanted = "a,b or a,b,gamma (lengths, and an angle in degrees), or a (2, 2) lattice"
+        raise refusal("cell", wanted, cell)
     a, b, *angle = as_array(cell, "cell", shape)
     gamma = angle[0] if angle else 120.0 if system == "hexagonal" else 90.0
-    lattice = cell_lattice((a, b, 1.0, 90.0, 90.0, gamma))[:2, :2]
+    lattice = cell_lattice((a, b, a, 90.0, 90.0, gamma))[:2, :2]
     return lattice @ np.array([[0.5, 0.5], [0.5, -0.5]]) if system == "rhombic" else lattice

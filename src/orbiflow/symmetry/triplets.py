@@ -12,10 +12,11 @@ from orbiflow.arrays import Array
 from orbiflow.errors import GroupError, LatticeMismatchError, NotAnIsometryError
 from orbiflow.symmetry.cells import cell_parameters, fitting_cell
 from orbiflow.symmetry.group import MAX_ORDER, CrystallographicGroup, checked_lattice, generated
-from orbiflow.symmetry.isometry import TOLERANCE, Isometry, translation
+from orbiflow.symmetry.isometry import Isometry, translation
 
 AXES = "xyz"
 MAX_LENGTH = 200
+ROUNDING = 1e-13  # the error of a shift that is meant to be a simple fraction
 _NUMBER = r"(?:\d{1,9}(?:/0*[1-9]\d{0,8}|\.\d{0,20})?|\.\d{1,20})"
 _TERM = re.compile(rf"([+-]?)({_NUMBER})?\*?([xyz]?)")
 
@@ -101,7 +102,8 @@ def operators(group: CrystallographicGroup, lattice: ArrayLike | None = None) ->
 def _part(row: list[float]) -> str:
     """Return one part of an operator as text: "x-y+1/3"."""
     fraction = Fraction(row[-1]).limit_denominator(48)
-    shift = f"{row[-1]:.12g}" if abs(fraction - row[-1]) > TOLERANCE else str(fraction)
+    decimal = f"{row[-1]:.15f}".rstrip("0")
+    shift = decimal if abs(fraction - row[-1]) > ROUNDING else str(fraction)
     terms = [f"{x:+.0f}*{axis}" for x, axis in zip(row[:-1], AXES, strict=False) if x]
-    terms += [f"+{shift}"] if row[-1] > TOLERANCE or not terms else []
+    terms += [f"+{shift}"] if row[-1] > ROUNDING or not terms else []
     return re.sub(r"(?<!\d)1\*", "", "".join(terms)).removeprefix("+")

@@ -51,6 +51,35 @@ def fold_call(**given: Any) -> Call:
 ALL = [f"{name} 1.{fold}" for fold in (1, 2, 3) for name in ("mixture", "chains")]
 
 
+@pytest.mark.usefixtures("here")
+def test_a_cell_reaches_the_folds(tmp_path: Path) -> None:
+    data = table_of(tmp_path, 40)
+    given = {"space": "4*2", "cell": [10.0, 10.0], "unit": None, "against": ["uniform"], "folds": 2}
+    call = call_of(data, **given)
+    summary, events = run_call(call)
+    assert summary["failed"] == 0
+    # uniform on an eighth of 100 square units; mixtures on such places are better, not 100 times
+    assert report_of(call)["uniform"] == pytest.approx(-math.log(12.5))
+    for row in lines_of(call.flat["out"] / "cv.csv"):
+        assert -math.log(12.5) < float(row["log_likelihood"]) < -math.log(12.5) + 3
+    told = [event.text for event in events if isinstance(event, Note)]
+    assert not any("no cell was given" in text for text in told)
+    del given["cell"]
+    _, events = run_call(call_of(data, **given, out=tmp_path / "other"))
+    told = [event.text for event in events if isinstance(event, Note)]
+    assert any("no cell was given" in text for text in told)
+
+
+@given(st.floats(-1e6, 1e6), st.floats(0, 1e4) | st.floats(0, 1e-12))
+def test_ticks_are_apart_however_near_the_values(low: float, span: float) -> None:
+    drawn = overview.strips([("a", (low, low + span), ())], "nats")
+    assert drawn is not None
+    places = [place for place, _ in drawn["ticks"]]
+    assert len(places) > 1
+    assert np.all(np.diff(places) > 1)
+    assert all(math.isfinite(dot) for dot in drawn["strips"][0]["dots"])
+
+
 def test_each_row_is_scored_by_a_fit_to_the_other_folds(here: Here, tmp_path: Path) -> None:
     call = call_of(table_of(tmp_path))
     summary, events = run_call(call)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cProfile
+import itertools
 import json
 import tracemalloc
 from typing import Any
@@ -221,3 +222,17 @@ def test_edges_that_agree_but_for_rounding_do_not_fool_the_overlay(angle: float)
     kind = isohedral_class("IH2")
     tile = Tile(kind.template(), kind.group()).transformed(rotation_matrix(angle), np.zeros(2))
     assert certify(tile).valid
+
+
+def test_needles_finer_than_rounding_are_refused_in_words() -> None:
+    found: list[str] = []
+    some = [(2.7, 0.28, 0.83, -0.1), (5.5, 0.15, 0.73, 0.8), (0.4, 0.28, 0.8, 0.1)]
+    for width, (turn, a, b, c) in itertools.product([-2e-16, -6e-17, -4e-17], some):
+        side = np.array([[0, 0], [a, 0], [b, c], [0, c * 0.3], [0, c * 0.7], [b, 0]])
+        side[3:5] += [[a + 0.3 * (b - a), width], [a + 0.7 * (b - a), 2 * width]]
+        ring = np.concatenate([side, [[1, 0], [1, 1]], (side[1:] + np.eye(2)[1])[::-1], [[0, 1]]])
+        basis = rotation_matrix(turn)
+        certificate = certify(Tile(ring @ basis.T, CrystallographicGroup.generate(basis)))
+        assert certificate.valid == (not certificate.reasons)
+        found.extend(certificate.reasons)
+    assert any("thinner than 1e-12" in reason for reason in found)

@@ -34,7 +34,7 @@ class Estimate:
     high: float
 
     def __str__(self) -> str:
-        return f"{self.value:.4f} ± {self.error:.4f} ({self.low:.4f} to {self.high:.4f})"
+        return f"{self.value:z.4f} ± {self.error:z.4f} ({self.low:z.4f} to {self.high:z.4f})"
 
 
 @dataclass(frozen=True)

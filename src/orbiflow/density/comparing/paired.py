@@ -57,8 +57,8 @@ class Difference:
     def __str__(self) -> str:
         verdict = "the rows cannot tell" if self.better is None else f"{self.better} is better"
         return (
-            f"{self.first} - {self.second}: {self.mean:+.4f} ± {self.error:.4f} nats a row, "
-            f"{self.low:+.4f} to {self.high:+.4f} (p {self.p:.2g}): {verdict}"
+            f"{self.first} - {self.second}: {self.mean:+z.4f} ± {self.error:.4f} nats a row, "
+            f"{self.low:+z.4f} to {self.high:+z.4f} (p {self.p:.2g}): {verdict}"
         )
 
 

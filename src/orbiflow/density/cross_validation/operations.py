@@ -15,7 +15,7 @@ from orbiflow.arguments import as_whole
 from orbiflow.density import operations, tables
 from orbiflow.density.fitting import COMPONENTS, ComponentSettings, DensitySettings
 from orbiflow.density.run_folder import write_files
-from orbiflow.density.tables import RowSettings, SpaceSettings
+from orbiflow.density.tables import GroupedRowSettings, SpaceSettings
 from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.settings import DefaultText, Option, Range, Repeated, Settings
 
@@ -71,8 +71,7 @@ class CrossValidation:
     out: Path
     where: SpaceSettings
     density: ComponentSettings
-    rows: RowSettings
-    group: str | None
+    rows: GroupedRowSettings
     cv: CvSettings
 
     def __post_init__(self) -> None:
@@ -113,10 +112,9 @@ def cross_validate(
     density: ComponentSettings = ComponentSettings(),
     out: Annotated[Path, Option("-o")] = Path("cv"),
     cv: CvSettings = CvSettings(),
-    rows: RowSettings = RowSettings(),
+    rows: GroupedRowSettings = GroupedRowSettings(),
     work: batch.WorkSettings = batch.WorkSettings(),
     *,
-    group: str | None = None,
     on_event: runtime.Sink = runtime.ignore,
     cancel: runtime.Cancel = runtime.Cancel(),
 ) -> runtime.Outcome:
@@ -131,10 +129,8 @@ def cross_validate(
     Args:
         data: CSV, TSV, NPY or Parquet.
         out: Folder for the results; an earlier cross-validation there is resumed.
-        group: Column that names what rows belong to (a protein, a station, an event): all rows of one
-            are on the same side of every split.
     """
-    asked = CrossValidation(data, out, where, density, rows, group, cv)
+    asked = CrossValidation(data, out, where, density, rows, cv)
 
     from orbiflow.density.cross_validation.overview import run
 
@@ -175,11 +171,10 @@ def fold(
     where: SpaceSettings,
     density: ComponentSettings = ComponentSettings(),
     out: Annotated[Path, Option("-o")] = Path("fold"),
-    rows: RowSettings = RowSettings(),
+    rows: GroupedRowSettings = GroupedRowSettings(),
     *,
     fold: int,
     held: str = "fold",
-    group: str | None = None,
     on_event: runtime.Sink = runtime.ignore,
     cancel: runtime.Cancel = runtime.Cancel(),
 ) -> runtime.Outcome:
@@ -193,13 +188,12 @@ def fold(
         out: Folder for the results, made if need be.
         fold: The fold that is held out.
         held: Column that numbers the fold of each row.
-        group: Column that names what rows belong to.
     """
     import numpy as np
 
     begin = time.perf_counter()
     width = len(rows.columns or ()) or None
-    read = tables.read_rows(data, rows, on_event, width=width, group=group)
+    read = tables.read_rows(data, rows, on_event, width=width, group=rows.group)
     out_of_fit = _held(data, read.table, fold, held, rows.header)
     fitted, unseen = read.only(~out_of_fit), read.only(out_of_fit)
     folder = runtime.ResultFolder(out, written_files)

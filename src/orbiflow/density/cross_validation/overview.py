@@ -106,7 +106,7 @@ class CvOverview:
             "settings": {
                 "folds": cv.folds,
                 "times": cv.times,
-                "group": self.asked.group,
+                "group": self.asked.rows.group,
                 "missing": self.asked.rows.missing,
                 "weights": self.asked.rows.weights,
                 "repeats": density.repeats,
@@ -219,6 +219,7 @@ def _item(fit: Fit, asked: CrossValidation, split: Split) -> batch.Item:
     given: dict[str, Any] = {
         "data": Path("rows.npy"),
         "space": space,
+        "cell": asked.where.cell,
         "fold": fit.fold,
         "columns": tuple(str(k + 1) for k in range(angles)),
         "held": str(angles + weighted + grouped + 1),
@@ -291,7 +292,12 @@ def cv_page(
 
 
 def _signed(value: float, sign: str = "-") -> str:
-    return f"{value:{sign}.4f}".replace("-", "\N{MINUS SIGN}")
+    """Return a figure, whose sign is no minus if it is rounded to 0.
+
+    >>> _signed(-1e-9, "+"), _signed(-0.5)
+    ('+0.0000', '−0.5000')
+    """
+    return f"{value:{sign}z.4f}".replace("-", "\N{MINUS SIGN}")
 
 
 Strip = tuple[str, Sequence[float], tuple[float, ...]]
@@ -321,7 +327,7 @@ def _pictures(
     )
 
 
-WIDTH, NAMES, MARGIN, STEP = 720, 300, 24, 34
+WIDTH, NAMES, MARGIN, STEP = 720, 300, 36, 34
 """Pixels: of the picture, of names at its left at most, of the free right margin, of a strip."""
 
 LETTER = 7.6
@@ -370,7 +376,8 @@ def _ticks(low: float, high: float) -> list[float]:
     >>> _ticks(-9.44, -9.21)
     [-9.45, -9.4, -9.35, -9.3, -9.25, -9.2]
     """
-    span = high - low if high > low else max(abs(high), 1.0) * 1e-3
+    span, size = high - low, max(abs(high), 1.0)
+    span = span if span > 1e-9 * size else 1e-3 * size  # equal but for rounding
     power = 10.0 ** math.floor(math.log10(span / 4))
     step = next(m * power for m in (1, 2, 5, 10) if span / (m * power) <= 6)
     first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)

@@ -97,12 +97,12 @@ class Fit:
 def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
     """Return the rows of the table that count."""
     width = asked.where.width
-    rows = read_rows(asked.data, asked.rows, tell, width=width, group=asked.group)
+    rows = read_rows(asked.data, asked.rows, tell, width=width, group=asked.rows.group)
     if rows.weights is not None:
         weighed(torch.zeros(len(rows.weights), 1), rows.weights)  # refuses what is no weight
         rows = rows.only(rows.weights > 0)  # others count for nothing
     table = rows.table
-    unit = angle_unit(asked.where.space, asked.where.unit, table, tell)
+    unit = angle_unit(asked.where, table, tell)
     where, seed = asked.where, asked.density.seed
     space = space_for(where.space, table.values, unit=unit, seed=seed, cell=where.cell)
     marginalise = asked.rows.missing == "marginalise"

@@ -184,18 +184,21 @@ def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: 
 def without_idle(candidates: Candidates, weights: Tensor) -> Tensor:
     """Return the weights (P,) without families that gain nothing on held-out rows."""
     while True:
-        idle = [part for part in judged(candidates, weights) if part.share and part.gain <= 0]
+        live = (weights > 0) | candidates.floor
+        idle = [p for p in judged(candidates, weights, live) if p.share and p.gain <= 0]
         if not idle:
             return weights
         worst = min(idle, key=lambda part: part.gain).name
-        rest = torch.tensor([family != worst for family, _ in candidates.keys]) & (
-            (weights > 0) | candidates.floor
-        )
-        weights = candidates.mixed(rest)
+        weights = candidates.mixed(live & (~candidates.of(worst) | candidates.floor))
 
 
-def judged(candidates: Candidates, weights: Tensor) -> list[ComponentEvidence]:
-    """Return what each family contributes to the mixture of these weights (P,)."""
+def judged(
+    candidates: Candidates, weights: Tensor, among: Tensor | None = None
+) -> list[ComponentEvidence]:
+    """Return what each family contributes to the mixture of these weights (P,).
+
+    It is compared with the best mixture of all others, or of those `among` (P,) the candidates.
+    """
     table, own_weights = candidates.table, candidates.row_weights
     whole, uniform = stacked(table, weights), table[-1]
     found: list[ComponentEvidence] = []
@@ -206,7 +209,8 @@ def judged(candidates: Candidates, weights: Tensor) -> list[ComponentEvidence]:
         share = float(weights[own & ~candidates.floor].sum())
         gain = Gain(0.0, 0.0)
         if share:
-            without = stacked(table, candidates.mixed(~own | candidates.floor))
+            others = ~own if among is None else among & ~own
+            without = stacked(table, candidates.mixed(others | candidates.floor))
             gain = gain_of(whole, without, own_weights)
         above = mean_of(alone - uniform, own_weights)
         found.append(ComponentEvidence(name, share, above, gain.nats, gain.error, table.shape[1]))

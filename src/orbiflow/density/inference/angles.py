@@ -15,14 +15,10 @@ def check_torus(space: Space, what: str) -> Torus:
     """Return the space if it is a torus."""
     if isinstance(space, Torus):
         return space
-    if space.is_round:
-        why = "its coordinates are no angles that could be parted from each other"
-    else:
-        why = (
-            "(theta + pi, pi - phi) is the same place as (theta, phi), so that neither angle has a "
-            "meaning without the other"
-        )
-    raise OrbiflowError(f"{what} are of angles on a torus; on the {space.name} {why}")
+    raise OrbiflowError(
+        f"{what} are of angles on a torus; on the {space.name} no coordinate has a meaning without the "
+        "others"
+    )
 
 
 def kept_axes(axes: Iterable[int] | int, dim: int) -> tuple[int, ...]:
@@ -53,7 +49,10 @@ def axes_named(wanted: Sequence[str | int], names: Sequence[str]) -> list[int]:
     >>> axes_named(["psi", 0], ["phi", "psi"])
     [1, 0]
     """
-    return [_named_axis(one, names) for one in wanted]
+    axes = [_named_axis(one, names) for one in wanted]
+    for twice in [axis for k, axis in enumerate(axes) if axis in axes[:k]]:
+        raise OrbiflowError(f"column {names[twice]!r} is given twice: name each once")
+    return axes
 
 
 def _named_axis(wanted: Any, names: Sequence[str]) -> int:

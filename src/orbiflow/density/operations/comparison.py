@@ -13,8 +13,9 @@ from orbiflow.batch import csv_bytes
 from orbiflow.density import comparing, tables
 from orbiflow.density.comparing import ComparisonSettings
 from orbiflow.density.operations.drawing import require_ending
+from orbiflow.density.operations.fitting import space_of
 from orbiflow.density.run_folder import write_file
-from orbiflow.density.tables import SpaceName, TableSettings, Unit
+from orbiflow.density.tables import SpaceSettings, TableSettings, Unit
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import DefaultText, Option, Repeated
 
@@ -37,7 +38,8 @@ def compare(
     *,
     data: Annotated[tuple[Path, ...], Option("-d"), Repeated()],
     models: Annotated[tuple[Path, ...] | None, Option("--model", "-m"), Repeated()] = None,
-    space: SpaceName | None = None,
+    space: str | None = None,
+    cell: tuple[float, ...] | None = None,
     unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None,
     group: str | None = None,
     out: Annotated[Path | None, Option("-o"), DefaultText("nothing is written")] = None,
@@ -51,7 +53,8 @@ def compare(
     Args:
         data: Table of held-out rows for models; or give it twice, for two data sets.
         models: Folder that `fit` wrote; give it twice or more.
-        space: Where two data sets live.
+        space: Where two data sets live, as `fit` takes it.
+        cell: Lengths and angles in degrees of the cell of two data sets on a group's quotient.
         unit: Unit of angles in two data sets.
         group: Column that names what rows belong to (a protein, a station, an event): those of one are
             not independent.
@@ -59,16 +62,18 @@ def compare(
     """
     models = models or ()
     require_ending(out, (".json", ".csv"))
-    _check_what_is_compared(data, models, space, unit)
+    asked: dict[str, Any] = {"space": space, "cell": cell, "unit": unit}
+    given = {name: value for name, value in asked.items() if value is not None}
+    _check_what_is_compared(data, models, given)
     if out is not None:
         runtime.check_output_file(out, *models, *data)
     read = _Reader(table, group, on_event, runtime.progress_events(on_event, cancel))
+    where = None if models else SpaceSettings(**given)
     with runtime.one_thread():
-        if models:
+        if where is None:
             found = _compare_models(data[0], models, read, settings)
         else:
-            assert space is not None
-            found = _compare_data(data, space, unit, read, settings)
+            found = _compare_data(data, where, read, settings)
     document = found.to_json()
     cancel.check()
     for line in [*found.words(), *found.notes]:
@@ -81,7 +86,7 @@ def compare(
 
 
 def _check_what_is_compared(
-    data: Sequence[Path], models: Sequence[Path], space: str | None, unit: str | None
+    data: Sequence[Path], models: Sequence[Path], where: Mapping[str, Any]
 ) -> None:
     """Check that there are models and a table, or two tables and a space."""
     if models:
@@ -91,15 +96,14 @@ def _check_what_is_compared(
             ],
             "{models} names one folder twice: give each once": len(set(models)) < len(models),
             "models are compared at one {data}, rows that none was fitted to": len(data) != 1,
-            "{space} is that of the models: leave it out": space is not None,
-            "{unit} is that of the models: leave it out": unit is not None,
+            **{f"{{{name}}} is that of the models: leave it out": True for name in where},
         }
     else:
         once = data[0].resolve() == data[-1].resolve()
         wrong = {
             "give two {models} or more and one {data} to compare models, or two {data} and their "
             "{space} to compare data": len(data) != 2,
-            "two {data} need their {space}": space is None,
+            "two {data} need their {space}": "space" not in where,
             "{data} names one file twice: give two data sets": once,
         }
     for message, is_wrong in wrong.items():
@@ -152,11 +156,7 @@ def _compare_models(
 
 
 def _compare_data(
-    data: Sequence[Path],
-    space: SpaceName,
-    unit: Unit | None,
-    read: _Reader,
-    settings: ComparisonSettings,
+    data: Sequence[Path], where: SpaceSettings, read: _Reader, settings: ComparisonSettings
 ) -> DataComparison:
     import numpy as np
 
@@ -172,9 +172,9 @@ def _compare_data(
     both = next(iter(found.values())).table
     if len({own.shape[1] for own in values.values()}) == 1:
         both = replace(both, values=np.concatenate(list(values.values())))
-    unit = tables.angle_unit(space, unit, both, read.tell)
+    unit = tables.angle_unit(where, both, read.tell)
     return comparing.compare_samples(
-        values, space, settings, unit=unit, groups=groups, progress=read.progress
+        values, space_of(where), settings, unit=unit, groups=groups, progress=read.progress
     )
 
 

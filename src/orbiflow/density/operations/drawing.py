@@ -161,9 +161,8 @@ def region(
 def _require_format(out: Path, kind: str, space: Space) -> None:
     """Check that regions of a space can be written in a format."""
     if kind == ".geojson" and not (space.is_round and space.is_planar):
-        points = "the angles of a" if space.has_chart else "points of the"
         raise OrbiflowError(
-            f"{out}: GeoJSON is for places on a globe, not for {points} {space.name}: write .json"
+            f"{out}: GeoJSON is for places on a globe, not for points of the {space.name}: write .json"
             + " or .csv" * space.is_planar
         )
     if kind == ".csv" and not space.is_planar:

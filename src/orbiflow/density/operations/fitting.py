@@ -19,6 +19,7 @@ from orbiflow.settings import Hidden, Option, SettingError
 
 if TYPE_CHECKING:
     from orbiflow.density.estimator import DensityEstimator
+    from orbiflow.density.spaces import Space
     from orbiflow.density.tables import TableRows
 
 MOST_SCORED = 20_000
@@ -79,6 +80,11 @@ def fit(
     return runtime.Outcome({**summary, "picture": pictures.THUMBNAIL if picture else None})
 
 
+def space_of(where: SpaceSettings) -> str | Space:
+    """Return the space if its cell is known, otherwise its name: data tell the rest."""
+    return spaces.make_space(where.space, cell=where.cell) if where.cell else where.space
+
+
 def fit_rows(
     rows: TableRows,
     where: SpaceSettings,
@@ -91,10 +97,9 @@ def fit_rows(
     from orbiflow.density.estimator import DensityEstimator
 
     values, labels = rows.table.values, rows.labels
-    unit = tables.angle_unit(where.space, where.unit, rows.table, tell)
+    unit = tables.angle_unit(where, rows.table, tell)
     given = {name: getattr(settings, name) for name in settings.fields_given}
-    space = spaces.make_space(where.space, cell=where.cell) if where.cell else where.space
-    estimator = DensityEstimator(space, unit=unit, missing=reading.kept_missing, **given)
+    estimator = DensityEstimator(space_of(where), unit=unit, missing=reading.kept_missing, **given)
     progress = runtime.progress_events(tell, cancel)
     return estimator.fit(values, sample_weight=rows.weights, groups=labels, progress=progress)
 
@@ -149,7 +154,7 @@ def _words(document: Mapping[str, Any], rows: int, out: Path) -> tuple[str, str]
     scored = likelihood["natural_rows"]
     which = "these rows" if scored == rows else f"{scored} of them"
     return (
-        f"{rows} rows: mean log density at {which} {likelihood['natural']:.4f} nats, {gain:.4f} more "
+        f"{rows} rows: mean log density at {which} {likelihood['natural']:.4f} nats, {gain:z.4f} more "
         f"than the uniform density; integral {'not checked' if mass is None else f'{mass:.5f}'}",
         f"written to {out} in {document['seconds']:.0f} s",
     )

@@ -54,7 +54,7 @@ def summary(
     for file in filter(None, (out, picture)):
         runtime.check_output_file(file, data)
     rows = tables.read_rows(data, reading, on_event, width=where.width, group=reading.group)
-    unit = tables.angle_unit(where.space, where.unit, rows.table, on_event)
+    unit = tables.angle_unit(where, rows.table, on_event)
     found = _summarised(rows, where.space, unit, settings.level)
     cancel.check()
     for event in _tables(found, settings.level):
@@ -88,13 +88,8 @@ def _check(where: SpaceSettings, reading: GroupedRowSettings, picture: Path | No
     """Refuse what has no summary before the table is read."""
     if where.space not in ("torus", "sphere", "projective-plane"):
         raise SettingError(
-            "{space} must be torus, sphere or projective-plane: there is no summary of points of the "
-            + literal(where.space)
-        )
-    if where.space not in ("torus", "sphere", "projective-plane"):
-        raise SettingError(
             "{space} must be torus, sphere or projective-plane: summaries are of angles, directions "
-            f"and axes, not of points of a {literal(where.space)}"
+            f"and axes; got {literal(repr(where.space))}"
         )
     if where.space != "torus":
         if reading.missing == "marginalise":
@@ -188,6 +183,9 @@ def _notes(found: dict[str, Any], rows: TableRows) -> list[str]:
         notes.append("tests that are known for independent rows of equal weight alone are left out")
     if units < MIN_ROWS:
         notes.append(f"intervals are rough with fewer than {MIN_ROWS} {what}, there are {units}")
+    peaks = [one for one in entries if "name" in one and one["rows"] > 1]
+    if constant := [one["name"] for one in peaks if one["resultant"] > 1 - 1e-12]:
+        notes.append(f"all rows have the same value of {', '.join(constant)}")
     undetermined = [entry["name"] for entry in entries if entry.get("half_width", 0) is None]
     if undetermined:
         notes.append(

@@ -363,8 +363,8 @@ def chosen_map(space: Space, points: Tensor, settings: PlotSettings | None = Non
     """
     if not (space.is_round and space.has_chart):
         raise OrbiflowError(
-            f"maps are of the sphere and the projective plane, not of {space!r}: draw columns of "
-            "`orbiflow density sample` beside those of the data"
+            f"maps are of the sphere and the projective plane, not of the {space.name}: draw columns "
+            "of `orbiflow density sample` beside those of the data"
         )
     settings = settings or PlotSettings()
     projection, radius, middle = settings.projection, settings.radius, settings.center

@@ -330,7 +330,7 @@ def to_geojson(outlines: Sequence[Outline]) -> dict[str, Any]:
         region = outline.region
         if not outline.window.on_globe:
             raise OrbiflowError(
-                "GeoJSON is for places on a globe, not for the angles of a "
+                "GeoJSON is for places on a globe, not for points of the "
                 f"{region.density.space.name}: write .json or .csv"
             )
         names = ("mass", "smooth", "held", "log_prob", "log_prob_low", "log_prob_high")

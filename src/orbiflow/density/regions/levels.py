@@ -177,7 +177,7 @@ def smoothed(density: Density, width: float, generator: torch.Generator) -> Adap
         generator: Source of the samples.
     """
     space = density.space
-    if not space.is_round and space.unit is None:
+    if not space.is_round and space.unit in (None, "units"):
         raise SettingError(f"{{smooth}} is for angles and directions, not for the {space.name}")
     turn = 360.0 if space.is_round else whole_turn(str(space.unit))
     least = turn / (2 * math.pi) * MAX_CONCENTRATION**-0.5

@@ -60,11 +60,12 @@ def to_latlon(vectors: Array) -> Array:
 def to_unit(table: Array) -> Array:
     """Return vectors (N, k), whose lengths must be 1 within a thousandth, at length 1."""
     length = np.linalg.norm(table, axis=1)
+    other = "; latitude and longitude are for the sphere and the projective-plane"
     refuse_rows(
         abs(length - 1) > UNIT_TOLERANCE,
         lambda row: (
             f"the vector {table[row].tolist()} has length {length[row]:.4g}, not 1: "
-            "divide each by its length"
+            f"divide each by its length{other * (table.shape[1] == 2)}"
         ),
     )
     return table / length[:, None]

@@ -52,7 +52,7 @@ SPACE_CLASSES: dict[str, type[Space]] = {}
 
 
 class Space(ABC):
-    """R^d modulo a crystallographic group (design points 12 and 20), or a sphere modulo a finite one.
+    """R^d modulo a crystallographic group (design points 12 and 19), or a sphere modulo a finite one.
 
     Points in the chart are float tensors (..., d), and any point of an orbit stands for it. Data are
     arrays (N, k) in the user's units.
@@ -123,8 +123,8 @@ class Space(ABC):
 
     @property
     def dimensions(self) -> str:
-        """The dimension, as a message says it that asks for two."""
-        return str(self.dim) if self.has_square else f"{self.dim} and no chart of the square"
+        """The dimension, as a message says it that asks for a chart of the square."""
+        return str(self.dim) if self.has_square else f"{self.dim}, but no square for a chart"
 
     @property
     def widths(self) -> tuple[int, ...]:

@@ -209,7 +209,8 @@ class RotationSpace(UnitVectorSpace):
         return (3, 4, 9)
 
     def cover(self, data: ArrayLike) -> Tensor:
-        table = checked_table(data, self.widths, "rotations")
+        what = "rotations (a vector, a quaternion or a matrix in each row)"
+        table = checked_table(data, self.widths, what)
         if table.shape[1] == 4:
             return torch.tensor(to_unit(table))
         rotations = _from_matrices(table) if table.shape[1] == 9 else self._from_angles(table)

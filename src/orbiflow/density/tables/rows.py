@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array
 from orbiflow.density.tables.files import column_names, is_identifier, read_labels, read_table
 from orbiflow.density.tables.settings import (
+    SPACES,
     RowSettings,
+    SpaceSettings,
     TableSettings,
     Unit,
-    check_unit,
     is_angular,
 )
 from orbiflow.density.tables.table import MissingCellsError, Table, TableError, find, quote
@@ -161,11 +162,18 @@ def _name(path: Path, column: str, header: bool | None) -> str:
     return names[find(path, names, column)]
 
 
-def angle_unit(space: str, unit: Unit | None, table: Table, tell: Sink) -> Unit:
-    """Return the unit of angles: the given one, or else radians if all values are within 2 pi."""
+def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
+    """Return the unit of angles: the given one, or else radians if all values are within 2 pi.
+
+    A cell that was not given is told, too: data of another size would be folded into it.
+    """
+    space, unit = where.space, where.unit
+    if space not in SPACES and where.cell is None:
+        tell(
+            Note("no cell was given: its lengths are taken to be about 1, in the unit of the data")
+        )
     if not is_angular(space, len(table.columns)):
         check_order(table.columns, space)
-        check_unit(space, unit)
         return "radians"
     if unit is not None:
         return unit

@@ -7,7 +7,6 @@ the free vertices, M and b. Every simple polygon of that space tiles: sides matc
 the number of tiles over a point (`certify`) cannot jump on the way from the first one.
 """
 
-import contextlib
 from collections.abc import Callable
 from typing import Any
 
@@ -96,7 +95,7 @@ def refine(
             cancel.check()
             if not descent.step():
                 break
-        found = next(t for t in map(space.tile, reversed(descent.path)) if _is_certified(t))
+        found = next(t for t in map(space.tile, reversed(descent.path)) if certify(t).valid)
     return EscherTile(
         found,
         name=start.name,
@@ -106,12 +105,6 @@ def refine(
         notes=(descent.note(),),
         thinnest=narrowest_neck(found.polygon),
     )
-
-
-def _is_certified(tile: Tile) -> bool:
-    with contextlib.suppress(shapely.GEOSException):  # needles finer than rounding
-        return certify(tile).valid
-    return False
 
 
 def _divided(tile: Tile, points: int) -> Tile:

@@ -181,6 +181,9 @@ def _reasons(found: Certificate, areas: Array, tiling: Tiling) -> tuple[str, ...
         )
     if not found.edge_mismatch <= bound:
         reasons.append(f"its edges miss their partners by {found.edge_mismatch:.1e} of its size")
+    if np.isnan(overlaps).any():
+        needles = "a tile has needles or gaps thinner than 1e-12 of its size: smooth its outline"
+        return (*reasons, f"overlaps cannot be computed, as {needles}")
     # edges that miss by the tolerance overlap by at most as much times their length
     excess = overlaps / np.minimum(lengths, 1.0)
     if not excess.max() <= bound:
@@ -233,9 +236,12 @@ def _areas(around: Surroundings) -> tuple[float, float, float, float, float]:
     region = shapely.buffer(polygon, _MARGIN, quad_segs=2)
     shapely.prepare(region)
     images = images[shapely.intersects(region, images)]
-    common = shapely.area(shapely.intersection(polygon, images, grid_size=_GRID))
-    covered = shapely.union_all([polygon, *images], grid_size=_GRID)
-    uncovered = shapely.area(shapely.difference(region, covered, grid_size=_GRID))
     length = float(polygon.length)
     width = 2 * float(polygon.area) / length
+    try:
+        common = shapely.area(shapely.intersection(polygon, images, grid_size=_GRID))
+        covered = shapely.union_all([polygon, *images], grid_size=_GRID)
+        uncovered = shapely.area(shapely.difference(region, covered, grid_size=_GRID))
+    except shapely.GEOSException:  # needles vanish in the grid
+        return math.nan, math.nan, math.nan, length, width
     return float(common.max(initial=0.0)), float(common.sum()), float(uncovered), length, width
