@@ -32,6 +32,7 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/density_rna.py --quick || test $$? -eq 2
 	$(BIN)/python benchmarks/density_unoriented.py --quick
 	$(BIN)/python benchmarks/density_many.py --quick
+	$(BIN)/python benchmarks/density_inference.py --quick || test $$? -eq 2
 	$(BIN)/python benchmarks/density_record.py --quick || test $$? -eq 2
 
 docs: $(VENV)/.installed-docs

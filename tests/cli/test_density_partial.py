@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from cli.conftest import Run
+from density.blends import random_blend
 from orbiflow.density import DensityEstimator, density_to_bytes
+from orbiflow.runtime import Cancel, Cancelled, Progress, find
 
 QUICK = ("--components", "mixture", "--unit", "degrees")
 
@@ -63,6 +65,60 @@ def test_marginal_and_conditional(tmp_path: Path, model: Path, orbiflow: Run) ->
         *("density", "score", drawn, "--model", two, "--out", tmp_path / "scores.csv")
     )
     assert scored.status == 0, scored.err
+
+
+@pytest.fixture(scope="module")
+def blend(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Kernels, chains and a network of four angles."""
+    folder = tmp_path_factory.mktemp("blend")
+    saved = density_to_bytes(random_blend(2, 4, network=True), columns=["a", "b", "c", "d"])
+    (folder / "density.safetensors").write_bytes(saved)
+    return folder
+
+
+def test_samples_of_three_angles(tmp_path: Path, blend: Path, orbiflow: Run) -> None:
+    asked = ("density", "conditional", "-m", blend, "--given", "b=100", "--sample", 400)
+    texts: list[str] = []
+    for name, seed in (("one", 3), ("two", 3), ("three", 4)):
+        done = orbiflow(*asked, "--seed", seed, "--out", tmp_path / name)
+        assert done.status == 0, done.err
+        assert "of the samples are chosen among weighed draws, of which" in done.out
+        texts.append((tmp_path / name / "samples.csv").read_text())
+    assert texts[0] == texts[1] != texts[2]
+    assert texts[0].startswith("a,c,d\n")
+    drawn = np.loadtxt(tmp_path / "one" / "samples.csv", delimiter=",", skiprows=1)
+    assert drawn.shape == (400, 3)
+    assert 90 < np.ptp(drawn, axis=0).min() <= 360  # in degrees
+    assert json.loads((tmp_path / "one" / "report.json").read_text())["samples"] == 400
+    assert not (tmp_path / "one" / "density.csv").exists()
+
+
+def test_accuracy_is_what_was_asked_for(tmp_path: Path, blend: Path, orbiflow: Run) -> None:
+    errors: list[float] = []
+    for accuracy in (0.2, 0.0005, 1e-6):
+        asked = ("--columns", "d", "--accuracy", accuracy, "--out", tmp_path / "out")
+        done = orbiflow("density", "marginal", "-m", blend, *asked)
+        assert done.status == 0, done.err
+        errors.append(json.loads((tmp_path / "out" / "report.json").read_text())["report"]["error"])
+        warned = f"WARNING: an error of {accuracy:g} nats cannot be had here" in done.out + done.err
+        assert warned == (errors[-1] > accuracy) == (accuracy == 1e-6)
+    assert errors[0] > errors[1]
+
+
+def test_it_can_be_cancelled_in_the_middle(tmp_path: Path, blend: Path) -> None:
+    cancel, told = Cancel(), list[str]()
+
+    def hear(event: object) -> None:
+        if isinstance(event, Progress):
+            told.append(event.what)
+            if "level 2" in event.what:
+                cancel.cancel()
+
+    asked = {"model": blend, "columns": ("d",), "accuracy": 1e-6, "out": tmp_path / "out"}
+    with pytest.raises(Cancelled):
+        find("density marginal").call(asked).run(hear, cancel)
+    assert told[-1] == "integrating, level 2"
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

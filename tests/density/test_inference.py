@@ -1,14 +1,114 @@
-"""Marginal and conditional densities of densities that are derived, and of three angles and more."""
+"""Marginal and conditional densities: how exact, derived twice, of three angles and more, stopped."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from density.blends import even_grid, random_blend
-from orbiflow.density import conditional, density_to_bytes, marginal, read_density
+from density.blends import even_grid, random_blend, random_chains, random_network
+from orbiflow.density import (
+    Density,
+    Mixture,
+    Torus,
+    VonMisesChains,
+    conditional,
+    density_to_bytes,
+    marginal,
+    read_density,
+)
+from orbiflow.density.models import Split
+
+seeds = st.integers(0, 2**31)
+GRID = 48
+"""Points an angle that resolve what `sharp` makes."""
+
+
+def sharp(seed: int, dim: int, kind: str) -> Density:
+    """Chains in any order, or a network, of deviations down to a sixth of a radian."""
+    rng, space = np.random.default_rng(seed), Torus(dim)
+    if kind == "network":
+        return random_network(rng, space)
+    own = random_chains(rng, space, 4)
+    sharper = own.concentrations * (3 if dim < 4 else 1)
+    return VonMisesChains(space, own.log_weights, own.means, sharper, own.order)
+
+
+def true_log(
+    density: Density, points: torch.Tensor, kept: list[int], known: dict[int, float]
+) -> torch.Tensor:
+    """Log density of what is kept, at points (N, k), and of what is known, by quadrature."""
+    hidden = [axis for axis in range(density.space.dim) if axis not in kept and axis not in known]
+    nodes = even_grid(GRID, len(hidden)) if hidden else torch.zeros(1, 0).double()
+    whole = points.new_empty(len(points), len(nodes), density.space.dim)
+    whole[:, :, kept], whole[:, :, hidden] = points[:, None], nodes
+    for axis, value in known.items():
+        whole[:, :, axis] = value
+    return density.log_prob(whole).logsumexp(dim=1) - math.log(len(nodes))
+
+
+def off(found: Density, density: Density, kept: list[int], known: dict[int, float]) -> float:
+    """Root mean square error of a derived density, in nats, at its own samples."""
+    points = found.sample(60, torch.Generator().manual_seed(7))
+    none = torch.zeros(1, 0, dtype=torch.float64)
+    evidence = true_log(density, none, [], known) if known else 0.0
+    truth = true_log(density, points, kept, known) - evidence
+    return float((found.log_prob(points) - truth).square().mean().sqrt())
+
+
+@given(seeds, st.sampled_from(["chains", "network"]), st.integers(0, 1), st.data())
+@settings(deadline=None, max_examples=12)
+def test_tables_are_the_integral_at_every_level(
+    seed: int, kind: str, known: int, data: st.DataObject
+) -> None:
+    """What is kept and given together: its density, and so what the given angle says of components."""
+    density = sharp(seed, 3, kind)
+    one, other, _ = data.draw(st.permutations(range(3)))
+    values = {other: 0.37} if known else {}
+    points = torch.tensor(np.random.default_rng(seed).uniform(size=(40, 1)))
+    truth = true_log(density, points, [one], values)
+    errors: list[float] = []
+    for level in (0, 2):
+        split = Split(3, (one,), tuple(values), tuple(values.values()))
+        parts = density.approximated(split, Torus(1), level, lambda: None)
+        found = torch.stack([log + own.log_prob(points) for log, own in parts]).logsumexp(dim=0)
+        errors.append(float(((found - truth).exp() - 1).abs().max()))
+    assert errors[1] < 0.02
+    assert errors[0] < 0.25
+
+
+@given(seeds, st.data())
+@settings(deadline=None, max_examples=6)
+def test_an_error_is_at_least_the_true_one(seed: int, data: st.DataObject) -> None:
+    """Also that of a density which is derived from a derived one, where both are asked for roughly."""
+    kind, dim = data.draw(st.sampled_from([("chains", 4), ("chains", 4), ("network", 3)]))
+    density = sharp(seed, dim, kind)
+    first, second, third, *_ = data.draw(st.permutations(range(dim)))
+    at, accuracy = data.draw(st.floats(0, 1)), data.draw(st.sampled_from([0.3, 0.02]))
+    both = marginal(density, [first, second], accuracy=accuracy)
+    for found, kept, known in (
+        (both, [first, second], {}),
+        (marginal(both, 1, accuracy=accuracy), [second], {}),
+        (conditional(both, {0: at}, accuracy=accuracy), [second], {first: at}),
+        (conditional(density, {third: at}, first, accuracy=accuracy), [first], {third: at}),
+    ):
+        assert found.error < accuracy * (1 + 2 * (kept == [second]))
+        if dim == 3 or [*kept, *known] != [second]:  # no quadrature over three hidden angles
+            assert off(found, density, kept, known) < 1.1 * found.error + 5e-4
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rough_error_is_seen(seed: int) -> None:
+    """Quasi-random nodes of two hidden angles are few at first."""
+    density = sharp(seed, 4, "chains")
+    found = marginal(density, [0, 1], accuracy=0.3)
+    assert 1e-3 < found.error < 0.3
+    assert 0.1 * found.error < off(found, density, [0, 1], {}) < 1.1 * found.error
 
 
 def test_the_error_of_the_first_step_is_kept(tmp_path: Path) -> None:
@@ -32,3 +132,37 @@ def test_three_angles_ask_the_whole(tmp_path: Path, given: dict[int, float] | No
     axis = marginal(density, 2) if given is None else conditional(density, given, 2)
     twice, line = marginal(again, 1), even_grid(16, 1)
     assert float((twice.log_prob(line) - axis.log_prob(line)).abs().max()) < 0.05
+
+
+def test_samples_are_of_what_is_given() -> None:
+    """They are chosen among weighed draws: mean sines and cosines against quadrature."""
+    network = random_network(np.random.default_rng(4), Torus(3))
+    density = Mixture([network, sharp(4, 3, "chains")], [0.5, 0.5])
+    last = network.factors[-1].axes[-1]  # so that neither has a closed form
+    kept = [axis for axis in range(3) if axis != last]
+    drawn = conditional(density, {last: 0.6}).sample(4000, torch.Generator().manual_seed(1))
+    grid = even_grid(GRID, 2)
+    weights = torch.softmax(true_log(density, grid, kept, {last: 0.6}), dim=0)
+    for function in (torch.sin, torch.cos):
+        expected = weights @ function(2 * math.pi * grid)
+        found = function(2 * math.pi * drawn)
+        assert (
+            (found.mean(dim=0) - expected).abs() < 4 * found.std(dim=0) / 4000**0.5 + 0.01
+        ).all()
+
+
+def test_it_can_be_stopped_in_the_middle() -> None:
+    class Stopped(Exception):
+        pass
+
+    told: list[float] = []
+
+    def progress(share: float, what: str) -> None:
+        told.append(share)
+        if share > 0.2:
+            raise Stopped(what)
+
+    with pytest.raises(Stopped, match="integrating, level 2"):
+        marginal(sharp(0, 3, "chains"), [0, 1], accuracy=1e-6, progress=progress)
+    assert len(told) > 2
+    assert told == sorted(told)

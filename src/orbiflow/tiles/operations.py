@@ -22,11 +22,11 @@ from orbiflow.runtime import (
     ignore,
     operation,
 )
-from orbiflow.settings import DefaultText, Ending, Hidden, Option, Settings
+from orbiflow.settings import DefaultText, Ending, Hidden, Option, Parsed, Settings
 from orbiflow.tiles.art import ArtSettings
 from orbiflow.tiles.exporting import ExportSettings
 from orbiflow.tiles.motion import AnimationSettings
-from orbiflow.tiles.search import EscherizeSettings
+from orbiflow.tiles.search import EscherizeSettings, class_names
 from orbiflow.tiles.silhouette import ReadingSettings
 from orbiflow.tiles.solids import SolidSettings
 
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from orbiflow.tiles.exporting import Exported
     from orbiflow.tiles.search import SearchResult
     from orbiflow.tiles.tile import EscherTile
-    from orbiflow.tiles.tilings import IsohedralClass
 
 
 class TileChoice(Settings):
@@ -413,46 +412,40 @@ def animate(
 @operation("classes")
 def classes(
     *,
+    classes: Annotated[
+        tuple[str, ...] | None,
+        Parsed(class_names, "classes such as IH12,IH26, or all", "CLASSES"),
+        DefaultText("the nine"),
+    ] = None,
     out: Annotated[Path | None, Option("-o"), Ending(".png", "")] = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
-    """List the nine isohedral classes: edges, rotation centres, glide lines.
+    """List isohedral classes: their groups, the symmetry of their tiles, and how edges are identified.
 
-    Between them they give every shape that tiles the plane isohedrally. Edges are numbered in order
-    around the tile; "0=3" is moved by a translation, "0~5" by a glide reflection, "0>4" by a
-    rotation, "2o" turns about its own midpoint.
+    The nine that are listed by default give every shape that tiles the plane isohedrally. In others of
+    the 81 types a tile has a symmetry of its own: D1 is a mirror, C2 a half-turn. Edges are numbered in
+    order around the tile; "0=3" is moved by a translation, "0~5" by a glide reflection, "0>4" by a
+    rotation, "0|3" by a mirror; "2o" turns about its own midpoint, and "2|" lies on a mirror.
 
     Args:
+        classes: The classes, or all 81 types.
         out: Also draw them into this PNG file.
     """
     from orbiflow.runtime import write_atomic
     from orbiflow.tiles.pictures import classes_png
-    from orbiflow.tiles.tilings import CLASSES
+    from orbiflow.tiles.tilings import CLASSES, ISOHEDRAL_TYPES, isohedral_class
 
     cancel.check()
-    facts = [_facts(kind) for kind in CLASSES.values()]
-    rows = tuple(tuple(fact.values()) for fact in facts)
-    on_event(Table("The nine isohedral classes", tuple(facts[0]), rows))
+    every = [name.strip().lower() for name in classes or ()] == ["all"]
+    names = ISOHEDRAL_TYPES if every else classes or CLASSES
+    kinds = tuple(isohedral_class(name) for name in names)
+    facts = [kind.facts() for kind in kinds]
+    title = "Isohedral classes" if classes else "The nine isohedral classes"
+    shown = ("class", "group", "tile", "symbol", "identified", "rotations", "stretch")
+    on_event(_table(title, [{name: row[name] for name in shown} for row in facts]))
     if out is not None:
-        write_atomic(out, classes_png())
+        write_atomic(out, classes_png(kinds))
         on_event(Written(out))
         on_event(Note(f"drawn in {out}"))
     return Outcome({"classes": facts, "file": None if out is None else str(out)})
-
-
-def _facts(kind: IsohedralClass) -> dict[str, str]:
-    from orbiflow.symmetry import symmetry_elements
-
-    elements = symmetry_elements(kind.group())
-    orders = sorted({center.order for center in elements.centers})
-    glides = {tuple(abs(glide.line.direction).round(6)) for glide in elements.lines}
-    return {
-        "class": kind.name,
-        "group": kind.group_name,
-        "edges": str(len(kind.template())),
-        "identified": " ".join(pair.brief for pair in kind.identified_edges),
-        "rotation centres": ", ".join(f"{order}-fold" for order in orders) or "-",
-        "glides": {0: "-", 1: "one direction"}.get(len(glides), "two directions"),
-        "stretch": {0: "none", 1: "one axis", 2: "any"}[kind.stretch_dim],
-    }

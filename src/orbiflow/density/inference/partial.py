@@ -131,7 +131,7 @@ def _restricted(
             f"the density of these angles cannot be approximated to better than {error:.1f} nats (root "
             'mean square): keep one angle, or fit with components="kernels,mixture"'
         )
-    whole.error = math.hypot(error, _inherited(density, split))
+    whole.error = error + _inherited(density, split)
     return whole
 
 
@@ -158,7 +158,8 @@ class _Left:
     """A component without a closed form: its log weight, how its angles are split, and kernels for it.
 
     - `found`: Kernels with log weights, of the last level; `before`: Of the level before.
-    - `change`: The root mean square change of the whole between them, in nats.
+    - `error`: The root mean square error of the whole that is its own, in nats. A change from one level
+      to the next is of two independent errors, of which the later one is not the larger.
     """
 
     log: float
@@ -166,7 +167,7 @@ class _Left:
     split: Split
     found: list[tuple[float, Density]] = field(default_factory=list[tuple[float, Density]])
     before: list[tuple[float, Density]] = field(default_factory=list[tuple[float, Density]])
-    change: float = math.inf
+    error: float = math.inf
 
     def refine(self, space: Torus, level: int, tick: Callable[[], None]) -> None:
         more = self.density.approximated(self.split, space, level, tick)
@@ -182,11 +183,11 @@ def _refined(
 ) -> tuple[Mixture, float]:
     """Return kernels for what has no closed form, level by level until they settle, and their error.
 
-    A component whose change is small is left as it is. Changes are of the whole, at its own samples.
+    A component whose error is small is left as it is. Changes are of the whole, at its own samples.
     """
     enough = accuracy / math.sqrt(len(left))
     for level in range(LEVELS):
-        wanted = [one for one in left if one.change > enough]
+        wanted = [one for one in left if one.error > enough]
         for number, one in enumerate(wanted):
             share, what = (level + number / len(wanted)) / LEVELS, f"integrating, level {level + 1}"
             one.refine(space, level, partial(say, share, what))
@@ -199,11 +200,12 @@ def _refined(
                 new, old = (_log_sum(parts, points) - total for parts in (one.found, one.before))
                 # what the whole would be with the old instead of the new
                 ratio = (old - now).exp() - (new - now).exp()
-                one.change = float(ratio.clamp_min(-1 + 1e-12).log1p().square().mean().sqrt())
-        if all(one.change <= enough for one in left):
+                change = ratio.clamp_min(-1 + 1e-12).log1p().square().mean()
+                one.error = float((change / 2).sqrt())
+        if all(one.error <= enough for one in left):
             break
     whole = _mixture([*closed, *(part for one in left for part in one.found)])
-    return whole, math.sqrt(sum(one.change**2 for one in left))
+    return whole, math.sqrt(sum(one.error**2 for one in left))
 
 
 def _log_total(closed: list[tuple[float, Density]], left: list[_Left]) -> float:

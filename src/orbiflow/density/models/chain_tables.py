@@ -14,7 +14,7 @@ from torch import Tensor
 
 from orbiflow.density.models.chains import REACH, SCALES, VonMisesChains, quantiles
 from orbiflow.density.models.density import Split
-from orbiflow.density.models.lattice import KERNEL_STEP, joined_tables, sharpest_on
+from orbiflow.density.models.lattice import KERNEL_STEP, sharpest_on
 from orbiflow.density.models.terms import FAINT
 from orbiflow.typed_torch import broadcast, listed, special, unique
 
@@ -27,23 +27,26 @@ FINEST = {1: 3072, 2: 768}
 FAINTEST = 25.0
 """Components whose logarithm is further than this below that of the largest are left out."""
 
-ALONE = 48
-"""The fewest nodes of an angle that is the only one hidden."""
+ALONE, FEWEST = 48, 8
+"""The fewest nodes of an angle that is the only one hidden, and of several."""
+
+SHARPNESS = 1.2 ** torch.arange(-30, 116, dtype=torch.float64)
+"""Concentrations by which quasi-random nodes are spread."""
 
 AT_ONCE = 2**18
 """Entries worked on at a time: few enough for the cache."""
-
 
 WIDE = 8.0
 """Concentration below which a given angle does not tell how likely a component is."""
 
 
 def chain_tables(
-    chains: VonMisesChains, split: Split, nodes: int, seed: int, tick: Callable[[], None]
+    chains: VonMisesChains, split: Split, level: int, start: float, tick: Callable[[], None]
 ) -> tuple[float, list[Tensor]]:
-    """Return tables (n,) or (n, n) on even grids whose sum is the density of what is kept and given.
+    """Return tables (n,) or (n, m) on even grids whose sum is the density of what is kept and given.
 
-    First comes the logarithm of their scale. `nodes` are those of the hidden angles.
+    First comes the logarithm of their scale. The grids begin at `start`, in turns; each level has more
+    nodes of the hidden angles.
     """
     scale = torch.tensor(SCALES, dtype=torch.float64)
     kappa = (chains.concentrations[:, None] / scale[:, None]).flatten(0, 1)
@@ -59,8 +62,8 @@ def chain_tables(
     tables: dict[tuple[int, ...], Tensor] = {}
     for walk in walks:
         tick()
-        walk.add_to(tables, top, nodes, seed)
-    return top, joined_tables(tables.values())
+        walk.add_to(tables, top, level, start)
+    return top, [*tables.values()]
 
 
 class _Walk:
@@ -123,31 +126,33 @@ class _Walk:
         self.wanted = sizes[torch.searchsorted(sizes, count).clamp_max(len(sizes) - 1)]
 
     def add_to(
-        self, tables: dict[tuple[int, ...], Tensor], top: float, nodes: int, seed: int
+        self, tables: dict[tuple[int, ...], Tensor], top: float, level: int, start: float
     ) -> None:
         """Add the components' densities, relative to exp(top), to tables of their sizes."""
         likely = torch.nonzero(self.likely > top - FAINTEST)[:, 0]
+        rule = _Rule(len(self.hidden), level)
         sizes, number = unique(self.wanted[likely], dim=0, return_inverse=True)
         for k, size in enumerate(listed(sizes)):
             table = tables.setdefault(tuple(size), torch.zeros(*size, dtype=torch.float64))
-            self._add(table, likely[number == k], top, nodes, seed)
+            self._add(table, likely[number == k], top, rule, start)
 
-    def _add(self, table: Tensor, chosen: Tensor, top: float, nodes: int, seed: int) -> None:
+    def _add(self, table: Tensor, chosen: Tensor, top: float, rule: _Rule, start: float) -> None:
         kept, sizes = list(self.split.kept), torch.tensor(table.shape)
         reach = (self.reach[chosen][:, kept] / (2 * math.pi) * sizes).ceil().long().amax(dim=0) + 1
         widths = torch.minimum(2 * reach + 1, sizes)
-        middle = (self.middle[chosen][:, kept] / (2 * math.pi) * sizes).round().long()
-        count = (1, max(nodes, ALONE))[len(self.hidden)] if len(self.hidden) < 2 else nodes
-        block = max(1, AT_ONCE // (count * int(widths.prod())))
+        middle = self.middle[chosen][:, kept] / (2 * math.pi) - start
+        middle = (middle * sizes).round().long()
+        block = max(1, AT_ONCE // (rule.count * int(widths.prod())))
         for some, at in zip(torch.split(chosen, block), torch.split(middle, block), strict=True):
             places = [
                 (at[:, i, None] - width // 2 + torch.arange(width)) % size
                 for i, (width, size) in enumerate(zip(listed(widths), table.shape, strict=True))
             ]
             angles = [
-                2 * math.pi * p.double() / size for p, size in zip(places, table.shape, strict=True)
+                2 * math.pi * (p.double() / size + start)
+                for p, size in zip(places, table.shape, strict=True)
             ]
-            values = self._values(some, angles, top, self._nodes(some, count, seed), table.shape)
+            values = self._values(some, angles, top, rule, table.shape)
             flat = (
                 places[0]
                 if len(places) == 1
@@ -155,78 +160,37 @@ class _Walk:
             )
             table.view(-1).index_add_(0, flat.flatten(), values.flatten())
 
-    def _nodes(self, rows: Tensor, count: int, seed: int) -> dict[int, tuple[Tensor, Tensor]]:
-        """Return offsets (C, Q) of each hidden angle from its mean, and logarithms of their weights.
-
-        They spread as the angle does, the angles kept before it being free.
-        """
-        found: dict[int, tuple[Tensor, Tensor]] = {}
-        d = self.split.dim
-        if not self.hidden:
-            return found
-        engine = torch.quasirandom.SobolEngine(len(self.hidden), scramble=True, seed=seed)
-        even = engine.draw(count, dtype=torch.float64)
-        for i, axis in enumerate(self.hidden):
-            spread = 1 / self.kappa[rows, axis].clamp_min(1e-12)
-            for j in self.split.kept:
-                most = self.means[rows, axis, 1 + j].square()
-                most = most + self.means[rows, axis, 1 + d + j].square()
-                spread = spread + most * (self.reach[rows, j] / REACH).clamp_max(1).square()
-            kappa = 1 / spread[:, None]
-            if len(self.hidden) == 1:
-                reach = (REACH * spread.sqrt()).clamp_max(math.pi)[:, None]
-                offset = reach * ((2 * torch.arange(count) + 1) / count - 1)
-                logs = (reach / (math.pi * count)).log().expand(-1, count)
-            else:
-                offset = quantiles(kappa[:, 0], even[:, i])
-                logs = -(_bump(kappa, offset) + math.log(count) * (i == 0))
-            found[axis] = offset, logs
-        return found
-
     def _values(
-        self,
-        rows: Tensor,
-        angles: list[Tensor],
-        top: float,
-        nodes: dict[int, tuple[Tensor, Tensor]],
-        shape: tuple[int, ...],
+        self, rows: Tensor, angles: list[Tensor], top: float, rule: _Rule, shape: tuple[int, ...]
     ) -> Tensor:
         """Return the densities (C, A) or (C, A, B), relative to exp(top), of components at angles."""
         kept, given = self.split.kept, dict(zip(self.split.given, self.split.values, strict=True))
         first_last = sorted(kept, key=self.order.index)
-        middle = self.middle[rows]
         total = (self.logs[rows] - top)[:, None, None, None]
-        # sines and cosines over components, nodes and grids; of those kept also at their middle
-        seen, rough = dict[int, tuple[Tensor, Tensor]](), dict[int, tuple[Tensor, Tensor]]()
+        # sines and cosines over components, nodes and grids
+        seen = dict[int, tuple[Tensor, Tensor]]()
         for axis in self.order:
-            kappa = self.kappa[rows, axis, None, None, None]
-            if axis in kept:
-                kappa = kappa.clamp_max(sharpest_on(shape[kept.index(axis)]))
-                at = angles[kept.index(axis)]
-                mean = self._mean(rows, axis, seen)
-                if axis == first_last[-1]:
-                    images = torch.stack([at.cos(), at.sin(), torch.ones_like(at)], dim=1)
-                    total = total - kappa - special.i0e(kappa).log()
-                    linear = [kappa * mean.cos(), kappa * mean.sin(), total]
-                    table = torch.stack(broadcast(*linear), dim=-1)[:, :, :, 0]
-                    total = (table.flatten(1, 2) @ images).reshape(*table.shape[:3], -1)
-                    at = at[:, None, None]
-                else:
-                    at = at[:, None, :, None]
-                    total = total + _bump(kappa, at - mean)
+            kappa, mean = self.kappa[rows, axis, None, None, None], self._mean(rows, axis, seen)
+            if axis in self.hidden:
+                offset, logs = rule.nodes(self.hidden.index(axis), self.kappa[rows, axis, None])
+                at, total = mean + offset[:, :, None, None], total + logs[:, :, None, None]
                 seen[axis] = at.sin(), at.cos()
-                own = middle[:, axis, None, None, None]
-                rough[axis] = own.sin(), own.cos()
                 continue
-            mean = self._mean(rows, axis, seen)
             if axis in given:
                 at = torch.full((1, 1, 1, 1), 2 * math.pi * given[axis], dtype=torch.float64)
             else:
-                offset, logs = (value[:, :, None, None] for value in nodes[axis])
-                at = self._mean(rows, axis, rough) + offset
-                total = total + logs
-            total = total + _bump(kappa, at - mean)
-            seen[axis] = rough[axis] = at.sin(), at.cos()
+                at = angles[kept.index(axis)][:, None, :, None]
+                kappa = kappa.clamp_max(sharpest_on(shape[kept.index(axis)]))
+            if axis == first_last[-1]:
+                at = at.mT
+                images = torch.cat([at.cos(), at.sin(), torch.ones_like(at)], dim=2)[:, 0]
+                total = total - kappa - special.i0e(kappa).log()
+                linear = [kappa * mean.cos(), kappa * mean.sin(), total]
+                table = torch.stack(broadcast(*linear), dim=-1)[:, :, :, 0]
+                total = (table.flatten(1, 2) @ images).reshape(*table.shape[:3], -1)
+            else:
+                total = total + kappa * ((at - mean).cos() - 1) - special.i0e(kappa).log()
+            seen[axis] = at.sin(), at.cos()
         values = total.clamp_min_(FAINT).exp_().sum(dim=1)
         if len(kept) == 1:
             return values[:, 0]
@@ -241,6 +205,31 @@ class _Walk:
         return mean
 
 
-def _bump(kappa: Tensor, angle: Tensor) -> Tensor:
-    """Return the logarithm of a von Mises density relative to the uniform one."""
-    return kappa * (angle.cos() - 1) - special.i0e(kappa).log()
+class _Rule:
+    """Nodes of hidden angles: even ones of a single angle, quasi-random ones of several."""
+
+    def __init__(self, hidden: int, level: int) -> None:
+        self.count = (1, ALONE * 2**level, FEWEST * 4**level)[min(hidden, 2)]
+        self.tables: list[Tensor] = []
+        if hidden > 1:
+            even = torch.quasirandom.SobolEngine(hidden, scramble=True, seed=level)
+            nodes = even.draw(self.count, dtype=torch.float64)
+            self.tables = [
+                quantiles(SHARPNESS, own) * SHARPNESS.sqrt()[:, None] for own in nodes.mT
+            ]
+
+    def nodes(self, number: int, kappa: Tensor) -> tuple[Tensor, Tensor]:
+        """Return offsets (C, Q) of a hidden angle from its mean, and the logarithms of their weights.
+
+        For concentrations (C, 1).
+        """
+        if self.tables:
+            kappa = kappa.clamp(float(SHARPNESS[0]), float(SHARPNESS[-2]))
+            row = torch.searchsorted(SHARPNESS, kappa[:, 0], right=True) - 1
+            part = (kappa / SHARPNESS[row, None] - 1) / (SHARPNESS[1] / SHARPNESS[0] - 1)
+            offset = torch.lerp(self.tables[number][row], self.tables[number][row + 1], part)
+            weight = -math.log(self.count) if number == 0 else 0.0
+            return offset / kappa.sqrt(), kappa.new_tensor([[weight]])
+        reach = (REACH / kappa.clamp_min(1e-12).sqrt()).clamp_max(math.pi)
+        offset = reach * ((2 * torch.arange(self.count) + 1) / self.count - 1)
+        return offset, torch.log_softmax(kappa * (offset.cos() - 1), dim=1)

@@ -44,6 +44,10 @@ PILOTS, SPARED = 64, 1e-3
 """Draws of each component by which it is judged where angles are given, and the share of draws that
 goes by weight alone."""
 
+SHIFT = (math.sqrt(5) - 1) / 2
+"""How far the grids of a level are shifted from those of the one before, in turns: the change tells
+what the grids miss."""
+
 BLOCK = 256
 """Points at a time: few enough for the cache."""
 
@@ -202,10 +206,11 @@ class VonMisesChains(Density, kind="chains"):
         from orbiflow.density.models.chain_tables import chain_tables
         from orbiflow.density.models.lattice import lattice_kernels
 
-        log_scale, tables = chain_tables(self, split, 8 * 4**level, level, tick)
+        start = level * SHIFT % 1
+        log_scale, tables = chain_tables(self, split, level, start, tick)
         found: list[Weighted] = []
         for table in tables:
-            log, kernels = lattice_kernels(table, space)
+            log, kernels = lattice_kernels(table, space, start)
             found.append((log_scale + log, kernels))
         return found
 

@@ -30,6 +30,9 @@ FINER = (0.85, 1.05, 1.4, 1.8)
 MOST_ENTRIES = 2**24
 """The most entries of a table on the way."""
 
+PAIRED = 64
+"""How many times more terms a product of two tables may have, which is one of matrices."""
+
 FAINT_SHARE = 1e-6
 """The least share of a component, given the parents, that is seen."""
 
@@ -55,7 +58,7 @@ def grids_for(factors: Sequence[Factor], split: Split, level: int) -> Grids | No
     for axis, kappa in wanted.items():
         step = KERNEL_STEP if axis in split.kept else STEP
         fine = FINER[level] * 2 * math.pi * math.sqrt(kappa) / step
-        sizes[axis] = 1 if axis in given else 8 * math.ceil(fine / 8)
+        sizes[axis] = 1 if axis in given else 2 * math.ceil(fine / 2)
     tables = [tuple(axis for axis in axes if sizes[axis] > 1) for axes, _ in factors]
     if elimination_order(tables, sizes, split.kept)[1] > MOST_ENTRIES:
         return None
@@ -108,7 +111,7 @@ def eliminated(
 def elimination_order(
     tables: Sequence[tuple[int, ...]], sizes: Mapping[int, int], kept: Sequence[int]
 ) -> tuple[list[int], int]:
-    """Return the hidden angles, cheapest first, and the most entries of a product on the way."""
+    """Return the hidden angles, cheapest first, and the most entries of a table on the way."""
     left = [frozenset(axes) for axes in tables]
     hidden = set(sizes) - set(kept)
     order: list[int] = []
@@ -116,7 +119,9 @@ def elimination_order(
     while hidden:
         cliques = {axis: frozenset[int]().union(*(t for t in left if axis in t)) for axis in hidden}
         axis = min(sorted(hidden), key=lambda one: _entries(cliques[one], sizes))
-        most = max(most, _entries(cliques[axis], sizes))
+        terms, result = (_entries(own, sizes) for own in (cliques[axis], cliques[axis] - {axis}))
+        paired = sum(axis in table for table in left) < 3
+        most = max(most, result, terms // PAIRED if paired else terms)
         left = [t for t in left if axis not in t] + [cliques[axis] - {axis}]
         hidden.remove(axis)
         order.append(axis)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 import torch
 from torch import Tensor
@@ -12,7 +11,7 @@ from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.spaces import Torus
 from orbiflow.typed_torch import fft, special
 
-KERNEL_STEP = 0.75
+KERNEL_STEP = 0.65
 """Deviations of the sharpest bumps of a function between two points of a grid that resolves it."""
 
 DROPPED = 1e-7
@@ -24,8 +23,10 @@ def sharpest_on(count: int, step: float = KERNEL_STEP) -> float:
     return (count * step / (2 * math.pi)) ** 2
 
 
-def lattice_kernels(values: Tensor, space: Torus) -> tuple[float, AdaptiveKernels]:
-    """Return kernels through values (n,) or (n, m) on an even grid that begins at 0.
+def lattice_kernels(
+    values: Tensor, space: Torus, start: float = 0.0
+) -> tuple[float, AdaptiveKernels]:
+    """Return kernels through values (n,) or (n, m) on an even grid that begins at `start`, in turns.
 
     The logarithm of the values' mean comes first. Kernels whose deviation is one step interpolate what
     is smooth over a few steps nearly to rounding: their weights are one deconvolution by Fourier
@@ -49,26 +50,7 @@ def lattice_kernels(values: Tensor, space: Torus) -> tuple[float, AdaptiveKernel
     kept = order[ordered.cumsum(0) >= DROPPED].sort().values
     grid = torch.cartesian_prod(*lines).reshape(-1, space.dim)[kept]
     concentrations = torch.tensor(kappas, dtype=torch.float64).expand(len(kept), -1)
-    own = AdaptiveKernels(space, grid, concentrations, weights[kept] / weights[kept].sum())
+    own = AdaptiveKernels(
+        space, (grid + start) % 1, concentrations, weights[kept] / weights[kept].sum()
+    )
     return math.log(float(values.mean())), own
-
-
-def joined_tables(tables: Iterable[Tensor]) -> list[Tensor]:
-    """Return sums of periodic tables whose finest sides are equal, all sides as fine as those."""
-    found: dict[int, Tensor] = {}
-    for table in tables:
-        size = max(table.shape)
-        fine = _on_finer_grid(table, size)
-        found[size] = found[size] + fine if size in found else fine
-    return [*found.values()]
-
-
-def _on_finer_grid(values: Tensor, size: int) -> Tensor:
-    """Return a periodic function on a grid with `size` points a side, by its waves."""
-    spectrum: Tensor = fft.fftn(values)
-    for axis, count in enumerate(values.shape):
-        low, high = torch.split(spectrum, [count - count // 2, count // 2], dim=axis)
-        shape = list(low.shape)
-        shape[axis] = size - count
-        spectrum = torch.cat([low, low.new_zeros(shape), high], dim=axis) * (size / count)
-    return fft.ifftn(spectrum).real.clamp_min(0)

@@ -30,6 +30,9 @@ DRAWS = 4096
 BANDWIDTH = 0.25
 """Deviation of kernels about draws, relative to the noise of an angle on which others depend."""
 
+FLATTEST = 1e-6
+"""The least concentration of a kernel: an angle may be even, of concentration 0."""
+
 AT_ONCE = 2**17
 """Points times draws worked on at a time."""
 
@@ -161,7 +164,8 @@ class VonMisesNetwork(Density, kind="network"):
         points, means, sharp = (own[:, list(split.kept)] for own in drawn[:3])
         noise = (points - means + 0.5) % 1 - 0.5
         centers = means + (1 - share**2).sqrt() * noise
-        own = AdaptiveKernels(space, centers % 1, sharp / share**2, shares_of(drawn.logs))
+        sharp = sharp.clamp_min(FLATTEST) / share**2
+        own = AdaptiveKernels(space, centers % 1, sharp, shares_of(drawn.logs))
         return float(log_sum_exp(drawn.logs)) - math.log(len(points)), own
 
     @property

@@ -152,13 +152,18 @@ def _flat_sums(kernels: AdaptiveKernels, x: Tensor, y: Tensor) -> Tensor:
     total = x.new_zeros(len(x), len(y))
     for images in zip(across, along, strict=True):
         for part in torch.arange(len(kernels.concentrations)).split(_KERNELS):
-            tables: list[Tensor] = []
+            tables: list[tuple[Tensor, Tensor]] = []
             sides = zip(images, rectangle(space).tolist(), strict=True)
             for axis, (image, period) in enumerate(sides):
-                own = kernels.concentrations[part, axis]
-                angle = 2 * math.pi * (image[:, None] - kernels.centers[part, axis]) / period
-                tables.append((own * (angle.cos() - 1)).exp() / (period * torch.special.i0e(own)))
-            total += (tables[0] * kernels.weights[part]) @ tables[1].T
+                # kernels on a lattice share their places and widths along an axis
+                both = torch.stack([kernels.centers, kernels.concentrations])[:, part, axis]
+                (center, own), place = torch.unique(both, dim=1, return_inverse=True)
+                angle = 2 * math.pi * (image[:, None] - center) / period
+                values = (own * (angle.cos() - 1)).exp() / (period * torch.special.i0e(own))
+                tables.append((values, place))
+            (left, row), (right, column) = tables
+            weighed = right.T[column] * kernels.weights[part, None]
+            total += left @ torch.zeros(left.shape[1], len(y)).to(total).index_add(0, row, weighed)
     return total
 
 

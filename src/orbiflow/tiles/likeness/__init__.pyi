@@ -17,8 +17,6 @@ from .metrics import hausdorff as hausdorff
 from .metrics import iou as iou
 from .metrics import pixel_accuracy as pixel_accuracy
 from .metrics import prepared_region as prepared_region
-from .near_symmetry import NearSymmetry as NearSymmetry
-from .near_symmetry import near_symmetry as near_symmetry
 from .necks import Thinnest as Thinnest
 from .necks import hair_share as hair_share
 from .necks import least_neck as least_neck
@@ -26,6 +24,8 @@ from .necks import narrowest_neck as narrowest_neck
 from .necks import narrowest_slit as narrowest_slit
 from .necks import neck_factor as neck_factor
 from .necks import slit_share as slit_share
+from .own_symmetry import NearSymmetry as NearSymmetry
+from .own_symmetry import near_symmetry as near_symmetry
 from .ranking import MOST_STARS as MOST_STARS
 from .ranking import Rating as Rating
 from .ranking import diverse as diverse

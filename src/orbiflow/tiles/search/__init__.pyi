@@ -4,6 +4,7 @@ from .candidates import Fit as Fit
 from .descent import fit_descent as fit_descent
 from .escherize_settings import EscherizeSettings as EscherizeSettings
 from .escherize_settings import SearchSettings as SearchSettings
+from .escherize_settings import class_names as class_names
 from .escherizing import SearchResult as SearchResult
 from .escherizing import escherize as escherize
 from .escherizing import escherize_class as escherize_class

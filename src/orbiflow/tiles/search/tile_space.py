@@ -17,16 +17,15 @@ Points are complex numbers x + iy throughout.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property, lru_cache
-from itertools import combinations_with_replacement
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array, Complex, Integers
-from orbiflow.symmetry import Isometry, identity
-from orbiflow.tiles.tilings import EdgeClass, EdgeImage, IsohedralClass
+from orbiflow.tiles.search.tile_orbits import Orbits, relations_of
+from orbiflow.tiles.tilings import IsohedralClass
 
 # Beyond this many, lengths and starts run in steps of more than one point
 MOST_PLACEMENTS = 4_000_000
@@ -110,48 +109,13 @@ def edge_lengths(kind: IsohedralClass, total: int) -> Integers:
     return lengths
 
 
-class _Relation(NamedTuple):
-    """An isometry that takes an edge onto another, or onto itself."""
-
-    first: int
-    second: int
-    factor: complex  # of its linear part, z -> factor z, or z -> factor conj(z) if it `flips`
-    flips: bool
-    reversed: bool  # whether the start of `first` goes to the end of `second`
-    weight: float  # what half the agreement of all its edges counts
-
-
-@lru_cache(maxsize=128)
-def _relations(kind: IsohedralClass) -> tuple[_Relation, ...]:
-    """All isometries between a class's edges; a tile's steps are means over those of each edge.
-
-    What an outline agrees with its mean is its length, squared, of which half is left out.
-    """
-    found: list[_Relation] = []
-    for own in kind.edge_classes:
-        start = EdgeImage(own.edge, identity(2), reversed=False)
-        members, folds = (start, *own.images), (start, *own.folds)
-        share = 1 / (len(members) * len(folds))
-        for x, y in combinations_with_replacement(range(len(members)), 2):
-            for fold in folds:
-                first, second = members[x], members[y]
-                element = second.isometry @ fold.isometry @ first.isometry.inverse()
-                back = (first.reversed != second.reversed) != fold.reversed
-                still = x == y and fold is start
-                weight = share - 0.5 if still else share if x == y else 2 * share
-                if weight:
-                    factor, flips, _ = _Element.of(element)
-                    found.append(_Relation(first.edge, second.edge, factor, flips, back, weight))
-    return tuple(found)
-
-
 def _gains(
     kind: IsohedralClass, steps: Complex, lengths: Integers, starts: Integers
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Gains and turns (C, len(starts)) of all placements."""
     n = len(steps)
     first = np.cumsum(lengths, axis=1) - lengths
-    relations = _relations(kind)
+    relations = relations_of(kind)
     tables = {key: _sums_along(steps, *key) for key in {own[3:5] for own in relations}}
     gains = np.zeros((len(lengths), len(starts)))
     glides = np.zeros_like(gains, dtype=complex)
@@ -215,7 +179,7 @@ class TileSpace:
     def __init__(self, kind: IsohedralClass, placements: Placements) -> None:
         self.kind, self.placements = kind, placements
         self.count, self.size = len(placements.starts), int(placements.lengths[0].sum())
-        self._orbits = _Orbits(kind, placements.lengths)
+        self._orbits = Orbits(kind, placements.lengths)
         self.corners = self._orbits.corners  # (C, K) vertices at the template's corners
         # (C, n) the outline's point at each vertex
         self.order = (np.arange(self.size) + placements.starts[:, None]) % self.size
@@ -228,7 +192,7 @@ class TileSpace:
     @property
     def glides(self) -> bool:
         """Whether the class has mirrors or glide reflections, whose axes can be turned."""
-        return any(relation.flips for relation in _relations(self.kind))
+        return any(relation.flips for relation in relations_of(self.kind))
 
     def turn(self, turns: Array) -> None:
         """Set the directions (C,) of the glide axes, in radians; no effect without glides."""
@@ -262,7 +226,7 @@ class TileSpace:
         goal = np.take_along_axis(outlines, self.order, axis=1)
         steps = np.roll(goal, -1, axis=1) - goal
         lengths, first = self.placements.lengths, self.corners
-        for edge, mate, factor, flips, back, weight in _relations(self.kind):
+        for edge, mate, factor, flips, back, weight in relations_of(self.kind):
             if not flips:
                 continue
             own = lengths[:, [edge]]
@@ -320,14 +284,16 @@ class TileSpace:
         width = np.where(mirror[free] == 0, 2, 1)
         position[free] = np.cumsum(width) - width
         columns, count = self._fit.columns[index], int(width.sum())
-        whole = np.zeros((n, count + columns.shape[1]), dtype=complex)
+        whole: Complex = np.zeros((n, count + columns.shape[1]), dtype=complex)
         v = np.flatnonzero(~fixed)
         factor, flips, on_line = self._factor[index, v], orbits.flips[index, v], mirror[v] != 0
         along = np.where(on_line, np.sqrt(mirror[v]), 1.0)
         whole[v, position[source[v]]] = _turn(factor, flips, along)
-        whole[v[~on_line], position[source[v]][~on_line] + 1] = _turn(factor, flips, 1j)[~on_line]
+        across = _turn(factor, flips, np.full(len(v), 1j))
+        whole[v[~on_line], position[source[v]][~on_line] + 1] = across[~on_line]
         whole[:, count:] = columns
-        real, imaginary = whole.real, whole.imag
+        real: Array = whole.real
+        imaginary: Array = whole.imag
         return real[self._place[index]], imaginary[self._place[index]]
 
     def group(self, index: int, parameters: Array) -> tuple[Array, Array]:
@@ -355,130 +321,8 @@ class TileSpace:
         return means
 
 
-class _Element(NamedTuple):
-    """z -> factor z + shift, or factor conj(z) + shift."""
-
-    factor: complex
-    flips: bool
-    shift: complex
-
-    @classmethod
-    def of(cls, isometry: Isometry) -> _Element:
-        linear = isometry.linear
-        return cls(
-            complex(linear[0, 0], linear[1, 0]),
-            bool(np.linalg.det(linear) < 0),
-            complex(*isometry.translation),
-        )
-
-
-class _Corner(NamedTuple):
-    """A corner of the template: image of the first of its orbit, and what holds that one."""
-
-    first: int
-    element: _Element
-    fixed: bool  # whether a rotation does
-    mirror: _Element | None  # the mirror that it lies on
-
-
-@lru_cache(maxsize=128)
-def _corners(kind: IsohedralClass) -> tuple[_Corner, ...]:
-    group, vertices = kind.group(), kind.template()
-    corners: list[_Corner] = []
-    for k, vertex in enumerate(vertices):
-        holding = [_Element.of(g) for g in group.elements_near(vertex, 1e-6, source=vertex)]
-        if sum(not element.flips for element in holding) > 1:
-            corners.append(_Corner(k, _Element(1, False, complex(*vertex)), True, None))
-            continue
-        mirror = next((element for element in holding if element.flips), None)
-        for first in range(k + 1):
-            images = list(group.elements_near(vertex, 1e-6, source=vertices[first]))
-            if images:
-                element = _Element.of(max(images, key=lambda g: g.determinant))
-                corners.append(_Corner(first, element, False, mirror))
-                break
-    return tuple(corners)
-
-
-class _Orbits:
-    """For each vertex: the free vertex that it is an image of, and by which element; or fixed.
-
-    A free vertex may lie on a mirror z -> mirror conj(z) + 2 foot, which is 0 if there is none.
-    """
-
-    def __init__(self, kind: IsohedralClass, lengths: Integers) -> None:
-        count, n = len(lengths), int(lengths[0].sum())
-        self.corners = np.cumsum(lengths, axis=1) - lengths
-        self.source = np.tile(np.arange(n), (count, 1))
-        self.factor = np.ones((count, n), dtype=complex)
-        self.flips = np.zeros((count, n), dtype=bool)
-        self.shift = np.zeros((count, n), dtype=complex)
-        self.fixed = np.zeros((count, n), dtype=bool)
-        self.mirror = np.zeros((count, n), dtype=complex)
-        self.foot = np.zeros((count, n), dtype=complex)
-        vertices = kind.template() @ [1, 1j]
-        for own in kind.edge_classes:
-            ends = vertices[own.edge], vertices[(own.edge + 1) % len(vertices)]
-            self._edges(own, lengths[:, [own.edge]], sum(ends) / 2)
-        for k, (first, element, fixed, mirror) in enumerate(_corners(kind)):
-            if fixed:
-                self._fix(np.arange(count), self.corners[:, k], element.shift)
-            else:
-                live = np.ones((count, 1), dtype=bool)
-                self._map(live, self.corners[:, [k]], self.corners[:, [first]], element)
-                if mirror and first == k:
-                    self._hold(live, self.corners[:, [k]], mirror)
-        self.has_lines = bool(self.mirror.any())
-        for values in (self.mirror, self.foot):
-            values[:] = np.take_along_axis(values, self.source, axis=1)
-
-    def _edges(self, own: EdgeClass, length: Integers, middle: complex) -> None:
-        """Map the inner vertices of edges of one class from those of the first half of its first."""
-        first = self.corners[:, [own.edge]]
-        straight = next((fold for fold in own.folds if not fold.reversed), None)
-        back = own.turn
-        j = np.arange(1, int(length.max(initial=1)))
-        inner = j < length
-        half = inner & (2 * j > length) if back else np.zeros_like(inner)
-        for edge, isometry, reverse in (EdgeImage(own.edge, identity(2), False), *own.images):
-            at = self.corners[:, [edge]] + (length - j if reverse else j)
-            if edge != own.edge:
-                self._map(inner & ~half, at, first + j, _Element.of(isometry))
-            if back:
-                turned = isometry @ back.isometry if edge != own.edge else back.isometry
-                self._map(half, at, first + length - j, _Element.of(turned))
-        if straight:
-            self._hold(inner & ~half, first + j, _Element.of(straight.isometry))
-        elif back and _flips(back):
-            self._hold(2 * j == length, first + j, _Element.of(back.isometry))
-        if back and not _flips(back):
-            rows = np.flatnonzero(length[:, 0] % 2 == 0)
-            for edge, isometry, _ in (EdgeImage(own.edge, identity(2), False), *own.images):
-                at = (self.corners[:, [edge]] + length // 2)[rows, 0]
-                self._fix(rows, at, complex(*isometry(np.array([middle.real, middle.imag]))))
-
-    def _map(self, live: NDArray[np.bool_], vertex: Array, source: Array, by: _Element) -> None:
-        rows, columns = np.nonzero(live)
-        at = rows, np.broadcast_to(vertex, live.shape)[rows, columns]
-        self.source[at] = np.broadcast_to(source, live.shape)[rows, columns]
-        self.factor[at], self.flips[at], self.shift[at] = by
-
-    def _hold(self, live: NDArray[np.bool_], vertex: Array, mirror: _Element) -> None:
-        rows, columns = np.nonzero(live)
-        at = rows, np.broadcast_to(vertex, live.shape)[rows, columns]
-        self.mirror[at], self.foot[at] = mirror.factor, mirror.shift / 2
-
-    def _fix(self, rows: Integers, vertex: Integers, where: complex) -> None:
-        self.fixed[rows, vertex], self.mirror[rows, vertex] = True, 0
-        self.shift[rows, vertex] = where
-
-
-def _flips(fold: EdgeImage) -> bool:
-    return fold.isometry.determinant < 0
-
-
 def _columns(
-    kind: IsohedralClass, orbits: _Orbits, factor: Complex, mirror: Complex, turn: Complex
+    kind: IsohedralClass, orbits: Orbits, factor: Complex, mirror: Complex, turn: Complex
 ) -> Complex:
     """(C, n, 2 + m): how offset and linear part move each vertex, its free vertex held."""
     one = np.ones_like(factor)

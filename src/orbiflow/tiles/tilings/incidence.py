@@ -58,12 +58,15 @@ class IncidenceSymbol:
 
     @cached_property
     def template(self) -> Array:
-        """The Laves tile (K, 2), turned so that mirrors and glide lines have the axes' directions."""
+        """The Laves tile (K, 2), turned so that mirrors and glide lines have the axes' directions.
+
+        Without any, its first edge is level.
+        """
         elements = [*self._stabiliser(self._tile), *self._across(self._tile)]
-        flips = (g.linear for g in elements if g.determinant < 0)
-        first = next(flips, np.diag([-1.0, 1.0]))  # a mirror of the tile's own becomes upright
-        axis = np.arctan2(first[1, 0], first[0, 0]) / 2
-        return self._tile @ rotation_matrix(pi / 2 - axis).T
+        # a mirror of the tile's own comes first, and becomes upright
+        flips = [np.arctan2(g.linear[1, 0], g.linear[0, 0]) for g in elements if g.determinant < 0]
+        edge = np.arctan2(*(self._tile[1] - self._tile[0])[::-1])
+        return self._tile @ rotation_matrix(pi / 2 - flips[0] / 2 if flips else pi - edge).T
 
     @cached_property
     def stabiliser(self) -> tuple[Isometry, ...]:

@@ -21,6 +21,7 @@ from orbiflow.symmetry import (
     reduced_basis,
     rotation,
     rotation_matrix,
+    symmetry_elements,
     transflection,
 )
 from orbiflow.tiles.tilings.class_table import (
@@ -32,6 +33,7 @@ from orbiflow.tiles.tilings.class_table import (
     TemplateKind,
 )
 from orbiflow.tiles.tilings.incidence import IncidenceSymbol
+from orbiflow.tiles.tilings.lattice_freedom import array_functions, commutant, stretch_matrix
 from orbiflow.tiles.tilings.tile_edges import (
     EdgeClass,
     EdgeIdentification,
@@ -104,7 +106,7 @@ def pentagon(gauge: PentagonGauge, shape: Points) -> Points:
             return cast(Points, turned)
         return vector @ cast_like(matrix, shape).T
 
-    functions = _functions(shape)
+    functions = array_functions(shape)
     p1 = shape + cast_like(np.array(gauge.default), shape)
     p0 = functions.zeros_like(p1)
     p2 = p0 + cast_like(np.array((gauge.distance, 0.0)), shape)
@@ -117,76 +119,8 @@ def template_vertices(kind: TemplateKind, shape: Points) -> Points:
     """Return vertices (..., K, 2) for shape parameters, (..., 2) of a pentagon or (..., 0)."""
     if kind == "hexagon":
         vertices = cast_like(hexagon(), shape)
-        return _functions(shape).broadcast_to(vertices, (*shape.shape[:-1], 6, 2))
+        return array_functions(shape).broadcast_to(vertices, (*shape.shape[:-1], 6, 2))
     return pentagon(PENTAGONS[kind], shape)
-
-
-_ROUNDING_ERROR = 1e-9
-
-
-def commutant(linear_parts: Array) -> Array:
-    """Return an orthonormal basis (m, 2) of the (a, b) whose [[a, b], [b, -a]] commutes with a group.
-
-    The mean over the group projects on them: R X R^T turns (a, b) as R turns directions, twice as
-    far. The basis is made by Gram-Schmidt in the order a, b, so that it depends only on the group;
-    saved parameters are coordinates in it.
-
-    >>> commutant(np.array([np.eye(2), np.diag([1.0, -1.0])])).tolist()
-    [[1.0, 0.0]]
-    """
-    units = np.array([[[1.0, 0.0], [0.0, -1.0]], [[0.0, 1.0], [1.0, 0.0]]])
-    turned = np.einsum("gij,kjl,gml->kim", linear_parts, units, linear_parts) / len(linear_parts)
-    basis: list[Array] = []
-    for a, b in turned[:, 0]:
-        rest = np.array([a, b])
-        for known in basis:
-            rest = rest - (rest @ known) * known
-        if np.linalg.norm(rest) > _ROUNDING_ERROR:
-            rest = rest / np.linalg.norm(rest)
-            # exact for a group in the frame of its axes
-            near = np.round(rest)
-            basis.append(near if np.abs(rest - near).max() < _ROUNDING_ERROR else rest)
-    return np.array(basis).reshape(-1, 2)
-
-
-def stretch_matrix(basis: Array, parameters: Points) -> Points:
-    """Return unimodular symmetric maps (..., 2, 2) for parameters (..., m) over a basis of `commutant`.
-
-    exp [[a, b], [b, -a]], where (a, b) = parameters @ basis. Differentiable, at zero too.
-    """
-    both = parameters @ cast_like(basis, parameters)
-    a, b = both[..., 0], both[..., 1]
-    cosh, sinhc = _cosh_sinhc(a * a + b * b)
-    rows = [cosh + sinhc * a, sinhc * b, sinhc * b, cosh - sinhc * a]
-    return _functions(parameters).stack(rows, -1).reshape(*parameters.shape[:-1], 2, 2)
-
-
-def _functions(values: Any) -> Any:
-    """Return the library that these values belong to, of which functions of both are used."""
-    if not is_tensor(values):
-        return np
-    import torch
-
-    return torch
-
-
-# of NumPy arrays, rounded as torch rounds them
-_cosh, _sinh = (np.vectorize(f, otypes=[float]) for f in (math.cosh, math.sinh))
-
-
-def _cosh_sinhc(square: Any) -> tuple[Any, Any]:
-    """cosh r and sinh(r) / r as functions of r^2, by their series where the root would hurt."""
-    own = _functions(square)
-    hyperbolic_cosh, hyperbolic_sinh = (own.cosh, own.sinh) if is_tensor(square) else (_cosh, _sinh)
-    small = square < 1e-2
-    root = own.sqrt(own.where(small, own.ones_like(square), square))
-    s = own.where(small, square, own.zeros_like(square))
-    cosh = 1 + s / 2 * (1 + s / 12 * (1 + s / 30 * (1 + s / 56 * (1 + s / 90))))
-    sinhc = 1 + s / 6 * (1 + s / 20 * (1 + s / 42 * (1 + s / 72 * (1 + s / 110))))
-    return (
-        own.where(small, cosh, hyperbolic_cosh(root)),
-        own.where(small, sinhc, hyperbolic_sinh(root) / root),
-    )
 
 
 class PaperOperator(NamedTuple):
@@ -304,6 +238,27 @@ class IsohedralClass:
         """
         return ()
 
+    def facts(self) -> dict[str, str]:
+        """Return what a table says of the class."""
+        elements = symmetry_elements(self._group)
+        orders = sorted({center.order for center in elements.centers})
+        angles = {True: set[int](), False: set[int]()}  # of mirrors, and of glide lines
+        for line in elements.lines:
+            x, y = line.line.direction
+            angles[line.is_mirror].add(round(math.degrees(math.atan2(y, x))) % 180)
+        return {
+            "class": self.name,
+            "group": self.group_name,
+            "tile": self.stabiliser_name,
+            "symbol": self.symbol,
+            "edges": str(len(self._default)),
+            "identified": " ".join(pair.brief for pair in self.identified_edges),
+            "rotations": ", ".join(map(str, orders)) or "-",
+            "mirrors": str(len(angles[True]) or "-"),
+            "glides": str(len(angles[False]) or "-"),
+            "stretch": {0: "none", 1: "one axis", 2: "any"}[self.stretch_dim],
+        }
+
     @cached_property
     def _incidence(self) -> IncidenceSymbol:
         return IncidenceSymbol(self.row.valences, self.row.symbol)
@@ -326,7 +281,7 @@ class IsohedralClass:
 
     def _shaped(self, shape: Any) -> Any:
         vertices = cast_like(self._default, shape)
-        return _functions(shape).broadcast_to(vertices, (*shape.shape[:-1], *vertices.shape))
+        return array_functions(shape).broadcast_to(vertices, (*shape.shape[:-1], *vertices.shape))
 
     def _parameters(self, values: Any, size: int, what: str) -> Any:
         if not is_tensor(values):

@@ -1,0 +1,109 @@
+"""Times and errors of marginal and conditional densities of default fits on tori.
+
+    python benchmarks/density_inference.py [--quick] [--rows N] [DATA ...]
+
+gln-5, lys-6: backbone and side-chain angles of residues (Top8000); rna-7: the RNA benchmark. Each is
+fitted once, as `density fit` would. Then every question is asked at the accuracies .01 and .001:
+processor seconds and seconds on the clock, the error that the density states, and the true one at its
+own samples, root mean square in nats. The truth is the whole density integrated over what is hidden at
+4 x 1024 or 4 x 4096 nodes of other seeds (by the trapezoidal rule where one angle is hidden); its own
+standard error is beside it. --quick: 400 rows of gln-5, one question of each kind, at .01.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+
+import numpy as np
+import torch
+from common import DATA, needed
+from density_default_data import rotamers
+
+from orbiflow.density import Density, DensityEstimator, conditional, marginal
+from orbiflow.runtime import one_blas_thread
+
+SEEDS, POINTS = 4, 40
+"""Sets of nodes of the truth, and points at which it is found."""
+
+ASKED: dict[str, list[tuple[tuple[int, ...], dict[int, float]]]] = {
+    "gln-5": [((2,), {}), ((2, 3), {}), ((2,), {0: -60, 1: -40}), ((3, 4), {2: -65})],
+    "lys-6": [((2,), {}), ((2, 3), {}), ((2,), {0: -60, 1: -40}), ((4, 5), {2: -65})],
+    "rna-7": [((0,), {}), ((0, 5), {}), ((6,), {3: 85}), ((0, 5), {3: 85})],
+}
+"""Which angles are kept, from 0, and which are given, in degrees."""
+
+
+def angles(name: str, rows: int) -> np.ndarray:
+    """Angles in radians."""
+    if name == "rna-7":
+        path = needed(DATA / "density" / "torus" / "rna.tsv", "the RNA angles")
+        return np.radians(np.loadtxt(path, usecols=range(2, 9)))[:rows]
+    residue = {"gln-5": "gln", "lys-6": "lys-1m"}[name]
+    return np.asarray(rotamers(residue, int(name[-1]), rows).data)
+
+
+def truth(
+    density: Density, points: torch.Tensor, kept: tuple[int, ...], given: dict[int, float]
+) -> tuple[torch.Tensor, float]:
+    """Log densities at points (N, k), and their standard error."""
+    known = points.new_tensor([*given.values()])
+    whole = torch.cat([points, known.expand(len(points), -1)], dim=1)
+    found: list[torch.Tensor] = []
+    for seed in range(101, 101 + SEEDS):
+        logs = density.log_marginal(whole, [*kept, *given], seed)
+        if given:
+            logs = logs - density.log_marginal(known[None], [*given], seed)
+        found.append(logs)
+    table = torch.stack(found)
+    mean = table.logsumexp(dim=0) - math.log(SEEDS)
+    return mean, float((table - mean).square().mean().sqrt()) / math.sqrt(SEEDS)
+
+
+def line(
+    density: Density, kept: tuple[int, ...], degrees: dict[int, float], accuracy: float
+) -> str:
+    """One row of the table."""
+    given = {axis: value / 360 for axis, value in degrees.items()}
+    clock, processor = time.perf_counter(), time.process_time()
+    if given:
+        found = conditional(density, given, kept, accuracy=accuracy)
+    else:
+        found = marginal(density, kept, accuracy=accuracy)
+    processor, clock = time.process_time() - processor, time.perf_counter() - clock
+    points = found.sample(POINTS, torch.Generator().manual_seed(0))
+    true, spread = truth(density, points, kept, given)
+    off = float((found.log_prob(points) - true).square().mean().sqrt())
+    asked = ",".join(map(str, kept)) + "".join(f" | {k}={v:g}" for k, v in degrees.items())
+    return (
+        f"{asked:18s} {accuracy:8g} {processor:8.1f} {clock:8.1f} {found.error:9.1e} {off:9.1e}"
+        f" ± {spread:.0e}"
+    )
+
+
+@torch.no_grad()
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("data", nargs="*", metavar="DATA", help=f"{', '.join(ASKED)} (all)")
+    parser.add_argument("--rows", type=int, default=10_000)
+    parser.add_argument("--quick", action="store_true", help="400 rows of gln-5, at .01")
+    options = parser.parse_args()
+    names = ["gln-5"] if options.quick else options.data or list(ASKED)
+    if unknown := set(names) - set(ASKED):
+        parser.error(f"no such data: {', '.join(sorted(unknown))}")
+    needed(DATA / "density" / "torus", "the angles of residues and of RNA")
+    for name in names:
+        rows = 400 if options.quick else options.rows
+        density = DensityEstimator("torus", seed=0).fit(angles(name, rows)).density_
+        print(f"{name}: {density}")
+        print("angles             accuracy  cpu / s clock / s   stated      true", flush=True)
+        for accuracy in (0.01,) if options.quick else (0.01, 0.001):
+            for kept, given in ASKED[name]:
+                with one_blas_thread():
+                    print(line(density, kept, given, accuracy), flush=True)
+
+
+if __name__ == "__main__":
+    main()
