@@ -81,10 +81,11 @@ def bent_tiles(
     sides = both[:1] if template_symmetries(kind)[1] else both
     searches = settings.searches(wanted, symmetric=len(kind.stabiliser) > 1)
     tasks = [(hand, own, body) for own in searches for body in own.bodies for hand in sides]
+    never_soft = all("soft" not in own.bodies for own in searches)
     work = sum(own.starts for _, own, _ in tasks)
     for hand, own, body in tasks:
         sound, crossed = _finalists(hand, BODIES[body], kind, own, cancel)
-        if 2 * len(sound) < own.finalists and "soft" not in own.bodies:
+        if never_soft and 2 * len(sound) < own.finalists:
             progress(0.9 * (done + 0.5 * own.starts) / work, math.nan)
             more, also = _finalists(hand, BODIES["soft"], kind, own, cancel)
             sound, crossed = sound + more, crossed + also

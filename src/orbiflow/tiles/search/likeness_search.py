@@ -26,11 +26,11 @@ SKETCH = {"placements": 60, "held": 6, "starts": 1, "share": 0.1, "finalists": 1
 
 FAST = {
     "placements": 80,
-    "held": 12,
-    "starts": 5,
+    "held": 10,
+    "starts": 4,
     "share": 0.15,
     "finalists": 2,
-    "rounds": 12,
+    "rounds": 10,
     "bodies": ALL_BODIES,
 }
 BEST = {
@@ -73,13 +73,13 @@ class LikenessSearch(Settings, SearchMethod):
         "best": {**BEST, "below": 2},
     }
 
-    placements: Count = 300
-    held: Count = 80
-    starts: Count = 32
-    share: Annotated[float, Range(above=0, most=1)] = 0.3
-    finalists: Count = 5
+    placements: Count = 200
+    held: Count = 36
+    starts: Count = 14
+    share: Annotated[float, Range(above=0, most=1)] = 0.2
+    finalists: Count = 4
     rounds: Count = 20
-    bodies: tuple[Body, ...] = ("firm",)
+    bodies: tuple[Body, ...] = ("firm", "stiff")
     below: Annotated[int, Range(0, 2)] = 0
     multiples: tuple[Count, ...] = (4, 6)
     min_neck: Annotated[float, Range(0, 0.2)] = 0.01
@@ -124,9 +124,9 @@ class LikenessSearch(Settings, SearchMethod):
         which have half the freedom, half as much is tried, and level "fast" alone if nothing is above.
 
         >>> [own.starts for own in LikenessSearch.for_effort("best").searches()]
-        [5, 32, 64]
+        [4, 14, 64]
         >>> [own.starts for own in LikenessSearch.for_effort("best").searches(symmetric=True)]
-        [16, 32]
+        [7, 32]
         """
         normal = {name: getattr(LikenessSearch, name) for name in FAST}
         found: list[LikenessSearch] = []
