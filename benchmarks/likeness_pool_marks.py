@@ -206,7 +206,7 @@ class Marked:
     def against(self, values: Ring) -> tuple[float, float, float]:
         """Return the correlation of ranks with the marks, the mark of the first, and what it lacks."""
         first = self.marks[np.argmax(values)]
-        return spearmanr(values, self.marks).statistic, first, self.marks.max() - first
+        return float(spearmanr(values, self.marks).statistic), first, self.marks.max() - first
 
 
 def order(options: argparse.Namespace) -> None:
@@ -268,11 +268,14 @@ def print_words(found: list[Marked]) -> None:
     theirs = [Rating.of_mark(mark) for one in found for mark in one.marks]
     print_agreement("\nour stars and the judges' mean", ours, theirs)
     rows = [pair for one in found for pair in zip(one.values, one.marks, strict=True)]
-    rigid = np.array([(own["overlap"], mark) for own, mark in rows if "overlap" in own]).T
-    if len(rigid.T) > 2:
-        slope, base = np.polyfit(*rigid, 1)
-        marks = f"marks are {slope:.1f} times their scores {base:+.1f}"
-        print(f"tiles for overlap: {marks}, rank correlation {spearmanr(*rigid).statistic:.2f}")
+    rigid = np.array([(own["overlap"], mark) for own, mark in rows if "overlap" in own])
+    if len(rigid) > 2:
+        scores, marks = rigid.T
+        slope, base = np.polyfit(scores, marks, 1)
+        line = f"marks are {slope:.1f} times their scores {base:+.1f}"
+        print(
+            f"tiles for overlap: {line}, rank correlation {spearmanr(scores, marks).statistic:.2f}"
+        )
     both = [one.readings[:2] for one in found if len(one.readings) > 1]
     if both:
         readings = np.concatenate(both, axis=1)
@@ -289,7 +292,8 @@ def print_words(found: list[Marked]) -> None:
 def print_agreement(label: str, ours: list[Rating], theirs: list[Rating]) -> None:
     """Print how far two lists of ratings agree."""
     apart = abs(places(ours) - places(theirs))
-    rank = spearmanr(*([own.stars for own in side] for side in (ours, theirs))).statistic
+    stars, others = ([own.stars for own in side] for side in (ours, theirs))
+    rank = spearmanr(stars, others).statistic
     print(
         f"{label}: rank correlation {rank:.2f} over all tiles, the same word "
         f"{np.mean(apart == 0):.0%}, that or the next {np.mean(apart < 2):.0%}"

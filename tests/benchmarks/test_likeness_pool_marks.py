@@ -59,7 +59,7 @@ def pool_fixture(tmp_path: Path) -> Path:
     usual |= {"energy": 0.2, "displacement": 0.05, "neck": 0.4, "iou": 0.7}
 
     def tile(method: str, taller: float, damage: float) -> dict[str, Any]:
-        values = {name: damage * value for name, value in usual.items()}
+        values: dict[str, Any] = {name: damage * value for name, value in usual.items()}
         values["pieces"] = [damage * x for x in (0.12, 0.16, 0.13)]
         bent = (3 * ring * (1, taller)).tolist()
         return {"method": method, "class": "IH4", "score": 0.8, "values": values, "bent": bent}
