@@ -133,11 +133,11 @@ def why_poor(best: EscherTile) -> str:
     long = kept is not None and kept.length > LONG_OUTLINE
     reasons = ["a tile fills the empty space around long thin limbs"] * long
     reasons += kept.lost if kept else []
-    because = f": {', '.join(reasons)}" if reasons else ""
-    change = "thicker or shorter limbs, nearer to the body" if long else "another pose, fewer limbs"
+    because = f", because {' and because '.join(reasons[:2])}" if reasons else ""
+    change = "thicker or shorter limbs" if long else "another pose, fewer or thicker limbs"
     return (
-        f"few people would call the first tile a good likeness{because}; {change}, all nine classes "
-        "or more effort may do better"
+        f"few people would call the first tile a good likeness{because}; {change} or more effort may "
+        "do better"
     )
 
 
