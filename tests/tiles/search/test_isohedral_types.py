@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import assume, given, settings
+from PIL import Image
 
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
@@ -29,6 +30,7 @@ from orbiflow.tiles import (
     signed_area,
 )
 from orbiflow.tiles.geometry import subdivided
+from orbiflow.tiles.operations import classes
 from orbiflow.tiles.search.candidates import waves
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
 from orbiflow.tiles.search.likeness_search import LikenessSearch
@@ -190,12 +192,12 @@ def test_a_silhouette_near_to_symmetric_gets_classes_of_symmetric_tiles(
         )
         return asked[1:]  # the first is the preview's
 
-    assert searched("bat_60") == [*CLASSES, "IH13", "IH12", "IH16"]
+    assert searched("bat_60") == [*CLASSES, "IH13", "IH12", "IH69"]
     assert "much like its mirror image (0.8" in notes[0]
     assert searched("camel_60") == list(CLASSES)
     assert notes == []
     assert searched("camel_60", classes=("all",)) == [
-        *(*CLASSES, "IH13", "IH12", "IH16"),
+        *(*CLASSES, "IH13", "IH12", "IH69"),
         *("IH8", "IH9"),
     ]
     assert searched("bat_60", classes=("IH26",)) == ["IH26"]
@@ -231,3 +233,16 @@ def test_every_class_divides_the_points_of_outlines_that_cross_themselves(
     side = 5.1  # so long that 78 points are asked for, or 72
     bar = np.array([[0.0, 0.0], [side, 0.0], [side, 1 / side], [0.0, 1 / side]])
     assert len(sampled(bar, step=step).coarse) == points
+
+
+def test_classes_are_listed_and_drawn_by_name(tmp_path: Path) -> None:
+    done = classes(classes=("26", "ih8"), out=tmp_path / "two.png")
+    first, second = done.summary["classes"]
+    assert (first["class"], first["tile"]) == ("IH26", "D1")
+    assert (first["symbol"], first["mirrors"], first["rotations"]) == ("a+a-b+cb- a+b-c", "2", "2")
+    assert (second["group"], second["tile"], second["mirrors"]) == ("p2", "C2", "-")
+    with Image.open(tmp_path / "two.png") as picture:
+        assert picture.width > picture.height > 400
+    assert [row["class"] for row in classes(classes=("all",)).summary["classes"]] == list(
+        ISOHEDRAL_TYPES
+    )
