@@ -23,7 +23,7 @@ NEAR = 0.52  # the score from which a silhouette is near to symmetric; docs/like
 
 
 class NearSymmetry(NamedTuple):
-    """Scores of a silhouette bent into a symmetric shape, 0 to 1: their fidelity times their IoU."""
+    """Scores of a silhouette bent into a symmetric shape, times its IoU with the silhouette, 0 to 1."""
 
     mirror: float
     half_turn: float
