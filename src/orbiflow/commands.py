@@ -30,7 +30,7 @@ SUMMARIES = {
     "art": "Carry a picture of the silhouette onto its tile and repeat it over the plane.",
     "solid": "Make a solid to print in 3D: a tile, cookie cutter, stamp, mould or puzzle.",
     "animate": "Write an animation: a tiling becoming animals, a silhouette bending, a tiling that grows.",
-    "classes": "List the nine isohedral classes: edges, rotation centres, glide lines.",
+    "classes": "List isohedral classes: their groups, the symmetry of their tiles, and how edges are identified.",
     "density summary": "Summarise angles, directions or axes: means with intervals, spread, correlations, tests.",
     "density fit": "Fit a density: angles (torus), lat,lon or x,y,z (sphere), axes (projective plane) or theta,phi.",
     "density score": "Add a column log_prob, in nats, to a table.",

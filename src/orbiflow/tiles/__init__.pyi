@@ -43,6 +43,8 @@ from .likeness.necks import hair_share as hair_share
 from .likeness.necks import narrowest_neck as narrowest_neck
 from .likeness.necks import narrowest_slit as narrowest_slit
 from .likeness.necks import slit_share as slit_share
+from .likeness.own_symmetry import NearSymmetry as NearSymmetry
+from .likeness.own_symmetry import near_symmetry as near_symmetry
 from .likeness.ranking import Rating as Rating
 from .likeness.ranking import diverse as diverse
 from .likeness.ranking import rank_score as rank_score
@@ -142,6 +144,7 @@ from .tilings.certificate import certify as certify
 from .tilings.colourings import Colouring as Colouring
 from .tilings.colourings import colouring as colouring
 from .tilings.isohedral import CLASSES as CLASSES
+from .tilings.isohedral import ISOHEDRAL_TYPES as ISOHEDRAL_TYPES
 from .tilings.isohedral import IsohedralClass as IsohedralClass
 from .tilings.isohedral import PaperOperator as PaperOperator
 from .tilings.isohedral import isohedral_class as isohedral_class

@@ -22,11 +22,11 @@ from orbiflow.runtime import (
     ignore,
     operation,
 )
-from orbiflow.settings import DefaultText, Ending, Hidden, Option, Settings
+from orbiflow.settings import DefaultText, Ending, Hidden, Option, Parsed, Settings
 from orbiflow.tiles.art import ArtSettings
 from orbiflow.tiles.exporting import ExportSettings
 from orbiflow.tiles.motion import AnimationSettings
-from orbiflow.tiles.search import EscherizeSettings
+from orbiflow.tiles.search import EscherizeSettings, class_names
 from orbiflow.tiles.silhouette import ReadingSettings
 from orbiflow.tiles.solids import SolidSettings
 
@@ -34,13 +34,6 @@ if TYPE_CHECKING:
     from orbiflow.tiles.exporting import Exported
     from orbiflow.tiles.search import SearchResult
     from orbiflow.tiles.tile import EscherTile
-    from orbiflow.tiles.tilings import IsohedralClass
-
-POOR = (
-    "even the first tile hardly looks like it; another pose, fewer or thicker limbs, all nine classes "
-    "or more effort may do better"
-)
-"""Said where nothing that was found looks like the silhouette."""
 
 
 class TileChoice(Settings):
@@ -162,10 +155,13 @@ def _figures(tile: EscherTile) -> dict[str, str]:
 
 def _closing(out: Path, written: bool, result: SearchResult, seconds: float) -> list[Note]:
     """What was written, or why nothing was; and the silhouette's doubts again, if they explain it."""
+    from orbiflow.tiles.search import why_poor
     from orbiflow.tiles.silhouette import doubts, is_hopeless
 
     explains = not result.tiles or is_hopeless(result.target)
     again = [Note(text, warning=True) for text in doubts(result.target)] if explains else []
+    if poor := why_poor(result.tiles[0]) if result.tiles else "":
+        again = [Note(poor), *again]
     if written and result.tiles:
         where = f"look at {out / 'overview.png'} first, or open {out / 'index.html'}"
         return [Note(f"written to {out} in {seconds:.0f} s; {where}"), *again]
@@ -187,8 +183,6 @@ def _remarks(result: SearchResult) -> list[str]:
         )
     for name in sorted(result.interrupted & {tile.isohedral_class for tile in tiles}):
         remarks.append(f"{name} has its first tile only: its search was interrupted")
-    if tiles and tiles[0].rating and tiles[0].rating.word == "poor":
-        remarks.append(POOR)
     return remarks
 
 
@@ -418,46 +412,40 @@ def animate(
 @operation("classes")
 def classes(
     *,
+    classes: Annotated[
+        tuple[str, ...] | None,
+        Parsed(class_names, "classes such as IH12,IH26, or all", "CLASSES"),
+        DefaultText("the nine"),
+    ] = None,
     out: Annotated[Path | None, Option("-o"), Ending(".png", "")] = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
-    """List the nine isohedral classes: edges, rotation centres, glide lines.
+    """List isohedral classes: their groups, the symmetry of their tiles, and how edges are identified.
 
-    Between them they give every shape that tiles the plane isohedrally. Edges are numbered in order
-    around the tile; "0=3" is moved by a translation, "0~5" by a glide reflection, "0>4" by a
-    rotation, "2o" turns about its own midpoint.
+    The nine that are listed by default give every shape that tiles the plane isohedrally. In others of
+    the 81 types a tile has a symmetry of its own: D1 is a mirror, C2 a half-turn. Edges are numbered in
+    order around the tile; "0=3" is moved by a translation, "0~5" by a glide reflection, "0>4" by a
+    rotation, "0|3" by a mirror; "2o" turns about its own midpoint, and "2|" lies on a mirror.
 
     Args:
+        classes: The classes, or all 81 types.
         out: Also draw them into this PNG file.
     """
     from orbiflow.runtime import write_atomic
     from orbiflow.tiles.pictures import classes_png
-    from orbiflow.tiles.tilings import CLASSES
+    from orbiflow.tiles.tilings import CLASSES, ISOHEDRAL_TYPES, isohedral_class
 
     cancel.check()
-    facts = [_facts(kind) for kind in CLASSES.values()]
-    rows = tuple(tuple(fact.values()) for fact in facts)
-    on_event(Table("The nine isohedral classes", tuple(facts[0]), rows))
+    every = [name.strip().lower() for name in classes or ()] == ["all"]
+    names = ISOHEDRAL_TYPES if every else classes or CLASSES
+    kinds = tuple(isohedral_class(name) for name in names)
+    facts = [kind.facts() for kind in kinds]
+    title = "Isohedral classes" if classes else "The nine isohedral classes"
+    shown = ("class", "group", "tile", "symbol", "identified", "rotations", "stretch")
+    on_event(_table(title, [{name: row[name] for name in shown} for row in facts]))
     if out is not None:
-        write_atomic(out, classes_png())
+        write_atomic(out, classes_png(kinds))
         on_event(Written(out))
         on_event(Note(f"drawn in {out}"))
     return Outcome({"classes": facts, "file": None if out is None else str(out)})
-
-
-def _facts(kind: IsohedralClass) -> dict[str, str]:
-    from orbiflow.symmetry import symmetry_elements
-
-    elements = symmetry_elements(kind.group())
-    orders = sorted({center.order for center in elements.centers})
-    glides = {tuple(abs(glide.line.direction).round(6)) for glide in elements.lines}
-    return {
-        "class": kind.name,
-        "group": kind.group_name,
-        "edges": str(len(kind.template())),
-        "identified": " ".join(pair.brief for pair in kind.identified_edges),
-        "rotation centres": ", ".join(f"{order}-fold" for order in orders) or "-",
-        "glides": {0: "-", 1: "one direction"}.get(len(glides), "two directions"),
-        "stretch": {0: "none", 1: "one axis", 2: "any"}[kind.stretch_dim],
-    }

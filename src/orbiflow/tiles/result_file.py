@@ -19,7 +19,7 @@ from orbiflow.runtime import ResultFolder, is_list, is_object, make_folder, read
 from orbiflow.symmetry import CrystallographicGroup, Isometry, checked_lattice
 from orbiflow.tiles.likeness import Fidelity, Rating, Recognisability, ShapeMetrics, Thinnest
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tilings import CLASSES, Tile, isohedral_class
+from orbiflow.tiles.tilings import ISOHEDRAL_TYPES, Tile, isohedral_class
 
 RESULT, TILE_MODEL = "result.json", "model.safetensors"
 SCHEMA_VERSION = 1
@@ -246,7 +246,7 @@ def _measurements(entry: dict[str, Any]) -> dict[str, Any]:
     own = ("deformation", "bent_iou", "pinned")
     found = {name: metrics.pop(name, None) for name in own}
     fidelity = metrics.pop("fidelity", None)
-    if fidelity is not None:
+    if fidelity is not None and "stretched" in fidelity:  # version 0.1 measured something else
         found["fidelity"] = Fidelity(**{**fidelity, "pieces": tuple(fidelity["pieces"])})
     if metrics.get("iou") is not None:
         found["metrics"] = ShapeMetrics(**{**metrics, "window": tuple(metrics["window"])})
@@ -284,6 +284,6 @@ def _tile(entry: dict[str, Any]) -> Tile:
     return Tile(
         ring[:-1],
         CrystallographicGroup(checked_lattice(group["lattice"]), cosets, str(group["name"])),
-        name if name in CLASSES else "",
+        name if name in ISOHEDRAL_TYPES else "",
         tuple(entry["corners"]),
     )

@@ -78,8 +78,8 @@ def test_folded_candidates_are_refused_unless_forced() -> None:
 def test_arguments_are_checked() -> None:
     with pytest.raises(OrbiflowError, match="the target must be a Target, got 'boot'"):
         fit_tile("boot", "IH4")  # pyright: ignore[reportArgumentType]
-    with pytest.raises(OrbiflowError, match="unknown isohedral class 'IH8'"):
-        fit_tile(TARGET, "IH8")
+    with pytest.raises(OrbiflowError, match="unknown isohedral class 'IH94'"):
+        fit_tile(TARGET, "IH94")
     for wrong, message in (("fast", "the method must be a search"), (BothSearch(), "fits twice")):
         with pytest.raises(OrbiflowError, match=message):
             fit_tile(TARGET, "IH4", wrong)  # pyright: ignore[reportArgumentType]

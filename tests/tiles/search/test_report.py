@@ -103,7 +103,7 @@ def test_a_document_without_tiles_is_valid() -> None:
     [
         (["schema_version"], 2),
         (["seed"], -1),
-        (["tiles", 0, "class"], "IH8"),
+        (["tiles", 0, "class"], "IH94"),
         (["tiles", 0, "polygon", 0], [0.0, 0.0, 0.0]),
         (["tiles", 0, "metrics", "iou"], 1.5),
         (["tiles", 0, "certificate", "reasons"], ["it overlaps"]),

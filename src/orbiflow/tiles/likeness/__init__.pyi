@@ -24,10 +24,11 @@ from .necks import narrowest_neck as narrowest_neck
 from .necks import narrowest_slit as narrowest_slit
 from .necks import neck_factor as neck_factor
 from .necks import slit_share as slit_share
+from .own_symmetry import NearSymmetry as NearSymmetry
+from .own_symmetry import near_symmetry as near_symmetry
 from .ranking import MOST_STARS as MOST_STARS
 from .ranking import Rating as Rating
 from .ranking import diverse as diverse
-from .ranking import likeness_ratings as likeness_ratings
 from .ranking import mutual_iou as mutual_iou
 from .ranking import rank_score as rank_score
 from .recognition import Recognisability as Recognisability

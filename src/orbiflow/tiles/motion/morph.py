@@ -14,7 +14,7 @@ stops.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -29,9 +29,19 @@ from scipy.sparse.linalg import spsolve
 from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry import Isometry, identity
+from orbiflow.symmetry import CrystallographicGroup, Isometry, identity
+from orbiflow.tiles.geometry import signed_area
 from orbiflow.tiles.silhouette import triangulate
-from orbiflow.tiles.tilings import IsohedralClass, Tile, isohedral_class
+from orbiflow.tiles.tilings import (
+    EdgeClass,
+    EdgeImage,
+    IsohedralClass,
+    Tile,
+    edge_classes,
+    edges,
+    free_subgroup,
+    isohedral_class,
+)
 
 # How far corresponding vertices of identified edges may lie apart, in square roots of the area
 TOLERANCE = 1e-6
@@ -39,9 +49,15 @@ TOLERANCE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class OwnFrame:
-    """A tile as an affine image of one whose group is its class's own."""
+    """A tile as an affine image of one whose group is its class's own.
+
+    Of a symmetric tile, the group is one that takes each tile to each other in one way only, if there
+    is one, so that inner points need no symmetry.
+    """
 
     kind: IsohedralClass
+    group: CrystallographicGroup  # in the own frame
+    edge_classes: tuple[EdgeClass, ...]
     points: Array  # (N, 2) the polygon in the own frame, from corner 0 on
     starts: tuple[int, ...]  # indices of the corners in it, increasing from 0
     linear: Array  # with `offset`: a point p of the own frame lies at linear p + offset
@@ -64,20 +80,23 @@ class OwnFrame:
         linear = tile.group.lattice @ kind.group().inverse_lattice
         offset = _offset(kind, placed, starts, linear)
         points = (placed - offset) @ np.linalg.inv(linear).T
-        own = cls(kind, points, starts, linear, offset)
+        group, found = kind.group(), kind.edge_classes
+        if len(kind.stabiliser) > 1:
+            group = free_subgroup(group, kind.stabiliser) or group
+            found = edge_classes(edges(Tile(kind.template(), group)))
+        own = cls(kind, group, found, points, starts, linear, offset)
         own.check()
         return own
 
     def check(self) -> None:
         """Check that identified edges are images of each other, vertex by vertex."""
-        size = np.sqrt(self.kind.group().cell_volume / self.kind.group().order)
-        for pair in self.kind.identified_edges:
-            first, second = self.edge(pair.first), self.edge(pair.second)
-            image = pair.isometry(first)
-            image = image[::-1] if pair.reversed else image
-            if len(image) != len(second) or np.abs(image - second).max() > TOLERANCE * size:
+        size = np.sqrt(self.group.cell_volume / self.group.order)
+        for first, image in _relations(self.edge_classes):
+            moved, second = image.isometry(self.edge(first)), self.edge(image.edge)
+            moved = moved[::-1] if image.reversed else moved
+            if len(moved) != len(second) or np.abs(moved - second).max() > TOLERANCE * size:
                 raise OrbiflowError(
-                    f"this tile's edges {pair.first} and {pair.second} are not images of each other "
+                    f"this tile's edges {first} and {image.edge} are not images of each other "
                     f"as class {self.kind.name} has them"
                 )
 
@@ -105,12 +124,19 @@ class OwnFrame:
         bounds = [*self.starts, len(self.points)]
         marks = np.zeros(len(self.points), dtype=bool)
         marks[list(sides)] = True
-        edges = [marks[bounds[k] : bounds[k + 1]] for k in range(len(self.starts))]
-        for pair in self.kind.identified_edges:
-            step = -1 if pair.reversed else 1
-            both = edges[pair.first] | edges[pair.second][::step]
-            edges[pair.first], edges[pair.second] = both, both[::step]
-        chosen = np.concatenate(edges)
+        parts = [marks[bounds[k] : bounds[k + 1]] for k in range(len(self.starts))]
+        for own in self.edge_classes:
+            steps = [
+                (image.edge, -1 if image.reversed else 1) for image in (*own.folds, *own.images)
+            ]
+            every = parts[own.edge]
+            for edge, step in steps:
+                every = every | parts[edge][::step]
+            if own.turn:
+                every = every | every[::-1]
+            for edge, step in ((own.edge, 1), *steps):
+                parts[edge] = every[::step]
+        chosen = np.concatenate(parts)
         index = np.flatnonzero(chosen)
         middles = (self.points[index] + self.points[(index + 1) % len(self.points)]) / 2
         points = np.insert(self.points, index + 1, middles, axis=0)
@@ -119,8 +145,8 @@ class OwnFrame:
         return replace(self, points=points, starts=starts)
 
     def tile(self) -> Tile:
-        """The tile again."""
-        group = self.kind.group().conjugate(self.linear, self.offset)
+        """The tile again, with this group."""
+        group = self.group.conjugate(self.linear, self.offset)
         placed = self.points @ self.linear.T + self.offset
         return Tile(placed, group, self.kind.name, self.starts)
 
@@ -130,11 +156,11 @@ def _offset(kind: IsohedralClass, placed: Array, starts: tuple[int, ...], linear
     rows: list[Array] = []
     values: list[Array] = []
     inverse = np.linalg.inv(linear)
-    for pair in kind.identified_edges:
-        element = pair.isometry
+    for first, image in _relations(kind.edge_classes):
+        element = image.isometry
         turned = linear @ element.linear @ inverse
-        begin = placed[starts[pair.first]]
-        end = starts[(pair.second + pair.reversed) % len(starts)]
+        begin = placed[starts[first]]
+        end = starts[(image.edge + image.reversed) % len(starts)]
         rows.append(np.eye(2) - turned)
         values.append(placed[end] - turned @ begin - linear @ element.translation)
     matrix = np.concatenate(rows)
@@ -143,6 +169,13 @@ def _offset(kind: IsohedralClass, placed: Array, starts: tuple[int, ...], linear
     open_ways = ways[np.concatenate([sizes, np.zeros(2 - len(sizes))]) < 1e-6]
     away = placed[list(starts)].mean(axis=0) - kind.template().mean(axis=0) @ linear.T - offset
     return offset + open_ways.T @ (open_ways @ away)
+
+
+def _relations(classes: Iterable[EdgeClass]) -> Iterator[tuple[int, EdgeImage]]:
+    """Yield each edge that others, or itself, are images of, with the image."""
+    for own in classes:
+        for image in (*own.folds, *own.images):
+            yield own.edge, image
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,12 +235,12 @@ def _links(own: OwnFrame) -> list[list[tuple[int, Isometry]]]:
     count = len(own.points)
     links: list[list[tuple[int, Isometry]]] = [[] for _ in range(count)]
     bounds = [*own.starts, count]
-    for pair in own.kind.identified_edges:
-        element = pair.isometry
+    for edge, image in _relations(own.edge_classes):
+        element = image.isometry
         back = element.inverse()
-        first = np.arange(bounds[pair.first], bounds[pair.first + 1] + 1) % count
-        second = np.arange(bounds[pair.second], bounds[pair.second + 1] + 1) % count
-        if pair.reversed:
+        first = np.arange(bounds[edge], bounds[edge + 1] + 1) % count
+        second = np.arange(bounds[image.edge], bounds[image.edge + 1] + 1) % count
+        if image.reversed:
             second = second[::-1]
         for i, j in zip(first.tolist(), second.tolist(), strict=True):
             links[i].append((j, element))
@@ -275,6 +308,12 @@ class _Weights:
 
     @classmethod
     def of(cls, own: OwnFrame) -> _Weights:
+        if own.group.order * signed_area(own.kind.template()) > 1.5 * own.group.cell_volume:
+            name = own.kind.name
+            raise OrbiflowError(
+                f"the straight way to this tile crosses itself, and tiles of {name} know no other: "
+                "animate it with another kind, bend or grow"
+            )
         for _ in range(ROUNDS):
             mesh = triangulate(own.points)
             if not len(mesh.sides):
@@ -368,7 +407,7 @@ def _block_matrix(blocks: Array, rows: Array, columns: Array, count: int) -> csc
 
 def _open_ways(own: OwnFrame) -> Array:
     """Return the orthonormal directions (k, 2) of shifts that commute with the group."""
-    rows = [np.eye(2) - g.linear for g in own.kind.group().cosets]
+    rows = [np.eye(2) - g.linear for g in own.group.cosets]
     _, sizes, ways = np.linalg.svd(np.concatenate(rows))
     return ways[sizes < 1e-6]
 

@@ -4,6 +4,7 @@ from .candidates import Fit as Fit
 from .descent import fit_descent as fit_descent
 from .escherize_settings import EscherizeSettings as EscherizeSettings
 from .escherize_settings import SearchSettings as SearchSettings
+from .escherize_settings import class_names as class_names
 from .escherizing import SearchResult as SearchResult
 from .escherizing import escherize as escherize
 from .escherizing import escherize_class as escherize_class
@@ -11,6 +12,7 @@ from .escherizing import fit_tile as fit_tile
 from .escherizing import report as report
 from .finished_tiles import ClassFailure as ClassFailure
 from .finished_tiles import certified_tiles as certified_tiles
+from .finished_tiles import why_poor as why_poor
 from .likeness_search import LikenessSearch as LikenessSearch
 from .occupancy import OccupancySamples as OccupancySamples
 from .occupancy import fit_occupancy as fit_occupancy

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError
+from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles.geometry import kept_vertices, plane_points, subdivided
 from orbiflow.tiles.search.tile_space import NearestTiles
 from orbiflow.tiles.tile import TileMap
-from orbiflow.tiles.tilings import CLASSES, EdgeIdentification, IsohedralClass, Tile
+from orbiflow.tiles.tilings import IsohedralClass, Tile
 
 if TYPE_CHECKING:
     from orbiflow.tiles.search.bending import PlacedBent
@@ -147,34 +148,38 @@ def _moved_edges(
     before = subdivided(vertices, pieces)
     closed = np.concatenate([before, before[:1]])
     first = [*(int(corner) * pieces for corner in corners), len(before)]
-    spans: dict[EdgeIdentification, slice[int, int, None]] = {}
-    for pair in kind.identified_edges:
-        start, end = first[pair.first], first[pair.first + 1]
-        spans[pair] = slice(start, (start + end) // 2 + 1 if pair.folded else end + 1)
-    carried = moved(np.concatenate([closed[span] for span in spans.values()]))
-    ends = np.cumsum([span.stop - span.start for span in spans.values()])
+    spans: list[slice[int, int, None]] = []
+    for own in kind.edge_classes:
+        start, end = first[own.edge], first[own.edge + 1]
+        spans.append(slice(start, (start + end) // 2 + 1 if own.turn else end + 1))
+    carried = moved(np.concatenate([closed[span] for span in spans]))
+    ends = np.cumsum([span.stop - span.start for span in spans])
     edges: dict[int, Array] = {}
-    for pair, own in zip(spans, np.split(carried, ends[:-1]), strict=True):
-        image = pair.isometry(own)
-        if pair.folded:
-            edges[pair.first] = np.concatenate([own, image[-2::-1]])
-        else:
-            edges[pair.first] = own
-            edges[pair.second] = image[::-1] if pair.reversed else image
+    for own, half in zip(kind.edge_classes, np.split(carried, ends[:-1]), strict=True):
+        turn = own.turn
+        edge = np.concatenate([half, turn.isometry(half)[-2::-1]]) if turn else half
+        edges[own.edge] = edge
+        for image in own.images:
+            points = image.isometry(edge)
+            edges[image.edge] = points[::-1] if image.reversed else points
     return [edges[i] for i in range(len(edges))]
 
 
 def _chosen_samples(kind: IsohedralClass, closed: list[Array], tolerance: float) -> list[Array]:
     """For each edge, which of its samples to keep, both ends included: matching on identified edges."""
     masks: dict[int, Array] = {}
-    for pair in kind.identified_edges:
-        curve = closed[pair.first]
-        if pair.folded:
+    for own in kind.edge_classes:
+        curve = closed[own.edge]
+        if own.straight:
+            mask = np.isin(np.arange(len(curve)), (0, len(curve) - 1))
+        elif own.turn:
             half = _simplified(curve[: len(curve) // 2 + 1], tolerance)
-            masks[pair.first] = np.concatenate([half, half[-2::-1]])
+            mask = np.concatenate([half, half[-2::-1]])
         else:
-            mask = masks[pair.first] = _simplified(curve, tolerance)
-            masks[pair.second] = mask[::-1] if pair.reversed else mask
+            mask = _simplified(curve, tolerance)
+        masks[own.edge] = mask
+        for image in own.images:
+            masks[image.edge] = mask[::-1] if image.reversed else mask
     return [masks[i] for i in range(len(closed))]
 
 
@@ -218,9 +223,26 @@ class Fit(NamedTuple):
         return self.candidates.as_model()
 
 
-# By class, the number of parameters of a symmetric field of frequency 1
-WAVES = dict(zip(CLASSES, (18, 9, 9, 8, 4, 4, 8, 4, 4), strict=True))
 STEPS = 8  # integration steps with which a flow's polygon is first computed
+
+
+def waves(group: CrystallographicGroup) -> int:
+    """Return the number of parameters of a symmetric field of frequency 1, without torch.
+
+    It is the trace of the mean over the group, which projects on the symmetric fields.
+
+    >>> from orbiflow.symmetry import wallpaper_group
+    >>> waves(wallpaper_group("p4"))
+    4
+    """
+    box = np.indices((3,) * group.dim).reshape(group.dim, -1).T - 1
+    images = np.unique(np.concatenate([box @ part for part in group.integral_parts]), axis=0)
+    trace = 0.0
+    for element, part in zip(group.cosets, group.integral_parts, strict=True):
+        still = images[(images @ part == images).all(axis=1)]
+        phase = 2 * np.pi * still @ group.inverse_lattice @ element.translation
+        trace += float(np.cos(phase).sum() * np.trace(element.linear))
+    return round(trace / group.order)
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +290,7 @@ class StillTiles:
             "offset": offset,
             "shape": np.zeros(self.kind.shape_dim),
             "stretch": own.stretch[0],
-            "flow.segments.0.parameters_": np.zeros(WAVES[self.kind.name]),
+            "flow.segments.0.parameters_": np.zeros(waves(self.kind.group())),
             VERTICES: vertices,
             CORNERS: corners,
         }

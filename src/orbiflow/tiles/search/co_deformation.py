@@ -17,6 +17,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from itertools import permutations
+from math import gcd
 from typing import NamedTuple
 
 import numpy as np
@@ -105,11 +106,14 @@ class _Reduced:
         return self.real @ self.parameters + 1j * (self.imaginary @ self.parameters)
 
 
-# Of the search: bodies and heads are stiff; thin parts are not, and keep their places. Tiles bent so
-# are seen to be more like the silhouette: docs/likeness.md has the comparison.
-FIRM = Stiffness(salience=-0.5, pose=60.0)
-# Of the search where too few tiles of a firm body are simple: many long limbs, which cross
-SOFT = Stiffness(salience=0.0)
+# Thin parts of a soft body are as stiff as others, and it may leave its pose: long limbs find a way
+# where those of firmer bodies cross. In firmer ones bodies and heads are stiff, thin parts are not, and
+# all keep their places, the more the stiffer. docs/likeness.md has the comparison.
+BODIES = {
+    "soft": Stiffness(salience=0.0),
+    "firm": Stiffness(salience=-0.5, pose=60.0),
+    "stiff": Stiffness(salience=-0.5, pose=600.0),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,18 +137,19 @@ class Hand:
         return self.made("coarse", stiffness), self.made(middle, stiffness), fine
 
 
-@lru_cache(maxsize=2)  # one serves all classes
+@lru_cache(maxsize=4)  # one serves most classes
 def hands(
     target: Target,
     settings: LikenessSearch,
     *,
     emphasis: Emphasis | None = None,
     pins: Pins | None = None,
+    step: int = 6,
 ) -> tuple[Hand, Hand]:
-    """The silhouette and its mirror image in the x axis, ready to be bent."""
+    """The silhouette and its mirror image in the x axis, with a multiple of `step` points."""
     phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
     outline = np.asarray(target.normal)
-    samples = sampled(outline, phase, settings.multiples)
+    samples = sampled(outline, phase, settings.multiples, step)
     # read backwards from the same first point: every k-th fine point stays beside a coarse one
     mirror = Samples(*(reverse(part) * (1.0, -1.0) for part in samples))
 
@@ -259,7 +264,7 @@ def _neighbours(
     options = Placements(lengths, starts, own.turns[owners], own.gains[owners])
     if share >= 1 or not len(owners):
         return owners, options
-    apart = TileSpace(kind, options).nearest(drawn.points[: body.size, owners].T).distance
+    apart = TileSpace(kind, options).distances(drawn.points[: body.size, owners].T)
     order = np.lexsort((apart, owners))
     rank = np.arange(len(order)) - np.searchsorted(owners[order], owners[order])
     count = np.bincount(owners, minlength=len(drawn.costs))[owners[order]]
@@ -285,18 +290,15 @@ def _take_better(drawn: Drawn, owners: Integers, tried: Drawn) -> Integers:
 def _moves(kind: IsohedralClass, step: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Neighbours of a placement: what is added to lengths (M, K) and starts (M,).
 
-    One pair of edges becomes longer and another shorter, with the first corner where it is, or
-    moved so that one of the other corners stays; or all corners move.
+    The edges of one class become longer and those of another shorter, with the first corner where it
+    is, or moved so that one of the other corners stays; or all corners move.
     """
-    pairs = kind.identified_edges
     still = np.zeros(len(kind.template()), dtype=np.int64)
     lengths, starts = [still, still], [step, -step]
-    for one, other in permutations(pairs, 2):
-        change = still.copy()
-        same = one.folded == other.folded
-        for pair, sign, mate in ((one, 1, other), (other, -1, one)):
-            amount = sign * step * (1 if same or mate.folded else 2)
-            change[list({pair.first, pair.second})] += amount
+    for one, other in permutations((own.edges for own in kind.edge_classes), 2):
+        change, common = still.copy(), gcd(len(one), len(other))
+        change[one] += step * len(other) // common
+        change[other] -= step * len(one) // common
         corners = np.cumsum(change) - change
         low, high = int(corners.min()), int(corners.max())
         for start in sorted({0, -low, -high, -(low + high) // 2}):

@@ -21,14 +21,12 @@ OVERLAP = Group("Search for overlap")
 OCCUPANCY = Group("Occupancy method")
 
 
-def class_names(text: str) -> tuple[str, ...] | None:
-    """Return the isohedral classes that a text names, None for all.
+def class_names(text: str) -> tuple[str, ...]:
+    """Return the isohedral classes that a text names, or "all".
 
     >>> class_names("IH4, IH6"), class_names("all")
-    (('IH4', 'IH6'), None)
+    (('IH4', 'IH6'), ('all',))
     """
-    if text.strip().lower() == "all":
-        return None
     return tuple(filter(None, re.split(r"[,\s]+", text)))
 
 
@@ -38,9 +36,10 @@ class SearchSettings(Settings, group="Search"):
     classes: Annotated[
         tuple[str, ...] | None,
         Parsed(class_names, "classes such as IH4,IH6, or all", "CLASSES"),
-        DefaultText("all"),
+        DefaultText("the nine, and some with symmetric tiles for a silhouette near to symmetric"),
     ] = None
-    """Isohedral classes, such as IH4,IH6, or all."""
+    """Isohedral classes, such as IH4,IH6. With all, classes with symmetric tiles are searched whatever
+    the silhouette."""
 
     effort: Annotated[Literal["fast", "normal", "best"], OnlyWith(method="descent")] = "normal"
     """How long the search takes: seconds, a quarter of a minute, or minutes."""

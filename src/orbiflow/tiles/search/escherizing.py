@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import itertools
 import math
 import platform
 import time
@@ -34,14 +35,14 @@ from orbiflow.runtime import (
     process_context,
     work,
 )
-from orbiflow.tiles.likeness import diverse, mutual_iou
+from orbiflow.tiles.likeness import NearSymmetry, diverse, mutual_iou, near_symmetry
 from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
 from orbiflow.tiles.search.both_search import ALIKE
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
 from orbiflow.tiles.search.finished_tiles import HOW, ClassFailure, best_tiles, rated
 from orbiflow.tiles.search.likeness_search import LikenessSearch
-from orbiflow.tiles.search.search_method import Goal, SearchMethod
+from orbiflow.tiles.search.search_method import SYMMETRIC, Goal, SearchMethod
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass, isohedral_class
@@ -64,6 +65,7 @@ class SearchResult:
     - `seconds`: How long it took.
     - `workers`: The number of processes.
     - `interrupted`: The classes that were not finished: each is a failure, or has its first tile alone.
+    - `near_symmetry`: How near the silhouette is to symmetric, if the method asks.
     """
 
     target: Target
@@ -76,6 +78,7 @@ class SearchResult:
     seconds: float = 0.0
     workers: int = 1
     interrupted: frozenset[str] = frozenset()
+    near_symmetry: NearSymmetry | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tiles", rated(self.tiles, self.target))
@@ -123,12 +126,15 @@ def escherize(
         pins = Pins.read(settings.pin, target, keep_angle=settings.pin_angle)
     method = method or settings.search_method
     task = _task(Goal(target, emphasis, pins), method, settings.per_class, settings.force)
-    names = list(dict.fromkeys(isohedral_class(name).name for name in settings.classes or CLASSES))
+    near = near_symmetry(target.normal) if method.takes_symmetric else None
+    names = _class_names(settings.classes, near)
     if on_checked is not None:
         on_checked()
     for source in (emphasis, pins):
         for note in source.notes if source else ():
             on_event(Note(note))
+    if near is not None and near.stabiliser in SYMMETRIC:
+        on_event(Note(_told(near, names)))
     workers = min(settings.workers or 1, len(names))
     record = _Record(names, on_event)
     with contextlib.suppress(Cancelled):
@@ -136,7 +142,32 @@ def escherize(
     tiles, failures, left = record.finish()
     tiles, seconds = method.short_list(tiles), time.perf_counter() - begin
     return SearchResult(
-        target, tiles, failures, record.found, method, emphasis, pins, seconds, workers, left
+        target, tiles, failures, record.found, method, emphasis, pins, seconds, workers, left, near
+    )
+
+
+def _class_names(classes: Sequence[str] | None, near: NearSymmetry | None) -> list[str]:
+    """Return the names of classes to search: by default the nine, and what suits the silhouette."""
+    if classes is None:
+        symmetric = SYMMETRIC.get(near.stabiliser, ()) if near else ()
+        classes = (*CLASSES, *symmetric)
+    found: list[str] = []
+    for name in classes:
+        if name.strip().lower() == "all":
+            found += [*CLASSES, *itertools.chain(*SYMMETRIC.values())]
+        else:
+            found.append(isohedral_class(name).name)
+    return list(dict.fromkeys(found))
+
+
+def _told(near: NearSymmetry, names: Sequence[str]) -> str:
+    """Return what a silhouette near to symmetric is told of, and which of its classes are searched."""
+    what = "its mirror image" if near.stabiliser == "D1" else "itself turned by 180 degrees"
+    own = [name for name in SYMMETRIC[near.stabiliser] if name in names]
+    searched = f"{', '.join(own)} with exactly symmetric tiles" if own else "no class of such tiles"
+    return (
+        f"the silhouette is much like {what} ({max(near):.2f} of 1): {searched} "
+        f"{'are' if len(own) > 1 else 'is'} searched"
     )
 
 
@@ -371,7 +402,7 @@ def _without_twins(tiles: Sequence[EscherTile], count: int) -> list[int]:
 
 def report(result: SearchResult) -> dict[str, Any]:
     """Return the whole document, ready for JSON, tiles best first."""
-    tiles, method = result.tiles, result.method
+    tiles, method, near = result.tiles, result.method, result.near_symmetry
     core_seconds = sum({tile.isohedral_class: tile.seconds for tile in tiles}.values())
     return {
         "schema_version": SCHEMA_VERSION,
@@ -392,6 +423,7 @@ def report(result: SearchResult) -> dict[str, Any]:
             "workers": result.workers,
         },
         "input": result.target.report(),
+        "near_symmetry": None if near is None else near._asdict(),
         "emphasis": None if result.emphasis is None else result.emphasis.report(),
         "pins": None if result.pins is None else result.pins.report(),
         "tiles": [tile_json(tile) for tile in tiles],

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from math import lcm
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.settings import Range, Settings
@@ -17,11 +18,31 @@ from orbiflow.tiles.tilings import IsohedralClass
 if TYPE_CHECKING:
     from orbiflow.tiles.search.co_deformation import Hand
 
+Body = Literal["soft", "firm", "stiff"]
+ALL_BODIES: tuple[Body, ...] = ("soft", "firm", "stiff")
+
 # Settings of the preview
 SKETCH = {"placements": 60, "held": 6, "starts": 1, "share": 0.1, "finalists": 1, "rounds": 10}
 
-FAST = {"placements": 80, "held": 20, "starts": 8, "share": 0.15, "finalists": 2, "rounds": 12}
-BEST = {"placements": 1500, "held": 300, "starts": 128, "share": 1.0, "finalists": 12, "rounds": 40}
+FAST = {
+    "placements": 80,
+    "held": 10,
+    "starts": 4,
+    "share": 0.15,
+    "finalists": 2,
+    "rounds": 10,
+    "bodies": ALL_BODIES,
+}
+BEST = {
+    "placements": 800,
+    "held": 160,
+    "starts": 64,
+    "share": 0.6,
+    "finalists": 8,
+    "rounds": 40,
+    "bodies": ALL_BODIES,
+}
+HALVED = ("placements", "held", "starts")  # in a search for symmetric tiles
 
 
 class LikenessSearch(Settings, SearchMethod):
@@ -34,6 +55,7 @@ class LikenessSearch(Settings, SearchMethod):
     - `finalists`: of what comes of it, the best that are worked out with all of the outline's detail,
       a class and hand.
     - `rounds`: steps of the minimisation for finalists.
+    - `bodies`: how stiff the silhouette is, from soft to stiff; each is searched.
     - `below`: levels of effort below that are searched, too, so that more effort never finds less.
     - `multiples`: points of a tile for each point of the search, the first that holds the corners.
     - `min_neck`: width of necks below which a tile's score falls, in square roots of the area; if
@@ -43,6 +65,7 @@ class LikenessSearch(Settings, SearchMethod):
 
     objective: ClassVar[str] = "likeness"
     takes_pins: ClassVar[bool] = True
+    takes_symmetric: ClassVar[bool] = True
     modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.bending",)
     efforts: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "fast": FAST,
@@ -50,12 +73,13 @@ class LikenessSearch(Settings, SearchMethod):
         "best": {**BEST, "below": 2},
     }
 
-    placements: Count = 300
-    held: Count = 80
-    starts: Count = 32
-    share: Annotated[float, Range(above=0, most=1)] = 0.3
-    finalists: Count = 5
+    placements: Count = 200
+    held: Count = 36
+    starts: Count = 14
+    share: Annotated[float, Range(above=0, most=1)] = 0.2
+    finalists: Count = 4
     rounds: Count = 20
+    bodies: tuple[Body, ...] = ("firm", "stiff")
     below: Annotated[int, Range(0, 2)] = 0
     multiples: tuple[Count, ...] = (4, 6)
     min_neck: Annotated[float, Range(0, 0.2)] = 0.01
@@ -67,7 +91,7 @@ class LikenessSearch(Settings, SearchMethod):
         """Let the silhouette bend into tiles of the class."""
         from orbiflow.tiles.search.bending import fit_bending
 
-        both = self.hands(goal)
+        both = self.hands(goal, kind.divisor)
         return fit_bending(goal.target, kind, self, both, per_class, progress, cancel)
 
     def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:
@@ -75,35 +99,43 @@ class LikenessSearch(Settings, SearchMethod):
         from orbiflow.tiles.search.bending import fit_bending
 
         quick = replace(self, below=0, **SKETCH)
-        return fit_bending(goal.target, kind, quick, self.hands(goal), 1, silent, cancel)
+        both = self.hands(goal, kind.divisor)
+        return fit_bending(goal.target, kind, quick, both, 1, silent, cancel)
 
     def prepare(self, goal: Goal) -> None:
         """Triangulate the silhouette and its mirror image."""
         self.hands(goal)
 
-    def hands(self, goal: Goal) -> tuple[Hand, Hand]:
-        """Return the silhouette and its mirror image, ready to be bent."""
+    def hands(self, goal: Goal, divisor: int = 1) -> tuple[Hand, Hand]:
+        """Return the silhouette and its mirror image, with a multiple of `divisor` points."""
         from orbiflow.tiles.search.co_deformation import hands
 
-        return hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins)
+        step = lcm(divisor, 6)
+        return hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins, step=step)
 
     def least_neck(self, goal: Goal) -> float:
         """Return `min_neck`, or a part of the silhouette's own narrowest neck."""
         return least_neck(goal.target.normal, self.min_neck)
 
-    def searches(self, wanted: int = 1) -> tuple[LikenessSearch, ...]:
+    def searches(self, wanted: int = 1, *, symmetric: bool = False) -> tuple[LikenessSearch, ...]:
         """Those of the levels below, least first, and these, with so many finalists `wanted`.
 
-        Each has twice as many starts as finalists at least, where more are wanted.
+        Each has twice as many starts as finalists at least, where more are wanted. For symmetric tiles,
+        which have half the freedom, half as much is tried, and level "fast" alone if nothing is above.
 
         >>> [own.starts for own in LikenessSearch.for_effort("best").searches()]
-        [8, 32, 128]
+        [4, 14, 64]
+        >>> [own.starts for own in LikenessSearch.for_effort("best").searches(symmetric=True)]
+        [7, 32]
         """
         normal = {name: getattr(LikenessSearch, name) for name in FAST}
         found: list[LikenessSearch] = []
         for changes in (*(FAST, normal)[: self.below], {}):
             own = replace(self, below=0, **changes)
+            if symmetric:
+                fewer = {name: -(-getattr(own, name) // 2) for name in HALVED}
+                own = replace(own, **fewer)
             if own.finalists < wanted:
                 own = replace(own, finalists=wanted, starts=max(own.starts, 2 * wanted))
             found.append(own)
-        return tuple(found)
+        return tuple(found[symmetric and len(found) > 1 :])

@@ -13,7 +13,7 @@ from orbiflow.settings import Range, Settings
 from orbiflow.tiles.search.candidates import Fit, OnProgress
 from orbiflow.tiles.search.escherize_settings import Count, Seed
 from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS, Goal, SearchMethod
-from orbiflow.tiles.tilings import CLASSES, IsohedralClass
+from orbiflow.tiles.tilings import CLASSES, ISOHEDRAL_TYPES, IsohedralClass
 
 NotNegative = Annotated[float, Range(0)]
 Positive = Annotated[float, Range(above=0)]
@@ -219,7 +219,7 @@ class OccupancySearch(Settings, SearchMethod):
         from orbiflow.tiles.search.occupancy import fit_occupancy
         from orbiflow.tiles.search.starts import initial_poses
 
-        number = list(CLASSES).index(kind.name)
+        number = list(dict.fromkeys((*CLASSES, *ISOHEDRAL_TYPES))).index(kind.name)
         own = replace(self, seed=(self.seed * 1009 + number) % 2**32)
         with one_thread():
             model = fit_occupancy(goal.target, kind, own, progress, cancel=cancel)

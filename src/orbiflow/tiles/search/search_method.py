@@ -19,6 +19,10 @@ from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 # The classes by how often they come near a silhouette at once, for the time that they take
 PREFERRED = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")
 
+# Classes whose tiles have a symmetry of their own, by that symmetry. They were chosen by looking at the
+# tiles of all 18 with a mirror: in the others many edges must be straight.
+SYMMETRIC = {"D1": ("IH13", "IH12", "IH69"), "C2": ("IH8", "IH9")}
+
 MAX_FREQUENCY = 60  # largest Omega that a fit takes on; time and memory grow with its square
 MAX_SEGMENTS = 2000  # of a flow; the descent adds one a step
 
@@ -41,6 +45,8 @@ class SearchMethod(ABC):
     - `objective`: What the method is after, for result.json.
     - `method_name`: The name of the method, for result.json.
     - `takes_pins`: Whether it minds parts of the silhouette that must not bend.
+    - `takes_symmetric`: Whether classes of symmetric tiles are searched, too, for a silhouette that is
+      near to symmetric, unless classes are named.
     - `modules`: What `fit` needs and nothing has imported yet.
     - `efforts`: What each level of effort changes, for `for_effort`.
     - `seed`: What a user changes for other tiles.
@@ -49,6 +55,7 @@ class SearchMethod(ABC):
     objective: ClassVar[str] = "overlap"
     method_name: ClassVar[str] = "descent"
     takes_pins: ClassVar[bool] = False
+    takes_symmetric: ClassVar[bool] = False
     modules: ClassVar[tuple[str, ...]] = ()
     efforts: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
     seed: int = 0
@@ -89,7 +96,7 @@ class SearchMethod(ABC):
         """Return a certified tile of one of the classes in a moment, if the method can."""
         from orbiflow.tiles.search.finished_tiles import best_tiles
 
-        kind = isohedral_class(next(name for name in PREFERRED if name in names))
+        kind = isohedral_class(next((name for name in PREFERRED if name in names), names[0]))
         try:
             return best_tiles(goal.target, self.sketch(goal, kind, cancel)._replace(enough=1))[0]
         except CertificationError:

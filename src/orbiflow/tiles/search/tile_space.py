@@ -17,14 +17,14 @@ Points are complex numbers x + iy throughout.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array, Complex, Integers
-from orbiflow.symmetry import Isometry
+from orbiflow.tiles.search.tile_orbits import Orbits, relations_of
 from orbiflow.tiles.tilings import IsohedralClass
 
 # Beyond this many, lengths and starts run in steps of more than one point
@@ -70,7 +70,7 @@ def best_placements(kind: IsohedralClass, outline: Complex, keep: int) -> Placem
 
 
 def _multiplicities(kind: IsohedralClass) -> list[int]:
-    return [1 if pair.folded else 2 for pair in kind.identified_edges]
+    return [len(own.edges) for own in kind.edge_classes]
 
 
 def _count(multiplicities: Sequence[int], total: int) -> int:
@@ -102,11 +102,10 @@ def _compositions(multiplicities: Sequence[int], total: int) -> Integers:
 
 def edge_lengths(kind: IsohedralClass, total: int) -> Integers:
     """All (C, K) lengths of the template's edges with sum `total`, equal on identified edges."""
-    pairs = kind.identified_edges
     parts = _compositions(_multiplicities(kind), total)
     lengths = np.zeros((len(parts), len(kind.template())), dtype=np.int64)
-    for column, pair in enumerate(pairs):
-        lengths[:, pair.first] = lengths[:, pair.second] = parts[:, column]
+    for column, own in enumerate(kind.edge_classes):
+        lengths[:, own.edges] = parts[:, [column]]
     return lengths
 
 
@@ -116,37 +115,36 @@ def _gains(
     """Gains and turns (C, len(starts)) of all placements."""
     n = len(steps)
     first = np.cumsum(lengths, axis=1) - lengths
-    turned, glided = _sums_along(steps)
+    relations = relations_of(kind)
+    tables = {key: _sums_along(steps, *key) for key in {own[3:5] for own in relations}}
     gains = np.zeros((len(lengths), len(starts)))
     glides = np.zeros_like(gains, dtype=complex)
-    for pair in kind.identified_edges:
-        linear = pair.isometry.linear
-        factor = complex(linear[0, 0], linear[1, 0])
-        length = lengths[:, pair.first][:, None]
-        a = (first[:, pair.first][:, None] + starts) % n
-        b = (first[:, pair.second][:, None] + starts) % n
-        if pair.reversed:  # the mate runs backwards, turned by `factor`
-            share = 0.5 if pair.folded else 1.0
-            table = -share * (np.conj(factor) * turned).real
-            gains += table[length, a, (b + length - 1) % n]
+    for edge, mate, factor, flips, back, weight in relations:
+        length = lengths[:, edge][:, None]
+        a = (first[:, edge][:, None] + starts) % n
+        b = (first[:, mate][:, None] + starts) % n
+        # a mate that runs backwards has the opposite steps
+        share, b = (-weight, (b + length - 1) % n) if back else (weight, b)
+        table = share * (np.conj(factor) * tables[flips, back])
+        if flips:
+            glides += table[length, a, b]
         else:
-            glides += np.conj(factor) * glided[length, a, b]
+            gains += table.real[length, a, b]
     turns = np.angle(glides) / 2  # the best common turn of all axes
     return (gains + abs(glides)) / (0.5 * (abs(steps) ** 2).sum()), turns
 
 
-def _sums_along(steps: Complex) -> tuple[Complex, Complex]:
-    """[k, a, b]: sum over j < k of conj(s[a+j]) s[b-j], and of s[a+j] s[b+j]."""
+def _sums_along(steps: Complex, flips: bool, back: bool) -> Complex:
+    """[k, a, b]: sum over j < k of conj(s[a+j]) s[b+j]; of s[a+j] if it flips, of s[b-j] if back."""
     n = len(steps)
     points = np.arange(n)
-    crossed, straight = np.conj(steps)[:, None] * steps, steps[:, None] * steps
-    turned = np.zeros((n + 1, n, n), dtype=complex)
-    glided = np.zeros_like(turned)
+    products = (steps if flips else np.conj(steps))[:, None] * steps
+    sums = np.zeros((n + 1, n, n), dtype=complex)
     for k in range(n):
-        ahead, back = (points + k) % n, (points - k) % n
-        turned[k + 1] = turned[k] + crossed[np.ix_(ahead, back)]
-        glided[k + 1] = glided[k] + straight[np.ix_(ahead, ahead)]
-    return turned, glided
+        sums[k + 1] = (
+            sums[k] + products[np.ix_((points + k) % n, (points + (-k if back else k)) % n)]
+        )
+    return sums
 
 
 class NearestTiles(NamedTuple):
@@ -166,13 +164,22 @@ class NearestTiles(NamedTuple):
         return self._make(part[index] for part in self)
 
 
+class _Fit(NamedTuple):
+    """How offset and linear part move vertices, orbits' means and residuals; the solution's matrix."""
+
+    columns: Complex
+    means: Complex
+    basis: Complex
+    solve: Complex
+
+
 class TileSpace:
     """The tiles of C placements of one class, all of n steps."""
 
     def __init__(self, kind: IsohedralClass, placements: Placements) -> None:
         self.kind, self.placements = kind, placements
         self.count, self.size = len(placements.starts), int(placements.lengths[0].sum())
-        self._orbits = _Orbits(kind, placements.lengths)
+        self._orbits = Orbits(kind, placements.lengths)
         self.corners = self._orbits.corners  # (C, K) vertices at the template's corners
         # (C, n) the outline's point at each vertex
         self.order = (np.arange(self.size) + placements.starts[:, None]) % self.size
@@ -184,8 +191,8 @@ class TileSpace:
 
     @property
     def glides(self) -> bool:
-        """Whether the class has glide reflections, whose axes can be turned."""
-        return any(not pair.reversed for pair in self.kind.identified_edges)
+        """Whether the class has mirrors or glide reflections, whose axes can be turned."""
+        return any(relation.flips for relation in relations_of(self.kind))
 
     def turn(self, turns: Array) -> None:
         """Set the directions (C,) of the glide axes, in radians; no effect without glides."""
@@ -193,47 +200,51 @@ class TileSpace:
         unit, orbits = np.exp(1j * self.turns)[:, None], self._orbits
         # the group's linear parts in the placed frame
         self._factor: Complex = np.where(orbits.flips, orbits.factor * unit**2, orbits.factor)
-        self._columns = _columns(self.kind, orbits, self._factor, unit)
-        pulled = _unturn(self._factor, orbits.flips, self._columns)
-        self._means = self._orbit_means(pulled)
-        self._basis = self._residual(pulled, self._means)
-        adjoint = np.swapaxes(np.conj(self._basis), 1, 2)
-        matrix = np.real(adjoint @ self._basis)
+        self._mirror: Complex = orbits.mirror * unit**2
+        self.__dict__.pop("_fit", None)
+
+    @cached_property
+    def _fit(self) -> _Fit:
+        """What a least squares fit needs: made when it is first asked for, as turns may change."""
+        unit, orbits = np.exp(1j * self.turns)[:, None], self._orbits
+        columns = _columns(self.kind, orbits, self._factor, self._mirror, unit)
+        pulled = _unturn(self._factor, orbits.flips, columns)
+        means = self._orbit_means(pulled)
+        basis = self._residual(pulled, means)
+        adjoint = np.swapaxes(np.conj(basis), 1, 2)
+        matrix = np.real(adjoint @ basis)
         # IH1 does not care about the offset: the least solution
         size = matrix.shape[-1]
         ridge = 1e-10 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(size)
-        self._solve: Complex = np.linalg.inv(matrix + ridge) @ adjoint
+        return _Fit(columns, means, basis, np.linalg.inv(matrix + ridge) @ adjoint)
 
     def best_turns(self, outlines: Complex) -> Array:
         """(C,) directions of the glide axes that suit the outlines (C, n) best; 0 without glides."""
         if not self.glides:
             return self.turns
-        glides = [pair for pair in self.kind.identified_edges if not pair.reversed]
         total = np.zeros(self.count, dtype=complex)
         goal = np.take_along_axis(outlines, self.order, axis=1)
         steps = np.roll(goal, -1, axis=1) - goal
         lengths, first = self.placements.lengths, self.corners
-        for pair in glides:
-            linear = pair.isometry.linear
-            own = lengths[:, [pair.first]]
+        for edge, mate, factor, flips, back, weight in relations_of(self.kind):
+            if not flips:
+                continue
+            own = lengths[:, [edge]]
             j = np.arange(int(own.max()))
-            a, b = ((first[:, [edge]] + j) % self.size for edge in (pair.first, pair.second))
-            both = np.take_along_axis(steps, a, axis=1) * np.take_along_axis(steps, b, axis=1)
-            total += complex(linear[0, 0], -linear[1, 0]) * np.where(j < own, both, 0).sum(axis=1)
+            a, b = first[:, [edge]] + j, first[:, [mate]] + (own - 1 - j if back else j)
+            both = np.take_along_axis(steps, a % self.size, axis=1)
+            both = both * np.take_along_axis(steps, b % self.size, axis=1)
+            share = -weight if back else weight
+            total += share * np.conj(factor) * np.where(j < own, both, 0).sum(axis=1)
         return np.angle(total) / 2
 
     def nearest(self, outlines: Complex) -> NearestTiles:
         """The tile of each placement that is nearest to its own outline (C, n)."""
-        orbits = self._orbits
-        goal = np.take_along_axis(outlines, self.order, axis=1)[..., None]
-        pulled = _unturn(self._factor, orbits.flips, goal)
-        means = self._orbit_means(pulled)
-        rest = self._residual(pulled, means)
-        solution: Array = np.real(self._solve @ rest)[..., 0]
-        left = rest[..., 0] - (self._basis @ solution[..., None])[..., 0]
-        free = means[..., 0] - (self._means @ solution[..., None])[..., 0]
+        orbits, (columns, images, *_) = self._orbits, self._fit
+        means, solution, left = self._fitted(outlines)
+        free = means[..., 0] - (images @ solution[..., None])[..., 0]
         image = _turn(self._factor, orbits.flips, np.take_along_axis(free, orbits.source, axis=1))
-        moved = (self._columns @ solution[..., None])[..., 0]
+        moved = (columns @ solution[..., None])[..., 0]
         vertices = np.where(orbits.fixed, 0, image) + moved
         return NearestTiles(
             vertices,
@@ -242,6 +253,19 @@ class TileSpace:
             self.corners,
             (abs(left) ** 2).sum(axis=1),
         )
+
+    def distances(self, outlines: Complex) -> Array:
+        """`distance` (C,) of the nearest tiles."""
+        return (abs(self._fitted(outlines)[2]) ** 2).sum(axis=1)
+
+    def _fitted(self, outlines: Complex) -> tuple[Complex, Array, Complex]:
+        """Means over orbits, parameters (C, m) of the nearest tile, and what is left of the outline."""
+        goal = np.take_along_axis(outlines, self.order, axis=1)[..., None]
+        pulled = _unturn(self._factor, self._orbits.flips, goal)
+        means = self._orbit_means(pulled)
+        rest = self._residual(pulled, means)
+        solution: Array = np.real(self._fit.solve @ rest)[..., 0]
+        return means, solution, rest[..., 0] - (self._fit.basis @ solution[..., None])[..., 0]
 
     def in_order(self, vertices: Complex) -> Complex:
         """Vertices (C, n), as of tiles, in the order of the outline's points."""
@@ -254,23 +278,27 @@ class TileSpace:
         """
         orbits, n = self._orbits, self.size
         source, fixed = orbits.source[index], orbits.fixed[index]
+        mirror = self._mirror[index]
         free = np.flatnonzero((source == np.arange(n)) & ~fixed)
         position = np.zeros(n, dtype=np.int64)
-        position[free] = np.arange(len(free))
-        columns = self._columns[index]
-        real = np.zeros((n, 2 * len(free) + columns.shape[1]))
-        imaginary = np.zeros_like(real)
+        width = np.where(mirror[free] == 0, 2, 1)
+        position[free] = np.cumsum(width) - width
+        columns, count = self._fit.columns[index], int(width.sum())
+        whole: Complex = np.zeros((n, count + columns.shape[1]), dtype=complex)
         v = np.flatnonzero(~fixed)
-        at, factor = 2 * position[source[v]], self._factor[index, v]
-        sign = np.where(orbits.flips[index, v], -1.0, 1.0)
-        real[v, at], real[v, at + 1] = factor.real, -factor.imag * sign
-        imaginary[v, at], imaginary[v, at + 1] = factor.imag, factor.real * sign
-        real[:, 2 * len(free) :], imaginary[:, 2 * len(free) :] = columns.real, columns.imag
+        factor, flips, on_line = self._factor[index, v], orbits.flips[index, v], mirror[v] != 0
+        along = np.where(on_line, np.sqrt(mirror[v]), 1.0)
+        whole[v, position[source[v]]] = _turn(factor, flips, along)
+        across = _turn(factor, flips, np.full(len(v), 1j))
+        whole[v[~on_line], position[source[v]][~on_line] + 1] = across[~on_line]
+        whole[:, count:] = columns
+        real: Array = whole.real
+        imaginary: Array = whole.imag
         return real[self._place[index]], imaginary[self._place[index]]
 
     def group(self, index: int, parameters: Array) -> tuple[Array, Array]:
         """Linear part (2, 2) and offset (2,) of the map from the group's frame, from `matrices`."""
-        own = parameters[-self._columns.shape[2] :][None]
+        own = parameters[-self._fit.columns.shape[2] :][None]
         return _linear(self.kind, own[:, 2:], self.turns[[index]])[0], own[0, :2]
 
     def _residual(self, pulled: Complex, means: Complex) -> Complex:
@@ -286,116 +314,56 @@ class TileSpace:
             part = values[..., column].ravel()
             for own, sums in ((part.real, means.real), (part.imag, means.imag)):
                 sums[:, column] = np.bincount(self._flat, own, minlength=count * n) / self._total
-        return means.reshape(count, n, m)
+        means = means.reshape(count, n, m)
+        if self._orbits.has_lines:
+            mirror = self._mirror[..., None]
+            means = np.where(mirror == 0, means, (means + mirror * np.conj(means)) / 2)
+        return means
 
 
-class _Element(NamedTuple):
-    """z -> factor z + shift, or factor conj(z) + shift."""
-
-    factor: complex
-    flips: bool
-    shift: complex
-
-    @classmethod
-    def of(cls, isometry: Isometry) -> _Element:
-        linear = isometry.linear
-        return cls(
-            complex(linear[0, 0], linear[1, 0]),
-            bool(np.linalg.det(linear) < 0),
-            complex(*isometry.translation),
-        )
-
-
-@lru_cache(maxsize=16)
-def _layout(kind: IsohedralClass) -> tuple[tuple[_Element, ...], tuple[tuple[int, _Element], ...]]:
-    """The elements of edge pairs; of each corner its orbit's first corner (-1: fixed), and how."""
-    group, vertices = kind.group(), kind.template()
-    corners: list[tuple[int, _Element]] = []
-    for k, vertex in enumerate(vertices):
-        if len(list(group.elements_near(vertex, 1e-6, source=vertex))) > 1:
-            corners.append((-1, _Element(1, False, complex(*vertex))))
-            continue
-        for first in range(k + 1):
-            images = list(group.elements_near(vertex, 1e-6, source=vertices[first]))
-            if images:
-                corners.append((first, _Element.of(images[0])))
-                break
-    edges = tuple(_Element.of(pair.isometry) for pair in kind.identified_edges)
-    return edges, tuple(corners)
-
-
-class _Orbits:
-    """For each vertex: the free vertex that it is an image of, and by which element; or fixed."""
-
-    def __init__(self, kind: IsohedralClass, lengths: Integers) -> None:
-        count, n = len(lengths), int(lengths[0].sum())
-        edges, corners = _layout(kind)
-        self.corners = np.cumsum(lengths, axis=1) - lengths
-        self.source = np.tile(np.arange(n), (count, 1))
-        self.factor = np.ones((count, n), dtype=complex)
-        self.flips = np.zeros((count, n), dtype=bool)
-        self.shift = np.zeros((count, n), dtype=complex)
-        self.fixed = np.zeros((count, n), dtype=bool)
-        vertices = kind.template() @ [1, 1j]
-        for pair, element in zip(kind.identified_edges, edges, strict=True):
-            middle = (vertices[pair.first] + vertices[(pair.first + 1) % len(vertices)]) / 2
-            own = self.corners[:, [pair.first]]
-            other = self.corners[:, [pair.second]]
-            length = lengths[:, [pair.first]]
-            j = np.arange(1, int(length.max(initial=1)))
-            if pair.folded:
-                self._map((j < length) & (2 * j > length), own + j, own + length - j, element)
-                rows = np.flatnonzero(length[:, 0] % 2 == 0)
-                self._fix(rows, (own + length // 2)[rows, 0], middle)
-            else:
-                mate = other + (length - j if pair.reversed else j)
-                self._map(j < length, mate, own + j, element)
-        rows = np.arange(count)
-        for k, (first, element) in enumerate(corners):
-            if first < 0:
-                self._fix(rows, self.corners[:, k], element.shift)
-            else:
-                live = np.ones((count, 1), dtype=bool)
-                self._map(live, self.corners[:, [k]], self.corners[:, [first]], element)
-
-    def _map(self, live: NDArray[np.bool_], vertex: Array, source: Array, by: _Element) -> None:
-        rows, columns = np.nonzero(live)
-        at = rows, np.broadcast_to(vertex, live.shape)[rows, columns]
-        self.source[at] = np.broadcast_to(source, live.shape)[rows, columns]
-        self.factor[at], self.flips[at], self.shift[at] = by
-
-    def _fix(self, rows: Integers, vertex: Integers, where: complex) -> None:
-        self.fixed[rows, vertex] = True
-        self.shift[rows, vertex] = where
-
-
-def _columns(kind: IsohedralClass, orbits: _Orbits, factor: Complex, turn: Complex) -> Complex:
+def _columns(
+    kind: IsohedralClass, orbits: Orbits, factor: Complex, mirror: Complex, turn: Complex
+) -> Complex:
     """(C, n, 2 + m): how offset and linear part move each vertex, its free vertex held."""
-    shift, one = orbits.shift, np.ones_like(factor)
+    one = np.ones_like(factor)
+    offsets = [z * one for z in (1, 1j)]
     columns = [
-        np.where(orbits.fixed, z * one, z * one - _turn(factor, orbits.flips, z * one))
-        for z in (1, 1j)
-    ]
-    match kind.stretch_dim:
-        case 2:
-            columns += [shift, 1j * shift, np.conj(shift), 1j * np.conj(shift)]
-        case 1:  # along the glides, which are the axes of the group's own frame
-            columns += [turn * np.real(shift), 1j * turn * np.imag(shift)]
-        case _:
-            columns += [shift, 1j * shift]
+        np.where(orbits.fixed, z, z - _turn(factor, orbits.flips, z)) for z in offsets
+    ] + _along_lattice(kind, orbits.shift, turn)
+    if orbits.has_lines:  # a mirror takes its vertices along
+        held = offsets + _along_lattice(kind, orbits.foot, turn)
+        for column, z in zip(columns, held, strict=True):
+            across = np.where(mirror == 0, 0, (z - mirror * np.conj(z)) / 2)
+            column += _turn(factor, orbits.flips, across)
     return np.stack(columns, axis=-1)
 
 
+def _along_lattice(kind: IsohedralClass, z: Complex, turn: Complex) -> list[Complex]:
+    """How the coefficients of the linear part move points (C, n) of the group's own frame."""
+    match kind.stretch_dim, kind.has_reflections:
+        case 2, _:
+            return [z, 1j * z, np.conj(z), 1j * np.conj(z)]
+        case 1, _:  # along the glides, which are the axes of the group's own frame
+            return [turn * np.real(z), 1j * turn * np.imag(z)]
+        case _, True:
+            return [turn * z]
+        case _:
+            return [z, 1j * z]
+
+
 def _linear(kind: IsohedralClass, solution: Array, turns: Array) -> Array:
-    """(C, 2, 2) from the coefficients of `_columns`."""
+    """(C, 2, 2) from the coefficients of `_along_lattice`."""
     cos, sin = np.cos(turns), np.sin(turns)
-    match kind.stretch_dim:
-        case 2:
+    match kind.stretch_dim, kind.has_reflections:
+        case 2, _:
             a, b, c, d = solution.T
             rows = [a + c, d - b, b + d, a - c]
-        case 1:  # along the glides, which are the axes of the group's own frame
+        case 1, _:  # along the glides, which are the axes of the group's own frame
             p, q = solution.T
             rows = [cos * p, -sin * q, sin * p, cos * q]
+        case _, True:
+            (p,) = solution.T
+            rows = [cos * p, -sin * p, sin * p, cos * p]
         case _:
             a, b = solution.T
             rows = [a, -b, b, a]

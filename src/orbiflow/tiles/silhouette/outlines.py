@@ -201,16 +201,17 @@ class Samples(NamedTuple):
 
 
 def sampled(
-    ring: Array, phase: float = 0.0, multiples: tuple[int, ...] = FINE_MULTIPLES
+    ring: Array, phase: float = 0.0, multiples: tuple[int, ...] = FINE_MULTIPLES, step: int = 6
 ) -> Samples:
     """Sample a counter-clockwise ring (M, 2) of area about 1, more densely if long or rich in corners.
 
     Points are shifted by `phase` coarse spacings; `multiples` are numbers of fine points for each
-    coarse one, in order of trial. Raises `OrbiflowError` if all cross themselves: there are hairs.
+    coarse one, in order of trial. The number of coarse points is a multiple of `step`, a divisor of 12.
+    Raises `OrbiflowError` if all cross themselves: there are hairs.
     """
     longer = ring_length(ring) / SHORT_OUTLINE
-    count = int(np.clip(6 * round(MIN_POINTS * longer / 6), MIN_POINTS, MAX_POINTS))
-    coarse = _simple_coarse(ring, count, phase)
+    count = int(np.clip(step * round(MIN_POINTS * longer / step), MIN_POINTS, MAX_POINTS))
+    coarse = _simple_coarse(ring, count, phase, step)
     corners = important_vertices(ring, CORNER_DEPTH)
     fine = None
     for multiple in multiples:
@@ -230,7 +231,7 @@ def sampled(
     return Samples(coarse, middle, fine)
 
 
-def _simple_coarse(ring: Array, count: int, phase: float) -> Array:
+def _simple_coarse(ring: Array, count: int, phase: float, step: int) -> Array:
     """Resample with as many points as a simple polygon takes; hairs are thickened."""
     polygon = shapely.Polygon(ring)
     for width in (0.0, 0.01, 0.02, 0.04):
@@ -241,7 +242,8 @@ def _simple_coarse(ring: Array, count: int, phase: float) -> Array:
             thick = thick[::-1] if not grown.exterior.is_ccw else thick
             start = int(np.argmin(np.linalg.norm(thick - ring[0], axis=1)))
             thick = np.roll(thick, -start, axis=0)
-        for points in dict.fromkeys((count, min(MAX_POINTS, 3 * count // 2), MAX_POINTS)):
+        more = 3 * count // (2 * step) * step
+        for points in dict.fromkeys((count, min(MAX_POINTS, more), MAX_POINTS)):
             coarse = resampled(thick, points, phase)
             if shapely.Polygon(coarse).is_valid:
                 return coarse

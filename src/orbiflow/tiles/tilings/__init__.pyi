@@ -3,12 +3,14 @@ from .certificate import certify as certify
 from .colourings import Colouring as Colouring
 from .colourings import colouring as colouring
 from .isohedral import CLASSES as CLASSES
+from .isohedral import ISOHEDRAL_TYPES as ISOHEDRAL_TYPES
 from .isohedral import IsohedralClass as IsohedralClass
 from .isohedral import PaperOperator as PaperOperator
-from .isohedral import commutant as commutant
 from .isohedral import isohedral_class as isohedral_class
+from .lattice_freedom import commutant as commutant
 from .prototile import Prototile as Prototile
 from .prototile import Stabiliser as Stabiliser
+from .prototile import free_subgroup as free_subgroup
 from .surroundings import Neighbours as Neighbours
 from .surroundings import arrangement as arrangement
 from .surroundings import aspects as aspects

@@ -1,4 +1,4 @@
-"""The nine isohedral classes, with their templates, groups, operators and lattice freedom."""
+"""Isohedral classes, with their templates, groups, operators and lattice freedom."""
 
 import math
 import re
@@ -17,9 +17,11 @@ from orbiflow.symmetry import (
     Line,
     Points,
     cast_like,
+    identity,
     reduced_basis,
     rotation,
     rotation_matrix,
+    symmetry_elements,
     transflection,
 )
 from orbiflow.tiles.tilings.class_table import (
@@ -30,7 +32,18 @@ from orbiflow.tiles.tilings.class_table import (
     RotationRow,
     TemplateKind,
 )
-from orbiflow.tiles.tilings.tile_edges import EdgeIdentification
+from orbiflow.tiles.tilings.incidence import IncidenceSymbol
+from orbiflow.tiles.tilings.lattice_freedom import array_functions, commutant, stretch_matrix
+from orbiflow.tiles.tilings.tile_edges import (
+    EdgeClass,
+    EdgeIdentification,
+    EdgeImage,
+    Edges,
+    edge_classes,
+    edges,
+)
+from orbiflow.tiles.tilings.tiling import Tile
+from orbiflow.tiles.tilings.type_table import TYPE_TABLE, TypeRow
 
 
 class PentagonGauge(NamedTuple):
@@ -93,7 +106,7 @@ def pentagon(gauge: PentagonGauge, shape: Points) -> Points:
             return cast(Points, turned)
         return vector @ cast_like(matrix, shape).T
 
-    functions = _functions(shape)
+    functions = array_functions(shape)
     p1 = shape + cast_like(np.array(gauge.default), shape)
     p0 = functions.zeros_like(p1)
     p2 = p0 + cast_like(np.array((gauge.distance, 0.0)), shape)
@@ -106,76 +119,8 @@ def template_vertices(kind: TemplateKind, shape: Points) -> Points:
     """Return vertices (..., K, 2) for shape parameters, (..., 2) of a pentagon or (..., 0)."""
     if kind == "hexagon":
         vertices = cast_like(hexagon(), shape)
-        return _functions(shape).broadcast_to(vertices, (*shape.shape[:-1], 6, 2))
+        return array_functions(shape).broadcast_to(vertices, (*shape.shape[:-1], 6, 2))
     return pentagon(PENTAGONS[kind], shape)
-
-
-_ROUNDING_ERROR = 1e-9
-
-
-def commutant(linear_parts: Array) -> Array:
-    """Return an orthonormal basis (m, 2) of the (a, b) whose [[a, b], [b, -a]] commutes with a group.
-
-    The mean over the group projects on them: R X R^T turns (a, b) as R turns directions, twice as
-    far. The basis is made by Gram-Schmidt in the order a, b, so that it depends only on the group;
-    saved parameters are coordinates in it.
-
-    >>> commutant(np.array([np.eye(2), np.diag([1.0, -1.0])])).tolist()
-    [[1.0, 0.0]]
-    """
-    units = np.array([[[1.0, 0.0], [0.0, -1.0]], [[0.0, 1.0], [1.0, 0.0]]])
-    turned = np.einsum("gij,kjl,gml->kim", linear_parts, units, linear_parts) / len(linear_parts)
-    basis: list[Array] = []
-    for a, b in turned[:, 0]:
-        rest = np.array([a, b])
-        for known in basis:
-            rest = rest - (rest @ known) * known
-        if np.linalg.norm(rest) > _ROUNDING_ERROR:
-            rest = rest / np.linalg.norm(rest)
-            # exact for a group in the frame of its axes
-            near = np.round(rest)
-            basis.append(near if np.abs(rest - near).max() < _ROUNDING_ERROR else rest)
-    return np.array(basis).reshape(-1, 2)
-
-
-def stretch_matrix(basis: Array, parameters: Points) -> Points:
-    """Return unimodular symmetric maps (..., 2, 2) for parameters (..., m) over a basis of `commutant`.
-
-    exp [[a, b], [b, -a]], where (a, b) = parameters @ basis. Differentiable, at zero too.
-    """
-    both = parameters @ cast_like(basis, parameters)
-    a, b = both[..., 0], both[..., 1]
-    cosh, sinhc = _cosh_sinhc(a * a + b * b)
-    rows = [cosh + sinhc * a, sinhc * b, sinhc * b, cosh - sinhc * a]
-    return _functions(parameters).stack(rows, -1).reshape(*parameters.shape[:-1], 2, 2)
-
-
-def _functions(values: Any) -> Any:
-    """Return the library that these values belong to, of which functions of both are used."""
-    if not is_tensor(values):
-        return np
-    import torch
-
-    return torch
-
-
-# of NumPy arrays, rounded as torch rounds them
-_cosh, _sinh = (np.vectorize(f, otypes=[float]) for f in (math.cosh, math.sinh))
-
-
-def _cosh_sinhc(square: Any) -> tuple[Any, Any]:
-    """cosh r and sinh(r) / r as functions of r^2, by their series where the root would hurt."""
-    own = _functions(square)
-    hyperbolic_cosh, hyperbolic_sinh = (own.cosh, own.sinh) if is_tensor(square) else (_cosh, _sinh)
-    small = square < 1e-2
-    root = own.sqrt(own.where(small, own.ones_like(square), square))
-    s = own.where(small, square, own.zeros_like(square))
-    cosh = 1 + s / 2 * (1 + s / 12 * (1 + s / 30 * (1 + s / 56 * (1 + s / 90))))
-    sinhc = 1 + s / 6 * (1 + s / 20 * (1 + s / 42 * (1 + s / 72 * (1 + s / 110))))
-    return (
-        own.where(small, cosh, hyperbolic_cosh(root)),
-        own.where(small, sinhc, hyperbolic_sinh(root) / root),
-    )
 
 
 class PaperOperator(NamedTuple):
@@ -194,33 +139,64 @@ class IsohedralClass:
 
     Every tile of the class is the image of the template (with some shape parameters) under a
     diffeomorphism that commutes with the group, followed by a map of the lattice freedom and a
-    similarity. Paper, section "Escherization"; design points 7 and 8.
+    similarity. Paper, section "Escherization"; design points 7, 8 and 18.
 
     >>> ih4 = isohedral_class("IH4")
     >>> ih4.group_name, ih4.group().order, ih4.template().shape, ih4.stretch_dim, ih4.shape_dim
     ('p2', 2, (6, 2), 2, 0)
+    >>> ih26 = isohedral_class("IH26")
+    >>> ih26.group_name, ih26.stabiliser_name, ih26.symbol
+    ('cmm', 'D1', 'a+a-b+cb- a+b-c')
     """
 
     name: str
-    row: ClassRow
+    row: TypeRow
 
     @property
     def group_name(self) -> str:
         """The wallpaper group, such as "pgg"."""
         return self.row.group
 
+    @property
+    def symbol(self) -> str:
+        """The incidence symbol, after Grünbaum and Shephard."""
+        return self.row.symbol
+
+    @cached_property
+    def has_reflections(self) -> bool:
+        """Whether the group has mirrors or glide reflections."""
+        return any(g.determinant < 0 for g in self._group.cosets)
+
+    @property
+    def stabiliser(self) -> tuple[Isometry, ...]:
+        """The elements of the group that take the template onto itself, the identity first."""
+        return self._incidence.stabiliser
+
+    @property
+    def stabiliser_name(self) -> str:
+        """The symmetry of the class's tiles: "D1" for a mirror, "C2" for a half-turn, "C1" for none."""
+        mirrored = any(g.determinant < 0 for g in self.stabiliser)
+        return f"{'D' if mirrored else 'C'}{len(self.stabiliser) // (1 + mirrored)}"
+
     @cached_property
     def identified_edges(self) -> tuple[EdgeIdentification, ...]:
         """Which edge of the template (edge k from p_k to p_{k+1}) is mapped onto which, and by what."""
-        return tuple(
-            EdgeIdentification(first, second, self._edge_isometry(first, second))
-            for first, second in self.row.edges
-        )
+        return self._edges.identifications
+
+    @cached_property
+    def edge_classes(self) -> tuple[EdgeClass, ...]:
+        """The template's edges, those that are images of each other together."""
+        return edge_classes(self._edges)
+
+    @property
+    def divisor(self) -> int:
+        """A divisor of the number of steps round a tile whose edges of one class have as many each."""
+        return math.gcd(*(len(own.edges) for own in self.edge_classes))
 
     @property
     def shape_dim(self) -> int:
-        """Number of shape parameters of the template: 0 for hexagons, 2 for pentagons."""
-        return 0 if self.row.template == "hexagon" else 2
+        """Number of shape parameters of the template: 2 for the pentagons of the nine, else 0."""
+        return 0
 
     @property
     def stretch_dim(self) -> int:
@@ -240,8 +216,7 @@ class IsohedralClass:
         """
         if shape is None:
             return self._default.copy()
-        own = self._parameters(shape, self.shape_dim, "shape")
-        return template_vertices(self.row.template, own)
+        return self._shaped(self._parameters(shape, self.shape_dim, "shape"))
 
     def stretch(self, parameters: Points) -> Points:
         """Return unimodular maps L (..., 2, 2) that commute with the point group.
@@ -257,48 +232,56 @@ class IsohedralClass:
         return self._group
 
     def paper_operators(self) -> tuple[PaperOperator, ...]:
-        """Return the paper's symmetrization operators, outermost first: V = O_1(O_2(...(F)))."""
-        return tuple(self._operator(row) for row in self.row.operators)
+        """Return the paper's symmetrization operators, outermost first: V = O_1(O_2(...(F))).
 
-    def _edge_isometry(self, first: int, second: int) -> Isometry:
-        """Return the element that takes an edge onto another, and the tile to its other side."""
-        vertices = self._default
-        start, end = vertices[first], vertices[(first + 1) % len(vertices)]
-        ends = vertices[second], vertices[(second + 1) % len(vertices)]
-        for sign, goal, goal_end in ((-1, *ends), (1, *ends[::-1])):
-            for element in self._group.elements_near(goal, 1e-6, source=start):
-                if element.determinant == sign and np.allclose(element(end), goal_end, atol=1e-6):
-                    return element
-        raise RuntimeError(f"{self.name}: no element takes edge {first} onto edge {second}")
+        There are none for other classes than the nine.
+        """
+        return ()
+
+    def facts(self) -> dict[str, str]:
+        """Return what a table says of the class."""
+        elements = symmetry_elements(self._group)
+        orders = sorted({center.order for center in elements.centers})
+        angles = {True: set[int](), False: set[int]()}  # of mirrors, and of glide lines
+        for line in elements.lines:
+            x, y = line.line.direction
+            angles[line.is_mirror].add(round(math.degrees(math.atan2(y, x))) % 180)
+        return {
+            "class": self.name,
+            "group": self.group_name,
+            "tile": self.stabiliser_name,
+            "symbol": self.symbol,
+            "edges": str(len(self._default)),
+            "identified": " ".join(pair.brief for pair in self.identified_edges),
+            "rotations": ", ".join(map(str, orders)) or "-",
+            "mirrors": str(len(angles[True]) or "-"),
+            "glides": str(len(angles[False]) or "-"),
+            "stretch": {0: "none", 1: "one axis", 2: "any"}[self.stretch_dim],
+        }
+
+    @cached_property
+    def _incidence(self) -> IncidenceSymbol:
+        return IncidenceSymbol(self.row.valences, self.row.symbol)
 
     @cached_property
     def _default(self) -> Array:
-        return np.array(template_vertices(self.row.template, np.zeros(self.shape_dim)))
+        return self._incidence.template
 
     @cached_property
     def _group(self) -> CrystallographicGroup:
-        columns = [
-            rotation_matrix(math.radians(vector.degrees)) @ self._point(vector.coefficients)
-            for vector in self.row.lattice
-        ]
-        # another basis of the paper's lattice: with the shortest, |k_i| <= Omega is isotropic
-        basis = reduced_basis(np.stack(columns, axis=1))
-        generators = [operator.isometry for operator in self.paper_operators()]
-        return CrystallographicGroup.generate(basis, generators, name=self.row.group)
+        return self._incidence.group(self.row.group)
+
+    @cached_property
+    def _edges(self) -> Edges:
+        return edges(Tile(self._default, self._group))
 
     @cached_property
     def _freedom(self) -> Array:
         return commutant(self._group.linear_parts)
 
-    def _point(self, coefficients: Coefficients) -> Array:
-        terms = [c * self._default[k] for k, c in coefficients.items()]
-        return np.sum(terms, axis=0) if terms else np.zeros(2)
-
-    def _operator(self, row: OperatorRow) -> PaperOperator:
-        if isinstance(row, RotationRow):
-            return PaperOperator(rotation(self._point(row.center), row.order), row.order)
-        line = Line(self._point(row.point), self._point(row.direction))
-        return PaperOperator(transflection(line, float(np.hypot(*self._point(row.shift)))), 2)
+    def _shaped(self, shape: Any) -> Any:
+        vertices = cast_like(self._default, shape)
+        return array_functions(shape).broadcast_to(vertices, (*shape.shape[:-1], *vertices.shape))
 
     def _parameters(self, values: Any, size: int, what: str) -> Any:
         if not is_tensor(values):
@@ -316,18 +299,101 @@ class IsohedralClass:
         return f"IsohedralClass({self.name}, {self.group_name})"
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class PaperClass(IsohedralClass):
+    """One of the paper's nine classes, with template and operators as the paper gives them."""
+
+    paper: ClassRow
+
+    @cached_property
+    def identified_edges(self) -> tuple[EdgeIdentification, ...]:
+        """Which edge of the template (edge k from p_k to p_{k+1}) is mapped onto which, and by what."""
+        return tuple(
+            EdgeIdentification(first, second, self._edge_isometry(first, second))
+            for first, second in self.paper.edges
+        )
+
+    @cached_property
+    def edge_classes(self) -> tuple[EdgeClass, ...]:
+        """The template's edges, those that are images of each other together."""
+        found: list[EdgeClass] = []
+        for pair in self.identified_edges:
+            image = EdgeImage(pair.second, pair.isometry, pair.reversed)
+            both = ((image,), ()) if pair.folded else ((), (image,))
+            found.append(EdgeClass(pair.first, *both))
+        return tuple(found)
+
+    @property
+    def shape_dim(self) -> int:
+        """Number of shape parameters of the template: 0 for hexagons, 2 for pentagons."""
+        return 0 if self.paper.template == "hexagon" else 2
+
+    @property
+    def stabiliser(self) -> tuple[Isometry, ...]:
+        """The elements of the group that take the template onto itself: the identity."""
+        return (identity(2),)
+
+    def paper_operators(self) -> tuple[PaperOperator, ...]:
+        """Return the paper's symmetrization operators, outermost first: V = O_1(O_2(...(F)))."""
+        return tuple(self._operator(row) for row in self.paper.operators)
+
+    def _edge_isometry(self, first: int, second: int) -> Isometry:
+        """Return the element that takes an edge onto another, and the tile to its other side."""
+        vertices = self._default
+        start, end = vertices[first], vertices[(first + 1) % len(vertices)]
+        ends = vertices[second], vertices[(second + 1) % len(vertices)]
+        for sign, goal, goal_end in ((-1, *ends), (1, *ends[::-1])):
+            for element in self._group.elements_near(goal, 1e-6, source=start):
+                if element.determinant == sign and np.allclose(element(end), goal_end, atol=1e-6):
+                    return element
+        raise RuntimeError(f"{self.name}: no element takes edge {first} onto edge {second}")
+
+    @cached_property
+    def _default(self) -> Array:
+        return np.array(template_vertices(self.paper.template, np.zeros(self.shape_dim)))
+
+    @cached_property
+    def _group(self) -> CrystallographicGroup:
+        columns = [
+            rotation_matrix(math.radians(vector.degrees)) @ self._point(vector.coefficients)
+            for vector in self.paper.lattice
+        ]
+        # another basis of the paper's lattice: with the shortest, |k_i| <= Omega is isotropic
+        basis = reduced_basis(np.stack(columns, axis=1))
+        generators = [operator.isometry for operator in self.paper_operators()]
+        return CrystallographicGroup.generate(basis, generators, name=self.paper.group)
+
+    def _shaped(self, shape: Any) -> Any:
+        return template_vertices(self.paper.template, shape)
+
+    def _point(self, coefficients: Coefficients) -> Array:
+        terms = [c * self._default[k] for k, c in coefficients.items()]
+        return np.sum(terms, axis=0) if terms else np.zeros(2)
+
+    def _operator(self, row: OperatorRow) -> PaperOperator:
+        if isinstance(row, RotationRow):
+            return PaperOperator(rotation(self._point(row.center), row.order), row.order)
+        line = Line(self._point(row.point), self._point(row.direction))
+        return PaperOperator(transflection(line, float(np.hypot(*self._point(row.shift)))), 2)
+
+
 CLASSES: dict[str, IsohedralClass] = {
-    name: IsohedralClass(name, row) for name, row in CLASS_TABLE.items()
+    name: PaperClass(name, TYPE_TABLE[name], row) for name, row in CLASS_TABLE.items()
 }
-"""The nine classes by name."""
+"""The nine classes by name: every shape that tiles isohedrally occurs in one of them."""
+
+ISOHEDRAL_TYPES: dict[str, IsohedralClass] = {
+    name: CLASSES.get(name) or IsohedralClass(name, row) for name, row in TYPE_TABLE.items()
+}
+"""All 81 isohedral types of tilings by polygons, by name; the nine classes are among them."""
 
 
 def isohedral_class(name: str | int | IsohedralClass) -> IsohedralClass:
-    """Return the class called `name`.
+    """Return the class called `name`, one of `ISOHEDRAL_TYPES`.
 
     "IH4", "ih4", "IH04", "4" and 4 are the same; a class is returned as it is.
 
-    Raises `OrbiflowError` for anything but the nine.
+    Raises `OrbiflowError` for anything but the 81.
 
     >>> isohedral_class("ih04")
     IsohedralClass(IH4, p2)
@@ -335,10 +401,16 @@ def isohedral_class(name: str | int | IsohedralClass) -> IsohedralClass:
     if isinstance(name, IsohedralClass):
         return name
     match = re.fullmatch(r"(?:IH[\s_-]?)?0*(\d+)", str(name).strip(), flags=re.IGNORECASE)
-    key = f"IH{match[1]}" if match else ""
-    if key not in CLASSES:
+    number = int(match[1]) if match and len(match[1]) < 3 else 0
+    key = f"IH{number}"
+    if key in ISOHEDRAL_TYPES:
+        return ISOHEDRAL_TYPES[key]
+    if 0 < number <= 93:
         raise OrbiflowError(
-            f"unknown isohedral class {described(name)}; the nine are {', '.join(CLASSES)}: "
-            "every tile shape of an isohedral tiling occurs in one of them"
+            f"{key} is a type of tiles with marks: its outlines are those of another of the 81 types "
+            "of polygons, which `orbiflow classes` lists"
         )
-    return CLASSES[key]
+    raise OrbiflowError(
+        f"unknown isohedral class {described(name)}; there are {', '.join(CLASSES)}, which have every "
+        "shape of tile, and the other types that `orbiflow classes` lists"
+    )

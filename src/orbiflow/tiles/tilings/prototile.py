@@ -4,8 +4,10 @@
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import combinations_with_replacement
 from typing import NamedTuple
 
 import numpy as np
@@ -131,6 +133,27 @@ def stabiliser(group: CrystallographicGroup, ring: Array) -> Stabiliser:
     elements = (Isometry(np.eye(2), np.zeros(2)), *(element for element, _, _ in found))
     orders = (still, *(order for _, order, _ in found))
     return Stabiliser(elements, orders, max((error for _, _, error in found), default=0.0))
+
+
+def free_subgroup(
+    group: CrystallographicGroup, own: Sequence[Isometry]
+) -> CrystallographicGroup | None:
+    """Return a subgroup that takes a tile with these symmetries to each other one in one way only.
+
+    It has the lattice of the group. None if there is no such subgroup.
+
+    >>> from orbiflow.symmetry import Line, identity, reflection, wallpaper_group
+    >>> mirror = reflection(Line([0.0, 0.0], [0.0, 1.0]))
+    >>> free_subgroup(wallpaper_group("p4m"), [identity(2), mirror]).order
+    4
+    """
+    order = group.order // len(own)
+    held = [g @ s @ g.inverse() for g in group.cosets for s in own[1:]]
+    for generators in combinations_with_replacement(group.cosets, 2):
+        found = CrystallographicGroup.generate(group.lattice, generators)
+        if found.order == order and not any(found.contains(element) for element in held):
+            return found
+    return None
 
 
 def _near_center(group: CrystallographicGroup, ring: Array, reach: float) -> list[Isometry]:

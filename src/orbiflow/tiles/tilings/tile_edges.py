@@ -265,6 +265,17 @@ class EdgeClass(NamedTuple):
     images: tuple[EdgeImage, ...]  # the other edges of the class
 
     @property
+    def edges(self) -> list[int]:
+        """The numbers of its edges."""
+        return [self.edge, *(image.edge for image in self.images)]
+
+    @property
+    def turn(self) -> EdgeImage | None:
+        """How the edge is its own image backwards, if it is: by a half-turn rather than a mirror."""
+        back = (fold for fold in self.folds if fold.reversed)
+        return max(back, key=lambda fold: fold.isometry.determinant, default=None)
+
+    @property
     def straight(self) -> bool:
         """Whether the edge lies on a mirror."""
         return any(not fold.reversed for fold in self.folds)
