@@ -2,10 +2,10 @@
 
     python benchmarks/likeness_ablations.py [--quick] [NAME ...]
 
-For each change the mean, over goals and the classes IH4, IH5 and IH6, of the damage of the best tile
-(`orbiflow.likeness.fidelity`: smaller is better; tiles of one silhouette differ by about 4) and of the
-seconds of CPU. Damage is one measure for all, whatever energy the search minimises, taken by as many
-points for all.
+For each change the mean, over goals and the classes IH4, IH5 and IH6, of the mark that is foretold for
+the best tile (`orbiflow.tiles.fidelity`, from 0 to 10; tiles of one silhouette differ by about 1) and
+of the seconds of CPU. The mark is one measure for all, whatever energy the search minimises, taken by
+as many points for all.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from likeness_methods import silhouette
 
 from orbiflow.runtime import one_blas_thread
 from orbiflow.tiles import CLASSES, LikenessSearch, fidelity
-from orbiflow.tiles.likeness.faithful import USUAL_VALUES
 from orbiflow.tiles.search import bending, co_deformation
-from orbiflow.tiles.search.co_deformation import FIRM, SOFT, TIGHTER, drawn_to_tiles, hands
+from orbiflow.tiles.search.co_deformation import BODIES, TIGHTER, drawn_to_tiles, hands
+from orbiflow.tiles.search.likeness_search import ALL_BODIES
 
 NAMES = ("bat_60", "camel_60", "octpus_94", "squirrel1_60")
 KINDS = ("IH4", "IH5", "IH6")
@@ -45,7 +45,7 @@ def springs(stages: int) -> dict[str, Any]:
 
 def stiff(**values: Any) -> dict[str, Any]:
     """Another stiffness of the search."""
-    return {"bending.FIRM": replace(FIRM, **values)}
+    return {"bending.BODIES": {**BODIES, "firm": replace(BODIES["firm"], **values)}}
 
 
 CHANGES: dict[str, Change] = {
@@ -57,8 +57,10 @@ CHANGES: dict[str, Change] = {
     "springs in three stages": (PLAIN, springs(3)),
     "half the points": (replace(PLAIN, multiples=(2,)), {}),
     "half as many more": (replace(PLAIN, multiples=(6,)), {}),
-    "never soft": (PLAIN, {"bending.SOFT": FIRM}),
-    "always soft": (PLAIN, {"bending.FIRM": SOFT}),
+    "never soft": (PLAIN, {"bending.BODIES": {**BODIES, "soft": BODIES["firm"]}}),
+    "always soft": (replace(PLAIN, bodies=("soft",)), {}),
+    "always stiff": (replace(PLAIN, bodies=("stiff",)), {}),
+    "soft, firm and stiff": (replace(PLAIN, bodies=ALL_BODIES), {}),
     "thin parts as stiff": (PLAIN, stiff(salience=0.0)),
     "thin parts stiffer": (PLAIN, stiff(salience=0.5)),
     "thin parts softer still": (PLAIN, stiff(salience=-1.0)),
@@ -84,27 +86,25 @@ def changed(values: dict[str, Any]) -> Iterator[None]:
             setattr(*places[name], value)
 
 
-def damage(bent: bending.Bent) -> float:
-    """Of a tile, by as many points whatever it was bent with; the cost, of another energy, left out."""
+def mark(bent: bending.Bent) -> float:
+    """Return the foretold mark of a tile, by as many points whatever it was bent with."""
     body, few = bent.hand.fine, 2 * len(bent.hand.samples.coarse)
     every = slice(0, body.size, body.size // few)
-    return fidelity(
-        body.rest[: body.size][every], bent.points[: body.size][every], USUAL_VALUES[-1]
-    ).damage
+    return fidelity(body.rest[: body.size][every], bent.points[: body.size][every], 0.0).mark
 
 
 def measured(names: Sequence[str], change: Change) -> tuple[float, float]:
-    """Mean damage and seconds of CPU."""
+    """Return the mean mark and seconds of CPU."""
     settings, values = change
-    damages = []
+    marks = []
     began = time.process_time()
     with changed(values), one_blas_thread():
         for name in names:
             both = hands(silhouette(name), settings)
             for kind in KINDS:
                 found, _ = bending.bent_tiles(both, CLASSES[kind], settings)
-                damages.append(damage(found[0]) if found else np.nan)
-    return float(np.nanmean(damages)), (time.process_time() - began) / len(damages)
+                marks.append(mark(found[0]) if found else np.nan)
+    return float(np.nanmean(marks)), (time.process_time() - began) / len(marks)
 
 
 def main() -> None:
@@ -116,10 +116,10 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="one goal")
     options = parser.parse_args()
     names: Sequence[str] = options.names or (NAMES[1:2] if options.quick else NAMES)
-    print(f"{', '.join(names)}; {', '.join(KINDS)}\n{'':28}damage  CPU s a class")
+    print(f"{', '.join(names)}; {', '.join(KINDS)}\n{'':28}  mark  CPU s a class")
     for label, change in CHANGES.items():
-        damage, seconds = measured(names, change)
-        print(f"{label:28}{damage:6.2f}{seconds:9.2f}", flush=True)
+        mean, seconds = measured(names, change)
+        print(f"{label:28}{mean:6.2f}{seconds:9.2f}", flush=True)
 
 
 if __name__ == "__main__":

@@ -35,12 +35,6 @@ if TYPE_CHECKING:
     from orbiflow.tiles.search import SearchResult
     from orbiflow.tiles.tile import EscherTile
 
-POOR = (
-    "even the first tile hardly looks like it; another pose, fewer or thicker limbs, all nine classes "
-    "or more effort may do better"
-)
-"""Said where nothing that was found looks like the silhouette."""
-
 
 class TileChoice(Settings):
     """Which tile of a result is taken."""
@@ -161,10 +155,13 @@ def _figures(tile: EscherTile) -> dict[str, str]:
 
 def _closing(out: Path, written: bool, result: SearchResult, seconds: float) -> list[Note]:
     """What was written, or why nothing was; and the silhouette's doubts again, if they explain it."""
+    from orbiflow.tiles.search import why_poor
     from orbiflow.tiles.silhouette import doubts, is_hopeless
 
     explains = not result.tiles or is_hopeless(result.target)
     again = [Note(text, warning=True) for text in doubts(result.target)] if explains else []
+    if poor := why_poor(result.tiles[0]) if result.tiles else "":
+        again = [Note(poor), *again]
     if written and result.tiles:
         where = f"look at {out / 'overview.png'} first, or open {out / 'index.html'}"
         return [Note(f"written to {out} in {seconds:.0f} s; {where}"), *again]
@@ -186,8 +183,6 @@ def _remarks(result: SearchResult) -> list[str]:
         )
     for name in sorted(result.interrupted & {tile.isohedral_class for tile in tiles}):
         remarks.append(f"{name} has its first tile only: its search was interrupted")
-    if tiles and tiles[0].rating and tiles[0].rating.word == "poor":
-        remarks.append(POOR)
     return remarks
 
 

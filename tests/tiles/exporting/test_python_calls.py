@@ -19,6 +19,7 @@ from orbiflow.tiles import (
     ClassFailure,
     EscherTile,
     ExportSettings,
+    Fidelity,
     LikenessSearch,
     SearchResult,
     Tile,
@@ -28,6 +29,7 @@ from orbiflow.tiles import (
     escherize_class,
     export,
     read_result,
+    save_tiles,
     with_map,
 )
 from orbiflow.tiles import write_run as write_folder
@@ -197,3 +199,27 @@ def test_a_notebook_shows_exports_and_artwork(tmp_path: Path, found: EscherTile)
     done = export(found, tmp_path / "a.svg", ExportSettings(tile_size=30, area=(90, 60)))
     assert Image.open(io.BytesIO(done._repr_png_())).size == (600, 400)
     assert Image.open(io.BytesIO(artwork(found, SMALL)._repr_png_())).size == (90, 60)
+
+
+def test_scores_and_stars_of_version_0_1_are_read_as_they_were(tmp_path: Path) -> None:
+    """Its measures were others, so its scores stay; what is computed from the new ones is not known."""
+    run = write_run(tmp_path / "run", "IH5", model=False)
+    document = json.loads((run / "result.json").read_text("utf-8"))
+    kept = {"pieces": [0.1, 0.2, 0.1], "notches": 0.2, "narrowed": 0.1, "cost": 0.3, "necks": 0.0}
+    (entry,) = document["tiles"]
+    entry["metrics"] = {"fidelity": kept}
+    entry |= {"score": 0.37, "rating": {"stars": 3.5, "word": "good"}}
+    (run / "result.json").write_text(json.dumps(document))
+    found = read_result(run)
+    assert (found.fidelity, found.score, str(found.rating)) == (None, 0.37, "★★★½")
+    again = read_result(save_tiles([found], tmp_path / "again"))
+    assert (again.fidelity, again.score, again.rating) == (None, 0.37, found.rating)
+    # measures of this version are read; half of them are refused
+    kept = {"pieces": [0.1, 0.2], "stretched": 0.2, "thickness": 0.1, "cost": 0.3, "length": 6.0}
+    entry["metrics"] = {"fidelity": kept}
+    (run / "result.json").write_text(json.dumps(document))
+    assert read_result(run).fidelity == Fidelity((0.1, 0.2), 0.2, 0.1, 0.3, 6.0)
+    del kept["length"]
+    (run / "result.json").write_text(json.dumps(document))
+    with pytest.raises(InputFileError, match=r"tile 1 cannot be read: .*length"):
+        read_result(run)

@@ -1,6 +1,9 @@
-"""Fidelity: blind to motions and scale, strict on notches, threads and lost parts."""
+"""Fidelity: blind to motions and scale, strict on notches, threads and lost parts; marks and scores."""
 
 from __future__ import annotations
+
+import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from orbiflow.tiles import complex_points, fidelity, resampled
+from orbiflow.tiles import Fidelity, Rating, complex_points, fidelity, plane_points, resampled
+from orbiflow.tiles.likeness import least_neck, narrowest_neck, neck_factor
+from orbiflow.tiles.likeness.faithful import GOOD_MARK
 from outlines import animal, limb
 
 SQUIRREL = complex_points(resampled(animal("squirrel.dat").normal, 240))
@@ -18,8 +23,8 @@ SQUIRREL = complex_points(resampled(animal("squirrel.dat").normal, 240))
 def test_motions_and_scale_cost_nothing(scale: float, turn: float, shift: complex) -> None:
     found = fidelity(SQUIRREL, scale * np.exp(1j * turn) * SQUIRREL + shift, 0.0)
     assert found.score > 0.999
-    assert max(found.pieces) < 1e-5
-    assert found.necks == 0
+    assert max(*found.pieces, found.stretched, found.thickness) < 1e-5
+    assert found.lost == []
 
 
 @given(st.integers(0, 239))
@@ -43,18 +48,67 @@ def test_a_bent_bar_is_better_than_a_notched_and_a_pinched_one() -> None:
     pinched = rest - 0.38j * dent * (rest.imag > 0.3)
     scores = [fidelity(rest, shape, 0.1).score for shape in (bent, notched, pinched)]
     assert scores == sorted(scores, reverse=True)
-    assert fidelity(rest, notched, 0.1).notches > 3 * fidelity(rest, bent, 0.1).notches
-    assert fidelity(rest, pinched, 0.1).necks > 0 == fidelity(rest, bent, 0.1).necks
+    bowed, cut, thread = (fidelity(rest, shape, 0.1) for shape in (bent, notched, pinched))
+    assert bowed.lost == []
+    assert cut.stretched > 3 * bowed.stretched
+    assert thread.stretched > cut.stretched
+    assert min(cut.thickness, thread.thickness) > 3 * bowed.thickness
+    # that it is a mere thread counts, too, whatever is lost
+    necks = [narrowest_neck(plane_points(shape)).share for shape in (rest, pinched)]
+    assert neck_factor(necks[1], least_neck(plane_points(rest), 0.01)) < 0.5
+    assert necks[1] < 0.05 < necks[0]
 
 
 def test_a_lost_limb_costs_more_than_a_bent_one() -> None:
     bent, lost = (fidelity(limb(), shape, 0.1) for shape in (limb(0.3), limb(length=0.05)))
     assert lost.score < bent.score
-    assert lost.pieces[1] > bent.pieces[1]
+    assert lost.pieces[0] > bent.pieces[0]
+    assert lost.stretched > 10 * bent.stretched
+    assert "some parts have shrunk while others have grown" in lost.lost
 
 
-@given(st.floats(0, 3), st.floats(0.01, 3))
-def test_what_costs_more_scores_less(cost: float, more: float) -> None:
-    cheap, dear = (fidelity(SQUIRREL, SQUIRREL, value) for value in (cost, cost + more))
-    assert dear.damage > cheap.damage
-    assert dear.score < cheap.score
+@st.composite
+def measured(draw: st.DrawFn) -> Fidelity:
+    """Any values."""
+    short, long, stretched, thickness = (draw(st.floats(0, 2)) for _ in range(4))
+    return Fidelity((short, long), stretched, thickness, 0.2, draw(st.floats(3, 15)))
+
+
+@given(measured(), st.integers(0, 3), st.floats(0.01, 3))
+def test_whatever_is_lost_lowers_the_mark(kept: Fidelity, which: int, more: float) -> None:
+    values = [*kept.pieces, kept.stretched, kept.thickness]
+    values[which] += more
+    worse = replace(kept, pieces=(values[0], values[1]), stretched=values[2], thickness=values[3])
+    assert worse.mark < kept.mark
+    assert worse.score <= kept.score
+    assert worse.losses[which] > kept.losses[which]
+
+
+@given(measured(), st.floats(0, 9), st.floats(0, 9))
+def test_a_long_outline_forgives_more_and_the_cost_counts_for_nothing(
+    kept: Fidelity, cost: float, longer: float
+) -> None:
+    other = replace(kept, cost=cost, length=kept.length + longer)
+    assert other.mark >= kept.mark
+    # within the lengths that were marked
+    assert other.mark - kept.mark <= 2 * math.log(10.9 / 4.2) + 1e-9
+
+
+@given(measured())
+def test_a_score_is_a_probability_that_the_stars_know(kept: Fidelity) -> None:
+    assert 0 <= kept.score <= 1
+    if 1e-8 < kept.score < 1 - 1e-8:
+        apart = Rating.of_likeness(kept.score).stars - Rating.of_mark(kept.mark).stars
+        assert abs(apart) <= 0.5  # halves may be rounded otherwise
+        middle = Rating.of_likeness(0.5)
+        assert (kept.score > 0.5) == (kept.mark > GOOD_MARK)
+        assert (Rating.of_likeness(kept.score).stars >= middle.stars) or kept.score < 0.5
+
+
+def test_what_is_lost_is_named_the_worst_first() -> None:
+    kept = Fidelity((0.4, 0.05), 0.01, 0.9, 0.2, 6.0)
+    assert kept.lost == [
+        "small parts such as ears and feet have lost their shapes",
+        "limbs or body have become thinner or thicker",
+    ]
+    assert replace(kept, thickness=0.1).lost == kept.lost[:1]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import LikenessSearch, Target, resampled, ring_length
-from orbiflow.tiles.search.co_deformation import FIRM, hands
+from orbiflow.tiles.search.co_deformation import BODIES, hands
 from orbiflow.tiles.silhouette import sampled
 from orbiflow.tiles.silhouette.outlines import (
     CORNER_DEPTH,
@@ -116,6 +116,6 @@ def test_hairs_give_bodies_or_a_reason(ring: Array) -> None:
         both, said = (), str(error)
     assert not said or "too thin" in said or "too ragged" in said
     for hand in both:
-        for points, body in zip(hand.samples, hand.bodies(FIRM), strict=True):
+        for points, body in zip(hand.samples, hand.bodies(BODIES["firm"]), strict=True):
             assert shapely.Polygon(points).is_valid
             assert body.size == len(points)

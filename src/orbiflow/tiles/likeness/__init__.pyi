@@ -29,7 +29,6 @@ from .own_symmetry import near_symmetry as near_symmetry
 from .ranking import MOST_STARS as MOST_STARS
 from .ranking import Rating as Rating
 from .ranking import diverse as diverse
-from .ranking import likeness_ratings as likeness_ratings
 from .ranking import mutual_iou as mutual_iou
 from .ranking import rank_score as rank_score
 from .recognition import Recognisability as Recognisability

@@ -1,18 +1,15 @@
 """How faithful a bent outline is to its silhouette, as people judge it, point by point.
 
-People's judgement of bent silhouettes depends on six measures, most of them independent of the pose
-(docs/likeness.md has the evidence); a seventh avoids threads that no cutter can make:
+The mark that people would give is foretold from four measures, none of which depends on the pose
+(docs/likeness.md has the evidence):
 
-- `pieces`: how well pieces of the outline are kept, each compared after its own best motion
-  (Procrustes; Gower, 1975), by the mean of the roots: a few pieces may be lost, the rest should be
-  exact. Small pieces show corners and toes, middle ones limbs and heads, large ones the whole. The
-  weight of a piece is the root of the body's thickness there, larger for a head than for a leg.
-- `notches`: where the space outside has become narrower: slits, notches and folds that the
-  silhouette does not have. The width is that of the largest disc outside that touches the outline
-  (the outer medial axis; found as by Ma, Bae and Choi, 3D medial axis point approximation, 2012).
-- `narrowed`: the same inside: limbs and bodies that have become thin.
-- `cost`: the cost of bending (`Elastic.cost`): energy, and displacement from the pose.
-- `necks`: how much narrower than half the inside has become at its worst place: threads.
+- `pieces`: how well short and long pieces of the outline are kept, each compared after its own best
+  motion (Procrustes; Gower, 1975), by the mean of the roots: a few pieces may be lost, the rest should
+  be exact. Short pieces show corners and limbs, long ones a head with its neck, or two legs. The weight
+  of a piece is the root of the body's thickness there, larger for a head than for a leg.
+- `stretched`: how unevenly the outline is stretched: shrunken limbs, and bodies that have grown.
+- `thickness`: where limbs and bodies have become thin or fat, by the largest disc inside that touches
+  the outline (the medial axis; found as by Ma, Bae and Choi, 3D medial axis point approximation, 2012).
 
 Outlines correspond point by point: this compares a shape with the one that was bent into it.
 """
@@ -32,48 +29,72 @@ from orbiflow.tiles.likeness.elastic import Elastic
 from orbiflow.tiles.likeness.metrics import Overlap, as_region, best_overlay
 from orbiflow.tiles.silhouette import sampled
 
-PIECE_LENGTHS = (0.04, 0.15, 0.4)  # the lengths of the pieces, as shares of the outline
+PIECE_LENGTHS = (0.08, 0.25)  # the lengths of the pieces, as shares of the outline
 # the offset of widths, in square roots of the area, below which differences matter little
 WIDTH_OFFSET = 0.02
-# the values of three pieces, `notches`, `narrowed` and `cost` in a tile of medium likeness
-USUAL_VALUES = (0.12, 0.16, 0.13, 0.3, 0.037, 0.25)
-# the weights of their logarithms, the inverse of how much these vary over a silhouette's tiles
-WEIGHTS = (6.5, 6.5, 6.5, 2.6, 2.3, 6.5)
-NEGLIGIBLE_SHARE = 0.3  # the share of the usual values below which differences matter little
+LARGEST_STRETCH = 2.0  # the largest logarithm of a stretch that counts
+# Values of two pieces, `stretched` and `thickness`: those below which differences matter little, those
+# of a tile of medium likeness, and the marks that a unit of their logarithms costs
+NEGLIGIBLE = (0.05, 0.05, 0.02, 0.02)
+USUAL_VALUES = (0.137, 0.12, 0.021, 0.105)
+WEIGHTS = (1.5, 1.9, 0.3, 0.5)
+# Rough outlines forgive more: marks for the logarithm of the outline's length, and lengths, in square
+# roots of the area: the usual one, and the extremes of those that were marked
+LENGTH_WEIGHT, USUAL_LENGTH, LENGTHS = 2.0, 6.5, (4.2, 10.9)
+USUAL_MARK = 5.9  # of a tile with usual values and of usual length
+# The foretold mark at which half of the people find a tile good, 6.5 or more, and how fast their log
+# odds grow with it
+GOOD_MARK, STEEPNESS = 6.1, 1.9
+# What has happened where each of the measures costs marks
+LOST = (
+    "small parts such as ears and feet have lost their shapes",
+    "heads and limbs are bent",
+    "some parts have shrunk while others have grown",
+    "limbs or body have become thinner or thicker",
+)
 
 
 @dataclass(frozen=True)
 class Fidelity:
     """How much of an outline is kept in its bending. Values are from 0; smaller is better.
 
-    - `pieces`: The misfits of pieces of three lengths, small to large.
-    - `notches`, `narrowed`, `necks`, `cost`: See the module.
+    - `pieces`: The misfits of pieces of two lengths, short and long.
+    - `stretched`: The mean square of the logarithm of the outline's stretch.
+    - `thickness`: The mean square of the logarithm by which the inside became thinner or thicker.
+    - `cost`: The cost of bending (`Elastic.cost`). It has no part in the mark.
+    - `length`: The length of the silhouette's outline, in square roots of its area.
     """
 
-    pieces: tuple[float, float, float]
-    notches: float
-    narrowed: float
-    necks: float
+    pieces: tuple[float, float]
+    stretched: float
+    thickness: float
     cost: float
+    length: float
 
     @property
-    def damage(self) -> float:
-        """The overall damage, about 0 for a tile of medium likeness; smaller is better.
+    def losses(self) -> tuple[float, ...]:
+        """The marks lost by the two pieces, `stretched` and `thickness`; below 0, better than usual."""
+        values = (*self.pieces, self.stretched, self.thickness)
+        parts = zip(WEIGHTS, values, USUAL_VALUES, NEGLIGIBLE, strict=True)
+        return tuple(w * math.log((least + x) / (least + usual)) for w, x, usual, least in parts)
 
-        `necks` plus the weighted logarithms of the other values, relative to usual ones.
-        """
-        values = (*self.pieces, self.notches, self.narrowed, self.cost)
-        relative = [value / usual for value, usual in zip(values, USUAL_VALUES, strict=True)]
-        parts = np.log((NEGLIGIBLE_SHARE + np.array(relative)) / (NEGLIGIBLE_SHARE + 1))
-        return self.necks + float(np.dot(WEIGHTS, parts))
+    @property
+    def lost(self) -> list[str]:
+        """What is worse than usual, in words: at most two things, the worst first."""
+        worst = sorted(zip(self.losses, LOST, strict=True), reverse=True)[:2]
+        return [words for loss, words in worst if loss > 0]
+
+    @property
+    def mark(self) -> float:
+        """The mark that people would give on a scale from 0 to 10, not cut at its ends."""
+        length = min(max(self.length, LENGTHS[0]), LENGTHS[1])
+        easier = LENGTH_WEIGHT * math.log(length / USUAL_LENGTH)
+        return USUAL_MARK + easier - sum(self.losses)
 
     @property
     def score(self) -> float:
-        """The score 1 / (1 + exp(damage / 4)), larger is better.
-
-        It is 0.5 for a tile of medium likeness and 1 for no change.
-        """
-        return 1 / (1 + math.exp(min(self.damage / 4, 700.0)))
+        """How probably people call it a good likeness, 0 to 1: a mark of 6.5 or more."""
+        return 1 / (1 + math.exp(min(STEEPNESS * (GOOD_MARK - self.mark), 700.0)))
 
 
 def fidelity(rest: Complex, bent: Complex, cost: float) -> Fidelity:
@@ -82,25 +103,25 @@ def fidelity(rest: Complex, bent: Complex, cost: float) -> Fidelity:
     Outlines (n,) x + iy are counter-clockwise and nearly evenly spaced, and their points correspond.
 
     >>> square = np.array([0, 1, 2, 2 + 1j, 2 + 2j, 1 + 2j, 2j, 1j])
-    >>> fidelity(square, 3 * square * 1j + 7, 0.0).score > 0.999
+    >>> fidelity(square, 3 * square * 1j + 7, 0.0).score > 0.99
     True
     """
     rest, bent = (z / np.sqrt(abs(signed_area(plane_points(z)))) for z in (rest, bent))
-    weight = abs(np.roll(rest, -1) - rest)
-    weight /= weight.sum()
-    outside = np.log(_clearance(rest) / _clearance(bent))
-    thick = _clearance(rest, inside=True)
-    inside = np.log(thick / _clearance(bent, inside=True))
-    small, middle, large = (
+    sides, now = abs(np.roll(rest, -1) - rest), abs(np.roll(bent, -1) - bent)
+    stretch = np.log(np.maximum(now, 1e-9) / np.maximum(sides, 1e-9))
+    weight = (sides + np.roll(sides, 1)) / (2 * sides.sum())
+    thick = _clearance(rest)
+    thinner = np.log(thick / _clearance(bent))
+    short, long = (
         float(np.average(np.sqrt(_misfits(rest, bent, length)), weights=np.sqrt(thick)))
         for length in PIECE_LENGTHS
     )
     return Fidelity(
-        (small, middle, large),
-        float((weight * np.maximum(outside, 0) ** 2).sum()),
-        float((weight * np.maximum(inside, 0) ** 2).sum()),
-        max(0.0, float(inside.max()) - math.log(2.0)),
+        (short, long),
+        float(np.minimum(stretch**2, LARGEST_STRETCH**2) @ weight),
+        float(weight @ thinner**2),
         cost,
+        float(sides.sum()),
     )
 
 
@@ -116,9 +137,9 @@ def _misfits(rest: Complex, bent: Complex, length: float) -> Array:
     return np.maximum(1 - 2 * common / sizes, 0.0)
 
 
-def _clearance(z: Complex, *, inside: bool = False) -> Array:
-    """Return the radius (n,) of the largest disc outside that touches each point, at most 1."""
-    z = z[::-1] if inside else z
+def _clearance(z: Complex) -> Array:
+    """Return the radius (n,) of the largest disc inside that touches each point, at most 1."""
+    z = z[::-1]
     n = len(z)
     along = np.roll(z, -1) - np.roll(z, 1)
     inward = 1j * along / np.maximum(abs(along), 1e-300)
@@ -131,7 +152,7 @@ def _clearance(z: Complex, *, inside: bool = False) -> Array:
         radius[own, (own + near) % n] = np.inf
     least = np.minimum(radius.min(axis=1), 1.0)
     smooth = (np.roll(least, 1) + 2 * least + np.roll(least, -1)) / 4 + WIDTH_OFFSET
-    return smooth[::-1] if inside else smooth
+    return smooth[::-1]
 
 
 TURNS = 24  # number of rotations tried for each orientation; the best `REFINED_TURNS` are refined

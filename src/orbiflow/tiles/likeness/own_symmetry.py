@@ -19,11 +19,11 @@ from orbiflow.tiles.silhouette import sampled
 PAIRINGS = 12  # mirrors that are tried, by how well the directions of the outline agree
 SPRINGS = tuple(np.geomspace(1.2, 3000.0, 9))  # strengths, stage by stage
 ROUNDS = 3  # steps in each stage
-NEAR = 0.75  # the score from which a silhouette is near to symmetric; docs/likeness.md has examples
+NEAR = 0.52  # the score from which a silhouette is near to symmetric; docs/likeness.md has examples
 
 
 class NearSymmetry(NamedTuple):
-    """Scores of a silhouette bent into a symmetric shape, 0 to 1: their fidelity times their IoU."""
+    """Scores of a silhouette bent into a symmetric shape, times its IoU with the silhouette, 0 to 1."""
 
     mirror: float
     half_turn: float

@@ -1,10 +1,4 @@
-"""The score by which tiles are listed, short lists without repeats, and stars.
-
-Scores order a silhouette's tiles, but the same score means more for a spider than for a fish. So a
-tile's mark is foretold, as judges gave it who saw a silhouette's tiles side by side: from the score of
-the run's best tile, from how far a tile falls behind it, and from how long the silhouette's outline is.
-docs/likeness.md has the evidence.
-"""
+"""The score by which overlaps are listed, short lists without repeats, and stars."""
 
 from __future__ import annotations
 
@@ -21,17 +15,15 @@ from orbiflow.arguments import as_array, as_number, as_whole
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import centroid, complex_points, orient, signed_area
+from orbiflow.tiles.likeness.faithful import GOOD_MARK, STEEPNESS
 from orbiflow.tiles.likeness.metrics import Overlap, best_overlay
 
 WORDS = {4.5: "excellent", 3.5: "good", 2.5: "fair", 1.0: "poor"}
 """The words, each with the least number of stars that has it."""
 
 MOST_STARS = 5
-LOWEST_MARK, HIGHEST_MARK = 1.5, 8.5  # the extremes that judges gave: one star, and five
-# Marks for the best score's log odds, for each unit of these that a tile falls behind it, and for the
-# logarithm of the outline's length in square roots of the area
-BEST_WEIGHT, BEHIND_WEIGHT, LENGTH_WEIGHT = 0.6, 1.4, 3.0
-SHORTEST, LONGEST = 5.8, 13.1  # lengths that were marked: rougher outlines look no better
+LOWEST_MARK, HIGHEST_MARK = 3.0, 8.5  # one star, and five
+OVERLAP_MARKS = (12.5, -4.8)  # the mark of a tile for overlap, foretold as a line in its score
 
 
 @dataclass(frozen=True)
@@ -57,6 +49,26 @@ class Rating:
         share = (mark - LOWEST_MARK) / (HIGHEST_MARK - LOWEST_MARK)
         return cls(max(1.0, min(5.0, round(2 * (1 + 4 * share)) / 2)))
 
+    @classmethod
+    def of_likeness(cls, score: float) -> Rating:
+        """Return the rating of a tile by its score after a search for likeness.
+
+        >>> [str(Rating.of_likeness(score)) for score in (0.9, 0.5, 0.1)]
+        ['★★★★', '★★★½', '★★½']
+        """
+        likely = min(max(score, 1e-9), 1 - 1e-9)
+        return cls.of_mark(GOOD_MARK + math.log(likely / (1 - likely)) / STEEPNESS)
+
+    @classmethod
+    def of_overlap(cls, score: float) -> Rating:
+        """Return the rating of a tile by its `rank_score`.
+
+        >>> [str(Rating.of_overlap(score)) for score in (0.9, 0.8, 0.7)]
+        ['★★★½', '★★½', '★★']
+        """
+        slope, base = OVERLAP_MARKS
+        return cls.of_mark(slope * score + base)
+
     @property
     def word(self) -> str:
         """The same in a word: excellent, good, fair or poor."""
@@ -64,21 +76,6 @@ class Rating:
 
     def __str__(self) -> str:
         return "★" * int(self.stars) + "½" * (self.stars % 1 > 0)
-
-
-def likeness_ratings(scores: Sequence[float], length: float) -> list[Rating]:
-    """Return the ratings of a run's tiles by their scores after a search for likeness.
-
-    A larger score never has fewer stars. `length` is that of the silhouette's outline, in square roots
-    of its area.
-
-    >>> [str(found) for found in likeness_ratings([0.18, 0.08, 0.03], length=11)]
-    ['★★★½', '★★★', '★★']
-    """
-    odds = [math.log(s / (1 - s)) for s in (min(max(s, 1e-9), 1 - 1e-9) for s in scores)]
-    best = max(odds, default=0.0)
-    top = LENGTH_WEIGHT * math.log(min(max(length, SHORTEST), LONGEST)) + BEST_WEIGHT * best
-    return [Rating.of_mark(top - BEHIND_WEIGHT * (best - own)) for own in odds]
 
 
 IOU_WEIGHT = 0.25

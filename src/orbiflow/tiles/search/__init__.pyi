@@ -12,6 +12,7 @@ from .escherizing import fit_tile as fit_tile
 from .escherizing import report as report
 from .finished_tiles import ClassFailure as ClassFailure
 from .finished_tiles import certified_tiles as certified_tiles
+from .finished_tiles import why_poor as why_poor
 from .likeness_search import LikenessSearch as LikenessSearch
 from .occupancy import OccupancySamples as OccupancySamples
 from .occupancy import fit_occupancy as fit_occupancy

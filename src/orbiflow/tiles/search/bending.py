@@ -28,8 +28,7 @@ from orbiflow.tiles.likeness import (
 )
 from orbiflow.tiles.search.candidates import Fit, OnProgress, Prototiles, StillTiles, silent
 from orbiflow.tiles.search.co_deformation import (
-    FIRM,
-    SOFT,
+    BODIES,
     Drawn,
     Hand,
     drawn_to_tiles,
@@ -81,13 +80,14 @@ def bent_tiles(
     dropped = done = 0
     sides = both[:1] if template_symmetries(kind)[1] else both
     searches = settings.searches(wanted, symmetric=len(kind.stabiliser) > 1)
-    tasks = [(hand, own) for own in searches for hand in sides]
-    work = sum(own.starts for _, own in tasks)
-    for hand, own in tasks:
-        sound, crossed = _finalists(hand, FIRM, kind, own, cancel)
-        if 2 * len(sound) < own.finalists:
+    tasks = [(hand, own, body) for own in searches for body in own.bodies for hand in sides]
+    never_soft = all("soft" not in own.bodies for own in searches)
+    work = sum(own.starts for _, own, _ in tasks)
+    for hand, own, body in tasks:
+        sound, crossed = _finalists(hand, BODIES[body], kind, own, cancel)
+        if never_soft and 2 * len(sound) < own.finalists:
             progress(0.9 * (done + 0.5 * own.starts) / work, math.nan)
-            more, also = _finalists(hand, SOFT, kind, own, cancel)
+            more, also = _finalists(hand, BODIES["soft"], kind, own, cancel)
             sound, crossed = sound + more, crossed + also
         found, dropped, done = found + sound, dropped + crossed, done + own.starts
         progress(0.9 * done / work, math.nan)

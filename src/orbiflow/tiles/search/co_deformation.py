@@ -106,11 +106,14 @@ class _Reduced:
         return self.real @ self.parameters + 1j * (self.imaginary @ self.parameters)
 
 
-# Of the search: bodies and heads are stiff; thin parts are not, and keep their places. Tiles bent so
-# are seen to be more like the silhouette: docs/likeness.md has the comparison.
-FIRM = Stiffness(salience=-0.5, pose=60.0)
-# Of the search where too few tiles of a firm body are simple: many long limbs, which cross
-SOFT = Stiffness(salience=0.0)
+# Thin parts of a soft body are as stiff as others, and it may leave its pose: long limbs find a way
+# where those of firmer bodies cross. In firmer ones bodies and heads are stiff, thin parts are not, and
+# all keep their places, the more the stiffer. docs/likeness.md has the comparison.
+BODIES = {
+    "soft": Stiffness(salience=0.0),
+    "firm": Stiffness(salience=-0.5, pose=60.0),
+    "stiff": Stiffness(salience=-0.5, pose=600.0),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,7 +264,7 @@ def _neighbours(
     options = Placements(lengths, starts, own.turns[owners], own.gains[owners])
     if share >= 1 or not len(owners):
         return owners, options
-    apart = TileSpace(kind, options).nearest(drawn.points[: body.size, owners].T).distance
+    apart = TileSpace(kind, options).distances(drawn.points[: body.size, owners].T)
     order = np.lexsort((apart, owners))
     rank = np.arange(len(order)) - np.searchsorted(owners[order], owners[order])
     count = np.bincount(owners, minlength=len(drawn.costs))[owners[order]]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -15,16 +14,7 @@ from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import one_blas_thread, one_thread
-from orbiflow.tiles.geometry import ring_length, signed_area
-from orbiflow.tiles.likeness import (
-    Pinned,
-    Rating,
-    Recogniser,
-    compare,
-    iou,
-    likeness_ratings,
-    narrowest_neck,
-)
+from orbiflow.tiles.likeness import Pinned, Rating, Recogniser, compare, iou, narrowest_neck
 from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
 from orbiflow.tiles.search.candidates import Fit, StillTiles
@@ -122,14 +112,33 @@ def rated(tiles: Sequence[EscherTile], target: Target) -> list[EscherTile]:
     """Return the tiles of a run with their ratings, in the same order."""
     if is_hopeless(target):
         return [tile.changed(rating=Rating(1)) for tile in tiles]
-    length = ring_length(target.outline) / math.sqrt(abs(signed_area(target.outline)))
-    likeness = [tile.score for tile in tiles if tile.fidelity is not None]
-    found = iter(likeness_ratings(likeness, length))
     return [
-        # no marks of tiles for overlap are kept: their scores are taken for marks
-        tile.changed(rating=next(found) if tile.fidelity else Rating.of_mark(10 * tile.score - 1))
+        tile.changed(
+            rating=(Rating.of_likeness if tile.fidelity else Rating.of_overlap)(tile.score)
+        )
         for tile in tiles
     ]
+
+
+FEW_PEOPLE = 0.4  # the score below which a run is told what makes its best likeness poor
+LONG_OUTLINE = 8.5  # in square roots of the area: that of long thin limbs, such as a spider's
+
+
+def why_poor(best: EscherTile) -> str:
+    """Return why few people would find a run's best tile good, and what to try; "" if many would."""
+    kept = best.fidelity
+    share = best.score if kept else 1.0
+    if share >= FEW_PEOPLE and not (best.rating and best.rating.word == "poor"):
+        return ""
+    long = kept is not None and kept.length > LONG_OUTLINE
+    reasons = ["a tile fills the empty space around long thin limbs"] * long
+    reasons += kept.lost if kept else []
+    because = f", because {' and because '.join(reasons[:2])}" if reasons else ""
+    change = "thicker or shorter limbs" if long else "another pose, fewer or thicker limbs"
+    return (
+        f"few people would call the first tile a good likeness{because}; {change} or more effort may "
+        "do better"
+    )
 
 
 def certified_tiles(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from math import lcm
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.settings import Range, Settings
@@ -18,11 +18,30 @@ from orbiflow.tiles.tilings import IsohedralClass
 if TYPE_CHECKING:
     from orbiflow.tiles.search.co_deformation import Hand
 
+Body = Literal["soft", "firm", "stiff"]
+ALL_BODIES: tuple[Body, ...] = ("soft", "firm", "stiff")
+
 # Settings of the preview
 SKETCH = {"placements": 60, "held": 6, "starts": 1, "share": 0.1, "finalists": 1, "rounds": 10}
 
-FAST = {"placements": 80, "held": 20, "starts": 8, "share": 0.15, "finalists": 2, "rounds": 12}
-BEST = {"placements": 1500, "held": 300, "starts": 128, "share": 1.0, "finalists": 12, "rounds": 40}
+FAST = {
+    "placements": 80,
+    "held": 10,
+    "starts": 4,
+    "share": 0.15,
+    "finalists": 2,
+    "rounds": 10,
+    "bodies": ALL_BODIES,
+}
+BEST = {
+    "placements": 800,
+    "held": 160,
+    "starts": 64,
+    "share": 0.6,
+    "finalists": 8,
+    "rounds": 40,
+    "bodies": ALL_BODIES,
+}
 HALVED = ("placements", "held", "starts")  # in a search for symmetric tiles
 
 
@@ -36,6 +55,7 @@ class LikenessSearch(Settings, SearchMethod):
     - `finalists`: of what comes of it, the best that are worked out with all of the outline's detail,
       a class and hand.
     - `rounds`: steps of the minimisation for finalists.
+    - `bodies`: how stiff the silhouette is, from soft to stiff; each is searched.
     - `below`: levels of effort below that are searched, too, so that more effort never finds less.
     - `multiples`: points of a tile for each point of the search, the first that holds the corners.
     - `min_neck`: width of necks below which a tile's score falls, in square roots of the area; if
@@ -53,12 +73,13 @@ class LikenessSearch(Settings, SearchMethod):
         "best": {**BEST, "below": 2},
     }
 
-    placements: Count = 300
-    held: Count = 80
-    starts: Count = 32
-    share: Annotated[float, Range(above=0, most=1)] = 0.3
-    finalists: Count = 5
+    placements: Count = 200
+    held: Count = 36
+    starts: Count = 14
+    share: Annotated[float, Range(above=0, most=1)] = 0.2
+    finalists: Count = 4
     rounds: Count = 20
+    bodies: tuple[Body, ...] = ("firm", "stiff")
     below: Annotated[int, Range(0, 2)] = 0
     multiples: tuple[Count, ...] = (4, 6)
     min_neck: Annotated[float, Range(0, 0.2)] = 0.01
@@ -103,9 +124,9 @@ class LikenessSearch(Settings, SearchMethod):
         which have half the freedom, half as much is tried, and level "fast" alone if nothing is above.
 
         >>> [own.starts for own in LikenessSearch.for_effort("best").searches()]
-        [8, 32, 128]
+        [4, 14, 64]
         >>> [own.starts for own in LikenessSearch.for_effort("best").searches(symmetric=True)]
-        [16, 64]
+        [7, 32]
         """
         normal = {name: getattr(LikenessSearch, name) for name in FAST}
         found: list[LikenessSearch] = []

@@ -17,6 +17,7 @@ Points are complex numbers x + iy throughout.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -163,6 +164,15 @@ class NearestTiles(NamedTuple):
         return self._make(part[index] for part in self)
 
 
+class _Fit(NamedTuple):
+    """How offset and linear part move vertices, orbits' means and residuals; the solution's matrix."""
+
+    columns: Complex
+    means: Complex
+    basis: Complex
+    solve: Complex
+
+
 class TileSpace:
     """The tiles of C placements of one class, all of n steps."""
 
@@ -191,16 +201,22 @@ class TileSpace:
         # the group's linear parts in the placed frame
         self._factor: Complex = np.where(orbits.flips, orbits.factor * unit**2, orbits.factor)
         self._mirror: Complex = orbits.mirror * unit**2
-        self._columns = _columns(self.kind, orbits, self._factor, self._mirror, unit)
-        pulled = _unturn(self._factor, orbits.flips, self._columns)
-        self._means = self._orbit_means(pulled)
-        self._basis = self._residual(pulled, self._means)
-        adjoint = np.swapaxes(np.conj(self._basis), 1, 2)
-        matrix = np.real(adjoint @ self._basis)
+        self.__dict__.pop("_fit", None)
+
+    @cached_property
+    def _fit(self) -> _Fit:
+        """What a least squares fit needs: made when it is first asked for, as turns may change."""
+        unit, orbits = np.exp(1j * self.turns)[:, None], self._orbits
+        columns = _columns(self.kind, orbits, self._factor, self._mirror, unit)
+        pulled = _unturn(self._factor, orbits.flips, columns)
+        means = self._orbit_means(pulled)
+        basis = self._residual(pulled, means)
+        adjoint = np.swapaxes(np.conj(basis), 1, 2)
+        matrix = np.real(adjoint @ basis)
         # IH1 does not care about the offset: the least solution
         size = matrix.shape[-1]
         ridge = 1e-10 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(size)
-        self._solve: Complex = np.linalg.inv(matrix + ridge) @ adjoint
+        return _Fit(columns, means, basis, np.linalg.inv(matrix + ridge) @ adjoint)
 
     def best_turns(self, outlines: Complex) -> Array:
         """(C,) directions of the glide axes that suit the outlines (C, n) best; 0 without glides."""
@@ -224,16 +240,11 @@ class TileSpace:
 
     def nearest(self, outlines: Complex) -> NearestTiles:
         """The tile of each placement that is nearest to its own outline (C, n)."""
-        orbits = self._orbits
-        goal = np.take_along_axis(outlines, self.order, axis=1)[..., None]
-        pulled = _unturn(self._factor, orbits.flips, goal)
-        means = self._orbit_means(pulled)
-        rest = self._residual(pulled, means)
-        solution: Array = np.real(self._solve @ rest)[..., 0]
-        left = rest[..., 0] - (self._basis @ solution[..., None])[..., 0]
-        free = means[..., 0] - (self._means @ solution[..., None])[..., 0]
+        orbits, (columns, images, *_) = self._orbits, self._fit
+        means, solution, left = self._fitted(outlines)
+        free = means[..., 0] - (images @ solution[..., None])[..., 0]
         image = _turn(self._factor, orbits.flips, np.take_along_axis(free, orbits.source, axis=1))
-        moved = (self._columns @ solution[..., None])[..., 0]
+        moved = (columns @ solution[..., None])[..., 0]
         vertices = np.where(orbits.fixed, 0, image) + moved
         return NearestTiles(
             vertices,
@@ -242,6 +253,19 @@ class TileSpace:
             self.corners,
             (abs(left) ** 2).sum(axis=1),
         )
+
+    def distances(self, outlines: Complex) -> Array:
+        """`distance` (C,) of the nearest tiles."""
+        return (abs(self._fitted(outlines)[2]) ** 2).sum(axis=1)
+
+    def _fitted(self, outlines: Complex) -> tuple[Complex, Array, Complex]:
+        """Means over orbits, parameters (C, m) of the nearest tile, and what is left of the outline."""
+        goal = np.take_along_axis(outlines, self.order, axis=1)[..., None]
+        pulled = _unturn(self._factor, self._orbits.flips, goal)
+        means = self._orbit_means(pulled)
+        rest = self._residual(pulled, means)
+        solution: Array = np.real(self._fit.solve @ rest)[..., 0]
+        return means, solution, rest[..., 0] - (self._fit.basis @ solution[..., None])[..., 0]
 
     def in_order(self, vertices: Complex) -> Complex:
         """Vertices (C, n), as of tiles, in the order of the outline's points."""
@@ -259,7 +283,7 @@ class TileSpace:
         position = np.zeros(n, dtype=np.int64)
         width = np.where(mirror[free] == 0, 2, 1)
         position[free] = np.cumsum(width) - width
-        columns, count = self._columns[index], int(width.sum())
+        columns, count = self._fit.columns[index], int(width.sum())
         whole: Complex = np.zeros((n, count + columns.shape[1]), dtype=complex)
         v = np.flatnonzero(~fixed)
         factor, flips, on_line = self._factor[index, v], orbits.flips[index, v], mirror[v] != 0
@@ -274,7 +298,7 @@ class TileSpace:
 
     def group(self, index: int, parameters: Array) -> tuple[Array, Array]:
         """Linear part (2, 2) and offset (2,) of the map from the group's frame, from `matrices`."""
-        own = parameters[-self._columns.shape[2] :][None]
+        own = parameters[-self._fit.columns.shape[2] :][None]
         return _linear(self.kind, own[:, 2:], self.turns[[index]])[0], own[0, :2]
 
     def _residual(self, pulled: Complex, means: Complex) -> Complex:

@@ -1,0 +1,92 @@
+"""A run says what makes its best likeness poor, in the terminal and on the page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orbiflow.runtime import Event, Note, Table
+from orbiflow.symmetry import wallpaper_group
+from orbiflow.tiles import (
+    EscherTile,
+    Fidelity,
+    Rating,
+    SearchResult,
+    Target,
+    Tile,
+    index_page,
+    pages,
+    search,
+)
+from orbiflow.tiles.likeness import Recognisability, compare
+from orbiflow.tiles.operations import escherize
+from orbiflow.tiles.search import why_poor
+
+TARGET = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])
+SAME, KNOWN = compare(TARGET.outline, TARGET.outline), Recognisability(1.0, 1.0, 1.0, 1.0)
+GOOD = Fidelity((0.08, 0.07), 0.01, 0.05, 0.2, 6.0)
+STRETCHED = Fidelity((0.1, 0.1), 0.9, 0.9, 0.9, 6.0)
+LEGS = Fidelity((0.6, 0.5), 0.02, 0.1, 0.9, 9.0)
+
+
+def tile(kept: Fidelity | None = None, **changes: Any) -> EscherTile:
+    own = Tile(TARGET.outline, wallpaper_group("p1"), "IH1")
+    return EscherTile(own, fidelity=kept, metrics=SAME, recognisability=KNOWN, **changes)
+
+
+def test_what_is_good_needs_no_words() -> None:
+    assert why_poor(tile(GOOD)) == ""
+    assert why_poor(tile(known_score=0.1)) == ""  # nothing is known of it
+    assert why_poor(tile(known_score=0.9, rating=Rating(3))) == ""
+
+
+def test_what_was_lost_is_said_and_what_to_try() -> None:
+    words = why_poor(tile(STRETCHED))
+    assert "some parts have shrunk while others have grown" in words
+    assert "limbs or body have become thinner or thicker" in words
+    assert "long thin limbs" not in words
+    assert "another pose" in words
+
+
+def test_long_thin_limbs_are_a_reason_of_their_own() -> None:
+    words = why_poor(tile(LEGS))
+    assert "good likeness, because a tile fills the empty space around long thin limbs " in words
+    assert "and because heads and limbs are bent; thicker or shorter limbs" in words
+
+
+def test_where_nothing_is_measured_it_is_still_said() -> None:
+    words = why_poor(tile(known_score=0.2, rating=Rating(2)))
+    assert words.startswith("few people would call the first tile a good likeness; another pose")
+
+
+def test_a_neck_that_is_too_thin_may_make_a_good_tile_poor() -> None:
+    share = tile(GOOD).score
+    assert share > 0.8
+    assert why_poor(tile(GOOD, known_score=share / 4)).startswith("few people")
+
+
+@pytest.mark.parametrize("kept", [GOOD, STRETCHED])
+def test_it_is_said_on_the_page(kept: Fidelity) -> None:
+    page = index_page([tile(kept)], TARGET, ["IH1"])
+    assert ("Few people would call the first tile a good likeness, because " in page) == (
+        kept is not GOOD
+    )
+
+
+@pytest.mark.parametrize("kept", [GOOD, STRETCHED])
+def test_it_is_said_after_the_table(
+    kept: Fidelity, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = SearchResult(TARGET, [tile(kept)])
+    monkeypatch.setattr(search, "escherize", lambda *_args, **_settings: found)
+    monkeypatch.setattr(pages, "write_run", lambda *_args, **_settings: True)
+    image, told = tmp_path / "boot.json", list[Event]()
+    image.write_text(str(np.round(TARGET.outline, 2).tolist()))
+    escherize(image, tmp_path / "out", on_event=told.append)
+    table = next(k for k, event in enumerate(told) if isinstance(event, Table))
+    after = [event.text for event in told[table:] if isinstance(event, Note)]
+    assert any(text == why_poor(tile(STRETCHED)) for text in after) == (kept is STRETCHED)
+    assert not any("good likeness" in str(event) for event in told[:table])
