@@ -14,6 +14,7 @@ from orbiflow.tiles import faithfulness, plane_points
 from orbiflow.tiles.likeness import bending_onto, faithful
 from outlines import animal, bent_squirrel, limb
 
+ALL_STARTS = bending_onto.STARTS
 SQUIRREL = np.asarray(animal("squirrel.dat").normal)
 
 
@@ -42,11 +43,14 @@ def test_a_mirror_image_may_be_asked_to_count() -> None:
 
 
 @pytest.mark.parametrize("name", ["IH1", "IH4", "IH6", "IH28"])
-def test_a_tile_is_judged_as_by_the_points_that_it_was_bent_by(name: str) -> None:
+def test_a_tile_is_judged_as_by_the_points_that_it_was_bent_by(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bending_onto, "STARTS", ALL_STARTS)
     case = bent_squirrel(name, False)
     known = case.bent.fidelity
     found = faithfulness(SQUIRREL, case.tile.polygon)
-    assert known.mark - 0.65 < found.mark < known.mark + 0.5  # points may lie better, or worse
+    assert known.mark - 0.5 < found.mark < known.mark + 0.5  # points may lie better, or worse
 
 
 def test_a_lost_limb_costs_more_than_a_bent_one() -> None:

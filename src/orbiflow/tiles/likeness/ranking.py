@@ -64,7 +64,7 @@ class Rating:
         """Return the rating of a tile by its `rank_score`.
 
         >>> [str(Rating.of_overlap(score)) for score in (0.9, 0.8, 0.7)]
-        ['★★★½', '★★½', '★★']
+        ['★★★½', '★★½', '★½']
         """
         slope, base = OVERLAP_MARKS
         return cls.of_mark(slope * score + base)
