@@ -109,7 +109,7 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     "wide kerf": (["--cut", "pieces", "--kerf", "5cm"], "wider than the piece's neck"),
     "many copies": (["--cut", "pieces", "--copies", "999"], "sheets are needed"),
     "no copies": (["--cut", "pieces", "--copies", "0"], "--copies ... at least 1"),
-    "class": (["--tile", "IH9"], "unknown isohedral class 'IH9'"),
+    "class": (["--tile", "IH99"], "unknown isohedral class 'IH99'"),
     "class not there": (["--tile", "IH1"], "holds no tile of IH1; there are IH6, IH4, IH6"),
     "rank": (["--tile", "4"], "no tile of rank 4; there are 1 to 3"),
     "rank 0": (["--tile", "0"], "no tile of rank 0"),

@@ -106,7 +106,7 @@ def test_bad_inputs(case: str, tmp_path: Path, orbiflow) -> None:
 
 
 BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
-    "class": (["--classes", "IH4,IH8"], "unknown isohedral class 'IH8'"),
+    "class": (["--classes", "IH4,IH98"], "unknown isohedral class 'IH98'"),
     "no class": (["--classes", " , "], "--classes must be classes such as IH4"),
     "frequency -1": (
         ["--objective", "overlap", "--max-frequency", "-1"],

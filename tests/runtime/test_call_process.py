@@ -63,14 +63,14 @@ def test_cancelling_keeps_the_order_and_ends_the_process(workers: int, tmp_path:
 
 
 def test_a_mistake_is_the_last_event(tmp_path: Path) -> None:
-    call = likeness_call(tmp_path, "IH8")
+    call = likeness_call(tmp_path, "IH94")
     with CallProcess(call) as process:
         events = list(process.events())
         assert process.wait() == 1
     check_order(events)
     assert isinstance(events[-1], Failed)
     assert events[-1].failure == "mistake"
-    assert "unknown isohedral class 'IH8'" in events[-1].message
+    assert "unknown isohedral class 'IH94'" in events[-1].message
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")

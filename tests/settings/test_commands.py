@@ -33,7 +33,7 @@ LINES: dict[str, tuple[str, dict[str, Any]]] = {
     "off": ("export X --whole", {"clip": False}),
     "size": ("export X --bed 3x2cm", {"bed": [30.0, 20.0]}),
     "repeated": ("escherize X --pin 1,2 --pin=-3,4,5", {"pin": ["1,2", "-3,4,5"]}),
-    "all": ("escherize X --classes all", {"classes": None}),
+    "all": ("escherize X --classes all", {"classes": ["all"]}),
     "commas": ("escherize X --classes IH4,IH6", {"classes": ["IH4", "IH6"]}),
     "negative": ("escherize X --pin -1,2", {"pin": ["-1,2"]}),
     "group": ("density fit X --space torus --columns a,b", {"columns": ["a", "b"]}),

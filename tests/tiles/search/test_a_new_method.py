@@ -23,7 +23,7 @@ from orbiflow.tiles import (
     report,
 )
 from orbiflow.tiles.search import BothSearch, Goal, SearchMethod
-from orbiflow.tiles.search.candidates import WAVES, OnProgress, StillTiles
+from orbiflow.tiles.search.candidates import OnProgress, StillTiles, waves
 from orbiflow.tiles.search.starts import template_starts
 from orbiflow.tiles.tilings import IsohedralClass
 from outlines import searched
@@ -98,7 +98,7 @@ def test_what_it_does_not_take_is_refused() -> None:
 @pytest.mark.parametrize("name", CLASSES)
 def test_tiles_that_no_flow_moves_are_those_of_a_flow_of_zero(name: str) -> None:
     kind = CLASSES[name]
-    assert WAVES[name] == FourierField(kind.group(), 1).size
+    assert waves(kind.group()) == FourierField(kind.group(), 1).size
     still = StillTiles(kind, template_starts(kind, turns=3, stretch=0.2))
     for index in (0, still.size - 1):
         tile, own = still.finished(index)

@@ -251,7 +251,7 @@ BAD_FILES: dict[str, tuple[Callable[[], bytes], str]] = {
     "settings a list": (with_metadata({FORMAT: "[1, 2]"}), "not a tile model saved by orbiflow"),
     "settings empty": (with_metadata({FORMAT: "{}"}), "settings"),
     "settings nested": (with_metadata({FORMAT: NESTED}), "not a tile model saved"),
-    "unknown class": (with_settings(**{"class": "IH8"}), "unknown isohedral class 'IH8'"),
+    "unknown class": (with_settings(**{"class": "IH94"}), "unknown isohedral class 'IH94'"),
     "class a number": (with_settings(**{"class": 1e300}), "unknown isohedral class"),
     "other class": (with_settings(**{"class": "IH28"}), "shape"),
     "frequency huge": (with_settings(max_frequency=10**30), "from 0 to 60, got 1000"),
