@@ -16,7 +16,7 @@ SAID = (
     r"there and back: \de-(0[4-9]|1\d)\n",
     r"step 0: no two atoms nearer than 0\.15\nstep 100: no two atoms nearer than 0\.[45]\d\n",
     r"the same patches: \de-1\d nats apart\nintegral: (1\.000\d|0\.999\d)\n\[\[.*\]\]\n",
-    r"IH\d+ True 0\.[89]\d?\n\(\d+, 2\) gap \de-1\d\n",
+    r"IH\d+ True 0\.[789]\d?\n\(\d+, 2\) gap \de-1\d\n",
     r"True a loss of one's own was lowered from -0\.369\d to -1\.[67]\d* in \d+ steps.*\n",
     # the first cheats; the second is the same at eight times as many steps
     r"1 steps: [5-9]\.\d\d nats\n8 steps: -\d+\.\d\d nats\nintegral \S+e\+\d\d\n"

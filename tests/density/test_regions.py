@@ -296,7 +296,7 @@ TORUS = kernels_about(make_space("torus"), [[0.0, 0.0]], [4.0], [1.0])
         (lambda: DensityLevels(TORUS, smooth=1e-5), "smooth must be at least 0.00032"),
         (lambda: DensityLevels(TORUS).above(math.inf), "level"),
         (lambda: highest_density_region(TORUS, 0.5).contains([[1.0, 2.0, 3.0]]), "2 angles"),
-        (lambda: to_geojson(outlines(*both())), "not for the angles of a torus"),
+        (lambda: to_geojson(outlines(*both())), "not for points of the torus"),
     ],
 )
 def test_mistakes(call: Any, message: str) -> None:

@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from awkward import NOT_SIMPLE, USELESS
@@ -105,6 +105,7 @@ def test_similar_shapes_are_alike(name: str, turn: float, scale: float, x: float
 @settings(max_examples=15)
 @given(st.floats(0.002, 0.009), st.floats(0.1, 1.5))
 def test_hairs_are_counted_by_length(width: float, length: float) -> None:
+    assume(abs(2 * length + 0.3 - 5 * 0.31) > 0.02)  # the least length of a slit
     ring = comb(4, width, 0.3, length)
     expected = 4 * (2 * length + width) / ring_length(ring)
     # a disc in the back does not reach where the outer teeth's sides go on

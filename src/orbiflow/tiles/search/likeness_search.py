@@ -74,8 +74,8 @@ class LikenessSearch(Settings, SearchMethod):
     }
 
     placements: Count = 200
-    held: Count = 36
-    starts: Count = 14
+    held: Count = 32
+    starts: Count = 12
     share: Annotated[float, Range(above=0, most=1)] = 0.2
     finalists: Count = 4
     rounds: Count = 20
@@ -124,9 +124,9 @@ class LikenessSearch(Settings, SearchMethod):
         which have half the freedom, half as much is tried, and level "fast" alone if nothing is above.
 
         >>> [own.starts for own in LikenessSearch.for_effort("best").searches()]
-        [4, 14, 64]
+        [4, 12, 64]
         >>> [own.starts for own in LikenessSearch.for_effort("best").searches(symmetric=True)]
-        [7, 32]
+        [6, 32]
         """
         normal = {name: getattr(LikenessSearch, name) for name in FAST}
         found: list[LikenessSearch] = []
