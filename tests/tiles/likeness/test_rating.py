@@ -83,7 +83,8 @@ class Marked(NamedTuple):
 
 
 def _kept(values: dict[str, Any]) -> Fidelity:
-    names = (field.name for field in fields(Fidelity))
+    # the tiles that were marked are of the nine classes, none of which is `symmetric`
+    names = {field.name for field in fields(Fidelity)} - {"symmetric"}
     return Fidelity(**{name: values[name] for name in names})
 
 
