@@ -188,7 +188,7 @@ def main() -> None:
     )
     commands = parser.add_subparsers(required=True)
     maker = commands.add_parser("make", help="write sheets and key")
-    maker.add_argument("names", nargs="*", help="goals or PhyloPic families; default the nine")
+    maker.add_argument("names", nargs="*", help="silhouettes by name; default the nine goals")
     maker.add_argument("--out", type=Path, default=Path("out/blind"))
     maker.add_argument("--seed", type=int, default=0)
     maker.add_argument("--rounds", type=int, default=3)

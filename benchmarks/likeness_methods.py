@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import DATA, LikenessTile, Ring, aligned, goal, likeness_tiles, needed
+from common import DATA, ROOT, LikenessTile, Ring, aligned, goal, likeness_tiles, needed
 from PIL import Image, ImageDraw
 
 from orbiflow.tiles import OverlapSearch, Target, centroid, escherize, signed_area
@@ -52,8 +52,14 @@ def kept(
     ]
 
 
+SHAPES = ROOT / "benchmarks" / "data" / "likeness_shapes.json"
+
+
 def silhouette(name: str) -> Target:
-    """A goal or, by its family's name, one of the twenty PhyloPic silhouettes."""
+    """A goal, an icon of likeness_shapes.json or, by its family's name, one of PhyloPic's twenty."""
+    shape = json.loads(SHAPES.read_text())["silhouettes"].get(name)
+    if shape and shape["source"].startswith("@iconify"):
+        return Target.from_polygon(shape["outline"])
     if name.rpartition("_")[2].isdigit():
         return goal(name)
     folder = needed(DATA / "silhouettes" / "phylopic", "the twenty PhyloPic silhouettes")
@@ -104,12 +110,22 @@ def _first(
         tiles = kept(folder, name, effort, lambda: likeness_tiles(target, effort))
         return aligned(tiles[0].ring, outline, TRIES).tolist() if tiles else []
     if method in BASELINES:
-        path = DATA / "silhouettes" / "baseline_tiles" / f"{name}.json"
-        tiles = json.loads(path.read_text())[BASELINES[method]] if path.exists() else []
-        return aligned(np.array(tiles[0]["tile"]), outline, TRIES).tolist() if tiles else []
+        tile = baseline(name).get(method)
+        return aligned(np.array(tile["tile"]), outline, TRIES).tolist() if tile else []
     path = DATA / "silhouettes" / "trial_tiles.json"
     trial = json.loads(path.read_text()) if path.exists() else {}
     return aligned(np.array(trial[name]), outline, TRIES).tolist() if name in trial else []
+
+
+def baseline(name: str) -> dict[str, dict[str, Any]]:
+    """The first tiles of EST and ARAP, by method, where they are at hand."""
+    icons = DATA / "silhouettes" / "icons" / "baselines.json"
+    goals = DATA / "silhouettes" / "baseline_tiles" / f"{name}.json"
+    if goals.exists():
+        tiles = json.loads(goals.read_text())
+        return {method: tiles[key][0] for method, key in BASELINES.items()}
+    known = json.loads(icons.read_text()) if icons.exists() else {}
+    return known.get(name.removesuffix("_80"), {})
 
 
 def _document(folder: Path | None, name: str, make: Callable[[], Any]) -> Any:

@@ -35,8 +35,8 @@ from typing import Any
 import numpy as np
 import shapely
 import torch
-from common import DATA, Ring
-from likeness_methods import BASELINES, cell, common_unit
+from common import Ring
+from likeness_methods import baseline, cell, common_unit
 from likeness_shapes import silhouettes
 from PIL import Image, ImageDraw, ImageFont
 
@@ -222,14 +222,7 @@ def overlap_candidates(target: Target) -> Iterator[Candidate]:
 
 def other_candidates(name: str, target: Target) -> Iterator[Candidate]:
     """Yield the first tiles of EST and ARAP, where they are at hand."""
-    icons = DATA / "silhouettes" / "icons" / "baselines.json"
-    goals = DATA / "silhouettes" / "baseline_tiles" / f"{name}.json"
-    known = json.loads(icons.read_text()) if icons.exists() else {}
-    found = known.get(name.removesuffix("_80"), {})
-    if goals.exists():
-        tiles = json.loads(goals.read_text())
-        found = {method: tiles[key][0] for method, key in BASELINES.items()}
-    for method, tile in found.items():
+    for method, tile in baseline(name).items():
         yield Candidate(method, tile["ih"], 0.0, laid(np.array(tile["tile"]), target))
 
 
