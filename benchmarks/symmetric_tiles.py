@@ -33,7 +33,7 @@ NAGATA, ICONS = BUNDLED / "nagata", DATA / "silhouettes" / "icons"
 PHYLOPIC = DATA / "silhouettes" / "phylopic"
 FILES = (
     NAGATA / "bat_60.dat",
-    NAGATA / "penguin_60.dat",
+    PHYLOPIC / "Platysternidae.svg",
     ICONS / "turtle_80.dat",
     ICONS / "bat_80.dat",
     PHYLOPIC / "Hipposideridae.svg",

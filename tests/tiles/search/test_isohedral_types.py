@@ -44,7 +44,7 @@ from strategies import seeds
 MARKED = (19, 35, 48, 60, 63, 65, 70, 75, 80, 87, 89, 92)
 SYMMETRIC = [name for name, kind in ISOHEDRAL_TYPES.items() if len(kind.stabiliser) > 1]
 PER_EDGE = 4
-NEAR = {"bat_60": "D1", "penguin_60": "D1", "camel_60": "C1", "spider_120": "C1"}
+NEAR = {"bat_60": "D1", "penguin_60": "C1", "camel_60": "C1", "spider_120": "C1"}
 
 
 def random_tile(kind: IsohedralClass, seed: int, size: float = 0.03) -> Tile:
