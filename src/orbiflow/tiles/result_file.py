@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.arguments import as_path
+from orbiflow.arguments import as_path, described
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import ResultFolder, is_list, is_object, make_folder, read_json, write_atomic
@@ -22,7 +22,7 @@ from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import ISOHEDRAL_TYPES, Tile, isohedral_class
 
 RESULT, TILE_MODEL = "result.json", "model.safetensors"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2  # 1 is read, too
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".gif", ".svg", ".pdf")
 MOST_NAMED = 5  # runs that a message names
 
@@ -113,6 +113,12 @@ def read_document(path: str | Path) -> tuple[Path, dict[str, Any]]:
         if file.name == RESULT:
             raise
         raise InputFileError(f"{error}; if it is a silhouette, {first}") from error
+    layout = document.get("schema_version", SCHEMA_VERSION)
+    if layout not in range(1, SCHEMA_VERSION + 1):
+        raise InputFileError(
+            f"{file}: schema_version must be 1 to {SCHEMA_VERSION}, got {described(layout)}; if a "
+            "newer orbiflow wrote the file, update this one"
+        )
     return file, document
 
 

@@ -207,6 +207,7 @@ def test_scores_and_stars_of_version_0_1_are_read_as_they_were(tmp_path: Path) -
     document = json.loads((run / "result.json").read_text("utf-8"))
     kept = {"pieces": [0.1, 0.2, 0.1], "notches": 0.2, "narrowed": 0.1, "cost": 0.3, "necks": 0.0}
     (entry,) = document["tiles"]
+    document["schema_version"] = 1
     entry["metrics"] = {"fidelity": kept}
     entry |= {"score": 0.37, "rating": {"stars": 3.5, "word": "good"}}
     (run / "result.json").write_text(json.dumps(document))
@@ -214,6 +215,7 @@ def test_scores_and_stars_of_version_0_1_are_read_as_they_were(tmp_path: Path) -
     assert (found.fidelity, found.score, str(found.rating)) == (None, 0.37, "★★★½")
     again = read_result(save_tiles([found], tmp_path / "again"))
     assert (again.fidelity, again.score, again.rating) == (None, 0.37, found.rating)
+    assert json.loads((tmp_path / "again" / "result.json").read_text())["schema_version"] == 2
     # measures of this version are read; half of them are refused
     kept = {"pieces": [0.1, 0.2], "stretched": 0.2, "thickness": 0.1, "cost": 0.3, "length": 6.0}
     entry["metrics"] = {"fidelity": kept}
@@ -222,4 +224,13 @@ def test_scores_and_stars_of_version_0_1_are_read_as_they_were(tmp_path: Path) -
     del kept["length"]
     (run / "result.json").write_text(json.dumps(document))
     with pytest.raises(InputFileError, match=r"tile 1 cannot be read: .*length"):
+        read_result(run)
+
+
+@pytest.mark.parametrize("version", [0, 3, None, "2"])
+def test_results_of_unknown_layouts_are_refused(tmp_path: Path, version: object) -> None:
+    run = write_run(tmp_path / "run", "IH5", model=False)
+    document = json.loads((run / "result.json").read_text("utf-8"))
+    (run / "result.json").write_text(json.dumps({**document, "schema_version": version}))
+    with pytest.raises(InputFileError, match=rf"1 to 2, got {version!r}; .*update this one"):
         read_result(run)
