@@ -74,7 +74,7 @@ BODIES = {
     "soft": SEARCHED["soft"],
     "firm": SEARCHED["firm"],
     "firm-600": SEARCHED["stiff"],
-    "firm-6000": replace(SEARCHED["stiff"], pose=6000.0),
+    "firm-6000": SEARCHED["rigid"],
 }
 """Bodies by their pull to the pose, which is 3, 60, 600 and 6,000."""
 

@@ -157,6 +157,21 @@ def test_more_rounds_cost_no_more() -> None:
     assert SMALL.rounds < 40
 
 
+def test_judged_finalists_have_better_marks_and_are_no_twins() -> None:
+    few = replace(SMALL, placements=40, held=12, starts=8, finalists=3, bodies=("firm",))
+    judged = replace(few, judged=True)
+    found = [bent_tiles(squirrel_hands()[:1], CLASSES["IH4"], own)[0] for own in (few, judged)]
+    plain, best = (max(bent.fidelity.mark for bent in tiles) for tiles in found)
+    assert best > plain + 0.05
+    assert len(found[1]) > 1
+
+
+def test_symmetric_tiles_are_searched_at_lower_efforts_too() -> None:
+    """Tiles that the soft body of effort fast finds: effort normal, without it, found less."""
+    searches = LikenessSearch.for_effort("normal").searches(symmetric=True)
+    assert searches[:1] == LikenessSearch.for_effort("fast").searches(symmetric=True)
+
+
 @pytest.mark.parametrize("name", ["IH5", "IH21"])
 def test_more_effort_never_scores_less(name: str) -> None:
     fast, normal = (LikenessSearch.for_effort(effort) for effort in ("fast", "normal"))

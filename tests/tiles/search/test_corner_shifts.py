@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from orbiflow.runtime import Cancel, Cancelled
 from orbiflow.tiles import CLASSES, complex_points, plane_points, resampled, signed_area
-from orbiflow.tiles.likeness import Elastic
-from orbiflow.tiles.search.co_deformation import _moves, shifted
+from orbiflow.tiles.likeness import Elastic, fidelity
+from orbiflow.tiles.search.co_deformation import CROSSED, _moves, shifted
 from orbiflow.tiles.search.tile_space import Placements, TileSpace, best_placements
 from outlines import animal
 from strategies import seeds
@@ -86,6 +86,19 @@ def test_no_placement_becomes_worse(name: str, share: float) -> None:
     assert (gone.placements.lengths.sum(axis=1) == BODY.size).all()
     corners = np.column_stack([gone.placements.lengths, gone.placements.starts])
     assert len(np.unique(corners, axis=0)) == len(corners)
+
+
+@pytest.mark.parametrize("name", ["IH4", "IH6"])
+def test_what_is_judged_moves_to_better_marks(name: str) -> None:
+    kind = CLASSES[name]
+    own = (BODY, kind, best_placements(kind, complex_points(RING), 6), at_rest(BODY, 6))
+    stay = shifted(*own, [], share=0.3, judged=True)
+    gone = shifted(*own, [(2, 6), (1, 6)], share=0.3, judged=True)
+    sound = gone.costs < CROSSED
+    marks = [fidelity(BODY.rest[: BODY.size], z[: BODY.size], 0.0).mark for z in gone.points.T]
+    assert np.allclose(np.log(gone.costs[sound]), -np.array(marks)[sound])
+    assert (np.diff(gone.costs) >= 0).all()
+    assert gone.costs[0] < 0.99 * stay.costs[0]
 
 
 def test_it_can_be_cancelled() -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from orbiflow.arrays import Array, Complex
+from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.errors import CertificationError
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles.geometry import best_similarity, plane_points, signed_area
@@ -124,8 +125,11 @@ def _best_placements(
     share = settings.share
     if middle is not fine:
         placements, points = _finer(coarse, middle, placements, points)
-        stages = [(2, settings.starts), (1, 2 * settings.finalists)]
-        drawn = shifted(middle, kind, placements, points, stages, share=share, cancel=cancel)
+        if settings.judged:
+            drawn = _judged(middle, kind, placements, points, settings, cancel)
+        else:
+            stages = [(2, settings.starts), (1, 2 * settings.finalists)]
+            drawn = shifted(middle, kind, placements, points, stages, share=share, cancel=cancel)
         drawn = drawn.take(np.arange(min(len(drawn.costs), settings.finalists)))
         placements, points = _finer(middle, fine, drawn.placements, drawn.points)
         stages = [(1, settings.finalists)]
@@ -133,6 +137,27 @@ def _best_placements(
         placements, points = _finer(coarse, fine, placements, points)
         stages = [(4, settings.starts), (2, 2 * settings.finalists), (1, settings.finalists)]
     return shifted(fine, kind, placements, points, stages, share=share, cancel=cancel)
+
+
+def _judged(
+    body: Elastic,
+    kind: IsohedralClass,
+    placements: Placements,
+    points: Complex,
+    settings: LikenessSearch,
+    cancel: Cancel,
+) -> Drawn:
+    """Placements of the best marks, without twins.
+
+    Corners move as long as bending costs less, and those of the best marks as long as these rise.
+    """
+    moved = partial(shifted, body, kind, share=settings.share, cancel=cancel)
+    drawn, many = moved(placements, points, [(2, settings.starts)]), 2 * settings.finalists
+    for stages in ([], [(2, many), (1, many)]):
+        drawn = moved(drawn.placements, drawn.points, stages, judged=True)
+        outlines = drawn.points[: body.size].T
+        drawn = drawn.take(_unlike_outlines(outlines, range(len(outlines)), many))
+    return drawn
 
 
 def _best_coarse(
@@ -148,12 +173,7 @@ def _best_coarse(
     tiles = held_on_tiles(body, TileSpace(kind, picked), z[:, chosen], FIRST_ROUNDS)
     costs, sound = _costs(body, tiles.points)
     order = np.lexsort((costs, ~sound))
-    outlines = tiles.points[: body.size].T
-
-    def twins(a: int, b: int) -> bool:
-        return _apart(outlines[a], outlines[b]) <= TWIN
-
-    fresh = np.array(_unlike(order.tolist(), settings.starts, twins), dtype=np.int64)
+    fresh = _unlike_outlines(tiles.points[: body.size].T, order.tolist(), settings.starts)
     return tiles.placements.take(fresh), tiles.points[:, fresh]
 
 
@@ -204,6 +224,15 @@ def _costs(body: Elastic, z: Complex) -> tuple[Array, NDArray[np.bool_]]:
     return body.energy(z) / np.maximum(area, 0.1) + body.stiffness.pose * body.displacement(
         z
     ), sound
+
+
+def _unlike_outlines(outlines: Complex, order: Iterable[int], count: int) -> Integers:
+    """Which outlines (C, n) come first in an order, at most `count`, without twins of earlier ones."""
+
+    def twins(a: int, b: int) -> bool:
+        return _apart(outlines[a], outlines[b]) <= TWIN
+
+    return np.array(_unlike(order, count, twins), dtype=np.int64)
 
 
 def _unlike(items: Iterable[Item], count: int, twins: Callable[[Item, Item], bool]) -> list[Item]:

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles.geometry import plane_points, reverse, signed_area
-from orbiflow.tiles.likeness import Elastic, Pinned, Stiffness
+from orbiflow.tiles.likeness import Elastic, Pinned, Stiffness, fidelity
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.tile_space import Placements, TileSpace
 from orbiflow.tiles.silhouette import Emphasis, Pins, Samples, Target, sampled, triangulate
@@ -108,11 +108,13 @@ class _Reduced:
 
 # Thin parts of a soft body are as stiff as others, and it may leave its pose: long limbs find a way
 # where those of firmer bodies cross. In firmer ones bodies and heads are stiff, thin parts are not, and
-# all keep their places, the more the stiffer. docs/likeness.md has the comparison.
+# all keep their places, the more the stiffer; a rigid one hardly bends. docs/likeness.md has the
+# comparison.
 BODIES = {
     "soft": Stiffness(salience=0.0),
     "firm": Stiffness(salience=-0.5, pose=60.0),
     "stiff": Stiffness(salience=-0.5, pose=600.0),
+    "rigid": Stiffness(salience=-0.5, pose=6000.0),
 }
 
 
@@ -184,7 +186,8 @@ class Drawn(NamedTuple):
 
     placements: Placements  # C of them
     points: Complex  # (N, C)
-    costs: Array  # (C,) energy, springs and displacement; `CROSSED` more of what crosses itself
+    # (C,) energy, springs and displacement, or exp(-mark); `CROSSED` more of what crosses itself
+    costs: Array
 
     def take(self, index: Integers) -> Drawn:
         """Those at `index`."""
@@ -199,13 +202,15 @@ def shifted(
     stages: Sequence[tuple[int, int]],
     *,
     share: float,
+    judged: bool = False,
     cancel: Cancel = NEVER,
 ) -> Drawn:
     """Move the corners of placements of shapes (N, C) until none of the `share` nearest is better.
 
     Each stage is the points by which corners move and how many of the best go on, no two the same.
+    Better is what costs less, or, if `judged`, what people would give the higher mark.
     """
-    drawn = _drawn(body, kind, placements, points)
+    drawn = _drawn(body, kind, placements, points, judged)
     for step, keep in stages:
         drawn = _distinct(drawn, keep)
         live = np.arange(len(drawn.costs))
@@ -214,12 +219,14 @@ def shifted(
             owners, options = _neighbours(body, kind, drawn, live, step, share)
             if not len(owners):
                 break
-            tried = _drawn(body, kind, options, drawn.points[:, owners])
+            tried = _drawn(body, kind, options, drawn.points[:, owners], judged)
             live = _take_better(drawn, owners, tried)
     return _distinct(drawn, len(drawn.costs))
 
 
-def _drawn(body: Elastic, kind: IsohedralClass, placements: Placements, points: Complex) -> Drawn:
+def _drawn(
+    body: Elastic, kind: IsohedralClass, placements: Placements, points: Complex, judged: bool
+) -> Drawn:
     space, n = TileSpace(kind, placements), body.size
     if space.glides:
         space.turn(space.best_turns(points[:n].T))
@@ -229,11 +236,14 @@ def _drawn(body: Elastic, kind: IsohedralClass, placements: Placements, points: 
 
     for _ in range(ROUNDS):
         points = body.pulled(points, tiles(), SPRINGS, 1)
-    apart = (abs(points[:n] - tiles()) ** 2).mean(axis=0)
     rings = plane_points(points[:n].T)
-    area = np.maximum(signed_area(rings), 0.1)
-    costs = (body.lenient_energy(points) + SPRINGS * apart) / area
-    costs += body.stiffness.pose * body.displacement(points)
+    if judged:
+        costs = np.exp([-fidelity(body.rest[:n], z[:n], 0.0).mark for z in points.T])
+    else:
+        apart = (abs(points[:n] - tiles()) ** 2).mean(axis=0)
+        area = np.maximum(signed_area(rings), 0.1)
+        costs = (body.lenient_energy(points) + SPRINGS * apart) / area
+        costs += body.stiffness.pose * body.displacement(points)
     costs[~shapely.is_valid(shapely.polygons(rings))] += CROSSED
     return Drawn(placements._replace(turns=space.turns), points, costs)
 

@@ -18,11 +18,19 @@ from orbiflow.tiles.tilings import IsohedralClass
 if TYPE_CHECKING:
     from orbiflow.tiles.search.co_deformation import Hand
 
-Body = Literal["soft", "firm", "stiff"]
+Body = Literal["soft", "firm", "stiff", "rigid"]
 ALL_BODIES: tuple[Body, ...] = ("soft", "firm", "stiff")
 
 # Settings of the preview
-SKETCH = {"placements": 60, "held": 6, "starts": 1, "share": 0.1, "finalists": 1, "rounds": 10}
+SKETCH = {
+    "placements": 60,
+    "held": 6,
+    "starts": 1,
+    "share": 0.1,
+    "finalists": 1,
+    "rounds": 10,
+    "judged": False,
+}
 
 FAST = {
     "placements": 80,
@@ -34,13 +42,13 @@ FAST = {
     "bodies": ALL_BODIES,
 }
 BEST = {
-    "placements": 800,
-    "held": 160,
-    "starts": 64,
-    "share": 0.6,
+    "placements": 400,
+    "held": 80,
+    "starts": 40,
+    "share": 0.4,
     "finalists": 8,
-    "rounds": 40,
-    "bodies": ALL_BODIES,
+    "bodies": (*ALL_BODIES, "rigid"),
+    "judged": True,
 }
 HALVED = ("placements", "held", "starts")  # in a search for symmetric tiles
 
@@ -55,7 +63,9 @@ class LikenessSearch(Settings, SearchMethod):
     - `finalists`: of what comes of it, the best that are worked out with all of the outline's detail,
       a class and hand.
     - `rounds`: steps of the minimisation for finalists.
-    - `bodies`: how stiff the silhouette is, from soft to stiff; each is searched.
+    - `judged`: whether finalists are chosen, and their corners moved, by the mark that people would
+      give rather than by what bending costs.
+    - `bodies`: how stiff the silhouette is, from soft to rigid; each is searched.
     - `below`: levels of effort below that are searched, too, so that more effort never finds less.
     - `multiples`: points of a tile for each point of the search, the first that holds the corners.
     - `min_neck`: width of necks below which a tile's score falls, in square roots of the area; if
@@ -79,6 +89,7 @@ class LikenessSearch(Settings, SearchMethod):
     share: Annotated[float, Range(above=0, most=1)] = 0.2
     finalists: Count = 4
     rounds: Count = 20
+    judged: bool = False
     bodies: tuple[Body, ...] = ("firm", "stiff")
     below: Annotated[int, Range(0, 2)] = 0
     multiples: tuple[Count, ...] = (4, 6)
@@ -121,16 +132,16 @@ class LikenessSearch(Settings, SearchMethod):
         """Those of the levels below, least first, and these, with so many finalists `wanted`.
 
         Each has twice as many starts as finalists at least, where more are wanted. For symmetric tiles,
-        which have half the freedom, half as much is tried, and level "fast" alone if nothing is above.
+        which have half the freedom, half as much is tried.
 
         >>> [own.starts for own in LikenessSearch.for_effort("best").searches()]
-        [4, 12, 64]
+        [4, 12, 40]
         >>> [own.starts for own in LikenessSearch.for_effort("best").searches(symmetric=True)]
-        [6, 32]
+        [2, 6, 20]
         """
-        normal = {name: getattr(LikenessSearch, name) for name in FAST}
+        normal = {name: getattr(LikenessSearch, name) for name in {**FAST, **BEST}}
         found: list[LikenessSearch] = []
-        for changes in (*(FAST, normal)[: self.below], {}):
+        for changes in (*({**normal, **FAST}, normal)[: self.below], {}):
             own = replace(self, below=0, **changes)
             if symmetric:
                 fewer = {name: -(-getattr(own, name) // 2) for name in HALVED}
@@ -138,4 +149,4 @@ class LikenessSearch(Settings, SearchMethod):
             if own.finalists < wanted:
                 own = replace(own, finalists=wanted, starts=max(own.starts, 2 * wanted))
             found.append(own)
-        return tuple(found[symmetric and len(found) > 1 :])
+        return tuple(found)
