@@ -14,10 +14,10 @@ import shapely
 from numpy.typing import NDArray
 
 from orbiflow.runtime import one_blas_thread
-from orbiflow.tiles import CLASSES, LikenessSearch, Target, orient, plane_points
-from orbiflow.tiles.likeness import least_neck
+from orbiflow.tiles import CLASSES, LikenessSearch, Target, isohedral_class, orient, plane_points
+from orbiflow.tiles.likeness import least_neck, near_symmetry
 from orbiflow.tiles.search.bending import bent_tiles
-from orbiflow.tiles.search.co_deformation import hands
+from orbiflow.tiles.search.search_method import SYMMETRIC, Goal
 
 ROOT = Path(__file__).resolve().parents[1]
 BUNDLED = ROOT / "examples" / "silhouettes"
@@ -76,15 +76,23 @@ class LikenessTile(NamedTuple):
 
 
 def likeness_tiles(target: Target, effort: str) -> list[LikenessTile]:
-    """Tiles of all classes by the search for likeness, best first: the only place that calls it."""
+    """Tiles of all classes by the search for likeness, best first: the only place that calls it.
+
+    Where the silhouette is near to symmetric, symmetric tiles are among them, with the mark that they
+    gain, as in the search.
+    """
     settings = LikenessSearch.for_effort(effort)
-    both = hands(target, settings)
     wide = least_neck(target.normal, settings.min_neck)
+    symmetric = SYMMETRIC.get(near_symmetry(target.normal).stabiliser, ())
     found = []
-    for name, kind in CLASSES.items():
+    for name in (*CLASSES, *symmetric):
+        kind = isohedral_class(name)
+        both = settings.hands(Goal(target), kind.divisor)
         with one_blas_thread():
             bents, _ = bent_tiles(both, kind, replace(settings, min_neck=wide))
         for bent in bents:
+            gained = replace(bent.fidelity, symmetric=name in symmetric)
+            bent = bent._replace(fidelity=gained)
             n = bent.hand.fine.size
             flip = (1.0, -1.0 if bent.hand.mirrored else 1.0)
             ring, source = (plane_points(z[:n]) * flip for z in (bent.points, bent.hand.fine.rest))
