@@ -64,7 +64,7 @@ class LikenessSearch(Settings, SearchMethod):
       a class and hand.
     - `rounds`: steps of the minimisation for finalists.
     - `judged`: whether finalists are chosen, and their corners moved, by the mark that people would
-      give rather than by what bending costs.
+      give rather than by what bending costs; not where hairs need all of the outline's points.
     - `bodies`: how stiff the silhouette is, from soft to rigid; each is searched.
     - `below`: levels of effort below that are searched, too, so that more effort never finds less.
     - `multiples`: points of a tile for each point of the search, the first that holds the corners.
