@@ -158,7 +158,7 @@ def test_more_rounds_cost_no_more() -> None:
 
 
 def test_judged_finalists_have_better_marks_and_are_no_twins() -> None:
-    few = replace(SMALL, placements=40, held=12, starts=8, finalists=3, bodies=("firm",))
+    few = replace(SMALL, starts=5, finalists=2, bodies=("firm",))
     judged = replace(few, judged=True)
     found = [bent_tiles(squirrel_hands()[:1], CLASSES["IH4"], own)[0] for own in (few, judged)]
     plain, best = (max(bent.fidelity.mark for bent in tiles) for tiles in found)
