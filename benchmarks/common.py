@@ -78,8 +78,7 @@ class LikenessTile(NamedTuple):
 def likeness_tiles(target: Target, effort: str) -> list[LikenessTile]:
     """Tiles of all classes by the search for likeness, best first: the only place that calls it.
 
-    Where the silhouette is near to symmetric, symmetric tiles are among them, with the mark that they
-    gain, as in the search.
+    Where the silhouette is near to symmetric, symmetric tiles are among them, as in the search.
     """
     settings = LikenessSearch.for_effort(effort)
     wide = least_neck(target.normal, settings.min_neck)
@@ -91,8 +90,6 @@ def likeness_tiles(target: Target, effort: str) -> list[LikenessTile]:
         with one_blas_thread():
             bents, _ = bent_tiles(both, kind, replace(settings, min_neck=wide))
         for bent in bents:
-            gained = replace(bent.fidelity, symmetric=name in symmetric)
-            bent = bent._replace(fidelity=gained)
             n = bent.hand.fine.size
             flip = (1.0, -1.0 if bent.hand.mirrored else 1.0)
             ring, source = (plane_points(z[:n]) * flip for z in (bent.points, bent.hand.fine.rest))

@@ -127,7 +127,6 @@ def published(document: dict[str, Any], marks: dict[str, list[float]]) -> dict[s
     for k, row in enumerate(document["tiles"]):
         own, bent = row["values"], np.array(row["bent"])
         kept = asdict(fidelity(complex_points(rest), complex_points(bent), own["cost"]))
-        del kept["symmetric"]  # no tile of the pool is
         values = kept | {name: own[name] for name in ALSO}
         if "notches" in own:
             values["before"] = score_before(own)

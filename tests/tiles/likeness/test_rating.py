@@ -83,8 +83,7 @@ class Marked(NamedTuple):
 
 
 def _kept(values: dict[str, Any]) -> Fidelity:
-    # the tiles that were marked are of the nine classes, none of which is `symmetric`
-    names = {field.name for field in fields(Fidelity)} - {"symmetric"}
+    names = {field.name for field in fields(Fidelity)}
     return Fidelity(**{name: values[name] for name in names})
 
 

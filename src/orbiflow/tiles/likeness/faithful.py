@@ -42,7 +42,6 @@ WEIGHTS = (1.5, 1.9, 0.3, 0.5)
 # roots of the area: the usual one, and the extremes of those that were marked
 LENGTH_WEIGHT, USUAL_LENGTH, LENGTHS = 2.0, 6.5, (4.2, 10.9)
 USUAL_MARK = 5.9  # of a tile with usual values and of usual length
-SYMMETRY_MARK = 1.0  # for a symmetry that the silhouette nearly has, and the tile exactly
 # The foretold mark at which half of the people find a tile good, 6.5 or more, and how fast their log
 # odds grow with it
 GOOD_MARK, STEEPNESS = 6.1, 1.9
@@ -64,7 +63,6 @@ class Fidelity:
     - `thickness`: The mean square of the logarithm by which the inside became thinner or thicker.
     - `cost`: The cost of bending (`Elastic.cost`). It has no part in the mark.
     - `length`: The length of the silhouette's outline, in square roots of its area.
-    - `symmetric`: Whether the tile has a symmetry that the silhouette nearly has.
     """
 
     pieces: tuple[float, float]
@@ -72,7 +70,6 @@ class Fidelity:
     thickness: float
     cost: float
     length: float
-    symmetric: bool = False
 
     @property
     def losses(self) -> tuple[float, ...]:
@@ -92,7 +89,7 @@ class Fidelity:
         """The mark that people would give on a scale from 0 to 10, not cut at its ends."""
         length = min(max(self.length, LENGTHS[0]), LENGTHS[1])
         easier = LENGTH_WEIGHT * math.log(length / USUAL_LENGTH)
-        return USUAL_MARK + easier + SYMMETRY_MARK * self.symmetric - sum(self.losses)
+        return USUAL_MARK + easier - sum(self.losses)
 
     @property
     def score(self) -> float:

@@ -9,7 +9,7 @@ import math
 import platform
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
 from typing import Any, cast
 
@@ -35,7 +35,7 @@ from orbiflow.runtime import (
     process_context,
     work,
 )
-from orbiflow.tiles.likeness import Fidelity, NearSymmetry, diverse, mutual_iou, near_symmetry
+from orbiflow.tiles.likeness import NearSymmetry, diverse, mutual_iou, near_symmetry
 from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
 from orbiflow.tiles.search.both_search import ALIKE
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
@@ -127,7 +127,6 @@ def escherize(
     method = method or settings.search_method
     task = _task(Goal(target, emphasis, pins), method, settings.per_class, settings.force)
     near = near_symmetry(target.normal) if method.takes_symmetric else None
-    task = replace(task, near=near)
     names = _class_names(settings.classes, near)
     if on_checked is not None:
         on_checked()
@@ -235,15 +234,6 @@ class _Task:
     method: SearchMethod
     per_class: int
     force: bool
-    near: NearSymmetry | None = None
-
-    def keeps_symmetry(self, kind: IsohedralClass) -> bool:
-        """Whether tiles of a class have the symmetry that the silhouette nearly has."""
-        own = "C1" if self.near is None else self.near.stabiliser
-        mirrors = [element.determinant < 0 for element in kind.stabiliser]
-        # a group without mirrors has a half-turn if its order is even
-        turned = (len(mirrors) - sum(mirrors)) % 2 == 0
-        return any(mirrors) if own == "D1" else turned and own == "C2"
 
 
 def _task(goal: Goal, method: SearchMethod, per_class: int = 1, force: bool = False) -> _Task:
@@ -382,14 +372,8 @@ def _outcome(task: _Task, kind: IsohedralClass, progress: OnProgress, cancel: Ca
     if not chosen:
         return ClassFailure(kind.name, "; ".join(dict.fromkeys(reasons)))
     seconds = time.perf_counter() - begin
-    if task.keeps_symmetry(kind):
-        chosen = [tile.changed(fidelity=_symmetric(tile.fidelity)) for tile in chosen]
     best, *others = (tile.changed(seconds=seconds) for tile in chosen)
     return best.changed(others=tuple(others))
-
-
-def _symmetric(fidelity: Fidelity | None) -> Fidelity | None:
-    return None if fidelity is None else replace(fidelity, symmetric=True)
 
 
 def _chosen_tiles(
