@@ -15,7 +15,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.studio.changing import pulled, space_json, variations
 from orbiflow.studio.tile_drawing import drawing_settings, with_any_map
-from orbiflow.studio.tile_view import elements_json, view_json
+from orbiflow.studio.tile_view import elements_json, tile_view
 from orbiflow.symmetry import Line, reflection, rotation
 from orbiflow.tiles import EscherTile, ExportSettings, Frame, Tile, TileMap, read_over
 from orbiflow.tiles.search.bent_map import map_of_bent
@@ -142,13 +142,13 @@ def test_elements_are_one_of_each_and_belong_to_the_group(group) -> None:
 
 def test_the_view_says_where_the_silhouette_went() -> None:
     tile = squirrel("IH4", y_down=True)
-    told = view_json(tile)
+    told = tile_view({}, tile)
     silhouette, track = np.array(told["silhouette_track"]), np.array(told["tile_track"])
     assert np.abs(tile.forward(silhouette) - track).max() < 1e-9
     line = shapely.LinearRing(tile.tile.polygon)
     assert shapely.distance(shapely.points(track), line).max() < 1e-9
     assert told["covered"] == [[0.0, 0.0], [200.0, 160.0]]
-    bare = view_json(EscherTile(tile.tile))
+    bare = tile_view({}, EscherTile(tile.tile))
     assert bare["map"] is None and bare["silhouette_track"] == tile.tile.polygon.tolist()
 
 
