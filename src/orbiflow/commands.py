@@ -52,6 +52,8 @@ WORK = {
     "density fold": "orbiflow.density.cross_validation.operations:fold",
     "studio read": "orbiflow.studio.tasks:read",
     "studio search": "orbiflow.studio.tasks:search",
+    "studio space": "orbiflow.studio.closeup_tasks:space",
+    "studio pull": "orbiflow.studio.closeup_tasks:pull",
     "studio take": "orbiflow.studio.takeaways:take",
 }
 """Operations that others give to workers, and that are no commands."""

@@ -86,7 +86,8 @@ def test_the_map_goes_where_its_outline_went(name: str, y_down: bool, tmp_path: 
     before = variations(tile).first.polygon
     found = pulled(tile, nudged(tile, 3, 0.4))
     after = found.tile.polygon
-    assert found.map is not None and found.map.ends_on(found.tile)
+    assert found.map is not None
+    assert found.map.ends_on(found.tile)
     # each point of the outline comes from where it came from
     assert np.abs(found.inverse(after) - tile.inverse(before)).max() < 1e-6
     share = np.random.default_rng(0).random((len(after), 1))

@@ -1,4 +1,4 @@
-"""A tile that was pulled by hand: the space in which it moves, and the certified tile that comes out."""
+"""A tile pulled by hand: the space in which it moves, and the certified tile that comes out."""
 
 from __future__ import annotations
 

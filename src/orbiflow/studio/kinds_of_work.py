@@ -56,6 +56,8 @@ ART_FORMATS = ("png", "svg")
 KINDS = {
     "read": Kind("studio read", "quick"),
     "search": Kind("studio search"),
+    "space": Kind("studio space", "quick"),
+    "pull": Kind("studio pull", "quick"),
     "export": Kind("studio take", makes="export"),
     "art": Kind("studio take", makes="art"),
     "solid": Kind("studio take", makes="solid"),

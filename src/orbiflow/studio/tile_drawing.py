@@ -1,4 +1,4 @@
-"""What was drawn on a tile in the browser, as exports take it: a picture over the silhouette, and eyes."""
+"""What was drawn on a tile in the browser, as exports take it."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def drawing_svg(strokes: list[Stroke], tile: EscherTile) -> str:
     parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {wide:.9g} {tall:.9g}">']
     for stroke in strokes:
         points = _on_page(stroke.points, tile)
-        ends = points if len(points) > 1 else np.repeat(points, 2, axis=0) + [[0, 0], [1e-3, 0]]
+        ends = points if len(points) > 1 else np.stack([points[0], points[0] + 1e-3])
         path = "L".join(f"{x:.6g} {y:.6g}" for x, y in ends)
         parts.append(
             f'<path d="M{path}" fill="none" stroke="{stroke.colour}" '

@@ -67,7 +67,7 @@ def tile_view(card: dict[str, Any], tile: EscherTile) -> dict[str, Any]:
     - `elements`: What the group's symmetries are, one of each kind up to the lattice: the corners of a
       `cell`, `centres` with their order, `mirrors` and `glides` with a point and a direction.
     - `map`: The triangles of the map from the silhouette, or None.
-    - `covered`: The corners of least and of greatest coordinates of what the silhouette's picture covers.
+    - `covered`: The corners, least and greatest, of what the silhouette's picture covers.
     """
     bending, frame = tile.bending, tile.frame
     own = tile.tile.polygon.tolist()
