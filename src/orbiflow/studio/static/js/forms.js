@@ -28,7 +28,7 @@ function control(name, schema, words, changed) {
     return { root: h("div", { class: "field" }, h("label", { class: "check" }, box, title), about), value };
   }
   if (options) {
-    const first = schema.default === null || schema.default === undefined ? [h("option", { value: "" }, schema["x-default"] ? capital(schema["x-default"]) : "As it comes")] : [];
+    const first = schema.default === null || schema.default === undefined ? [h("option", { value: "" }, words?.usual ?? capital(schema["x-default"] || "as it comes"))] : [];
     const box = h("select", shared, first, options.map((option) => h("option", { value: option }, words?.options?.[option] ?? capital(option))));
     box.value = schema.default ?? "";
     const value = () => (box.value === (schema.default ?? "") ? undefined : box.value);

@@ -108,7 +108,7 @@ function drawBar(step, tile) {
   [shownStep, shownTile] = [step, tile];
   const project = feed?.project;
   const save = newest((name) => api.patch(`projects/${project.id}`, { name }), 500);
-  put(bar, h("div", { class: "bar" },
+  put(bar, h("div", { class: `bar ${step ?? ""}` },
     h("a", { class: "brand", href: "#/", "aria-label": "orbiflow studio: start" },
       h("img", { src: "icon.svg", alt: "" }), h("span", {}, "orbiflow")),
     project && h("input", {

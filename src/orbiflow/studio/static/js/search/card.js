@@ -15,7 +15,7 @@ export function cardView(project, actions) {
   const link = h("a", { class: "open" }, canvas, h("span", { class: "facts" },
     h("span", { class: "row" }, stars, word, h("span", { class: "grow" }), stage),
     h("span", { class: "row" }, lies, h("span", { class: "grow" }), name)));
-  const more = button("More like this one", () => actions.more(shown), { kind: "quiet" });
+  const more = button("More like this", () => actions.more(shown), { kind: "quiet" });
   const drop = button("Remove this tile", () => actions.remove(shown), { kind: "quiet icon", image: "bin" });
   const take = h("a", { class: "button quiet" }, "Take away");
   const root = h("li", { class: "card" }, link, h("div", { class: "row deeds" }, take, more, h("span", { class: "grow" }), drop));
@@ -47,7 +47,7 @@ export function cardView(project, actions) {
     stage.textContent = card.stage === "final" ? "" : STAGES[card.stage] ?? "";
     const about = `${capital(card.word || "a tile")}, ${card.arrangement}`;
     link.setAttribute("aria-label", `Open: ${about}. ${starWords(card.stars)}. Class ${card.class_name}.`);
-    more.setAttribute("aria-label", `More like this one: ${about}`);
+    more.setAttribute("aria-label", `More like this: ${about}`);
     take.setAttribute("aria-label", `Take away: ${about}`);
     if (anew) paint();
   }

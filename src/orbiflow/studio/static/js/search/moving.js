@@ -7,6 +7,7 @@ export function reordered(place, children) {
   if (order.length === children.length && order.every((child, k) => child === children[k])) return;
   const from = new Map(order.map((child) => [child, child.getBoundingClientRect()]));
   const held = document.activeElement;
+  order.filter((child) => !children.includes(child)).forEach((child) => child.remove());
   let next = place.firstElementChild;
   for (const child of children) { // moves as few as possible, so that what has the focus keeps it
     if (child === next) next = next.nextElementSibling;

@@ -70,9 +70,9 @@ export async function show(root, { api, events, project, navigate, about }) {
       put(deeds, buttons(own));
       if (held) deeds.querySelector("button")?.focus();
       panel.hidden = alive(own);
+      if (panel.hidden) panel.open = false;
     }
     empty.hidden = Boolean(project.tiles.length) || alive(own);
-    skeletons(alive(own) && !project.tiles.length);
   }
 
   const buttons = (own) => ({
@@ -81,20 +81,22 @@ export async function show(root, { api, events, project, navigate, about }) {
     paused: [button("Go on", () => act(own, "resume"), { kind: "primary", image: "play" }), button("Stop", () => act(own, "cancel"), { image: "stop" })],
   })[own?.state] ?? [button(own ? "Search again" : "Search", search, { kind: "primary", image: "arrow" })];
 
-  function skeletons(wait) {
-    const there = grid.querySelectorAll(".ghost");
-    if (wait && !there.length) grid.append(...Array.from({ length: 9 }, () => h("li", { class: "card ghost", "aria-hidden": "true" }, h("div", {}))));
-    if (!wait) there.forEach((ghost) => ghost.remove());
+  /** Empty cards hold the place of the nine classes until the first tiles are there. */
+  function ghosts() {
+    const { tiles } = project;
+    const missing = alive(task()) && !tiles.some(({ stage }) => stage === "final") ? Math.max(0, 9 - tiles.length) : 0;
+    while (spare.length < missing) spare.push(h("li", { class: "card ghost", "aria-hidden": "true" }, h("div", {})));
+    return spare.slice(0, missing);
   }
+  const spare = [];
 
   /** Show the cards in their order; cards that stay move there calmly. */
   function arrange() {
     const cards = [...project.tiles].sort(better);
     const kept = new Set(cards.map(({ id }) => id));
     for (const [id, view] of views) if (!kept.has(id)) { view.root.remove(); views.delete(id); }
-    skeletons(!cards.length && alive(task()));
     for (const card of cards) if (!views.has(card.id)) views.set(card.id, cardView(project, actions));
-    reordered(grid, cards.map((card) => views.get(card.id).root));
+    reordered(grid, [...cards.map((card) => views.get(card.id).root), ...ghosts()]);
     cards.forEach((card) => views.get(card.id).update(card, palette()));
   }
   let due = 0;
@@ -129,6 +131,6 @@ export async function show(root, { api, events, project, navigate, about }) {
   arrange();
   tell();
   const off = ["card", "gone", "refresh"].map((kind) => events.on(kind, soon));
-  off.push(events.on("task", tell));
+  off.push(events.on("task", soon));
   return () => { off.forEach((stop) => stop()); watch.disconnect(); cancelAnimationFrame(due); };
 }

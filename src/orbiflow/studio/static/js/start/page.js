@@ -5,6 +5,8 @@ import { Camera, Tiling, paint, sized } from "../tiling.js";
 import { ago, bytes, number } from "../words.js";
 import { sample } from "./sample.js";
 
+const TABLES = /\.(csv|tsv|txt|npy|parquet)$/i;
+const stem = ({ name }) => name.replace(/\.\w+$/, "");
 const PICTURES = "image/*,.svg,.json,.dat";
 
 export async function show(root, { api, navigate, about }) {
@@ -34,13 +36,21 @@ export async function show(root, { api, navigate, about }) {
       toast(`${name} has ${bytes(file.size)}; at most ${bytes(most)} can be read. Make it smaller first.`, { bad: true });
       return undefined;
     }
-    return begin(name.replace(/\.\w+$/, ""), (id) => api.put(`projects/${id}/input?name=${encodeURIComponent(name)}`, file));
+    return begin(stem({ name }), (id) => api.put(`projects/${id}/input?name=${encodeURIComponent(name)}`, file));
   };
   const open = (file) => trying(async () => {
     const project = await api.post("projects/open", file);
     navigate(project.kind === "density" ? `d/${project.id}` : `p/${project.id}`);
   });
-  const either = (file) => (file.name?.endsWith(".orbiflow") ? open(file) : take(file));
+  const count = (file) => trying(async () => {
+    const { id } = await api.post("projects", { kind: "density", name: file ? stem(file) : "My table" });
+    if (file) await api.put(`projects/${id}/density/table?name=${encodeURIComponent(file.name)}`, file);
+    navigate(`d/${id}`);
+  });
+  const either = (file) => {
+    if (file.name?.endsWith(".orbiflow")) return open(file);
+    return TABLES.test(file.name) ? count(file) : take(file);
+  };
 
   const chosen = (label, use, attributes) => {
     const box = h("input", { type: "file", class: "unseen", tabindex: "-1", "aria-label": label, onchange: () => box.files[0] && use(box.files[0]), ...attributes });
@@ -95,10 +105,7 @@ export async function show(root, { api, navigate, about }) {
     projects,
     h("section", { class: "others" },
       button("Open a project file", () => saved.click(), { image: "open" }),
-      button("Numbers instead of animals", () => trying(async () => {
-        const { id } = await api.post("projects", { kind: "density", name: "My table" });
-        navigate(`d/${id}`);
-      }), { kind: "quiet", image: "arrow" }),
+      button("Numbers instead of animals", () => count(), { kind: "quiet", image: "arrow" }),
       h("span", { class: "soft small" }, "Angles, directions or axes in a table: see where they crowd.")));
 
   async function list() {

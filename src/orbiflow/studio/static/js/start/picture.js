@@ -1,6 +1,7 @@
 /** What was read of a picture, and how to mend it: sliders, brushes, lassos, parts to keep. */
 
 import { button, choice, h, newest, put, slider, style, trying } from "../dom.js";
+import { sized } from "../tiling.js";
 import { alive, number } from "../words.js";
 import { Marks, drawStroke } from "./marks.js";
 import { pointing } from "./pointing.js";
@@ -49,7 +50,7 @@ export async function show(root, { api, events, project, navigate }) {
   } });
   const smoothing = slider("Smoothing", { min: 0, max: 0.06, step: 0.002, value: reading.smooth, said: (value) => (value ? `${(100 * value).toFixed(1)} %` : "none") },
     (value) => change({ smooth: value }));
-  const part = choice("The animal is", [[null, "found by itself"], [false, "the dark part"], [true, "the light part"]], reading.invert,
+  const part = choice("The animal is", [[null, "found by itself"], [false, "dark"], [true, "light"]], reading.invert,
     (value) => change({ invert: value }));
 
   /** Strokes that the outline on the screen does not know yet. */
@@ -58,9 +59,10 @@ export async function show(root, { api, events, project, navigate }) {
   function paint() {
     const { silhouette } = project;
     if (!silhouette || !picture) return;
-    const { width, height } = canvas;
-    const context = canvas.getContext("2d");
-    const pixel = width / Math.max(1, canvas.clientWidth);
+    const { width, height } = marks;
+    const { context, width: shown, ratio } = sized(canvas);
+    const pixel = width / shown;
+    context.setTransform(ratio / pixel, 0, 0, ratio / pixel, 0, 0);
     context.fillStyle = "#ffffff";
     context.fillRect(0, 0, width, height);
     context.drawImage(picture, 0, 0, width, height);
@@ -71,7 +73,7 @@ export async function show(root, { api, events, project, navigate }) {
     rest.rect(0, 0, width, height);
     context.fillStyle = "rgb(255 255 255 / 62%)";
     context.fill(rest, "evenodd");
-    context.fillStyle = "rgb(11 107 102 / 22%)";
+    context.fillStyle = "rgb(15 143 134 / 55%)";
     context.fill(outline);
     context.lineJoin = "round";
     for (const ring of silhouette.left_out ?? []) {
@@ -84,7 +86,7 @@ export async function show(root, { api, events, project, navigate }) {
       context.stroke(out);
       context.setLineDash([]);
     }
-    context.globalAlpha = 0.5;
+    context.globalAlpha = 0.65;
     for (const layer of ["pins", "emphasis"]) {
       if (marks.has(layer)) context.drawImage(tinted(layer), 0, 0);
     }
@@ -124,7 +126,7 @@ export async function show(root, { api, events, project, navigate }) {
     return layers.get(layer);
   }
 
-  const brush = () => (state.size / 100) * Math.max(canvas.width, canvas.height);
+  const brush = () => (state.size / 100) * Math.max(marks.width, marks.height);
 
   /** Send the layers that a stroke touches; the newest state wins. */
   const send = Object.fromEntries(["mend", "pins", "emphasis"].map((layer) => [layer, newest(async () => {
@@ -156,7 +158,7 @@ export async function show(root, { api, events, project, navigate }) {
     tell();
   }
 
-  pointing(canvas, () => [canvas.width, canvas.height], {
+  pointing(canvas, () => [marks.width, marks.height], {
     begin(point) {
       const layer = { add: "mend", remove: "mend", rub: "all" }[state.tool] ?? state.tool;
       state.stroke = { layer, shape: state.shape, size: brush(), points: [point], black: state.tool === "remove", erases: state.tool === "rub" };
@@ -200,7 +202,7 @@ export async function show(root, { api, events, project, navigate }) {
       image.src = silhouette.backdrop;
       await trying(() => image.decode());
       [picture, shownPicture] = [image, silhouette.backdrop];
-      if (canvas.width !== silhouette.width || canvas.height !== silhouette.height || marks.width === 1) await fit(silhouette);
+      if (marks.width !== silhouette.width || marks.height !== silhouette.height) await fit(silhouette);
     }
     state.sent = Math.min(state.until ?? 0, marks.strokes.length);
     stage.hidden = !silhouette;
@@ -209,7 +211,6 @@ export async function show(root, { api, events, project, navigate }) {
 
   /** A canvas of the picture's size, with the marks that the server has. */
   async function fit({ width, height }) {
-    Object.assign(canvas, { width, height });
     stage.style.setProperty("--shape", `${width} / ${height}`);
     stage.style.setProperty("--ratio", width / height);
     marks = new Marks(width, height);
@@ -230,22 +231,23 @@ export async function show(root, { api, events, project, navigate }) {
   const stage = h("div", { class: "stage", hidden: true }, canvas);
   const size = slider("Size of the brush", { min: 1, max: 20, step: 0.5, value: state.size, said: (value) => `${value} %` }, (value) => { state.size = value; paint(); });
   const unread = h("p", { class: "lonely soft" }, "Reading the picture …");
+  const tools = choice("Paint on the picture", TOOLS, "add", (tool) => { state.tool = tool; meaning.textContent = TOOL_MEANINGS[tool]; paint(); });
+  tools.classList.add("tools");
   put(root, h("div", { class: "picture" },
     h("div", { class: "stack" },
       h("h1", { tabindex: "-1" }, "Is this your animal?"),
       h("p", { class: "soft" }, "The green shape is what we read. If something is missing or too much, mend it here."),
       stage, unread),
     h("div", { class: "stack side" },
+      h("div", { class: "go" }, find),
       said,
-      h("section", { class: "panel stack", "aria-label": "Paint on the picture" },
-        choice("Paint on the picture", TOOLS, "add", (tool) => { state.tool = tool; meaning.textContent = TOOL_MEANINGS[tool]; paint(); }),
-        meaning,
-        choice("With a", [["brush", "brush", "brush"], ["lasso", "lasso", "lasso"]], "brush", (shape) => { state.shape = shape; size.hidden = shape === "lasso"; }, { unseen: true }),
-        size,
-        h("div", { class: "row" }, back, again, clear)),
       h("section", { class: "panel stack", "aria-label": "How the picture is read" },
         part, h("label", { class: "check" }, auto, "Find the edge of the animal by itself"), level, smoothing),
-      h("div", { class: "go" }, find))));
+      h("section", { class: "panel stack", "aria-label": "Paint on the picture" },
+        tools, meaning,
+        choice("With a", [["brush", "brush", "brush"], ["lasso", "lasso", "lasso"]], "brush", (shape) => { state.shape = shape; size.hidden = shape === "lasso"; }, { unseen: true }),
+        size,
+        h("div", { class: "row" }, back, again, clear)))));
   const ready = () => { unread.hidden = Boolean(project.silhouette); silhouetteChanged(); };
   ready();
   const keys = (event) => {
@@ -254,6 +256,8 @@ export async function show(root, { api, events, project, navigate }) {
     changed(event.shiftKey ? marks.redo() : marks.undo());
   };
   document.addEventListener("keydown", keys);
+  const watch = new ResizeObserver(paint);
+  watch.observe(stage);
   const off = [events.on("silhouette", ready), events.on("refresh", ready), events.on("task", tell)];
-  return () => { document.removeEventListener("keydown", keys); off.forEach((stop) => stop()); };
+  return () => { watch.disconnect(); document.removeEventListener("keydown", keys); off.forEach((stop) => stop()); };
 }

@@ -15,7 +15,7 @@ export const KINDS = {
           template: "Template to trace by hand", colouring: "Colouring page", stickers: "Stickers",
         },
       },
-      format: { title: "Kind of file", options: { svg: "SVG", pdf: "PDF", dxf: "DXF", png: "PNG", json: "JSON (numbers)" } },
+      format: { title: "Kind of file", usual: "What suits it", options: { svg: "SVG", pdf: "PDF", dxf: "DXF", png: "PNG", json: "JSON (numbers)" } },
       tile_size: { title: "How long is one tile?" },
       area: { title: "How large is the page?", about: "Such as A4, letter, mug, phone or 300x200mm." },
       palette: { title: "Colours" },
@@ -41,7 +41,7 @@ export const KINDS = {
     words: {
       kind: { title: "What shall it be?", options: { tile: "Tile", cutter: "Cookie cutter", stamp: "Stamp", mould: "Mould", puzzle: "Puzzle in a tray" } },
       tile_size: { title: "How long is one tile?" },
-      format: { title: "Kind of file", options: { stl: "STL", "3mf": "3MF" } },
+      format: { title: "Kind of file", usual: "What suits it", options: { stl: "STL", "3mf": "3MF" } },
     },
   },
   animate: {
@@ -52,7 +52,7 @@ export const KINDS = {
       kind: { title: "What happens?", options: { morph: "a plain tiling becomes animals", bend: "the animal bends into the tile", grow: "the tiling grows" } },
       seconds: { title: "How long?" },
       palette: { title: "Colours" },
-      format: { title: "Kind of file", options: { gif: "GIF", mp4: "MP4", svg: "SVG" } },
+      format: { title: "Kind of file", usual: "What suits it", options: { gif: "GIF", mp4: "MP4", svg: "SVG" } },
     },
   },
 };

@@ -39,11 +39,13 @@ export function trueSize(polygon, yDown) {
     const flip = yDown ? 1 : -1;
     context.setTransform(unit * ratio, 0, 0, flip * unit * ratio, (2 - left * unit) * ratio, (2 - (yDown ? top : -(top + high)) * unit) * ratio);
     const look = getComputedStyle(canvas);
-    context.fillStyle = look.backgroundColor;
     context.strokeStyle = look.color;
     context.lineWidth = 1.5 / unit;
     context.lineJoin = "round";
-    context.stroke(pathOf(polygon));
+    const path = pathOf(polygon);
+    context.fillStyle = look.getPropertyValue("--accent-soft");
+    context.fill(path);
+    context.stroke(path);
     const measured = [wide, high].map((side) => ((side * size) / Math.max(wide, high)).toFixed(1));
     canvas.setAttribute("aria-label", `The tile in its true size, ${measured[0]} by ${measured[1]} mm`);
     said.textContent = `${measured[0]} × ${measured[1]} mm. ${localStorage.getItem(KEY) ? "Your screen is measured." : "Screens differ: measure yours once."}`;
