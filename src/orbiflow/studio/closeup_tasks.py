@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-from orbiflow.arguments import as_path
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import (
     NEVER,
@@ -21,6 +20,7 @@ from orbiflow.runtime import (
 from orbiflow.studio.tile_files import STAGES, best_stage, put_tile, tile_folder, tile_number
 
 SPACE = "space.json"
+PIXELS = (".png", ".jpg", ".jpeg", ".webp")  # of pictures on which lines can be drawn
 
 
 @operation("studio space")
@@ -100,10 +100,10 @@ def with_drawing(
     tile, scratch = with_any_map(given), make_folder(scratch)
     if tile is not given:
         result = tile.save(scratch / "tile")
-    under = files.get("picture")
-    made = drawing_settings(
-        parts, tile, scratch, None if under is None else as_path(under, "the picture")
-    )
+    under: Path | None = files.get("picture")
+    if under is not None and under.suffix not in PIXELS:
+        under = under.with_name("backdrop.png")
+    made = drawing_settings(parts, tile, scratch, under)
     if made["picture"] is not None:
         files = {**files, "picture": made["picture"]}
     return result, files, {**settings, "eyes": made["eyes"]} if made["eyes"] else settings
