@@ -53,6 +53,8 @@ WORK = {
     "studio read": "orbiflow.studio.tasks:read",
     "studio open": "orbiflow.studio.tasks:open_file",
     "studio search": "orbiflow.studio.tasks:search",
+    "studio space": "orbiflow.studio.closeup_tasks:space",
+    "studio pull": "orbiflow.studio.closeup_tasks:pull",
     "studio take": "orbiflow.studio.takeaways:take",
 }
 """Operations that others give to workers, and that are no commands."""
