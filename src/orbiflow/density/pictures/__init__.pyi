@@ -23,5 +23,6 @@ from .settings import PlotSettings as PlotSettings
 from .square import edge_pairs as edge_pairs
 from .surfaces import density_page as density_page
 from .surfaces import immersion as immersion
+from .surfaces import surface_data as surface_data
 from .surfaces import viewpoint as viewpoint
 from .thumbnail import density_thumbnail as density_thumbnail

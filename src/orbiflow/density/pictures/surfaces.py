@@ -207,32 +207,17 @@ _SOFT = 1.6
 """Cells that the narrowest peak is averaged over: with fewer, a triangle's corners would be seen."""
 
 
-def density_page(
+def surface_data(
     density: Density,
     settings: PlotSettings | None = None,
     *,
     samples: Tensor | None = None,
     coastlines: Sequence[Array] = (),
     resolution: int | None = None,
-    title: str = "",
-) -> str:
-    """Return a self-contained HTML page with the surface of the space, to be turned.
+) -> dict[str, Any]:
+    """Return what `surface.js` draws, as JSON has it: see `density_page`.
 
-    The torus is a ring, the sphere the unit sphere in the user's frame, the Klein bottle the figure-8
-    immersion, the projective plane Boy's surface. The density is evaluated at every vertex, so the
-    colours close over the seams; peaks narrower than its triangles are averaged over them, and the
-    caption says so. The page opens with the peak in front. WebGL 2 draws it, or a plain canvas if
-    there is none.
-
-    Args:
-        density: A density on a two-dimensional space.
-        settings: How it is drawn; `dots` says whether the samples are seen at first.
-        samples: Chart points (N, 2) to draw as dots, which a box in the page shows and hides. Of more
-            than `MAX_DOTS` a random choice is drawn.
-        coastlines: For the sphere and the projective plane, lines (M, 2) from `read_coastlines`.
-        resolution: Cells along an edge of the square, 2 to 250. Default: 160, or 240 for a density
-            with kernels.
-        title: The title. Default: "Density on the" and the space.
+    The value at a vertex is its place on the bar of colours; "caption" says what is seen.
     """
     from matplotlib import colormaps
 
@@ -269,11 +254,41 @@ def density_page(
     if colours.is_sharp(density, pixel=_SOFT / cells):
         notes.append(average_note(round(cells / _SOFT)))
     words = CAPTIONS[space.name].format(*(frames.axis_label(view, k) for k in (0, 1)))
-    caption = f"{words} {frames.sentences(notes)}".strip()
-    title = title or f"Density on the {frames.space_title(space)}"
-    page = rendered(
-        "orbiflow.density.pictures", "surface.html", title=title, caption=caption, data=data
+    return {**data, "caption": f"{words} {frames.sentences(notes)}".strip()}
+
+
+def density_page(
+    density: Density,
+    settings: PlotSettings | None = None,
+    *,
+    samples: Tensor | None = None,
+    coastlines: Sequence[Array] = (),
+    resolution: int | None = None,
+    title: str = "",
+) -> str:
+    """Return a self-contained HTML page with the surface of the space, to be turned.
+
+    The torus is a ring, the sphere the unit sphere in the user's frame, the Klein bottle the figure-8
+    immersion, the projective plane Boy's surface. The density is evaluated at every vertex, so the
+    colours close over the seams; peaks narrower than its triangles are averaged over them, and the
+    caption says so. The page opens with the peak in front. WebGL 2 draws it, or a plain canvas if
+    there is none.
+
+    Args:
+        density: A density on a two-dimensional space.
+        settings: How it is drawn; `dots` says whether the samples are seen at first.
+        samples: Chart points (N, 2) to draw as dots, which a box in the page shows and hides. Of more
+            than `MAX_DOTS` a random choice is drawn.
+        coastlines: For the sphere and the projective plane, lines (M, 2) from `read_coastlines`.
+        resolution: Cells along an edge of the square, 2 to 250. Default: 160, or 240 for a density
+            with kernels.
+        title: The title. Default: "Density on the" and the space.
+    """
+    data = surface_data(
+        density, settings, samples=samples, coastlines=coastlines, resolution=resolution
     )
+    title = title or f"Density on the {frames.space_title(density.space)}"
+    page = rendered("orbiflow.density.pictures", "surface.html", title=title, data=data)
     size = len(page.encode())
     if size > MAX_BYTES:
         raise OrbiflowError(
