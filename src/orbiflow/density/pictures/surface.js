@@ -68,7 +68,7 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false,
   function webglDrawer(gl) {
     const head = `#version 300 es
       precision highp float;
-      uniform mat4 M; uniform vec3 eye, center; uniform float radius, cut, least;`;
+      uniform mat4 M; uniform vec3 eye, center; uniform float radius, cut, lowest;`;
     const depth = "depth = dot(eye, p - center) / radius;";
     const surface = program(`${head}
       in vec3 p, n; in float t, l; out vec3 normal; out float value, level, depth;
@@ -79,7 +79,7 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false,
         vec3 m = normalize(normal); m *= sign(dot(m, eye) + 1e-9);
         float light = 0.7 + 0.3 * max(dot(m, normalize(eye + 0.5 * up - 0.4 * right)), 0.0);
         vec3 own = texture(map, vec2((value * 255.0 + 0.5) / 256.0, 0.5)).rgb;
-        colour = vec4(light * (level < least ? mix(own, vec3(${PALE}), ${PALENESS}) : own), 1.0);
+        colour = vec4(light * (level < lowest ? mix(own, vec3(${PALE}), ${PALENESS}) : own), 1.0);
       }`);
     const stroke = program(`${head}
       in vec3 a, b; in vec2 corner; uniform vec2 size; uniform float width; out float depth;
@@ -177,7 +177,7 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false,
           gl.uniform3fv(at(name), value);
         gl.uniform1f(at("radius"), data.radius);
         gl.uniform1f(at("cut"), cutDepth());
-        gl.uniform1f(at("least"), view.least);
+        gl.uniform1f(at("lowest"), view.least);
         return at;
       };
       gl.viewport(0, 0, width, height);
