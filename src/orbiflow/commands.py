@@ -46,7 +46,13 @@ SUMMARIES = {
 }
 """The first sentence of each one's docstring, so that a list of all commands imports none of them."""
 
-WORK = {"density fold": "orbiflow.density.cross_validation.operations:fold"}
+WORK = {
+    "density fold": "orbiflow.density.cross_validation.operations:fold",
+    "studio table": "orbiflow.studio.density_tasks:table",
+    "studio density": "orbiflow.studio.density_tasks:density",
+    "studio density map": "orbiflow.studio.density_tasks:density_map",
+    "studio density take": "orbiflow.studio.density_tasks:take",
+}
 """Operations that others give to workers, and that are no commands."""
 
 RUN_FOLDERS = {

@@ -214,10 +214,12 @@ def surface_data(
     samples: Tensor | None = None,
     coastlines: Sequence[Array] = (),
     resolution: int | None = None,
+    levels: bool = False,
 ) -> dict[str, Any]:
     """Return what `surface.js` draws, as JSON has it: see `density_page`.
 
-    The value at a vertex is its place on the bar of colours; "caption" says what is seen.
+    The value at a vertex is its place on the bar of colours; "caption" says what is seen. With `levels`
+    there is the logarithm of the density at each vertex, too, as a share of its "span".
     """
     from matplotlib import colormaps
 
@@ -235,21 +237,26 @@ def surface_data(
     data = {
         **_surface(space, grid.points, int(values.argmax())),
         "round": space.name == "sphere",  # the near side hides the far one
-        "triangles": _packed(grid.triangles, "<u2"),
-        "values": _packed(65535 * np.clip(shade.places(values), 0, 1), "<u2"),
+        "triangles": packed(grid.triangles, "<u2"),
+        "values": packed(65535 * np.clip(shade.places(values), 0, 1), "<u2"),
         "lines": [{"width": width, **_polylines(parts)} for width, parts in lines if parts],
         "samples": "",
         "widths": "",
         "dots": settings.dots,
         "labels": _labels(view),
-        "colours": _packed(255 * colormaps[colours.COLOURS](np.linspace(0, 1, 256)), "u1"),
+        "colours": packed(255 * colormaps[colours.COLOURS](np.linspace(0, 1, 256)), "u1"),
         "ticks": [tick._asdict() for tick in colours.bar_ticks(shade, ends=True)],
         "measure": colours.bar_label(shade, space, settings.measure),
     }
+    if levels:
+        logs = np.log(np.maximum(values, values.max() * 1e-12))
+        span = float(logs.min()), float(logs.max()) + 1e-6
+        places = 65535 * (logs - span[0]) / (span[1] - span[0])
+        data |= {"levels": packed(places, "<u2"), "span": span}
     if samples is not None:
         points = torch.tensor(thinned(frames.chart_points(space, samples).numpy()))
         places, widths = uncrowded(immersion(space)(space.project(points)))
-        data |= {"samples": _packed(places, "<f4"), "widths": _packed(widths, "<f4")}
+        data |= {"samples": packed(places, "<f4"), "widths": packed(widths, "<f4")}
         notes.append(SMALLER)
     if colours.is_sharp(density, pixel=_SOFT / cells):
         notes.append(average_note(round(cells / _SOFT)))
@@ -313,12 +320,12 @@ def _surface(space: Space, points: Tensor, peak: int) -> dict[str, Any]:
         "radius": radius,
         "start": viewpoint(space, points[peak])._asdict(),
         "eye": EYE,
-        "points": _packed(places, "<f4"),
-        "normals": _packed(127 * normals(space, points), "i1"),
+        "points": packed(places, "<f4"),
+        "normals": packed(127 * normals(space, points), "i1"),
     }
 
 
-def _packed(array: Array, kind: str) -> str:
+def packed(array: Array, kind: str) -> str:
     """Return the base64 text of an array, rounded if `kind` is an integer."""
     if np.dtype(kind).kind != "f":
         array = np.rint(array)
@@ -326,7 +333,7 @@ def _packed(array: Array, kind: str) -> str:
 
 
 def _polylines(lines: list[Array]) -> dict[str, Any]:
-    return {"points": _packed(np.concatenate(lines), "<f4"), "counts": list(map(len, lines))}
+    return {"points": packed(np.concatenate(lines), "<f4"), "counts": list(map(len, lines))}
 
 
 Lines = tuple[tuple[float, list[Array]], tuple[float, list[Array]]]
