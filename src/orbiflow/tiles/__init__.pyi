@@ -106,6 +106,7 @@ from .search.escherizing import escherize as escherize
 from .search.escherizing import escherize_class as escherize_class
 from .search.escherizing import fit_tile as fit_tile
 from .search.escherizing import report as report
+from .search.escherizing import searched_classes as searched_classes
 from .search.finished_tiles import ClassFailure as ClassFailure
 from .search.finished_tiles import certified_tiles as certified_tiles
 from .search.likeness_search import LikenessSearch as LikenessSearch
@@ -122,12 +123,16 @@ from .search.tile_model import as_model as as_model
 from .search.tile_model import load_model as load_model
 from .search.tile_model import placed_field as placed_field
 from .silhouette.bending import Bending as Bending
+from .silhouette.checks import doubts as doubts
+from .silhouette.checks import parts_left_out as parts_left_out
 from .silhouette.emphasis import Emphasis as Emphasis
 from .silhouette.pins import Pins as Pins
 from .silhouette.readers.files import read_outline as read_outline
+from .silhouette.readers.pictures import open_image as open_image
 from .silhouette.readers.pictures import read_mask_array as read_mask_array
 from .silhouette.readers.reading import FileContent as FileContent
 from .silhouette.readers.reading import Reading as Reading
+from .silhouette.settings import ReadingSettings as ReadingSettings
 from .silhouette.soft_target import SoftTarget as SoftTarget
 from .silhouette.soft_target import signed_distance as signed_distance
 from .silhouette.target import Frame as Frame

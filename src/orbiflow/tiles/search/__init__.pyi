@@ -10,6 +10,7 @@ from .escherizing import escherize as escherize
 from .escherizing import escherize_class as escherize_class
 from .escherizing import fit_tile as fit_tile
 from .escherizing import report as report
+from .escherizing import searched_classes as searched_classes
 from .finished_tiles import ClassFailure as ClassFailure
 from .finished_tiles import certified_tiles as certified_tiles
 from .finished_tiles import why_poor as why_poor

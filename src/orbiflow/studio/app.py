@@ -1,0 +1,127 @@
+"""The web application: its pages, what it tells about itself, and how it says what went wrong."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter, FastAPI, Request
+from fastapi.responses import FileResponse, JSONResponse
+from fastapi.staticfiles import StaticFiles
+from starlette.exceptions import HTTPException
+from starlette.types import ASGIApp
+
+from orbiflow import __version__
+from orbiflow.drawing import PALETTES
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import find
+from orbiflow.studio.animals import ANIMALS, animal_file
+from orbiflow.studio.density_routes import density_routes
+from orbiflow.studio.guard import Guard, Refused
+from orbiflow.studio.hub import Hub
+from orbiflow.studio.kinds_of_work import kind_of_work, own_schema
+from orbiflow.studio.project_routes import project_routes
+from orbiflow.studio.settings import Limits
+from orbiflow.studio.store import Missing, Store
+from orbiflow.studio.tile_routes import tile_routes
+from orbiflow.studio.work_queue import WorkQueue
+
+STATIC = Path(__file__).parent / "static"
+MAX_PIXELS = 40_000_000  # of a picture that is read
+log = logging.getLogger("orbiflow.studio")
+
+
+def create_app(
+    store: Store,
+    queue: WorkQueue,
+    limits: Limits | None = None,
+    *,
+    port: int = 8437,
+    token: str = "",
+) -> ASGIApp:
+    """Return the application as a server runs it, behind its guard.
+
+    Args:
+        store: Where projects are kept.
+        queue: What does their work; it begins and ends with the application.
+        limits: What is taken at most.
+        port: The port by which browsers know the server.
+        token: What clients must bring, where others than this machine may reach the server.
+    """
+    limits = limits or Limits()
+    hub = Hub(store)
+
+    @asynccontextmanager
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        hub.open(asyncio.get_running_loop())
+        queue.start()
+        yield
+        hub.close()
+        await asyncio.to_thread(queue.close)
+        store.close()
+
+    app = FastAPI(
+        title="orbiflow studio", lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None
+    )
+    app.state.store, app.state.queue, app.state.hub, app.state.limits = store, queue, hub, limits
+    app.include_router(_own_routes(limits), prefix="/api")
+    app.include_router(density_routes(store, queue), prefix="/api")
+    app.include_router(project_routes(store, queue, hub, limits), prefix="/api")
+    app.include_router(tile_routes(store, queue, hub), prefix="/api")
+    app.mount("/", StaticFiles(directory=STATIC, html=True))
+    for kind in (OrbiflowError, HTTPException, Exception):
+        app.add_exception_handler(kind, _told)
+    return Guard(app, limits, port=port, token=token)
+
+
+def _own_routes(limits: Limits) -> APIRouter:
+    routes = APIRouter()
+
+    @routes.get("/about")
+    async def about() -> dict[str, Any]:
+        return {
+            "version": __version__,
+            "limits": {"bytes": limits.upload, "pixels": MAX_PIXELS, "projects": limits.projects},
+            "animals": [
+                {"name": name, "title": title, "picture": f"/api/animals/{name}.png"}
+                for name, (title, _) in ANIMALS.items()
+            ],
+            "palettes": [
+                {"name": name, "colours": list(own.colours), "outline": own.outline}
+                for name, own in PALETTES.items()
+            ],
+            "spaces": [],
+            "efforts": ["fast", "normal", "best"],
+            "touch": True,
+        }
+
+    @routes.get("/animals/{name}.png")
+    async def animal(name: str) -> FileResponse:
+        return FileResponse(animal_file(name, picture=True))
+
+    @routes.get("/operations/{name}/schema")
+    async def schema(name: str) -> dict[str, Any]:
+        kind = kind_of_work(name)
+        return own_schema(find(kind.makes or kind.work))
+
+    return routes
+
+
+async def _told(_request: Request, error: Exception) -> JSONResponse:
+    """Answer what went wrong in words, without paths or insides."""
+    if isinstance(error, Refused):
+        return JSONResponse({"error": error.text}, error.status)
+    if isinstance(error, Missing):
+        return JSONResponse({"error": str(error)}, 404)
+    if isinstance(error, OrbiflowError):
+        return JSONResponse({"error": str(error)}, 422)
+    if isinstance(error, HTTPException):
+        words = {404: "there is nothing here; go back to the start page"}
+        text = words.get(error.status_code, "this request cannot be answered; reload the page")
+        return JSONResponse({"error": text}, error.status_code)
+    log.error("a request failed", exc_info=error)
+    return JSONResponse({"error": "something went wrong in the studio; reload the page"}, 500)
