@@ -53,7 +53,7 @@ export class Grid {
     this.#rank();
   }
 
-  /** Sort the cells, densest first, with the mass and the area of all up to each. */
+  /** Sort the cells, densest first, with the mass and the area of all up to each; `top` is where it is densest. */
   #rank() {
     const [rows, columns = 1] = this.cells, order = Uint32Array.from(this.logs.keys());
     const area = (k) => (this.onGlobe ? Math.cos(Math.PI * ((Math.floor(k / columns) + 0.5) / rows - 0.5)) : 1);
@@ -67,6 +67,8 @@ export class Grid {
       this.area[k] = whole += area(cell);
     });
     this.peak = this.logs[order[0]];
+    const top = [(Math.floor(order[0] / columns) + 0.5) / rows, ((order[0] % columns) + 0.5) / columns];
+    this.top = this.turned ? top.reverse() : top;
   }
 
   /** The smallest region that holds a share of the mass: its least log density, and its share of the area. */

@@ -148,15 +148,15 @@ export class FlatMap {
 
   /** The rows: places in the window, or degrees north and east. */
   draw(pen, box) {
-    const { points, grid, axes } = this, wide = grid.onGlobe ? 2 : this.frame.axes.length, size = this.frame.shown > 1000 ? 1.3 : 2;
-    pen.fillStyle = "rgb(255 255 255 / 85%)";
+    const { points, grid, axes } = this, wide = grid.onGlobe ? 2 : this.frame.axes.length, many = this.frame.shown > 500;
+    pen.fillStyle = many ? "rgb(255 255 255 / 60%)" : "rgb(255 255 255 / 85%)";
     pen.strokeStyle = "rgb(26 26 26 / 75%)";
-    pen.lineWidth = 0.7;
+    pen.lineWidth = many ? 0.3 : 0.7;
     for (let k = 0; k < points.length; k += wide) {
       const own = (axis) => points[k + axis];
       const [x, y] = grid.onGlobe ? grid.map.spot(0.5 + own(1) / 360, 0.5 + own(0) / 180) : axes.map(own);
       pen.beginPath();
-      pen.arc(box.x + x * box.w, box.y + (1 - y) * box.h, size, 0, 7);
+      pen.arc(box.x + x * box.w, box.y + (1 - y) * box.h, many ? 1.1 : 2, 0, 7);
       pen.fill();
       pen.stroke();
     }

@@ -2,10 +2,10 @@
 
 import { showSurface } from "../../api/density/surface.js";
 import { button, choice, h, icon, put, slider, trying, unique } from "../dom.js";
-import { alive, bytes } from "../words.js";
+import { alive, bytes, capital } from "../words.js";
 import { Grid } from "./grid.js";
 import { FlatMap, drawBar, drawCurve, painted } from "./map.js";
-import { PARTS, angleText, count, figure, percent, shape } from "./words.js";
+import { EDGES, PARTS, angleText, count, figure, percent, shape } from "./words.js";
 
 const TIPS = "Drag to turn, or use the arrow keys. Plus and minus zoom, 0 starts again.";
 
@@ -27,7 +27,7 @@ export class Result {
   async show(root) {
     const { fit } = this;
     const names = fit.names.join(", "), parts = [this.views()];
-    if (fit.angles > 1) parts.push(this.conditional());
+    if (fit.angles === 2) parts.push(this.conditional());
     parts.push(h("div", { class: "facts" }, this.likelihood(), this.parts()), this.takeaway());
     put(root, h("p", { class: "soft" }, `${shape(fit.space, fit.columns.length)}. ${count(fit.rows)} rows of ${names}.`), ...parts);
     await trying(async () => {
@@ -45,12 +45,18 @@ export class Result {
     const region = slider("Show the smallest region that holds", {
       min: 0.05, max: 1, step: 0.01, value: 1, said: (share) => (share >= 1 ? "everything" : percent(share)),
     }, (share) => { this.share = share; this.mark(); });
-    const dots = h("input", { type: "checkbox", checked: true, onchange: () => this.mark() });
-    this.dots = dots;
-    const figures = [h("figure", { class: "panel stack" }, h("h2", {}, one ? "The curve" : "The map"), this.pairs, this.mapCanvas, !one && this.bar)];
+    const box = (words, checked) => {
+      const made = h("input", { type: "checkbox", checked, onchange: () => this.mark() });
+      return [made, h("label", { class: "check" }, made, words)];
+    };
+    const [dots, dotsLabel] = box("Rows of the table as dots on the map", true), [surfaceDots, surfaceLabel] = box("and on the surface", false);
+    Object.assign(this, { dots, surfaceDots });
+    const about = EDGES[one ? "circle" : fit.space];
+    const figures = [h("figure", { class: "panel stack" }, h("h2", {}, one ? "The curve" : "The map"), this.pairs, this.mapCanvas, !one && this.bar, h("p", { class: "soft small" }, about))];
     if (fit.surface) figures.unshift(this.surfaceFigure());
-    return h("section", { class: "stack" }, h("div", { class: fit.surface ? "views two" : "views" }, figures),
-      h("div", { class: "panel controls" }, h("div", {}, region, this.areaText), !one && h("label", { class: "check" }, dots, "Show the rows of the table as dots")));
+    else if (!one) figures.push(this.conditional());
+    return h("section", { class: "stack" }, h("div", { class: one ? "views" : "views two" }, figures),
+      h("div", { class: "panel controls" }, h("div", {}, region, this.areaText), !one && h("div", { class: "row" }, dotsLabel, fit.surface && surfaceLabel)));
   }
 
   surfaceFigure() {
@@ -141,6 +147,7 @@ export class Result {
       if (this.stopped || pair.join() !== this.pair.join()) return;
       this.grid = grid;
       this.map.show(grid, pair);
+      if (!this.holding) this.held.place = grid.top[this.held.axis];
       this.redrawBar?.();
       const names = pair.map((axis) => this.fit.names[axis]).join(" and ");
       this.mapCanvas.setAttribute("aria-label", `Map of the density of ${this.fit.angles ? names : this.fit.names.join(" and ")}. Bright is where rows are likely.`);
@@ -163,7 +170,7 @@ export class Result {
     if (this.surface) {
       const [low, high] = this.span;
       this.surface.view.least = least === -Infinity ? -1 : (least - low) / (high - low);
-      this.surface.view.dots = this.dots.checked;
+      this.surface.view.dots = this.surfaceDots.checked;
       this.surface.redraw();
     }
     const where = this.fit.angles > 2 ? "this map" : "the space";
@@ -210,9 +217,9 @@ export class Result {
       if (built !== this.pair.join()) {
         built = this.pair.join();
         const which = choice("Hold", [0, 1].map((axis) => [axis, names()[axis]]), this.held.axis, (axis) => {
-          this.held = { axis, place: 0.5 };
+          this.held = { axis, place: this.grid.top[axis] };
           build();
-          this.hold(0.5);
+          this.hold(this.held.place);
         });
         put(controls, which, place, says);
         build();
@@ -226,24 +233,25 @@ export class Result {
     const { mean, rows, uniform } = this.fit.likelihood, { rows: kept, gain } = this.fit.held_out, times = (nats) => figure(Math.exp(nats), 2);
     const which = rows === this.fit.rows ? `all ${count(rows)} rows` : `${count(rows)} of the ${count(this.fit.rows)} rows, drawn at random`;
     return h("section", { class: "panel stack" }, h("h2", {}, "How well it fits"),
-      h("p", { class: "big" }, `${times(mean - uniform)} times better than chance`),
+      h("p", { class: "big" }, `Rows are ${times(mean - uniform)} times as likely as by chance`),
       h("p", {}, `Mean log density: ${figure(mean, 4)} nats, over ${which} that it was made from. If all places were alike it would be ${figure(uniform, 4)}.`),
-      h("p", { class: "soft" }, `The fairer test: while it was made, ${count(kept)} rows were kept aside in turn. Of those it knew ${times(gain)} times more than chance (${figure(gain, 3)} nats).`));
+      h("p", { class: "soft" }, `The fairer test: while it was made, ${count(kept)} rows were kept aside in turn. Those were ${times(gain)} times as likely as by chance (${figure(gain, 3)} nats above).`));
   }
 
   parts() {
-    const worth = new Map(this.fit.components.map((part) => [part.name, part]));
-    const shares = Object.entries(this.fit.weights ?? {}).sort((a, b) => b[1] - a[1]);
-    const idle = this.fit.components.filter(({ name, share }) => !share && !shares.some(([own, share]) => own === name && share)).map(({ name }) => PARTS[name]?.[0] ?? name);
-    const said = ([name, share]) => {
-      const [title, about] = PARTS[name] ?? [name, ""], own = worth.get(name);
-      const gain = own && own.share ? (own.gain > own.error ? `Without it, rows would be ${figure(100 * (1 - Math.exp(-own.gain)), 2)} % less likely.` : "The others could do without it.") : "";
+    const { components, weights, notes } = this.fit;
+    const said = ({ name, share, gain, error }) => {
+      const [title, about] = PARTS[name] ?? [name, ""];
+      const worth = gain > error ? ` Without it, rows would be ${figure(100 * (1 - Math.exp(-gain)), 2)} % less likely.` : gain === undefined ? "" : " The others could do without it.";
       return h("li", {}, h("div", { class: "share" }, h("strong", {}, title), h("span", {}, percent(share))),
-        h("meter", { min: 0, max: 1, value: share, "aria-label": `${title}: ${percent(share)}` }), h("p", { class: "soft small" }, `${about}. ${gain}`));
+        h("meter", { min: 0, max: 1, value: share, "aria-label": `${title}: ${percent(share)}` }), h("p", { class: "soft small" }, `${capital(about)}.${worth}`));
     };
-    return h("section", { class: "panel stack" }, h("h2", {}, "What it is made of"), h("ul", { class: "parts" }, shares.filter(([, share]) => share > 0).map(said)),
-      idle.length > 0 && h("p", { class: "soft small" }, `Also tried, and not needed: ${idle.join(", ")}.`),
-      h("details", {}, h("summary", {}, "Notes of the fit"), h("ul", { class: "notes soft small" }, this.fit.notes.map((note) => h("li", {}, note)))));
+    const used = components.filter(({ share }) => share > 0).sort((one, other) => other.share - one.share);
+    const idle = components.filter(({ share }) => !share).map(({ name }) => PARTS[name]?.[0] ?? name);
+    if (weights?.uniform) used.push({ name: "uniform", share: weights.uniform });
+    return h("section", { class: "panel stack" }, h("h2", {}, "What it is made of"), h("ul", { class: "parts" }, used.map(said)),
+      idle.length > 0 && h("p", { class: "soft small" }, `Also tried, and not needed: ${idle.join(", ").toLowerCase()}.`),
+      h("details", {}, h("summary", {}, "Notes of the fit"), h("ul", { class: "notes soft small" }, notes.map((note) => h("li", {}, note)))));
   }
 
   takeaway() {

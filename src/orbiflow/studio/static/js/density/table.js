@@ -41,14 +41,14 @@ function firstRows(table) {
 export function chooseSpace(table, start, last) {
   const guess = last ?? table.guess;
   const chosen = { space: guess.space, columns: [...guess.columns], unit: guess.unit };
-  const units = h("div", {}), go = button("Fit the density", () => start(settings()), { kind: "primary big" });
+  const units = h("div", { class: "unit" }), go = button("Fit the density", () => start(settings()), { kind: "primary big" });
   const says = h("p", { class: "soft", role: "status" });
   const settings = () => ({ space: chosen.space, columns: chosen.columns, ...(spaceOf(chosen.space)?.angular ? { unit: chosen.unit } : {}) });
 
   const name = unique("space");
-  const spaces = h("fieldset", { class: "spaces" }, h("legend", {}, "What are the numbers?"), SPACES.map((space) =>
+  const spaces = h("fieldset", {}, h("legend", {}, "What are the numbers?"), h("div", { class: "spaces" }, SPACES.map((space) =>
     h("label", { class: "space" }, h("input", { type: "radio", name, checked: space.name === chosen.space, onchange: () => { chosen.space = space.name; fit(); } }),
-      h("span", {}, h("strong", {}, space.title), h("span", { class: "soft small" }, space.about), h("span", { class: "soft small" }, `Needs ${space.needs}.`)))));
+      h("span", {}, h("strong", {}, space.title), h("span", { class: "soft small" }, space.about), h("span", { class: "soft small" }, `Needs ${space.needs}.`))))));
   const order = h("span", { class: "soft small" });
   const columns = h("fieldset", { class: "columns" }, h("legend", {}, "Which columns?"), h("div", { class: "row" }, table.columns.map((column) => {
     const box = h("input", { type: "checkbox", checked: chosen.columns.includes(column.name), onchange: () => {
@@ -76,7 +76,7 @@ export function chooseSpace(table, start, last) {
   }
   fit();
   const why = h("p", { class: guess.space ? "notice good" : "notice" }, guess.why.charAt(0).toUpperCase() + guess.why.slice(1) + (guess.space ? ". So this is chosen already; change it if it is wrong." : "."));
-  return h("div", { class: "stack" },
+  return h("div", { class: "ask" },
     h("section", { class: "panel stack" }, h("h2", {}, "The table"), h("p", { class: "soft" }, `${count(table.rows)} rows${table.more ? `; ${count(table.more)} more columns are not shown` : ""}. Rows with an empty cell are left out.`), firstRows(table)),
     h("section", { class: "panel stack" }, h("h2", {}, "Where they live"), !last && why, spaces, columns, units, h("div", { class: "row" }, go, says)));
 }

@@ -1,7 +1,7 @@
 /** A fit as it goes on: how far it is, what it tries, and buttons to hold or stop it. */
 
 import { button, h, put, trying } from "../dom.js";
-import { STATES } from "../words.js";
+import { STATES, capital } from "../words.js";
 import { PARTS } from "./words.js";
 
 const TRIED = /^held-out part (\d+) of (\d+): (\w+)(?: of (\d+))?/;
@@ -57,7 +57,7 @@ export class Watch {
     put(this.kinds, [...this.found].map(([name, { part, parts, size }]) => {
       const [title, about] = PARTS[name] ?? [name, ""], share = part ? part / parts : this.task.share;
       return h("li", {}, h("div", { class: "share" }, h("strong", {}, title), h("span", { class: "soft small" }, part ? `part ${part} of ${parts}${size ? `, up to ${size} bumps` : ""}` : "being stirred")),
-        h("meter", { min: 0, max: 1, value: share, "aria-label": title }), h("p", { class: "soft small" }, `${about}.`));
+        h("meter", { min: 0, max: 1, value: share, "aria-label": title }), h("p", { class: "soft small" }, `${capital(about)}.`));
     }));
   }
 }

@@ -33,6 +33,15 @@ export const PARTS = {
   uniform: ["Even layer", "a thin layer everywhere, for surprises"],
 };
 
+/** What a flat map leaves out. */
+export const EDGES = {
+  circle: "The left and the right end are one.",
+  torus: "The left and the right edge are one, and so are the top and the bottom.",
+  sphere: "Equal areas look equal. The left and the right edge are one.",
+  "projective-plane": "Half of the ball from above its pole, as the other half is the same. Opposite points of the rim are one.",
+  "klein-bottle": "The left and the right edge are one. So are the top and the bottom, but one of them is turned round.",
+};
+
 /** A number in a few digits, with a true minus sign. */
 export const figure = (value, digits = 3) => {
   const size = Math.abs(value);
@@ -40,7 +49,10 @@ export const figure = (value, digits = 3) => {
   return text.replaceAll("-", "\u2212");
 };
 export const count = (value) => value.toLocaleString("en");
-export const percent = (share) => `${share > 0 && share < 0.01 ? figure(100 * share, 1) : Math.round(100 * share)} %`;
+export const percent = (share) => {
+  const rest = Math.min(share, 1 - share);
+  return `${rest > 0 && rest < 0.01 ? figure(100 * share, share < 0.5 ? 1 : 3) : Math.round(100 * share)} %`;
+};
 /** An angle of a torus' window, from 0 to 1, in its unit. */
 export const angleText = (place, unit) => {
   const turns = place - 0.5;
