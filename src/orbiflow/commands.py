@@ -56,6 +56,10 @@ WORK = {
     "studio space": "orbiflow.studio.closeup_tasks:space",
     "studio pull": "orbiflow.studio.closeup_tasks:pull",
     "studio take": "orbiflow.studio.takeaways:take",
+    "studio table": "orbiflow.studio.density_tasks:table",
+    "studio density": "orbiflow.studio.density_tasks:density",
+    "studio density map": "orbiflow.studio.density_tasks:density_map",
+    "studio density take": "orbiflow.studio.density_tasks:take",
 }
 """Operations that others give to workers, and that are no commands."""
 

@@ -66,6 +66,10 @@ KINDS = {
     "art": Kind("studio take", makes="art"),
     "solid": Kind("studio take", makes="solid"),
     "animate": Kind("studio take", makes="animate"),
+    "density table": Kind("studio table", "quick"),
+    "density fit": Kind("studio density"),
+    "density map": Kind("studio density map", "quick"),
+    "density take": Kind("studio density take"),
 }
 
 
