@@ -53,7 +53,13 @@ WORK = {
     "studio read": "orbiflow.studio.tasks:read",
     "studio open": "orbiflow.studio.tasks:open_file",
     "studio search": "orbiflow.studio.tasks:search",
+    "studio space": "orbiflow.studio.closeup_tasks:space",
+    "studio pull": "orbiflow.studio.closeup_tasks:pull",
     "studio take": "orbiflow.studio.takeaways:take",
+    "studio table": "orbiflow.studio.density_tasks:table",
+    "studio density": "orbiflow.studio.density_tasks:density",
+    "studio density map": "orbiflow.studio.density_tasks:density_map",
+    "studio density take": "orbiflow.studio.density_tasks:take",
 }
 """Operations that others give to workers, and that are no commands."""
 

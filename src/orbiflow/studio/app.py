@@ -21,6 +21,8 @@ from orbiflow.drawing import PALETTES
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import find
 from orbiflow.studio.animals import ANIMALS, animal_file
+from orbiflow.studio.closeup_routes import closeup_routes
+from orbiflow.studio.density_routes import density_routes
 from orbiflow.studio.guard import Guard, Refused
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.kinds_of_work import KINDS, kind_of_work, own_schema
@@ -72,6 +74,8 @@ def create_app(
     )
     app.state.store, app.state.queue, app.state.hub, app.state.limits = store, queue, hub, limits
     app.include_router(_own_routes(limits), prefix="/api")
+    app.include_router(closeup_routes(store, queue, hub), prefix="/api")
+    app.include_router(density_routes(store, queue), prefix="/api")
     app.include_router(project_routes(store, queue, hub, limits), prefix="/api")
     app.include_router(tile_routes(store, queue, hub), prefix="/api")
     app.mount("/", StaticFiles(directory=STATIC, html=True))

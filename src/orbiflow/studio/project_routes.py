@@ -217,7 +217,9 @@ def project_routes(store: Store, queue: WorkQueue, hub: Hub, limits: Limits) -> 
         operation, settings = given.get("operation"), given.get("settings", {})
         if not isinstance(operation, str) or not is_object(settings):
             raise OrbiflowError("a task has an operation and settings")
-        store.project(project)
+        view = store.project(project)["view"]
+        if settings.get("drawing") is True:  # as it is now
+            settings = {**settings, "drawing": json.dumps(view.get("drawing", {}))}
         number = queue.submit(project, operation, settings, most=limits.waiting)
         return {"task": shown_task(store, store.task(number))}
 

@@ -7,7 +7,10 @@ from .figures import draw_cells as draw_cells
 from .figures import flow_picture as flow_picture
 from .figures import mean_field as mean_field
 from .figures import samples_picture as samples_picture
+from .flat_data import flat_data as flat_data
+from .flat_data import flat_frame as flat_frame
 from .frames import space_title as space_title
+from .frames import symbol as symbol
 from .plots import MODEL as MODEL
 from .plots import PICTURES as PICTURES
 from .plots import REPORT as REPORT
@@ -23,5 +26,6 @@ from .settings import PlotSettings as PlotSettings
 from .square import edge_pairs as edge_pairs
 from .surfaces import density_page as density_page
 from .surfaces import immersion as immersion
+from .surfaces import surface_data as surface_data
 from .surfaces import viewpoint as viewpoint
 from .thumbnail import density_thumbnail as density_thumbnail

@@ -1,0 +1,303 @@
+/** What a fit shows: the surface, the map, regions, an angle that is held, how well it fits, and files. */
+
+import { showSurface } from "../../api/density/surface.js";
+import { button, choice, h, icon, put, slider, trying, unique } from "../dom.js";
+import { alive, bytes, capital } from "../words.js";
+import { Grid } from "./grid.js";
+import { FlatMap, drawBar, drawCurve, painted } from "./map.js";
+import { EDGES, PARTS, angleText, count, figure, percent, shape } from "./words.js";
+
+const TIPS = "Drag to turn, or use the arrow keys. Plus and minus zoom, 0 starts again.";
+
+export class Result {
+  constructor(page, fit) {
+    Object.assign(this, { page, fit, ends: [], grids: new Map(), share: 1, holding: false });
+    this.path = `projects/${page.project.id}/density/${fit.number}`;
+    this.pair = fit.angles > 1 ? [0, 1] : [0];
+    if (!fit.angles) this.pair = [0, 1];
+    this.held = { axis: 0, place: 0.5 };
+  }
+
+  stop() {
+    this.stopped = true;
+    for (const end of this.ends) end();
+  }
+
+  /** Build everything into an element. */
+  async show(root) {
+    const { fit } = this;
+    const names = fit.names.join(", "), parts = [this.views()];
+    if (fit.angles === 2) parts.push(this.conditional());
+    parts.push(h("div", { class: "facts" }, this.likelihood(), this.parts()), this.takeaway());
+    put(root, h("p", { class: "soft" }, `${shape(fit.space, fit.columns.length)}. ${count(fit.rows)} rows of ${names}.`), ...parts);
+    await trying(async () => {
+      if (fit.surface) await this.openSurface();
+      await this.openMap();
+    });
+  }
+
+  views() {
+    const { fit } = this, one = fit.angles === 1;
+    this.mapCanvas = h("canvas", { role: "img", class: one ? "curve" : fit.space === "sphere" ? "map wide" : "map" });
+    this.bar = h("canvas", { class: "bar-of-colours", "aria-hidden": "true" });
+    this.pairs = h("div", {});
+    this.areaText = h("p", { class: "soft small", role: "status" });
+    const region = slider("Show the smallest region that holds", {
+      min: 0.05, max: 1, step: 0.01, value: 1, said: (share) => (share >= 1 ? "everything" : percent(share)),
+    }, (share) => { this.share = share; this.mark(); });
+    const box = (words, checked) => {
+      const made = h("input", { type: "checkbox", checked, onchange: () => this.mark() });
+      return [made, h("label", { class: "check" }, made, words)];
+    };
+    const [dots, dotsLabel] = box("Rows of the table as dots on the map", true), [surfaceDots, surfaceLabel] = box("and on the surface", false);
+    Object.assign(this, { dots, surfaceDots });
+    const about = EDGES[one ? "circle" : fit.space];
+    const figures = [h("figure", { class: "panel stack" }, h("h2", {}, one ? "The curve" : "The map"), this.pairs, this.mapCanvas, !one && this.bar, h("p", { class: "soft small" }, about))];
+    if (fit.surface) figures.unshift(this.surfaceFigure());
+    else if (!one) figures.push(this.conditional());
+    return h("section", { class: "stack" }, h("div", { class: one ? "views" : "views two" }, figures),
+      h("div", { class: "panel controls" }, h("div", {}, region, this.areaText), !one && h("div", { class: "row" }, dotsLabel, fit.surface && surfaceLabel)));
+  }
+
+  surfaceFigure() {
+    this.surfaceCanvas = h("canvas", { role: "img", tabindex: "0", "aria-describedby": "surface-tips" });
+    this.cut = slider("Cut away the front", { min: 0, max: 100, step: 1, value: 0, said: (cut) => `${cut} %` }, (cut) => {
+      if (this.surface) { this.surface.view.cut = cut; this.surface.redraw(); }
+    });
+    this.caption = h("p", { class: "soft small" });
+    return h("figure", { class: "panel stack" }, h("h2", {}, "The surface"), h("div", { class: "turned" }, this.surfaceCanvas),
+      h("p", { class: "soft small", id: "surface-tips" }, TIPS), this.cut,
+      h("details", {}, h("summary", {}, "What am I looking at?"), this.caption));
+  }
+
+  async openSurface() {
+    const data = await this.page.api.get(`${this.path}/surface`);
+    if (this.stopped) return;
+    this.span = data.span;
+    this.caption.textContent = data.caption;
+    this.surfaceCanvas.setAttribute("aria-label", `The density on its surface. ${data.caption}`);
+    this.cut.hidden = data.round;
+    this.surface = showSurface(this.surfaceCanvas, data, { scrolls: true, changed: (view) => this.cut.set(view.cut) });
+    this.cut.set(data.start.cut);
+    this.ends.push(() => this.surface.stop());
+    this.mark();
+  }
+
+  async openMap() {
+    const { fit } = this;
+    if (fit.angles === 1) {
+      const curve = painted(this.mapCanvas, (pen, width, height) => {
+        const own = this.grid && Float64Array.from(this.grid.logs, Math.exp);
+        if (own) drawCurve(pen, width, height, { values: [...own], axis: fit.axes[0], peak: Math.exp(this.grid.peak), least: this.least });
+      });
+      this.ends.push(curve.stop);
+      this.map = { redraw: curve.redraw, show: curve.redraw };
+    } else {
+      this.map = new FlatMap(this.mapCanvas, fit, { pick: (u, v) => this.pick(u, v) });
+      const bar = painted(this.bar, (pen, width, height) => {
+        pen.clearRect(0, 0, width, height);
+        if (this.grid) drawBar(pen, width, fit, this.grid.data);
+      });
+      this.ends.push(() => this.map.stop(), bar.stop);
+      this.redrawBar = bar.redraw;
+      if (fit.angles > 2) this.choosePair();
+    }
+    await this.showPair();
+  }
+
+  /** Two boxes that say which angles the map shows. */
+  choosePair() {
+    const box = (place, words) => {
+      const id = unique("angle");
+      const made = h("select", { id, onchange: () => {
+        const other = this.pair[1 - place], chosen = Number(made.value);
+        if (chosen === other) this.pair[1 - place] = this.pair[place];
+        this.pair[place] = chosen;
+        this.boxes.forEach((each, k) => { each.value = this.pair[k]; });
+        trying(() => this.showPair());
+      } }, this.fit.names.map((name, k) => h("option", { value: k }, name)));
+      made.value = this.pair[place];
+      return [h("div", {}, h("label", { for: id, class: "label" }, words), made), made];
+    };
+    const made = [box(0, "Across"), box(1, "Up")];
+    this.boxes = made.map(([, select]) => select);
+    put(this.pairs, h("div", { class: "row pair" }, made.map(([root]) => root)), h("p", { class: "soft small" }, "Whatever the other angles are."));
+  }
+
+  /** The grid of two angles: the server is asked once for each two. */
+  async gridOf(pair) {
+    const key = pair.join("-");
+    if (!this.grids.has(key)) {
+      const axes = [...pair].sort((a, b) => a - b), ask = () => this.page.api.get(`${this.path}/map?axes=${axes.join("-")}`);
+      const data = await ask().catch(async (error) => {
+        if (error.status !== 404) throw error;
+        await this.work("density map", { fit: this.fit.number, axes });
+        return ask();
+      });
+      this.grids.set(key, new Grid(data, this.fit.space, pair[0] > pair[1]));
+    }
+    return this.grids.get(key);
+  }
+
+  async showPair() {
+    this.mapCanvas.classList.add("busy");
+    const pair = [...this.pair];
+    try {
+      const grid = await this.gridOf(pair);
+      if (this.stopped || pair.join() !== this.pair.join()) return;
+      this.grid = grid;
+      this.map.show(grid, pair);
+      if (!this.holding) this.held.place = grid.top[this.held.axis];
+      this.redrawBar?.();
+      const names = pair.map((axis) => this.fit.names[axis]).join(" and ");
+      this.mapCanvas.setAttribute("aria-label", `Map of the density of ${this.fit.angles ? names : this.fit.names.join(" and ")}. Bright is where rows are likely.`);
+      this.mark();
+      this.drawHolding?.();
+    } finally {
+      if (pair.join() === this.pair.join()) this.mapCanvas.classList.remove("busy");
+    }
+  }
+
+  /** Mark the region on both pictures, and say how large it is. */
+  mark() {
+    if (!this.grid) return;
+    const { least, area } = this.grid.region(this.share);
+    this.least = least;
+    this.map.least = least;
+    this.map.dots = this.dots.checked;
+    this.map.held = this.holding ? this.held : null;
+    this.map.redraw();
+    if (this.surface) {
+      const [low, high] = this.span;
+      this.surface.view.least = least === -Infinity ? -1 : (least - low) / (high - low);
+      this.surface.view.dots = this.surfaceDots.checked;
+      this.surface.redraw();
+    }
+    const where = this.fit.angles > 2 ? "this map" : "the space";
+    this.areaText.textContent = this.share >= 1 ? "Pull the slider to find where most rows are." : `${percent(this.share)} of all rows to come fall into ${percent(area)} of ${where}.`;
+  }
+
+  pick(u, v) {
+    if (this.fit.angles < 2) return;
+    this.hold(this.held.axis === 0 ? u : v);
+    this.heldSlider.set(this.held.place);
+  }
+
+  hold(place) {
+    this.holding = true;
+    this.held.place = place;
+    this.mark();
+    this.drawHolding();
+  }
+
+  /** One angle is held: the curve of the other follows. */
+  conditional() {
+    const canvas = h("canvas", { class: "curve", role: "img" }), controls = h("div", { class: "stack" }), place = h("div", {});
+    const says = h("p", { class: "soft small" });
+    const curve = painted(canvas, (pen, width, height) => {
+      if (!this.grid) return;
+      const { axis, place: at } = this.held, other = this.pair[1 - axis];
+      const values = [...this.grid.slice(axis, at)];
+      drawCurve(pen, width, height, { values, axis: this.fit.axes[other], peak: Math.max(...values) });
+    });
+    this.ends.push(curve.stop);
+    const names = () => this.pair.map((axis) => this.fit.names[axis]);
+    const build = () => {
+      const [name, other] = this.held.axis === 0 ? names() : names().reverse();
+      this.heldSlider = slider(`${name} is held at`, {
+        min: 0, max: 1, step: 1 / 360, value: this.held.place, said: (at) => `${name} = ${angleText(at, this.fit.unit)}`,
+      }, (at) => this.hold(at));
+      put(place, this.heldSlider);
+      says.textContent = `The curve says how likely each ${other} then is. You may also drag on the map.`;
+      canvas.setAttribute("aria-label", `Curve of ${other} while ${name} is held`);
+      curve.redraw();
+    };
+    let built = "";
+    this.drawHolding = () => {
+      if (built !== this.pair.join()) {
+        built = this.pair.join();
+        const which = choice("Hold", [0, 1].map((axis) => [axis, names()[axis]]), this.held.axis, (axis) => {
+          this.held = { axis, place: this.grid.top[axis] };
+          build();
+          this.hold(this.held.place);
+        });
+        put(controls, which, place, says);
+        build();
+      }
+      curve.redraw();
+    };
+    return h("section", { class: "panel split" }, h("div", { class: "stack" }, h("h2", {}, "If you know one angle"), controls), canvas);
+  }
+
+  likelihood() {
+    const { mean, rows, uniform } = this.fit.likelihood, { rows: kept, gain } = this.fit.held_out, times = (nats) => figure(Math.exp(nats), 2);
+    const which = rows === this.fit.rows ? `all ${count(rows)} rows` : `${count(rows)} of the ${count(this.fit.rows)} rows, drawn at random`;
+    return h("section", { class: "panel stack" }, h("h2", {}, "How well it fits"),
+      h("p", { class: "big" }, `Rows are ${times(mean - uniform)} times as likely as by chance`),
+      h("p", {}, `Mean log density: ${figure(mean, 4)} nats, over ${which} that it was made from. If all places were alike it would be ${figure(uniform, 4)}.`),
+      h("p", { class: "soft" }, `The fairer test: while it was made, ${count(kept)} rows were kept aside in turn. Those were ${times(gain)} times as likely as by chance (${figure(gain, 3)} nats above).`));
+  }
+
+  parts() {
+    const { components, weights, notes } = this.fit;
+    const said = ({ name, share, gain, error }) => {
+      const [title, about] = PARTS[name] ?? [name, ""];
+      const worth = gain > error ? ` Without it, rows would be ${figure(100 * (1 - Math.exp(-gain)), 2)} % less likely.` : gain === undefined ? "" : " The others could do without it.";
+      return h("li", {}, h("div", { class: "share" }, h("strong", {}, title), h("span", {}, percent(share))),
+        h("meter", { min: 0, max: 1, value: share, "aria-label": `${title}: ${percent(share)}` }), h("p", { class: "soft small" }, `${capital(about)}.${worth}`));
+    };
+    const used = components.filter(({ share }) => share > 0).sort((one, other) => other.share - one.share);
+    const idle = components.filter(({ share }) => !share).map(({ name }) => PARTS[name]?.[0] ?? name);
+    if (weights?.uniform) used.push({ name: "uniform", share: weights.uniform });
+    return h("section", { class: "panel stack" }, h("h2", {}, "What it is made of"), h("ul", { class: "parts" }, used.map(said)),
+      idle.length > 0 && h("p", { class: "soft small" }, `Also tried, and not needed: ${idle.join(", ").toLowerCase()}.`),
+      h("details", {}, h("summary", {}, "Notes of the fit"), h("ul", { class: "notes soft small" }, notes.map((note) => h("li", {}, note)))));
+  }
+
+  takeaway() {
+    const amount = h("input", { type: "number", id: unique("amount"), min: 1, max: 1000000, value: 1000 });
+    const format = h("select", { id: unique("format") }, [["png", "PNG, for screens"], ["svg", "SVG, for print"], ["pdf", "PDF, for print"]].map(([value, words]) => h("option", { value }, words)));
+    const made = h("ul", { class: "made" });
+    const make = (what, settings = () => ({})) => () => trying(() => this.submit("density take", { fit: this.fit.number, what, ...settings() }));
+    const card = (title, about, act, ...fields) => h("div", { class: "take stack" }, h("h3", {}, title), h("p", { class: "soft small" }, about), fields, act);
+    const get = (what, settings) => button("Make it", make(what, settings), { image: "more", "aria-label": `Make ${what}` });
+    const list = () => {
+      const tasks = this.page.project.tasks.filter(({ operation }) => operation === "density take");
+      put(made, tasks.map((task) => h("li", {}, alive(task) ? h("span", { role: "status" }, `${task.what || "Waiting"} …`) : task.state === "done"
+        ? task.result.files.map((file) => h("a", { class: "button", download: file.name, href: `api/takeaways/${task.id}/files/${encodeURIComponent(file.name)}` }, icon("download"), `${file.name}, ${bytes(file.bytes)}`))
+        : h("span", { class: "error" }, task.error ?? "Stopped."))));
+    };
+    this.ends.push(this.page.events.on("task", list), this.page.events.on("refresh", list));
+    list();
+    return h("section", { class: "panel stack" }, h("h2", {}, "Take away"), h("div", { class: "takes" },
+      card("New rows", "As many as you like, drawn from the density.", get("samples", () => ({ count: Number(amount.value) })), h("label", { for: amount.id, class: "label" }, "How many"), amount),
+      card("Pictures", "The map, and the surface as a page of its own.", get("figures", () => ({ format: format.value })), h("label", { for: format.id, class: "label" }, "Format"), format),
+      card("Regions", "The smallest outlines that hold a half and nine tenths.", get("regions")),
+      card("The density itself", "To go on with in Python, or with the command orbiflow density.", get("model"))), made);
+  }
+
+  /** Give the server a task. */
+  async submit(operation, settings) {
+    const { project, api } = this.page;
+    const { task } = await api.post(`projects/${project.id}/tasks`, { operation, settings });
+    return task;
+  }
+
+  /** Give the server a task, and wait for its end. */
+  async work(operation, settings) {
+    const { id } = await this.submit(operation, settings);
+    return new Promise((resolve, reject) => {
+      const look = () => {
+        const task = this.page.project.tasks.find((own) => own.id === id);
+        if (!task || alive(task)) return;
+        end();
+        if (task.state === "done") resolve(task);
+        else reject(new Error(task.error ?? "Stopped."));
+      };
+      const offs = [this.page.events.on("task", look), this.page.events.on("refresh", look)];
+      const end = () => offs.forEach((off) => off());
+      this.ends.push(end);
+      look();
+    });
+  }
+}

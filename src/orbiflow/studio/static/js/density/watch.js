@@ -1,0 +1,63 @@
+/** A fit as it goes on: how far it is, what it tries, and buttons to hold or stop it. */
+
+import { button, h, put, trying } from "../dom.js";
+import { STATES, capital } from "../words.js";
+import { PARTS } from "./words.js";
+
+const TRIED = /^held-out part (\d+) of (\d+): (\w+)(?: of (\d+))?/;
+
+export class Watch {
+  constructor(page, task) {
+    Object.assign(this, { page, found: new Map(), lines: [] });
+    this.bar = h("progress", { max: 1, "aria-label": "How far the fit is" });
+    this.says = h("p", { role: "status" });
+    this.kinds = h("ul", { class: "parts" });
+    this.log = h("ol", { class: "notes soft small", reversed: true });
+    this.buttons = h("div", { class: "row" });
+    this.root = h("section", { class: "panel stack watch" }, h("h2", {}, "Fitting"), this.bar, this.says, this.buttons,
+      h("p", { class: "soft small" }, "Several kinds of density are tried. Rows that were kept aside choose among them."), this.kinds,
+      h("details", {}, h("summary", {}, "Every step"), this.log));
+    this.update(task);
+  }
+
+  update(task) {
+    this.task = task;
+    this.bar.value = task.share;
+    this.hear(task.what ?? "");
+    const state = task.state === "waiting" && task.place ? `${STATES.waiting}: ${task.place} before it` : STATES[task.state];
+    this.says.textContent = task.state === "running" ? `${Math.round(100 * task.share)} % done. ${this.words()}` : state;
+    this.steer();
+  }
+
+  /** Draw the buttons, if others are needed: the focus stays where it is. */
+  steer() {
+    if (this.state === this.task.state) return;
+    this.state = this.task.state;
+    const act = (verb) => () => trying(() => this.page.api.post(`tasks/${this.task.id}/${verb}`));
+    const focused = this.buttons.contains(document.activeElement);
+    put(this.buttons, this.state === "paused" ? button("Go on", act("resume"), { image: "play", kind: "primary" }) : button("Pause", act("pause"), { image: "pause" }),
+      button("Stop", act("cancel"), { image: "stop" }));
+    if (focused) this.buttons.firstChild.focus();
+  }
+
+  words() {
+    const tried = TRIED.exec(this.task.what);
+    if (tried) return `Kept-aside part ${tried[1]} of ${tried[2]}: ${(PARTS[tried[3]]?.[0] ?? tried[3]).toLowerCase()}.`;
+    return { flow: "Stirring the dough.", drawing: "Drawing.", "putting together": "Putting it together." }[this.task.what.split(":")[0]] ?? "";
+  }
+
+  hear(what) {
+    if (!what || what === this.lines.at(-1)) return;
+    this.lines.push(what);
+    this.log.prepend(h("li", {}, what));
+    const tried = TRIED.exec(what), kind = tried ? tried[3] : what.startsWith("flow") ? "flow" : null;
+    if (!kind) return;
+    const own = this.found.get(kind) ?? {};
+    this.found.set(kind, tried ? { part: Number(tried[1]), parts: Number(tried[2]), size: tried[4] ?? own.size } : { going: true });
+    put(this.kinds, [...this.found].map(([name, { part, parts, size }]) => {
+      const [title, about] = PARTS[name] ?? [name, ""], share = part ? part / parts : this.task.share;
+      return h("li", {}, h("div", { class: "share" }, h("strong", {}, title), h("span", { class: "soft small" }, part ? `part ${part} of ${parts}${size ? `, up to ${size} bumps` : ""}` : "being stirred")),
+        h("meter", { min: 0, max: 1, value: share, "aria-label": title }), h("p", { class: "soft small" }, `${capital(about)}.`));
+    }));
+  }
+}
