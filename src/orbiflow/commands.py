@@ -51,6 +51,7 @@ SUMMARIES = {
 WORK = {
     "density fold": "orbiflow.density.cross_validation.operations:fold",
     "studio read": "orbiflow.studio.tasks:read",
+    "studio open": "orbiflow.studio.tasks:open_file",
     "studio search": "orbiflow.studio.tasks:search",
     "studio take": "orbiflow.studio.takeaways:take",
 }

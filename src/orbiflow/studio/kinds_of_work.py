@@ -55,6 +55,7 @@ ART_FORMATS = ("png", "svg")
 
 KINDS = {
     "read": Kind("studio read", "quick"),
+    "open": Kind("studio open", "quick"),
     "search": Kind("studio search"),
     "export": Kind("studio take", makes="export"),
     "art": Kind("studio take", makes="art"),
