@@ -78,13 +78,7 @@ def map_file(fit: Path, axes: tuple[int, ...]) -> Path:
 
 
 @operation("studio table")
-def table(
-    project: Path,
-    task: int,
-    *,
-    on_event: Sink = ignore,
-    cancel: Cancel = NEVER,
-) -> Outcome:
+def table(project: Path, task: int, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> Outcome:
     """Look at the table of a project.
 
     Args:
@@ -101,12 +95,7 @@ def table(
 
 @operation("studio density")
 def density(
-    project: Path,
-    task: int,
-    choice: FitChoice,
-    *,
-    on_event: Sink = ignore,
-    cancel: Cancel = NEVER,
+    project: Path, task: int, choice: FitChoice, *, on_event: Sink = ignore, cancel: Cancel = NEVER
 ) -> Outcome:
     """Fit a density to columns of a project's table, and draw it.
 

@@ -114,7 +114,9 @@ def _pair(density: Density, axes: tuple[int, ...]) -> Array:
     view, t = frames.view_of(density.space), _middles(CELLS["pair"])
     if len(set(axes)) != 2 or not all(0 <= axis < density.space.dim for axis in axes):
         raise OrbiflowError(f"a flat picture is of two different angles, got {list(axes)}")
-    grid = torch.stack(torch.meshgrid(*(t + view.low[axis] for axis in axes), indexing="ij"), dim=-1)
+    grid = torch.stack(
+        torch.meshgrid(*(t + view.low[axis] for axis in axes), indexing="ij"), dim=-1
+    )
     points = torch.full((len(t) ** 2, density.space.dim), math.nan, dtype=torch.float64)
     points[:, list(axes)] = grid.reshape(-1, 2)
     logs = log_prob_observed(density, points, measure=NATURAL)

@@ -4,7 +4,7 @@ import { showSurface } from "../../api/density/surface.js";
 import { button, choice, h, icon, put, slider, trying, unique } from "../dom.js";
 import { alive, bytes, capital } from "../words.js";
 import { Grid } from "./grid.js";
-import { FlatMap, drawBar, drawCurve, painted } from "./map.js";
+import { FlatMap, dark, drawBar, drawCurve, painted, pale } from "./map.js";
 import { EDGES, PARTS, angleText, count, figure, percent, shape } from "./words.js";
 
 const TIPS = "Drag to turn, or use the arrow keys. Plus and minus zoom, 0 starts again.";
@@ -79,7 +79,9 @@ export class Result {
     this.cut.hidden = data.round;
     this.surface = showSurface(this.surfaceCanvas, data, { scrolls: true, changed: (view) => this.cut.set(view.cut) });
     this.cut.set(data.start.cut);
-    this.ends.push(() => this.surface.stop());
+    const shade = () => this.mark();
+    dark.addEventListener("change", shade);
+    this.ends.push(() => this.surface.stop(), () => dark.removeEventListener("change", shade));
     this.mark();
   }
 
@@ -170,6 +172,7 @@ export class Result {
     if (this.surface) {
       const [low, high] = this.span;
       this.surface.view.least = least === -Infinity ? -1 : (least - low) / (high - low);
+      this.surface.view.pale = pale();
       this.surface.view.dots = this.surfaceDots.checked;
       this.surface.redraw();
     }
