@@ -51,7 +51,10 @@ SUMMARIES = {
 WORK = {
     "density fold": "orbiflow.density.cross_validation.operations:fold",
     "studio read": "orbiflow.studio.tasks:read",
+    "studio open": "orbiflow.studio.tasks:open_file",
     "studio search": "orbiflow.studio.tasks:search",
+    "studio space": "orbiflow.studio.closeup_tasks:space",
+    "studio pull": "orbiflow.studio.closeup_tasks:pull",
     "studio take": "orbiflow.studio.takeaways:take",
     "studio table": "orbiflow.studio.density_tasks:table",
     "studio density": "orbiflow.studio.density_tasks:density",

@@ -77,6 +77,11 @@ class CallProcess:
         """The number of the process, which is that of its group and session, too."""
         return self._process.pid
 
+    @property
+    def alive(self) -> bool:
+        """Whether it has not ended."""
+        return self._process.poll() is None
+
     def __enter__(self) -> CallProcess:
         return self
 

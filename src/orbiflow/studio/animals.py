@@ -8,24 +8,22 @@ from orbiflow.studio.store import Missing
 
 FOLDER = Path(__file__).parent / "animals"
 ANIMALS = {
-    "turtle": ("Turtle", ".png"),
-    "night-monkey": ("Night monkey", ".png"),
-    "barbet": ("Bird", ".svg"),
+    "turtle": "Turtle",
+    "gecko": "Gecko",
+    "frog": "Frog",
+    "barbet": "Bird",
+    "monkey": "Night monkey",
+    "crocodile": "Crocodile",
+    "potoroo": "Rat kangaroo",
+    "shark": "Shark",
+    "bat": "Bat",
+    "paca": "Paca",
 }
-"""Titles and endings by name."""
+"""What people call each animal."""
 
 
-def animal_file(name: str, *, picture: bool = False) -> Path:
-    """Return the file of an animal; as a picture, one that every browser shows."""
-    return FOLDER / f"{name}{'.png' if picture else _known(name)[1]}"
-
-
-def animal_title(name: str) -> str:
-    """Return what people call an animal."""
-    return _known(name)[0]
-
-
-def _known(name: str) -> tuple[str, str]:
+def animal_file(name: str) -> Path:
+    """Return the picture of an animal."""
     if name not in ANIMALS:
         raise Missing(f"there is no such animal; there are {', '.join(ANIMALS)}")
-    return ANIMALS[name]
+    return FOLDER / f"{name}.png"

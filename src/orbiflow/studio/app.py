@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fastapi import APIRouter, FastAPI, Request
+from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 from starlette.exceptions import HTTPException
@@ -20,10 +21,11 @@ from orbiflow.drawing import PALETTES
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import find
 from orbiflow.studio.animals import ANIMALS, animal_file
+from orbiflow.studio.closeup_routes import closeup_routes
 from orbiflow.studio.density_routes import density_routes
 from orbiflow.studio.guard import Guard, Refused
 from orbiflow.studio.hub import Hub
-from orbiflow.studio.kinds_of_work import kind_of_work, own_schema
+from orbiflow.studio.kinds_of_work import KINDS, kind_of_work, own_schema
 from orbiflow.studio.project_routes import project_routes
 from orbiflow.studio.settings import Limits
 from orbiflow.studio.store import Missing, Store
@@ -58,6 +60,9 @@ def create_app(
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         hub.open(asyncio.get_running_loop())
+        for kind in KINDS.values():  # no request waits for imports
+            find(kind.work)
+            find(kind.makes or kind.work)
         queue.start()
         yield
         hub.close()
@@ -69,11 +74,12 @@ def create_app(
     )
     app.state.store, app.state.queue, app.state.hub, app.state.limits = store, queue, hub, limits
     app.include_router(_own_routes(limits), prefix="/api")
+    app.include_router(closeup_routes(store, queue, hub), prefix="/api")
     app.include_router(density_routes(store, queue), prefix="/api")
     app.include_router(project_routes(store, queue, hub, limits), prefix="/api")
     app.include_router(tile_routes(store, queue, hub), prefix="/api")
     app.mount("/", StaticFiles(directory=STATIC, html=True))
-    for kind in (OrbiflowError, HTTPException, Exception):
+    for kind in (Refused, OrbiflowError, RequestValidationError, HTTPException, Exception):
         app.add_exception_handler(kind, _told)
     return Guard(app, limits, port=port, token=token)
 
@@ -88,12 +94,9 @@ def _own_routes(limits: Limits) -> APIRouter:
             "limits": {"bytes": limits.upload, "pixels": MAX_PIXELS, "projects": limits.projects},
             "animals": [
                 {"name": name, "title": title, "picture": f"/api/animals/{name}.png"}
-                for name, (title, _) in ANIMALS.items()
+                for name, title in ANIMALS.items()
             ],
-            "palettes": [
-                {"name": name, "colours": list(own.colours), "outline": own.outline}
-                for name, own in PALETTES.items()
-            ],
+            "palettes": [{"name": name, **own._asdict()} for name, own in PALETTES.items()],
             "spaces": [],
             "efforts": ["fast", "normal", "best"],
             "touch": True,
@@ -101,7 +104,7 @@ def _own_routes(limits: Limits) -> APIRouter:
 
     @routes.get("/animals/{name}.png")
     async def animal(name: str) -> FileResponse:
-        return FileResponse(animal_file(name, picture=True))
+        return FileResponse(animal_file(name))
 
     @routes.get("/operations/{name}/schema")
     async def schema(name: str) -> dict[str, Any]:
@@ -119,6 +122,8 @@ async def _told(_request: Request, error: Exception) -> JSONResponse:
         return JSONResponse({"error": str(error)}, 404)
     if isinstance(error, OrbiflowError):
         return JSONResponse({"error": str(error)}, 422)
+    if isinstance(error, RequestValidationError):
+        return JSONResponse({"error": "this address is not complete; reload the page"}, 422)
     if isinstance(error, HTTPException):
         words = {404: "there is nothing here; go back to the start page"}
         text = words.get(error.status_code, "this request cannot be answered; reload the page")

@@ -42,7 +42,7 @@ class Kind:
             if taken := [name for name in place if name in settings]:
                 raise SettingError(f"the studio itself sets {taken[0]}; leave it out")
             return find(self.work).call({**place, **settings})
-        own = {name: settings[name] for name in ("tile", "picture") if name in settings}
+        own = {name: settings[name] for name in ("tile", "picture", "drawing") if name in settings}
         rest = {name: value for name, value in settings.items() if name not in own}
         making_call(self.makes, rest, Path("tile"))
         return find(self.work).call(
@@ -50,12 +50,18 @@ class Kind:
         )
 
 
+DRAWN = ("export", "art")
+"""What shows the drawing on a tile."""
+
 ART_FORMATS = ("png", "svg")
 """The endings of a picture's file, whose settings have no format."""
 
 KINDS = {
     "read": Kind("studio read", "quick"),
+    "open": Kind("studio open", "quick"),
     "search": Kind("studio search"),
+    "space": Kind("studio space", "quick"),
+    "pull": Kind("studio pull", "quick"),
     "export": Kind("studio take", makes="export"),
     "art": Kind("studio take", makes="art"),
     "solid": Kind("studio take", makes="solid"),

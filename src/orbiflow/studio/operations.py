@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import secrets
+import socket
 import threading
 import webbrowser
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import NEVER, Cancel, Note, Outcome, Sink, ignore, operation
-from orbiflow.studio.settings import Limits, StudioSettings
+from orbiflow.studio.settings import StudioSettings
 
 EXTRA = ("fastapi", "uvicorn", "platformdirs")
 
@@ -62,26 +64,27 @@ def _serve(
     from orbiflow.studio.work_queue import WorkQueue
 
     cancel.check()
-    store = Store(folder)
-    queue = WorkQueue(store)
     host = f"[{settings.host}]" if ":" in settings.host else settings.host
     address = f"http://{host}:{settings.port}/" + (f"?token={token}" if token else "")
-    app = create_app(store, queue, Limits(), port=settings.port, token=token)
-    server = uvicorn.Server(
-        uvicorn.Config(
-            app,
-            host=settings.host,
-            port=settings.port,
-            log_level="warning",
-            server_header=False,
-            timeout_keep_alive=20,
-            timeout_graceful_shutdown=2,
-            limit_concurrency=400,
-        )
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    try:
+        own = socket.create_server((settings.host, settings.port), family=family, backlog=256)
+    except OSError as error:
+        raise SettingError(
+            f"{settings.host} {{port}} {settings.port} cannot be had ({error.strerror}); give another "
+            "{port}"
+        ) from error
+    store = Store(folder)
+    app = create_app(store, WorkQueue(store), port=settings.port, token=token)
+    config = uvicorn.Config(
+        app,
+        log_level="warning",
+        server_header=False,
+        timeout_graceful_shutdown=1,
+        limit_concurrency=400,
     )
     on_event(Note(f"the studio is at {address} and keeps its projects in {folder}; Ctrl-C ends it"))
     if settings.browser:
-        threading.Timer(1.0, webbrowser.open, [address]).start()
-    server.run()
-    if not server.started:
-        raise OrbiflowError(f"port {settings.port} cannot be had; give another one as port")
+        threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+    with own, suppress(KeyboardInterrupt):
+        uvicorn.Server(config).run(sockets=[own])

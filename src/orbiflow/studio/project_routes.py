@@ -11,15 +11,17 @@ from typing import Any
 
 from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse, StreamingResponse
+from starlette.background import BackgroundTask
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_object
-from orbiflow.studio.animals import animal_file, animal_title
+from orbiflow.studio.animals import ANIMALS, animal_file
 from orbiflow.studio.guard import Refused
 from orbiflow.studio.hub import Hub
+from orbiflow.studio.project_file import ENDING, write_project
 from orbiflow.studio.settings import Limits
 from orbiflow.studio.store import Store
-from orbiflow.studio.words import MASKS, shown_project, shown_summary, shown_task
+from orbiflow.studio.words import MASKS, plain_name, shown_project, shown_summary, shown_task
 from orbiflow.studio.work_queue import WorkQueue
 from orbiflow.tiles import ReadingSettings
 
@@ -37,13 +39,6 @@ async def body_object(request: Request) -> dict[str, Any]:
     if not is_object(found):
         raise Refused(400, "the request is no JSON object; reload the page")
     return found
-
-
-def plain_name(given: Any, otherwise: str) -> str:
-    """Return a name on one line, without folders."""
-    text = given if isinstance(given, str) else ""
-    text = PurePosixPath(text.replace("\\", "/")).name
-    return "".join(letter for letter in text if letter.isprintable()).strip()[:80] or otherwise
 
 
 async def save_body(request: Request, file: Path) -> None:
@@ -100,6 +95,34 @@ def project_routes(store: Store, queue: WorkQueue, hub: Hub, limits: Limits) -> 
         made = store.create(kind, name, limits.projects)
         return shown_project(store, store.project(made))
 
+    @routes.post("/projects/open")
+    async def open_file(request: Request) -> dict[str, Any]:
+        made = store.create("tile", "Opened project", limits.projects)
+        try:
+            await save_body(request, store.home(made) / f"opened{ENDING}")
+            queue.submit(made, "open", {}, most=limits.waiting)
+        except BaseException:
+            store.delete(made)
+            raise
+        return shown_project(store, store.project(made))
+
+    @routes.get("/projects/{project}/file")
+    def file(project: str) -> FileResponse:
+        with store.still():
+            own = store.project(project)
+            cards = store.cards(project)
+        names = ("name", "kind", "view", "reading", "input")
+        tiles = [{name: card[name] for name in ("id", "parent")} for card in cards]
+        home = store.home(project)
+        out = home / f".{secrets.token_hex(4)}.tmp"
+        write_project(home, {**{name: own[name] for name in names}, "tiles": tiles}, out)
+        return FileResponse(
+            out,
+            filename=f"{own['name']}{ENDING}",
+            media_type="application/zip",
+            background=BackgroundTask(out.unlink, missing_ok=True),
+        )
+
     @routes.get("/projects/{project}")
     async def get(project: str) -> dict[str, Any]:
         with store.still():
@@ -142,9 +165,9 @@ def project_routes(store: Store, queue: WorkQueue, hub: Hub, limits: Limits) -> 
         name = str((await body_object(request)).get("name"))
         store.project(project)
         source = animal_file(name)
-        file = store.home(project) / f"input{source.suffix}"
+        file = store.home(project) / "input.png"
         file.write_bytes(source.read_bytes())
-        return new_input(project, f"{animal_title(name)}{source.suffix}", file)
+        return new_input(project, f"{ANIMALS[name]}.png", file)
 
     @routes.put("/projects/{project}/reading")
     async def reading(request: Request, project: str) -> dict[str, Any]:
@@ -194,7 +217,9 @@ def project_routes(store: Store, queue: WorkQueue, hub: Hub, limits: Limits) -> 
         operation, settings = given.get("operation"), given.get("settings", {})
         if not isinstance(operation, str) or not is_object(settings):
             raise OrbiflowError("a task has an operation and settings")
-        store.project(project)
+        view = store.project(project)["view"]
+        if settings.get("drawing") is True:  # as it is now
+            settings = {**settings, "drawing": json.dumps(view.get("drawing", {}))}
         number = queue.submit(project, operation, settings, most=limits.waiting)
         return {"task": shown_task(store, store.task(number))}
 

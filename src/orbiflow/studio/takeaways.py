@@ -21,10 +21,12 @@ from orbiflow.runtime import (
     make_folder,
     operation,
 )
-from orbiflow.studio.kinds_of_work import file_ending, making_call
+from orbiflow.studio.closeup_tasks import with_drawing
+from orbiflow.studio.kinds_of_work import DRAWN, file_ending, making_call
 from orbiflow.studio.tile_files import tile_folder
 
 PREVIEW = "preview.png"
+SCRATCH = ".drawn"  # a folder for what is written on the way
 SIDE = 1000.0  # pixels of a preview's longer side
 
 
@@ -36,6 +38,7 @@ def take(
     tile: int,
     settings: str = "{}",
     picture: bool = False,
+    drawing: str = "",
     *,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
@@ -49,12 +52,15 @@ def take(
         tile: The number of the tile.
         settings: Its settings, as JSON.
         picture: Whether the picture that was uploaded goes onto the tile.
+        drawing: What was drawn on the tile, as JSON.
     """
     from orbiflow.studio.silhouette_file import input_file
 
     folder = make_folder(project / "exports" / str(task))
     files = {"picture": input_file(project)} if picture else {}
     given, result = json.loads(settings), tile_folder(project, tile)
+    if drawing and makes in DRAWN:
+        result, files, given = with_drawing(drawing, result, files, given, folder / SCRATCH)
     name = f"tile-{tile}-{makes}.{file_ending(makes, given, result)}"
     call = making_call(makes, given, result, out=folder / name, **files)
 

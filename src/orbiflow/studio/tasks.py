@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -162,3 +163,40 @@ def _tell_progress(event: Event, done: float, on_event: Sink) -> None:
         on_event(Progress(done + (1 - done) * event.share, event.what))
     elif isinstance(event, Note):
         on_event(event)
+
+
+@operation("studio open")
+def open_file(
+    project: Path, task: int, *, on_event: Sink = ignore, cancel: Cancel = NEVER
+) -> Outcome:
+    """Take up a project's file that was uploaded into an empty project.
+
+    Args:
+        project: The project's folder, with the file.
+        task: The number of the task.
+    """
+    from orbiflow.studio.project_file import ENDING, read_tiles, reading_of, unpack
+    from orbiflow.studio.silhouette_file import read_input
+
+    with tempfile.TemporaryDirectory(dir=project) as folder:
+        home = Path(folder)
+        document = unpack(project / f"opened{ENDING}", home)
+        (picture,) = [*home.glob("input.*")][:1] or [None]
+        called, reading = reading_of(document)
+        tiles = read_tiles(home, document)
+        for file in [*home.glob("input.*"), *home.glob("*.png")]:
+            file.replace(project / file.name)
+        if picture is not None:
+            read_input(project, called, reading)
+    numbers = {number: tile_number(task, place) for place, (_, number, _) in enumerate(tiles)}
+    for tile, number, parent in tiles:
+        cancel.check()
+        known = None if parent is None else numbers.get(parent)
+        put_tile(project, numbers[number], STAGES[-1], tile, on_event, parent=known)
+    opened = {
+        "name": str(document["name"]),
+        "view": document["view"],
+        "reading": reading.to_json(),
+        "input": picture and {"name": called, "type": picture.suffix.lstrip(".")},
+    }
+    return Outcome({"read": picture is not None, "opened": opened})

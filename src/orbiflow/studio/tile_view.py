@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from orbiflow.arrays import Array
+from orbiflow.drawing import cell_ring
 from orbiflow.runtime import is_list
+from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
 from orbiflow.tiles import EscherTile, Rating, as_tiling, colouring
+from orbiflow.tiles.geometry import border
 
 
 def tile_card(
@@ -55,6 +60,73 @@ def _rounded(ring: Array) -> list[list[float]]:
 
 
 def tile_view(card: dict[str, Any], tile: EscherTile) -> dict[str, Any]:
-    """Return what the page of one tile shows: its card and more."""
-    del tile
-    return card
+    """Return what the page of one tile shows: its card, and in the input's units:
+
+    - `silhouette_track`, `tile_track`: The silhouette's outline and where its points go; both are the
+      tile's polygon where there is no map.
+    - `elements`: What the group's symmetries are, one of each kind up to the lattice: the corners of a
+      `cell`, `centres` with their order, `mirrors` and `glides` with a point and a direction.
+    - `map`: The triangles of the map from the silhouette, or None.
+    - `covered`: The corners, least and greatest, of what the silhouette's picture covers.
+    """
+    bending, frame = tile.bending, tile.frame
+    own = tile.tile.polygon.tolist()
+    view: dict[str, Any] = {
+        **card,
+        "elements": elements_json(tile.tile.group, tile.tile.center),
+        "silhouette_track": own,
+        "tile_track": own,
+        "map": None,
+        "covered": None,
+    }
+    if bending is None or frame is None:
+        return view
+    rest, images = frame.to_input(bending.rest), frame.to_input(bending.images)
+    ring = border(bending.triangles)
+    low, high = covered(tile)
+    return {
+        **view,
+        "silhouette_track": rest[ring].tolist(),
+        "tile_track": images[ring].tolist(),
+        "map": {
+            "rest": rest.tolist(),
+            "images": images.tolist(),
+            "triangles": bending.triangles.tolist(),
+        },
+        "covered": [low.tolist(), high.tolist()],
+    }
+
+
+def elements_json(group: CrystallographicGroup, middle: Array) -> dict[str, Any]:
+    """Return the symmetry elements of one lattice cell near `middle`."""
+    ring = cell_ring(group, middle)[:-1]
+    found = symmetry_elements(group, ring.mean(axis=0))
+    size = float(np.sqrt(group.cell_volume))
+    centres: dict[tuple[int, ...], dict[str, Any]] = {}
+    for center in found.centers:
+        share = (center.point - ring[0]) @ group.inverse_lattice.T
+        key = (center.order, *(np.round(share * 1e4).astype(int) % 10_000).tolist())
+        centres.setdefault(key, {"order": center.order, "at": center.point.tolist()})
+    lines = [
+        {"at": line.point.tolist(), "along": line.direction.tolist(), "shift": shift / size}
+        for line, shift in found.lines
+    ]
+    return {
+        "cell": ring.tolist(),
+        "centres": list(centres.values()),
+        "mirrors": [line for line in lines if not line["shift"]],
+        "glides": [line for line in lines if line["shift"]],
+    }
+
+
+def covered(tile: EscherTile) -> tuple[Array, Array]:
+    """Return the corners of what a picture of a tile's silhouette covers, in the input's units.
+
+    That is the picture or page which was read, or the outline's box where there was none.
+    """
+    bending, frame = tile.require_map()
+    if frame.size is not None:
+        low = np.array(frame.corner)
+        return low, low + frame.size
+    ring = frame.to_input(bending.rest[border(bending.triangles)])
+    return ring.min(axis=0), ring.max(axis=0)

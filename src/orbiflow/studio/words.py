@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import PurePosixPath
 from typing import Any
 
 from orbiflow.studio.store import Store
 
 MASKS = ("mend", "pins", "emphasis")
+
+
+def plain_name(given: Any, otherwise: str) -> str:
+    """Return a name on one line, without folders.
+
+    >>> plain_name("C:\\\\cats\\\\cat.png", "picture"), plain_name("../..", "picture")
+    ('cat.png', 'picture')
+    """
+    text = given if isinstance(given, str) else ""
+    text = PurePosixPath(text.replace("\\", "/")).name
+    name = "".join(letter for letter in text if letter.isprintable()).strip(" .")
+    return name[:80] or otherwise
 
 
 def shown_task(store: Store, task: dict[str, Any]) -> dict[str, Any]:

@@ -31,8 +31,15 @@ from orbiflow.runtime import (
 )
 from orbiflow.studio.kinds_of_work import kind_of_work
 from orbiflow.studio.store import Missing, Store
+from orbiflow.studio.words import plain_name
 
-WARM = ("orbiflow.studio.tasks", "orbiflow.tiles.search.bending")
+WARM = (
+    "orbiflow.studio.tasks",
+    "orbiflow.studio.silhouette_file",
+    "orbiflow.studio.tile_view",
+    "orbiflow.tiles.search.escherizing",
+    "orbiflow.tiles.search.bending",
+)
 """What a worker has imported before there is work for it."""
 
 STEP = 0.002  # of a task: smaller progress is not told
@@ -69,7 +76,7 @@ class WorkQueue:
         spawn: Spawn = warm_process,
     ) -> None:
         self.store = store
-        self._slots = slots or {"long": cores(), "quick": max(2, cores() // 2)}
+        self.slots = slots or {"long": cores(), "quick": max(2, cores() // 2)}
         self._spare_count, self._spawn = spares, spawn
         self._spares: list[CallProcess] = []
         self._running: dict[int, CallProcess] = {}
@@ -135,6 +142,7 @@ class WorkQueue:
                     self._held.pop(oldest).kill()
             else:
                 self._running.pop(task).kill()
+            self._lanes.pop(task, None)
         self._schedule()
 
     def resume(self, task: int) -> None:
@@ -150,6 +158,7 @@ class WorkQueue:
                 return
             self.store.change_task(task, state="cancelled", pid=None)
             process = self._running.pop(task, None) or self._held.pop(task, None)
+            self._lanes.pop(task, None)
         if process is not None:
             process.kill()
         self._schedule()
@@ -162,10 +171,13 @@ class WorkQueue:
     def _schedule(self) -> None:
         """Start what can be started."""
         with self._lock:
-            while not self._closed and (task := self._next()) is not None:
-                self._begin(task)
-            while not self._closed and len(self._spares) < self._spare_count:
-                self._spares.append(self._spawn())
+            try:
+                while not self._closed and (task := self._next()) is not None:
+                    self._begin(task)
+                while not self._closed and len(self._spares) < self._spare_count:
+                    self._spares.append(self._spawn())
+            except OSError:  # no memory, or too many processes: tried again when something ends
+                log.exception("no process can be started")
 
     def _next(self) -> dict[str, Any] | None:
         """Return the task whose turn it is: of the project that has least, then waited longest."""
@@ -177,7 +189,7 @@ class WorkQueue:
             for task in self.store.undone()
             if task["state"] == "waiting"
             and task["id"] not in self._running
-            and full[task["lane"]] < self._slots[task["lane"]]
+            and full[task["lane"]] < self.slots[task["lane"]]
         ]
 
         def turn(task: dict[str, Any]) -> tuple[int, int, int]:
@@ -205,6 +217,7 @@ class WorkQueue:
         self._run(number, project, call)
 
     def _run(self, number: int, project: str, call: Call) -> None:
+        self._spares = [spare for spare in self._spares if spare.alive]
         process = self._spares.pop(0) if self._spares else self._spawn()
         process.begin(call)
         self._running[number] = process
@@ -227,10 +240,9 @@ class WorkQueue:
                 told.record(event)
         process.wait()
         with self._lock:
-            own = self._owner(number) is process
-            self._running.pop(number, None) if own else None
-            self._held.pop(number, None) if own else None
-            if own and not self._closed:
+            if self._owner(number) is process and not self._closed:
+                for processes in (self._running, self._held, self._lanes):
+                    processes.pop(number, None)
                 told.end(ending)
         self._schedule()
 
@@ -262,7 +274,7 @@ class _Told:
                         (self.home / "tiles" / tile / stage / "card.json").read_text()
                     )
                     self.store.put_card(self.project, int(tile), card)
-                case Note(text=text, warning=warning):
+                case Note(text=text, warning=warning) if not text.startswith("written "):
                     self.notes.append(self._plain(text))
                     if warning:
                         self.store.notice(self.project, self._plain(text), warning=warning)
@@ -285,9 +297,12 @@ class _Told:
         self.store.change_task(self.number, **changes)
 
     def _take_up(self, summary: dict[str, Any]) -> None:
-        """Keep a silhouette that was read."""
-        if summary.get("read"):
-            with suppress(Missing):
+        """Keep a silhouette that was read, and what an opened file says of its project."""
+        with suppress(Missing):
+            if opened := summary.get("opened"):
+                opened["name"] = plain_name(opened["name"], "Opened project")
+                self.store.change(self.project, **opened)
+            if summary.get("read"):
                 found = json.loads((self.home / "silhouette.json").read_text())
                 self.store.change(self.project, "silhouette", silhouette=found["shown"])
 

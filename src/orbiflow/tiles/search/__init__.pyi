@@ -1,3 +1,4 @@
+from .bent_map import carried_on as carried_on
 from .bent_map import matched as matched
 from .both_search import BothSearch as BothSearch
 from .candidates import Fit as Fit
@@ -20,7 +21,6 @@ from .occupancy import fit_occupancy as fit_occupancy
 from .occupancy import occupancy_loss as occupancy_loss
 from .overlap_search import OccupancySearch as OccupancySearch
 from .overlap_search import OverlapSearch as OverlapSearch
-from .refinement import TileVariations as TileVariations
 from .refinement import refine as refine
 from .search_method import Goal as Goal
 from .search_method import SearchMethod as SearchMethod
@@ -29,3 +29,5 @@ from .tile_model import as_map as as_map
 from .tile_model import as_model as as_model
 from .tile_model import load_model as load_model
 from .tile_model import placed_field as placed_field
+from .tile_variations import TileVariations as TileVariations
+from .tile_variations import divided_tile as divided_tile

@@ -39,7 +39,7 @@ export class Feed {
     if (kind === "task") byId(own.tasks, data, "unshift");
     if (kind === "card") byId(own.tiles, data, "push");
     if (kind === "card") own.tiles.sort(better);
-    if (kind === "silhouette") own.silhouette = data;
+    if (kind === "silhouette" || kind === "project") Object.assign(own, data);
     if (kind === "gone" && data.tile) own.tiles = own.tiles.filter((card) => card.id !== data.tile);
   }
 

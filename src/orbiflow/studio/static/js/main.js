@@ -1,6 +1,6 @@
 /** The shell: which page is shown, its project, and the bar on top. */
 
-import { about, api, client } from "./api.js";
+import { about, api } from "./api.js";
 import { h, newest, put, toast } from "./dom.js";
 import { Feed } from "./events.js";
 
@@ -79,7 +79,7 @@ async function follow(id) {
   own.on("back", () => { document.querySelector(".lost").hidden = true; });
   own.on("notice", ({ text, warning }) => toast(text, { bad: warning }));
   own.on("gone", (what) => { if (what.project) { toast("This project was deleted."); navigate(""); } });
-  own.on("project", ({ changed_by: by }) => { if (by !== client) own.refresh().then(rename); });
+  own.on("project", rename);
   own.on("card", links);
 }
 
@@ -108,7 +108,7 @@ function drawBar(step, tile) {
   [shownStep, shownTile] = [step, tile];
   const project = feed?.project;
   const save = newest((name) => api.patch(`projects/${project.id}`, { name }), 500);
-  put(bar, h("div", { class: `bar ${step ?? ""}` },
+  put(bar, h("div", { class: `bar at-${step}` },
     h("a", { class: "brand", href: "#/", "aria-label": "orbiflow studio: start" },
       h("img", { src: "icon.svg", alt: "" }), h("span", {}, "orbiflow")),
     project && h("input", {

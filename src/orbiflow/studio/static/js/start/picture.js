@@ -1,8 +1,8 @@
 /** What was read of a picture, and how to mend it: sliders, brushes, lassos, parts to keep. */
 
-import { button, choice, h, newest, put, slider, style, trying } from "../dom.js";
-import { sized } from "../tiling.js";
-import { alive, number } from "../words.js";
+import { button, choice, h, newest, put, slider, style, toast, trying } from "../dom.js";
+import { pathOf, sized } from "../tiling.js";
+import { alive, capital, number } from "../words.js";
 import { Marks, drawStroke } from "./marks.js";
 import { pointing } from "./pointing.js";
 
@@ -66,9 +66,7 @@ export async function show(root, { api, events, project, navigate }) {
     context.fillStyle = "#ffffff";
     context.fillRect(0, 0, width, height);
     context.drawImage(picture, 0, 0, width, height);
-    const outline = new Path2D();
-    silhouette.outline.forEach(([x, y]) => outline.lineTo(x, y));
-    outline.closePath();
+    const outline = pathOf(silhouette.outline);
     const rest = new Path2D(outline);
     rest.rect(0, 0, width, height);
     context.fillStyle = "rgb(255 255 255 / 62%)";
@@ -77,13 +75,10 @@ export async function show(root, { api, events, project, navigate }) {
     context.fill(outline);
     context.lineJoin = "round";
     for (const ring of silhouette.left_out ?? []) {
-      const out = new Path2D();
-      ring.forEach(([x, y]) => out.lineTo(x, y));
-      out.closePath();
       context.setLineDash([5 * pixel, 4 * pixel]);
       context.lineWidth = 2 * pixel;
       context.strokeStyle = COLOURS.remove;
-      context.stroke(out);
+      context.stroke(pathOf(ring));
       context.setLineDash([]);
     }
     context.globalAlpha = 0.65;
@@ -124,6 +119,18 @@ export async function show(root, { api, events, project, navigate }) {
       layers.set(layer, own);
     }
     return layers.get(layer);
+  }
+
+  /** Whether a stroke meets the animal. */
+  function touches({ points, size }) {
+    const context = canvas.getContext("2d");
+    const outline = pathOf(project.silhouette.outline);
+    context.save();
+    context.resetTransform();
+    context.lineWidth = size;
+    const found = points.some(([x, y]) => context.isPointInPath(outline, x, y) || context.isPointInStroke(outline, x, y));
+    context.restore();
+    return found;
   }
 
   const brush = () => (state.size / 100) * Math.max(marks.width, marks.height);
@@ -169,6 +176,10 @@ export async function show(root, { api, events, project, navigate }) {
       const { stroke } = state;
       state.stroke = null;
       if (!stroke || (stroke.shape === "lasso" && stroke.points.length < 3)) return paint();
+      if (["pins", "emphasis"].includes(stroke.layer) && !touches(stroke)) {
+        toast("Paint on the animal itself: that is outside of it.");
+        return paint();
+      }
       marks.add(stroke);
       return changed(stroke);
     },
@@ -191,7 +202,7 @@ export async function show(root, { api, events, project, navigate }) {
       silhouette && h("ul", { class: "notes stack" },
         silhouette.doubts.map((text) => h("li", { class: "notice" }, text)),
         out > 0 && h("li", {}, h("span", { class: "swatch dashed" }), `${number(out, "part is", "parts are")} left out: a tile is one piece. Paint a bridge with “Add” to keep ${out === 1 ? "it" : "them"}.`),
-        silhouette.notes.map((text) => h("li", {}, text))));
+        silhouette.notes.length > 0 && h("li", {}, h("details", {}, h("summary", {}, "How it was read"), h("p", { class: "soft" }, silhouette.notes.map(capital).join(". "))))));
     paint();
   }
 

@@ -55,8 +55,15 @@ export async function show(root, { api, events, project, tileId, navigate, about
   }
 
   const files = (task) => task.result.files.map(({ name, bytes: size }) =>
-    h("a", { class: "button primary", href: `api/takeaways/${task.result.takeaway ?? task.id}/files/${encodeURIComponent(name)}`, download: name }, icon("download"), `${name}`, size ? h("span", { class: "small" }, bytes(size)) : null));
-  const picture = (task) => h("img", { src: `api/takeaways/${task.result.takeaway ?? task.id}/preview.png`, alt: `Preview of what was made: ${KINDS[task.operation].title.toLowerCase()}` });
+    h("a", { class: "button primary", href: `api/takeaways/${task.result.takeaway}/files/${encodeURIComponent(name)}`, download: name }, icon("download"), `${name}`, size ? h("span", { class: "small" }, bytes(size)) : null));
+  const picture = (task) => {
+    const { takeaway, preview, files: [first] } = task.result;
+    const shows = preview || /\.(png|gif|svg)$/.test(first.name);
+    return shows && h("img", {
+      src: preview ? `api/takeaways/${takeaway}/preview.png` : `api/takeaways/${takeaway}/files/${encodeURIComponent(first.name)}`,
+      alt: `What was made: ${KINDS[task.operation].title.toLowerCase()}`, loading: "lazy",
+    });
+  };
 
   function tell() {
     const { task } = state;
@@ -64,7 +71,9 @@ export async function show(root, { api, events, project, tileId, navigate, about
     make.lastChild.textContent = busy ? "Stop" : state.stale ? "Make it again" : "Make it";
     const done = task?.state === "done" && task.result?.files?.length;
     if (done && !state.stale) {
-      put(shown, task.result.preview === false ? canvas : picture(task));
+      const seen = picture(task);
+      put(shown, seen || canvas);
+      if (!seen) paint();
     } else if (shown.firstChild !== canvas) {
       put(shown, canvas);
       paint();
@@ -81,7 +90,7 @@ export async function show(root, { api, events, project, tileId, navigate, about
   function history() {
     const made = project.tasks.filter((task) => KINDS[task.operation] && task.state === "done" && task.result?.files?.length && task.id !== state.task?.id);
     put(earlier, made.length > 0 && [h("h2", { id: "earlier" }, "Made before"), h("ul", { class: "made" }, made.map((task) =>
-      h("li", { class: "panel stack" }, task.result.preview !== false && picture(task), h("span", { class: "soft small" }, KINDS[task.operation].title), files(task).map((link) => { link.classList.remove("primary"); return link; }))))]);
+      h("li", { class: "panel stack" }, picture(task), h("span", { class: "soft small" }, KINDS[task.operation].title), files(task).map((link) => { link.classList.remove("primary"); return link; }))))]);
   }
 
   const canvas = h("canvas", { role: "img", "aria-label": `A tiling: ${card.arrangement}` });
