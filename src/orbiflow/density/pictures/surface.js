@@ -3,7 +3,8 @@
 const PULL = 0.006; // how far lines and dots are pulled forward
 const PALENESS = 0.85; // how grey is what lies outside a region
 
-function unpack(text, Kind) {
+/** The numbers in a base64 text. */
+export function unpack(text, Kind) {
   const raw = atob(text), bytes = new Uint8Array(raw.length);
   for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
   return new Kind(bytes.buffer);

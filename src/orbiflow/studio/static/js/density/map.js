@@ -1,6 +1,7 @@
 /** The flat map of a density, with the table's rows as dots, a region that stands out, and a line that is held. */
 
-import { meridians, unpack } from "./grid.js";
+import { unpack } from "../../api/density/surface.js";
+import { meridians } from "./grid.js";
 
 const PALENESS = 0.85; // as the surface has it
 export const dark = matchMedia("(prefers-color-scheme: dark)");
@@ -201,9 +202,9 @@ export function drawBar(pen, width, frame, data) {
 }
 
 /** A curve over an axis of the window, filled down to its foot, with what is inside a region filled strongly. */
-export function drawCurve(pen, width, height, { values, axis, peak, least = -Infinity }) {
-  const [left, top, right, below] = [14, 10, 14, 44], w = width - left - right, h = height - top - below, foot = top + h;
-  const x = (k) => left + ((k + 0.5) / values.length) * w, y = (value) => foot - (value / (peak * 1.06)) * h;
+export function drawCurve(pen, width, height, { values, axis, least = -Infinity }) {
+  const [left, top, right, below] = [14, 10, 14, 44], w = width - left - right, h = height - top - below, foot = top + h, peak = Math.max(...values);
+  const x = (k) => left + ((k + 0.5) / values.length) * w, y = (value) => foot - (value / peak / 1.06) * h;
   pen.clearRect(0, 0, width, height);
   const fill = (colour, inside) => {
     pen.fillStyle = colour;
