@@ -1,4 +1,4 @@
-"""A table that somebody uploaded: its first rows, what each column seems to be, and where its rows live."""
+"""A table that somebody uploaded: its first rows, what its columns seem to be, where its rows live."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_ANGLES = 7
 NORTH = {"lat", "latitude", "plunge", "inclination"}
 EAST = {"lon", "long", "lng", "longitude", "trend", "azimuth", "declination"}
 AXES = {"pole", "poles", "axis", "axes", "axial", "plunge", "trend"}
-"""Words in names of columns that say an angle towards the pole, around it, and of lines without an arrow."""
+"""Words in names of columns: an angle towards the pole, one around it, and lines without an arrow."""
 
 ANGLES = {
     "phi",

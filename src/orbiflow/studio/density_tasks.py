@@ -1,7 +1,7 @@
-"""What the studio's workers do for densities: read a table, fit, draw on grids, write what is taken away.
+"""What the studio's workers do for densities: read a table, fit, draw, write what is taken away.
 
-A fit is in the folder "fits" of its project, under the number of its task, and is complete once it has a
-view.
+A fit is in the folder "fits" of its project, under the number of its task. It is complete once it has
+a view.
 """
 
 from __future__ import annotations
