@@ -301,7 +301,15 @@ def test_regions_are_taken_away(client: Client, fitted: str) -> None:
     assert json.dumps(regions).count('"mass": 0.6') >= 1
 
 
-@pytest.mark.parametrize("settings", [{"what": "samples", "data": "/etc/passwd"}, {"what": "everything"}, {"what": "samples", "count": 10**9}, {"what": "figures", "count": 5}])  # fmt: skip
+WRONG = [
+    {"what": "samples", "data": "/etc/passwd"},
+    {"what": "everything"},
+    {"what": "samples", "count": 10**9},
+    {"what": "figures", "count": 5},
+]
+
+
+@pytest.mark.parametrize("settings", WRONG)
 def test_nothing_else_is_taken_away(client: Client, fitted: str, settings: dict[str, Any]) -> None:
     body = {"operation": "density take", "settings": {"fit": 1, **settings}}
     assert client.post(f"{fitted}/tasks", json=body).status_code == 422

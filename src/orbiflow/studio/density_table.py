@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from orbiflow.arrays import Array
-from orbiflow.density.tables import Table, TableError, is_identifier, read_table
+from orbiflow.density import Table, TableError, is_identifier, read_table
 from orbiflow.errors import OrbiflowError
 
 ENDINGS = (".csv", ".tsv", ".txt", ".npy")

@@ -25,7 +25,7 @@ NATURAL = "natural"
 
 
 def flat_frame(density: Density, names: tuple[str, ...], samples: Tensor) -> dict[str, Any]:
-    """Return what all flat pictures of a density share: axes, points, colours.
+    """Return what all flat pictures of a density share: names, axes, points, colours.
 
     Points are at most `MAX_DOTS`: places in the window, between 0 and 1, or degrees north and east.
 
@@ -51,6 +51,7 @@ def flat_frame(density: Density, names: tuple[str, ...], samples: Tensor) -> dic
             axes.append({"label": label, "at": at, "texts": texts})
     ramp = 255 * colormaps[colours.COLOURS](np.linspace(0, 1, 256))
     return {
+        "names": list(view.names),
         "axes": axes,
         "points": packed(places, "<f4"),
         "shown": len(places),
