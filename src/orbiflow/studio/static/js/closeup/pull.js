@@ -8,7 +8,8 @@
  * and points are found in turns, the latter by conjugate gradients from where they are.
  */
 
-const GRAB = 300; // strength of the spring to the pointer; that of a triangle is about one
+const GRAB = 600; // strength of the spring to the pointer; that of a triangle is about one
+const GRIP = 0.3; // width of the hand, in reaches
 const HOLD = 4; // of those beyond the reach
 const LEAST_HOLD = 1e-3; // of all others, so that the whole does not float away
 const STEEPEST = 8; // largest weight of a triangle's side: slivers would be too stiff
@@ -184,8 +185,8 @@ export class Puller {
    * all stays; with `lattice` the way in which copies lie may change as well.
    */
   grab(vertex, share, reach, { lattice = true } = {}) {
-    const next = (vertex + 1) % this.count;
-    this.pin = { vertex, next, share, target: null };
+    this.pin = { vertex, next: (vertex + 1) % this.count, share, target: null };
+    this.#grip(GRIP * reach);
     this.pin.target = this.held();
     this.free.fill(1);
     if (!lattice) this.free.fill(0, this.group, this.parametersCount);
@@ -193,9 +194,27 @@ export class Puller {
     this.#measureDiagonal();
   }
 
+  /** The hand is soft: it holds the mean of the outline nearby, so that no spike comes out. */
+  #grip(width) {
+    const { pin, count, rest } = this;
+    const [x, y] = this.grip();
+    const weight = (i) => Math.exp(-3 * ((rest[2 * i] - x) ** 2 + (rest[2 * i + 1] - y) ** 2) / width ** 2);
+    const found = new Map([[pin.vertex, 1 - pin.share], [pin.next, pin.share]]);
+    for (const [from, step] of [[pin.vertex, -1], [pin.next, 1]]) {
+      for (let k = 0, i = from; k < count / 4; k += 1, i = (i + step + count) % count) {
+        const own = weight(i);
+        if (k > 1 && own < 0.05) break;
+        found.set(i, (found.get(i) ?? 0) + own);
+      }
+    }
+    const total = [...found.values()].reduce((sum, own) => sum + own, 0);
+    pin.parts = [...found].map(([i, own]) => [i, own / total]);
+  }
+
   #holdBeyond(reach) {
     const { rest, orbit, count } = this;
-    const { vertex, next, share, target } = this.pin;
+    const { vertex, next, share } = this.pin;
+    const target = this.grip();
     const nearest = share < 0.5 ? vertex : next;
     const from = (i, x, y) => Math.hypot(rest[2 * i] - x, rest[2 * i + 1] - y);
     const places = [target];
@@ -211,11 +230,18 @@ export class Puller {
     }
   }
 
-  /** Where the hand holds the outline now. */
-  held() {
+  /** The point of the outline that was taken hold of, where it is now. */
+  grip() {
     const { vertex, next, share } = this.pin;
     const at = this.#pointsOf(2 * vertex, 2 * vertex + 2).concat(this.#pointsOf(2 * next, 2 * next + 2));
     return [0, 1].map((j) => (1 - share) * at[j] + share * at[2 + j]);
+  }
+
+  /** What the hand holds, the mean of the outline nearby, where it is now. */
+  held() {
+    const found = [0, 0];
+    for (const [i, part] of this.pin.parts) this.#pointsOf(2 * i, 2 * i + 2).forEach((own, j) => { found[j] += part * own; });
+    return found;
   }
 
   #pointsOf(from, to) {
@@ -238,9 +264,7 @@ export class Puller {
         if (this.laplacian.at[k] === i) own[i] = this.laplacian.value[k] + this.hold[i];
       }
     }
-    const { vertex, next, share } = this.pin;
-    own[vertex] += GRAB * (1 - share) ** 2;
-    own[next] += GRAB * share ** 2;
+    for (const [i, part] of this.pin.parts) own[i] += GRAB * part ** 2;
     this.diagonal.fill(0);
     for (let i = 0; i < 2 * this.size; i += 1) {
       for (let k = start[i]; k < start[i + 1]; k += 1) this.diagonal[at[k]] += value[k] ** 2 * Math.max(own[i >> 1], 1e-6);
@@ -268,16 +292,14 @@ export class Puller {
       y[2 * i] = u;
       y[2 * i + 1] = v;
     }
-    this.#addGrab(y, (j) => (1 - pin.share) * x[2 * pin.vertex + j] + pin.share * x[2 * pin.next + j]);
+    this.#addGrab(y, (j) => pin.parts.reduce((sum, [i, part]) => sum + part * x[2 * i + j], 0));
     return multiplyBack(this.points, y, out);
   }
 
   #addGrab(y, amount) {
-    const { vertex, next, share } = this.pin;
     for (const j of [0, 1]) {
       const own = GRAB * amount(j);
-      y[2 * vertex + j] += (1 - share) * own;
-      y[2 * next + j] += share * own;
+      for (const [i, part] of this.pin.parts) y[2 * i + j] += part * own;
     }
   }
 
@@ -316,7 +338,7 @@ export class Puller {
   }
 
   /** Move what is held towards a target; returns how far the outline still moved, in sizes of the tile. */
-  pull(target, { turns = 3, steps = 24 } = {}) {
+  pull(target, { turns = 2, steps = 20 } = {}) {
     this.pin.target = target;
     const before = this.polygon();
     for (let turn = 0; turn < turns; turn += 1) this.#solve(steps);
