@@ -13,6 +13,7 @@ const GRIP = 0.3; // width of the hand, in reaches
 const HOLD = 4; // of those beyond the reach
 const LEAST_HOLD = 1e-3; // of all others, so that the whole does not float away
 const STEEPEST = 8; // largest weight of a triangle's side: slivers would be too stiff
+const AFTER = [1, 2, 0, 1]; // corners of a triangle after corner 0, 1, 2
 const ENOUGH = 1e-4; // of the residual, at which conjugate gradients stop
 
 /** Rows of a sparse matrix as typed arrays, from {indptr, indices, values}. */
@@ -20,10 +21,10 @@ function sparse({ indptr, indices, values }, cols) {
   return { start: Int32Array.from(indptr), at: Int32Array.from(indices), value: Float64Array.from(values), cols };
 }
 
-/** out = matrix x */
+/** out = matrix x, as many rows as fit */
 function multiply(matrix, x, out) {
   const { start, at, value } = matrix;
-  for (let i = 0; i < start.length - 1; i += 1) {
+  for (let i = 0; i < out.length; i += 1) {
     let sum = 0;
     for (let k = start[i]; k < start[i + 1]; k += 1) sum += value[k] * x[at[k]];
     out[i] = sum;
@@ -284,7 +285,8 @@ export class Puller {
     multiply(this.points, given, x);
     const { start, at, value } = laplacian;
     for (let i = 0; i < this.size; i += 1) {
-      let [u, v] = [hold[i] * x[2 * i], hold[i] * x[2 * i + 1]];
+      let u = hold[i] * x[2 * i];
+      let v = hold[i] * x[2 * i + 1];
       for (let k = start[i]; k < start[i + 1]; k += 1) {
         u += value[k] * x[2 * at[k]];
         v += value[k] * x[2 * at[k] + 1];
@@ -292,14 +294,14 @@ export class Puller {
       y[2 * i] = u;
       y[2 * i + 1] = v;
     }
-    this.#addGrab(y, (j) => pin.parts.reduce((sum, [i, part]) => sum + part * x[2 * i + j], 0));
+    this.#addGrab(y, pin.parts.reduce((sum, [i, part]) => sum + part * x[2 * i], 0), pin.parts.reduce((sum, [i, part]) => sum + part * x[2 * i + 1], 0));
     return multiplyBack(this.points, y, out);
   }
 
-  #addGrab(y, amount) {
-    for (const j of [0, 1]) {
-      const own = GRAB * amount(j);
-      for (const [i, part] of this.pin.parts) y[2 * i + j] += part * own;
+  #addGrab(y, u, v) {
+    for (const [i, part] of this.pin.parts) {
+      y[2 * i] += GRAB * part * u;
+      y[2 * i + 1] += GRAB * part * v;
     }
   }
 
@@ -309,31 +311,33 @@ export class Puller {
     multiply(this.points, this.z, x);
     for (let i = 0; i < 2 * this.size; i += 1) y[i] = hold[i >> 1] * rest[i];
     for (let t = 0; t < triangles.length; t += 3) {
-      let [cos, sin] = [0, 0];
+      let cos = 0;
+      let sin = 0;
       for (let k = 0; k < 3; k += 1) {
-        const b = 2 * triangles[t + ((k + 1) % 3)];
-        const c = 2 * triangles[t + ((k + 2) % 3)];
-        const [ux, uy] = [rest[b] - rest[c], rest[b + 1] - rest[c + 1]];
-        const [vx, vy] = [x[b] - x[c], x[b + 1] - x[c + 1]];
-        cos += cotangents[t + k] * (ux * vx + uy * vy);
-        sin += cotangents[t + k] * (ux * vy - uy * vx);
+        const b = 2 * triangles[t + AFTER[k]];
+        const c = 2 * triangles[t + AFTER[k + 1]];
+        const u = rest[b] - rest[c];
+        const v = rest[b + 1] - rest[c + 1];
+        const p = x[b] - x[c];
+        const q = x[b + 1] - x[c + 1];
+        cos += cotangents[t + k] * (u * p + v * q);
+        sin += cotangents[t + k] * (u * q - v * p);
       }
-      const long = Math.hypot(cos, sin) || 1;
-      cos = cos / long || (sin ? 0 : 1);
-      sin /= long;
+      const long = Math.sqrt(cos * cos + sin * sin);
+      cos = long ? cos / long : 1;
+      sin = long ? sin / long : 0;
       for (let k = 0; k < 3; k += 1) {
-        const b = 2 * triangles[t + ((k + 1) % 3)];
-        const c = 2 * triangles[t + ((k + 2) % 3)];
-        const [ux, uy] = [rest[b] - rest[c], rest[b + 1] - rest[c + 1]];
-        const u = cotangents[t + k] * (cos * ux - sin * uy);
-        const v = cotangents[t + k] * (sin * ux + cos * uy);
+        const b = 2 * triangles[t + AFTER[k]];
+        const c = 2 * triangles[t + AFTER[k + 1]];
+        const u = cotangents[t + k] * (cos * (rest[b] - rest[c]) - sin * (rest[b + 1] - rest[c + 1]));
+        const v = cotangents[t + k] * (sin * (rest[b] - rest[c]) + cos * (rest[b + 1] - rest[c + 1]));
         y[b] += u;
         y[b + 1] += v;
         y[c] -= u;
         y[c + 1] -= v;
       }
     }
-    this.#addGrab(y, (j) => pin.target[j]);
+    this.#addGrab(y, pin.target[0], pin.target[1]);
     return multiplyBack(this.points, y, out);
   }
 
@@ -376,7 +380,7 @@ export class Puller {
 
   /** The outline: x0, y0, x1, y1 ... */
   polygon() {
-    return Float64Array.from(this.#pointsOf(0, 2 * this.count));
+    return multiply(this.points, this.z, new Float64Array(2 * this.count));
   }
 
   /** All points of the body, for what lies on the tile. */
