@@ -52,9 +52,10 @@ def density_routes(store: Store, queue: WorkQueue) -> APIRouter:
                 old.unlink(missing_ok=True)
         (home(project) / TABLE).unlink(missing_ok=True)
         shutil.rmtree(home(project) / "fits", ignore_errors=True)
+        own = store.project(project)
         changes: dict[str, Any] = {"input": {"name": name, "type": file.suffix.lstrip(".")}}
-        if store.project(project)["name"] in NAMES.values():
-            changes["name"] = name.rsplit(".", 1)[0]
+        if own["name"] in (*NAMES.values(), Path((own["input"] or changes["input"])["name"]).stem):
+            changes["name"] = Path(name).stem
         store.change(project, **changes)
         task = queue.submit(project, "density table", {})
         return {"task": shown_task(store, store.task(task))}

@@ -1,4 +1,4 @@
-"""A table that somebody uploaded: its first rows, what each column seems to be, and where its rows live."""
+"""A table that somebody uploaded: its first rows, what its columns seem to be, where its rows live."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import Any, Literal
 import numpy as np
 
 from orbiflow.arrays import Array
-from orbiflow.density.tables import Table, is_identifier, read_table
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.density import Table, TableError, is_identifier, read_table
+from orbiflow.errors import OrbiflowError
 
 ENDINGS = (".csv", ".tsv", ".txt", ".npy")
 MAX_ROWS, MAX_SHOWN, FIRST = 200_000, 30, 6
@@ -25,9 +25,21 @@ MOST_ANGLES = 7
 NORTH = {"lat", "latitude", "plunge", "inclination"}
 EAST = {"lon", "long", "lng", "longitude", "trend", "azimuth", "declination"}
 AXES = {"pole", "poles", "axis", "axes", "axial", "plunge", "trend"}
-"""Words in names of columns that say an angle towards the pole, around it, and of lines without an arrow."""
+"""Words in names of columns: an angle towards the pole, one around it, and lines without an arrow."""
 
-ANGLES = {"phi", "psi", "chi", "omega", "theta", "alpha", "beta", "gamma", "delta", "epsilon", "zeta"}
+ANGLES = {
+    "phi",
+    "psi",
+    "chi",
+    "omega",
+    "theta",
+    "alpha",
+    "beta",
+    "gamma",
+    "delta",
+    "epsilon",
+    "zeta",
+}
 ANGLES |= {"angle", "direction", "dir", "heading", "bearing", "aspect"}
 
 Seems = Literal["number", "latitude", "longitude", "degrees", "radians", "count"]
@@ -78,9 +90,13 @@ def table_view(path: Path) -> dict[str, Any]:
     Raises:
         OrbiflowError: If it is no table of numbers, or too large.
     """
-    if path.suffix == ".npy" and not path.read_bytes()[:6] == b"\x93NUMPY":
-        raise InputFileError(f"{path.name} does not begin as a .npy file does; save it again")
-    table = read_table(path, columns=None, width=None, max_rows=MAX_ROWS, keep_missing=True)
+    try:
+        table = read_table(path, columns=None, width=None, max_rows=MAX_ROWS, keep_missing=True)
+    except TableError:
+        raise OrbiflowError(
+            "this table has no column of numbers, or some are infinite; save it again as CSV, with a "
+            "row for each thing and numbers in its columns"
+        ) from None
     columns = [seen_column(name, table.values[:, k]) for k, name in enumerate(table.columns)]
     first = [[None if math.isnan(v) else float(f"{v:.6g}") for v in row[:MAX_SHOWN]]
              for row in table.values[:FIRST].tolist()]  # fmt: skip
@@ -122,7 +138,9 @@ def seen_column(name: str, values: Array) -> Column:
 
 def guess(columns: Sequence[Column], table: Table) -> Guess:
     """Return where the rows of a table seem to live."""
-    by_kind = {kind: [c.name for c in columns if c.seems == kind] for kind in ("latitude", "longitude")}
+    by_kind = {
+        kind: [c.name for c in columns if c.seems == kind] for kind in ("latitude", "longitude")
+    }
     if by_kind["latitude"] and by_kind["longitude"]:
         pair = (by_kind["latitude"][0], by_kind["longitude"][0])
         if _words(" ".join(pair)) & AXES:
@@ -133,7 +151,9 @@ def guess(columns: Sequence[Column], table: Table) -> Guess:
     if vectors:
         why = "each row of these three has length 1, as directions have"
         return Guess("sphere", vectors, None, why)
-    angles = [c for c in columns if c.seems == "degrees"] or [c for c in columns if c.seems == "radians"]
+    angles = [c for c in columns if c.seems == "degrees"] or [
+        c for c in columns if c.seems == "radians"
+    ]
     named = {c.name.casefold(): c.name for c in angles}
     if set(named) == {"theta", "phi"}:
         pair = (named["theta"], named["phi"])

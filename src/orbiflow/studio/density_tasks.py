@@ -1,7 +1,7 @@
-"""What the studio's workers do for densities: read a table, fit, draw on grids, write what is taken away.
+"""What the studio's workers do for densities: read a table, fit, draw, write what is taken away.
 
-A fit is in the folder "fits" of its project, under the number of its task, and is complete once it has a
-view.
+A fit is in the folder "fits" of its project, under the number of its task. It is complete once it has
+a view.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from orbiflow.settings import OnlyWith, Range, Settings
 from orbiflow.studio.density_table import MAX_SHOWN, table_file, table_view
 
 if TYPE_CHECKING:
-    from orbiflow.density.models import Density
+    from orbiflow.density import Density
 
 TABLE, FIT, VIEW, SURFACE = "table.json", "model", "view.json", "surface.json"
 SURFACE_CELLS = 120
@@ -78,13 +78,7 @@ def map_file(fit: Path, axes: tuple[int, ...]) -> Path:
 
 
 @operation("studio table")
-def table(
-    project: Path,
-    task: int,
-    *,
-    on_event: Sink = ignore,
-    cancel: Cancel = NEVER,
-) -> Outcome:
+def table(project: Path, task: int, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> Outcome:
     """Look at the table of a project.
 
     Args:
@@ -101,12 +95,7 @@ def table(
 
 @operation("studio density")
 def density(
-    project: Path,
-    task: int,
-    choice: FitChoice,
-    *,
-    on_event: Sink = ignore,
-    cancel: Cancel = NEVER,
+    project: Path, task: int, choice: FitChoice, *, on_event: Sink = ignore, cancel: Cancel = NEVER
 ) -> Outcome:
     """Fit a density to columns of a project's table, and draw it.
 
@@ -132,32 +121,30 @@ def density(
 
 def _view(folder: Path, data: Path, choice: FitChoice, tell: Sink) -> dict[str, Any]:
     """Return what a page shows of a fit, and write the files of its surface and its map."""
-    from orbiflow.density import PlotSettings, pictures, tables
+    from orbiflow.density import PlotSettings, flat_data, flat_frame, read_table, surface_data
 
     fitted = _model(folder)
     space, names = fitted.space, choice.columns
     tell(Progress(0.0, "drawing"))
-    settings = tables.TableSettings(columns=names, drop_missing=True)
-    rows = tables.read_rows(data, settings, ignore).table.values
+    rows = read_table(data, columns=names, width=None, drop_missing=True).values
     points = space.to_chart(rows)
     if space.is_planar:
-        surface = pictures.surface_data(
+        surface = surface_data(
             fitted, PlotSettings(names=names, dots=True), samples=points, resolution=SURFACE_CELLS,
             levels=True,
         )  # fmt: skip
         _write(folder / SURFACE, surface)
     tell(Progress(0.5, "drawing"))
     axes = tuple(range(min(2, space.dim)))
-    _write(map_file(folder, axes), pictures.flat_data(fitted, axes if space.dim > 1 else None))
+    _write(map_file(folder, axes), flat_data(fitted, axes if space.dim > 1 else None))
     return {
         "space": space.name,
         "columns": list(names),
-        "names": [pictures.symbol(name) for name in names],
         "unit": space.unit,
         "angles": space.dim if space.is_torus else 0,
         "surface": space.is_planar,
         "rows": len(rows),
-        **pictures.flat_frame(fitted, names, points),
+        **flat_frame(fitted, names, points),
     }
 
 
@@ -183,7 +170,7 @@ def density_map(
     folder = fit_folder(project, fit)
     on_event(Progress(0.1, "finding the density of these two angles"))
 
-    from orbiflow.density.pictures import flat_data
+    from orbiflow.density import flat_data
 
     found = flat_data(_model(folder), axes)
     cancel.check()
@@ -253,7 +240,7 @@ def take(
 
 
 def _model(folder: Path) -> Density:
-    from orbiflow.density.models import read_density
+    from orbiflow.density import read_density
 
     return read_density(folder / FIT / "density.safetensors")[0]
 

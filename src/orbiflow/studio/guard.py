@@ -12,6 +12,7 @@ import json
 import secrets
 from collections.abc import Iterable
 from http.cookies import CookieError, SimpleCookie
+from time import monotonic
 from urllib.parse import parse_qs
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -155,13 +156,13 @@ class _Body:
         """Return the next part."""
         if self._whole:  # the application waits for the client to leave
             return await self._receive()
-        begin = asyncio.get_running_loop().time()
+        begin = monotonic()
         try:
             async with asyncio.timeout(self._limits.seconds):
                 message = await self._receive()
         except TimeoutError:
             raise Refused(408, "the file did not come in time; try again") from None
-        self._waited += asyncio.get_running_loop().time() - begin
+        self._waited += monotonic() - begin
         self._size += len(message.get("body", b""))
         self._whole = not message.get("more_body", False)
         if self._size > self._most:

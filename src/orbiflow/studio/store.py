@@ -100,9 +100,10 @@ class Store:
             listener(project)
 
     def _rows(self, query: str, *values: Any) -> list[dict[str, Any]]:
-        with self._lock:
+        with self._lock, suppress(OverflowError):  # no number of anything is that large
             found = self._data.execute(query, values).fetchall()
-        return [_plain(row) for row in found]
+            return [_plain(row) for row in found]
+        return []
 
     def _row(self, query: str, *values: Any, what: str) -> dict[str, Any]:
         found = self._rows(query, *values)

@@ -76,7 +76,7 @@ class WorkQueue:
         spawn: Spawn = warm_process,
     ) -> None:
         self.store = store
-        self._slots = slots or {"long": cores(), "quick": max(2, cores() // 2)}
+        self.slots = slots or {"long": cores(), "quick": max(2, cores() // 2)}
         self._spare_count, self._spawn = spares, spawn
         self._spares: list[CallProcess] = []
         self._running: dict[int, CallProcess] = {}
@@ -189,7 +189,7 @@ class WorkQueue:
             for task in self.store.undone()
             if task["state"] == "waiting"
             and task["id"] not in self._running
-            and full[task["lane"]] < self._slots[task["lane"]]
+            and full[task["lane"]] < self.slots[task["lane"]]
         ]
 
         def turn(task: dict[str, Any]) -> tuple[int, int, int]:

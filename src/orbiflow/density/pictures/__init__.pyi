@@ -7,10 +7,9 @@ from .figures import draw_cells as draw_cells
 from .figures import flow_picture as flow_picture
 from .figures import mean_field as mean_field
 from .figures import samples_picture as samples_picture
-from .flat_data import flat_data as flat_data
-from .flat_data import flat_frame as flat_frame
 from .frames import space_title as space_title
-from .frames import symbol as symbol
+from .grids import flat_data as flat_data
+from .grids import flat_frame as flat_frame
 from .plots import MODEL as MODEL
 from .plots import PICTURES as PICTURES
 from .plots import REPORT as REPORT

@@ -1,9 +1,10 @@
 // A surface coloured by a density, to be turned: WebGL 2 draws it, or a plain canvas if there is none.
 
 const PULL = 0.006; // how far lines and dots are pulled forward
-const PALE = 0.8, PALENESS = 0.85; // the grey of what lies outside a region, and how much of it there is
+const PALENESS = 0.85; // how grey is what lies outside a region
 
-function unpack(text, Kind) {
+/** The numbers in a base64 text. */
+export function unpack(text, Kind) {
   const raw = atob(text), bytes = new Uint8Array(raw.length);
   for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
   return new Kind(bytes.buffer);
@@ -18,11 +19,11 @@ const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
  * - `scrolls`: Whether the page scrolls: then the wheel zooms only with the Ctrl key.
  * - `plain`: Whether WebGL is not used.
  *
- * Returns `view`, whose `cut` (0 to 100), `dots` and `least` (levels from 0 to 1: what is below is pale) may be
- * changed before a `redraw()`, and `stop()`.
+ * Returns `view`, whose `cut` (0 to 100), `dots`, `least` (levels from 0 to 1: what is below is greyed) and `pale`
+ * (that grey, 0 to 1) may be changed before a `redraw()`, and `stop()`.
  */
 export function showSurface(canvas, data, { changed = () => {}, scrolls = false, plain = false } = {}) {
-  const view = { ...data.start, zoom: 1, dots: data.dots && data.samples !== "", least: -1 };
+  const view = { ...data.start, zoom: 1, dots: data.dots && data.samples !== "", least: -1, pale: 0.8 };
   const points = unpack(data.points, Float32Array), normals = unpack(data.normals, Int8Array);
   const values = unpack(data.values, Uint16Array), triangles = unpack(data.triangles, Uint16Array);
   const colours = unpack(data.colours, Uint8Array), samples = unpack(data.samples, Float32Array);
@@ -68,7 +69,7 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false,
   function webglDrawer(gl) {
     const head = `#version 300 es
       precision highp float;
-      uniform mat4 M; uniform vec3 eye, center; uniform float radius, cut, lowest;`;
+      uniform mat4 M; uniform vec3 eye, center; uniform float radius, cut, lowest, pale;`;
     const depth = "depth = dot(eye, p - center) / radius;";
     const surface = program(`${head}
       in vec3 p, n; in float t, l; out vec3 normal; out float value, level, depth;
@@ -79,7 +80,7 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false,
         vec3 m = normalize(normal); m *= sign(dot(m, eye) + 1e-9);
         float light = 0.7 + 0.3 * max(dot(m, normalize(eye + 0.5 * up - 0.4 * right)), 0.0);
         vec3 own = texture(map, vec2((value * 255.0 + 0.5) / 256.0, 0.5)).rgb;
-        colour = vec4(light * (level < lowest ? mix(own, vec3(${PALE}), ${PALENESS}) : own), 1.0);
+        colour = vec4(light * (level < lowest ? mix(own, vec3(pale), ${PALENESS}) : own), 1.0);
       }`);
     const stroke = program(`${head}
       in vec3 a, b; in vec2 corner; uniform vec2 size; uniform float width; out float depth;
@@ -178,6 +179,7 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false,
         gl.uniform1f(at("radius"), data.radius);
         gl.uniform1f(at("cut"), cutDepth());
         gl.uniform1f(at("lowest"), view.least);
+        gl.uniform1f(at("pale"), view.pale);
         return at;
       };
       gl.viewport(0, 0, width, height);
@@ -226,7 +228,7 @@ export function showSurface(canvas, data, { changed = () => {}, scrolls = false,
           const t = Math.min(255, (values[a] + values[b] + values[c]) / 771 | 0), s = (shade[a] + shade[b] + shade[c]) / 3;
           const outside = levels[a] + levels[b] + levels[c] < 3 * 65535 * view.least;
           const rgb = [0, 1, 2].map(j => colours[4 * t + j]).map(own =>
-            Math.round(s * (outside ? own + PALENESS * (255 * PALE - own) : own)));
+            Math.round(s * (outside ? own + PALENESS * (255 * view.pale - own) : own)));
           context.fillStyle = context.strokeStyle = `rgb(${rgb})`;
           context.lineWidth = 0.7 * scale;
           context.beginPath();

@@ -39,6 +39,7 @@ async function show() {
     const [module, known] = await Promise.all([load(), about(), follow(id)]);
     if (mine !== turn) return;
     drawBar(step, Number(tileId) || null);
+    clearTimeout(waiting);
     put(page, root);
     const shown = await module.show(root, {
       api, events: feed, project: feed?.project ?? null, tileId: Number(tileId) || null, navigate, about: known,

@@ -1,10 +1,6 @@
 /** A density on a grid: its colours, the masses that its regions hold, and maps to draw it on. */
 
-export function unpack(text, Kind) {
-  const raw = atob(text), bytes = new Uint8Array(raw.length);
-  for (let i = 0; i < raw.length; i += 1) bytes[i] = raw.charCodeAt(i);
-  return new Kind(bytes.buffer);
-}
+import { unpack } from "../../api/density/surface.js";
 
 const turn = (t) => t - Math.floor(t);
 
@@ -40,9 +36,8 @@ const disc = {
 };
 
 export class Grid {
-  /** `data` is what `flat_data` gives, `space` the name of the space; if it is `turned`, its axes are exchanged. */
-  constructor(data, space, turned = false) {
-    this.turned = turned;
+  /** `data` is what `flat_data` gives, `space` the name of the space. */
+  constructor(data, space) {
     this.logs = unpack(data.logs, Float32Array);
     this.cells = data.cells;
     this.shade = data.shade;
@@ -66,9 +61,7 @@ export class Grid {
       this.mass[k] = mass += Math.exp(this.logs[cell]) * area(cell);
       this.area[k] = whole += area(cell);
     });
-    this.peak = this.logs[order[0]];
-    const top = [(Math.floor(order[0] / columns) + 0.5) / rows, ((order[0] % columns) + 0.5) / columns];
-    this.top = this.turned ? top.reverse() : top;
+    this.top = [(Math.floor(order[0] / columns) + 0.5) / rows, ((order[0] % columns) + 0.5) / columns];
   }
 
   /** The smallest region that holds a share of the mass: its least log density, and its share of the area. */
@@ -84,8 +77,7 @@ export class Grid {
   }
 
   /** The log density at a place: on squares the first axis, then the second; interpolated. */
-  at(first, second) {
-    const [u, v] = this.turned ? [second, first] : [first, second];
+  at(u, v) {
     const [across, up] = this.onGlobe ? [this.cells[1], this.cells[0]] : this.cells;
     const x = u * across - 0.5, y = v * up - 0.5, i = Math.floor(x), j = Math.floor(y), s = x - i, t = y - j;
     const bound = (k, n, wraps) => (wraps ? ((k % n) + n) % n : Math.max(0, Math.min(n - 1, k)));
@@ -104,10 +96,7 @@ export class Grid {
 
   /** The density along the other axis where one is held at a place from 0 to 1; it integrates to 1. */
   slice(axis, held, count = 360) {
-    const values = Float64Array.from({ length: count }, (_, k) => {
-      const t = (k + 0.5) / count;
-      return Math.exp(axis === 0 ? this.at(held, t) : this.at(t, held));
-    });
+    const values = Array.from({ length: count }, (_, k) => Math.exp(this.at(...(axis ? [(k + 0.5) / count, held] : [held, (k + 0.5) / count]))));
     const mean = values.reduce((sum, value) => sum + value, 0) / count;
     return values.map((value) => value / mean);
   }

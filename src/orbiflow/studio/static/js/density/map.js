@@ -1,8 +1,12 @@
 /** The flat map of a density, with the table's rows as dots, a region that stands out, and a line that is held. */
 
-import { meridians, unpack } from "./grid.js";
+import { unpack } from "../../api/density/surface.js";
+import { meridians } from "./grid.js";
 
-const PALE = [204, 204, 204], PALENESS = 0.85; // as the surface has it
+const PALENESS = 0.85; // as the surface has it
+export const dark = matchMedia("(prefers-color-scheme: dark)");
+/** The grey of what lies outside a region. */
+export const pale = () => (dark.matches ? 0.25 : 0.8);
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 /** A canvas that is drawn anew when its size or the colours of the page change. */
@@ -17,7 +21,7 @@ export function painted(canvas, paint) {
   };
   let asked = 0;
   const soon = () => { cancelAnimationFrame(asked); asked = requestAnimationFrame(draw); };
-  const observer = new ResizeObserver(soon), dark = matchMedia("(prefers-color-scheme: dark)");
+  const observer = new ResizeObserver(soon);
   observer.observe(canvas);
   dark.addEventListener("change", soon);
   return { redraw: soon, stop: () => { cancelAnimationFrame(asked); observer.disconnect(); dark.removeEventListener("change", soon); } };
@@ -79,11 +83,11 @@ export class FlatMap {
 
   /** The colours of all pixels, inside of regions and outside, which are kept while the size stays. */
   pixels(w, h) {
-    if (this.cache?.w === w && this.cache.h === h && this.cache.grid === this.grid) return this.cache;
-    const { grid, colours } = this, logs = new Float32Array(w * h), strong = new Uint32Array(w * h), pale = new Uint32Array(w * h);
+    if (this.cache?.w === w && this.cache.h === h && this.cache.grid === this.grid && this.cache.grey === pale()) return this.cache;
+    const { grid, colours } = this, logs = new Float32Array(w * h), strong = new Uint32Array(w * h), weak = new Uint32Array(w * h), grey = pale();
     const pack = (rgb) => (255 << 24) | (rgb[2] << 16) | (rgb[1] << 8) | rgb[0];
     const ramp = Array.from({ length: 256 }, (_, k) => colours.subarray(4 * k, 4 * k + 3));
-    const full = ramp.map(pack), faint = ramp.map((rgb) => pack([0, 1, 2].map((k) => Math.round(rgb[k] + PALENESS * (PALE[k] - rgb[k])))));
+    const full = ramp.map(pack), faint = ramp.map((rgb) => pack([0, 1, 2].map((k) => Math.round(rgb[k] + PALENESS * (255 * grey - rgb[k])))));
     for (let j = 0; j < h; j += 1) {
       for (let i = 0; i < w; i += 1) {
         const k = j * w + i, place = grid.map.place((i + 0.5) / w, 1 - (j + 0.5) / h);
@@ -92,21 +96,21 @@ export class FlatMap {
         logs[k] = grid.at(place[0], place[1]);
         const tone = Math.round(255 * grid.tone(logs[k]));
         strong[k] = full[tone];
-        pale[k] = faint[tone];
+        weak[k] = faint[tone];
       }
     }
-    this.cache = { w, h, grid, logs, strong, pale };
+    this.cache = { w, h, grid, grey, logs, strong, weak };
     return this.cache;
   }
 
   picture(w, h, ratio) {
-    const { logs, strong, pale } = this.pixels(w, h), made = new OffscreenCanvas(w, h), image = new ImageData(w, h);
+    const { logs, strong, weak } = this.pixels(w, h), made = new OffscreenCanvas(w, h), image = new ImageData(w, h);
     const out = new Uint32Array(image.data.buffer), { least } = this, wide = Math.max(1, Math.round(0.8 * ratio));
     for (let k = 0; k < out.length; k += 1) {
       const inside = logs[k] >= least;
-      out[k] = inside || least === -Infinity ? strong[k] : pale[k];
+      out[k] = inside || least === -Infinity ? strong[k] : weak[k];
       const edge = inside !== logs[k + wide] >= least || inside !== logs[k + wide * w] >= least;
-      if (edge && least > -Infinity && strong[k] && (k % w) + wide < w && k + wide * w < out.length && strong[k + wide] && strong[k + wide * w]) out[k] = 0xff1a1a1a;
+      if (edge && least > -Infinity && strong[k] && (k % w) + wide < w && k + wide * w < out.length && strong[k + wide] && strong[k + wide * w]) out[k] = dark.matches ? 0xffffffff : 0xff1a1a1a;
     }
     made.getContext("2d").putImageData(image, 0, 0);
     return made;
@@ -198,9 +202,9 @@ export function drawBar(pen, width, frame, data) {
 }
 
 /** A curve over an axis of the window, filled down to its foot, with what is inside a region filled strongly. */
-export function drawCurve(pen, width, height, { values, axis, peak, least = -Infinity }) {
-  const [left, top, right, below] = [14, 10, 14, 44], w = width - left - right, h = height - top - below, foot = top + h;
-  const x = (k) => left + ((k + 0.5) / values.length) * w, y = (value) => foot - (value / (peak * 1.06)) * h;
+export function drawCurve(pen, width, height, { values, axis, least = -Infinity }) {
+  const [left, top, right, below] = [14, 10, 14, 44], w = width - left - right, h = height - top - below, foot = top + h, peak = Math.max(...values);
+  const x = (k) => left + ((k + 0.5) / values.length) * w, y = (value) => foot - (value / peak / 1.06) * h;
   pen.clearRect(0, 0, width, height);
   const fill = (colour, inside) => {
     pen.fillStyle = colour;

@@ -1,7 +1,7 @@
 /** The density page: a table, where its rows live, the fit, and what it shows. */
 
 import { button, h, put, style, trying } from "../dom.js";
-import { alive } from "../words.js";
+import { alive, capital } from "../words.js";
 import { Result } from "./result.js";
 import { chooseSpace, chooseTable } from "./table.js";
 import { Watch } from "./watch.js";
@@ -22,7 +22,7 @@ export async function show(root, page) {
   function wanted() {
     const reading = newest("density table"), fitting = newest("density fit");
     if (alive(reading)) return ["reading", `reading ${reading.id}`];
-    if (alive(fitting) && !(changing === fitting.id)) return ["watch", `watch ${fitting.id}`];
+    if (alive(fitting)) return ["watch", `watch ${fitting.id}`];
     if (state.fit && !changing) return ["result", `result ${state.fit.number}`];
     if (state.table) return ["space", `space ${reading?.id}`];
     return ["table", "table"];
@@ -37,7 +37,7 @@ export async function show(root, page) {
     part = null;
     const again = button("Change what is fitted", () => { changing = true; build(); }, { image: "pencil" });
     const back = button("Back to the density", () => { changing = false; build(); }, { image: "undo" });
-    put(actions, kind === "result" && again, kind === "space" && state.fit && back, ["result", "space"].includes(kind) && h("a", { class: "button", href: "#/" }, "Another table"));
+    put(actions, kind === "result" && again, kind === "space" && state.fit && back, ["result", "space"].includes(kind) && button("Another table", another));
     if (kind === "table") put(body, intro(), chooseTable(page, state.examples));
     if (kind === "reading") put(body, h("p", { class: "panel", role: "status" }, "Reading the table …"));
     if (kind === "space") put(body, chooseSpace(state.table, start, state.fit && { ...state.fit, why: "" }));
@@ -51,13 +51,22 @@ export async function show(root, page) {
     }
   }
 
+  const another = () => trying(async () => page.navigate(`d/${(await api.post("projects", { kind: "density" })).id}`));
   const intro = () => h("p", { class: "soft lead" }, "A density says where rows of a table are likely. It is made for numbers that go round: angles, directions, axes.");
 
+  const STEPS = ["density table", "density fit"];
+  /** Say what went wrong in the newest step, if anything did. */
+  function complain() {
+    const fault = STEPS.map(newest).find((task) => task?.state === "failed");
+    if (fault?.id === problem.told) return;
+    problem.told = fault?.id;
+    put(problem, fault && h("p", { class: "error", role: "alert" }, `${capital(fault.error)}.`));
+  }
+
   async function hear(task) {
-    if (!task.operation.startsWith("density ")) return;
-    const fault = ["density table", "density fit"].map(newest).find((own) => own?.state === "failed");
-    put(problem, fault && h("p", { class: "error", role: "alert" }, fault.error));
-    if (!alive(task) && ["density table", "density fit"].includes(task.operation)) state = await api.get(path);
+    if (!STEPS.includes(task.operation)) return;
+    if (!alive(task)) state = await api.get(path);
+    complain();
     build();
   }
   const offs = [
@@ -65,7 +74,6 @@ export async function show(root, page) {
     events.on("refresh", () => trying(async () => { state = await api.get(path); build(); })),
   ];
   build();
-  const fault = ["density table", "density fit"].map(newest).find((own) => own?.state === "failed");
-  if (fault) put(problem, h("p", { class: "error", role: "alert" }, fault.error));
+  complain();
   return () => { offs.forEach((off) => off()); part?.stop?.(); };
 }

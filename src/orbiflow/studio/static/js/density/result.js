@@ -4,7 +4,7 @@ import { showSurface } from "../../api/density/surface.js";
 import { button, choice, h, icon, put, slider, trying, unique } from "../dom.js";
 import { alive, bytes, capital } from "../words.js";
 import { Grid } from "./grid.js";
-import { FlatMap, drawBar, drawCurve, painted } from "./map.js";
+import { FlatMap, dark, drawBar, drawCurve, painted, pale } from "./map.js";
 import { EDGES, PARTS, angleText, count, figure, percent, shape } from "./words.js";
 
 const TIPS = "Drag to turn, or use the arrow keys. Plus and minus zoom, 0 starts again.";
@@ -13,8 +13,7 @@ export class Result {
   constructor(page, fit) {
     Object.assign(this, { page, fit, ends: [], grids: new Map(), share: 1, holding: false });
     this.path = `projects/${page.project.id}/density/${fit.number}`;
-    this.pair = fit.angles > 1 ? [0, 1] : [0];
-    if (!fit.angles) this.pair = [0, 1];
+    this.pair = fit.angles === 1 ? [0] : [0, 1];
     this.held = { axis: 0, place: 0.5 };
   }
 
@@ -79,7 +78,9 @@ export class Result {
     this.cut.hidden = data.round;
     this.surface = showSurface(this.surfaceCanvas, data, { scrolls: true, changed: (view) => this.cut.set(view.cut) });
     this.cut.set(data.start.cut);
-    this.ends.push(() => this.surface.stop());
+    const shade = () => this.mark();
+    dark.addEventListener("change", shade);
+    this.ends.push(() => this.surface.stop(), () => dark.removeEventListener("change", shade));
     this.mark();
   }
 
@@ -87,8 +88,7 @@ export class Result {
     const { fit } = this;
     if (fit.angles === 1) {
       const curve = painted(this.mapCanvas, (pen, width, height) => {
-        const own = this.grid && Float64Array.from(this.grid.logs, Math.exp);
-        if (own) drawCurve(pen, width, height, { values: [...own], axis: fit.axes[0], peak: Math.exp(this.grid.peak), least: this.least });
+        if (this.grid) drawCurve(pen, width, height, { values: [...this.grid.logs].map(Math.exp), axis: fit.axes[0], least: this.least });
       });
       this.ends.push(curve.stop);
       this.map = { redraw: curve.redraw, show: curve.redraw };
@@ -105,46 +105,35 @@ export class Result {
     await this.showPair();
   }
 
-  /** Two boxes that say which angles the map shows. */
+  /** A box that says which two angles the map shows. */
   choosePair() {
-    const box = (place, words) => {
-      const id = unique("angle");
-      const made = h("select", { id, onchange: () => {
-        const other = this.pair[1 - place], chosen = Number(made.value);
-        if (chosen === other) this.pair[1 - place] = this.pair[place];
-        this.pair[place] = chosen;
-        this.boxes.forEach((each, k) => { each.value = this.pair[k]; });
-        trying(() => this.showPair());
-      } }, this.fit.names.map((name, k) => h("option", { value: k }, name)));
-      made.value = this.pair[place];
-      return [h("div", {}, h("label", { for: id, class: "label" }, words), made), made];
-    };
-    const made = [box(0, "Across"), box(1, "Up")];
-    this.boxes = made.map(([, select]) => select);
-    put(this.pairs, h("div", { class: "row pair" }, made.map(([root]) => root)), h("p", { class: "soft small" }, "Whatever the other angles are."));
+    const { names } = this.fit, id = unique("pair"), pairs = names.flatMap((_, up) => names.slice(0, up).map((__, across) => [across, up]));
+    const box = h("select", { id, onchange: () => { this.pair = pairs[box.value]; trying(() => this.showPair()); } },
+      pairs.map((pair, k) => h("option", { value: k }, pair.map((axis) => names[axis]).join(" and "))));
+    put(this.pairs, h("label", { for: id, class: "label" }, "Which two angles"), box, h("p", { class: "soft small" }, "Whatever the others are."));
   }
 
   /** The grid of two angles: the server is asked once for each two. */
-  async gridOf(pair) {
-    const key = pair.join("-");
+  async gridOf(axes) {
+    const key = axes.join("-");
     if (!this.grids.has(key)) {
-      const axes = [...pair].sort((a, b) => a - b), ask = () => this.page.api.get(`${this.path}/map?axes=${axes.join("-")}`);
+      const ask = () => this.page.api.get(`${this.path}/map?axes=${key}`);
       const data = await ask().catch(async (error) => {
         if (error.status !== 404) throw error;
         await this.work("density map", { fit: this.fit.number, axes });
         return ask();
       });
-      this.grids.set(key, new Grid(data, this.fit.space, pair[0] > pair[1]));
+      this.grids.set(key, new Grid(data, this.fit.space));
     }
     return this.grids.get(key);
   }
 
   async showPair() {
     this.mapCanvas.classList.add("busy");
-    const pair = [...this.pair];
+    const { pair } = this;
     try {
       const grid = await this.gridOf(pair);
-      if (this.stopped || pair.join() !== this.pair.join()) return;
+      if (this.stopped || pair !== this.pair) return;
       this.grid = grid;
       this.map.show(grid, pair);
       if (!this.holding) this.held.place = grid.top[this.held.axis];
@@ -154,7 +143,7 @@ export class Result {
       this.mark();
       this.drawHolding?.();
     } finally {
-      if (pair.join() === this.pair.join()) this.mapCanvas.classList.remove("busy");
+      if (pair === this.pair) this.mapCanvas.classList.remove("busy");
     }
   }
 
@@ -170,6 +159,7 @@ export class Result {
     if (this.surface) {
       const [low, high] = this.span;
       this.surface.view.least = least === -Infinity ? -1 : (least - low) / (high - low);
+      this.surface.view.pale = pale();
       this.surface.view.dots = this.surfaceDots.checked;
       this.surface.redraw();
     }
@@ -197,8 +187,7 @@ export class Result {
     const curve = painted(canvas, (pen, width, height) => {
       if (!this.grid) return;
       const { axis, place: at } = this.held, other = this.pair[1 - axis];
-      const values = [...this.grid.slice(axis, at)];
-      drawCurve(pen, width, height, { values, axis: this.fit.axes[other], peak: Math.max(...values) });
+      drawCurve(pen, width, height, { values: this.grid.slice(axis, at), axis: this.fit.axes[other] });
     });
     this.ends.push(curve.stop);
     const names = () => this.pair.map((axis) => this.fit.names[axis]);
@@ -212,10 +201,10 @@ export class Result {
       canvas.setAttribute("aria-label", `Curve of ${other} while ${name} is held`);
       curve.redraw();
     };
-    let built = "";
+    let built;
     this.drawHolding = () => {
-      if (built !== this.pair.join()) {
-        built = this.pair.join();
+      if (built !== this.pair) {
+        built = this.pair;
         const which = choice("Hold", [0, 1].map((axis) => [axis, names()[axis]]), this.held.axis, (axis) => {
           this.held = { axis, place: this.grid.top[axis] };
           build();

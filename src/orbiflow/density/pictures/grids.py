@@ -25,7 +25,7 @@ NATURAL = "natural"
 
 
 def flat_frame(density: Density, names: tuple[str, ...], samples: Tensor) -> dict[str, Any]:
-    """Return what all flat pictures of a density share: axes, points, colours.
+    """Return what all flat pictures of a density share: names, axes, points, colours.
 
     Points are at most `MAX_DOTS`: places in the window, between 0 and 1, or degrees north and east.
 
@@ -51,6 +51,7 @@ def flat_frame(density: Density, names: tuple[str, ...], samples: Tensor) -> dic
             axes.append({"label": label, "at": at, "texts": texts})
     ramp = 255 * colormaps[colours.COLOURS](np.linspace(0, 1, 256))
     return {
+        "names": list(view.names),
         "axes": axes,
         "points": packed(places, "<f4"),
         "shown": len(places),
@@ -114,7 +115,9 @@ def _pair(density: Density, axes: tuple[int, ...]) -> Array:
     view, t = frames.view_of(density.space), _middles(CELLS["pair"])
     if len(set(axes)) != 2 or not all(0 <= axis < density.space.dim for axis in axes):
         raise OrbiflowError(f"a flat picture is of two different angles, got {list(axes)}")
-    grid = torch.stack(torch.meshgrid(*(t + view.low[axis] for axis in axes), indexing="ij"), dim=-1)
+    grid = torch.stack(
+        torch.meshgrid(*(t + view.low[axis] for axis in axes), indexing="ij"), dim=-1
+    )
     points = torch.full((len(t) ** 2, density.space.dim), math.nan, dtype=torch.float64)
     points[:, list(axes)] = grid.reshape(-1, 2)
     logs = log_prob_observed(density, points, measure=NATURAL)

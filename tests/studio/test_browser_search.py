@@ -1,0 +1,157 @@
+"""The pages of the search and of what is taken away, in a real browser."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+
+from studio.browser import (
+    RunningStudio,
+    covers_page_once,
+    hidden_parts,
+    running_studio,
+    serious_issues,
+    small_searches,
+)
+
+CARD = ".card[data-tile]"
+DONE = ".card[data-stage=final]"
+
+
+def state(page: Any) -> str:
+    """Return what a page says about its search."""
+    return page.locator(".state-words").inner_text()
+
+
+def test_from_a_picture_to_a_file_that_covers_its_page(page, drawing, tmp_path) -> None:
+    small_searches(page, "IH4")
+    page.goto("/")
+    page.set_input_files("#file", drawing)
+    page.get_by_role("button", name="Find tiles").click()
+    page.wait_for_selector(DONE)
+    assert page.locator(f"{CARD} .stars").first.get_attribute("aria-label").endswith("stars")
+    page.get_by_role("link", name=re.compile("^Take away:")).first.click()
+    page.get_by_label("What is it for?").select_option("print")
+    page.get_by_label("Kind of file").select_option("svg")
+    page.get_by_role("button", name="Make it").click()
+    page.wait_for_selector(".preview img")
+    with page.expect_download() as caught:
+        page.get_by_role("link", name=re.compile("svg")).first.click()
+    caught.value.save_as(tmp_path / "tiling.svg")
+    assert covers_page_once((tmp_path / "tiling.svg").read_text())
+
+
+def test_a_search_is_paused_continued_and_stopped(page, studio: RunningStudio) -> None:
+    own = studio.with_picture()
+    page.goto(f"/#/p/{own}/picture")
+    page.get_by_role("button", name="Find tiles").click()
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Go on").wait_for()
+    assert state(page) == "Paused."
+    page.get_by_role("button", name="Go on").click()
+    page.wait_for_selector(CARD)
+    page.get_by_role("button", name="Stop").click()
+    page.get_by_role("button", name="Search again").wait_for()
+    assert state(page) == "Stopped."
+    assert page.locator(CARD).count() == len(studio.project(own)["tiles"])
+
+
+def test_two_tabs_and_a_reload_in_the_middle(page, studio: RunningStudio) -> None:
+    own = studio.with_picture()
+    other = page.context.new_page()
+    other.goto(f"/#/p/{own}")
+    other.wait_for_selector(".cards", state="attached")
+    small_searches(page, "IH1", "IH2", "IH4")
+    page.goto(f"/#/p/{own}/picture")
+    page.get_by_role("button", name="Find tiles").click()
+    other.wait_for_selector(CARD)
+    page.reload()
+    page.wait_for_selector(f"{DONE} >> nth=2")
+    other.wait_for_selector(f"{DONE} >> nth=2")
+    names = [tab.locator(f"{CARD} .tag").all_inner_texts() for tab in (page, other)]
+    assert names[0] == names[1]
+    page.get_by_label("Name of the project").fill("Boots")
+    other.wait_for_function("document.querySelector('.title').value === 'Boots'")
+
+
+def test_a_server_that_was_killed_loses_nothing(browser, tmp_path) -> None:
+    with running_studio(tmp_path) as studio:
+        own = studio.with_picture()
+        page = browser.new_page()
+        page.set_default_timeout(120_000)
+        page.goto(f"{studio.address}/#/p/{own}")
+        page.wait_for_selector(".cards", state="attached")
+        studio.search(own, "IH1", "IH2", "IH4")
+        page.wait_for_selector(CARD)
+        before = {card["id"] for card in studio.project(own)["tiles"]}
+        studio.kill()
+        page.get_by_text("The studio does not answer").wait_for()
+        studio.start()
+        page.get_by_text("The studio does not answer").wait_for(state="hidden")
+        page.wait_for_selector(f"{DONE} >> nth=2")
+        assert before <= {card["id"] for card in studio.found(own)}
+        page.wait_for_function(
+            "document.querySelector('.state-words').textContent.startsWith('3 tiles')"
+        )
+        page.close()
+
+
+def test_more_like_one_and_no_more_of_another(page, studio: RunningStudio, searched) -> None:
+    small_searches(page, "IH4")
+    page.goto(f"/#/p/{searched}")
+    page.wait_for_selector(CARD)
+    with page.expect_request("**/tasks") as caught:
+        page.get_by_role("button", name=re.compile("^More like this")).first.click()
+    first = studio.project(searched)["tiles"][0]["id"]
+    assert caught.value.post_data_json["settings"]["like"] == first
+    page.get_by_role("button", name="Stop").click()
+    page.get_by_role("button", name="Search again").wait_for()
+
+
+def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched) -> None:
+    tile = studio.project(searched)["tiles"][0]["id"]
+    page.goto(f"/#/p/{searched}/take/{tile}")
+    page.get_by_text("Page and file").click()
+    assert page.get_by_label("What is drawn").input_value() == "none"
+    assert not page.get_by_label("Kerf").is_visible()
+    page.get_by_label("What is drawn").select_option("pieces")
+    page.get_by_text("Pieces", exact=True).click()
+    page.get_by_label("Kerf").fill("0.2")
+    page.get_by_label("How long is one tile?").fill("much")
+    page.get_by_role("button", name="Make it").click()
+    page.locator(".toast.bad, .error").first.wait_for()
+    assert "size" in page.locator(".toast.bad, .error").first.inner_text()
+
+
+def test_the_true_size_follows_the_screen_that_was_measured(page, studio, searched) -> None:
+    tile = studio.project(searched)["tiles"][0]["id"]
+    page.goto(f"/#/p/{searched}/take/{tile}")
+    long = "(() => { const { width, height } = document.querySelector('.true-tile').style;"
+    long += " return Math.max(parseFloat(width), parseFloat(height)); })()"
+    page.wait_for_selector(".true-tile")
+    assert page.evaluate(long) == pytest.approx(40 * 96 / 25.4 + 4, abs=0.1)
+    page.get_by_label("How long is one tile?").fill("60")
+    page.keyboard.press("Tab")
+    assert page.evaluate(long) == pytest.approx(60 * 96 / 25.4 + 4, abs=0.1)
+    page.get_by_role("button", name="Measure my screen").click()
+    page.get_by_label(re.compile("bank card")).fill("5")
+    assert page.evaluate(long) == pytest.approx(60 * 5 + 4, abs=0.1)
+    card = page.locator(".bank-card").bounding_box()
+    assert card["width"] / card["height"] == pytest.approx(85.6 / 53.98, rel=1e-2)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_pages_are_for_everyone(page, studio: RunningStudio, searched, scheme) -> None:
+    tile = studio.project(searched)["tiles"][0]["id"]
+    page.emulate_media(color_scheme=scheme)
+    for path, ready in ((f"/#/p/{searched}", CARD), (f"/#/p/{searched}/take/{tile}", ".form")):
+        page.set_viewport_size({"width": 1280, "height": 900})
+        page.goto(path)
+        page.wait_for_selector(ready)
+        for closed in page.locator("summary").all():
+            closed.click()
+        assert serious_issues(page) == []
+        page.set_viewport_size({"width": 360, "height": 700})
+        assert hidden_parts(page) <= 0
