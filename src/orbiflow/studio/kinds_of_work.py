@@ -107,7 +107,11 @@ def own_schema(operation: Operation) -> dict[str, Any]:
         for entry in own_fields(operation)
     }
     if operation.name == "art":
-        properties["format"] = {"enum": list(ART_FORMATS), "default": ART_FORMATS[0]}
+        properties["format"] = {
+            "enum": list(ART_FORMATS),
+            "default": ART_FORMATS[0],
+            "description": "Format of the file.",
+        }
     return {**operation.schema, "properties": properties, "required": []}
 
 

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import json
 import re
+import struct
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +34,7 @@ TILE = re.compile(r"tiles/([1-9][0-9]{0,14})/(result\.json|[A-Za-z0-9-]{1,20}/mo
 MOST_ENTRIES = 3 * PLACES
 MOST_BYTES = 512 * 2**20  # of all entries, unpacked
 MOST_OF_ONE = 64 * 2**20
+DAMAGED = (zlib.error, EOFError, struct.error, KeyError, IndexError, TypeError, OverflowError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +118,11 @@ def unpack(path: Path, home: Path) -> dict[str, Any]:
             with zipfile.ZipFile(path) as archive:
                 _unpack_entries(archive, home)
             document = json.loads((home / PROJECT).read_text(encoding="utf-8"))
-        except (zipfile.BadZipFile, FileNotFoundError, NotImplementedError, EOFError) as error:
+        except (zipfile.BadZipFile, FileNotFoundError, NotImplementedError) as error:
             if not path.exists():
                 raise
             raise InputFileError(f"{path.name}: not a project of the studio; {cure}") from error
-        except (ValueError, RecursionError, RuntimeError) as error:
+        except (*DAMAGED, ValueError, RuntimeError) as error:
             if isinstance(error, OrbiflowError):
                 raise
             raise InputFileError(f"{path.name}: its contents are damaged; {cure}") from error

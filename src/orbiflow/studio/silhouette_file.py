@@ -26,6 +26,7 @@ from orbiflow.tiles import (
 
 SILHOUETTE, BACKDROP, MEND = "silhouette.json", "backdrop.png", "mend.png"
 SIDE = 1200  # pixels of the backdrop's longer side
+SAMPLES = 3  # along each side of a pixel of what is drawn
 PAPER, INK = (255, 255, 255), (70, 78, 92)
 
 
@@ -105,24 +106,26 @@ def _picture(target: Target, content: FileContent) -> Image.Image:
         return picture
     _, extent = _frame(target)
     width, height = np.maximum(1, np.round(extent * SIDE / extent.max())).astype(int).tolist()
-    picture = Image.new("RGB", (width, height), PAPER)
-    _fill(picture, target, INK, PAPER)
-    return picture
+    return _drawn(target, (width, height), "RGB", INK, PAPER)
 
 
-def _fill(picture: Image.Image, target: Target, ink: Any, paper: Any) -> None:
+def _drawn(target: Target, size: tuple[int, int], mode: str, ink: Any, paper: Any) -> Image.Image:
+    """Return what was read as shape, filled."""
+    width, height = finer = size[0] * SAMPLES, size[1] * SAMPLES
+    picture = Image.new(mode, (width, height), paper)
     draw = ImageDraw.Draw(picture)
 
     def points(ring: Any) -> list[tuple[float, ...]]:
-        return list(map(tuple, _to_backdrop(target, np.asarray(ring), picture.size).tolist()))
+        # Pillow's whole numbers are the middles of pixels
+        return list(map(tuple, (_to_backdrop(target, np.asarray(ring), finer) - 0.5).tolist()))
 
-    seen = [] if target.seen is None else polygons_in(target.seen)
-    for part in seen:
+    for part in [] if target.seen is None else polygons_in(target.seen):
         draw.polygon(points(part.exterior.coords), fill=ink)
         for hole in part.interiors:
             draw.polygon(points(hole.coords), fill=paper)
-    if not seen:
+    if target.seen is None:
         draw.polygon(points(target.outline), fill=ink)
+    return picture.reduce(SAMPLES)
 
 
 def _mended(target: Target, home: Path, size: tuple[int, int]) -> Target:
@@ -133,8 +136,7 @@ def _mended(target: Target, home: Path, size: tuple[int, int]) -> Target:
     painted, _ = open_image(FileContent(file.read_bytes(), "the corrections"))
     painted = painted.convert("RGBA").resize(size, Image.Resampling.NEAREST)
     level, _, _, opacity = (np.asarray(band) > 127 for band in painted.split())
-    own = Image.new("L", size)
-    _fill(own, target, 255, 0)
+    own = _drawn(target, size, "L", 255, 0)
     mask = (np.asarray(own) > 127) & ~(opacity & ~level) | (opacity & level)
     mask = np.pad(mask, 1)  # the shape may touch the picture's edge
     if not mask.any():
