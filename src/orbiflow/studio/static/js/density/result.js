@@ -157,7 +157,7 @@ export class Result {
   pick(u, v) {
     if (this.fit.angles < 2) return;
     this.hold(this.held.axis === 0 ? u : v);
-    this.heldSlider.set(this.held.place);
+    this.heldSlider.set(360 * this.held.place);
   }
 
   hold(place) {
@@ -180,8 +180,8 @@ export class Result {
     const build = () => {
       const [name, other] = this.held.axis === 0 ? names() : names().reverse();
       this.heldSlider = slider(`${name} is held at`, {
-        min: 0, max: 1, step: 1 / 360, value: this.held.place, said: (at) => `${name} = ${angleText(at, this.fit.unit)}`,
-      }, (at) => this.hold(at));
+        min: 0, max: 360, step: 1, value: 360 * this.held.place, said: (at) => `${name} = ${angleText(at / 360, this.fit.unit)}`,
+      }, (at) => this.hold(at / 360));
       put(place, this.heldSlider);
       says.textContent = `The curve says how likely each ${other} then is. You may also drag on the map.`;
       canvas.setAttribute("aria-label", `Curve of ${other} while ${name} is held`);
