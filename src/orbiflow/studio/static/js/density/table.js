@@ -24,7 +24,7 @@ export function chooseTable(page, examples) {
   drop.addEventListener("drop", (event) => { over(false)(event); take(event.dataTransfer.files[0]); });
   const example = ({ name, title, about }) => h("li", {}, h("button", { type: "button", class: "example panel", onclick: () => trying(() => api.post(`${path}/example`, { name })) },
     h("strong", {}, title), h("span", { class: "soft small" }, about)));
-  return h("div", { class: "stack" }, drop, h("h2", {}, "Or try one of these"), h("ul", { class: "examples" }, examples.map(example)));
+  return h("div", { class: "stack" }, drop, h("h2", {}, "Or try one of these"), h("ul", { class: "grid narrow" }, examples.map(example)));
 }
 
 /** The first rows of a table. */
@@ -46,7 +46,7 @@ export function chooseSpace(table, start, last) {
   const settings = () => ({ space: chosen.space, columns: chosen.columns, ...(spaceOf(chosen.space)?.angular ? { unit: chosen.unit } : {}) });
 
   const name = unique("space");
-  const spaces = h("fieldset", {}, h("legend", {}, "What are the numbers?"), h("div", { class: "spaces" }, SPACES.map((space) =>
+  const spaces = h("fieldset", {}, h("legend", {}, "What are the numbers?"), h("div", { class: "grid narrow" }, SPACES.map((space) =>
     h("label", { class: "space" }, h("input", { type: "radio", name, checked: space.name === chosen.space, onchange: () => { chosen.space = space.name; fit(); } }),
       h("span", {}, h("strong", {}, space.title), h("span", { class: "soft small" }, space.about), h("span", { class: "soft small" }, `Needs ${space.needs}.`))))));
   const order = h("span", { class: "soft small" });

@@ -25,7 +25,7 @@ export class Watch {
     this.bar.value = task.share;
     this.hear(task.what ?? "");
     const state = task.state === "waiting" && task.place ? `${STATES.waiting}: ${task.place} before it` : STATES[task.state];
-    this.says.textContent = task.state === "running" ? `${Math.round(100 * task.share)} % done. ${this.words()}` : state;
+    this.says.textContent = task.state === "running" ? `${Math.round(100 * task.share)} % done` : state;
     this.steer();
   }
 
@@ -40,12 +40,6 @@ export class Watch {
     if (focused) this.buttons.firstChild.focus();
   }
 
-  words() {
-    const tried = TRIED.exec(this.task.what);
-    if (tried) return `Kept-aside part ${tried[1]} of ${tried[2]}: ${(PARTS[tried[3]]?.[0] ?? tried[3]).toLowerCase()}.`;
-    return { flow: "Stirring the dough.", drawing: "Drawing.", "putting together": "Putting it together." }[this.task.what.split(":")[0]] ?? "";
-  }
-
   hear(what) {
     if (!what || what === this.lines.at(-1)) return;
     this.lines.push(what);
@@ -57,7 +51,7 @@ export class Watch {
     put(this.kinds, [...this.found].map(([name, { part, parts, size }]) => {
       const [title, about] = PARTS[name] ?? [name, ""], share = part ? part / parts : this.task.share;
       return h("li", {}, h("div", { class: "share" }, h("strong", {}, title), h("span", { class: "soft small" }, part ? `part ${part} of ${parts}${size ? `, up to ${size} bumps` : ""}` : "being stirred")),
-        h("meter", { min: 0, max: 1, value: share, "aria-label": title }), h("p", { class: "soft small" }, `${capital(about)}.`));
+        h("meter", { value: share, "aria-label": title }), h("p", { class: "soft small" }, `${capital(about)}.`));
     }));
   }
 }

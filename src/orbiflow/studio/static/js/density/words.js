@@ -1,10 +1,10 @@
 /** Words of the density page. */
 
 export const SPACES = [
-  { name: "torus", title: "Angles", about: "Each number goes round and comes back to its start, like a clock. Two angles live on a doughnut.", needs: "1 to 7 columns of angles", least: 1, most: 7, angular: true },
+  { name: "torus", title: "Angles", about: "Each comes back to its start, like a clock. Two angles live on a doughnut.", needs: "1 to 7 columns of angles", least: 1, most: 7, angular: true },
   { name: "sphere", title: "Directions", about: "Where an arrow points from the middle of a ball: places on the Earth, winds, stars.", needs: "latitude and longitude, or x, y, z", least: 2, most: 3 },
   { name: "projective-plane", title: "Lines without an arrow", about: "Both ends mean the same: axes of crystals, magnetic poles, cracks in rock.", needs: "latitude and longitude, or x, y, z", least: 2, most: 3 },
-  { name: "klein-bottle", title: "Theta and phi of picture patches", about: "How light edges lie in tiny bits of photographs. They live on a Klein bottle, which has no inside.", needs: "theta, then phi", least: 2, most: 2, angular: true },
+  { name: "klein-bottle", title: "Theta and phi of picture patches", about: "How edges lie in tiny bits of photographs: on a Klein bottle, which has no inside.", needs: "theta, then phi", least: 2, most: 2, angular: true },
 ];
 
 export const spaceOf = (name) => SPACES.find((space) => space.name === name);
