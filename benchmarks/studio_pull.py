@@ -134,7 +134,9 @@ def processor_seconds() -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
     parser.add_argument("--vertices", type=int, default=500)
     parser.add_argument("--seconds", type=float, default=5.0)
     parser.add_argument("--across", type=float, default=4.0)
@@ -143,7 +145,9 @@ def main() -> None:
     view = json.loads(json.dumps(tile_view(tile_card(tile, 1, "final"), tile)))
     found = measured(view, with_vertices(tile, given.vertices), given.seconds, given.across)
     frames = found["frames"]
-    print(f"vertices {found['vertices']}, points of the body {found['points']}, copies {found['copies']}")
+    print(
+        f"vertices {found['vertices']}, points of the body {found['points']}, copies {found['copies']}"
+    )
     print(f"frames a second               {frames / found['seconds']:.1f}")
     print(f"with a core to itself         {frames / found['processor']:.1f} (at most 60)")
     print(f"processor time a frame, ms    {1000 * found['processor'] / frames:.1f}")

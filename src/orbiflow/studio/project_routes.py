@@ -218,8 +218,9 @@ def project_routes(store: Store, queue: WorkQueue, hub: Hub, limits: Limits) -> 
         if not isinstance(operation, str) or not is_object(settings):
             raise OrbiflowError("a task has an operation and settings")
         view = store.project(project)["view"]
-        if settings.get("drawing") is True:  # as it is now
-            settings = {**settings, "drawing": json.dumps(view.get("drawing", {}))}
+        if "drawing" in settings:  # as it is now
+            drawn = view.get("drawing", {}) if settings["drawing"] is True else {}
+            settings = {**settings, "drawing": json.dumps(drawn)}
         number = queue.submit(project, operation, settings, most=limits.waiting)
         return {"task": shown_task(store, store.task(number))}
 
