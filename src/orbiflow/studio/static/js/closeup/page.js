@@ -261,8 +261,10 @@ class Closeup {
 
   #pulledTo({ crossed, body }) {
     this.pen.ride(this.pulling.puller, body, this.space);
-    if (crossed) this.tell("crossed", "The outline crosses itself here");
-    else if (body && !this.pulling.waiting) this.tell("moving", "Let go to check it");
+    if (this.pulling.hand) {
+      if (crossed) this.tell("crossed", "The outline crosses itself here");
+      else this.tell("moving", "Let go to check it");
+    }
     if (!body && this.badge.dataset.kind !== "refused") this.tell("proved", "Proved to tile");
     if (!body) this.stale();
     if (!body && this.later) {
