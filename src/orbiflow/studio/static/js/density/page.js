@@ -45,10 +45,7 @@ export async function show(root, page) {
       part = new Watch(page, newest("density fit"));
       put(body, part.root);
     }
-    if (kind === "result") {
-      part = new Result(page, state.fit);
-      part.show(body);
-    }
+    if (kind === "result") (part = new Result(page, state.fit)).show(body);
   }
 
   const another = () => trying(async () => page.navigate(`d/${(await api.post("projects", { kind: "density" })).id}`));
