@@ -17,7 +17,7 @@ export class Watch {
   constructor(page, task) {
     Object.assign(this, { page, found: new Map() });
     this.bar = h("progress", { max: 1, "aria-label": "How far the fit is" });
-    this.says = h("p", { role: "status" });
+    this.says = h("p");
     this.kinds = h("ul", { class: "parts stack" });
     this.buttons = h("div", { class: "row" });
     this.root = h("section", { class: "panel stack watch" }, h("h2", {}, "Fitting"), this.bar, this.says, this.buttons,
@@ -49,7 +49,7 @@ export class Watch {
     const tried = TRIED.exec(what), kind = tried ? tried[3] : what.startsWith("flow") ? "flow" : null;
     if (!kind) return;
     const own = this.found.get(kind) ?? {};
-    this.found.set(kind, tried ? { part: Number(tried[1]), parts: Number(tried[2]), size: tried[4] ?? own.size } : { going: true });
+    this.found.set(kind, tried ? { part: Number(tried[1]), parts: Number(tried[2]), size: tried[4] ?? own.size } : {});
     put(this.kinds, [...this.found].map(([name, { part, parts, size }]) => (part
       ? partBar(name, part / parts, `part ${part} of ${parts}${size ? `, up to ${size} bumps` : ""}`)
       : partBar(name, this.task.share, "being stirred"))));
