@@ -59,6 +59,8 @@ def test_a_search_is_paused_continued_and_stopped(page, studio: RunningStudio) -
 
 
 def test_two_tabs_and_a_reload_in_the_middle(page, studio: RunningStudio) -> None:
+    from playwright.sync_api import expect
+
     own = studio.with_picture()
     other = page.context.new_page()
     other.goto(f"/#/p/{own}")
@@ -73,7 +75,7 @@ def test_two_tabs_and_a_reload_in_the_middle(page, studio: RunningStudio) -> Non
     names = [tab.locator(f"{CARD} .tag").all_inner_texts() for tab in (page, other)]
     assert names[0] == names[1]
     page.get_by_label("Name of the project").fill("Boots")
-    other.wait_for_function("document.querySelector('.title').value === 'Boots'")
+    expect(other.get_by_label("Name of the project")).to_have_value("Boots")
 
 
 def test_a_server_that_was_killed_loses_nothing(browser, tmp_path) -> None:
@@ -150,7 +152,7 @@ def test_pages_are_for_everyone(page, studio: RunningStudio, searched, scheme) -
         page.set_viewport_size({"width": 1280, "height": 900})
         page.goto(path)
         page.wait_for_selector(ready)
-        for closed in page.locator("summary").all():
+        for closed in page.locator("summary:visible").all():
             closed.click()
         assert serious_issues(page) == []
         page.set_viewport_size({"width": 360, "height": 700})

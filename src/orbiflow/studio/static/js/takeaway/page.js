@@ -89,6 +89,7 @@ export async function show(root, { api, events, project, tileId, navigate, about
 
   function history() {
     const made = project.tasks.filter((task) => KINDS[task.operation] && task.state === "done" && task.result?.files?.length && task.id !== state.task?.id);
+    earlier.hidden = !made.length;
     put(earlier, made.length > 0 && [h("h2", { id: "earlier" }, "Made before"), h("ul", { class: "made" }, made.map((task) =>
       h("li", { class: "panel stack" }, picture(task), h("span", { class: "soft small" }, KINDS[task.operation].title), files(task).map((link) => { link.classList.remove("primary"); return link; }))))]);
   }
