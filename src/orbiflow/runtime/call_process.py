@@ -176,7 +176,9 @@ def _main() -> int:
     try:
         # a line and not a byte more: what follows must stay there to be noticed
         with open(0, "rb", buffering=0, closefd=False) as words:
-            call = call_from_json(json.loads(words.readline()))
+            if not (line := words.readline()):
+                return 0  # there was nothing to do
+            call = call_from_json(json.loads(line))
     except (OrbiflowError, ValueError, RecursionError) as error:
         tell(Failed(str(error), "mistake"))
         return 1

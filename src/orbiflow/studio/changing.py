@@ -19,6 +19,7 @@ from orbiflow.tiles import (
     complex_points,
     orient,
     points_along,
+    ring_length,
 )
 from orbiflow.tiles.geometry import border
 from orbiflow.tiles.likeness import Rating, fidelity, narrowest_neck
@@ -29,6 +30,7 @@ POINTS = 240
 """About how many points of the outline can be pulled: longer sides are divided."""
 
 COMPARED = 240  # points at which a pulled outline is compared with its silhouette
+COARSE = 2.5  # distance of points inside the body, in mean sides of the outline
 NEGLIGIBLE = 1e-12  # entry of the space's matrix that is nothing but rounding
 SIZES = (0.05, 20.0)  # area of a pulled tile, and of its lattice's cell, in those of before
 CROSSED = "the outline crosses itself there, so tiles would overlap: pull it less far"
@@ -56,7 +58,8 @@ def space_json(tile: EscherTile) -> dict[str, Any]:
     """
     space = variations(tile)
     ring = space.first.polygon
-    body, count = triangulate(orient(ring, counter_clockwise=True)), len(ring)
+    spacing = COARSE * ring_length(ring) / len(ring)
+    body, count = triangulate(orient(ring, counter_clockwise=True), spacing), len(ring)
     number, sides, shares = np.arange(len(body.points)), body.sides, body.shares
     if space.first.signed_area < 0:  # the vertices are there in reverse, from the same first one
         number[:count] = -number[:count] % count

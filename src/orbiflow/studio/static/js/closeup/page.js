@@ -66,6 +66,7 @@ class Closeup {
     this.stage.layers.push((context) => this.#overlay(context));
     this.stage.onhover = (place) => this.#hover(place);
     this.stage.options.skin = () => this.#skin();
+    this.stage.options.over = (context) => this.pen.over(context);
     this.undoButton = button("Undo", () => this.undo(), { kind: "icon", image: "undo" });
     this.redoButton = button("Redo", () => this.redo(), { kind: "icon", image: "redo" });
     const zooms = h("div", { class: "zooms" },
@@ -122,11 +123,7 @@ class Closeup {
   }
 
   get tool() {
-    return this.mode === "pull" ? this.pullTool : this.mode === "draw" ? this.pen : null;
-  }
-
-  get pullTool() {
-    return (this.pullTools ??= Object.assign(Object.create(this.pulling), { over: (context) => this.pen.overMoving(context) }));
+    return { pull: this.pulling, draw: this.pen }[this.mode];
   }
 
   #choose(mode) {

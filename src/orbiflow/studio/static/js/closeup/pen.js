@@ -20,7 +20,6 @@ export class Pen {
     this.drawing = { strokes: [], eyes: [] };
     this.marks = { lines: [], eyes: [] };
     this.line = null;
-    this.over = (context) => this.#over(context);
   }
 
   /** Take a tile's map and what was drawn. */
@@ -37,17 +36,12 @@ export class Pen {
   #carried() {
     this.marks = {
       lines: this.drawing.strokes.map(({ points, colour, width }) => ({
-        points: points.map((point) => this.carry.forward(point)), colour, width: width * this.growth,
+        points: points.map((point) => this.carry.forward(point)), colour, width, // as exports keep it
       })),
       eyes: this.drawing.eyes.map(([x, y, radius]) => this.#eye([x, y], radius)),
     };
     this.moving = null;
     this.on.marks();
-  }
-
-  /** How wide lines of the silhouette are on the tile: exports keep their width. */
-  get growth() {
-    return 1;
   }
 
   #eye(point, radius) {
@@ -162,17 +156,12 @@ export class Pen {
     for (const eye of this.moving.eyes) eye.at = Riders.at(eye.seat, body);
   }
 
-  /** On each copy: the line in hand; and all marks while the tile is pulled. */
-  #over(context) {
-    if (this.moving) this.overMoving(context);
-    if (this.line) lineInto(context, this.line.points, this.settings.colour, WIDTHS[this.settings.width] * this.size);
-  }
-
-  overMoving(context) {
-    if (!this.moving) return;
+  /** Draw on a copy the line in hand, and all marks while the tile is pulled. */
+  over(context) {
     const { palette } = this.stage.options;
-    for (const { points, colour, width } of this.moving.lines) lineInto(context, points, colour, width);
-    for (const { at, radius } of this.moving.eyes) eyeInto(context, at, radius, palette, this.stage.tiling.yDown);
+    for (const { points, colour, width } of this.moving?.lines ?? []) lineInto(context, points, colour, width);
+    for (const { at, radius } of this.moving?.eyes ?? []) eyeInto(context, at, radius, palette, this.stage.tiling.yDown);
+    if (this.line) lineInto(context, this.line.points, this.settings.colour, WIDTHS[this.settings.width] * this.size);
   }
 
   hover(place) {

@@ -8,10 +8,12 @@
  * and points are found in turns, the latter by conjugate gradients from where they are.
  */
 
-const GRAB = 300; // strength of the spring to the pointer; that of a triangle is about one
+const GRAB = 600; // strength of the spring to the pointer; that of a triangle is about one
+const GRIP = 0.3; // width of the hand, in reaches
 const HOLD = 4; // of those beyond the reach
 const LEAST_HOLD = 1e-3; // of all others, so that the whole does not float away
 const STEEPEST = 8; // largest weight of a triangle's side: slivers would be too stiff
+const AFTER = [1, 2, 0, 1]; // corners of a triangle after corner 0, 1, 2
 const ENOUGH = 1e-4; // of the residual, at which conjugate gradients stop
 
 /** Rows of a sparse matrix as typed arrays, from {indptr, indices, values}. */
@@ -19,10 +21,10 @@ function sparse({ indptr, indices, values }, cols) {
   return { start: Int32Array.from(indptr), at: Int32Array.from(indices), value: Float64Array.from(values), cols };
 }
 
-/** out = matrix x */
+/** out = matrix x, as many rows as fit */
 function multiply(matrix, x, out) {
   const { start, at, value } = matrix;
-  for (let i = 0; i < start.length - 1; i += 1) {
+  for (let i = 0; i < out.length; i += 1) {
     let sum = 0;
     for (let k = start[i]; k < start[i + 1]; k += 1) sum += value[k] * x[at[k]];
     out[i] = sum;
@@ -184,8 +186,8 @@ export class Puller {
    * all stays; with `lattice` the way in which copies lie may change as well.
    */
   grab(vertex, share, reach, { lattice = true } = {}) {
-    const next = (vertex + 1) % this.count;
-    this.pin = { vertex, next, share, target: null };
+    this.pin = { vertex, next: (vertex + 1) % this.count, share, target: null };
+    this.#grip(GRIP * reach);
     this.pin.target = this.held();
     this.free.fill(1);
     if (!lattice) this.free.fill(0, this.group, this.parametersCount);
@@ -193,9 +195,27 @@ export class Puller {
     this.#measureDiagonal();
   }
 
+  /** The hand is soft: it holds the mean of the outline nearby, so that no spike comes out. */
+  #grip(width) {
+    const { pin, count, rest } = this;
+    const [x, y] = this.grip();
+    const weight = (i) => Math.exp(-3 * ((rest[2 * i] - x) ** 2 + (rest[2 * i + 1] - y) ** 2) / width ** 2);
+    const found = new Map([[pin.vertex, 1 - pin.share], [pin.next, pin.share]]);
+    for (const [from, step] of [[pin.vertex, -1], [pin.next, 1]]) {
+      for (let k = 0, i = from; k < count / 4; k += 1, i = (i + step + count) % count) {
+        const own = weight(i);
+        if (k > 1 && own < 0.05) break;
+        found.set(i, (found.get(i) ?? 0) + own);
+      }
+    }
+    const total = [...found.values()].reduce((sum, own) => sum + own, 0);
+    pin.parts = [...found].map(([i, own]) => [i, own / total]);
+  }
+
   #holdBeyond(reach) {
     const { rest, orbit, count } = this;
-    const { vertex, next, share, target } = this.pin;
+    const { vertex, next, share } = this.pin;
+    const target = this.grip();
     const nearest = share < 0.5 ? vertex : next;
     const from = (i, x, y) => Math.hypot(rest[2 * i] - x, rest[2 * i + 1] - y);
     const places = [target];
@@ -211,11 +231,18 @@ export class Puller {
     }
   }
 
-  /** Where the hand holds the outline now. */
-  held() {
+  /** The point of the outline that was taken hold of, where it is now. */
+  grip() {
     const { vertex, next, share } = this.pin;
     const at = this.#pointsOf(2 * vertex, 2 * vertex + 2).concat(this.#pointsOf(2 * next, 2 * next + 2));
     return [0, 1].map((j) => (1 - share) * at[j] + share * at[2 + j]);
+  }
+
+  /** What the hand holds, the mean of the outline nearby, where it is now. */
+  held() {
+    const found = [0, 0];
+    for (const [i, part] of this.pin.parts) this.#pointsOf(2 * i, 2 * i + 2).forEach((own, j) => { found[j] += part * own; });
+    return found;
   }
 
   #pointsOf(from, to) {
@@ -238,9 +265,7 @@ export class Puller {
         if (this.laplacian.at[k] === i) own[i] = this.laplacian.value[k] + this.hold[i];
       }
     }
-    const { vertex, next, share } = this.pin;
-    own[vertex] += GRAB * (1 - share) ** 2;
-    own[next] += GRAB * share ** 2;
+    for (const [i, part] of this.pin.parts) own[i] += GRAB * part ** 2;
     this.diagonal.fill(0);
     for (let i = 0; i < 2 * this.size; i += 1) {
       for (let k = start[i]; k < start[i + 1]; k += 1) this.diagonal[at[k]] += value[k] ** 2 * Math.max(own[i >> 1], 1e-6);
@@ -260,7 +285,8 @@ export class Puller {
     multiply(this.points, given, x);
     const { start, at, value } = laplacian;
     for (let i = 0; i < this.size; i += 1) {
-      let [u, v] = [hold[i] * x[2 * i], hold[i] * x[2 * i + 1]];
+      let u = hold[i] * x[2 * i];
+      let v = hold[i] * x[2 * i + 1];
       for (let k = start[i]; k < start[i + 1]; k += 1) {
         u += value[k] * x[2 * at[k]];
         v += value[k] * x[2 * at[k] + 1];
@@ -268,16 +294,14 @@ export class Puller {
       y[2 * i] = u;
       y[2 * i + 1] = v;
     }
-    this.#addGrab(y, (j) => (1 - pin.share) * x[2 * pin.vertex + j] + pin.share * x[2 * pin.next + j]);
+    this.#addGrab(y, pin.parts.reduce((sum, [i, part]) => sum + part * x[2 * i], 0), pin.parts.reduce((sum, [i, part]) => sum + part * x[2 * i + 1], 0));
     return multiplyBack(this.points, y, out);
   }
 
-  #addGrab(y, amount) {
-    const { vertex, next, share } = this.pin;
-    for (const j of [0, 1]) {
-      const own = GRAB * amount(j);
-      y[2 * vertex + j] += (1 - share) * own;
-      y[2 * next + j] += share * own;
+  #addGrab(y, u, v) {
+    for (const [i, part] of this.pin.parts) {
+      y[2 * i] += GRAB * part * u;
+      y[2 * i + 1] += GRAB * part * v;
     }
   }
 
@@ -287,36 +311,38 @@ export class Puller {
     multiply(this.points, this.z, x);
     for (let i = 0; i < 2 * this.size; i += 1) y[i] = hold[i >> 1] * rest[i];
     for (let t = 0; t < triangles.length; t += 3) {
-      let [cos, sin] = [0, 0];
+      let cos = 0;
+      let sin = 0;
       for (let k = 0; k < 3; k += 1) {
-        const b = 2 * triangles[t + ((k + 1) % 3)];
-        const c = 2 * triangles[t + ((k + 2) % 3)];
-        const [ux, uy] = [rest[b] - rest[c], rest[b + 1] - rest[c + 1]];
-        const [vx, vy] = [x[b] - x[c], x[b + 1] - x[c + 1]];
-        cos += cotangents[t + k] * (ux * vx + uy * vy);
-        sin += cotangents[t + k] * (ux * vy - uy * vx);
+        const b = 2 * triangles[t + AFTER[k]];
+        const c = 2 * triangles[t + AFTER[k + 1]];
+        const u = rest[b] - rest[c];
+        const v = rest[b + 1] - rest[c + 1];
+        const p = x[b] - x[c];
+        const q = x[b + 1] - x[c + 1];
+        cos += cotangents[t + k] * (u * p + v * q);
+        sin += cotangents[t + k] * (u * q - v * p);
       }
-      const long = Math.hypot(cos, sin) || 1;
-      cos = cos / long || (sin ? 0 : 1);
-      sin /= long;
+      const long = Math.sqrt(cos * cos + sin * sin);
+      cos = long ? cos / long : 1;
+      sin = long ? sin / long : 0;
       for (let k = 0; k < 3; k += 1) {
-        const b = 2 * triangles[t + ((k + 1) % 3)];
-        const c = 2 * triangles[t + ((k + 2) % 3)];
-        const [ux, uy] = [rest[b] - rest[c], rest[b + 1] - rest[c + 1]];
-        const u = cotangents[t + k] * (cos * ux - sin * uy);
-        const v = cotangents[t + k] * (sin * ux + cos * uy);
+        const b = 2 * triangles[t + AFTER[k]];
+        const c = 2 * triangles[t + AFTER[k + 1]];
+        const u = cotangents[t + k] * (cos * (rest[b] - rest[c]) - sin * (rest[b + 1] - rest[c + 1]));
+        const v = cotangents[t + k] * (sin * (rest[b] - rest[c]) + cos * (rest[b + 1] - rest[c + 1]));
         y[b] += u;
         y[b + 1] += v;
         y[c] -= u;
         y[c + 1] -= v;
       }
     }
-    this.#addGrab(y, (j) => pin.target[j]);
+    this.#addGrab(y, pin.target[0], pin.target[1]);
     return multiplyBack(this.points, y, out);
   }
 
   /** Move what is held towards a target; returns how far the outline still moved, in sizes of the tile. */
-  pull(target, { turns = 3, steps = 24 } = {}) {
+  pull(target, { turns = 2, steps = 20 } = {}) {
     this.pin.target = target;
     const before = this.polygon();
     for (let turn = 0; turn < turns; turn += 1) this.#solve(steps);
@@ -354,7 +380,7 @@ export class Puller {
 
   /** The outline: x0, y0, x1, y1 ... */
   polygon() {
-    return Float64Array.from(this.#pointsOf(0, 2 * this.count));
+    return multiply(this.points, this.z, new Float64Array(2 * this.count));
   }
 
   /** All points of the body, for what lies on the tile. */

@@ -210,7 +210,7 @@ export class Pulling {
   /** The circle of the reach, and the point in hand. */
   paint(context) {
     const at = this.hand
-      ? { copy: this.hand.copy, point: this.puller.held() }
+      ? { copy: this.hand.copy, point: this.puller.grip() }
       : this.near ? this.#pointOf(this.near) : this.chosen && this.puller ? this.#pointOf({ ...this.chosen, share: 0 }) : null;
     if (!at) return;
     const [x, y] = moved(this.stage.matrixOf(at.copy), at.point);

@@ -9,7 +9,7 @@ const MOST_TILE = 3; // canvases that a tile fills when near
 const STEP = 48; // pixels that an arrow key pans
 
 export class Stage {
-  /** `tool()` gives the tool in hand: {down, move, up, hover, key, over, cursor}, all optional. */
+  /** `tool()` gives the tool in hand: {down, move, up, cancel, hover, key, paint}, all optional. */
   constructor({ label, help, tool }) {
     this.tool = tool;
     this.canvas = h("canvas", { class: "closeup-canvas", tabindex: "0", role: "application", "aria-label": label, "aria-describedby": help });
@@ -59,12 +59,11 @@ export class Stage {
 
   paint() {
     const { context, width, height, ratio } = sized(this.canvas);
-    const { line, palette, skin } = this.options;
+    const { line, palette, skin, over } = this.options;
     Object.assign(this, { width, height });
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.fillStyle = palette.paper ?? "#ffffff";
     context.fillRect(0, 0, this.canvas.width, this.canvas.height);
-    const over = this.tool()?.over;
     this.copies = paintScene(context, this.tiling, this.camera, palette, { width, height, ratio, line, skin: skin?.(), over });
     for (const layer of this.layers) layer(context);
     this.tool()?.paint?.(context);
