@@ -129,7 +129,7 @@ export class FlatMap {
     across.at.forEach((t, k) => pen.fillText(across.texts[k], box.x + t * box.w, box.y + box.h + 18));
     pen.fillText(across.label, box.x + box.w / 2, box.y + box.h + 38);
     pen.textAlign = "right";
-    up.at.forEach((t, k) => pen.fillText(up.texts[k], box.x - 6, box.y + (1 - t) * box.h + 4 + 4 * (t === 1)));
+    up.at.forEach((t, k) => pen.fillText(up.texts[k], box.x - 6, box.y + (1 - t) * box.h + 4));
     pen.save();
     pen.translate(box.x - 42, box.y + box.h / 2);
     pen.rotate(-Math.PI / 2);

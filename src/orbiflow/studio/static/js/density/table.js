@@ -14,7 +14,7 @@ export function chooseTable(page, examples) {
   });
   const input = h("input", { type: "file", id: unique("table"), class: "unseen", accept: ENDINGS, onchange: () => take(input.files[0]) });
   const drop = h("div", { class: "drop panel stack" }, icon("upload"), h("p", {}, "Drop a table here"),
-    h("p", { class: "soft small" }, "CSV, TSV or NumPy (.npy), with a row for each thing that you measured."),
+    h("p", { class: "soft small" }, "CSV, TSV or .npy, with a row for each thing that you measured."),
     h("div", {}, button("Choose a file", () => input.click(), { kind: "primary" }), input));
   input.tabIndex = -1;
   input.setAttribute("aria-label", "A table");

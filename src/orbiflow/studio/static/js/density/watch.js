@@ -27,10 +27,10 @@ export class Watch {
 
   update(task) {
     this.task = task;
+    const what = task.what ?? "", step = { drawing: ": drawing it", "putting together": ": putting it together" }[what] ?? (this.hear(what) ? ": trying what suits the rows" : "");
     this.bar.value = task.share;
-    this.hear(task.what ?? "");
     const state = task.state === "waiting" && task.place ? `${STATES.waiting}: ${task.place} before it` : STATES[task.state];
-    this.says.textContent = task.state === "running" ? `${Math.round(100 * task.share)} % done` : state;
+    this.says.textContent = task.state === "running" ? `${Math.round(100 * task.share)} % done${step}` : state;
     this.steer();
   }
 
@@ -47,11 +47,12 @@ export class Watch {
 
   hear(what) {
     const tried = TRIED.exec(what), kind = tried ? tried[3] : what.startsWith("flow") ? "flow" : null;
-    if (!kind) return;
+    if (!kind) return false;
     const own = this.found.get(kind) ?? {};
     this.found.set(kind, tried ? { part: Number(tried[1]), parts: Number(tried[2]), size: tried[4] ?? own.size } : {});
     put(this.kinds, [...this.found].map(([name, { part, parts, size }]) => (part
       ? partBar(name, part / parts, `part ${part} of ${parts}${size ? `, up to ${size} bumps` : ""}`)
       : partBar(name, this.task.share, "being stirred"))));
+    return true;
   }
 }
