@@ -54,7 +54,8 @@ def density_routes(store: Store, queue: WorkQueue) -> APIRouter:
         shutil.rmtree(home(project) / "fits", ignore_errors=True)
         own = store.project(project)
         changes: dict[str, Any] = {"input": {"name": name, "type": file.suffix.lstrip(".")}}
-        if own["name"] in (*NAMES.values(), Path((own["input"] or changes["input"])["name"]).stem):
+        before = Path(own["input"]["name"]).stem if own["input"] else name
+        if own["name"] in (NAMES["density"], "My table", before):
             changes["name"] = Path(name).stem
         store.change(project, **changes)
         task = queue.submit(project, "density table", {})

@@ -112,8 +112,9 @@ async def task(request: Request, project: str, here: Here) -> dict[str, Any]:
     if not isinstance(operation, str) or not is_object(settings):
         raise OrbiflowError("a task has an operation and settings")
     view = here.store.project(project)["view"]
-    if settings.get("drawing") is True:  # as it is now
-        settings = {**settings, "drawing": json.dumps(view.get("drawing", {}))}
+    if "drawing" in settings:  # as it is now
+        drawn = view.get("drawing", {}) if settings["drawing"] is True else {}
+        settings = {**settings, "drawing": json.dumps(drawn)}
     return here.submit(project, operation, settings)
 
 

@@ -35,16 +35,13 @@ export class FlatMap {
   constructor(canvas, ends, frame, pick) {
     Object.assign(this, { frame, colours: unpack(frame.colours, Uint8Array), points: unpack(frame.points, Float32Array), least: -Infinity, dots: true, held: null });
     this.redraw = painted(canvas, ends, (...given) => this.paint(...given));
-    let down = false;
     const heard = (event) => {
-      if (!down || !this.box) return;
+      if (!event.buttons || !this.box) return;
       const { x, y, w, h } = this.box, at = canvas.getBoundingClientRect();
       const [u, v] = [(event.clientX - at.left - x) / w, 1 - (event.clientY - at.top - y) / h];
       pick(Math.max(0, Math.min(1, u)), Math.max(0, Math.min(1, v)));
     };
-    canvas.addEventListener("pointerdown", (event) => { down = true; heard(event); });
-    canvas.addEventListener("pointermove", heard);
-    for (const name of ["pointerup", "pointercancel", "pointerleave"]) canvas.addEventListener(name, () => { down = false; });
+    for (const name of ["pointerdown", "pointermove"]) canvas.addEventListener(name, heard);
   }
 
   /** Show a grid of two axes, across and up. */
@@ -132,7 +129,7 @@ export class FlatMap {
     across.at.forEach((t, k) => pen.fillText(across.texts[k], box.x + t * box.w, box.y + box.h + 18));
     pen.fillText(across.label, box.x + box.w / 2, box.y + box.h + 38);
     pen.textAlign = "right";
-    up.at.forEach((t, k) => pen.fillText(up.texts[k], box.x - 6, box.y + (1 - t) * box.h + 4 + 4 * (t === 1)));
+    up.at.forEach((t, k) => pen.fillText(up.texts[k], box.x - 6, box.y + (1 - t) * box.h + 4));
     pen.save();
     pen.translate(box.x - 42, box.y + box.h / 2);
     pen.rotate(-Math.PI / 2);

@@ -2,9 +2,10 @@
 
 import { showSurface } from "../../api/density/surface.js";
 import { button, choice, h, icon, put, slider, toast, trying, unique } from "../dom.js";
-import { alive, bytes, capital } from "../words.js";
+import { alive, bytes } from "../words.js";
 import { Grid } from "./grid.js";
 import { FlatMap, dark, drawBar, drawCurve, painted, pale } from "./map.js";
+import { partBar } from "./watch.js";
 import { EDGES, PARTS, angleText, count, figure, percent, shape } from "./words.js";
 
 export class Result {
@@ -53,7 +54,7 @@ export class Result {
     if (fit.surface) figures.unshift(this.surfaceFigure());
     else if (!one) figures.push(this.conditional());
     return h("section", { class: "stack" }, h("div", { class: one ? "stack" : "grid views" }, figures),
-      h("div", { class: "panel controls" }, h("div", {}, region, this.areaText), !one && h("div", { class: "row" }, dotsLabel, fit.surface && surfaceLabel)));
+      h("div", { class: "panel stack controls" }, h("div", {}, region, this.areaText), !one && h("div", { class: "row" }, dotsLabel, fit.surface && surfaceLabel)));
   }
 
   surfaceFigure() {
@@ -215,16 +216,12 @@ export class Result {
 
   parts() {
     const { components, weights, notes } = this.fit;
-    const said = ({ name, share, gain, error }) => {
-      const [title, about] = PARTS[name] ?? [name, ""];
-      const worth = gain > error ? ` Without it, rows would be ${figure(100 * (1 - Math.exp(-gain)), 2)} % less likely.` : gain === undefined ? "" : " The others could do without it.";
-      return h("li", {}, h("div", { class: "share" }, h("strong", {}, title), h("span", {}, percent(share))),
-        h("meter", { value: share, "aria-label": title }), h("p", { class: "soft small" }, `${capital(about)}.${worth}`));
-    };
+    const said = ({ name, share, gain, error }) => partBar(name, share, percent(share), gain === undefined ? "" : gain > error
+      ? `Without it, rows would be ${figure(100 * (1 - Math.exp(-gain)), 2)} % less likely.` : "The others could do without it.");
     const used = components.filter(({ share }) => share > 0).sort((one, other) => other.share - one.share);
     const idle = components.filter(({ share }) => !share).map(({ name }) => PARTS[name]?.[0] ?? name);
     if (weights?.uniform) used.push({ name: "uniform", share: weights.uniform });
-    return h("section", { class: "panel stack" }, h("h2", {}, "What it is made of"), h("ul", { class: "parts" }, used.map(said)),
+    return h("section", { class: "panel stack" }, h("h2", {}, "What it is made of"), h("ul", { class: "parts stack" }, used.map(said)),
       idle.length > 0 && h("p", { class: "soft small" }, `Also tried, and not needed: ${idle.join(", ").toLowerCase()}.`),
       h("details", {}, h("summary", {}, "Notes of the fit"), h("ul", { class: "notes soft small" }, notes.map((note) => h("li", {}, note)))));
   }
