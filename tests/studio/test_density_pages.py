@@ -158,6 +158,7 @@ HOSTILE = {
     "long.csv": b"phi\n" + b"1" * 150_000,
     "many.csv": b"phi\n" + b"1\n" * 60,
     "latin.csv": b"phi\n\xff\xfe\n",
+    "name.csv": b"p" * 300 + b"\n1\n2\n",
 }  # fmt: skip
 
 

@@ -17,9 +17,9 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.studio.density_table import ENDINGS, ending_of
 from orbiflow.studio.density_tasks import FIT, SURFACE, TABLE, VIEW, fit_folder, map_file
 from orbiflow.studio.guard import Refused
-from orbiflow.studio.project_routes import NAMES, body_object, plain_name, save_body
+from orbiflow.studio.requests import body_object, save_body
 from orbiflow.studio.store import Store
-from orbiflow.studio.words import shown_task
+from orbiflow.studio.words import NAMES, plain_name, shown_task
 from orbiflow.studio.work_queue import WorkQueue
 
 EXAMPLES = {
@@ -54,7 +54,8 @@ def density_routes(store: Store, queue: WorkQueue) -> APIRouter:
         shutil.rmtree(home(project) / "fits", ignore_errors=True)
         own = store.project(project)
         changes: dict[str, Any] = {"input": {"name": name, "type": file.suffix.lstrip(".")}}
-        if own["name"] in (*NAMES.values(), Path((own["input"] or changes["input"])["name"]).stem):
+        before = Path(own["input"]["name"]).stem if own["input"] else name
+        if own["name"] in (NAMES["density"], "My table", before):
             changes["name"] = Path(name).stem
         store.change(project, **changes)
         task = queue.submit(project, "density table", {})

@@ -22,25 +22,17 @@ MAX_ROWS, MAX_SHOWN, FIRST = 200_000, 30, 6
 MOST_ANGLES = 7
 """Angles that are chosen ahead: of more, a fit takes long."""
 
-NORTH = {"lat", "latitude", "plunge", "inclination"}
-EAST = {"lon", "long", "lng", "longitude", "trend", "azimuth", "declination"}
-AXES = {"pole", "poles", "axis", "axes", "axial", "plunge", "trend"}
-"""Words in names of columns: an angle towards the pole, one around it, and lines without an arrow."""
+NORTH = frozenset(["lat", "latitude", "plunge", "inclination"])
+EAST = frozenset(["lon", "long", "lng", "longitude", "trend", "azimuth", "declination"])
+AXES = frozenset(["pole", "poles", "axis", "axes", "axial", "plunge", "trend"])
+ANGLES = frozenset(
+    ["phi", "psi", "chi", "omega", "theta", "alpha", "beta", "gamma", "delta", "epsilon", "zeta"]
+)
+ANGLES |= frozenset(["angle", "direction", "dir", "heading", "bearing", "aspect"])
+"""Words in names of columns: angles towards the pole, around it, of lines without an arrow, others."""
 
-ANGLES = {
-    "phi",
-    "psi",
-    "chi",
-    "omega",
-    "theta",
-    "alpha",
-    "beta",
-    "gamma",
-    "delta",
-    "epsilon",
-    "zeta",
-}
-ANGLES |= {"angle", "direction", "dir", "heading", "bearing", "aspect"}
+MAX_NAME = 200
+"""Letters of a column's name."""
 
 Seems = Literal["number", "latitude", "longitude", "degrees", "radians", "count"]
 
@@ -51,8 +43,6 @@ class Column:
 
     name: str
     seems: Seems
-    low: float
-    high: float
     missing: int
 
 
@@ -97,14 +87,16 @@ def table_view(path: Path) -> dict[str, Any]:
             "this table has no column of numbers, or some are infinite; save it again as CSV, with a "
             "row for each thing and numbers in its columns"
         ) from None
-    columns = [seen_column(name, table.values[:, k]) for k, name in enumerate(table.columns)]
-    first = [[None if math.isnan(v) else float(f"{v:.6g}") for v in row[:MAX_SHOWN]]
-             for row in table.values[:FIRST].tolist()]  # fmt: skip
+    shown = table.columns[:MAX_SHOWN]
+    if max(map(len, shown)) > MAX_NAME:
+        raise OrbiflowError(f"the name of a column has over {MAX_NAME} letters; shorten it")
+    columns = [seen_column(name, table.values[:, k]) for k, name in enumerate(shown)]
+    first = table.values[:FIRST, : len(shown)].tolist()
     return {
         "rows": len(table.values),
-        "columns": [asdict(column) for column in columns[:MAX_SHOWN]],
-        "more": max(0, len(columns) - MAX_SHOWN),
-        "first": first,
+        "columns": [asdict(column) for column in columns],
+        "more": len(table.columns) - len(shown),
+        "first": [[None if math.isnan(v) else float(f"{v:.6g}") for v in row] for row in first],
         "notes": list(table.notes),
         "guess": asdict(guess(columns, table)),
     }
@@ -133,7 +125,7 @@ def seen_column(name: str, values: Array) -> Column:
         seems = "radians"
     elif 2 * math.pi < most <= 360 and (named or high - low > 90):
         seems = "degrees"
-    return Column(name, seems, low, high, len(values) - len(known))
+    return Column(name, seems, len(values) - len(known))
 
 
 def guess(columns: Sequence[Column], table: Table) -> Guess:

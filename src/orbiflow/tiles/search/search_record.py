@@ -17,6 +17,12 @@ from orbiflow.tiles.tile import EscherTile
 INTERRUPTED = "interrupted"  # the reason given for a class that was left undone
 Outcome = EscherTile | ClassFailure
 OnTile = Callable[[EscherTile, str], object]
+WHAT = {
+    "sketch": "sketching a tile of each kind",
+    "better": "improving the tiles",
+    "final": "finishing the tiles",
+}
+"""What is being done in each stage, for who watches."""
 
 
 class Record:
@@ -64,7 +70,16 @@ class Record:
         self.shares[name] = share = min(1.0, share)
         whole = sum(self.shares.values()) / len(self.shares)
         known = loss if math.isfinite(loss) else None  # no NaN in JSON
-        self.on_event(Progress(whole, "fitting", name, share, known))
+        self.on_event(Progress(whole, self._what, name, share, known))
+
+    @property
+    def stage(self) -> str:
+        """How good the tiles are that are found now."""
+        return "final" if self._last else "better" if self._done else "sketch"
+
+    @property
+    def _what(self) -> str:
+        return WHAT[self.stage] if self.on_tile else "fitting"
 
     def level_outcome(self, found: Outcome) -> None:
         """Keep what a level of effort gave for a class, unless an earlier one gave better."""
@@ -77,10 +92,9 @@ class Record:
         else:
             self.progress(found.name, 1.0)
         if self.on_tile and isinstance(whole, EscherTile) and (self._last or whole is found):
-            stage = "final" if self._last else "better" if self._done else "sketch"
             for tile in whole.family():
                 if tile.certificate.valid:
-                    self.on_tile(tile, stage)
+                    self.on_tile(tile, self.stage)
 
     def outcome(self, found: Outcome, share: float = 1.0) -> None:
         """Keep what a class gave, and then tell it."""

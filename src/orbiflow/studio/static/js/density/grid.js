@@ -107,5 +107,5 @@ export function meridians(grid) {
   const steps = Array.from({ length: 61 }, (_, k) => k / 60), north = grid.map === disc;
   const upright = Array.from({ length: 12 }, (_, k) => steps.map((t) => [k / 12, north ? 0.5 + t / 2 : t]));
   const level = [1, 2, 3, 4, 5].filter((k) => !north || k > 2).map((k) => steps.map((t) => [t, k / 6]));
-  return [...upright, ...(north ? [] : [steps.map((t) => [1, t])]), ...level].map((line) => line.map(([u, v]) => grid.map.spot(u, v)));
+  return [...upright, ...level].map((line) => line.map(([u, v]) => grid.map.spot(u, v)));
 }

@@ -9,8 +9,8 @@ export const dark = matchMedia("(prefers-color-scheme: dark)");
 export const pale = () => (dark.matches ? 0.25 : 0.8);
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-/** A canvas that is drawn anew when its size or the colours of the page change. */
-export function painted(canvas, paint) {
+/** Draw a canvas, and again when its size or the colours of the page change; returns what asks for it, `ends` what stops it. */
+export function painted(canvas, ends, paint) {
   const draw = () => {
     const ratio = Math.min(2, window.devicePixelRatio || 1), width = canvas.clientWidth, height = canvas.clientHeight;
     if (!width || !height) return;
@@ -24,47 +24,35 @@ export function painted(canvas, paint) {
   const observer = new ResizeObserver(soon);
   observer.observe(canvas);
   dark.addEventListener("change", soon);
-  return { redraw: soon, stop: () => { cancelAnimationFrame(asked); observer.disconnect(); dark.removeEventListener("change", soon); } };
+  ends.push(() => { cancelAnimationFrame(asked); observer.disconnect(); dark.removeEventListener("change", soon); });
+  return soon;
 }
 
 export class FlatMap {
   /**
-   * `frame` is what `flat_frame` gives. `axes` are those that are drawn, across and up. `pick(u, v)` hears of
-   * pointers on the map.
+   * `frame` is what `flat_frame` gives; `pick(u, v)` hears of pointers on the map.
    */
-  constructor(canvas, frame, { pick = () => {} } = {}) {
-    this.frame = frame;
-    this.colours = unpack(frame.colours, Uint8Array);
-    this.points = unpack(frame.points, Float32Array);
-    this.least = -Infinity;
-    this.dots = true;
-    this.held = null;
-    this.canvas = canvas;
-    const own = painted(canvas, (pen, width, height, ratio) => this.paint(pen, width, height, ratio));
-    this.redraw = own.redraw;
-    this.stop = own.stop;
-    let down = false;
+  constructor(canvas, ends, frame, pick) {
+    Object.assign(this, { frame, colours: unpack(frame.colours, Uint8Array), points: unpack(frame.points, Float32Array), least: -Infinity, dots: true, held: null });
+    this.redraw = painted(canvas, ends, (...given) => this.paint(...given));
     const heard = (event) => {
-      if (!down || !this.box) return;
+      if (!event.buttons || !this.box) return;
       const { x, y, w, h } = this.box, at = canvas.getBoundingClientRect();
       const [u, v] = [(event.clientX - at.left - x) / w, 1 - (event.clientY - at.top - y) / h];
       pick(Math.max(0, Math.min(1, u)), Math.max(0, Math.min(1, v)));
     };
-    canvas.addEventListener("pointerdown", (event) => { down = true; heard(event); });
-    canvas.addEventListener("pointermove", heard);
-    for (const name of ["pointerup", "pointercancel", "pointerleave"]) canvas.addEventListener(name, () => { down = false; });
+    for (const name of ["pointerdown", "pointermove"]) canvas.addEventListener(name, heard);
   }
 
+  /** Show a grid of two axes, across and up. */
   show(grid, axes) {
-    this.grid = grid;
-    this.axes = axes;
-    this.cache = null;
+    Object.assign(this, { grid, axes, cache: null });
     this.redraw();
   }
 
   /** The place of the picture in the canvas: beside ticks on squares. */
   room(width, height) {
-    const { map, onGlobe } = this.grid, pad = onGlobe ? [2, 2, 2, 2] : [54, 8, 12, 44];
+    const { map, onGlobe } = this.grid, pad = onGlobe ? [2, 2, 2, 2] : [54, 8, 20, 44];
     const [left, top, right, below] = pad, w = Math.min(width - left - right, (height - top - below) * map.aspect);
     return { x: left + (width - left - right - w) / 2, y: top, w, h: w / map.aspect };
   }
@@ -141,7 +129,7 @@ export class FlatMap {
     across.at.forEach((t, k) => pen.fillText(across.texts[k], box.x + t * box.w, box.y + box.h + 18));
     pen.fillText(across.label, box.x + box.w / 2, box.y + box.h + 38);
     pen.textAlign = "right";
-    up.at.forEach((t, k) => pen.fillText(up.texts[k], box.x - 6, box.y + (1 - t) * box.h + 4 + 4 * (t === 1)));
+    up.at.forEach((t, k) => pen.fillText(up.texts[k], box.x - 6, box.y + (1 - t) * box.h + 4));
     pen.save();
     pen.translate(box.x - 42, box.y + box.h / 2);
     pen.rotate(-Math.PI / 2);
@@ -153,7 +141,7 @@ export class FlatMap {
   /** The rows: places in the window, or degrees north and east. */
   draw(pen, box) {
     const { points, grid, axes } = this, wide = grid.onGlobe ? 2 : this.frame.axes.length, many = this.frame.shown > 500;
-    pen.fillStyle = many ? "rgb(255 255 255 / 60%)" : "rgb(255 255 255 / 85%)";
+    pen.fillStyle = many ? `rgb(255 255 255 / ${dark.matches ? 40 : 60}%)` : "rgb(255 255 255 / 85%)";
     pen.strokeStyle = "rgb(26 26 26 / 75%)";
     pen.lineWidth = many ? 0.3 : 0.7;
     for (let k = 0; k < points.length; k += wide) {

@@ -10,7 +10,7 @@ export async function show(root, page) {
   const { api, events, project } = page, path = `projects/${project.id}/density`;
   await style("density");
   const body = h("div", { class: "stack" }), problem = h("div", {}), actions = h("div", { class: "row" });
-  put(root, h("div", { class: "density stack" }, h("div", { class: "row heading" }, h("h1", { class: "grow", tabindex: "-1" }, "See where your data crowd"), actions), problem, body));
+  put(root, h("div", { class: "density stack" }, h("div", { class: "row" }, h("h1", { class: "grow", tabindex: "-1" }, "See where your data crowd"), actions), problem, body));
   let state = await api.get(path), shown = "", part = null, changing = false;
 
   const newest = (operation) => project.tasks.find((task) => task.operation === operation);
@@ -45,10 +45,7 @@ export async function show(root, page) {
       part = new Watch(page, newest("density fit"));
       put(body, part.root);
     }
-    if (kind === "result") {
-      part = new Result(page, state.fit);
-      part.show(body);
-    }
+    if (kind === "result") (part = new Result(page, state.fit)).show(body);
   }
 
   const another = () => trying(async () => page.navigate(`d/${(await api.post("projects", { kind: "density" })).id}`));

@@ -1,13 +1,12 @@
 /** What a fit shows: the surface, the map, regions, an angle that is held, how well it fits, and files. */
 
 import { showSurface } from "../../api/density/surface.js";
-import { button, choice, h, icon, put, slider, trying, unique } from "../dom.js";
-import { alive, bytes, capital } from "../words.js";
+import { button, choice, h, icon, put, slider, toast, trying, unique } from "../dom.js";
+import { alive, bytes } from "../words.js";
 import { Grid } from "./grid.js";
 import { FlatMap, dark, drawBar, drawCurve, painted, pale } from "./map.js";
+import { partBar } from "./watch.js";
 import { EDGES, PARTS, angleText, count, figure, percent, shape } from "./words.js";
-
-const TIPS = "Drag to turn, or use the arrow keys. Plus and minus zoom, 0 starts again.";
 
 export class Result {
   constructor(page, fit) {
@@ -27,7 +26,7 @@ export class Result {
     const { fit } = this;
     const names = fit.names.join(", "), parts = [this.views()];
     if (fit.angles === 2) parts.push(this.conditional());
-    parts.push(h("div", { class: "facts" }, this.likelihood(), this.parts()), this.takeaway());
+    parts.push(h("div", { class: "grid" }, this.likelihood(), this.parts()), this.takeaway());
     put(root, h("p", { class: "soft" }, `${shape(fit.space, fit.columns.length)}. ${count(fit.rows)} rows of ${names}.`), ...parts);
     await trying(async () => {
       if (fit.surface) await this.openSurface();
@@ -54,8 +53,8 @@ export class Result {
     const figures = [h("figure", { class: "panel stack" }, h("h2", {}, one ? "The curve" : "The map"), this.pairs, this.mapCanvas, !one && this.bar, h("p", { class: "soft small" }, about))];
     if (fit.surface) figures.unshift(this.surfaceFigure());
     else if (!one) figures.push(this.conditional());
-    return h("section", { class: "stack" }, h("div", { class: one ? "views" : "views two" }, figures),
-      h("div", { class: "panel controls" }, h("div", {}, region, this.areaText), !one && h("div", { class: "row" }, dotsLabel, fit.surface && surfaceLabel)));
+    return h("section", { class: "stack" }, h("div", { class: one ? "stack" : "grid views" }, figures),
+      h("div", { class: "panel stack controls" }, h("div", {}, region, this.areaText), !one && h("div", { class: "row" }, dotsLabel, fit.surface && surfaceLabel)));
   }
 
   surfaceFigure() {
@@ -65,7 +64,7 @@ export class Result {
     });
     this.caption = h("p", { class: "soft small" });
     return h("figure", { class: "panel stack" }, h("h2", {}, "The surface"), h("div", { class: "turned" }, this.surfaceCanvas),
-      h("p", { class: "soft small", id: "surface-tips" }, TIPS), this.cut,
+      h("p", { class: "soft small", id: "surface-tips" }, "Drag to turn, or use the arrow keys. Plus and minus zoom, 0 starts again."), this.cut,
       h("details", {}, h("summary", {}, "What am I looking at?"), this.caption));
   }
 
@@ -84,25 +83,27 @@ export class Result {
     this.mark();
   }
 
-  async openMap() {
-    const { fit } = this;
+  openMap() {
+    const { fit, ends } = this;
     if (fit.angles === 1) {
-      const curve = painted(this.mapCanvas, (pen, width, height) => {
+      const redraw = painted(this.mapCanvas, ends, (pen, width, height) => {
         if (this.grid) drawCurve(pen, width, height, { values: [...this.grid.logs].map(Math.exp), axis: fit.axes[0], least: this.least });
       });
-      this.ends.push(curve.stop);
-      this.map = { redraw: curve.redraw, show: curve.redraw };
+      this.map = { redraw, show: redraw };
     } else {
-      this.map = new FlatMap(this.mapCanvas, fit, { pick: (u, v) => this.pick(u, v) });
-      const bar = painted(this.bar, (pen, width, height) => {
+      this.map = new FlatMap(this.mapCanvas, ends, fit, (u, v) => this.pick(u, v));
+      this.redrawBar = painted(this.bar, ends, (pen, width, height) => {
         pen.clearRect(0, 0, width, height);
         if (this.grid) drawBar(pen, width, fit, this.grid.data);
       });
-      this.ends.push(() => this.map.stop(), bar.stop);
-      this.redrawBar = bar.redraw;
       if (fit.angles > 2) this.choosePair();
     }
-    await this.showPair();
+    ends.push(this.page.events.on("refresh", () => trying(() => this.showPair())), this.page.events.on("task", ({ operation, state, error }) => {
+      if (operation !== "density map" || this.grids.has(this.pair.join("-"))) return;
+      if (state === "done") trying(() => this.showPair());
+      if (state === "failed") toast(error, { bad: true });
+    }));
+    return this.showPair();
   }
 
   /** A box that says which two angles the map shows. */
@@ -113,38 +114,25 @@ export class Result {
     put(this.pairs, h("label", { for: id, class: "label" }, "Which two angles"), box, h("p", { class: "soft small" }, "Whatever the others are."));
   }
 
-  /** The grid of two angles: the server is asked once for each two. */
-  async gridOf(axes) {
-    const key = axes.join("-");
-    if (!this.grids.has(key)) {
-      const ask = () => this.page.api.get(`${this.path}/map?axes=${key}`);
-      const data = await ask().catch(async (error) => {
-        if (error.status !== 404) throw error;
-        await this.work("density map", { fit: this.fit.number, axes });
-        return ask();
-      });
-      this.grids.set(key, new Grid(data, this.fit.space));
-    }
-    return this.grids.get(key);
-  }
-
+  /** Show the chosen angles; where their grid is not there yet, the server makes it, and this is called again. */
   async showPair() {
+    const { pair, fit, page } = this, key = pair.join("-");
     this.mapCanvas.classList.add("busy");
-    const { pair } = this;
-    try {
-      const grid = await this.gridOf(pair);
-      if (this.stopped || pair !== this.pair) return;
-      this.grid = grid;
-      this.map.show(grid, pair);
-      if (!this.holding) this.held.place = grid.top[this.held.axis];
-      this.redrawBar?.();
-      const names = pair.map((axis) => this.fit.names[axis]).join(" and ");
-      this.mapCanvas.setAttribute("aria-label", `Map of the density of ${this.fit.angles ? names : this.fit.names.join(" and ")}. Bright is where rows are likely.`);
-      this.mark();
-      this.drawHolding?.();
-    } finally {
-      if (pair === this.pair) this.mapCanvas.classList.remove("busy");
+    if (!this.grids.has(key)) {
+      const data = await page.api.get(`${this.path}/map?axes=${key}`).catch((error) => { if (error.status !== 404) throw error; });
+      if (!data) return this.submit("density map", { fit: fit.number, axes: pair });
+      this.grids.set(key, new Grid(data, fit.space));
     }
+    if (this.stopped || pair !== this.pair) return undefined;
+    this.grid = this.grids.get(key);
+    this.map.show(this.grid, pair);
+    if (!this.holding) this.held.place = this.grid.top[this.held.axis];
+    this.redrawBar?.();
+    const names = fit.angles ? pair.map((axis) => fit.names[axis]) : fit.names;
+    this.mapCanvas.setAttribute("aria-label", `Map of the density of ${names.join(" and ")}. Bright is where rows are likely.`);
+    this.mapCanvas.classList.remove("busy");
+    this.mark();
+    return this.drawHolding?.();
   }
 
   /** Mark the region on both pictures, and say how large it is. */
@@ -170,7 +158,7 @@ export class Result {
   pick(u, v) {
     if (this.fit.angles < 2) return;
     this.hold(this.held.axis === 0 ? u : v);
-    this.heldSlider.set(this.held.place);
+    this.heldSlider.set(360 * this.held.place);
   }
 
   hold(place) {
@@ -184,22 +172,21 @@ export class Result {
   conditional() {
     const canvas = h("canvas", { class: "curve", role: "img" }), controls = h("div", { class: "stack" }), place = h("div", {});
     const says = h("p", { class: "soft small" });
-    const curve = painted(canvas, (pen, width, height) => {
+    const redraw = painted(canvas, this.ends, (pen, width, height) => {
       if (!this.grid) return;
       const { axis, place: at } = this.held, other = this.pair[1 - axis];
       drawCurve(pen, width, height, { values: this.grid.slice(axis, at), axis: this.fit.axes[other] });
     });
-    this.ends.push(curve.stop);
     const names = () => this.pair.map((axis) => this.fit.names[axis]);
     const build = () => {
       const [name, other] = this.held.axis === 0 ? names() : names().reverse();
       this.heldSlider = slider(`${name} is held at`, {
-        min: 0, max: 1, step: 1 / 360, value: this.held.place, said: (at) => `${name} = ${angleText(at, this.fit.unit)}`,
-      }, (at) => this.hold(at));
+        min: 0, max: 360, step: 1, value: 360 * this.held.place, said: (at) => `${name} = ${angleText(at / 360, this.fit.unit)}`,
+      }, (at) => this.hold(at / 360));
       put(place, this.heldSlider);
       says.textContent = `The curve says how likely each ${other} then is. You may also drag on the map.`;
       canvas.setAttribute("aria-label", `Curve of ${other} while ${name} is held`);
-      curve.redraw();
+      redraw();
     };
     let built;
     this.drawHolding = () => {
@@ -213,9 +200,9 @@ export class Result {
         put(controls, which, place, says);
         build();
       }
-      curve.redraw();
+      redraw();
     };
-    return h("section", { class: "panel split" }, h("div", { class: "stack" }, h("h2", {}, "If you know one angle"), controls), canvas);
+    return h("section", { class: "panel grid" }, h("div", { class: "stack" }, h("h2", {}, "If you know one angle"), controls), canvas);
   }
 
   likelihood() {
@@ -224,21 +211,17 @@ export class Result {
     return h("section", { class: "panel stack" }, h("h2", {}, "How well it fits"),
       h("p", { class: "big" }, `Rows are ${times(mean - uniform)} times as likely as by chance`),
       h("p", {}, `Mean log density: ${figure(mean, 4)} nats, over ${which} that it was made from. If all places were alike it would be ${figure(uniform, 4)}.`),
-      h("p", { class: "soft" }, `The fairer test: while it was made, ${count(kept)} rows were kept aside in turn. Those were ${times(gain)} times as likely as by chance (${figure(gain, 3)} nats above).`));
+      h("p", { class: "soft" }, `The fairer test: ${count(kept)} rows were kept aside in turn while it was made. They were ${times(gain)} times as likely as by chance (${figure(gain, 3)} nats).`));
   }
 
   parts() {
     const { components, weights, notes } = this.fit;
-    const said = ({ name, share, gain, error }) => {
-      const [title, about] = PARTS[name] ?? [name, ""];
-      const worth = gain > error ? ` Without it, rows would be ${figure(100 * (1 - Math.exp(-gain)), 2)} % less likely.` : gain === undefined ? "" : " The others could do without it.";
-      return h("li", {}, h("div", { class: "share" }, h("strong", {}, title), h("span", {}, percent(share))),
-        h("meter", { min: 0, max: 1, value: share, "aria-label": `${title}: ${percent(share)}` }), h("p", { class: "soft small" }, `${capital(about)}.${worth}`));
-    };
+    const said = ({ name, share, gain, error }) => partBar(name, share, percent(share), gain === undefined ? "" : gain > error
+      ? `Without it, rows would be ${figure(100 * (1 - Math.exp(-gain)), 2)} % less likely.` : "The others could do without it.");
     const used = components.filter(({ share }) => share > 0).sort((one, other) => other.share - one.share);
     const idle = components.filter(({ share }) => !share).map(({ name }) => PARTS[name]?.[0] ?? name);
     if (weights?.uniform) used.push({ name: "uniform", share: weights.uniform });
-    return h("section", { class: "panel stack" }, h("h2", {}, "What it is made of"), h("ul", { class: "parts" }, used.map(said)),
+    return h("section", { class: "panel stack" }, h("h2", {}, "What it is made of"), h("ul", { class: "parts stack" }, used.map(said)),
       idle.length > 0 && h("p", { class: "soft small" }, `Also tried, and not needed: ${idle.join(", ").toLowerCase()}.`),
       h("details", {}, h("summary", {}, "Notes of the fit"), h("ul", { class: "notes soft small" }, notes.map((note) => h("li", {}, note)))));
   }
@@ -247,9 +230,8 @@ export class Result {
     const amount = h("input", { type: "number", id: unique("amount"), min: 1, max: 1000000, value: 1000 });
     const format = h("select", { id: unique("format") }, [["png", "PNG, for screens"], ["svg", "SVG, for print"], ["pdf", "PDF, for print"]].map(([value, words]) => h("option", { value }, words)));
     const made = h("ul", { class: "made" });
-    const make = (what, settings = () => ({})) => () => trying(() => this.submit("density take", { fit: this.fit.number, what, ...settings() }));
+    const get = (words, what, settings = () => ({})) => button(words, () => trying(() => this.submit("density take", { fit: this.fit.number, what, ...settings() })));
     const card = (title, about, act, ...fields) => h("div", { class: "take stack" }, h("h3", {}, title), h("p", { class: "soft small" }, about), fields, act);
-    const get = (what, settings) => button("Make it", make(what, settings), { image: "more", "aria-label": `Make ${what}` });
     const list = () => {
       const tasks = this.page.project.tasks.filter(({ operation }) => operation === "density take");
       put(made, tasks.map((task) => h("li", {}, alive(task) ? h("span", { role: "status" }, `${task.what || "Waiting"} …`) : task.state === "done"
@@ -258,35 +240,15 @@ export class Result {
     };
     this.ends.push(this.page.events.on("task", list), this.page.events.on("refresh", list));
     list();
-    return h("section", { class: "panel stack" }, h("h2", {}, "Take away"), h("div", { class: "takes" },
-      card("New rows", "As many as you like, drawn from the density.", get("samples", () => ({ count: Number(amount.value) })), h("label", { for: amount.id, class: "label" }, "How many"), amount),
-      card("Pictures", "The map, and the surface as a page of its own.", get("figures", () => ({ format: format.value })), h("label", { for: format.id, class: "label" }, "Format"), format),
-      card("Regions", "The smallest outlines that hold a half and nine tenths.", get("regions")),
-      card("The density itself", "To go on with in Python, or with the command orbiflow density.", get("model"))), made);
+    return h("section", { class: "panel stack" }, h("h2", {}, "Take away"), h("div", { class: "grid narrow" },
+      card("New rows", "As many as you like, drawn from the density.", get("Draw rows", "samples", () => ({ count: Number(amount.value) })), h("label", { for: amount.id, class: "label" }, "How many"), amount),
+      card("Pictures", this.fit.surface ? "The map, and the surface as a page of its own." : "New rows beside yours, angle by angle.", get("Make pictures", "figures", () => ({ format: format.value })), h("label", { for: format.id, class: "label" }, "Format"), format),
+      card("Regions", `The smallest regions that hold a half and nine tenths: ${this.fit.surface ? "their outlines" : "how large, and how dense"}.`, get("Find regions", "regions")),
+      card("The density itself", "To go on with in Python, or with the command orbiflow density.", get("Get the density", "model"))), made);
   }
 
   /** Give the server a task. */
-  async submit(operation, settings) {
-    const { project, api } = this.page;
-    const { task } = await api.post(`projects/${project.id}/tasks`, { operation, settings });
-    return task;
-  }
-
-  /** Give the server a task, and wait for its end. */
-  async work(operation, settings) {
-    const { id } = await this.submit(operation, settings);
-    return new Promise((resolve, reject) => {
-      const look = () => {
-        const task = this.page.project.tasks.find((own) => own.id === id);
-        if (!task || alive(task)) return;
-        end();
-        if (task.state === "done") resolve(task);
-        else reject(new Error(task.error ?? "Stopped."));
-      };
-      const offs = [this.page.events.on("task", look), this.page.events.on("refresh", look)];
-      const end = () => offs.forEach((off) => off());
-      this.ends.push(end);
-      look();
-    });
+  submit(operation, settings) {
+    return this.page.api.post(`projects/${this.page.project.id}/tasks`, { operation, settings });
   }
 }

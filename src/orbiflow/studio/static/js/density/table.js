@@ -14,7 +14,7 @@ export function chooseTable(page, examples) {
   });
   const input = h("input", { type: "file", id: unique("table"), class: "unseen", accept: ENDINGS, onchange: () => take(input.files[0]) });
   const drop = h("div", { class: "drop panel stack" }, icon("upload"), h("p", {}, "Drop a table here"),
-    h("p", { class: "soft small" }, "CSV, TSV or NumPy (.npy), with a row for each thing that you measured."),
+    h("p", { class: "soft small" }, "CSV, TSV or .npy, with a row for each thing that you measured."),
     h("div", {}, button("Choose a file", () => input.click(), { kind: "primary" }), input));
   input.tabIndex = -1;
   input.setAttribute("aria-label", "A table");
@@ -24,7 +24,8 @@ export function chooseTable(page, examples) {
   drop.addEventListener("drop", (event) => { over(false)(event); take(event.dataTransfer.files[0]); });
   const example = ({ name, title, about }) => h("li", {}, h("button", { type: "button", class: "example panel", onclick: () => trying(() => api.post(`${path}/example`, { name })) },
     h("strong", {}, title), h("span", { class: "soft small" }, about)));
-  return h("div", { class: "stack" }, drop, h("h2", {}, "Or try one of these"), h("ul", { class: "examples" }, examples.map(example)));
+  return h("div", { class: "stack" }, drop, h("h2", {}, "Or try one of these"), h("ul", { class: "grid narrow" }, examples.map(example)),
+    h("p", { class: "soft small" }, "From the Top8000 proteins of Duke University (CC BY 4.0), PmagPy and javaPlex (BSD)."));
 }
 
 /** The first rows of a table. */
@@ -46,11 +47,11 @@ export function chooseSpace(table, start, last) {
   const settings = () => ({ space: chosen.space, columns: chosen.columns, ...(spaceOf(chosen.space)?.angular ? { unit: chosen.unit } : {}) });
 
   const name = unique("space");
-  const spaces = h("fieldset", {}, h("legend", {}, "What are the numbers?"), h("div", { class: "spaces" }, SPACES.map((space) =>
+  const spaces = h("fieldset", {}, h("legend", {}, "What are the numbers?"), h("div", { class: "grid narrow" }, SPACES.map((space) =>
     h("label", { class: "space" }, h("input", { type: "radio", name, checked: space.name === chosen.space, onchange: () => { chosen.space = space.name; fit(); } }),
       h("span", {}, h("strong", {}, space.title), h("span", { class: "soft small" }, space.about), h("span", { class: "soft small" }, `Needs ${space.needs}.`))))));
   const order = h("span", { class: "soft small" });
-  const columns = h("fieldset", { class: "columns" }, h("legend", {}, "Which columns?"), h("div", { class: "row" }, table.columns.map((column) => {
+  const columns = h("fieldset", {}, h("legend", {}, "Which columns?"), h("div", { class: "row" }, table.columns.map((column) => {
     const box = h("input", { type: "checkbox", checked: chosen.columns.includes(column.name), onchange: () => {
       chosen.columns = chosen.columns.filter((own) => own !== column.name);
       if (box.checked) chosen.columns.push(column.name);
@@ -72,11 +73,12 @@ export function chooseSpace(table, start, last) {
     } else put(units);
     const fits = space && number >= space.least && number <= space.most;
     go.disabled = !fits;
-    says.textContent = !space ? "Choose what the numbers are." : fits ? `${shape(space.name, number)}.` : `This needs ${space.needs}; ${number} ${number === 1 ? "column is" : "columns are"} chosen.`;
+    says.textContent = !space ? "Choose what the numbers are." : fits ? `${shape(space.name, number)}.${table.rows > 5000 ? " So many rows take some minutes." : ""}` : `This needs ${space.needs}; ${number} ${number === 1 ? "column is" : "columns are"} chosen.`;
   }
   fit();
   const why = h("p", { class: guess.space ? "notice good" : "notice" }, guess.why.charAt(0).toUpperCase() + guess.why.slice(1) + (guess.space ? ". So this is chosen already; change it if it is wrong." : "."));
   return h("div", { class: "ask" },
-    h("section", { class: "panel stack" }, h("h2", {}, "The table"), h("p", { class: "soft" }, `${count(table.rows)} rows${table.more ? `; ${count(table.more)} more columns are not shown` : ""}. Rows with an empty cell are left out.`), firstRows(table)),
+    h("section", { class: "panel stack" }, h("h2", {}, "The table"), h("p", { class: "soft" }, `${count(table.rows)} rows${table.more ? `; ${count(table.more)} more columns are not shown` : ""}. Rows with an empty cell are left out.`), firstRows(table),
+      table.notes.length > 0 && h("p", { class: "soft small" }, `Read so: ${table.notes.join("; ")}.`)),
     h("section", { class: "panel stack" }, h("h2", {}, "Where they live"), !last && why, spaces, columns, units, h("div", { class: "row" }, go, says)));
 }

@@ -6,26 +6,31 @@ import { PARTS } from "./words.js";
 
 const TRIED = /^held-out part (\d+) of (\d+): (\w+)(?: of (\d+))?/;
 
+/** A part of a density, with a bar that says how much of it there is. */
+export const partBar = (name, share, words, more = "") => {
+  const [title, about] = PARTS[name] ?? [name, ""];
+  return h("li", {}, h("div", { class: "share" }, h("strong", {}, title), h("span", {}, words)),
+    h("meter", { value: share, "aria-label": title }), h("p", { class: "soft small" }, `${capital(about)}. ${more}`));
+};
+
 export class Watch {
   constructor(page, task) {
-    Object.assign(this, { page, found: new Map(), lines: [] });
+    Object.assign(this, { page, found: new Map() });
     this.bar = h("progress", { max: 1, "aria-label": "How far the fit is" });
-    this.says = h("p", { role: "status" });
-    this.kinds = h("ul", { class: "parts" });
-    this.log = h("ol", { class: "notes soft small", reversed: true });
+    this.says = h("p");
+    this.kinds = h("ul", { class: "parts stack" });
     this.buttons = h("div", { class: "row" });
     this.root = h("section", { class: "panel stack watch" }, h("h2", {}, "Fitting"), this.bar, this.says, this.buttons,
-      h("p", { class: "soft small" }, "Several kinds of density are tried. Rows that were kept aside choose among them."), this.kinds,
-      h("details", {}, h("summary", {}, "Every step"), this.log));
+      h("p", { class: "soft small" }, "Several kinds of density are tried. Rows that were kept aside choose among them."), this.kinds);
     this.update(task);
   }
 
   update(task) {
     this.task = task;
+    const what = task.what ?? "", step = { drawing: ": drawing it", "putting together": ": putting it together" }[what] ?? (this.hear(what) ? ": trying what suits the rows" : "");
     this.bar.value = task.share;
-    this.hear(task.what ?? "");
     const state = task.state === "waiting" && task.place ? `${STATES.waiting}: ${task.place} before it` : STATES[task.state];
-    this.says.textContent = task.state === "running" ? `${Math.round(100 * task.share)} % done. ${this.words()}` : state;
+    this.says.textContent = task.state === "running" ? `${Math.round(100 * task.share)} % done${step}` : state;
     this.steer();
   }
 
@@ -40,24 +45,14 @@ export class Watch {
     if (focused) this.buttons.firstChild.focus();
   }
 
-  words() {
-    const tried = TRIED.exec(this.task.what);
-    if (tried) return `Kept-aside part ${tried[1]} of ${tried[2]}: ${(PARTS[tried[3]]?.[0] ?? tried[3]).toLowerCase()}.`;
-    return { flow: "Stirring the dough.", drawing: "Drawing.", "putting together": "Putting it together." }[this.task.what.split(":")[0]] ?? "";
-  }
-
   hear(what) {
-    if (!what || what === this.lines.at(-1)) return;
-    this.lines.push(what);
-    this.log.prepend(h("li", {}, what));
     const tried = TRIED.exec(what), kind = tried ? tried[3] : what.startsWith("flow") ? "flow" : null;
-    if (!kind) return;
+    if (!kind) return false;
     const own = this.found.get(kind) ?? {};
-    this.found.set(kind, tried ? { part: Number(tried[1]), parts: Number(tried[2]), size: tried[4] ?? own.size } : { going: true });
-    put(this.kinds, [...this.found].map(([name, { part, parts, size }]) => {
-      const [title, about] = PARTS[name] ?? [name, ""], share = part ? part / parts : this.task.share;
-      return h("li", {}, h("div", { class: "share" }, h("strong", {}, title), h("span", { class: "soft small" }, part ? `part ${part} of ${parts}${size ? `, up to ${size} bumps` : ""}` : "being stirred")),
-        h("meter", { min: 0, max: 1, value: share, "aria-label": title }), h("p", { class: "soft small" }, `${capital(about)}.`));
-    }));
+    this.found.set(kind, tried ? { part: Number(tried[1]), parts: Number(tried[2]), size: tried[4] ?? own.size } : {});
+    put(this.kinds, [...this.found].map(([name, { part, parts, size }]) => (part
+      ? partBar(name, part / parts, `part ${part} of ${parts}${size ? `, up to ${size} bumps` : ""}`)
+      : partBar(name, this.task.share, "being stirred"))));
+    return true;
   }
 }

@@ -1,20 +1,18 @@
 /** Words of the density page. */
 
 export const SPACES = [
-  { name: "torus", title: "Angles", about: "Each number goes round and comes back to its start, like a clock. Two angles live on a doughnut.", needs: "1 to 7 columns of angles", least: 1, most: 7, angular: true },
-  { name: "sphere", title: "Directions", about: "Where an arrow points from the middle of a ball: places on the Earth, winds, stars.", needs: "latitude and longitude, or x, y, z", least: 2, most: 3 },
-  { name: "projective-plane", title: "Lines without an arrow", about: "Both ends mean the same: axes of crystals, magnetic poles, cracks in rock.", needs: "latitude and longitude, or x, y, z", least: 2, most: 3 },
-  { name: "klein-bottle", title: "Theta and phi of picture patches", about: "How light edges lie in tiny bits of photographs. They live on a Klein bottle, which has no inside.", needs: "theta, then phi", least: 2, most: 2, angular: true },
+  { name: "torus", title: "Angles", about: "Each comes back to its start, like a clock. Two angles live on a doughnut.", needs: "1 to 7 columns of angles", least: 1, most: 7, angular: true },
+  { name: "sphere", title: "Directions", about: "Where an arrow points: places on the Earth, winds, stars.", needs: "latitude and longitude, or x, y, z", least: 2, most: 3 },
+  { name: "projective-plane", title: "Lines without an arrow", about: "Both ends mean the same: crystals, magnetic poles, cracks in rock.", needs: "latitude and longitude, or x, y, z", least: 2, most: 3 },
+  { name: "klein-bottle", title: "Theta and phi of picture patches", about: "How edges lie in tiny bits of photographs: a Klein bottle.", needs: "theta, then phi", least: 2, most: 2, angular: true },
 ];
 
 export const spaceOf = (name) => SPACES.find((space) => space.name === name);
 
-const ANGLES = ["", "One angle: a circle", "Two angles: a doughnut", "Three angles", "Four angles", "Five angles", "Six angles", "Seven angles"];
-
 /** Where rows of so many columns live, in a few words. */
 export function shape(space, count) {
-  if (space === "torus") return ANGLES[count] ?? `${count} angles`;
-  return { sphere: "Directions: a ball", "projective-plane": "Lines without an arrow: the projective plane", "klein-bottle": "Theta and phi: the Klein bottle" }[space];
+  const angles = { 1: "One angle: a circle", 2: "Two angles: a doughnut" }[count] ?? `${count} angles, all at once`;
+  return { torus: angles, sphere: "Directions: a ball", "projective-plane": "Lines without an arrow: the projective plane", "klein-bottle": "Theta and phi: the Klein bottle" }[space];
 }
 
 export const SEEMS = {
@@ -38,8 +36,8 @@ export const EDGES = {
   circle: "The left and the right end are one.",
   torus: "The left and the right edge are one, and so are the top and the bottom.",
   sphere: "Equal areas look equal. The left and the right edge are one.",
-  "projective-plane": "Half of the ball from above its pole, as the other half is the same. Opposite points of the rim are one.",
-  "klein-bottle": "The left and the right edge are one. So are the top and the bottom, but one of them is turned round.",
+  "projective-plane": "Half of the ball, as the other is the same. Opposite points of the rim are one.",
+  "klein-bottle": "The left and the right edge are one. So are top and bottom, one of them turned round.",
 };
 
 /** A number in a few digits, with a true minus sign. */

@@ -50,6 +50,7 @@ export async function show(root, { api, events, project, navigate, about }) {
     if (own.state === "failed") return own.error;
     if (own.state === "waiting") return own.place > 0 ? `Waiting: ${number(own.place, "other thing")} to do first.` : "It starts in a moment.";
     if (own.state === "running") return own.what ? capital(own.what) : "Looking for tiles";
+    if (own.state === "done" && !project.tiles.length) return "No tile was found. Smooth the picture a little, or search more thoroughly.";
     if (own.state === "done") return `${capital(number(project.tiles.length, "tile"))}, best first. Each one covers the plane: we proved it.`;
     return `${STATES[own.state]}.`;
   }
@@ -119,7 +120,7 @@ export async function show(root, { api, events, project, navigate, about }) {
   const dots = h("span", { class: "dots", "aria-hidden": "true" });
   const swatches = () => put(dots, palette().colours.slice(0, 4).map((colour) => h("i", { style: { background: colour } })));
   swatches();
-  put(empty, h("p", { class: "soft" }, "No tiles yet."));
+  put(empty, h("p", { class: "soft" }, "No tiles yet."), h("p", {}, h("a", { href: `#/${place.replace("projects", "p")}/picture` }, "Back to the picture")));
 
   put(root,
     h("div", { class: "head" },

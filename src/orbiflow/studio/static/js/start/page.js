@@ -11,7 +11,7 @@ const PICTURES = "image/*,.svg,.json,.dat";
 
 export async function show(root, { api, navigate, about }) {
   await style("start");
-  const projects = h("section", { "aria-labelledby": "yours" });
+  const projects = h("section", { "aria-labelledby": "yours", hidden: true });
 
   /** Make a project of what somebody brings, and go and see what was read. */
   async function begin(name, send) {
@@ -110,6 +110,7 @@ export async function show(root, { api, navigate, about }) {
 
   async function list() {
     const found = await api.get("projects");
+    projects.hidden = !found.length;
     put(projects, found.length > 0 && [h("h2", { id: "yours" }, "Your projects"),
       h("ul", { class: "projects" }, found.map((own) => {
         const path = own.kind === "density" ? `d/${own.id}` : own.tiles || own.busy ? `p/${own.id}` : `p/${own.id}/picture`;
