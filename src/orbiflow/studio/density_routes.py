@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fastapi import APIRouter, Request
-from fastapi.responses import FileResponse
+from fastapi.responses import FileResponse, JSONResponse, Response
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.studio.density_table import ENDINGS, ending_of
@@ -97,11 +97,11 @@ def density_routes(store: Store, queue: WorkQueue) -> APIRouter:
         return new_table(project, file, f"{EXAMPLES[name][0]}.csv")
 
     @routes.get("/projects/{project}/density/{fit}/surface")
-    async def surface(project: str, fit: int) -> FileResponse:
+    async def surface(project: str, fit: int) -> Response:
         return _document(fit_folder(home(project), fit) / SURFACE)
 
     @routes.get("/projects/{project}/density/{fit}/map")
-    async def flat(project: str, fit: int, axes: str = "0") -> FileResponse:
+    async def flat(project: str, fit: int, axes: str = "0") -> Response:
         chosen = axes.split("-")
         if len(chosen) > 2 or not all(a.isdecimal() and int(a) < MOST_AXES for a in chosen):
             raise Refused(404, "a map is of one or two angles, such as 0-1")
@@ -110,10 +110,10 @@ def density_routes(store: Store, queue: WorkQueue) -> APIRouter:
     return routes
 
 
-def _document(file: Path) -> FileResponse:
-    if not file.is_file():
-        raise Refused(404, "this is not drawn yet; ask for it with a task")
-    return FileResponse(file, media_type="application/json")
+def _document(file: Path) -> Response:
+    """Return a file of JSON, or null if nobody has drawn it yet."""
+    drawn = file.is_file()
+    return FileResponse(file, media_type="application/json") if drawn else JSONResponse(None)
 
 
 def _report(fit: Path) -> dict[str, Any]:
