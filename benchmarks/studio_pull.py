@@ -74,6 +74,20 @@ PULL = """async (seconds) => {
 }"""
 
 
+PAN = """async (seconds) => {
+  const { stage } = globalThis.ready;
+  const began = performance.now();
+  let frames = 0;
+  while (performance.now() - began < 1000 * seconds) {
+    await new Promise((resolve) => requestAnimationFrame(resolve));
+    stage.pan(3, 2);
+    stage.paint();
+    frames += 1;
+  }
+  return { frames, seconds: (performance.now() - began) / 1000 };
+}"""
+
+
 def turtle() -> EscherTile:
     """Return a tile of the turtle."""
     target = Target.read(HERE / "examples" / "silhouettes" / "turtle.png")
@@ -113,6 +127,9 @@ def measured(view: dict[str, Any], space: dict[str, Any], seconds: float, across
         before = processor_seconds()
         found = page.evaluate(PULL, seconds)
         found["processor"] = processor_seconds() - before
+        before = processor_seconds()
+        found["pan"] = page.evaluate(PAN, seconds)
+        found["pan"]["processor"] = processor_seconds() - before
         browser.close()
     return found
 
@@ -134,7 +151,9 @@ def processor_seconds() -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
     parser.add_argument("--vertices", type=int, default=500)
     parser.add_argument("--seconds", type=float, default=5.0)
     parser.add_argument("--across", type=float, default=4.0)
@@ -143,13 +162,20 @@ def main() -> None:
     view = json.loads(json.dumps(tile_view(tile_card(tile, 1, "final"), tile)))
     found = measured(view, with_vertices(tile, given.vertices), given.seconds, given.across)
     frames = found["frames"]
-    print(f"vertices {found['vertices']}, points of the body {found['points']}, copies {found['copies']}")
+    print(
+        f"vertices {found['vertices']}, points of the body {found['points']}, copies {found['copies']}"
+    )
+    print("pulling")
     print(f"frames a second               {frames / found['seconds']:.1f}")
     print(f"with a core to itself         {frames / found['processor']:.1f} (at most 60)")
     print(f"processor time a frame, ms    {1000 * found['processor'] / frames:.1f}")
     print(f"following, ms                 {found['pull'] / frames:.1f}")
     print(f"painting, ms                  {found['paint'] / frames:.1f}")
     print(f"longest frame, ms             {found['longest']:.0f}")
+    pan = found["pan"]
+    print("panning")
+    print(f"frames a second               {pan['frames'] / pan['seconds']:.1f}")
+    print(f"with a core to itself         {pan['frames'] / pan['processor']:.1f} (at most 60)")
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ import shapely
 from exported import polygons, svg_lines
 
 CHROMIUM = Path("/usr/bin/chromium")
-PATIENCE = 60.0  # seconds until something that never comes counts as missing
+PATIENCE = 120.0  # seconds until something that never comes counts as missing
 BOOT = b"[[0, 0], [60, 0], [60, 20], [30, 25], [28, 70], [0, 70]]"
 
 

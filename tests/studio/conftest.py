@@ -38,7 +38,7 @@ def page_fixture(browser: Any, studio: RunningStudio) -> Iterator[Any]:
     context = browser.new_context(
         base_url=studio.address, viewport={"width": 1280, "height": 900}, reduced_motion="reduce"
     )
-    context.set_default_timeout(30_000)
+    context.set_default_timeout(120_000)
     page, wrong = context.new_page(), list[str]()
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on("response", lambda got: got.status in (200, 206, 304, 422) or wrong.append(got.url))

@@ -138,7 +138,7 @@ class Client:
     """A browser's part: requests to an application, one after another."""
 
     def __init__(self, app: Any, runner: asyncio.Runner, headers: dict[str, str]) -> None:
-        self.studio = app.app.state
+        self.studio = app.app.state.studio
         """The application's `store`, `queue`, `hub` and `limits`."""
         self.headers = headers
         self.runner = runner

@@ -20,16 +20,16 @@ from orbiflow import __version__
 from orbiflow.drawing import PALETTES
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import find
+from orbiflow.studio import picture_routes, project_routes, tile_routes
 from orbiflow.studio.animals import ANIMALS, animal_file
 from orbiflow.studio.closeup_routes import closeup_routes
 from orbiflow.studio.density_routes import density_routes
 from orbiflow.studio.guard import Guard, Refused
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.kinds_of_work import KINDS, kind_of_work, own_schema
-from orbiflow.studio.project_routes import project_routes
+from orbiflow.studio.requests import Here, Studio
 from orbiflow.studio.settings import Limits
 from orbiflow.studio.store import Missing, Store
-from orbiflow.studio.tile_routes import tile_routes
 from orbiflow.studio.work_queue import WorkQueue
 
 STATIC = Path(__file__).parent / "static"
@@ -72,46 +72,48 @@ def create_app(
     app = FastAPI(
         title="orbiflow studio", lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None
     )
-    app.state.store, app.state.queue, app.state.hub, app.state.limits = store, queue, hub, limits
-    app.include_router(_own_routes(limits), prefix="/api")
+    app.state.studio = Studio(store, queue, hub, limits)
+    app.include_router(routes, prefix="/api")
     app.include_router(closeup_routes(store, queue, hub), prefix="/api")
     app.include_router(density_routes(store, queue), prefix="/api")
-    app.include_router(project_routes(store, queue, hub, limits), prefix="/api")
-    app.include_router(tile_routes(store, queue, hub), prefix="/api")
+    for module in (project_routes, tile_routes, picture_routes):
+        app.include_router(module.routes, prefix="/api")
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     for kind in (Refused, OrbiflowError, RequestValidationError, HTTPException, Exception):
         app.add_exception_handler(kind, _told)
     return Guard(app, limits, port=port, token=token)
 
 
-def _own_routes(limits: Limits) -> APIRouter:
-    routes = APIRouter()
+routes = APIRouter()
 
-    @routes.get("/about")
-    async def about() -> dict[str, Any]:
-        return {
-            "version": __version__,
-            "limits": {"bytes": limits.upload, "pixels": MAX_PIXELS, "projects": limits.projects},
-            "animals": [
-                {"name": name, "title": title, "picture": f"/api/animals/{name}.png"}
-                for name, title in ANIMALS.items()
-            ],
-            "palettes": [{"name": name, **own._asdict()} for name, own in PALETTES.items()],
-            "spaces": [],
-            "efforts": ["fast", "normal", "best"],
-            "touch": True,
-        }
 
-    @routes.get("/animals/{name}.png")
-    async def animal(name: str) -> FileResponse:
-        return FileResponse(animal_file(name))
+@routes.get("/about")
+async def about(here: Here) -> dict[str, Any]:
+    """Return what the pages need to know of the studio."""
+    limits = here.limits
+    return {
+        "version": __version__,
+        "limits": {"bytes": limits.upload, "pixels": MAX_PIXELS, "projects": limits.projects},
+        "animals": [
+            {"name": name, "title": title, "picture": f"/api/animals/{name}.png"}
+            for name, title in ANIMALS.items()
+        ],
+        "palettes": [{"name": name, **own._asdict()} for name, own in PALETTES.items()],
+        "efforts": ["fast", "normal", "best"],
+    }
 
-    @routes.get("/operations/{name}/schema")
-    async def schema(name: str) -> dict[str, Any]:
-        kind = kind_of_work(name)
-        return own_schema(find(kind.makes or kind.work))
 
-    return routes
+@routes.get("/animals/{name}.png")
+async def animal(name: str) -> FileResponse:
+    """Return the picture of an animal."""
+    return FileResponse(animal_file(name))
+
+
+@routes.get("/operations/{name}/schema")
+async def schema(name: str) -> dict[str, Any]:
+    """Return the settings of a task."""
+    kind = kind_of_work(name)
+    return own_schema(find(kind.makes or kind.work))
 
 
 async def _told(_request: Request, error: Exception) -> JSONResponse:

@@ -17,9 +17,9 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.studio.density_table import ENDINGS, ending_of
 from orbiflow.studio.density_tasks import FIT, SURFACE, TABLE, VIEW, fit_folder, map_file
 from orbiflow.studio.guard import Refused
-from orbiflow.studio.project_routes import NAMES, body_object, plain_name, save_body
+from orbiflow.studio.requests import body_object, save_body
 from orbiflow.studio.store import Store
-from orbiflow.studio.words import shown_task
+from orbiflow.studio.words import NAMES, plain_name, shown_task
 from orbiflow.studio.work_queue import WorkQueue
 
 EXAMPLES = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from typing import Any
 
 from fastapi.sse import KEEPALIVE_COMMENT, format_sse_event
@@ -46,7 +46,7 @@ class Hub:
         for event in self._watching.get(project, ()):
             event.set()
 
-    async def changes(self, project: str) -> AsyncIterator[bool]:
+    async def changes(self, project: str) -> AsyncGenerator[bool]:
         """Yield at once and after each change of a project; False if nothing changed for a while."""
         wake = asyncio.Event()
         self._watching.setdefault(project, set()).add(wake)
@@ -69,7 +69,7 @@ class Hub:
             if not self._watching[project]:
                 del self._watching[project]
 
-    async def stream(self, project: str, after: int) -> AsyncIterator[bytes]:
+    async def stream(self, project: str, after: int) -> AsyncGenerator[bytes]:
         """Yield the events of a project after one, as a browser takes them."""
         yield KEEPALIVE_COMMENT
         changes = self.changes(project)
@@ -87,7 +87,7 @@ class Hub:
                     yield _event(number, kind, data)
                     after = number
         finally:
-            await changes.aclose()  # pyright: ignore[reportAttributeAccessIssue]
+            await changes.aclose()
 
     def _fresh(self, project: str, after: int) -> list[tuple[int, str, Any]]:
         with self.store.still():

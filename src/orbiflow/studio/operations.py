@@ -80,6 +80,7 @@ def _serve(
         app,
         log_level="warning",
         server_header=False,
+        timeout_keep_alive=60,
         timeout_graceful_shutdown=1,
         limit_concurrency=400,
     )

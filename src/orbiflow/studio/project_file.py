@@ -22,15 +22,16 @@ from orbiflow.arguments import as_path
 from orbiflow.errors import InputFileError, OrbiflowError, system_errors
 from orbiflow.runtime import is_object
 from orbiflow.studio.tile_files import PLACES, best_stage, tile_folder
+from orbiflow.studio.words import MASKS
 
 if TYPE_CHECKING:
     from orbiflow.tiles import EscherTile, Target
 
 FORMAT = "orbiflow-project/1"
 PROJECT, ENDING = "project.json", ".orbiflow"
-MASKS = ("mend", "pins", "emphasis")
 INPUT = re.compile(r"input\.[a-z0-9]{1,7}")
 TILE = re.compile(r"tiles/([1-9][0-9]{0,14})/(result\.json|[A-Za-z0-9-]{1,20}/model\.safetensors)")
+MOST_VIEW = 200_000  # characters of what pages remember of a project
 MOST_ENTRIES = 3 * PLACES
 MOST_BYTES = 512 * 2**20  # of all entries, unpacked
 MOST_OF_ONE = 64 * 2**20
@@ -157,6 +158,8 @@ def _checked(document: object, path: Path) -> dict[str, Any]:
     for name, kind in plain.items():
         if not isinstance(document.setdefault(name, kind()), kind):
             raise InputFileError(f"{path.name}: {name} in {PROJECT} is damaged")
+    if len(json.dumps(document["view"])) > MOST_VIEW:
+        raise InputFileError(f"{path.name}: its view is too large; save it again with less drawing")
     return document
 
 

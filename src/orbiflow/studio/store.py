@@ -76,6 +76,9 @@ class Store:
                 f"{folder} was written by another version of orbiflow; give another folder as data"
             )
 
+        for litter in folder.glob("projects/*/.*.tmp"):  # uploads that a crash broke off
+            litter.unlink(missing_ok=True)
+
     def close(self) -> None:
         """Close the file."""
         with self._lock:

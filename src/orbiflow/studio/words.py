@@ -7,7 +7,11 @@ from typing import Any
 
 from orbiflow.studio.store import Store
 
+NAMES = {"tile": "New tile", "density": "New density"}
+"""What a project of each kind is called before it has a name."""
+
 MASKS = ("mend", "pins", "emphasis")
+"""What is painted over a picture."""
 
 
 def plain_name(given: Any, otherwise: str) -> str:

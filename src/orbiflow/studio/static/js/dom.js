@@ -158,15 +158,16 @@ export function newest(work, ms = 250) {
 }
 
 const sheets = new Map();
-/** Load a page's style sheet once; resolves when it applies. */
-export function style(name) {
+/** Use a page's style sheet, and no other page's; resolves when it applies. */
+export async function style(name) {
   if (!sheets.has(name)) {
-    sheets.set(name, new Promise((resolve) => {
-      const link = h("link", { rel: "stylesheet", href: `css/${name}.css`, onload: resolve, onerror: resolve });
-      document.head.append(link);
-    }));
+    const link = h("link", { rel: "stylesheet", href: `css/${name}.css` });
+    const ready = new Promise((resolve) => { link.onload = link.onerror = resolve; });
+    sheets.set(name, { link, ready });
+    document.head.append(link);
   }
-  return sheets.get(name);
+  await sheets.get(name).ready;
+  for (const [other, { link }] of sheets) link.disabled = other !== name;
 }
 
 /** Replace all children. */

@@ -20,7 +20,13 @@ let feed = null;
 let turn = 0;
 
 /** Go to a page; `replace` leaves no step in the history. */
-export function navigate(path, { replace = false } = {}) {
+export function navigate(path, { replace = false, quiet = false } = {}) {
+  if (quiet) {
+    history.replaceState(null, "", `#/${path}`);
+    shownTile = Number(path.match(/\/t\/(\d+)$/)?.[1]) || shownTile;
+    links();
+    return;
+  }
   if (replace) location.replace(`#/${path}`);
   else location.hash = `#/${path}`;
 }

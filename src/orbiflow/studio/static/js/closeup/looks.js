@@ -86,11 +86,15 @@ export function penPanel(pen, colours, change, clear) {
     colours.map(([colour, words]) => h("label", { title: words }, h("input", {
       type: "radio", name, checked: pen.colour === colour, "aria-label": words, onchange: () => change({ colour }),
     }), h("span", { style: { background: colour } }))), well));
+  const lines = h("div", { class: "stack", hidden: pen.tool !== "pencil" }, swatches,
+    choice("Line", [["thin", "Thin"], ["medium", "Medium"], ["thick", "Thick"]], pen.width, (width) => change({ width })));
   return h("div", { class: "stack" },
     h("p", { class: "soft" }, "Draw inside any tile: the same appears in all of them."),
-    choice("Draw with", [["pencil", "Pencil", "pencil"], ["rubber", "Rubber", "rub"], ["eye", "Eye"]], pen.tool, (tool) => change({ tool })),
-    swatches,
-    choice("Line", [["thin", "Thin"], ["medium", "Medium"], ["thick", "Thick"]], pen.width, (width) => change({ width })),
+    choice("Draw with", [["pencil", "Pencil", "pencil"], ["rubber", "Rubber", "rub"], ["eye", "Eye"]], pen.tool, (tool) => {
+      lines.hidden = tool !== "pencil";
+      change({ tool });
+    }),
+    lines,
     h("p", { class: "small soft" }, "By keyboard: move the pen with arrows, put it down and up with ", h("kbd", {}, "Space"), "."),
     button("Clear the drawing", clear, { kind: "quiet", image: "bin" }));
 }

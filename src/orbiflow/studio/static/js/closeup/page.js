@@ -1,6 +1,6 @@
 /** The close-up of one tile: look, pull, draw. */
 
-import { button, choice, h, newest, put, style, toast } from "../dom.js";
+import { button, choice, h, newest, put, style, toast, trying } from "../dom.js";
 import { Carry } from "./carry.js";
 import { LiveTiling } from "./live.js";
 import { colourPanel, penPanel, pullPanel, shapePanel, signPanel } from "./looks.js";
@@ -38,14 +38,27 @@ class Closeup {
     this.keep = newest(() => api.patch(this.home, { view: { closeup: { look: { ...this.look, share: 1 }, pull: this.pull, pen: this.penSettings, mode: this.mode } } }), 600);
     this.keepDrawing = newest((drawing) => api.patch(this.home, { view: { drawing } }), 500);
     this.#build();
+    this.off = events.on("card", (card) => this.#better(card));
     this.keys = (event) => this.#shortcut(event);
     addEventListener("keydown", this.keys);
   }
 
   close() {
     removeEventListener("keydown", this.keys);
+    this.off();
     this.stage.close();
     this.closed = true;
+  }
+
+  /** A search has made the tile that is shown better: show it, unless it is in the hand. */
+  async #better(card) {
+    if (card.id !== this.view?.id || card.stage === this.view.stage) return;
+    if (this.pulling.hand || this.pulling.waiting || this.pen.line) {
+      this.later = () => this.#better(card);
+      return;
+    }
+    await trying(() => this.open(card.id));
+    toast("The search has made this tile better.");
   }
 
   #build() {
@@ -99,7 +112,7 @@ class Closeup {
     this.pen.use(this.carry, this.project.view?.drawing);
     this.heading.textContent = view.arrangement ? sentence(view.arrangement) : "Close up";
     this.kind.textContent = [view.class_name, view.group.name].filter(Boolean).join(" · ");
-    this.tell("proved", view.parent ? "Proved to tile" : "Proved to tile");
+    this.tell("proved", "Proved to tile");
     this.#panels();
     this.#past();
     if (quiet) this.navigate(`p/${this.project.id}/t/${id}`, { quiet: true });
@@ -248,10 +261,16 @@ class Closeup {
 
   #pulledTo({ crossed, body }) {
     this.pen.ride(this.pulling.puller, body, this.space);
-    if (crossed) this.tell("crossed", "The outline crosses itself here");
-    else if (body && !this.pulling.waiting) this.tell("moving", "Let go to check it");
+    if (this.pulling.hand) {
+      if (crossed) this.tell("crossed", "The outline crosses itself here");
+      else this.tell("moving", "Let go to check it");
+    }
     if (!body && this.badge.dataset.kind !== "refused") this.tell("proved", "Proved to tile");
     if (!body) this.stale();
+    if (!body && this.later) {
+      this.later();
+      this.later = null;
+    }
   }
 
   async #released(parameters) {

@@ -7,6 +7,9 @@ import { STATES, alive, bytes, capital } from "../words.js";
 import { KINDS, lengthIn } from "./kinds.js";
 import { trueSize } from "./truesize.js";
 
+const DRAWN = ["export", "art"]; // what a drawing or the picture can be laid on
+const PICTURES = ["png", "jpg", "jpeg", "webp", "svg"];
+
 export async function show(root, { api, events, project, tileId, navigate, about }) {
   const card = project.tiles.find(({ id }) => id === tileId);
   if (!card) throw new Error("This tile is not there any more.");
@@ -32,8 +35,13 @@ export async function show(root, { api, events, project, tileId, navigate, about
     if (state.kind !== kind) return;
     const schema = schemas.get(kind);
     const named = schema.properties.palette && { ...schema, properties: { ...schema.properties, palette: { ...schema.properties.palette, enum: about.palettes.map(({ name }) => name) } } };
+    const { strokes, eyes } = project.view?.drawing ?? {};
+    state.own = DRAWN.includes(kind) ? [
+      (strokes?.length || eyes?.length) && ["drawing", "With what you drew on it", true],
+      PICTURES.includes(project.input?.type) && ["picture", "With the picture itself on each tile", false],
+    ].filter(Boolean).map(([name, words, checked]) => [name, h("input", { type: "checkbox", checked, onchange: () => changed() }), words]) : [];
     state.form = form(named || schema, { first, words, hidden: ["tile", "result", "out", "force", "picture", ...(hidden ?? [])] }, changed);
-    put(wishes, state.form);
+    put(wishes, state.own.map(([, box, words]) => h("label", { class: "check" }, box, words)), state.form);
     state.task = null;
     changed();
     tell();
@@ -48,7 +56,8 @@ export async function show(root, { api, events, project, tileId, navigate, about
   }
 
   async function start() {
-    const settings = { tile: tileId, ...state.form.values() };
+    const own = state.own.filter(([, box]) => box.checked).map(([name]) => [name, true]);
+    const settings = { tile: tileId, ...Object.fromEntries(own), ...state.form.values() };
     state.task = (await api.post(`${place}/tasks`, { operation: state.kind, settings })).task;
     state.stale = false;
     tell();
