@@ -20,10 +20,9 @@ from orbiflow import __version__
 from orbiflow.drawing import PALETTES
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import find
-from orbiflow.studio import picture_routes, project_routes, tile_routes
+from orbiflow.studio import density_routes, picture_routes, project_routes, tile_routes
 from orbiflow.studio.animals import ANIMALS, animal_file
 from orbiflow.studio.closeup_routes import closeup_routes
-from orbiflow.studio.density_routes import density_routes
 from orbiflow.studio.guard import Guard, Refused
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.kinds_of_work import KINDS, kind_of_work, own_schema
@@ -33,6 +32,7 @@ from orbiflow.studio.store import Missing, Store
 from orbiflow.studio.work_queue import WorkQueue
 
 STATIC = Path(__file__).parent / "static"
+SETTLED_EVERY = 20.0  # seconds
 MAX_PIXELS = 40_000_000  # of a picture that is read
 log = logging.getLogger("orbiflow.studio")
 
@@ -64,7 +64,9 @@ def create_app(
             find(kind.work)
             find(kind.makes or kind.work)
         queue.start()
+        settling = asyncio.create_task(_settle(store))
         yield
+        settling.cancel()
         hub.close()
         await asyncio.to_thread(queue.close)
         store.close()
@@ -75,13 +77,19 @@ def create_app(
     app.state.studio = Studio(store, queue, hub, limits)
     app.include_router(routes, prefix="/api")
     app.include_router(closeup_routes(store, queue, hub), prefix="/api")
-    app.include_router(density_routes(store, queue), prefix="/api")
-    for module in (project_routes, tile_routes, picture_routes):
+    for module in (density_routes, project_routes, tile_routes, picture_routes):
         app.include_router(module.routes, prefix="/api")
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     for kind in (Refused, OrbiflowError, RequestValidationError, HTTPException, Exception):
         app.add_exception_handler(kind, _told)
     return Guard(app, limits, port=port, token=token)
+
+
+async def _settle(store: Store) -> None:
+    """Let the store settle now and then."""
+    while True:
+        await asyncio.sleep(SETTLED_EVERY)
+        await asyncio.to_thread(store.settle)
 
 
 routes = APIRouter()

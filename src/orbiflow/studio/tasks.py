@@ -112,18 +112,12 @@ def search(
 def _search_settings(project: Path, choice: SearchChoice) -> EscherizeSettings:
     from orbiflow.tiles import EscherizeSettings
 
-    masks = {
-        name: project / f"{file}.png"
-        for name, file in (("emphasis", "emphasis"), ("pin", "pins"))
-        if (project / f"{file}.png").exists()
-    }
-    if choice.objective == "overlap":
-        masks.pop("pin", None)
-    if "pin" in masks:
-        masks["pin"] = (str(masks["pin"]),)  # pyright: ignore[reportArgumentType]
-    settings = EscherizeSettings(
-        effort=choice.effort, objective=choice.objective, seed=choice.seed, **masks
-    )
+    settings = EscherizeSettings(effort=choice.effort, objective=choice.objective, seed=choice.seed)
+    emphasis, pins = project / "emphasis.png", project / "pins.png"
+    if emphasis.exists():
+        settings = settings.replace(emphasis=emphasis)
+    if pins.exists() and choice.objective == "likeness":
+        settings = settings.replace(pin=(str(pins),))
     if choice.like is None:
         return settings.replace(classes=choice.classes) if choice.classes else settings
     return settings.replace(
