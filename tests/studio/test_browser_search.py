@@ -105,6 +105,22 @@ def test_two_tabs_and_a_reload_in_the_middle(page, studio: RunningStudio) -> Non
     expect(other.get_by_label("Name of the project")).to_have_value("Boots")
 
 
+def test_a_tab_that_was_hidden_catches_up(page, studio: RunningStudio, searched) -> None:
+    from playwright.sync_api import expect
+
+    page.goto(f"/#/p/{searched}")
+    page.wait_for_selector(CARD)
+    hide = """(hidden) => {
+        Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
+        document.dispatchEvent(new Event("visibilitychange"));
+    }"""
+    page.evaluate(hide, True)
+    studio.client.patch(f"projects/{searched}", json={"name": "Renamed elsewhere"})
+    assert page.get_by_label("Name of the project").input_value() != "Renamed elsewhere"
+    page.evaluate(hide, False)
+    expect(page.get_by_label("Name of the project")).to_have_value("Renamed elsewhere")
+
+
 def test_a_server_that_was_killed_loses_nothing(browser, tmp_path) -> None:
     with running_studio(tmp_path) as studio:
         own = studio.with_picture()
