@@ -125,7 +125,8 @@ async def alone(client: httpx.AsyncClient) -> None:
     times = sorted(cards.values())
     nine = times[8] if len(times) >= 9 else float("nan")
     print(
-        f"search: first certified tile after {times[0]:.2f} s, nine after {nine:.2f} s, done {now:.1f} s"
+        f"search: first certified tile after {times[0]:.2f} s, nine after {nine:.2f} s, "
+        f"the end after {now:.1f} s"
     )
 
 

@@ -90,10 +90,10 @@ class Store:
     def settle(self) -> None:
         """Bring what was written from the log into the file, and the log to the disk.
 
-        It may take seconds where the disk is busy, and nobody waits for it.
+        It may take seconds where the disk is busy; neither readers nor writers wait for it.
         """
         with closing(sqlite3.connect(self.folder / "studio.sqlite3")) as data:
-            data.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            data.execute("PRAGMA wal_checkpoint(PASSIVE)")
 
     def home(self, project: str) -> Path:
         """Return the folder of a project's files."""
