@@ -26,6 +26,16 @@ import httpx
 import numpy as np
 
 STATIC = Path(__file__).parents[1] / "src" / "orbiflow" / "studio" / "static"
+IDLE = """
+import sys, uvicorn
+async def app(scope, receive, send):
+    if scope["type"] == "http":
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await send({"type": "http.response.body", "body": b""})
+uvicorn.run(app, port=int(sys.argv[1]), log_level="error", lifespan="off")
+"""
+"""A server that does nothing: what it takes at the same time is the machine's."""
+
 HEADERS = {"X-Orbiflow": "1"}
 PAUSE = 0.5  # seconds between two looks of a client at its project
 
@@ -43,6 +53,7 @@ def main() -> None:
         port = free.getsockname()[1]
         free.close()
         begin = time.perf_counter()
+        idle = subprocess.Popen([sys.executable, "-c", IDLE, str(port + 1)])
         server = subprocess.Popen(
             [
                 *(sys.executable, "-m", "orbiflow", "studio", "--no-browser"),
@@ -53,8 +64,9 @@ def main() -> None:
         try:
             asyncio.run(measured(f"http://127.0.0.1:{port}", server.pid, clients, projects, begin))
         finally:
-            server.kill()
-            server.wait()
+            for process in (server, idle):
+                process.kill()
+                process.wait()
 
 
 def page_weight() -> None:
@@ -113,27 +125,46 @@ async def alone(client: httpx.AsyncClient) -> None:
     times = sorted(cards.values())
     nine = times[8] if len(times) >= 9 else float("nan")
     print(
-        f"search: first certified tile after {times[0]:.2f} s, nine after {nine:.2f} s, done {now:.1f} s"
+        f"search: first certified tile after {times[0]:.2f} s, nine after {nine:.2f} s, "
+        f"the end after {now:.1f} s"
     )
 
 
 async def many(client: httpx.AsyncClient, server: int, count: int) -> None:
     """Print the longest request while so many work at once, and what was lost."""
     times: list[tuple[float, str]] = []
+    idle: list[float] = []
     memory = [0.0, 0.0]
     watch = asyncio.create_task(watched(server, memory))
     begin = time.perf_counter()
+    other = asyncio.create_task(asked_meanwhile(client.base_url.copy_with(path="/"), idle))
     ends = await asyncio.gather(*(one_of_many(client, times, k) for k in range(count)))
     watch.cancel()
+    other.cancel()
     whole = time.perf_counter() - begin
     own = np.array([took for took, _ in times])
     longest, what = max(times)
-    lost = sum(end != "done" for end in ends)
+    lost = [end for end in ends if end != "done"]
     print(
         f"{count} clients: {len(times)} requests in {whole:.0f} s, longest {1000 * longest:.0f} ms "
-        f"({what}), 99 of 100 below {1000 * np.quantile(own, 0.99):.0f} ms; {lost} searches lost"
+        f"({what}), 99 of 100 below {1000 * np.quantile(own, 0.99):.0f} ms; {len(lost)} searches "
+        f"lost {lost or ''}"
+    )
+    print(
+        f"a server that does nothing, at the same time: {len(idle)} requests, longest "
+        f"{1000 * max(idle):.0f} ms, 99 of 100 below {1000 * np.quantile(idle, 0.99):.0f} ms"
     )
     print(f"memory: server {memory[0]:.0f} MB, with all workers {memory[1]:.0f} MB at most")
+
+
+async def asked_meanwhile(base: httpx.URL, times: list[float]) -> None:
+    """Ask the server that does nothing again and again."""
+    async with httpx.AsyncClient(base_url=base.copy_with(port=(base.port or 0) + 1)) as client:
+        while True:
+            begin = time.perf_counter()
+            await client.get("/", timeout=300)
+            times.append(time.perf_counter() - begin)
+            await asyncio.sleep(PAUSE / 10)
 
 
 async def one_of_many(client: httpx.AsyncClient, times: list[tuple[float, str]], k: int) -> str:
@@ -158,7 +189,8 @@ async def one_of_many(client: httpx.AsyncClient, times: list[tuple[float, str]],
         await ask("GET", "/api/projects")
         (state,) = (own["state"] for own in found["tasks"] if own["id"] == task)
         if state not in ("waiting", "running"):
-            return state if found["tiles"] else "nothing"
+            (error,) = (own["error"] for own in found["tasks"] if own["id"] == task)
+            return error or (state if found["tiles"] else "no tile")
     raise AssertionError
 
 

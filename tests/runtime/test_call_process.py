@@ -120,3 +120,21 @@ def test_a_process_is_held_and_goes_on() -> None:
         process.begin(find("classes").call({}))
         assert isinstance(list(process.events())[-1], Finished)
     assert process.pause()  # it has ended: no other process is stopped
+
+
+@pytest.mark.skipif(os.name != "posix", reason="processes do one call there")
+def test_a_process_does_one_call_after_another() -> None:
+    with CallProcess(again=True) as process:
+        for names in (["IH4"], ["IH999"], ["IH6"]):
+            process.begin(find("classes").call({"classes": names}))
+            last = list(process.events())[-1]
+            assert isinstance(last, Failed if names == ["IH999"] else Finished)
+            process.cancel()  # too late, and no harm to the next
+        assert isinstance(last, Finished)
+        assert last.summary["classes"][0]["class"] == "IH6"
+        assert process.alive
+        process.begin(find("escherize").call({"image": "no such.png"}))
+        process.kill()
+        last = list(process.events())[-1]
+        assert isinstance(last, Failed)
+        assert last.failure == "died"

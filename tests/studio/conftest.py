@@ -26,7 +26,11 @@ def browser_fixture() -> Iterator[Any]:
 
     with sync_playwright() as playwright:
         own = playwright.chromium.launch(
-            executable_path=program, args=["--no-sandbox", "--disable-gpu"]
+            executable_path=program,
+            args=[
+                *("--no-sandbox", "--disable-gpu"),
+                *("--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"),
+            ],
         )
         yield own
         own.close()

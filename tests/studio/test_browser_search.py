@@ -25,20 +25,40 @@ def state(page: Any) -> str:
     return page.locator(".state-words").inner_text()
 
 
-def test_from_a_picture_to_a_file_that_covers_its_page(page, drawing, tmp_path) -> None:
+def reach(page: Any, name: str, typed: str = "") -> None:
+    """Go on with the Tab key until an element is reached, by its label or words; then press Enter.
+
+    With `typed`, choose the option of a list that begins so.
+    """
+    said = """() => { const own = document.activeElement;
+        return own.getAttribute("aria-label") ?? own.labels?.[0]?.innerText ?? own.innerText; }"""
+    for _ in range(100):
+        page.keyboard.press("Tab")
+        if (page.evaluate(said) or "").startswith(name):
+            page.keyboard.type(typed) if typed else page.keyboard.press("Enter")
+            return
+    raise AssertionError(f"the Tab key never reaches {name}")
+
+
+def test_keyboard_alone_leads_to_a_file_that_covers_its_page(page, drawing, tmp_path) -> None:
     small_searches(page, "IH4")
     page.goto("/")
-    page.set_input_files("#file", drawing)
-    page.get_by_role("button", name="Find tiles").click()
+    page.wait_for_selector("h1")
+    with page.expect_file_chooser() as chooser:
+        reach(page, "Choose a picture")
+    chooser.value.set_files(drawing)
+    page.wait_for_selector(".stage:not([hidden])")
+    reach(page, "Find tiles")
     page.wait_for_selector(DONE)
-    assert page.locator(f"{CARD} .stars").first.get_attribute("aria-label").endswith("stars")
-    page.get_by_role("link", name=re.compile("^Take away:")).first.click()
-    page.get_by_label("What is it for?").select_option("print")
-    page.get_by_label("Kind of file").select_option("svg")
-    page.get_by_role("button", name="Make it").click()
+    reach(page, "Take away:")
+    page.wait_for_selector(".form")
+    reach(page, "What is it for?", "Poster")
+    reach(page, "Kind of file", "SVG")
+    reach(page, "Make it")
     page.wait_for_selector(".preview img")
+    page.focus("h1")
     with page.expect_download() as caught:
-        page.get_by_role("link", name=re.compile("svg")).first.click()
+        reach(page, "tile-")
     caught.value.save_as(tmp_path / "tiling.svg")
     assert covers_page_once((tmp_path / "tiling.svg").read_text())
 

@@ -259,6 +259,27 @@ def test_a_change_wakes_the_streams_of_its_project(bench: Bench) -> None:
     assert asyncio.run(watch()) == [True, True]
 
 
+def test_the_log_goes_into_the_file_and_litter_goes(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    project = store.create("tile", "a project", 9)
+    file, log = tmp_path / "studio.sqlite3", tmp_path / "studio.sqlite3-wal"
+    before = file.stat().st_size
+    for k in range(200):
+        store.change(project, view={"text": "x" * 1000, "turn": k})
+    grown = log.stat().st_size
+    store.settle()
+    assert file.stat().st_size >= before
+    for k in range(200):
+        store.change(project, view={"text": "y" * 1000, "turn": k})
+    assert log.stat().st_size < 1.5 * grown  # the log is used anew
+    (store.home(project) / ".input.png.1234.tmp").touch()
+    store.close()
+    store = Store(tmp_path)
+    assert store.project(project)["view"]["turn"] == 199
+    assert not list(store.home(project).iterdir())
+    store.close()
+
+
 def test_another_version_is_not_touched(tmp_path: Path) -> None:
     store = Store(tmp_path)
     store._data.execute("PRAGMA user_version = 99")  # pyright: ignore[reportPrivateUsage]

@@ -3,7 +3,7 @@
 `python -m orbiflow.runtime.call_process MODULE...` is that process, which imports the modules first.
 The first line of its standard input is the call as JSON; anything after it, or its end, means stop.
 Events go to the standard output, each as a line of JSON; whatever else is printed goes to the standard
-error.
+error. With `--again` before the modules, a call that has ended may be followed by a line with another.
 """
 
 from __future__ import annotations
@@ -31,8 +31,10 @@ from orbiflow.runtime.events import (
     Polled,
     event_from_json,
 )
-from orbiflow.runtime.operations import Call, call_from_json
+from orbiflow.runtime.operations import Call, Sink, call_from_json
 from orbiflow.runtime.threads import one_thread_environment
+
+AGAIN, CANCEL = "--again", b"cancel\n"
 
 
 class CallProcess:
@@ -51,15 +53,24 @@ class CallProcess:
     Args:
         call: The call. Without one the process waits until `begin` is given one.
         modules: The names of modules that the process imports before it reads the call.
+        again: Whether the process waits for another call after each (where there are signals); who
+            has no more calls must kill it.
     """
 
-    def __init__(self, call: Call | None = None, *, modules: Sequence[str] = ()) -> None:
+    def __init__(
+        self, call: Call | None = None, *, modules: Sequence[str] = (), again: bool = False
+    ) -> None:
         self._lock = threading.Lock()
+        self._again = again and os.name == "posix"
         # so that the process imports this very package
         package = str(Path(__file__).parents[2])
         paths = [package, *filter(None, [os.environ.get("PYTHONPATH")])]
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "orbiflow.runtime.call_process", *modules],
+            [
+                *(sys.executable, "-m", "orbiflow.runtime.call_process"),
+                *([AGAIN] * self._again),
+                *modules,
+            ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env={**os.environ, **one_thread_environment(), "PYTHONPATH": os.pathsep.join(paths)},
@@ -99,14 +110,15 @@ class CallProcess:
         """
         assert self._process.stdout is not None
         last = None
-        with self._process.stdout as lines:
-            for line in lines:
-                try:
-                    event = event_from_json(json.loads(line))
-                except ValueError:  # half a line: it died while it wrote
-                    continue
-                last = event
-                yield event
+        for line in self._process.stdout:
+            try:
+                last = event_from_json(json.loads(line))
+            except ValueError:  # half a line: it died while it wrote
+                continue
+            yield last
+            if self._again and isinstance(last, Finished | Failed):
+                return
+        self._process.stdout.close()
         status = self.wait()
         if not isinstance(last, Finished | Failed):
             how = f"signal {-status}" if status < 0 else f"status {status}"
@@ -114,7 +126,7 @@ class CallProcess:
 
     def cancel(self) -> None:
         """Ask the process to stop; a search keeps what it has found. May be called from any thread."""
-        self._send(b"cancel\n")
+        self._send(CANCEL)
 
     def pause(self) -> bool:
         """Hold the process and all that it started; return whether the system can do that."""
@@ -162,23 +174,33 @@ class CallProcess:
 
 
 def _main() -> int:
-    """Run the call and tell its events; return the exit status."""
+    """Run the call, or calls, and tell events; return the exit status."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
     events = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
-    for name in sys.argv[1:]:
+    again = sys.argv[1:2] == [AGAIN]
+    for name in sys.argv[1 + again :]:
         import_module(name)
 
     def tell(event: Event) -> None:
         events.write(json.dumps(event.to_json(), allow_nan=False) + "\n")
         events.flush()
 
+    status = 0
+    # lines and not a byte more: what follows must stay there to be noticed
+    with open(0, "rb", buffering=0, closefd=False) as words:
+        while line := words.readline():
+            if not (again and line == CANCEL):  # of a call that had ended
+                status = _run(line, tell)
+            if not again:
+                break
+    return status
+
+
+def _run(line: bytes, tell: Sink) -> int:
+    """Run a call and return the exit status."""
     try:
-        # a line and not a byte more: what follows must stay there to be noticed
-        with open(0, "rb", buffering=0, closefd=False) as words:
-            if not (line := words.readline()):
-                return 0  # there was nothing to do
-            call = call_from_json(json.loads(line))
+        call = call_from_json(json.loads(line))
     except (OrbiflowError, ValueError, RecursionError) as error:
         tell(Failed(str(error), "mistake"))
         return 1

@@ -32,6 +32,7 @@ from orbiflow.studio.store import Missing, Store
 from orbiflow.studio.work_queue import WorkQueue
 
 STATIC = Path(__file__).parent / "static"
+SETTLED_EVERY = 20.0  # seconds
 MAX_PIXELS = 40_000_000  # of a picture that is read
 log = logging.getLogger("orbiflow.studio")
 
@@ -63,7 +64,9 @@ def create_app(
             find(kind.work)
             find(kind.makes or kind.work)
         queue.start()
+        settling = asyncio.create_task(_settle(store))
         yield
+        settling.cancel()
         hub.close()
         await asyncio.to_thread(queue.close)
         store.close()
@@ -80,6 +83,13 @@ def create_app(
     for kind in (Refused, OrbiflowError, RequestValidationError, HTTPException, Exception):
         app.add_exception_handler(kind, _told)
     return Guard(app, limits, port=port, token=token)
+
+
+async def _settle(store: Store) -> None:
+    """Let the store settle now and then."""
+    while True:
+        await asyncio.sleep(SETTLED_EVERY)
+        await asyncio.to_thread(store.settle)
 
 
 routes = APIRouter()

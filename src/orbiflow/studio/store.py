@@ -14,7 +14,7 @@ import sqlite3
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +67,10 @@ class Store:
             folder / "studio.sqlite3", check_same_thread=False, isolation_level=None
         )
         self._data.row_factory = sqlite3.Row
-        self._data.executescript("PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;")
+        # a request must not wait for the disk: see `settle`
+        self._data.executescript(
+            "PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL; PRAGMA wal_autocheckpoint=0;"
+        )
         (version,) = self._data.execute("PRAGMA user_version").fetchone()
         if version == 0:
             self._data.executescript(f"BEGIN; {TABLES} PRAGMA user_version={VERSION}; COMMIT;")
@@ -83,6 +86,14 @@ class Store:
         """Close the file."""
         with self._lock:
             self._data.close()
+
+    def settle(self) -> None:
+        """Bring what was written from the log into the file, and the log to the disk.
+
+        It may take seconds where the disk is busy; neither readers nor writers wait for it.
+        """
+        with closing(sqlite3.connect(self.folder / "studio.sqlite3")) as data:
+            data.execute("PRAGMA wal_checkpoint(PASSIVE)")
 
     def home(self, project: str) -> Path:
         """Return the folder of a project's files."""

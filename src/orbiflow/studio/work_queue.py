@@ -35,6 +35,8 @@ from orbiflow.studio.words import plain_name
 
 WARM = (
     "orbiflow.studio.tasks",
+    "orbiflow.studio.changing",
+    "orbiflow.studio.closeup_tasks",
     "orbiflow.studio.silhouette_file",
     "orbiflow.studio.tile_view",
     "orbiflow.tiles.search.escherizing",
@@ -43,6 +45,7 @@ WARM = (
 """What a worker has imported before there is work for it."""
 
 STEP = 0.002  # of a task: smaller progress is not told
+MOST_CALLS = 40  # of a process, one after another
 MOST_HELD = 3  # processes that are kept in memory while their tasks are paused
 FAULT = (
     "something went wrong inside orbiflow; the server's own output says what. Try other settings."
@@ -53,8 +56,8 @@ Spawn = Callable[[], CallProcess]
 
 
 def warm_process() -> CallProcess:
-    """Return a process that gets ready and waits for its call."""
-    return CallProcess(modules=WARM)
+    """Return a process that gets ready and waits for calls."""
+    return CallProcess(modules=WARM, again=True)
 
 
 class WorkQueue:
@@ -79,6 +82,7 @@ class WorkQueue:
         self.slots = slots or {"long": cores(), "quick": max(2, cores() // 2)}
         self._spare_count, self._spawn = spares, spawn
         self._spares: list[CallProcess] = []
+        self._calls: Counter[CallProcess] = Counter()  # that each has done
         self._running: dict[int, CallProcess] = {}
         self._held: dict[int, CallProcess] = {}  # in the order in which they were paused
         self._lanes: dict[int, tuple[str, str]] = {}  # project and lane of what runs
@@ -176,6 +180,9 @@ class WorkQueue:
                     self._begin(task)
                 while not self._closed and len(self._spares) < self._spare_count:
                     self._spares.append(self._spawn())
+                for process in self._spares[self._spare_count :]:
+                    process.kill()
+                del self._spares[self._spare_count :]
             except OSError:  # no memory, or too many processes: tried again when something ends
                 log.exception("no process can be started")
 
@@ -238,13 +245,23 @@ class WorkQueue:
                 ending = event
             else:
                 told.record(event)
-        process.wait()
         with self._lock:
             if self._owner(number) is process and not self._closed:
-                for processes in (self._running, self._held, self._lanes):
-                    processes.pop(number, None)
                 told.end(ending)
+                self._let_go(number, process)
         self._schedule()
+
+    def _let_go(self, number: int, process: CallProcess) -> None:
+        """Keep the process of a task that has ended for another quick one, or end it."""
+        _, lane = self._lanes.pop(number)
+        for processes in (self._running, self._held):
+            processes.pop(number, None)
+        self._calls[process] += 1
+        if lane == "quick" and process.alive and self._calls[process] < MOST_CALLS:
+            self._spares.insert(0, process)
+        else:
+            del self._calls[process]
+            process.kill()
 
     def _owner(self, number: int) -> CallProcess | None:
         with self._lock:

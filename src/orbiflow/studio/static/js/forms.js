@@ -17,8 +17,9 @@ function control(name, schema, words, changed) {
   const id = unique(name);
   const found = kinds(schema);
   const options = found.find((kind) => kind.enum)?.enum;
-  const described = schema.description ? `${id}-about` : undefined;
-  const about = described && h("p", { class: "soft small", id: described }, words?.about ?? schema.description);
+  const meaning = words?.about ?? schema.description;
+  const described = meaning ? `${id}-about` : undefined;
+  const about = meaning && h("p", { class: "soft small", id: described }, meaning);
   const shared = { id, name, "aria-describedby": described, onchange: changed };
   const unit = schema["x-unit"];
   const title = words?.title ?? label(name);

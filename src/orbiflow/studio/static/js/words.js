@@ -35,6 +35,9 @@ export const starWords = (stars) => (stars ? `${stars} of 5 stars` : "not rated 
 
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
+/** What the server says, as a sentence. */
+export const sentence = (text) => (text ? `${capital(text)}${/[.!?…]$/.test(text) ? "" : "."}` : "");
+
 /** How long ago a moment was. Moments: ISO texts, or seconds since 1970. */
 export function ago(moment) {
   const seconds = (Date.now() - (typeof moment === "number" ? moment * 1000 : Date.parse(moment))) / 1000;

@@ -106,6 +106,7 @@ class Closeup {
     this.tiling = new LiveTiling(view);
     this.look.share = 1;
     this.space = null;
+    delete this.root.dataset.ready;
     this.pulling.use(null);
     this.stage.show(this.tiling);
     this.#palette();
@@ -129,6 +130,7 @@ class Closeup {
       this.space = space;
       this.tiling.outline(space.polygon);
       this.pulling.use(space);
+      this.stage.redraw();
       this.root.dataset.ready = "pull";
     } catch (error) {
       toast(error.message, { bad: true });

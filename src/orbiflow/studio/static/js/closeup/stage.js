@@ -133,7 +133,10 @@ export class Stage {
     };
     canvas.addEventListener("pointerup", end);
     canvas.addEventListener("pointercancel", end);
-    canvas.addEventListener("pointerleave", () => this.onhover?.(null));
+    canvas.addEventListener("pointerleave", () => {
+      this.onhover?.(null);
+      this.tool()?.leave?.();
+    });
     canvas.addEventListener("keydown", (event) => this.#key(event));
   }
 

@@ -2,7 +2,7 @@
 
 import { button, choice, confirmed, h, newest, put, style, toast, trying } from "../dom.js";
 import { better } from "../events.js";
-import { EFFORTS, EFFORT_TIMES, OBJECTIVES, OBJECTIVE_MEANINGS, STATES, alive, capital, number } from "../words.js";
+import { EFFORTS, EFFORT_TIMES, OBJECTIVES, OBJECTIVE_MEANINGS, STATES, alive, capital, number, sentence } from "../words.js";
 import { cardView } from "./card.js";
 import { reordered } from "./moving.js";
 
@@ -16,7 +16,7 @@ export async function show(root, { api, events, project, navigate, about }) {
   await style("search");
   const place = `projects/${project.id}`;
   const wanted = { effort: "normal", objective: "likeness", palette: about.palettes[0].name, ...project.view?.search };
-  const keep = newest(() => api.patch(place, { view: { ...project.view, search: { ...wanted } } }), 400);
+  const keep = newest(() => api.patch(place, { view: { search: wanted } }), 400);
   const palette = () => about.palettes.find(({ name }) => name === wanted.palette) ?? about.palettes[0];
   const views = new Map();
 
@@ -45,9 +45,9 @@ export async function show(root, { api, events, project, navigate, about }) {
   const task = () => project.tasks.find((own) => SEARCHES.includes(own.operation) && alive(own))
     ?? project.tasks.find((own) => SEARCHES.includes(own.operation));
 
-  function sentence(own) {
+  function progress(own) {
     if (!own) return "Nothing has been searched yet.";
-    if (own.state === "failed") return own.error;
+    if (own.state === "failed") return sentence(own.error);
     if (own.state === "waiting") return own.place > 0 ? `Waiting: ${number(own.place, "other thing")} to do first.` : "It starts in a moment.";
     if (own.state === "running") return own.what ? capital(own.what) : "Looking for tiles";
     if (own.state === "done" && !project.tiles.length) return "No tile was found. Smooth the picture a little, or search more thoroughly.";
@@ -58,7 +58,7 @@ export async function show(root, { api, events, project, navigate, about }) {
   let drawn = "";
   function tell() {
     const own = task();
-    const words = sentence(own);
+    const words = progress(own);
     if (said.textContent !== words) said.textContent = words;
     said.classList.toggle("error", own?.state === "failed");
     bar.hidden = !alive(own);
