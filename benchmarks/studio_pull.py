@@ -55,7 +55,8 @@ PULL = """async (seconds) => {
     const now = await frame();
     const turn = (now - began) / 400;
     const before = performance.now();
-    puller.pull([start[0] + 0.05 * size * Math.sin(turn), start[1] + 0.05 * size * (1 - Math.cos(turn))]);
+    const [x, y] = [Math.sin(turn), 1 - Math.cos(turn)];
+    puller.pull([start[0] + 0.05 * size * x, start[1] + 0.05 * size * y]);
     const ring = puller.polygon();
     tiling.place(puller.placement());
     tiling.outline(ring, { exact: false });

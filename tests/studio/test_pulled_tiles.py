@@ -93,7 +93,8 @@ def test_the_map_goes_where_its_outline_went(name: str, y_down: bool, tmp_path: 
     share = np.random.default_rng(0).random((len(after), 1))
     between = [(1 - share) * ring + share * np.roll(ring, -1, axis=0) for ring in (before, after)]
     assert np.abs(found.inverse(between[1]) - tile.inverse(between[0])).max() < 1e-6
-    assert found.fidelity is not None and found.rating is not None
+    assert found.fidelity is not None
+    assert found.rating is not None
     loaded = EscherTile.load(found.save(tmp_path / "tile"))
     assert np.array_equal(loaded.tile.polygon, after)
     assert np.array_equal(loaded.forward(before), found.forward(before))
