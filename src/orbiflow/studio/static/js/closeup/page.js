@@ -28,7 +28,7 @@ class Closeup {
     Object.assign(this, { root, api, events, project, navigate, about });
     this.home = `projects/${project.id}`;
     const kept = project.view?.closeup ?? {};
-    this.look = { palette: about.palettes[0].name, custom: null, line: 1.4, art: false, signs: false, ...kept.look, share: 1 };
+    this.look = { palette: project.view?.search?.palette ?? about.palettes[0].name, custom: null, line: 1.4, art: false, signs: false, ...kept.look, share: 1 };
     this.pull = { reach: 0.5, lattice: true, ...kept.pull };
     this.penSettings = { tool: "pencil", colour: "#1b1b1b", width: "medium", ...kept.pen };
     this.mode = kept.mode ?? "look";

@@ -1,18 +1,14 @@
 /** The symmetry of a tiling, drawn over it and said in plain sentences. */
 
 import { moved } from "../tiling.js";
+import { beside } from "./lines.js";
 
 const COLOURS = { 2: "#c2410c", 3: "#6d28d9", 4: "#0f766e", 6: "#b91c1c" };
 const LINES = "#b91c1c";
 const NEAREST = 26; // pixels between signs below which they are left out
 const AT_MOST = 1500;
 
-const TURNS = {
-  2: ["Half-turn points", "Turn the whole pattern half way round this point: it looks just the same."],
-  3: ["Third-turn points", "Turn the whole pattern a third of the way round this point: it looks just the same."],
-  4: ["Quarter-turn points", "Turn the whole pattern a quarter of the way round this point: it looks just the same."],
-  6: ["Sixth-turn points", "Turn the whole pattern a sixth of the way round this point: it looks just the same."],
-};
+const TURNS = { 2: ["Half", "half way"], 3: ["Third", "a third of the way"], 4: ["Quarter", "a quarter of the way"], 6: ["Sixth", "a sixth of the way"] };
 
 /** The kinds of symmetry that a tiling has: [{key, name, says, colour}]. */
 export function kindsOf(elements) {
@@ -23,7 +19,15 @@ export function kindsOf(elements) {
     says: "Slide the whole pattern along a side of this box: it looks just the same. One box holds all of the pattern.",
     colour: "currentcolor",
   }];
-  for (const order of orders) kinds.push({ key: `turn${order}`, name: TURNS[order][0], says: TURNS[order][1], colour: COLOURS[order] });
+  for (const order of orders) {
+    const [name, way] = TURNS[order];
+    kinds.push({
+      key: `turn${order}`,
+      name: `${name}-turn points`,
+      says: `Turn the whole pattern ${way} round this point: it looks just the same.`,
+      colour: COLOURS[order],
+    });
+  }
   if (elements.mirrors.length) {
     kinds.push({ key: "mirrors", name: "Mirror lines", says: "What is on one side of this line is the mirror image of the other side.", colour: LINES });
   }
@@ -182,11 +186,5 @@ export function signAt(signs, [x, y]) {
   for (const { key, from, along } of signs.lines) {
     if (Math.abs((x - from[0]) * along[1] - (y - from[1]) * along[0]) < 7) return key;
   }
-  const near = signs.cell.some((a, k) => {
-    const b = signs.cell[(k + 1) % 4];
-    const [u, v] = [b[0] - a[0], b[1] - a[1]];
-    const along = Math.max(0, Math.min(1, ((x - a[0]) * u + (y - a[1]) * v) / (u * u + v * v)));
-    return Math.hypot(a[0] + along * u - x, a[1] + along * v - y) < 7;
-  });
-  return near ? "cell" : null;
+  return signs.cell.some((a, k) => beside([x, y], a, signs.cell[(k + 1) % 4]).apart < 7) ? "cell" : null;
 }
