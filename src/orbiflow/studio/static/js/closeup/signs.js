@@ -85,9 +85,7 @@ export function placed(elements, tiling, camera, width, height) {
   const cells = (point) => {
     // the cells whose copy of a point is in view
     const far = reach / 2 + 40;
-    const [x, y] = [width / 2 - point[0], height / 2 - point[1]];
-    const m = (x * steps[1][1] - y * steps[1][0]) / (steps[0][0] * steps[1][1] - steps[0][1] * steps[1][0]);
-    const n = (steps[0][0] * y - steps[0][1] * x) / (steps[0][0] * steps[1][1] - steps[0][1] * steps[1][0]);
+    const [m, n] = inSteps(steps, [width / 2 - point[0], height / 2 - point[1]]);
     const [dm, dn] = [(far * Math.hypot(...steps[1])) / flat, (far * Math.hypot(...steps[0])) / flat];
     return [Math.floor(m - dm), Math.ceil(m + dm), Math.floor(n - dn), Math.ceil(n + dn)];
   };
@@ -124,16 +122,19 @@ export function placed(elements, tiling, camera, width, height) {
       }
     }
   }
-  return { centres, lines: [...lines.values()], cell: cellNear(elements, to, steps, flat, width, height) };
+  return { centres, lines: [...lines.values()], cell: cellNear(elements, to, steps, width, height) };
 }
 
-function cellNear(elements, to, steps, flat, width, height) {
+/** A vector as multiples of the two steps of the lattice. */
+function inSteps([[a, b], [c, d]], [x, y]) {
+  const size = a * d - b * c;
+  return [(x * d - y * c) / size, (a * y - b * x) / size];
+}
+
+function cellNear(elements, to, steps, width, height) {
   const ring = elements.cell.map(to);
   const middle = [0, 1].map((j) => ring.reduce((sum, point) => sum + point[j] / 4, 0));
-  const [x, y] = [width / 2 - middle[0], height / 2 - middle[1]];
-  const size = steps[0][0] * steps[1][1] - steps[0][1] * steps[1][0];
-  const m = Math.round((x * steps[1][1] - y * steps[1][0]) / size);
-  const n = Math.round((steps[0][0] * y - steps[0][1] * x) / size);
+  const [m, n] = inSteps(steps, [width / 2 - middle[0], height / 2 - middle[1]]).map(Math.round);
   return ring.map(([u, v]) => [u + m * steps[0][0] + n * steps[1][0], v + m * steps[0][1] + n * steps[1][1]]);
 }
 
