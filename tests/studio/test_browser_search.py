@@ -5,8 +5,15 @@ from __future__ import annotations
 import re
 from typing import Any
 
+import numpy as np
 import pytest
+import shapely
 
+from exported import tile_of
+from orbiflow.arrays import Array
+from orbiflow.studio.tile_view import tile_card
+from orbiflow.symmetry import Isometry
+from orbiflow.tiles import CLASSES, EscherTile, colouring
 from studio.browser import (
     RunningStudio,
     covers_page_once,
@@ -98,6 +105,22 @@ def test_two_tabs_and_a_reload_in_the_middle(page, studio: RunningStudio) -> Non
     expect(other.get_by_label("Name of the project")).to_have_value("Boots")
 
 
+def test_a_tab_that_was_hidden_catches_up(page, studio: RunningStudio, searched) -> None:
+    from playwright.sync_api import expect
+
+    page.goto(f"/#/p/{searched}")
+    page.wait_for_selector(CARD)
+    hide = """(hidden) => {
+        Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
+        document.dispatchEvent(new Event("visibilitychange"));
+    }"""
+    page.evaluate(hide, True)
+    studio.client.patch(f"projects/{searched}", json={"name": "Renamed elsewhere"})
+    assert page.get_by_label("Name of the project").input_value() != "Renamed elsewhere"
+    page.evaluate(hide, False)
+    expect(page.get_by_label("Name of the project")).to_have_value("Renamed elsewhere")
+
+
 def test_a_server_that_was_killed_loses_nothing(browser, tmp_path) -> None:
     with running_studio(tmp_path) as studio:
         own = studio.with_picture()
@@ -114,9 +137,7 @@ def test_a_server_that_was_killed_loses_nothing(browser, tmp_path) -> None:
         page.get_by_text("The studio does not answer").wait_for(state="hidden")
         page.wait_for_selector(DONE)
         assert before <= {card["id"] for card in studio.found(own)}
-        page.wait_for_function(
-            "document.querySelector('.state-words').textContent.startsWith('3 tiles')"
-        )
+        page.get_by_text("1 tile, best first").wait_for()
         page.close()
 
 
@@ -132,12 +153,46 @@ def test_more_like_one_and_no_more_of_another(page, studio: RunningStudio, searc
     page.get_by_role("button", name="Search again").wait_for()
 
 
+def whole(matrix: list[float]) -> Array:
+    """Return a matrix of a canvas in homogeneous coordinates."""
+    return np.array([matrix[0::2], matrix[1::2], [0, 0, 1]])
+
+
+def test_tilings_are_drawn_as_the_library_has_them(page) -> None:
+    page.goto("/")
+    for name in CLASSES:
+        own = EscherTile(tile_of(name), name=name)
+        told = page.evaluate(
+            """async (card) => {
+                const { Camera, Tiling } = await import("/js/tiling.js");
+                const tiling = new Tiling(card);
+                const camera = new Camera({ ...tiling.middle, scale: 9, turn: 0.3, yDown: false });
+                const copies = tiling.copies(camera, 300, 200);
+                return { copies, view: camera.matrix(300, 200) };
+            }""",
+            tile_card(own, 1, "final"),
+        )
+        view, colours, seen = whole(told["view"]), colouring(own.tile), list[shapely.Polygon]()
+        for copy in told["copies"]:
+            matrix = whole(copy["matrix"])
+            seen.append(shapely.Polygon(own.tile.polygon @ matrix[:2, :2].T + matrix[:2, 2]))
+            element = np.linalg.solve(view, matrix)
+            assert copy["colour"] == colours.colour(Isometry(element[:2, :2], element[:2, 2]))
+        window = shapely.box(0, 0, 300, 200)
+        assert window.difference(shapely.union_all(seen, grid_size=1e-6)).area < 0.01
+
+
 def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched) -> None:
     tile = studio.project(searched)["tiles"][0]["id"]
+    studio.client.patch(f"projects/{searched}", json={"view": {"search": {"palette": "dusk"}}})
     page.goto(f"/#/p/{searched}/take/{tile}")
     page.get_by_text("Page and file").click()
     assert page.get_by_label("What is drawn").input_value() == "none"
     assert not page.get_by_label("Kerf").is_visible()
+    assert page.get_by_label("Colours").input_value() == "dusk"
+    page.get_by_label("What is it for?").select_option("laser")
+    assert not page.get_by_label("Colours").is_visible()
+    page.get_by_label("What is it for?").select_option("")
     page.get_by_label("What is drawn").select_option("pieces")
     page.get_by_text("Pieces", exact=True).click()
     page.get_by_label("Kerf").fill("0.2")

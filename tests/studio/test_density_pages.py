@@ -173,6 +173,8 @@ def test_hostile_tables_are_refused_in_words(
     assert "/" not in task["error"].replace("/ ", "")
     assert "inside orbiflow" not in task["error"]
     assert client.get(f"{own}/density").json()["table"] is None
+    fit = worked(client, own, "density fit", space="torus", columns=["1"], unit="degrees")
+    assert "not read" in fit["error"]
 
 
 @pytest.mark.parametrize(

@@ -91,6 +91,8 @@ def density(
         project: The project's folder.
         task: The number of the task.
     """
+    if not (project / TABLE).is_file():
+        raise SettingError("this table was not read; upload another one")
     folder = make_folder(project / "fits" / str(task))
     data = table_file(project)
     asked = {"data": data, "out": folder / FIT, "drop_missing": True, **choice.to_json()}

@@ -88,6 +88,7 @@ async function follow(id) {
   own.on("notice", ({ text, warning }) => toast(sentence(text), { bad: warning }));
   own.on("gone", (what) => { if (what.project) { toast("This project was deleted."); navigate(""); } });
   own.on("project", rename);
+  own.on("refresh", () => { rename(); links(); });
   own.on("card", links);
 }
 

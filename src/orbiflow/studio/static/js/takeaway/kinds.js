@@ -18,7 +18,11 @@ export const KINDS = {
       format: { about: "", title: "Kind of file", usual: "What suits it", options: { svg: "SVG", pdf: "PDF", dxf: "DXF", png: "PNG", json: "JSON (numbers)" } },
       tile_size: { title: "How long is one tile?" },
       area: { title: "How large is the page?", about: "Such as A4, letter, mug, phone or 300x200mm." },
-      palette: { about: "", title: "Colours" },
+      palette: {
+        about: "",
+        title: "Colours",
+        not: { purpose: ["laser", "plotter", "template", "colouring"], cut: ["skeleton", "jigsaw", "template"], filled: [false] },
+      },
       cut: { title: "What is drawn", about: "", options: { none: "every tile, filled", skeleton: "each line once", pieces: "tiles apart", jigsaw: "a jigsaw", template: "one tile, by hand" } },
     },
   },
@@ -64,4 +68,20 @@ export function lengthIn(value) {
   const found = /^\s*([\d.]+)\s*(mm|cm|m|in|pt)?\s*$/.exec(String(value ?? ""));
   const length = found ? Number(found[1]) * UNITS[found[2] ?? "mm"] : NaN;
   return length > 0 ? length : undefined;
+}
+
+const OWN = "My own colours";
+
+/**
+ * The colours that were chosen in this project: {palette, value, options}: to draw with, as a setting,
+ * and the words of all that can be chosen, by value.
+ */
+export function colours({ view }, { palettes }) {
+  const { palette: name, custom } = view?.closeup?.look ?? {};
+  const found = [name, view?.search?.palette].map((wanted) => palettes.find((own) => own.name === wanted));
+  const palette = found.find(Boolean) ?? palettes[0];
+  const options = Object.fromEntries(palettes.map((own) => [own.name, undefined]));
+  if (name !== "own" || !custom) return { palette, value: palette.name, options };
+  const value = [...custom.colours, `outline=${custom.outline}`].join(",");
+  return { palette: { ...palette, ...custom }, value, options: { [value]: OWN, ...options } };
 }

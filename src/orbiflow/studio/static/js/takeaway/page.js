@@ -4,10 +4,11 @@ import { button, choice, h, icon, newest, put, style, trying } from "../dom.js";
 import { form } from "../forms.js";
 import { paintCard } from "../tiling.js";
 import { alive, bytes, capital, sentence } from "../words.js";
-import { KINDS, lengthIn } from "./kinds.js";
+import { KINDS, colours, lengthIn } from "./kinds.js";
 import { trueSize } from "./truesize.js";
 
 const DRAWN = ["export", "art"]; // what a drawing or the picture can be laid on
+const NEVER = ["tile", "result", "out", "force", "picture", "drawing"]; // the page's own
 const PICTURES = ["png", "jpg", "jpeg", "webp", "svg"];
 
 export async function show(root, { api, events, project, tileId, navigate, about }) {
@@ -17,7 +18,7 @@ export async function show(root, { api, events, project, tileId, navigate, about
   const place = `projects/${project.id}`;
   const schemas = new Map();
   const state = { kind: "export", task: null, form: null };
-  const palette = about.palettes.find(({ name }) => name === project.view?.search?.palette) ?? about.palettes[0];
+  const { palette, value: chosen, options } = colours(project, about);
 
   const heading = h("h1", { tabindex: "-1" }, "Take it away");
   const wishes = h("div", { class: "stack" });
@@ -30,17 +31,20 @@ export async function show(root, { api, events, project, tileId, navigate, about
 
   async function choose(kind) {
     state.kind = kind;
-    const { first, words, hidden } = KINDS[kind];
+    const { first, words } = KINDS[kind];
     if (!schemas.has(kind)) schemas.set(kind, await api.get(`operations/${kind}/schema`));
     if (state.kind !== kind) return;
-    const schema = schemas.get(kind);
-    const named = schema.properties.palette && { ...schema, properties: { ...schema.properties, palette: { ...schema.properties.palette, enum: about.palettes.map(({ name }) => name) } } };
+    const schema = structuredClone(schemas.get(kind));
+    const { palette: own } = schema.properties;
+    if (own) own.enum = Object.keys(options);
     const { strokes, eyes } = project.view?.drawing ?? {};
     state.own = DRAWN.includes(kind) ? [
       (strokes?.length || eyes?.length) && ["drawing", "With what you drew on it", true],
       PICTURES.includes(project.input?.type) && ["picture", "With the picture itself on each tile", false],
-    ].filter(Boolean).map(([name, words, checked]) => [name, h("input", { type: "checkbox", checked, onchange: () => changed() }), words]) : [];
-    state.form = form(named || schema, { first, words, hidden: ["tile", "result", "out", "force", "picture", ...(hidden ?? [])] }, changed);
+    ].filter(Boolean).map(([name, said, checked]) => [name, h("input", { type: "checkbox", checked, onchange: () => changed() }), said]) : [];
+    state.form = form(schema, {
+      first, words: { ...words, palette: { ...words.palette, options } }, hidden: NEVER, start: own && { palette: chosen },
+    }, changed);
     put(wishes, state.own.map(([, box, words]) => h("label", { class: "check" }, box, words)), state.form);
     state.task = null;
     changed();
