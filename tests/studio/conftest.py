@@ -26,7 +26,11 @@ def browser_fixture() -> Iterator[Any]:
 
     with sync_playwright() as playwright:
         own = playwright.chromium.launch(
-            executable_path=program, args=["--no-sandbox", "--disable-gpu"]
+            executable_path=program,
+            args=[
+                *("--no-sandbox", "--disable-gpu"),
+                *("--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"),
+            ],
         )
         yield own
         own.close()
@@ -41,7 +45,7 @@ def page_fixture(browser: Any, studio: RunningStudio) -> Iterator[Any]:
     context.set_default_timeout(120_000)
     page, wrong = context.new_page(), list[str]()
     page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.on("response", lambda got: got.status in (200, 206, 422) or wrong.append(got.url))
+    page.on("response", lambda got: got.status in (200, 206, 304, 422) or wrong.append(got.url))
     page.on(
         "console",
         lambda said: said.type != "error" or "422" in said.text or wrong.append(said.text),

@@ -40,6 +40,13 @@ def proved(page: Any, but: int) -> int:
     return shown(page)
 
 
+def picture(page: Any) -> str:
+    """Return what the canvas shows, with the pointer elsewhere."""
+    page.mouse.move(5, 5)
+    page.wait_for_timeout(100)
+    return page.locator(CANVAS).evaluate("canvas => canvas.toDataURL()")
+
+
 def choose(page: Any, what: str) -> None:
     page.get_by_role("radio", name=what, exact=True).check()
     if what == "Pull":
@@ -122,8 +129,10 @@ def test_by_keyboard_and_what_crosses_springs_back(closeup, tile) -> None:
     second = proved(page, tile["id"])
     assert second != tile["id"]
     page.wait_for_selector("[data-ready=pull]")
+    before = picture(page)
     pulled(page, 0.0, 700.0)
     page.wait_for_selector(f"{BADGE}[data-kind=refused]")
+    assert picture(page) == before
     assert "crosses itself" in page.locator(BADGE).inner_text()
     assert shown(page) == second
     # the refusal is an answer of the server, which browsers note
@@ -134,7 +143,7 @@ def test_lines_and_eyes_repeat_and_are_in_the_file(
     closeup, studio: RunningStudio, searched, tile
 ) -> None:
     page = closeup
-    before = page.locator(CANVAS).screenshot()
+    before = picture(page)
     choose(page, "Draw")
     page.get_by_role("radio", name="Red").check()
     box = page.locator(CANVAS).bounding_box()
@@ -151,7 +160,7 @@ def test_lines_and_eyes_repeat_and_are_in_the_file(
         lambda: found if (found := studio.project(searched)["view"]["drawing"])["eyes"] else None
     )
     assert {stroke["colour"] for stroke in drawn["strokes"]} == {"#c8322b"}
-    assert page.locator(CANVAS).screenshot() != before
+    assert picture(page) != before
     text = taken_away(studio, searched, tile["id"], drawing=True)
     assert "#c8322b" in text
     page.keyboard.press("Control+z")

@@ -110,6 +110,14 @@ def test_a_shape_can_be_drawn(page, studio: RunningStudio, how) -> None:
     assert area_of(studio.project(own_project(page))) > 10_000
 
 
+def test_a_photo_is_taken(page, studio: RunningStudio) -> None:
+    page.goto("/")
+    page.get_by_role("button", name="Take a photo").click()
+    page.get_by_role("button", name="Take the photo").click()
+    own = own_project(page)
+    assert studio.project(own)["input"] == {"name": "photo.png", "type": "png"}
+
+
 def test_pictures_are_dropped_and_pasted(page, drawing) -> None:
     for event, holder in (("drop", "dataTransfer"), ("paste", "clipboardData")):
         page.goto("/#/")
@@ -163,6 +171,9 @@ def test_pages_are_for_everyone(page, studio: RunningStudio, scheme) -> None:
         assert serious_issues(page) == []
         page.set_viewport_size({"width": 360, "height": 700})
         assert hidden_parts(page) <= 0
+    page.goto("/")
+    page.get_by_role("button", name="Draw a shape").click()
+    assert serious_issues(page) == []
 
 
 def test_pages_are_light() -> None:

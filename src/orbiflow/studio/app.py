@@ -19,10 +19,9 @@ from orbiflow import __version__
 from orbiflow.drawing import PALETTES
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import find
-from orbiflow.studio import picture_routes, project_routes, tile_routes
+from orbiflow.studio import density_routes, picture_routes, project_routes, tile_routes
 from orbiflow.studio.animals import ANIMALS, animal_file
 from orbiflow.studio.closeup_routes import closeup_routes
-from orbiflow.studio.density_routes import density_routes
 from orbiflow.studio.guard import Guard, Refused
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.kinds_of_work import KINDS, kind_of_work, own_schema
@@ -77,8 +76,7 @@ def create_app(
     app.state.studio = Studio(store, queue, hub, limits)
     app.include_router(routes, prefix="/api")
     app.include_router(closeup_routes(store, queue, hub), prefix="/api")
-    app.include_router(density_routes(store, queue), prefix="/api")
-    for module in (project_routes, tile_routes, picture_routes):
+    for module in (density_routes, project_routes, tile_routes, picture_routes):
         app.include_router(module.routes, prefix="/api")
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     for kind in (Refused, OrbiflowError, RequestValidationError, HTTPException, Exception):

@@ -14,17 +14,21 @@ from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.tiles import (
     Bending,
     EscherTile,
+    Rating,
     TileMap,
+    TileVariations,
     arc_lengths,
+    border,
+    carried_on,
     complex_points,
+    divided_tile,
+    fidelity,
+    narrowest_neck,
     orient,
     points_along,
     ring_length,
+    triangulate,
 )
-from orbiflow.tiles.geometry import border
-from orbiflow.tiles.likeness import Rating, fidelity, narrowest_neck
-from orbiflow.tiles.search import TileVariations, carried_on, divided_tile
-from orbiflow.tiles.silhouette import triangulate
 
 POINTS = 240
 """About how many points of the outline can be pulled: longer sides are divided."""

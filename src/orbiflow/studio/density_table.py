@@ -14,10 +14,10 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.density import Table, TableError, is_identifier, read_table
 from orbiflow.errors import OrbiflowError
+from orbiflow.studio.density_files import MAX_SHOWN
 
-ENDINGS = (".csv", ".tsv", ".txt", ".npy")
-MAX_ROWS, MAX_SHOWN, FIRST = 200_000, 30, 6
-"""Rows that a table may have; columns and rows that are shown of it."""
+MAX_ROWS, FIRST = 200_000, 6
+"""Rows that a table may have, and rows that are shown of it."""
 
 MOST_ANGLES = 7
 """Angles that are chosen ahead: of more, a fit takes long."""
@@ -54,24 +54,6 @@ class Guess:
     columns: tuple[str, ...]
     unit: str | None
     why: str
-
-
-def table_file(home: Path) -> Path:
-    """Return the table of a project, as it was uploaded."""
-    found = [path for ending in ENDINGS if (path := home / f"table{ending}").is_file()]
-    if not found:
-        raise OrbiflowError("there is no table in this project; upload one")
-    return found[0]
-
-
-def ending_of(name: str) -> str:
-    """Return the ending under which a table of this name is kept, or refuse it."""
-    ending = Path(name).suffix.lower()
-    if ending not in ENDINGS:
-        raise OrbiflowError(
-            f"a table's name ends in {', '.join(ENDINGS)}; save yours as CSV and give that"
-        )
-    return ending
 
 
 def table_view(path: Path) -> dict[str, Any]:

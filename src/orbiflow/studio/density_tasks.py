@@ -1,8 +1,4 @@
-"""What the studio's workers do for densities: read a table, fit, draw, write what is taken away.
-
-A fit is in the folder "fits" of its project, under the number of its task. It is complete once it has
-a view.
-"""
+"""What the studio's workers do for densities: read a table, fit, draw, write what is taken away."""
 
 from __future__ import annotations
 
@@ -12,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.errors import SettingError
 from orbiflow.runtime import (
     NEVER,
     Call,
@@ -29,12 +25,20 @@ from orbiflow.runtime import (
     write_atomic,
 )
 from orbiflow.settings import OnlyWith, Range, Settings
-from orbiflow.studio.density_table import MAX_SHOWN, table_file, table_view
+from orbiflow.studio.density_files import (
+    FIT,
+    MAX_SHOWN,
+    SURFACE,
+    TABLE,
+    VIEW,
+    fit_folder,
+    map_file,
+    table_file,
+)
 
 if TYPE_CHECKING:
     from orbiflow.density import Density
 
-TABLE, FIT, VIEW, SURFACE = "table.json", "model", "view.json", "surface.json"
 SURFACE_CELLS = 120
 FITTED = 0.9
 """Share of the work that is done when a density is fitted, and its pictures are to be made."""
@@ -58,25 +62,6 @@ class FitChoice(Settings, group="Density"):
             raise SettingError(f"{{columns}} must be 1 to {MAX_SHOWN} names of columns")
 
 
-def fit_folder(project: Path, number: int | None = None) -> Path:
-    """Return the folder of a fit that is complete, the newest if there is no number.
-
-    Raises:
-        OrbiflowError: If there is none.
-    """
-    done = [int(view.parent.name) for view in project.glob(f"fits/[0-9]*/{VIEW}")]
-    if number is None and done:
-        number = max(done)
-    if number not in done:
-        raise OrbiflowError("there is no such density (any more); fit one first")
-    return project / "fits" / str(number)
-
-
-def map_file(fit: Path, axes: tuple[int, ...]) -> Path:
-    """Return the file of a fit with the density of two of its angles on a grid."""
-    return fit / f"map-{'-'.join(map(str, axes))}.json"
-
-
 @operation("studio table")
 def table(project: Path, task: int, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> Outcome:
     """Look at the table of a project.
@@ -87,6 +72,9 @@ def table(project: Path, task: int, *, on_event: Sink = ignore, cancel: Cancel =
     """
     del task
     on_event(Progress(0.1, "reading the table"))
+
+    from orbiflow.studio.density_table import table_view
+
     view = table_view(table_file(project))
     cancel.check()
     _write(project / TABLE, view)
@@ -103,6 +91,8 @@ def density(
         project: The project's folder.
         task: The number of the task.
     """
+    if not (project / TABLE).is_file():
+        raise SettingError("this table was not read; upload another one")
     folder = make_folder(project / "fits" / str(task))
     data = table_file(project)
     asked = {"data": data, "out": folder / FIT, "drop_missing": True, **choice.to_json()}

@@ -14,9 +14,16 @@ from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list, is_object, write_atomic
 from orbiflow.studio.tile_view import covered
-from orbiflow.tiles import Bending, EscherTile, Frame, TileMap, orient
-from orbiflow.tiles.geometry import border
-from orbiflow.tiles.silhouette import open_image, triangulate
+from orbiflow.tiles import (
+    Bending,
+    EscherTile,
+    Frame,
+    TileMap,
+    border,
+    open_image,
+    orient,
+    triangulate,
+)
 
 MOST_STROKES, MOST_POINTS, MOST_EYES = 2000, 100_000, 60
 FINER = 2  # pixels, across, of which one pixel of a picture with lines is the mean

@@ -10,8 +10,7 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import cell_ring
 from orbiflow.runtime import is_list
 from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
-from orbiflow.tiles import EscherTile, Rating, as_tiling, colouring
-from orbiflow.tiles.geometry import border
+from orbiflow.tiles import EscherTile, Rating, as_tiling, border, colouring
 
 
 def tile_card(

@@ -1,5 +1,7 @@
 /** Calls to the server. Whatever fails is a `Refusal` with one plain sentence. */
 
+import { sentence } from "./words.js";
+
 export const client = crypto.getRandomValues(new Uint32Array(2)).join("");
 
 export class Refusal extends Error {
@@ -27,7 +29,7 @@ async function call(method, path, body, { signal } = {}) {
   } catch {
     throw new Refusal("The studio answered something that this page cannot read. Reload the page.", answer.status);
   }
-  if (!answer.ok) throw new Refusal(found?.error ?? `The studio refused this (${answer.status}).`, answer.status);
+  if (!answer.ok) throw new Refusal(sentence(found?.error) || `The studio refused this (${answer.status}).`, answer.status);
   return found;
 }
 

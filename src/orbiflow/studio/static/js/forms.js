@@ -12,20 +12,21 @@ function kinds(schema) {
 const text = (value) => (Array.isArray(value) ? value.join(" x ") : value ?? "");
 const label = (name) => capital(name.replaceAll("_", " "));
 
-/** The control of one setting, {root, value()}: undefined where it has its default. */
+/** The control of one setting, {root, box, value()}: undefined where it has its default. */
 function control(name, schema, words, changed) {
   const id = unique(name);
   const found = kinds(schema);
   const options = found.find((kind) => kind.enum)?.enum;
-  const described = schema.description ? `${id}-about` : undefined;
-  const about = described && h("p", { class: "soft small", id: described }, words?.about ?? schema.description);
+  const meaning = words?.about ?? schema.description;
+  const described = meaning ? `${id}-about` : undefined;
+  const about = meaning && h("p", { class: "soft small", id: described }, meaning);
   const shared = { id, name, "aria-describedby": described, onchange: changed };
   const unit = schema["x-unit"];
   const title = words?.title ?? label(name);
   if (found.some(({ type }) => type === "boolean")) {
     const box = h("input", { ...shared, type: "checkbox", checked: Boolean(schema.default) });
     const value = () => (box.checked === Boolean(schema.default) ? undefined : box.checked);
-    return { root: h("div", { class: "field" }, h("label", { class: "check" }, box, title), about), value };
+    return { root: h("div", { class: "field" }, h("label", { class: "check" }, box, title), about), value, box };
   }
   if (options) {
     const first = schema.default === null || schema.default === undefined ? [h("option", { value: "" }, words?.usual ?? capital(schema["x-default"] || "as it comes"))] : [];
@@ -38,7 +39,7 @@ function control(name, schema, words, changed) {
   const numeric = bare && found.length === 1;
   const start = text(schema.default);
   const box = h("input", {
-    ...shared, type: numeric ? "number" : "text", value: start, placeholder: start === "" ? schema["x-default"] : undefined,
+    ...shared, type: numeric ? "number" : "text", value: start, placeholder: start === "" ? schema["x-default"] : start,
     min: numeric ? bare.minimum ?? bare.exclusiveMinimum : undefined, max: numeric ? bare.maximum : undefined,
     step: !numeric ? undefined : bare.type === "integer" ? 1 : "any", autocomplete: "off", inputmode: bare ? "decimal" : undefined,
   });
@@ -52,21 +53,28 @@ function control(name, schema, words, changed) {
 }
 
 /**
- * A form: the settings named in `first` on top, the rest folded away in their groups. `words`: titles
- * and the like by setting; `hidden`: settings that the page sets itself. `.values()`: what was changed.
+ * A form: the settings named in `first` on top, the rest folded away in their groups.
+ * `words`: titles and the like by setting; `not` in them: values of others with which it does not apply.
+ * `hidden`: settings that the page sets itself. `start`: values to begin with.
+ * `.values()`: what differs from the defaults and applies. `.refuse(text)`: show what is wrong beside the
+ * setting that the text begins with; false if it names none.
  */
-export function form(schema, { first, words = {}, hidden = [] }, changed = () => {}) {
+export function form(schema, { first, words = {}, hidden = [], start = {} }, changed = () => {}) {
   const controls = new Map();
   const names = Object.keys(schema.properties).filter((name) => !hidden.includes(name) && !("const" in schema.properties[name]));
   const heard = () => { fit(); changed(made.values()); };
-  for (const name of names) controls.set(name, control(name, schema.properties[name], words[name], heard));
+  for (const name of names) {
+    controls.set(name, control(name, schema.properties[name], words[name], heard));
+    if (start[name] !== undefined) controls.get(name).box.value = start[name];
+  }
 
   /** Hide what does not apply to the rest, so that only what works can be set. */
   function fit() {
     for (const name of names) {
       const rules = Object.entries(schema.properties[name]["x-only-with"] ?? {});
       const applies = rules.every(([other, allowed]) => !controls.has(other) || [allowed].flat().includes(now(other)));
-      controls.get(name).root.hidden = !applies;
+      const never = Object.entries(words[name]?.not ?? {}).some(([other, values]) => controls.has(other) && values.includes(now(other)));
+      controls.get(name).root.hidden = !applies || never;
     }
     for (const box of made.querySelectorAll("details")) box.hidden = ![...box.querySelectorAll(".field")].some((field) => !field.hidden);
   }
@@ -81,6 +89,19 @@ export function form(schema, { first, words = {}, hidden = [] }, changed = () =>
   made.values = () => {
     const shown = names.filter((name) => !controls.get(name).root.hidden);
     return Object.fromEntries(shown.map((name) => [name, controls.get(name).value()]).filter(([, value]) => value !== undefined));
+  };
+  made.refuse = (text) => {
+    const name = names.filter((own) => text.toLowerCase().startsWith(own.replaceAll("_", " "))).sort((a, b) => b.length - a.length)[0];
+    if (!name) return false;
+    const { root, box } = controls.get(name);
+    const said = h("p", { class: "error small", role: "alert" }, text);
+    root.querySelector(".error")?.remove();
+    root.append(said);
+    root.closest("details")?.setAttribute("open", "");
+    box.setAttribute("aria-invalid", "true");
+    box.addEventListener("input", () => { said.remove(); box.removeAttribute("aria-invalid"); }, { once: true });
+    box.focus();
+    return true;
   };
   fit();
   return made;

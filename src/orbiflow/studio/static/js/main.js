@@ -3,6 +3,7 @@
 import { about, api } from "./api.js";
 import { h, newest, put, toast } from "./dom.js";
 import { Feed } from "./events.js";
+import { sentence } from "./words.js";
 
 const ROUTES = [
   [/^$/, () => import("./start/page.js")],
@@ -84,9 +85,10 @@ async function follow(id) {
   feed = own;
   own.on("lost", () => { document.querySelector(".lost").hidden = false; });
   own.on("back", () => { document.querySelector(".lost").hidden = true; });
-  own.on("notice", ({ text, warning }) => toast(text, { bad: warning }));
+  own.on("notice", ({ text, warning }) => toast(sentence(text), { bad: warning }));
   own.on("gone", (what) => { if (what.project) { toast("This project was deleted."); navigate(""); } });
   own.on("project", rename);
+  own.on("refresh", () => { rename(); links(); });
   own.on("card", links);
 }
 

@@ -7,6 +7,7 @@ const GRIP = 18; // pixels around the outline in which a mouse takes hold
 const FINGER = 34;
 const STILL = 2e-5; // movement, in sizes of the tile, below which nothing is left to follow
 const SETTLED = 900; // ms after the last key until a tile is checked
+const EDGE = 50; // pixels of the picture's edge that a chosen point keeps free
 const KEY_STEP = 6; // pixels that a key moves a point
 
 export class Pulling {
@@ -59,9 +60,14 @@ export class Pulling {
   }
 
   hover(place) {
-    const found = this.ready && this.stage.outlineAt(place, GRIP);
+    const found = (this.ready && this.stage.outlineAt(place, GRIP)) || null;
     this.stage.canvas.style.cursor = found ? "grab" : "";
-    this.near = found || null;
+    if (found || this.near) this.stage.redraw();
+    this.near = found;
+  }
+
+  leave() {
+    this.near = null;
     this.stage.redraw();
   }
 
@@ -183,8 +189,17 @@ export class Pulling {
     const own = copy ?? this.#middleCopy([width / 2, height / 2]);
     const vertex = this.chosen ? (this.chosen.vertex + step * stride + count) % count : 0;
     this.chosen = { copy: own, vertex };
-    this.stage.redraw();
+    this.#seek();
     this.on.said(`Point ${vertex + 1} of ${count}. Hold shift and press an arrow key to move it.`);
+  }
+
+  /** Bring the chosen point into view. */
+  #seek() {
+    const { copy, point } = this.#pointOf({ ...this.chosen, share: 0 });
+    const [x, y] = moved(this.stage.matrixOf(copy), point);
+    const { width, height } = this.stage;
+    if (x < EDGE || y < EDGE || x > width - EDGE || y > height - EDGE) this.stage.pan(width / 2 - x, height / 2 - y);
+    this.stage.redraw();
   }
 
   #middleCopy(place) {

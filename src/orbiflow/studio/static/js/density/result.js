@@ -119,7 +119,7 @@ export class Result {
     const { pair, fit, page } = this, key = pair.join("-");
     this.mapCanvas.classList.add("busy");
     if (!this.grids.has(key)) {
-      const data = await page.api.get(`${this.path}/map?axes=${key}`).catch((error) => { if (error.status !== 404) throw error; });
+      const data = await page.api.get(`${this.path}/map?axes=${key}`);
       if (!data) return this.submit("density map", { fit: fit.number, axes: pair });
       this.grids.set(key, new Grid(data, fit.space));
     }

@@ -2,7 +2,7 @@
 
 import { button, choice, confirmed, h, newest, put, style, toast, trying } from "../dom.js";
 import { better } from "../events.js";
-import { EFFORTS, EFFORT_TIMES, OBJECTIVES, OBJECTIVE_MEANINGS, STATES, alive, capital, number } from "../words.js";
+import { EFFORTS, EFFORT_TIMES, OBJECTIVES, OBJECTIVE_MEANINGS, STATES, alive, capital, number, sentence } from "../words.js";
 import { cardView } from "./card.js";
 import { reordered } from "./moving.js";
 
@@ -16,11 +16,14 @@ export async function show(root, { api, events, project, navigate, about }) {
   await style("search");
   const place = `projects/${project.id}`;
   const wanted = { effort: "normal", objective: "likeness", palette: about.palettes[0].name, ...project.view?.search };
-  const keep = newest(() => api.patch(place, { view: { ...project.view, search: { ...wanted } } }), 400);
+  const keep = newest(() => api.patch(place, { view: { search: wanted } }), 400);
   const palette = () => about.palettes.find(({ name }) => name === wanted.palette) ?? about.palettes[0];
   const views = new Map();
+  let due = 0;
+  let later = 0;
 
-  const grid = h("ul", { class: "cards" });
+  let touched = -Infinity; // when the mouse last moved over the cards
+  const grid = h("ul", { class: "cards", onpointermove: ({ pointerType }) => { if (pointerType === "mouse") touched = performance.now(); } });
   const said = h("p", { class: "state-words", role: "status" });
   const bar = h("progress", { max: 1, "aria-label": "How far the search is" });
   const deeds = h("div", { class: "row" });
@@ -45,9 +48,9 @@ export async function show(root, { api, events, project, navigate, about }) {
   const task = () => project.tasks.find((own) => SEARCHES.includes(own.operation) && alive(own))
     ?? project.tasks.find((own) => SEARCHES.includes(own.operation));
 
-  function sentence(own) {
+  function progress(own) {
     if (!own) return "Nothing has been searched yet.";
-    if (own.state === "failed") return own.error;
+    if (own.state === "failed") return sentence(own.error);
     if (own.state === "waiting") return own.place > 0 ? `Waiting: ${number(own.place, "other thing")} to do first.` : "It starts in a moment.";
     if (own.state === "running") return own.what ? capital(own.what) : "Looking for tiles";
     if (own.state === "done" && !project.tiles.length) return "No tile was found. Smooth the picture a little, or search more thoroughly.";
@@ -58,7 +61,7 @@ export async function show(root, { api, events, project, navigate, about }) {
   let drawn = "";
   function tell() {
     const own = task();
-    const words = sentence(own);
+    const words = progress(own);
     if (said.textContent !== words) said.textContent = words;
     said.classList.toggle("error", own?.state === "failed");
     bar.hidden = !alive(own);
@@ -91,16 +94,22 @@ export async function show(root, { api, events, project, navigate, about }) {
   }
   const spare = [];
 
-  /** Show the cards in their order; cards that stay move there calmly. */
+  const placeOf = ({ id }) => (views.has(id) ? [...grid.children].indexOf(views.get(id).root) : 1e9);
+
+  /** Show the cards in their order; cards that stay move there calmly, but not away from the mouse. */
   function arrange() {
     const cards = [...project.tiles].sort(better);
+    if (performance.now() - touched < 1500) {
+      cards.sort((a, b) => placeOf(a) - placeOf(b) || better(a, b));
+      clearTimeout(later);
+      later = setTimeout(soon, 1500);
+    }
     const kept = new Set(cards.map(({ id }) => id));
     for (const [id, view] of views) if (!kept.has(id)) { view.root.remove(); views.delete(id); }
     for (const card of cards) if (!views.has(card.id)) views.set(card.id, cardView(project, actions));
     reordered(grid, [...cards.map((card) => views.get(card.id).root), ...ghosts()]);
     cards.forEach((card) => views.get(card.id).update(card, palette()));
   }
-  let due = 0;
   const soon = () => { cancelAnimationFrame(due); due = requestAnimationFrame(() => { arrange(); tell(); }); };
 
   const effortWords = h("p", { class: "soft small" }, EFFORT_TIMES[wanted.effort]);
@@ -133,5 +142,5 @@ export async function show(root, { api, events, project, navigate, about }) {
   tell();
   const off = ["card", "gone", "refresh"].map((kind) => events.on(kind, soon));
   off.push(events.on("task", soon));
-  return () => { off.forEach((stop) => stop()); watch.disconnect(); cancelAnimationFrame(due); };
+  return () => { off.forEach((stop) => stop()); watch.disconnect(); cancelAnimationFrame(due); clearTimeout(later); };
 }

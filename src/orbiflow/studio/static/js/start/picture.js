@@ -2,7 +2,7 @@
 
 import { button, choice, h, newest, put, slider, style, toast, trying } from "../dom.js";
 import { pathOf, sized } from "../tiling.js";
-import { alive, capital, number } from "../words.js";
+import { alive, number, sentence } from "../words.js";
 import { Marks, drawStroke } from "./marks.js";
 import { pointing } from "./pointing.js";
 
@@ -198,11 +198,11 @@ export async function show(root, { api, events, project, navigate }) {
     const out = silhouette?.left_out?.length ?? 0;
     put(said,
       busy && h("p", { class: "soft" }, silhouette ? "Reading it again …" : "Reading the picture …"),
-      !busy && task?.state === "failed" && h("p", { class: "error" }, task.error),
+      !busy && task?.state === "failed" && h("p", { class: "error" }, sentence(task.error)),
       silhouette && h("ul", { class: "notes stack" },
-        silhouette.doubts.map((text) => h("li", { class: "notice" }, text)),
+        silhouette.doubts.map((text) => h("li", { class: "notice" }, sentence(text))),
         out > 0 && h("li", {}, h("span", { class: "swatch dashed" }), `${number(out, "part is", "parts are")} left out: a tile is one piece. Paint a bridge with “Add” to keep ${out === 1 ? "it" : "them"}.`),
-        silhouette.notes.length > 0 && h("li", {}, h("details", {}, h("summary", {}, "How it was read"), h("p", { class: "soft" }, silhouette.notes.map(capital).join(". "))))));
+        silhouette.notes.length > 0 && h("li", {}, h("details", {}, h("summary", {}, "How it was read"), h("p", { class: "soft" }, silhouette.notes.map(sentence).join(" "))))));
     paint();
   }
 

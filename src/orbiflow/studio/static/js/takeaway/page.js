@@ -3,11 +3,12 @@
 import { button, choice, h, icon, newest, put, style, trying } from "../dom.js";
 import { form } from "../forms.js";
 import { paintCard } from "../tiling.js";
-import { STATES, alive, bytes, capital } from "../words.js";
-import { KINDS, lengthIn } from "./kinds.js";
+import { alive, bytes, capital, sentence } from "../words.js";
+import { KINDS, colours, lengthIn } from "./kinds.js";
 import { trueSize } from "./truesize.js";
 
 const DRAWN = ["export", "art"]; // what a drawing or the picture can be laid on
+const NEVER = ["tile", "result", "out", "force", "picture", "drawing"]; // the page's own
 const PICTURES = ["png", "jpg", "jpeg", "webp", "svg"];
 
 export async function show(root, { api, events, project, tileId, navigate, about }) {
@@ -17,30 +18,33 @@ export async function show(root, { api, events, project, tileId, navigate, about
   const place = `projects/${project.id}`;
   const schemas = new Map();
   const state = { kind: "export", task: null, form: null };
-  const palette = about.palettes.find(({ name }) => name === project.view?.search?.palette) ?? about.palettes[0];
+  const { palette, value: chosen, options } = colours(project, about);
 
   const heading = h("h1", { tabindex: "-1" }, "Take it away");
   const wishes = h("div", { class: "stack" });
   const shown = h("div", { class: "preview" });
-  const said = h("div", { class: "stack", role: "status" });
+  const said = h("div", { class: "stack said", role: "status" });
   const make = button("Make it", () => trying(() => (alive(state.task) ? api.post(`tasks/${state.task.id}/cancel`) : start())), { kind: "primary big" });
   const own = trueSize(card.polygon, card.y_down);
-  const real = h("section", { class: "panel stack", "aria-labelledby": "true" }, h("h2", { id: "true" }, "In its true size"), own.root);
-  const earlier = h("section", { class: "stack", "aria-labelledby": "earlier" });
+  const real = h("section", { class: "panel stack real", "aria-labelledby": "true" }, h("h2", { id: "true" }, "In its true size"), own.root);
+  const earlier = h("section", { class: "stack earlier", "aria-labelledby": "earlier" });
 
   async function choose(kind) {
     state.kind = kind;
-    const { first, words, hidden } = KINDS[kind];
+    const { first, words } = KINDS[kind];
     if (!schemas.has(kind)) schemas.set(kind, await api.get(`operations/${kind}/schema`));
     if (state.kind !== kind) return;
-    const schema = schemas.get(kind);
-    const named = schema.properties.palette && { ...schema, properties: { ...schema.properties, palette: { ...schema.properties.palette, enum: about.palettes.map(({ name }) => name) } } };
+    const schema = structuredClone(schemas.get(kind));
+    const { palette: own } = schema.properties;
+    if (own) own.enum = Object.keys(options);
     const { strokes, eyes } = project.view?.drawing ?? {};
     state.own = DRAWN.includes(kind) ? [
       (strokes?.length || eyes?.length) && ["drawing", "With what you drew on it", true],
       PICTURES.includes(project.input?.type) && ["picture", "With the picture itself on each tile", false],
-    ].filter(Boolean).map(([name, words, checked]) => [name, h("input", { type: "checkbox", checked, onchange: () => changed() }), words]) : [];
-    state.form = form(named || schema, { first, words, hidden: ["tile", "result", "out", "force", "picture", ...(hidden ?? [])] }, changed);
+    ].filter(Boolean).map(([name, said, checked]) => [name, h("input", { type: "checkbox", checked, onchange: () => changed() }), said]) : [];
+    state.form = form(schema, {
+      first, words: { ...words, palette: { ...words.palette, options } }, hidden: NEVER, start: own && { palette: chosen },
+    }, changed);
     put(wishes, state.own.map(([, box, words]) => h("label", { class: "check" }, box, words)), state.form);
     state.task = null;
     changed();
@@ -58,8 +62,13 @@ export async function show(root, { api, events, project, tileId, navigate, about
   async function start() {
     const own = state.own.filter(([, box]) => box.checked).map(([name]) => [name, true]);
     const settings = { tile: tileId, ...Object.fromEntries(own), ...state.form.values() };
-    state.task = (await api.post(`${place}/tasks`, { operation: state.kind, settings })).task;
-    state.stale = false;
+    try {
+      state.task = (await api.post(`${place}/tasks`, { operation: state.kind, settings })).task;
+    } catch (error) {
+      if (state.form.refuse(error.message)) return;
+      throw error;
+    }
+    Object.assign(state, { stale: false, news: true });
     tell();
   }
 
@@ -83,15 +92,17 @@ export async function show(root, { api, events, project, tileId, navigate, about
       const seen = picture(task);
       put(shown, seen || canvas);
       if (!seen) paint();
+      if (state.news) shown.scrollIntoView({ block: "nearest" });
+      state.news = false;
     } else if (shown.firstChild !== canvas) {
       put(shown, canvas);
       paint();
     }
     put(said,
       busy && h("div", { class: "stack" }, h("p", {}, task.state === "waiting" ? "Waiting its turn …" : capital(task.what || "At work …")), h("progress", { max: 1, value: task.share, "aria-label": "How far it is" })),
-      task?.state === "failed" && h("p", { class: "error" }, task.error),
+      task?.state === "failed" && h("p", { class: "error" }, sentence(task.error)),
       task?.state === "cancelled" && h("p", { class: "soft" }, "Stopped."),
-      done && h("div", { class: "stack" }, (task.result.notes ?? []).map((text) => h("p", { class: "notice" }, text)),
+      done && h("div", { class: "stack" }, (task.result.notes ?? []).map((text) => h("p", { class: "notice" }, sentence(text))),
         state.stale && h("p", { class: "soft" }, "You changed something since. Make it again to have it."), h("div", { class: "row" }, files(task))));
     history();
   }
@@ -112,8 +123,8 @@ export async function show(root, { api, events, project, tileId, navigate, about
     h("div", { class: "take" },
       h("div", { class: "stack" }, shown, said, real, earlier),
       h("div", { class: "stack side" },
-        h("section", { class: "panel stack" }, kinds, wishes, h("div", { class: "go" }, make)),
-        h("section", { class: "panel stack", "aria-labelledby": "whole" },
+        h("section", { class: "panel stack wishes" }, kinds, wishes, h("div", { class: "go" }, make)),
+        h("section", { class: "panel stack whole", "aria-labelledby": "whole" },
           h("h2", { id: "whole" }, "The whole project"),
           h("p", { class: "soft small" }, "One file with the picture and all tiles. It opens again here, and from Python."),
           h("a", { class: "button", href: `api/${place}/file`, download: true }, icon("download"), "Save the project")))));
