@@ -63,7 +63,7 @@ def test_a_connection_that_says_nothing_is_closed() -> None:
     transport = SimpleNamespace(
         close=lambda: closed.append(True), get_extra_info=lambda *_: None, write=lambda _: None
     )
-    config = uvicorn.Config(_nothing, interface="asgi3", log_config=None, ws="none")
+    config = uvicorn.Config(_app, interface="asgi3", log_config=None, ws="none")
     config.load()
     own = PatientProtocol(config, ServerState(), {}, loop)  # pyright: ignore[reportArgumentType]
     own.connection_made(transport)  # pyright: ignore[reportArgumentType]
@@ -91,7 +91,7 @@ def test_streams_end_when_the_server_stops(tmp_path: Path) -> None:
 
         reader = asyncio.create_task(read())
         await asyncio.sleep(0)
-        config = uvicorn.Config(_nothing, log_config=None)
+        config = uvicorn.Config(_app, log_config=None)
         server = Server(config, hub)
         server.servers, server.lifespan = [], SimpleNamespace(shutdown=_nothing)  # pyright: ignore
         await server.shutdown()
@@ -100,6 +100,10 @@ def test_streams_end_when_the_server_stops(tmp_path: Path) -> None:
         return log
 
     assert asyncio.run(watch())[-1] == "end"
+
+
+async def _app(_scope: Any, _receive: Any, _send: Any) -> None:
+    pass
 
 
 async def _nothing(*_: object) -> None:
