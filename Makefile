@@ -34,6 +34,7 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/density_many.py --quick
 	$(BIN)/python benchmarks/density_inference.py --quick || test $$? -eq 2
 	$(BIN)/python benchmarks/density_record.py --quick || test $$? -eq 2
+	$(BIN)/python benchmarks/studio_load.py --quick
 
 docs: $(VENV)/.installed-docs
 	$(BIN)/python -m sphinx -b html -W --keep-going -q docs out/site
@@ -53,7 +54,7 @@ clean:
 
 $(VENV)/.installed: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(PIP) -e .
+	$(PIP) -e '.[studio]'
 	touch $@
 
 $(VENV)/.installed-dev: pyproject.toml constraints.txt

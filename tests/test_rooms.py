@@ -32,7 +32,7 @@ ROOMS = [
     *("runtime", "symmetry", "fields", "flows", "drawing", "batch"),
     *(f"tiles.{room}" for room in TILES),
     *(f"density.{room}" for room in DENSITY),
-    *("tiles", "density", "loading", "cli"),
+    *("tiles", "density", "loading", "studio", "cli"),
 ]
 """Each room may import those before it; a wing's own files come after its rooms."""
 

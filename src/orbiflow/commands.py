@@ -21,6 +21,7 @@ OPERATIONS = {
     "density cv": "orbiflow.density.cross_validation.operations:cross_validate",
     "density patches": "orbiflow.density.operations.drawing:patches",
     "density batch": "orbiflow.density.operations.fitting:batch",
+    "studio": "orbiflow.studio.operations:studio",
 }
 
 SUMMARIES = {
@@ -43,10 +44,23 @@ SUMMARIES = {
     "density cv": "Cross-validate: how well does a density foretell rows that its fit has not seen?",
     "density patches": "Turn image patches into theta,phi on the Klein bottle, for `fit --space klein-bottle`.",
     "density batch": "Fit a density to every table of a folder, here or on a Dask cluster.",
+    "studio": "Make tiles and densities in a browser: a web page that this very machine serves.",
 }
 """The first sentence of each one's docstring, so that a list of all commands imports none of them."""
 
-WORK = {"density fold": "orbiflow.density.cross_validation.operations:fold"}
+WORK = {
+    "density fold": "orbiflow.density.cross_validation.operations:fold",
+    "studio read": "orbiflow.studio.tasks:read",
+    "studio open": "orbiflow.studio.tasks:open_file",
+    "studio search": "orbiflow.studio.tasks:search",
+    "studio space": "orbiflow.studio.closeup_tasks:space",
+    "studio pull": "orbiflow.studio.closeup_tasks:pull",
+    "studio take": "orbiflow.studio.takeaways:take",
+    "studio table": "orbiflow.studio.density_tasks:table",
+    "studio density": "orbiflow.studio.density_tasks:density",
+    "studio density map": "orbiflow.studio.density_tasks:density_map",
+    "studio density take": "orbiflow.studio.density_tasks:take",
+}
 """Operations that others give to workers, and that are no commands."""
 
 RUN_FOLDERS = {

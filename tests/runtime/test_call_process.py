@@ -10,7 +10,16 @@ from pathlib import Path
 
 import pytest
 
-from orbiflow.runtime import CallProcess, ClassFailed, Event, Failed, Finished, Progress, TileFound
+from orbiflow.runtime import (
+    CallProcess,
+    ClassFailed,
+    Event,
+    Failed,
+    Finished,
+    Progress,
+    TileFound,
+    find,
+)
 from runtime.searches import ENDLESS, boot_call, check_order, likeness_call
 
 
@@ -88,3 +97,44 @@ def test_a_process_that_dies_is_the_last_event(tmp_path: Path) -> None:
     assert events[-1].failure == "died"
     assert "signal 9" in events[-1].message
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["read.png"]
+
+
+def test_a_process_may_be_started_before_there_is_a_call() -> None:
+    with CallProcess(modules=["orbiflow.tiles.operations"]) as process:
+        assert process.alive
+        process.begin(find("classes").call({"classes": ["IH4"]}))
+        events = list(process.events())
+        assert isinstance(events[-1], Finished)
+        assert events[-1].summary["classes"][0]["class"] == "IH4"
+    assert not process.alive
+
+
+@pytest.mark.skipif(os.name != "posix", reason="processes cannot be held there")
+def test_a_process_is_held_and_goes_on() -> None:
+    with CallProcess() as process:
+        assert process.pause()
+        # it has stopped, and not ended
+        assert os.WIFSTOPPED(os.waitpid(process.pid, os.WUNTRACED)[1])
+        assert process.alive
+        assert process.resume()
+        process.begin(find("classes").call({}))
+        assert isinstance(list(process.events())[-1], Finished)
+    assert process.pause()  # it has ended: no other process is stopped
+
+
+@pytest.mark.skipif(os.name != "posix", reason="processes do one call there")
+def test_a_process_does_one_call_after_another() -> None:
+    with CallProcess(again=True) as process:
+        for names in (["IH4"], ["IH999"], ["IH6"]):
+            process.begin(find("classes").call({"classes": names}))
+            last = list(process.events())[-1]
+            assert isinstance(last, Failed if names == ["IH999"] else Finished)
+            process.cancel()  # too late, and no harm to the next
+        assert isinstance(last, Finished)
+        assert last.summary["classes"][0]["class"] == "IH6"
+        assert process.alive
+        process.begin(find("escherize").call({"image": "no such.png"}))
+        process.kill()
+        last = list(process.events())[-1]
+        assert isinstance(last, Failed)
+        assert last.failure == "died"

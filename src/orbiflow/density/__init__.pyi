@@ -63,6 +63,8 @@ from .pictures.figures import flow_picture as flow_picture
 from .pictures.figures import mean_field as mean_field
 from .pictures.figures import samples_picture as samples_picture
 from .pictures.frames import space_title as space_title
+from .pictures.grids import flat_data as flat_data
+from .pictures.grids import flat_frame as flat_frame
 from .pictures.plots import MODEL as MODEL
 from .pictures.plots import PICTURES as PICTURES
 from .pictures.plots import REPORT as REPORT
@@ -76,6 +78,7 @@ from .pictures.settings import PlotSettings as PlotSettings
 from .pictures.square import edge_pairs as edge_pairs
 from .pictures.surfaces import density_page as density_page
 from .pictures.surfaces import immersion as immersion
+from .pictures.surfaces import surface_data as surface_data
 from .pictures.surfaces import viewpoint as viewpoint
 from .pictures.thumbnail import density_thumbnail as density_thumbnail
 from .regions.boundaries import Outline as Outline
@@ -125,5 +128,6 @@ from .tables.files import read_table as read_table
 from .tables.files import to_csv as to_csv
 from .tables.table import MissingCellsError as MissingCellsError
 from .tables.table import Table as Table
+from .tables.table import TableError as TableError
 from .tables.table import find as find
 from .tables.table import listing as listing

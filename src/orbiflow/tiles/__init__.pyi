@@ -13,6 +13,7 @@ from .exporting.writing import sheet_names as sheet_names
 from .exporting.writing import write_scene as write_scene
 from .geometry import arc_lengths as arc_lengths
 from .geometry import best_similarity as best_similarity
+from .geometry import border as border
 from .geometry import centroid as centroid
 from .geometry import complex_points as complex_points
 from .geometry import orient as orient
@@ -96,6 +97,7 @@ from .scene.scene import Uses as Uses
 from .scene.svg import tile_svg as tile_svg
 from .scene.svg import tiling_svg as tiling_svg
 from .scene.svg import write_svg as write_svg
+from .search.bent_map import carried_on as carried_on
 from .search.both_search import BothSearch as BothSearch
 from .search.candidates import Fit as Fit
 from .search.descent import fit_descent as fit_descent
@@ -106,6 +108,7 @@ from .search.escherizing import escherize as escherize
 from .search.escherizing import escherize_class as escherize_class
 from .search.escherizing import fit_tile as fit_tile
 from .search.escherizing import report as report
+from .search.escherizing import searched_classes as searched_classes
 from .search.finished_tiles import ClassFailure as ClassFailure
 from .search.finished_tiles import certified_tiles as certified_tiles
 from .search.likeness_search import LikenessSearch as LikenessSearch
@@ -121,13 +124,20 @@ from .search.tile_model import as_map as as_map
 from .search.tile_model import as_model as as_model
 from .search.tile_model import load_model as load_model
 from .search.tile_model import placed_field as placed_field
+from .search.tile_variations import TileVariations as TileVariations
+from .search.tile_variations import divided_tile as divided_tile
 from .silhouette.bending import Bending as Bending
+from .silhouette.checks import doubts as doubts
+from .silhouette.checks import parts_left_out as parts_left_out
 from .silhouette.emphasis import Emphasis as Emphasis
+from .silhouette.mesh import triangulate as triangulate
 from .silhouette.pins import Pins as Pins
 from .silhouette.readers.files import read_outline as read_outline
+from .silhouette.readers.pictures import open_image as open_image
 from .silhouette.readers.pictures import read_mask_array as read_mask_array
 from .silhouette.readers.reading import FileContent as FileContent
 from .silhouette.readers.reading import Reading as Reading
+from .silhouette.settings import ReadingSettings as ReadingSettings
 from .silhouette.soft_target import SoftTarget as SoftTarget
 from .silhouette.soft_target import signed_distance as signed_distance
 from .silhouette.target import Frame as Frame

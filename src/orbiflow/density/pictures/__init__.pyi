@@ -8,6 +8,8 @@ from .figures import flow_picture as flow_picture
 from .figures import mean_field as mean_field
 from .figures import samples_picture as samples_picture
 from .frames import space_title as space_title
+from .grids import flat_data as flat_data
+from .grids import flat_frame as flat_frame
 from .plots import MODEL as MODEL
 from .plots import PICTURES as PICTURES
 from .plots import REPORT as REPORT
@@ -23,5 +25,6 @@ from .settings import PlotSettings as PlotSettings
 from .square import edge_pairs as edge_pairs
 from .surfaces import density_page as density_page
 from .surfaces import immersion as immersion
+from .surfaces import surface_data as surface_data
 from .surfaces import viewpoint as viewpoint
 from .thumbnail import density_thumbnail as density_thumbnail

@@ -207,6 +207,63 @@ _SOFT = 1.6
 """Cells that the narrowest peak is averaged over: with fewer, a triangle's corners would be seen."""
 
 
+def surface_data(
+    density: Density,
+    settings: PlotSettings | None = None,
+    *,
+    samples: Tensor | None = None,
+    coastlines: Sequence[Array] = (),
+    resolution: int | None = None,
+    levels: bool = False,
+) -> dict[str, Any]:
+    """Return what `surface.js` draws, as JSON has it: see `density_page`.
+
+    The value at a vertex is its place on the bar of colours; "caption" says what is seen. With `levels`
+    there is the logarithm of the density at each vertex, too, as a share of its "span".
+    """
+    from matplotlib import colormaps
+
+    settings, space = settings or PlotSettings(), density.space
+    cells = resolution or (_FINE_CELLS if density.has_fine_detail else _CELLS)
+    grid, view = mesh(space, cells), frames.view_of(space, settings.names)
+    t = torch.linspace(0.0, 1.0, cells + 1, dtype=torch.float64)
+    values = colours.density_on_grid(density, t, t, settings.measure, pixel=_SOFT / cells).ravel()
+    # by area on the surface: vertices crowd at the cone points
+    areas = space.log_area(grid.points).exp().numpy()
+    log, _ = colours.chosen_scale(density, settings.measure, settings.scale)
+    shade = colours.shading(values, areas, log=log)
+    lines = (*_coordinate_lines(space), (1.6, _on_surface(space, coastlines)))
+    notes = []
+    data = {
+        **_surface(space, grid.points, int(values.argmax())),
+        "round": space.name == "sphere",  # the near side hides the far one
+        "triangles": packed(grid.triangles, "<u2"),
+        "values": packed(65535 * np.clip(shade.places(values), 0, 1), "<u2"),
+        "lines": [{"width": width, **_polylines(parts)} for width, parts in lines if parts],
+        "samples": "",
+        "widths": "",
+        "dots": settings.dots,
+        "labels": _labels(view),
+        "colours": packed(255 * colormaps[colours.COLOURS](np.linspace(0, 1, 256)), "u1"),
+        "ticks": [tick._asdict() for tick in colours.bar_ticks(shade, ends=True)],
+        "measure": colours.bar_label(shade, space, settings.measure),
+    }
+    if levels:
+        logs = np.log(np.maximum(values, values.max() * 1e-12))
+        span = float(logs.min()), float(logs.max()) + 1e-6
+        places = 65535 * (logs - span[0]) / (span[1] - span[0])
+        data |= {"levels": packed(places, "<u2"), "span": span}
+    if samples is not None:
+        points = torch.tensor(thinned(frames.chart_points(space, samples).numpy()))
+        places, widths = uncrowded(immersion(space)(space.project(points)))
+        data |= {"samples": packed(places, "<f4"), "widths": packed(widths, "<f4")}
+        notes.append(SMALLER)
+    if colours.is_sharp(density, pixel=_SOFT / cells):
+        notes.append(average_note(round(cells / _SOFT)))
+    words = CAPTIONS[space.name].format(*(frames.axis_label(view, k) for k in (0, 1)))
+    return {**data, "caption": f"{words} {frames.sentences(notes)}".strip()}
+
+
 def density_page(
     density: Density,
     settings: PlotSettings | None = None,
@@ -234,46 +291,11 @@ def density_page(
             with kernels.
         title: The title. Default: "Density on the" and the space.
     """
-    from matplotlib import colormaps
-
-    settings, space = settings or PlotSettings(), density.space
-    cells = resolution or (_FINE_CELLS if density.has_fine_detail else _CELLS)
-    grid, view = mesh(space, cells), frames.view_of(space, settings.names)
-    t = torch.linspace(0.0, 1.0, cells + 1, dtype=torch.float64)
-    values = colours.density_on_grid(density, t, t, settings.measure, pixel=_SOFT / cells).ravel()
-    # by area on the surface: vertices crowd at the cone points
-    areas = space.log_area(grid.points).exp().numpy()
-    log, _ = colours.chosen_scale(density, settings.measure, settings.scale)
-    shade = colours.shading(values, areas, log=log)
-    lines = (*_coordinate_lines(space), (1.6, _on_surface(space, coastlines)))
-    notes = []
-    data = {
-        **_surface(space, grid.points, int(values.argmax())),
-        "round": space.name == "sphere",  # the near side hides the far one
-        "triangles": _packed(grid.triangles, "<u2"),
-        "values": _packed(65535 * np.clip(shade.places(values), 0, 1), "<u2"),
-        "lines": [{"width": width, **_polylines(parts)} for width, parts in lines if parts],
-        "samples": "",
-        "widths": "",
-        "dots": settings.dots,
-        "labels": _labels(view),
-        "colours": _packed(255 * colormaps[colours.COLOURS](np.linspace(0, 1, 256)), "u1"),
-        "ticks": [tick._asdict() for tick in colours.bar_ticks(shade, ends=True)],
-        "measure": colours.bar_label(shade, space, settings.measure),
-    }
-    if samples is not None:
-        points = torch.tensor(thinned(frames.chart_points(space, samples).numpy()))
-        places, widths = uncrowded(immersion(space)(space.project(points)))
-        data |= {"samples": _packed(places, "<f4"), "widths": _packed(widths, "<f4")}
-        notes.append(SMALLER)
-    if colours.is_sharp(density, pixel=_SOFT / cells):
-        notes.append(average_note(round(cells / _SOFT)))
-    words = CAPTIONS[space.name].format(*(frames.axis_label(view, k) for k in (0, 1)))
-    caption = f"{words} {frames.sentences(notes)}".strip()
-    title = title or f"Density on the {frames.space_title(space)}"
-    page = rendered(
-        "orbiflow.density.pictures", "surface.html", title=title, caption=caption, data=data
+    data = surface_data(
+        density, settings, samples=samples, coastlines=coastlines, resolution=resolution
     )
+    title = title or f"Density on the {frames.space_title(density.space)}"
+    page = rendered("orbiflow.density.pictures", "surface.html", title=title, data=data)
     size = len(page.encode())
     if size > MAX_BYTES:
         raise OrbiflowError(
@@ -298,12 +320,12 @@ def _surface(space: Space, points: Tensor, peak: int) -> dict[str, Any]:
         "radius": radius,
         "start": viewpoint(space, points[peak])._asdict(),
         "eye": EYE,
-        "points": _packed(places, "<f4"),
-        "normals": _packed(127 * normals(space, points), "i1"),
+        "points": packed(places, "<f4"),
+        "normals": packed(127 * normals(space, points), "i1"),
     }
 
 
-def _packed(array: Array, kind: str) -> str:
+def packed(array: Array, kind: str) -> str:
     """Return the base64 text of an array, rounded if `kind` is an integer."""
     if np.dtype(kind).kind != "f":
         array = np.rint(array)
@@ -311,7 +333,7 @@ def _packed(array: Array, kind: str) -> str:
 
 
 def _polylines(lines: list[Array]) -> dict[str, Any]:
-    return {"points": _packed(np.concatenate(lines), "<f4"), "counts": list(map(len, lines))}
+    return {"points": packed(np.concatenate(lines), "<f4"), "counts": list(map(len, lines))}
 
 
 Lines = tuple[tuple[float, list[Array]], tuple[float, list[Array]]]

@@ -1,3 +1,4 @@
+from .bent_map import carried_on as carried_on
 from .bent_map import matched as matched
 from .both_search import BothSearch as BothSearch
 from .candidates import Fit as Fit
@@ -10,6 +11,7 @@ from .escherizing import escherize as escherize
 from .escherizing import escherize_class as escherize_class
 from .escherizing import fit_tile as fit_tile
 from .escherizing import report as report
+from .escherizing import searched_classes as searched_classes
 from .finished_tiles import ClassFailure as ClassFailure
 from .finished_tiles import certified_tiles as certified_tiles
 from .finished_tiles import why_poor as why_poor
@@ -19,7 +21,6 @@ from .occupancy import fit_occupancy as fit_occupancy
 from .occupancy import occupancy_loss as occupancy_loss
 from .overlap_search import OccupancySearch as OccupancySearch
 from .overlap_search import OverlapSearch as OverlapSearch
-from .refinement import TileVariations as TileVariations
 from .refinement import refine as refine
 from .search_method import Goal as Goal
 from .search_method import SearchMethod as SearchMethod
@@ -28,3 +29,5 @@ from .tile_model import as_map as as_map
 from .tile_model import as_model as as_model
 from .tile_model import load_model as load_model
 from .tile_model import placed_field as placed_field
+from .tile_variations import TileVariations as TileVariations
+from .tile_variations import divided_tile as divided_tile

@@ -15,7 +15,15 @@ from scipy.spatial.distance import cdist
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import arc_lengths, orient, plane_points, points_along, resampled
+from orbiflow.tiles.geometry import (
+    arc_lengths,
+    border,
+    orient,
+    plane_points,
+    points_along,
+    resampled,
+    signed_area,
+)
 from orbiflow.tiles.search.bending import Bent
 from orbiflow.tiles.silhouette import Bending, Mesh, harmonic, triangulate, unfolded
 from orbiflow.tiles.tilings import Tile
@@ -178,6 +186,33 @@ def divided(mesh: Mesh, at: Array, images: Array) -> tuple[Mesh, Array]:
     sides, at_side = np.concatenate([mesh.sides, side]), np.concatenate([mesh.shares, at - side])
     triangles = np.array([t for t in rows if t], dtype=np.int64)
     return Mesh(extended(mesh.points), triangles, sides, at_side, mesh.size), extended(images)
+
+
+def carried_on(bending: Bending, before: Array, after: Array) -> Bending:
+    """Return a map to a tile `before` (N, 2), composed with the move of its vertices to `after` (N, 2).
+
+    All are in normal form; the polygons may be clockwise. The inside follows harmonically and is
+    untangled; an `OrbiflowError` if it cannot follow without folds.
+    """
+    first = border(bending.triangles)
+    order = np.concatenate([first, np.setdiff1d(np.arange(len(bending.rest)), first)])
+    triangles = np.argsort(order)[bending.triangles]
+    mesh = Mesh(bending.rest[order], triangles, np.zeros(0, int), np.zeros(0), len(first))
+    images = bending.images[order]
+    old, new = (p[:: -1 if signed_area(before) < 0 else 1] for p in (before, after))
+    # both run along the same curve, from a point that they share
+    offset, start = np.unravel_index(
+        cdist(images[: mesh.size], old).argmin(), (mesh.size, len(old))
+    )
+    old, new = np.roll(old, -start, axis=0), np.roll(new, -start, axis=0)
+    knots = arc_lengths(np.roll(images[: mesh.size], -offset, axis=0))
+    places = arc_lengths(old) * (knots[-1] / arc_lengths(old)[-1])
+    at: Array = np.interp(places[:-1], knots, np.arange(len(knots))) + offset
+    mesh, images = divided(mesh, _unknown(mesh, at), images)
+    along = np.interp((shares(mesh) - offset) % mesh.size, np.arange(len(knots)), knots)
+    steps = [np.interp(along, places, np.append(step, step[0])) for step in (new - old).T]
+    images = images + harmonic(mesh, np.stack(steps, axis=-1))
+    return Bending(mesh.points, unfolded(mesh, images), mesh.triangles)
 
 
 TILE, SILHOUETTE = 240, 480  # points along the two outlines that are matched

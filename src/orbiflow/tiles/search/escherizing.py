@@ -5,11 +5,10 @@ from __future__ import annotations
 import contextlib
 import functools
 import itertools
-import math
 import platform
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from typing import Any, cast
 
@@ -23,32 +22,25 @@ from orbiflow.runtime import (
     NEVER,
     Cancel,
     Cancelled,
-    ClassFailed,
     Note,
-    Preview,
-    Progress,
     Sink,
-    TileFound,
     ignore,
     one_blas_thread,
     one_thread,
     process_context,
     work,
 )
-from orbiflow.tiles.likeness import NearSymmetry, diverse, mutual_iou, near_symmetry
+from orbiflow.tiles.likeness import NearSymmetry, near_symmetry
 from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
-from orbiflow.tiles.search.both_search import ALIKE
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
 from orbiflow.tiles.search.finished_tiles import HOW, ClassFailure, best_tiles, rated
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.search_method import SYMMETRIC, Goal, SearchMethod
+from orbiflow.tiles.search.search_record import OnTile, Outcome, Record, without_twins
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import CLASSES, IsohedralClass, isohedral_class
-
-INTERRUPTED = "interrupted"  # the reason given for a class that was left undone
-Outcome = EscherTile | ClassFailure
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +84,7 @@ def escherize(
     emphasis: Emphasis | None = None,
     pins: Pins | None = None,
     on_checked: Callable[[], object] | None = None,
+    on_tile: OnTile | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> SearchResult:
@@ -105,6 +98,9 @@ def escherize(
         emphasis: What must survive, instead of the settings' mask.
         pins: What must not bend, instead of the settings'.
         on_checked: Called when all arguments have been checked, before the search.
+        on_tile: Called in this thread with each certified tile and its stage, as soon as it is found:
+            "sketch" for all classes first, "better" and, once for each class, "final". The
+            search then takes a level of effort for all classes before the next.
         on_event: Called in this thread with each `Note`, `Progress`, `Preview`, `TileFound` and
             `ClassFailed`. What it raises ends the search.
         cancel: Ends the search early; what was found by then is returned, and the other classes are
@@ -136,14 +132,21 @@ def escherize(
     if near is not None and near.stabiliser in SYMMETRIC:
         on_event(Note(_told(near, names)))
     workers = min(settings.workers or 1, len(names))
-    record = _Record(names, on_event)
+    shown = None if on_tile is None else _rating(on_tile, target)
+    record = Record(names, on_event, shown, most=method.shown(settings.per_class))
     with contextlib.suppress(Cancelled):
-        _search(task, names, workers, record, cancel)
+        _search_by_levels(task, names, workers, record, cancel)
     tiles, failures, left = record.finish()
     tiles, seconds = method.short_list(tiles), time.perf_counter() - begin
     return SearchResult(
         target, tiles, failures, record.found, method, emphasis, pins, seconds, workers, left, near
     )
+
+
+def searched_classes(target: Target, settings: EscherizeSettings) -> list[str]:
+    """Return the names of the classes that a search with these settings looks at, in order."""
+    asks = settings.search_method.takes_symmetric
+    return _class_names(settings.classes, near_symmetry(target.normal) if asks else None)
 
 
 def _class_names(classes: Sequence[str] | None, near: NearSymmetry | None) -> list[str]:
@@ -252,84 +255,49 @@ def _task(goal: Goal, method: SearchMethod, per_class: int = 1, force: bool = Fa
     return _Task(goal, method, per_class, force)
 
 
-class _Record:
-    """What a search has found, and how far each class is, told as events."""
+def _rating(on_tile: OnTile, target: Target) -> OnTile:
+    """Return a function that gives a tile its stars before it is shown."""
+    return lambda tile, stage: on_tile(rated([tile], target)[0], stage)
 
-    def __init__(self, names: Sequence[str], on_event: Sink) -> None:
-        self.shares = dict.fromkeys(names, 0.0)
-        self.outcomes: dict[str, Outcome] = {}
-        self.preview: EscherTile | None = None
-        self.on_event = on_event
-        self.begin = time.perf_counter()
-        on_event(Progress(0.0, "fitting"))
 
-    @property
-    def found(self) -> list[EscherTile]:
-        """All tiles of the classes that have an outcome."""
-        best = [found for found in self.outcomes.values() if isinstance(found, EscherTile)]
-        return [tile for first in best for tile in first.family()]
-
-    def first_look(self, tile: EscherTile) -> None:
-        """Keep a tile that the search is going to improve on."""
-        self.preview = tile
-        seconds = time.perf_counter() - self.begin
-        self.on_event(Preview(tile.name, tile.metrics.iou, seconds))
-
-    def progress(self, name: str, share: float, loss: float = math.nan) -> None:
-        """Tell how far a class is, which never falls."""
-        self.shares[name] = share = max(share, self.shares[name])
-        whole = sum(self.shares.values()) / len(self.shares)
-        known = loss if math.isfinite(loss) else None  # no NaN in JSON
-        self.on_event(Progress(whole, "fitting", name, share, known))
-
-    def outcome(self, found: Outcome, share: float = 1.0) -> None:
-        """Keep what a class gave, and then tell it."""
-        self.outcomes[found.name] = found
-        self.progress(found.name, share)
-        if isinstance(found, ClassFailure):
-            self.on_event(ClassFailed(found.name, found.reason))
-        else:
-            iou, certified = found.metrics.iou, found.certificate.valid
-            self.on_event(TileFound(found.name, iou, found.score, certified))
-
-    def finish(self) -> tuple[list[EscherTile], list[ClassFailure], frozenset[str]]:
-        """Return tiles, best first, those for likeness before those for overlap; failures; who is left.
-
-        Of a class that is left, a first look is its tile.
-        """
-        names = list(self.shares)
-        left = [name for name in names if name not in self.outcomes]
-        for name in left:
-            first = self.preview if self.preview and self.preview.name == name else None
-            self.outcome(first or ClassFailure(name, INTERRUPTED), self.shares[name])
-        tiles = self.found
-        tiles.sort(key=lambda t: (t.objective != "likeness", -t.score, names.index(t.name)))
-        failures = [found for found in self.outcomes.values() if isinstance(found, ClassFailure)]
-        return tiles, failures, frozenset(left)
+def _search_by_levels(
+    task: _Task, names: Sequence[str], workers: int, record: Record, cancel: Cancel
+) -> None:
+    """Do the task for each class; if somebody watches, one level of effort after another."""
+    if record.on_tile is None:
+        _search(task, names, workers, record, cancel)
+        return
+    *first, (_, last) = task.method.levels()
+    for share, method in first:
+        own = replace(task, method=method, per_class=1)
+        _search(own, names, workers, record.next_level(share), cancel)
+    rest = 1 - sum(share for share, _ in first)
+    _search(replace(task, method=last), names, workers, record.next_level(rest, last=True), cancel)
 
 
 def _search(
-    task: _Task, names: Sequence[str], workers: int, record: _Record, cancel: Cancel
+    task: _Task, names: Sequence[str], workers: int, record: Record, cancel: Cancel
 ) -> None:
     """Do the task for each class, here or in processes."""
     # asked before torch is limited here: a limit makes no fork safe
     preload = ("orbiflow.tiles.search.escherizing", *task.method.modules)
     context = process_context(preload) if workers > 1 else None
-    with one_thread(), one_blas_thread():
-        first = task.method.preview(task.goal, names, cancel)
-    if first is not None:
-        record.first_look(first)
+    if record.on_tile is None:
+        with one_thread(), one_blas_thread():
+            first = task.method.preview(task.goal, names, cancel)
+        if first is not None:
+            record.first_look(first)
     if context is not None:
         _search_in_processes(task, names, workers, context, record, cancel)
         return
     for name in names:
         cancel.check()
         progress = functools.partial(record.progress, name)
-        record.outcome(_outcome(task, isohedral_class(name), progress, cancel))
+        record.level_outcome(_outcome(task, isohedral_class(name), progress, cancel))
 
 
 def _search_in_processes(
-    task: _Task, names: Sequence[str], workers: int, context: Any, record: _Record, cancel: Cancel
+    task: _Task, names: Sequence[str], workers: int, context: Any, record: Record, cancel: Cancel
 ) -> None:
     cancel.check()
     if context.get_start_method() == "fork":
@@ -341,7 +309,7 @@ def _search_in_processes(
     with contextlib.closing(work(function, order, workers, context=context, cancel=cancel)) as news:
         for one in news:
             if one.done:
-                record.outcome(one.value)
+                record.level_outcome(one.value)
             else:
                 record.progress(order[one.index], *one.value)
 
@@ -385,19 +353,9 @@ def _chosen_tiles(
     with one_thread(), one_blas_thread():
         found = method.fit(goal, kind, count, progress, cancel)
         tiles = best_tiles(goal.target, found, force=task.force, min_neck=method.least_neck(goal))
-        chosen = [tiles[k] for k in _without_twins(tiles, count)]
+        chosen = [tiles[k] for k in without_twins(tiles, count)]
         cancel.check()
         return task.method.finish(chosen, goal)
-
-
-def _without_twins(tiles: Sequence[EscherTile], count: int) -> list[int]:
-    if count == 1 or len(tiles) == 1:
-        return [0]
-    sound = [k for k, tile in enumerate(tiles) if tile.certificate.simple]
-    alike = mutual_iou([tiles[k].normal_tile.polygon for k in sound], ALIKE)
-    below = float(np.nextafter(ALIKE, 0))
-    chosen = diverse([tiles[k].score for k in sound], count, alike, twin=below)
-    return [sound[k] for k in chosen] or [0]
 
 
 def report(result: SearchResult) -> dict[str, Any]:

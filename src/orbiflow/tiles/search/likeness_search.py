@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import lcm
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -12,7 +12,7 @@ from orbiflow.settings import Range, Settings
 from orbiflow.tiles.likeness import least_neck
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.search.escherize_settings import Count, Seed
-from orbiflow.tiles.search.search_method import Goal, SearchMethod
+from orbiflow.tiles.search.search_method import Goal, SearchMethod, Sketches
 from orbiflow.tiles.tilings import IsohedralClass
 
 if TYPE_CHECKING:
@@ -139,10 +139,8 @@ class LikenessSearch(Settings, SearchMethod):
         >>> [own.starts for own in LikenessSearch.for_effort("best").searches(symmetric=True)]
         [2, 6, 20]
         """
-        normal = {name: getattr(LikenessSearch, name) for name in {**FAST, **BEST}}
         found: list[LikenessSearch] = []
-        for changes in (*({**normal, **FAST}, normal)[: self.below], {}):
-            own = replace(self, below=0, **changes)
+        for own in self._alone():
             if symmetric:
                 fewer = {name: -(-getattr(own, name) // 2) for name in HALVED}
                 own = replace(own, **fewer)
@@ -150,3 +148,16 @@ class LikenessSearch(Settings, SearchMethod):
                 own = replace(own, finalists=wanted, starts=max(own.starts, 2 * wanted))
             found.append(own)
         return tuple(found)
+
+    def _alone(self) -> list[LikenessSearch]:
+        """Return the levels below, least first, and this one, each without those below it."""
+        normal = {name: getattr(LikenessSearch, name) for name in {**FAST, **BEST}}
+        levels = (*({**normal, **FAST}, normal)[: self.below], {})
+        return [replace(self, below=0, **own) for own in levels]
+
+    def levels(self) -> Sequence[tuple[float, SearchMethod]]:
+        """Return the sketch, the levels of effort below, and what this one has beyond them."""
+        alone = self._alone()
+        work = [float(own.starts * len(own.bodies)) for own in alone]
+        shares = [0.9 * own / sum(work) for own in work]
+        return [(0.1, Sketches(self)), *zip(shares, alone, strict=True)]

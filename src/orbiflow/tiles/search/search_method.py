@@ -122,6 +122,14 @@ class SearchMethod(ABC):
         """Return the methods that are used in turn for each class, each with its share of the work."""
         return [(1.0, self)]
 
+    def levels(self) -> Sequence[tuple[float, SearchMethod]]:
+        """Return methods that find more and more, each with its share of the work.
+
+        Who watches a search sees the tiles of all classes by the first, then by the second, and so on;
+        together they find what this one does.
+        """
+        return [(0.05, Sketches(self)), (0.95, self)]
+
     def shown(self, per_class: int) -> int:
         """Return how many tiles of a class each part keeps."""
         return per_class
@@ -137,3 +145,29 @@ class SearchMethod(ABC):
     def short_list(self, tiles: Sequence[EscherTile]) -> list[EscherTile]:
         """Return which of all tiles the search gives, in order."""
         return list(tiles)
+
+
+@dataclass(frozen=True)
+class Sketches(SearchMethod):
+    """The quick way of another method as one of its own, of one tile a class."""
+
+    whole: SearchMethod
+
+    def fit(
+        self,
+        goal: Goal,
+        kind: IsohedralClass,
+        per_class: int,  # noqa: ARG002
+        progress: OnProgress,  # noqa: ARG002
+        cancel: Cancel,
+    ) -> Fit:
+        """Sketch tiles of the class."""
+        return self.whole.sketch(goal, kind, cancel)._replace(enough=1)
+
+    def prepare(self, goal: Goal) -> None:
+        """Compute what all fits share."""
+        self.whole.prepare(goal)
+
+    def least_neck(self, goal: Goal) -> float:
+        """Return the other's."""
+        return self.whole.least_neck(goal)

@@ -1,0 +1,352 @@
+// A surface coloured by a density, to be turned: WebGL 2 draws it, or a plain canvas if there is none.
+
+const PULL = 0.006; // how far lines and dots are pulled forward
+const PALENESS = 0.85; // how grey is what lies outside a region
+
+/** The numbers in a base64 text. */
+export function unpack(text, Kind) {
+  const raw = atob(text), bytes = new Uint8Array(raw.length);
+  for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
+  return new Kind(bytes.buffer);
+}
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+
+/**
+ * Draw a surface on a canvas, to be turned by mouse, touch and keys; labels are put beside the canvas.
+ *
+ * - `data`: What `surface_data` in surfaces.py returns.
+ * - `changed`: Called with the view when a key sets it back.
+ * - `scrolls`: Whether the page scrolls: then the wheel zooms only with the Ctrl key.
+ * - `plain`: Whether WebGL is not used.
+ *
+ * Returns `view`, whose `cut` (0 to 100), `dots`, `least` (levels from 0 to 1: what is below is greyed) and `pale`
+ * (that grey, 0 to 1) may be changed before a `redraw()`, and `stop()`.
+ */
+export function showSurface(canvas, data, { changed = () => {}, scrolls = false, plain = false } = {}) {
+  const view = { ...data.start, zoom: 1, dots: data.dots && data.samples !== "", least: -1, pale: 0.8 };
+  const points = unpack(data.points, Float32Array), normals = unpack(data.normals, Int8Array);
+  const values = unpack(data.values, Uint16Array), triangles = unpack(data.triangles, Uint16Array);
+  const colours = unpack(data.colours, Uint8Array), samples = unpack(data.samples, Float32Array);
+  const widths = unpack(data.widths, Float32Array);
+  const levels = data.levels ? unpack(data.levels, Uint16Array) : values;
+  const lines = data.lines.map(({ width, points, counts }) => {
+    const p = unpack(points, Float32Array), segments = [];
+    let first = 0;
+    for (const count of counts) {
+      for (let i = first; i < first + count - 1; i++)
+        segments.push(...p.subarray(3 * i, 3 * i + 6));
+      first += count;
+    }
+    return { width, segments: new Float32Array(segments) };
+  });
+
+  // unit vectors to the right, up and towards the eye
+  function frame() {
+    const [cy, sy, cp, sp] = [Math.cos(view.yaw), Math.sin(view.yaw), Math.cos(view.pitch), Math.sin(view.pitch)];
+    return { right: [-sy, cy, 0], up: [-sp * cy, -sp * sy, cp], eye: [cp * cy, cp * sy, sp] };
+  }
+  // column-major matrix from the surface's coordinates to clip space
+  function matrix(width, height) {
+    const { right, up, eye } = frame(), c = data.center, r = data.radius;
+    const size = 0.88 * view.zoom * Math.sqrt(1 - 1 / data.eye ** 2), short = Math.min(width, height);
+    const rows = [
+      [...right.map(t => t * size * short / width / r), 0],
+      [...up.map(t => t * size * short / height / r), 0],
+      [...eye.map(t => -0.4 * t / r), 0],
+      [...eye.map(t => -t / data.eye / r), 1],
+    ];
+    for (const row of rows) row[3] -= dot(row, c);
+    return Float32Array.from([0, 1, 2, 3].flatMap(column => rows.map(row => row[column])));
+  }
+  // pixels across of the largest and the smallest dot, and of a unit of length in the middle
+  function dotSizes(width, height, scale) {
+    const size = 0.88 * view.zoom * Math.sqrt(1 - 1 / data.eye ** 2), short = Math.min(width, height);
+    return { most: 5.5 * scale * Math.sqrt(view.zoom), least: 1.5 * scale, unit: size * short / 2 / data.radius };
+  }
+  // depth of the cutting plane, towards the eye; nothing is cut at 1
+  const cutDepth = () => data.round || view.cut === 0 ? 9 : 1 - 2 * view.cut / 100;
+
+  function webglDrawer(gl) {
+    const head = `#version 300 es
+      precision highp float;
+      uniform mat4 M; uniform vec3 eye, center; uniform float radius, cut, lowest, pale;`;
+    const depth = "depth = dot(eye, p - center) / radius;";
+    const surface = program(`${head}
+      in vec3 p, n; in float t, l; out vec3 normal; out float value, level, depth;
+      void main() { gl_Position = M * vec4(p, 1.0); normal = n; value = t; level = l; ${depth} }`, `${head}
+      uniform sampler2D map; uniform vec3 right, up; in vec3 normal; in float value, level, depth; out vec4 colour;
+      void main() {
+        if (depth > cut) discard;
+        vec3 m = normalize(normal); m *= sign(dot(m, eye) + 1e-9);
+        float light = 0.7 + 0.3 * max(dot(m, normalize(eye + 0.5 * up - 0.4 * right)), 0.0);
+        vec3 own = texture(map, vec2((value * 255.0 + 0.5) / 256.0, 0.5)).rgb;
+        colour = vec4(light * (level < lowest ? mix(own, vec3(pale), ${PALENESS}) : own), 1.0);
+      }`);
+    const stroke = program(`${head}
+      in vec3 a, b; in vec2 corner; uniform vec2 size; uniform float width; out float depth;
+      void main() {
+        vec4 A = M * vec4(a, 1.0), B = M * vec4(b, 1.0);
+        vec2 along = normalize((B.xy / B.w - A.xy / A.w) * size + 1e-9), side = vec2(-along.y, along.x);
+        gl_Position = corner.x < 0.5 ? A : B;
+        gl_Position.xy += (corner.y * side + (corner.x - 0.5) * along) * width / size * gl_Position.w;
+        gl_Position.z -= ${PULL} * gl_Position.w;
+        vec3 p = corner.x < 0.5 ? a : b; ${depth}
+      }`, `${head}
+      uniform vec4 ink; in float depth; out vec4 colour;
+      void main() { if (depth > cut) discard; colour = ink; }`);
+    const dots = program(`${head}
+      in vec3 p; in float wide; uniform float most, least, unit; out float depth, ink;
+      void main() { gl_Position = M * vec4(p, 1.0); gl_Position.z -= ${PULL} * gl_Position.w;
+        float own = wide * unit / gl_Position.w; gl_PointSize = clamp(own, least, most);
+        ink = clamp(own * own / gl_PointSize / gl_PointSize, 0.03, 1.0); ${depth} }`, `${head}
+      in float depth, ink; out vec4 colour;
+      void main() {
+        float r = 2.0 * length(gl_PointCoord - 0.5);
+        if (r > 1.0 || depth > cut) discard;
+        colour = r > 0.68 ? vec4(0.1, 0.1, 0.1, 0.8 * ink) : vec4(1.0, 1.0, 1.0, 0.85 * ink);
+      }`);
+
+    function program(vertex, fragment) {
+      const made = gl.createProgram();
+      for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+        const shader = gl.createShader(kind);
+        gl.shaderSource(shader, text);
+        gl.compileShader(shader);
+        if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
+        gl.attachShader(made, shader);
+      }
+      gl.linkProgram(made);
+      if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made));
+      return made;
+    }
+    function feed(made, name, buffer, size, type, normalised = false, stride = 0, offset = 0, divisor = 0) {
+      const place = gl.getAttribLocation(made, name);
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+      gl.enableVertexAttribArray(place);
+      gl.vertexAttribPointer(place, size, type, normalised, stride, offset);
+      gl.vertexAttribDivisor(place, divisor);
+    }
+    function store(array, target = gl.ARRAY_BUFFER) {
+      const buffer = gl.createBuffer();
+      gl.bindBuffer(target, buffer);
+      gl.bufferData(target, array, gl.STATIC_DRAW);
+      return buffer;
+    }
+    function setup(fill) {
+      const array = gl.createVertexArray();
+      gl.bindVertexArray(array);
+      fill();
+      gl.bindVertexArray(null);
+      return array;
+    }
+    const surfaceArray = setup(() => {
+      feed(surface, "p", store(points), 3, gl.FLOAT);
+      feed(surface, "n", store(normals), 3, gl.BYTE, true);
+      feed(surface, "t", store(values), 1, gl.UNSIGNED_SHORT, true);
+      feed(surface, "l", store(levels), 1, gl.UNSIGNED_SHORT, true);
+      store(triangles, gl.ELEMENT_ARRAY_BUFFER);
+    });
+    const corners = store(new Float32Array([0, -1, 0, 1, 1, -1, 1, 1]));
+    const strokes = lines.map(({ width, segments }) => {
+      const buffer = store(segments);
+      return { width, count: segments.length / 6, array: setup(() => {
+        feed(stroke, "corner", corners, 2, gl.FLOAT);
+        feed(stroke, "a", buffer, 3, gl.FLOAT, false, 24, 0, 1);
+        feed(stroke, "b", buffer, 3, gl.FLOAT, false, 24, 12, 1);
+      }) };
+    });
+    const dotsArray = setup(() => {
+      feed(dots, "p", store(samples), 3, gl.FLOAT);
+      feed(dots, "wide", store(widths), 1, gl.FLOAT);
+    });
+    gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, colours);
+    for (const [name, value] of [["MIN_FILTER", gl.LINEAR], ["MAG_FILTER", gl.LINEAR], ["WRAP_S", gl.CLAMP_TO_EDGE]])
+      gl.texParameteri(gl.TEXTURE_2D, gl["TEXTURE_" + name], value);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LEQUAL);
+    gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+
+    return function draw(width, height, scale) {
+      const { right, up, eye } = frame();
+      const use = (made, array) => {
+        const at = name => gl.getUniformLocation(made, name);
+        gl.useProgram(made);
+        gl.bindVertexArray(array);
+        gl.uniformMatrix4fv(at("M"), false, matrix(width, height));
+        for (const [name, value] of [["eye", eye], ["center", data.center], ["right", right], ["up", up]])
+          gl.uniform3fv(at(name), value);
+        gl.uniform1f(at("radius"), data.radius);
+        gl.uniform1f(at("cut"), cutDepth());
+        gl.uniform1f(at("lowest"), view.least);
+        gl.uniform1f(at("pale"), view.pale);
+        return at;
+      };
+      gl.viewport(0, 0, width, height);
+      gl.clearColor(0, 0, 0, 0);
+      gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+      gl.disable(gl.BLEND);
+      gl.depthMask(true);
+      use(surface, surfaceArray);
+      gl.drawElements(gl.TRIANGLES, triangles.length, gl.UNSIGNED_SHORT, 0);
+      gl.enable(gl.BLEND);
+      gl.depthMask(false);
+      for (const { width: pixels, count, array } of strokes) {
+        const at = use(stroke, array);
+        gl.uniform2f(at("size"), width, height);
+        gl.uniform1f(at("width"), pixels * scale);
+        gl.uniform4fv(at("ink"), [1, 1, 1, pixels < 1.5 ? 0.45 : 0.9]);
+        gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count);
+      }
+      if (view.dots) {
+        const at = use(dots, dotsArray);
+        for (const [name, value] of Object.entries(dotSizes(width, height, scale))) gl.uniform1f(at(name), value);
+        gl.drawArrays(gl.POINTS, 0, samples.length / 3);
+      }
+    };
+  }
+
+  // painter's algorithm: everything from far to near
+  function canvasDrawer(context) {
+    const count = points.length / 3, x = new Float32Array(count), y = new Float32Array(count), z = new Float32Array(count);
+    const shade = new Float32Array(count);
+    return function draw(width, height, scale) {
+      const m = matrix(width, height), { right, up, eye } = frame(), items = [], cut = cutDepth();
+      const raw = eye.map((t, i) => t + 0.5 * up[i] - 0.4 * right[i]), size = Math.hypot(...raw);
+      const place = (p, i) => {
+        const row = k => m[k] * p[i] + m[4 + k] * p[i + 1] + m[8 + k] * p[i + 2] + m[12 + k], w = row(3);
+        return [(1 + row(0) / w) * width / 2, (1 - row(1) / w) * height / 2, -row(2) / 0.4];
+      };
+      for (let i = 0; i < count; i++) {
+        [x[i], y[i], z[i]] = place(points, 3 * i);
+        const n = normals.subarray(3 * i, 3 * i + 3), side = Math.sign(dot(n, eye)) || 1;
+        shade[i] = 0.7 + 0.3 * Math.max(side * dot(n, raw) / size / 127, 0);
+      }
+      for (let k = 0; k < triangles.length; k += 3) {
+        const [a, b, c] = triangles.subarray(k, k + 3), depth = (z[a] + z[b] + z[c]) / 3;
+        if (depth <= cut) items.push([depth, () => {
+          const t = Math.min(255, (values[a] + values[b] + values[c]) / 771 | 0), s = (shade[a] + shade[b] + shade[c]) / 3;
+          const outside = levels[a] + levels[b] + levels[c] < 3 * 65535 * view.least;
+          const rgb = [0, 1, 2].map(j => colours[4 * t + j]).map(own =>
+            Math.round(s * (outside ? own + PALENESS * (255 * view.pale - own) : own)));
+          context.fillStyle = context.strokeStyle = `rgb(${rgb})`;
+          context.lineWidth = 0.7 * scale;
+          context.beginPath();
+          for (const i of [a, b, c]) context.lineTo(x[i], y[i]);
+          context.closePath();
+          context.fill();
+          context.stroke();
+        }]);
+      }
+      for (const { width: pixels, segments } of lines)
+        for (let k = 0; k < segments.length; k += 6) {
+          const a = place(segments, k), b = place(segments, k + 3), depth = (a[2] + b[2]) / 2;
+          if (depth <= cut) items.push([depth + 0.02, () => {
+            context.strokeStyle = `rgba(255, 255, 255, ${pixels < 1.5 ? 0.45 : 0.9})`;
+            context.lineWidth = pixels * scale;
+            context.beginPath();
+            context.moveTo(a[0], a[1]);
+            context.lineTo(b[0], b[1]);
+            context.stroke();
+          }]);
+        }
+      const { most, least, unit } = dotSizes(width, height, scale);
+      for (let k = 0; view.dots && k < samples.length; k += 3) {
+        const p = place(samples, k), own = unit * widths[k / 3], across = Math.min(most, Math.max(least, own));
+        const ink = Math.max(0.03, Math.min(1, (own / across) ** 2));
+        if (p[2] <= cut) items.push([p[2] + 0.02, () => {
+          context.beginPath();
+          context.arc(p[0], p[1], 0.4 * across, 0, 7);
+          context.fillStyle = `rgba(255, 255, 255, ${0.85 * ink})`;
+          context.strokeStyle = `rgba(26, 26, 26, ${0.8 * ink})`;
+          context.lineWidth = 0.15 * across;
+          context.fill();
+          context.stroke();
+        }]);
+      }
+      context.clearRect(0, 0, width, height);
+      for (const [, paint] of items.sort((a, b) => a[0] - b[0])) paint();
+    };
+  }
+
+  const tags = data.labels.map(({ text }) => {
+    const tag = document.createElement("div");
+    tag.className = "label";
+    tag.textContent = text;
+    canvas.parentElement.append(tag);
+    return tag;
+  });
+  function placeLabels(width, height) {
+    const m = matrix(width, height), { eye } = frame();
+    data.labels.forEach(({ at }, k) => {
+      const row = i => m[i] * at[0] + m[4 + i] * at[1] + m[8 + i] * at[2] + m[12 + i], w = row(3);
+      tags[k].style.left = `${50 * (1 + row(0) / w)}%`;
+      tags[k].style.top = `${50 * (1 - row(1) / w)}%`;
+      // of a sphere the eye sees what is above 1 / data.eye of its radius
+      tags[k].style.visibility = data.eye * dot(at, eye) > 0.96 * Math.hypot(...at) ? "visible" : "hidden";
+    });
+  }
+
+  const gl = plain ? null : canvas.getContext("webgl2");
+  const draw = gl ? webglDrawer(gl) : canvasDrawer(canvas.getContext("2d"));
+  let asked = false;
+  function redraw() {
+    if (asked) return;
+    asked = true;
+    requestAnimationFrame(paint);
+  }
+  function paint() {
+    asked = false;
+    const scale = window.devicePixelRatio || 1;
+    const width = Math.max(1, Math.round(canvas.clientWidth * scale)), height = Math.max(1, Math.round(canvas.clientHeight * scale));
+    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+    draw(width, height, scale);
+    placeLabels(width, height);
+  }
+  function turn(dx, dy) {
+    view.yaw -= dx;
+    view.pitch = Math.max(-Math.PI / 2, Math.min(Math.PI / 2, view.pitch + dy));
+    redraw();
+  }
+  function zoom(factor) { view.zoom = Math.max(0.4, Math.min(8, view.zoom * factor)); redraw(); }
+
+  const held = new Map();
+  const spread = () => { const [a, b] = [...held.values()]; return Math.hypot(a.x - b.x, a.y - b.y); };
+  canvas.addEventListener("pointerdown", e => { canvas.setPointerCapture(e.pointerId); held.set(e.pointerId, { x: e.clientX, y: e.clientY }); });
+  canvas.addEventListener("pointermove", e => {
+    const last = held.get(e.pointerId);
+    if (!last) return;
+    const before = held.size === 2 ? spread() : 0, per = 3 / canvas.clientHeight / Math.sqrt(view.zoom);
+    if (held.size === 1) turn((e.clientX - last.x) * per, (e.clientY - last.y) * per);
+    held.set(e.pointerId, { x: e.clientX, y: e.clientY });
+    if (before > 0) zoom(spread() / before);
+  });
+  for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, e => held.delete(e.pointerId));
+  canvas.addEventListener("wheel", e => { if (scrolls && !e.ctrlKey) return; e.preventDefault(); zoom(Math.exp(-0.0015 * e.deltaY)); }, { passive: false });
+  canvas.addEventListener("keydown", e => {
+    const step = 0.1, moves = {
+      ArrowLeft: () => turn(-step, 0), ArrowRight: () => turn(step, 0), ArrowUp: () => turn(0, -step), ArrowDown: () => turn(0, step),
+      "+": () => zoom(1.15), "=": () => zoom(1.15), "-": () => zoom(1 / 1.15), 0: () => { Object.assign(view, data.start, { zoom: 1 }); changed(view); redraw(); },
+    };
+    if (!moves[e.key] || e.ctrlKey || e.metaKey) return;
+    e.preventDefault();
+    moves[e.key]();
+  });
+  // at once: a frame later the old picture would have been stretched to the new size
+  const observer = new ResizeObserver(paint);
+  observer.observe(canvas);
+  return { view, redraw, stop: () => { observer.disconnect(); for (const tag of tags) tag.remove(); } };
+}
+
+/** Fill an element with the bar of a surface's colours and its ticks. */
+export function showBar(bar, data) {
+  const colours = unpack(data.colours, Uint8Array), stops = [];
+  for (let k = 0; k < 256; k += 5) stops.push(`rgb(${colours.subarray(4 * k, 4 * k + 3)})`);
+  bar.style.background = `linear-gradient(to top, ${stops})`;
+  bar.replaceChildren(...data.ticks.map(({ at, text }) => {
+    const tick = document.createElement("span");
+    tick.style.bottom = `${100 * at}%`;
+    tick.textContent = text;
+    return tick;
+  }));
+}

@@ -1,0 +1,141 @@
+"""The web application: its pages, what it tells about itself, and how it says what went wrong."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter, FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import FileResponse, JSONResponse
+from fastapi.staticfiles import StaticFiles
+from starlette.exceptions import HTTPException
+
+from orbiflow import __version__
+from orbiflow.drawing import PALETTES
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import find
+from orbiflow.studio import density_routes, picture_routes, project_routes, tile_routes
+from orbiflow.studio.animals import ANIMALS, animal_file
+from orbiflow.studio.closeup_routes import closeup_routes
+from orbiflow.studio.guard import Guard, Refused
+from orbiflow.studio.hub import Hub
+from orbiflow.studio.kinds_of_work import KINDS, kind_of_work, own_schema
+from orbiflow.studio.requests import Here, Studio
+from orbiflow.studio.settings import Limits
+from orbiflow.studio.store import Missing, Store
+from orbiflow.studio.work_queue import WorkQueue
+
+STATIC = Path(__file__).parent / "static"
+SETTLED_EVERY = 20.0  # seconds
+MAX_PIXELS = 40_000_000  # of a picture that is read
+log = logging.getLogger("orbiflow.studio")
+
+
+def create_app(
+    store: Store,
+    queue: WorkQueue,
+    limits: Limits | None = None,
+    *,
+    port: int = 8437,
+    token: str = "",
+) -> Guard:
+    """Return the application as a server runs it, behind its guard.
+
+    Args:
+        store: Where projects are kept.
+        queue: What does their work; it begins and ends with the application.
+        limits: What is taken at most.
+        port: The port by which browsers know the server.
+        token: What clients must bring, where others than this machine may reach the server.
+    """
+    limits = limits or Limits()
+    hub = Hub(store)
+
+    @asynccontextmanager
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        hub.open(asyncio.get_running_loop())
+        for kind in KINDS.values():  # no request waits for imports
+            find(kind.work)
+            find(kind.makes or kind.work)
+        queue.start()
+        settling = asyncio.create_task(_settle(store))
+        yield
+        settling.cancel()
+        hub.close()
+        await asyncio.to_thread(queue.close)
+        store.close()
+
+    app = FastAPI(
+        title="orbiflow studio", lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None
+    )
+    app.state.studio = Studio(store, queue, hub, limits)
+    app.include_router(routes, prefix="/api")
+    app.include_router(closeup_routes(store, queue, hub), prefix="/api")
+    for module in (density_routes, project_routes, tile_routes, picture_routes):
+        app.include_router(module.routes, prefix="/api")
+    app.mount("/", StaticFiles(directory=STATIC, html=True))
+    for kind in (Refused, OrbiflowError, RequestValidationError, HTTPException, Exception):
+        app.add_exception_handler(kind, _told)
+    return Guard(app, limits, port=port, token=token)
+
+
+async def _settle(store: Store) -> None:
+    """Let the store settle now and then."""
+    while True:
+        await asyncio.sleep(SETTLED_EVERY)
+        await asyncio.to_thread(store.settle)
+
+
+routes = APIRouter()
+
+
+@routes.get("/about")
+async def about(here: Here) -> dict[str, Any]:
+    """Return what the pages need to know of the studio."""
+    limits = here.limits
+    return {
+        "version": __version__,
+        "limits": {"bytes": limits.upload, "pixels": MAX_PIXELS, "projects": limits.projects},
+        "animals": [
+            {"name": name, "title": title, "picture": f"/api/animals/{name}.png"}
+            for name, title in ANIMALS.items()
+        ],
+        "palettes": [{"name": name, **own._asdict()} for name, own in PALETTES.items()],
+        "efforts": ["fast", "normal", "best"],
+    }
+
+
+@routes.get("/animals/{name}.png")
+async def animal(name: str) -> FileResponse:
+    """Return the picture of an animal."""
+    return FileResponse(animal_file(name))
+
+
+@routes.get("/operations/{name}/schema")
+async def schema(name: str) -> dict[str, Any]:
+    """Return the settings of a task."""
+    kind = kind_of_work(name)
+    return own_schema(find(kind.makes or kind.work))
+
+
+async def _told(_request: Request, error: Exception) -> JSONResponse:
+    """Answer what went wrong in words, without paths or insides."""
+    if isinstance(error, Refused):
+        return JSONResponse({"error": error.text}, error.status)
+    if isinstance(error, Missing):
+        return JSONResponse({"error": str(error)}, 404)
+    if isinstance(error, OrbiflowError):
+        return JSONResponse({"error": str(error)}, 422)
+    if isinstance(error, RequestValidationError):
+        return JSONResponse({"error": "this address is not complete; reload the page"}, 422)
+    if isinstance(error, HTTPException):
+        words = {404: "there is nothing here; go back to the start page"}
+        text = words.get(error.status_code, "this request cannot be answered; reload the page")
+        return JSONResponse({"error": text}, error.status_code)
+    log.error("a request failed", exc_info=error)
+    return JSONResponse({"error": "something went wrong in the studio; reload the page"}, 500)

@@ -1,0 +1,150 @@
+"""What browsers ask of densities: upload a table, and what a fit shows.
+
+Fits and take-aways are tasks like any others: "density fit", "density map" and "density take".
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter, Request
+from fastapi.responses import FileResponse, JSONResponse, Response
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.studio.density_files import (
+    ENDINGS,
+    FIT,
+    SURFACE,
+    TABLE,
+    VIEW,
+    ending_of,
+    fit_folder,
+    map_file,
+)
+from orbiflow.studio.guard import Refused
+from orbiflow.studio.requests import Here, Studio, body_object, save_body
+from orbiflow.studio.words import NAMES, plain_name
+
+EXAMPLES = {
+    "backbone": ("Bends of a protein chain", "Two angles at each link, phi and psi: a doughnut."),
+    "sidechain": ("Bends with a side arm", "Three angles: choose which two you see."),
+    "poles": ("Old magnetic poles", "The Earth's magnet flips, so both ends count as one."),
+    "patches": ("Tiny bits of photographs", "How edges lie in 3 by 3 dots: a Klein bottle."),
+}
+"""Tables that anybody may try: a title, and what they are."""
+
+TABLES = Path(__file__).parent / "tables"
+SCRIPT = Path(__file__).parents[1] / "density" / "pictures" / "surface.js"
+MOST_AXES = 64
+TASKS = ("density table", "density fit", "density map", "density take")
+UNNAMED = (NAMES["density"], "My table")
+
+routes = APIRouter()
+
+
+@routes.get("/density/surface.js")
+async def script() -> FileResponse:
+    """Serve the script that turns surfaces, here and in the page that a plot writes."""
+    return FileResponse(SCRIPT, media_type="text/javascript")
+
+
+@routes.get("/projects/{project}/density")
+async def density(project: str, here: Here) -> dict[str, Any]:
+    """Tell of a project's table, of what is fitted to it, and of tables to try."""
+    home, table, fit = _home(here, project), None, None
+    if (home / TABLE).is_file():
+        table = json.loads((home / TABLE).read_text())
+    with suppress(OrbiflowError):
+        own = fit_folder(home)
+        view = json.loads((own / VIEW).read_text())
+        fit = {"number": int(own.name), **view, **_report(own)}
+    titles = [{"name": name, "title": t, "about": about} for name, (t, about) in EXAMPLES.items()]
+    return {"table": table, "fit": fit, "examples": titles}
+
+
+@routes.put("/projects/{project}/density/table")
+async def upload(request: Request, project: str, here: Here, name: str = "") -> dict[str, Any]:
+    """Take a table."""
+    called = plain_name(name, "table.csv")
+    file = _home(here, project) / f"table{ending_of(called)}"
+    await save_body(request, file)
+    return _new_table(here, project, file, called)
+
+
+@routes.post("/projects/{project}/density/example")
+async def example(request: Request, project: str, here: Here) -> dict[str, Any]:
+    """Take a table of ours."""
+    name = (await body_object(request)).get("name")
+    if not isinstance(name, str) or name not in EXAMPLES:
+        raise OrbiflowError(f"there is no such example; there are {', '.join(EXAMPLES)}")
+    file = _home(here, project) / "table.csv"
+    shutil.copyfile(TABLES / f"{name}.csv", file)
+    return _new_table(here, project, file, f"{EXAMPLES[name][0]}.csv")
+
+
+@routes.get("/projects/{project}/density/{fit}/surface")
+async def surface(project: str, fit: int, here: Here) -> Response:
+    """Give what the script draws."""
+    return _document(fit_folder(_home(here, project), fit) / SURFACE)
+
+
+@routes.get("/projects/{project}/density/{fit}/map")
+async def flat(project: str, fit: int, here: Here, axes: str = "0") -> Response:
+    """Give the density on a grid, of one angle or of two."""
+    chosen = axes.split("-")
+    if len(chosen) > 2 or not all(a.isdecimal() and int(a) < MOST_AXES for a in chosen):
+        raise Refused(404, "a map is of one or two angles, such as 0-1")
+    return _document(map_file(fit_folder(_home(here, project), fit), tuple(map(int, chosen))))
+
+
+def _home(here: Studio, project: str) -> Path:
+    if here.store.project(project)["kind"] != "density":
+        raise Refused(404, "this project is no density; start one with a table")
+    return here.store.home(project)
+
+
+def _new_table(here: Studio, project: str, file: Path, name: str) -> dict[str, Any]:
+    """Forget what was made of an earlier table, and look at this one."""
+    here.queue.forget(project, *TASKS)
+    home, own = here.store.home(project), here.store.project(project)
+    for old in (home / TABLE, *(home / f"table{ending}" for ending in ENDINGS)):
+        if old != file:
+            old.unlink(missing_ok=True)
+    shutil.rmtree(home / "fits", ignore_errors=True)
+    changes: dict[str, Any] = {"input": {"name": name, "type": file.suffix.lstrip(".")}}
+    before = Path(own["input"]["name"]).stem if own["input"] else name
+    if own["name"] in (*UNNAMED, before):
+        changes["name"] = Path(name).stem
+    here.store.change(project, **changes)
+    return here.submit(project, "density table", {})
+
+
+def _document(file: Path) -> Response:
+    """Return a file of JSON, or null if nobody has drawn it yet."""
+    drawn = file.is_file()
+    return FileResponse(file, media_type="application/json") if drawn else JSONResponse(None)
+
+
+def _report(fit: Path) -> dict[str, Any]:
+    """Return what a page says of a fit: its mean log density, over which rows, and its components."""
+    document = json.loads((fit / FIT / "report.json").read_text())
+    report, likelihood = document["report"], document["log_likelihood"]
+    return {
+        "likelihood": {
+            "mean": likelihood["natural"],
+            "rows": likelihood["natural_rows"],
+            "uniform": likelihood["uniform"],
+        },
+        "held_out": {
+            "rows": report["validation"],
+            "gain": report["start_nll"] - report["validation_nll"],
+        },
+        "weights": report["weights"],
+        "components": report["components"],
+        "notes": report["notes"],
+        "seconds": document["seconds"],
+    }

@@ -1,0 +1,251 @@
+"""What the studio's workers do for densities: read a table, fit, draw, write what is taken away."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from orbiflow.errors import SettingError
+from orbiflow.runtime import (
+    NEVER,
+    Call,
+    Cancel,
+    Event,
+    Note,
+    Outcome,
+    Progress,
+    Sink,
+    find,
+    ignore,
+    make_folder,
+    operation,
+    write_atomic,
+)
+from orbiflow.settings import OnlyWith, Range, Settings
+from orbiflow.studio.density_files import (
+    FIT,
+    MAX_SHOWN,
+    SURFACE,
+    TABLE,
+    VIEW,
+    fit_folder,
+    map_file,
+    table_file,
+)
+
+if TYPE_CHECKING:
+    from orbiflow.density import Density
+
+SURFACE_CELLS = 120
+FITTED = 0.9
+"""Share of the work that is done when a density is fitted, and its pictures are to be made."""
+
+
+class FitChoice(Settings, group="Density"):
+    """What a density is fitted to."""
+
+    space: Literal["torus", "sphere", "projective-plane", "klein-bottle"]
+    """Where the rows live."""
+
+    columns: tuple[str, ...]
+    """Columns of the table."""
+
+    unit: Literal["degrees", "radians", "turns"] | None = None
+    """Unit of angles."""
+
+    def check(self) -> None:
+        """Check that there are columns, few enough to draw."""
+        if not 0 < len(self.columns) <= MAX_SHOWN:
+            raise SettingError(f"{{columns}} must be 1 to {MAX_SHOWN} names of columns")
+
+
+@operation("studio table")
+def table(project: Path, task: int, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> Outcome:
+    """Look at the table of a project.
+
+    Args:
+        project: The project's folder.
+        task: The number of the task.
+    """
+    del task
+    on_event(Progress(0.1, "reading the table"))
+
+    from orbiflow.studio.density_table import table_view
+
+    view = table_view(table_file(project))
+    cancel.check()
+    _write(project / TABLE, view)
+    return Outcome({"rows": view["rows"], "columns": len(view["columns"])})
+
+
+@operation("studio density")
+def density(
+    project: Path, task: int, choice: FitChoice, *, on_event: Sink = ignore, cancel: Cancel = NEVER
+) -> Outcome:
+    """Fit a density to columns of a project's table, and draw it.
+
+    Args:
+        project: The project's folder.
+        task: The number of the task.
+    """
+    if not (project / TABLE).is_file():
+        raise SettingError("this table was not read; upload another one")
+    folder = make_folder(project / "fits" / str(task))
+    data = table_file(project)
+    asked = {"data": data, "out": folder / FIT, "drop_missing": True, **choice.to_json()}
+    call = find("density fit").call(asked)
+    told = _part(on_event, 0.0, FITTED)
+    call.operation.function(**call.arguments, on_event=told, cancel=cancel)
+    cancel.check()
+    view = _view(folder, data, choice, _part(on_event, FITTED, 1.0))
+    cancel.check()
+    _write(folder / VIEW, view)
+    for other in (project / "fits").iterdir():
+        if other.name != folder.name:
+            shutil.rmtree(other, ignore_errors=True)
+    return Outcome({"fit": task, "rows": view["rows"]})
+
+
+def _view(folder: Path, data: Path, choice: FitChoice, tell: Sink) -> dict[str, Any]:
+    """Return what a page shows of a fit, and write the files of its surface and its map."""
+    from orbiflow.density import PlotSettings, flat_data, flat_frame, read_table, surface_data
+
+    fitted = _model(folder)
+    space, names = fitted.space, choice.columns
+    tell(Progress(0.0, "drawing"))
+    rows = read_table(data, columns=names, width=None, drop_missing=True).values
+    points = space.to_chart(rows)
+    if space.is_planar:
+        surface = surface_data(
+            fitted, PlotSettings(names=names, dots=True), samples=points, resolution=SURFACE_CELLS,
+            levels=True,
+        )  # fmt: skip
+        _write(folder / SURFACE, surface)
+    tell(Progress(0.5, "drawing"))
+    axes = tuple(range(min(2, space.dim)))
+    _write(map_file(folder, axes), flat_data(fitted, axes if space.dim > 1 else None))
+    return {
+        "space": space.name,
+        "columns": list(names),
+        "unit": space.unit,
+        "angles": space.dim if space.is_torus else 0,
+        "surface": space.is_planar,
+        "rows": len(rows),
+        **flat_frame(fitted, names, points),
+    }
+
+
+@operation("studio density map")
+def density_map(
+    project: Path,
+    task: int,
+    fit: Annotated[int, Range(1)],
+    axes: tuple[Annotated[int, Range(0, MAX_SHOWN)], ...],
+    *,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Find the density of two angles of a fit, whatever the others are, on a grid.
+
+    Args:
+        project: The project's folder.
+        task: The number of the task.
+        fit: The number of the fit.
+        axes: The numbers of the angles, from 0.
+    """
+    del task
+    folder = fit_folder(project, fit)
+    on_event(Progress(0.1, "finding the density of these two angles"))
+
+    from orbiflow.density import flat_data
+
+    found = flat_data(_model(folder), axes)
+    cancel.check()
+    _write(map_file(folder, axes), found)
+    return Outcome({"fit": fit, "axes": list(axes)})
+
+
+class TakeChoice(Settings, group="Take away"):
+    """What is taken away of a density."""
+
+    what: Literal["model", "samples", "figures", "regions"]
+    """Model: the density itself. Samples: new rows. Figures: pictures. Regions: the smallest outlines
+    that hold a mass."""
+
+    count: Annotated[int, Range(1, 1_000_000), OnlyWith(what=("samples",))] = 1000
+    """Number of samples."""
+
+    format: Annotated[Literal["png", "svg", "pdf"], OnlyWith(what=("figures",))] = "png"
+    """Format of the figures."""
+
+    mass: Annotated[
+        tuple[Annotated[float, Range(above=0, below=1)], ...], OnlyWith(what=("regions",))
+    ] = (0.5, 0.9)
+    """Masses of the regions."""
+
+    def call(self, model: Path, data: Path, columns: list[str], out: Path) -> Call:
+        """Return the call that writes samples, figures or regions into a folder."""
+        if self.what == "samples":
+            given: dict[str, Any] = {"out": out / "samples.csv", "count": self.count}
+        elif self.what == "regions":
+            given = {"out": out / "regions.json", "mass": self.mass}
+        else:
+            given = {"out": out, "format": self.format, "data": data, "columns": columns}
+            given |= {"drop_missing": True, "dots": True}
+        name = {"samples": "sample", "regions": "region", "figures": "plot"}[self.what]
+        return find(f"density {name}").call({**given, "model": model})
+
+
+@operation("studio density take")
+def take(
+    project: Path,
+    task: int,
+    fit: int,
+    choice: TakeChoice,
+    *,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Write what a user takes away of a density.
+
+    Args:
+        project: The project's folder.
+        task: The number of the task.
+        fit: The number of the fit.
+    """
+    source, out = fit_folder(project, fit), make_folder(project / "exports" / str(task))
+    if choice.what == "model":
+        for file in (source / FIT).iterdir():
+            write_atomic(out / file.name, file.read_bytes())
+    else:
+        columns = json.loads((source / VIEW).read_text())["columns"]
+        call = choice.call(source / FIT, table_file(project), columns, out)
+        call.operation.function(**call.arguments, on_event=_part(on_event), cancel=cancel)
+    written = sorted(file for file in out.iterdir() if file.is_file())
+    files = [{"name": file.name, "bytes": file.stat().st_size} for file in written]
+    return Outcome({"takeaway": task, "what": choice.what, "files": files, "preview": False})
+
+
+def _model(folder: Path) -> Density:
+    from orbiflow.density import read_density
+
+    return read_density(folder / FIT / "density.safetensors")[0]
+
+
+def _write(path: Path, document: dict[str, Any]) -> None:
+    write_atomic(path, json.dumps(document, allow_nan=False))
+
+
+def _part(tell: Sink, begin: float = 0.0, end: float = 1.0) -> Callable[[Event], None]:
+    """Return a sink that tells an operation's progress as that of a part, and its notes."""
+
+    def told(event: Event) -> None:
+        if isinstance(event, Progress):
+            tell(Progress(begin + (end - begin) * event.share, event.what))
+        elif isinstance(event, Note):
+            tell(event)
+
+    return told

@@ -1,0 +1,140 @@
+"""The kinds of task that a project can have, and the call that a worker is given for each."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from orbiflow.errors import OrbiflowError, SettingError, literal
+from orbiflow.kinds import PathKind
+from orbiflow.runtime import Call, Operation, find
+from orbiflow.settings import Field, FileSettings, Hidden, OnlyWith
+
+OWN = ("project", "task", "force", "workers", "tile", "picture")
+"""Parameters of operations that the server sets, or nobody."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of task.
+
+    - `work`: The operation that does it, in `orbiflow.commands.WORK`, with parameters `project` (the
+      project's folder) and `task` (the task's number, from which it numbers what it makes).
+    - `lane`: "quick" for what somebody waits for; it waits for no search.
+    - `makes`: Of a take-away, the operation that writes it.
+    """
+
+    work: str
+    lane: Literal["quick", "long"] = "long"
+    makes: str = ""
+
+    def call(self, home: Path, task: int, settings: Mapping[str, Any]) -> Call:
+        """Return the call of a task.
+
+        Raises:
+            SettingError: For settings that cannot be used.
+        """
+        place = {"project": home, "task": task}
+        if not self.makes:
+            if taken := [name for name in place if name in settings]:
+                raise SettingError(f"the studio itself sets {taken[0]}; leave it out")
+            return find(self.work).call({**place, **settings})
+        own = {name: settings[name] for name in ("tile", "picture", "drawing") if name in settings}
+        rest = {name: value for name, value in settings.items() if name not in own}
+        making_call(self.makes, rest, Path("tile"))
+        return find(self.work).call(
+            {**place, **own, "makes": self.makes, "settings": json.dumps(rest)}
+        )
+
+
+DRAWN = ("export", "art")
+"""What shows the drawing on a tile."""
+
+ART_FORMATS = ("png", "svg")
+"""The endings of a picture's file, whose settings have no format."""
+
+KINDS = {
+    "read": Kind("studio read", "quick"),
+    "open": Kind("studio open", "quick"),
+    "search": Kind("studio search"),
+    "space": Kind("studio space", "quick"),
+    "pull": Kind("studio pull", "quick"),
+    "export": Kind("studio take", makes="export"),
+    "art": Kind("studio take", makes="art"),
+    "solid": Kind("studio take", makes="solid"),
+    "animate": Kind("studio take", makes="animate"),
+    "density table": Kind("studio table", "quick"),
+    "density fit": Kind("studio density"),
+    "density map": Kind("studio density map", "quick"),
+    "density take": Kind("studio density take"),
+}
+
+
+def kind_of_work(operation: str) -> Kind:
+    """Return the kind of task of a name."""
+    if operation not in KINDS:
+        raise OrbiflowError(f"there is no such task; there are {', '.join(KINDS)}")
+    return KINDS[operation]
+
+
+def own_fields(operation: Operation) -> list[Field]:
+    """Return the settings of an operation that make sense in the studio."""
+    return [
+        entry
+        for entry in operation.fields
+        if entry.name == "format"
+        or not (entry.is_of(PathKind) or entry.of_class(Hidden) or entry.name in OWN)
+    ]
+
+
+def own_schema(operation: Operation) -> dict[str, Any]:
+    """Return the JSON Schema of what a browser may set of an operation."""
+    properties = {
+        entry.name: {
+            **entry.schema,
+            "x-group": entry.group,
+            "x-default": entry.default_text,
+            "x-only-with": {
+                name: list(values)
+                for rule in entry.rules
+                if isinstance(rule, OnlyWith)
+                for name, values in rule.others.items()
+            },
+        }
+        for entry in own_fields(operation)
+    }
+    if operation.name == "art":
+        properties["format"] = {
+            "enum": list(ART_FORMATS),
+            "default": ART_FORMATS[0],
+            "description": "Format of the file.",
+        }
+    return {**operation.schema, "properties": properties, "required": []}
+
+
+def making_call(makes: str, settings: Mapping[str, Any], result: Path, **files: Any) -> Call:
+    """Return the call that writes a take-away with settings from a browser.
+
+    Raises:
+        SettingError: For a setting that the studio does not take, or a value that is not allowed.
+    """
+    made = find(makes)
+    own = dict(settings)
+    if makes == "art" and own.pop("format", "png") not in ART_FORMATS:
+        raise SettingError(f"{{format}} must be {' or '.join(ART_FORMATS)}")
+    known = {entry.name for entry in own_fields(made)}
+    if strange := [name for name in own if name not in known]:
+        names = literal(", ".join(sorted(known)))
+        raise SettingError(f"{makes} takes {names} here, not {literal(strange[0])}")
+    return made.call({"result": result, **own, **files})
+
+
+def file_ending(makes: str, settings: Mapping[str, Any], result: Path) -> str:
+    """Return the ending of the file that a call with these settings writes."""
+    own = making_call(makes, settings, result).arguments["settings"]
+    if isinstance(own, FileSettings):
+        return own.file_format
+    return settings.get("format", ART_FORMATS[0])

@@ -1,0 +1,82 @@
+"""The operation that starts the studio."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+import threading
+import webbrowser
+from contextlib import suppress
+from importlib.util import find_spec
+from pathlib import Path
+
+from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.runtime import NEVER, Cancel, Note, Outcome, Sink, ignore, operation
+from orbiflow.studio.settings import StudioSettings
+
+EXTRA = ("fastapi", "uvicorn", "platformdirs")
+
+
+@operation("studio", starts_processes=True)
+def studio(
+    settings: StudioSettings = StudioSettings(), *, on_event: Sink = ignore, cancel: Cancel = NEVER
+) -> Outcome:
+    """Make tiles and densities in a browser: a web page that this very machine serves.
+
+    Projects are kept, and searches that were not done go on when the studio is started again. The
+    server ends with Ctrl-C.
+    """
+    missing = [name for name in EXTRA if find_spec(name) is None]
+    if missing:
+        raise OrbiflowError(
+            f"the studio needs {', '.join(missing)}; install them with: pip install 'orbiflow[studio]'"
+        )
+    token = "" if settings.is_local else secrets.token_urlsafe(24)
+    folder = settings.data or _usual_folder()
+
+    from filelock import FileLock, Timeout
+
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        with FileLock(folder / "studio.lock", timeout=0):
+            _serve(settings, folder, token, on_event, cancel)
+    except Timeout:
+        raise OrbiflowError(
+            f"another studio is using {folder}; open its page, or give another folder as data"
+        ) from None
+    return Outcome({"folder": str(folder)})
+
+
+def _usual_folder() -> Path:
+    from platformdirs import user_data_path
+
+    return user_data_path("orbiflow") / "studio"
+
+
+def _serve(
+    settings: StudioSettings, folder: Path, token: str, on_event: Sink, cancel: Cancel
+) -> None:
+    """Run the server until it is told to stop."""
+    from orbiflow.studio.app import create_app
+    from orbiflow.studio.serving import serve
+    from orbiflow.studio.store import Store
+    from orbiflow.studio.work_queue import WorkQueue
+
+    cancel.check()
+    host = f"[{settings.host}]" if ":" in settings.host else settings.host
+    address = f"http://{host}:{settings.port}/" + (f"?token={token}" if token else "")
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    try:
+        own = socket.create_server((settings.host, settings.port), family=family, backlog=256)
+    except OSError as error:
+        raise SettingError(
+            f"{settings.host} {{port}} {settings.port} cannot be had ({error.strerror}); give another "
+            "{port}"
+        ) from error
+    store = Store(folder)
+    app = create_app(store, WorkQueue(store), port=settings.port, token=token)
+    on_event(Note(f"the studio is at {address} and keeps its projects in {folder}; Ctrl-C ends it"))
+    if settings.browser:
+        threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+    with own, suppress(KeyboardInterrupt):
+        serve(app, own)

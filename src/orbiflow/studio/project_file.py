@@ -1,0 +1,189 @@
+"""A project as one file, NAME.orbiflow: to keep, to give away, and to go on with in Python.
+
+It is a zip archive with project.json, the picture as it was uploaded, what was painted over it, and a
+folder for each tile as `EscherTile.save` writes it. What a browser shows is made anew when a file is
+opened: the picture is read again, and each tile is certified again, so a file needs no trust.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from orbiflow.arguments import as_path
+from orbiflow.errors import InputFileError, OrbiflowError, system_errors
+from orbiflow.runtime import is_object
+from orbiflow.studio.tile_files import PLACES, best_stage, tile_folder
+from orbiflow.studio.words import MASKS
+
+if TYPE_CHECKING:
+    from orbiflow.tiles import EscherTile, Target
+
+FORMAT = "orbiflow-project/1"
+PROJECT, ENDING = "project.json", ".orbiflow"
+INPUT = re.compile(r"input\.[a-z0-9]{1,7}")
+TILE = re.compile(r"tiles/([1-9][0-9]{0,14})/(result\.json|[A-Za-z0-9-]{1,20}/model\.safetensors)")
+MOST_VIEW = 200_000  # characters of what pages remember of a project
+MOST_ENTRIES = 3 * PLACES
+MOST_BYTES = 512 * 2**20  # of all entries, unpacked
+MOST_OF_ONE = 64 * 2**20
+DAMAGED = (zlib.error, EOFError, struct.error, KeyError, IndexError, TypeError, OverflowError)
+
+
+@dataclass(frozen=True, eq=False)
+class StudioProject:
+    """A project of the studio, read from its file.
+
+    - `name`: Its name.
+    - `target`: The silhouette; None if there was no picture yet.
+    - `tiles`: Its tiles, each certified again, best first.
+    - `numbers`: The number of each tile in the studio, and of the tile that it was made from by hand.
+    - `document`: What else the file says.
+    """
+
+    name: str
+    target: Target | None
+    tiles: tuple[EscherTile, ...]
+    numbers: tuple[tuple[int, int | None], ...]
+    document: Mapping[str, Any]
+
+
+def write_project(home: Path, document: Mapping[str, Any], out: Path) -> None:
+    """Write the files of a project, and what is known of it, into one file.
+
+    Args:
+        home: The project's folder.
+        document: Its name, kind, view and reading; its input's name; and `tiles`, each with its `id`
+            and `parent`.
+        out: The file.
+    """
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        archive.writestr(PROJECT, json.dumps({"format": FORMAT, **document}, allow_nan=False))
+        for file in [*home.glob("input.*"), *(home / f"{mask}.png" for mask in MASKS)]:
+            if file.exists():
+                archive.write(file, file.name, zipfile.ZIP_STORED)
+        for number in (tile["id"] for tile in document["tiles"]):
+            if best_stage(home, number) is None:
+                continue
+            folder = tile_folder(home, number)
+            for file in sorted(folder.rglob("*")):
+                if file.is_file():
+                    archive.write(file, f"tiles/{number}/{file.relative_to(folder).as_posix()}")
+
+
+def open_project(path: str | Path) -> StudioProject:
+    """Read a project's file.
+
+    Raises:
+        InputFileError: If it is not one, is damaged, or is too large.
+
+    >>> open_project("no such.orbiflow")
+    Traceback (most recent call last):
+    orbiflow.errors.InputFileError: no such.orbiflow: cannot be read: No such file or directory; ...
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        home = Path(folder)
+        document = unpack(as_path(path, "the project's file"), home)
+        found = read_tiles(home, document)
+        target = None
+        if next(home.glob("input.*"), None) is not None:
+            from orbiflow.studio.silhouette_file import read_input
+
+            target = read_input(home, *reading_of(document))
+        return StudioProject(
+            str(document["name"]),
+            target,
+            tuple(tile for tile, _, _ in found),
+            tuple((number, parent) for _, number, parent in found),
+            document,
+        )
+
+
+def unpack(path: Path, home: Path) -> dict[str, Any]:
+    """Unpack what is known of a project's file into an empty folder; return what project.json says.
+
+    Raises:
+        InputFileError: If it is not such a file, is damaged, or is too large.
+    """
+    cure = "give a file that the studio saved"
+    with system_errors(InputFileError, f"{path.name}: cannot be read", cure):
+        try:
+            with zipfile.ZipFile(path) as archive:
+                _unpack_entries(archive, home)
+            document = json.loads((home / PROJECT).read_text(encoding="utf-8"))
+        except (zipfile.BadZipFile, FileNotFoundError, NotImplementedError) as error:
+            if not path.exists():
+                raise
+            raise InputFileError(f"{path.name}: not a project of the studio; {cure}") from error
+        except (*DAMAGED, ValueError, RuntimeError) as error:
+            if isinstance(error, OrbiflowError):
+                raise
+            raise InputFileError(f"{path.name}: its contents are damaged; {cure}") from error
+    return _checked(document, path)
+
+
+def _unpack_entries(archive: zipfile.ZipFile, home: Path) -> None:
+    entries = archive.infolist()
+    if len(entries) > MOST_ENTRIES:
+        raise InputFileError(f"the project has {len(entries)} files; {MOST_ENTRIES} can be read")
+    left = MOST_BYTES
+    for entry in entries:
+        name = entry.filename
+        own = name == PROJECT or name in {f"{mask}.png" for mask in MASKS}
+        if not (own or INPUT.fullmatch(name) or TILE.fullmatch(name)):
+            continue  # of a later version, or of somebody else
+        # what an entry says of its size may be a lie: no more is read
+        with archive.open(entry) as source:
+            content = source.read(min(left, MOST_OF_ONE) + 1)
+        left -= len(content)
+        if len(content) > MOST_OF_ONE or left < 0:
+            raise InputFileError(f"the project is too large: {name} or all of it, unpacked")
+        place = home / name
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes(content)
+
+
+def _checked(document: object, path: Path) -> dict[str, Any]:
+    if not is_object(document) or document.get("format") != FORMAT:
+        raise InputFileError(f"{path.name}: not a project of the studio, or of a later version")
+    plain = {"name": str, "kind": str, "view": dict, "reading": dict, "tiles": list}
+    for name, kind in plain.items():
+        if not isinstance(document.setdefault(name, kind()), kind):
+            raise InputFileError(f"{path.name}: {name} in {PROJECT} is damaged")
+    if len(json.dumps(document["view"])) > MOST_VIEW:
+        raise InputFileError(f"{path.name}: its view is too large; save it again with less drawing")
+    return document
+
+
+def reading_of(document: Mapping[str, Any]) -> tuple[str, Any]:
+    """Return what the picture was called, and how it was read."""
+    from orbiflow.tiles import ReadingSettings
+
+    given = document.get("input")
+    called = given.get("name") if is_object(given) else None
+    return str(called or "picture")[:80], ReadingSettings(**document["reading"])
+
+
+def read_tiles(home: Path, document: Mapping[str, Any]) -> list[tuple[EscherTile, int, int | None]]:
+    """Return the certified tiles in an unpacked project, each with its number and its parent's."""
+    from orbiflow.tiles import EscherTile
+
+    found: list[tuple[EscherTile, int, int | None]] = []
+    for entry in document["tiles"][:PLACES]:
+        number = entry.get("id") if is_object(entry) else None
+        if type(number) is not int or not (home / "tiles" / str(number) / "result.json").is_file():
+            continue
+        tile = EscherTile.load(home / "tiles" / str(number))
+        tile.require_certified(otherwise="so the project cannot be opened; save it again")
+        tile = tile.changed(map_source=tile.map)  # its file may go
+        parent = entry.get("parent")
+        found.append((tile, number, parent if type(parent) is int else None))
+    return found

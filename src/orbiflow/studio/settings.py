@@ -1,0 +1,80 @@
+"""How the studio is started, and what it takes at most."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from orbiflow.settings import DefaultText, Option, Range, Settings
+
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+
+
+class StudioSettings(Settings, group="Server"):
+    """Where the studio is reached, and where it keeps its projects."""
+
+    port: Annotated[int, Range(1, 65535)] = 8437
+    """Port of the server."""
+
+    data: Annotated[Path | None, DefaultText("a folder of the user's for data")] = None
+    """Folder that keeps all projects, made if need be."""
+
+    browser: Annotated[bool, Option("--browser", off="--no-browser")] = True
+    """Open a browser."""
+
+    host: str = "127.0.0.1"
+    """Address that the server listens on. With another than this machine's own, whoever comes must
+    bring the token that is printed."""
+
+    @property
+    def is_local(self) -> bool:
+        """Whether only this machine reaches the server."""
+        return self.host in LOOPBACK
+
+
+class Limits(Settings):
+    """What the server takes at most."""
+
+    upload: Annotated[int, Range(1)] = 64 * 2**20
+    """Bytes of a file that is uploaded."""
+
+    message: Annotated[int, Range(1)] = 2 * 2**20
+    """Bytes of any other body."""
+
+    seconds: Annotated[float, Range(above=0)] = 20.0
+    """Longest wait for the next part of a body."""
+
+    slowest: Annotated[float, Range(0)] = 20_000.0
+    """Bytes a second of a body, on average after the longest wait."""
+
+    uploads: Annotated[int, Range(1)] = 16
+    """Bodies that are received at a time."""
+
+    projects: Annotated[int, Range(1)] = 1000
+    """Projects."""
+
+    waiting: Annotated[int, Range(1)] = 20
+    """Tasks of one project that are not done."""
+
+    streams: Annotated[int, Range(1)] = 100
+    """Streams of events at a time."""
+
+
+class SearchChoice(Settings, group="Search"):
+    """How tiles are searched for in the studio."""
+
+    effort: Literal["fast", "normal", "best"] = "normal"
+    """How long the search takes: seconds, a quarter of a minute, or minutes."""
+
+    objective: Literal["likeness", "overlap"] = "likeness"
+    """With likeness, the picture bends until it is a tile; with overlap, the tile covers the picture
+    as it is."""
+
+    classes: tuple[str, ...] | None = None
+    """Ways that the copies may lie, such as IH4 and IH6. Default: all that suit the picture."""
+
+    like: Annotated[int | None, Range(1)] = None
+    """Number of a tile: look longer, for more tiles whose copies lie like its copies."""
+
+    seed: Annotated[int, Range(0, 2**32 - 1)] = 0
+    """Start of the random numbers: another one gives other tiles."""

@@ -1,0 +1,166 @@
+"""The silhouette of a project: read from its input, mended by brush, and kept in a file."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from orbiflow.arrays import Array
+from orbiflow.errors import InputFileError
+from orbiflow.runtime import write_atomic
+from orbiflow.tiles import (
+    FileContent,
+    ReadingSettings,
+    Target,
+    doubts,
+    open_image,
+    parts_left_out,
+    polygons_in,
+)
+
+SILHOUETTE, BACKDROP, MEND = "silhouette.json", "backdrop.png", "mend.png"
+SIDE = 1200  # pixels of the backdrop's longer side
+SAMPLES = 3  # along each side of a pixel of what is drawn
+PAPER, INK = (255, 255, 255), (70, 78, 92)
+
+
+def input_file(home: Path) -> Path:
+    """Return the file that was uploaded."""
+    found = next(home.glob("input.*"), None)
+    if found is None:
+        raise InputFileError("there is no picture yet; choose one first")
+    return found
+
+
+def read_input(home: Path, called: str, reading: ReadingSettings) -> Target:
+    """Read a project's picture and write its backdrop and its silhouette."""
+    content = FileContent(input_file(home).read_bytes(), called)
+    target = Target.from_bytes(
+        content.data, called, threshold=reading.threshold, invert=reading.invert
+    ).smoothed(reading.smooth)
+    picture = _picture(target, content)
+    mended = _mended(target, home, picture.size)
+    data = io.BytesIO()
+    picture.save(data, "png")
+    write_atomic(home / BACKDROP, data.getvalue())
+    document = {"shown": _shown(mended, picture.size), "target": _stored(mended)}
+    write_atomic(home / SILHOUETTE, json.dumps(document, allow_nan=False))
+    return mended
+
+
+def load_target(home: Path) -> Target:
+    """Return the silhouette that was read last."""
+    try:
+        stored = json.loads((home / SILHOUETTE).read_text())["target"]
+    except FileNotFoundError:
+        raise InputFileError("there is no silhouette yet; choose a picture first") from None
+    stored["outline"] = np.array(stored["outline"])
+    stored["size"] = stored["size"] and tuple(stored["size"])
+    return Target(**{**stored, "corner": tuple(stored["corner"]), "notes": tuple(stored["notes"])})
+
+
+def _stored(target: Target) -> dict[str, Any]:
+    names = ("y_down", "kind", "size", "notes", "corner", "source")
+    return {"outline": target.outline.tolist(), **{name: getattr(target, name) for name in names}}
+
+
+def _frame(target: Target) -> tuple[Array, Array]:
+    """Return the corner of least coordinates and the size that the backdrop covers."""
+    if target.size is not None:
+        return np.array(target.corner), np.array(target.size)
+    low, high = target.outline.min(axis=0), target.outline.max(axis=0)
+    return low, high - low
+
+
+def _to_backdrop(target: Target, points: Array, size: tuple[int, int]) -> Array:
+    corner, extent = _frame(target)
+    at = (points - corner) / extent
+    if not target.y_down:
+        at = at * (1, -1) + (0, 1)
+    return at * size
+
+
+def _from_backdrop(target: Target, pixels: Array, size: tuple[int, int]) -> Array:
+    corner, extent = _frame(target)
+    at = pixels / size
+    if not target.y_down:
+        at = (at - (0, 1)) * (1, -1)
+    return at * extent + corner
+
+
+def _picture(target: Target, content: FileContent) -> Image.Image:
+    """Return the picture that the user is shown below the silhouette."""
+    if target.kind == "image":
+        picture, _ = open_image(content, enough=SIDE)
+        if picture.mode.startswith(("I", "F")):
+            levels = np.asarray(picture, dtype=np.float64)
+            picture = Image.fromarray((levels / max(1.0, levels.max()) * 255).astype(np.uint8))
+        picture = picture.convert("RGBA" if picture.has_transparency_data else "RGB")
+        picture.thumbnail((SIDE, SIDE))
+        return picture
+    _, extent = _frame(target)
+    width, height = np.maximum(1, np.round(extent * SIDE / extent.max())).astype(int).tolist()
+    return _drawn(target, (width, height), "RGB", INK, PAPER)
+
+
+def _drawn(target: Target, size: tuple[int, int], mode: str, ink: Any, paper: Any) -> Image.Image:
+    """Return what was read as shape, filled."""
+    width, height = finer = size[0] * SAMPLES, size[1] * SAMPLES
+    picture = Image.new(mode, (width, height), paper)
+    draw = ImageDraw.Draw(picture)
+
+    def points(ring: Any) -> list[tuple[float, ...]]:
+        # Pillow's whole numbers are the middles of pixels
+        return list(map(tuple, (_to_backdrop(target, np.asarray(ring), finer) - 0.5).tolist()))
+
+    for part in [] if target.seen is None else polygons_in(target.seen):
+        draw.polygon(points(part.exterior.coords), fill=ink)
+        for hole in part.interiors:
+            draw.polygon(points(hole.coords), fill=paper)
+    if target.seen is None:
+        draw.polygon(points(target.outline), fill=ink)
+    return picture.reduce(SAMPLES)
+
+
+def _mended(target: Target, home: Path, size: tuple[int, int]) -> Target:
+    """Return the silhouette with what was painted white added and what was painted black removed."""
+    file = home / MEND
+    if not file.exists():
+        return target
+    painted, _ = open_image(FileContent(file.read_bytes(), "the corrections"))
+    painted = painted.convert("RGBA").resize(size, Image.Resampling.NEAREST)
+    level, _, _, opacity = (np.asarray(band) > 127 for band in painted.split())
+    own = _drawn(target, size, "L", 255, 0)
+    mask = (np.asarray(own) > 127) & ~(opacity & ~level) | (opacity & level)
+    mask = np.pad(mask, 1)  # the shape may touch the picture's edge
+    if not mask.any():
+        raise InputFileError("nothing of the picture is left; paint some of it back")
+    found = Target.from_mask(mask, source=target.source)
+
+    def placed(ring: Array) -> Array:
+        return _from_backdrop(target, ring - 1, size)
+
+    notes = tuple(note for note in target.notes if not note.startswith("kept the largest"))
+    return replace(target, outline=placed(found.outline), notes=notes, seen=None)
+
+
+def _shown(target: Target, size: tuple[int, int]) -> dict[str, Any]:
+    """Return what a browser needs of the silhouette, in pixels of the backdrop."""
+
+    def pixels(ring: Any) -> list[list[float]]:
+        return np.round(_to_backdrop(target, np.asarray(ring), size), 2).tolist()
+
+    return {
+        "outline": pixels(target.outline),
+        "width": size[0],
+        "height": size[1],
+        "notes": list(target.notes),
+        "left_out": [pixels(part.exterior.coords) for part in parts_left_out(target)],
+        "doubts": doubts(target),
+    }

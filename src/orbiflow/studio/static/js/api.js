@@ -1,0 +1,46 @@
+/** Calls to the server. Whatever fails is a `Refusal` with one plain sentence. */
+
+import { sentence } from "./words.js";
+
+export const client = crypto.getRandomValues(new Uint32Array(2)).join("");
+
+export class Refusal extends Error {
+  constructor(message, status) {
+    super(message);
+    this.status = status;
+  }
+}
+
+async function call(method, path, body, { signal } = {}) {
+  const headers = { "X-Orbiflow": "1", "X-Orbiflow-Client": client };
+  const raw = body instanceof Blob;
+  if (body !== undefined && !raw) headers["Content-Type"] = "application/json";
+  let answer;
+  try {
+    answer = await fetch(`api/${path}`, { method, headers, signal, body: raw || body === undefined ? body : JSON.stringify(body) });
+  } catch (error) {
+    if (error.name === "AbortError") throw error;
+    throw new Refusal("The studio does not answer. Start it again; your work is kept.", 0);
+  }
+  const text = await answer.text();
+  let found = null;
+  try {
+    found = text ? JSON.parse(text) : null;
+  } catch {
+    throw new Refusal("The studio answered something that this page cannot read. Reload the page.", answer.status);
+  }
+  if (!answer.ok) throw new Refusal(sentence(found?.error) || `The studio refused this (${answer.status}).`, answer.status);
+  return found;
+}
+
+export const api = {
+  get: (path, options) => call("GET", path, undefined, options),
+  post: (path, body = {}, options = {}) => call("POST", path, body, options),
+  put: (path, body, options) => call("PUT", path, body, options),
+  patch: (path, body, options) => call("PATCH", path, body, options),
+  remove: (path, options) => call("DELETE", path, undefined, options),
+};
+
+let told;
+/** What the server can do: limits, animals, palettes, efforts. Asked once. */
+export const about = () => (told ??= api.get("about").catch((error) => { told = undefined; throw error; }));

@@ -1,0 +1,92 @@
+/** A tiling whose tile and group move, and the scene that is painted of it. */
+
+import { Tiling, fill, pathOf, times } from "../tiling.js";
+
+const COARSE = 0.6; // pixels below which a side of the outline is left out
+
+export class LiveTiling extends Tiling {
+  constructor(view) {
+    super(view);
+    this.home = { aspects: this.aspects, basis: this.basis };
+    this.moved = { linear: [[1, 0], [0, 1]], shift: [0, 0] };
+  }
+
+  /** Move the group by p -> M p + b, where M commutes with its turns. */
+  place({ linear, shift }) {
+    this.moved = { linear, shift };
+    const by = (x, y) => [linear[0][0] * x + linear[0][1] * y, linear[1][0] * x + linear[1][1] * y];
+    const [p, q, r, s] = this.home.basis;
+    this.basis = [...by(p, q), ...by(r, s)];
+    this.aspects = this.home.aspects.map(([a, b, c, d, e, f]) => {
+      const [x, y] = by(e, f);
+      const [u, v] = shift;
+      return [a, b, c, d, x + u - a * u - c * v, y + v - b * u - d * v];
+    });
+  }
+
+  /** Where a point that the group has gone to has come to. */
+  carried([x, y]) {
+    const { linear, shift } = this.moved;
+    return [linear[0][0] * x + linear[0][1] * y + shift[0], linear[1][0] * x + linear[1][1] * y + shift[1]];
+  }
+
+  /** Take an outline, x0, y0, x1, y1 ... or points; `exact` measures it as well. */
+  outline(ring, { exact = true } = {}) {
+    const points = typeof ring[0] === "number" ? pairs(ring) : ring;
+    if (exact) this.change(points);
+    else {
+      this.polygon = points;
+      this.path = pathOf(points);
+    }
+    this.simple = null;
+  }
+
+  /** The outline with as many points as can be seen at a scale. */
+  pathAt(scale) {
+    if (this.simple && Math.abs(Math.log2(this.simple.scale / scale)) < 0.5) return this.simple.path;
+    const least = COARSE / scale;
+    let last = this.polygon[0];
+    const kept = this.polygon.filter((point, k) => {
+      const far = k === 0 || Math.hypot(point[0] - last[0], point[1] - last[1]) >= least;
+      if (far) last = point;
+      return far;
+    });
+    this.simple = { scale, path: pathOf(kept) };
+    return this.simple.path;
+  }
+}
+
+export function pairs(flat) {
+  const found = [];
+  for (let k = 0; k < flat.length; k += 2) found.push([flat[k], flat[k + 1]]);
+  return found;
+}
+
+/**
+ * Paint a tiling with what lies on its tiles. `skin`: {canvas, matrix: its pixels to the prototile}.
+ * `over(context)` draws more on each copy, in the prototile's own coordinates. Returns the copies.
+ */
+export function paintScene(context, tiling, camera, palette, { width, height, ratio, line, skin, over }) {
+  const path = tiling.pathAt(camera.scale * ratio);
+  const copies = tiling.copies(camera, width, height);
+  const fills = new Map();
+  context.lineJoin = "round";
+  for (const copy of copies) {
+    if (!fills.has(copy.colour)) fills.set(copy.colour, fill(palette, copy.colour));
+    const matrix = copy.matrix.map((entry) => entry * ratio);
+    context.setTransform(...matrix);
+    context.fillStyle = fills.get(copy.colour);
+    context.fill(path);
+    if (skin) {
+      context.setTransform(...times(matrix, skin.matrix));
+      context.drawImage(skin.canvas, 0, 0);
+      context.setTransform(...matrix);
+    }
+    over?.(context, copy);
+    context.strokeStyle = line ? palette.outline : fills.get(copy.colour);
+    context.lineWidth = (line || 0.7) / camera.scale;
+    context.stroke(path);
+  }
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  return copies;
+}

@@ -1,0 +1,100 @@
+/** The controls for colours, outline, artwork and symmetry. */
+
+import { button, choice, h, put, slider, unique } from "../dom.js";
+import { kindsOf, signInto } from "./signs.js";
+
+const PERCENT = (value) => `${Math.round(100 * value)} %`;
+
+function check(words, checked, onchange) {
+  return h("label", { class: "check" }, h("input", { type: "checkbox", checked, onchange: ({ target }) => onchange(target.checked) }), h("span", {}, words));
+}
+
+/** Palettes as rows of swatches, and one of the user's own. */
+export function colourPanel(about, look, needed, change) {
+  const name = unique("palette");
+  const own = () => look.custom ?? { colours: [...about.palettes[0].colours], outline: about.palettes[0].outline };
+  const chips = (colours) => h("span", { class: "chips" }, colours.slice(0, 5).map((colour) => h("span", { style: { background: colour } })));
+  const wells = h("div", { class: "wells" });
+  const drawWells = () => {
+    const custom = own();
+    const labels = [...Array(Math.max(needed, 1)).keys()].map((k) => [`Colour ${k + 1}`, custom.colours[k] ?? "#cccccc", (colour) => { custom.colours[k] = colour; }]);
+    labels.push(["Lines", custom.outline, (colour) => { custom.outline = colour; }]);
+    put(wells, labels.map(([words, value, set]) => h("label", {}, h("input", {
+      type: "color", value, oninput: ({ target }) => { set(target.value); look.custom = custom; change({ palette: "own" }); },
+    }), h("span", {}, words))));
+    wells.hidden = look.palette !== "own";
+  };
+  const radio = (value, words, colours) => h("label", { class: "palette", title: words }, h("input", {
+    type: "radio", name, value, checked: look.palette === value, "aria-label": words,
+    onchange: () => { if (value === "own") look.custom = own(); change({ palette: value }); drawWells(); },
+  }), chips(colours));
+  const made = h("fieldset", {}, h("legend", {}, "Colours"),
+    h("div", { class: "palettes" }, about.palettes.map((palette) => radio(palette.name, palette.name, palette.colours)),
+      h("label", { class: "palette own" }, h("input", {
+        type: "radio", name, value: "own", checked: look.palette === "own",
+        onchange: () => { look.custom = own(); change({ palette: "own" }); drawWells(); },
+      }), h("span", {}, "My own"))), wells);
+  drawWells();
+  return made;
+}
+
+/** From silhouette to tile, outline, artwork. */
+export function shapePanel(look, { hasMap, hasArt }, change) {
+  return h("div", { class: "stack" },
+    hasMap && slider("From your picture to the tile", { min: 0, max: 1, step: 0.01, value: 1, said: (v) => (v >= 1 ? "the tile" : v <= 0 ? "your picture" : PERCENT(v)) }, (share) => change({ share })),
+    slider("Outline", { min: 0, max: 6, step: 0.2, value: look.line, said: (v) => (v ? `${v} px` : "none") }, (line) => change({ line })),
+    hasArt && check("Show my picture on the tiles", look.art, (art) => change({ art })));
+}
+
+/** The symmetry, with a sentence for each kind; `light(key)` when one is pointed at or focused. */
+export function signPanel(elements, look, change, light) {
+  const list = h("ul", { class: "signs", hidden: !look.signs });
+  const ratio = 2;
+  for (const { key, name, says, colour } of kindsOf(elements)) {
+    const canvas = h("canvas", { width: 28 * ratio, height: 28 * ratio, "aria-hidden": "true" });
+    const draw = () => {
+      const context = canvas.getContext("2d");
+      context.setTransform(ratio, 0, 0, ratio, 0, 0);
+      const ink = colour === "currentcolor" ? getComputedStyle(canvas).color : colour;
+      signInto(context, key, 14, 14, 9, ink);
+    };
+    const row = h("button", { type: "button", class: "sign", "data-key": key, onfocus: () => light(key), onblur: () => light(null), onpointerenter: () => light(key), onpointerleave: () => light(null), onclick: () => light(key) },
+      canvas, h("span", {}, h("strong", {}, name), h("span", { class: "small" }, says)));
+    list.append(h("li", {}, row));
+    requestAnimationFrame(draw);
+  }
+  const made = h("div", {}, check("Show the symmetry", look.signs, (signs) => { list.hidden = !signs; change({ signs }); }), list);
+  made.light = (key) => list.querySelectorAll(".sign").forEach((row) => row.classList.toggle("lit", row.dataset.key === key));
+  return made;
+}
+
+/** How a point is pulled. */
+export function pullPanel(pull, change, back) {
+  return h("div", { class: "stack" },
+    h("p", { class: "soft" }, "Take hold of any point of the outline and pull. All copies follow, so there is never a gap."),
+    slider("How far the pull reaches", { min: 0.1, max: 2, step: 0.05, value: pull.reach, said: (v) => (v < 0.3 ? "a little" : v < 0.8 ? "a part" : v < 1.5 ? "most of it" : "all of it") }, (reach) => change({ reach })),
+    check("The grid may change, too", pull.lattice, (lattice) => change({ lattice })),
+    h("p", { class: "small soft" }, "By keyboard: click the picture or go to it with ", h("kbd", {}, "Tab"), ", choose a point with ", h("kbd", {}, "←"), " ", h("kbd", {}, "→"), ", move it with ", h("kbd", {}, "Shift"), " and arrows."),
+    button("Put it back", back, { kind: "quiet" }));
+}
+
+/** What is drawn with. */
+export function penPanel(pen, colours, change, clear) {
+  const name = unique("pen");
+  const well = h("input", { type: "color", value: pen.colour, "aria-label": "Another colour", oninput: ({ target }) => change({ colour: target.value }) });
+  const swatches = h("fieldset", {}, h("legend", {}, "Colour"), h("div", { class: "swatches" },
+    colours.map(([colour, words]) => h("label", { title: words }, h("input", {
+      type: "radio", name, checked: pen.colour === colour, "aria-label": words, onchange: () => change({ colour }),
+    }), h("span", { style: { background: colour } }))), well));
+  const lines = h("div", { class: "stack", hidden: pen.tool !== "pencil" }, swatches,
+    choice("Line", [["thin", "Thin"], ["medium", "Medium"], ["thick", "Thick"]], pen.width, (width) => change({ width })));
+  return h("div", { class: "stack" },
+    h("p", { class: "soft" }, "Draw inside any tile: the same appears in all of them."),
+    choice("Draw with", [["pencil", "Pencil", "pencil"], ["rubber", "Rubber", "rub"], ["eye", "Eye"]], pen.tool, (tool) => {
+      lines.hidden = tool !== "pencil";
+      change({ tool });
+    }),
+    lines,
+    h("p", { class: "small soft" }, "By keyboard: move the pen with arrows, put it down and up with ", h("kbd", {}, "Space"), "."),
+    button("Clear the drawing", clear, { kind: "quiet", image: "bin" }));
+}

@@ -1,0 +1,388 @@
+/** The close-up of one tile: look, pull, draw. */
+
+import { client } from "../api.js";
+import { button, choice, h, newest, put, style, toast, trying } from "../dom.js";
+import { Carry } from "./carry.js";
+import { LiveTiling } from "./live.js";
+import { colourPanel, penPanel, pullPanel, shapePanel, signPanel } from "./looks.js";
+import { Pen } from "./pen.js";
+import { Pulling } from "./pulling.js";
+import { kindsOf, paintSigns, placed, signAt } from "./signs.js";
+import { paintSkin } from "./skin.js";
+import { Stage } from "./stage.js";
+
+const PEN_COLOURS = [["#1b1b1b", "Black"], ["#ffffff", "White"], ["#c8322b", "Red"], ["#e9a13b", "Yellow"], ["#2f7d4f", "Green"], ["#2563a8", "Blue"]];
+const SHARPER = 1.5; // times that the scale may change before the skin is painted anew
+
+/** What was undone and redone, by project: it outlives a change of the address. */
+const pasts = new Map();
+
+export async function show(root, given) {
+  await style("closeup");
+  const page = new Closeup(root, given);
+  await page.open(given.tileId);
+  return () => page.close();
+}
+
+class Closeup {
+  constructor(root, { api, events, project, navigate, about }) {
+    Object.assign(this, { root, api, events, project, navigate, about });
+    this.home = `projects/${project.id}`;
+    const kept = project.view?.closeup ?? {};
+    this.look = { palette: project.view?.search?.palette ?? about.palettes[0].name, custom: null, line: 1.4, art: false, signs: false, ...kept.look, share: 1 };
+    this.pull = { reach: 0.5, lattice: true, ...kept.pull };
+    this.penSettings = { tool: "pencil", colour: "#1b1b1b", width: "medium", ...kept.pen };
+    this.mode = kept.mode ?? "look";
+    this.past = pasts.get(project.id) ?? { done: [], undone: [] };
+    pasts.set(project.id, this.past);
+    this.lit = null;
+    this.keep = newest(() => api.patch(this.home, { view: { closeup: { look: { ...this.look, share: 1 }, pull: this.pull, pen: this.penSettings, mode: this.mode } } }), 600);
+    this.keepDrawing = newest((drawing) => api.patch(this.home, { view: { drawing } }), 500);
+    this.#build();
+    this.offs = [events.on("card", (card) => this.#better(card)), events.on("project", (now) => this.#elsewhere(now))];
+    this.keys = (event) => this.#shortcut(event);
+    addEventListener("keydown", this.keys);
+  }
+
+  close() {
+    removeEventListener("keydown", this.keys);
+    this.offs.forEach((off) => off());
+    this.stage.close();
+    this.closed = true;
+  }
+
+  /** A search has made the tile that is shown better: show it, unless it is in the hand. */
+  async #better(card) {
+    if (card.id !== this.view?.id || card.stage === this.view.stage) return;
+    if (this.pulling.hand || this.pulling.waiting || this.pen.line) {
+      this.later = () => this.#better(card);
+      return;
+    }
+    await trying(() => this.open(card.id));
+    toast("The search has made this tile better.");
+  }
+
+  /** Another tab has drawn. */
+  #elsewhere({ view, changed_by: by }) {
+    if (by !== client && view?.drawing && this.carry && !this.pen.line) this.pen.use(this.carry, view.drawing);
+  }
+
+  #build() {
+    this.said = h("p", { class: "unseen", role: "status", "aria-live": "polite" });
+    this.badge = h("p", { class: "badge", role: "status" });
+    this.hint = h("p", { class: "hint", hidden: true });
+    this.stage = new Stage({ label: "The tiling, without end", help: "closeup-help", tool: () => this.tool });
+    this.pulling = new Pulling(this.stage, this.pull, {
+      released: (parameters) => this.#released(parameters),
+      said: (text) => this.say(text),
+      changed: (now) => this.#pulledTo(now),
+    });
+    this.pen = new Pen(this.stage, this.penSettings, {
+      drawn: (drawing, before) => this.#drawn(drawing, before),
+      said: (text) => this.say(text),
+      marks: () => this.stale(),
+    });
+    this.stage.layers.push((context) => this.#overlay(context));
+    this.stage.onhover = (place) => this.#hover(place);
+    this.stage.options.skin = () => this.#skin();
+    this.stage.options.over = (context) => this.pen.over(context);
+    this.undoButton = button("Undo", () => this.undo(), { kind: "icon", image: "undo" });
+    this.redoButton = button("Redo", () => this.redo(), { kind: "icon", image: "redo" });
+    const zooms = h("div", { class: "zooms" },
+      h("button", { type: "button", class: "button icon", "aria-label": "Nearer", onclick: () => this.stage.zoom(1.35) }, "+"),
+      h("button", { type: "button", class: "button icon", "aria-label": "Farther", onclick: () => this.stage.zoom(1 / 1.35) }, "−"),
+      h("button", { type: "button", class: "button", onclick: () => this.stage.fit() }, "Fit"));
+    this.stage.box.append(h("div", { class: "past" }, this.undoButton, this.redoButton), this.badge, this.hint, zooms);
+    this.heading = h("h1", { tabindex: "-1" }, "Close up");
+    this.kind = h("p", { class: "soft small" });
+    this.modes = choice("What to do", [["look", "Look"], ["pull", "Pull"], ["draw", "Draw"]], this.mode, (mode) => this.#choose(mode), { unseen: true });
+    this.panel = h("div", { class: "stack" });
+    const side = h("div", { class: "closeup-side" }, h("div", {}, this.heading, this.kind), this.modes, this.panel,
+      h("p", { class: "small soft", id: "closeup-help" }, "Drag to move, scroll or pinch to zoom. Keys: arrows, + and −, 0 fits."));
+    this.root.classList.add("closeup");
+    put(this.root, h("div", { class: "closeup-page" }, this.stage.box, side), this.said);
+  }
+
+  /** Show a tile of the project. */
+  async open(id, { quiet = false } = {}) {
+    const view = await this.api.get(`${this.home}/tiles/${id}`);
+    if (this.closed) return;
+    const drawing = this.view ? this.pen.drawing : this.project.view?.drawing;
+    if ((this.past.at ??= id) !== id && !quiet) Object.assign(this.past, { done: [], undone: [] });
+    this.past.at = id;
+    this.view = view;
+    this.carry = new Carry(view.map);
+    this.tiling = new LiveTiling(view);
+    this.look.share = 1;
+    this.space = null;
+    delete this.root.dataset.ready;
+    this.pulling.use(null);
+    this.stage.show(this.tiling);
+    this.#palette();
+    this.pen.use(this.carry, drawing);
+    this.heading.textContent = view.arrangement ? sentence(view.arrangement) : "Close up";
+    this.kind.textContent = [view.class_name, view.group.name].filter(Boolean).join(" · ");
+    this.#proved();
+    this.#panels();
+    this.#past();
+    if (quiet) this.navigate(`p/${this.project.id}/t/${id}`, { quiet: true });
+    if (this.mode === "pull") await this.#ready();
+  }
+
+  /** Fetch how the tile can be pulled. */
+  async #ready() {
+    const { view } = this;
+    if (this.space) return;
+    try {
+      const space = await this.api.get(`${this.home}/tiles/${view.id}/space`);
+      if (this.closed || this.view !== view) return;
+      this.space = space;
+      this.tiling.outline(space.polygon);
+      this.pulling.use(space);
+      this.stage.redraw();
+      this.root.dataset.ready = "pull";
+    } catch (error) {
+      toast(error.message, { bad: true });
+    }
+  }
+
+  get tool() {
+    return { pull: this.pulling, draw: this.pen }[this.mode];
+  }
+
+  #choose(mode) {
+    this.mode = mode;
+    this.stage.canvas.style.cursor = "";
+    if (this.badge.dataset.kind === "refused") this.#proved();
+    if (mode !== "look" && this.look.share < 1) this.#change({ share: 1 });
+    this.#panels();
+    if (mode === "pull") this.#ready();
+    this.keep();
+    this.stage.redraw();
+  }
+
+  #panels() {
+    const { look, view, about } = this;
+    const needed = 1 + Math.max(...view.colours.table.flat(2));
+    const change = (what) => this.#change(what);
+    if (this.mode === "look") {
+      this.signs = signPanel(view.elements, look, change, (key) => this.#light(key));
+      put(this.panel, shapePanel(look, { hasMap: Boolean(view.map), hasArt: this.#hasArt() }, change), this.signs, colourPanel(about, look, needed, change));
+    } else if (this.mode === "pull") {
+      put(this.panel, pullPanel(this.pull, (what) => { Object.assign(this.pull, what); this.keep(); this.stage.redraw(); }, () => this.#restore()));
+    } else {
+      put(this.panel, penPanel(this.penSettings, PEN_COLOURS, (what) => { Object.assign(this.penSettings, what); this.keep(); },
+        () => this.#setDrawing({ strokes: [], eyes: [] })));
+    }
+  }
+
+  #hasArt() {
+    return Boolean(this.view.map && this.view.covered && this.project.silhouette?.backdrop);
+  }
+
+  #change(what) {
+    Object.assign(this.look, what);
+    if ("share" in what) this.#between();
+    else this.keep();
+    if ("art" in what) this.stale();
+    this.#palette();
+    this.stage.redraw();
+  }
+
+  #palette() {
+    const { look, about } = this;
+    const known = about.palettes.find(({ name }) => name === look.palette) ?? about.palettes[0];
+    const palette = look.palette === "own" && look.custom ? { ...known, ...look.custom } : known;
+    if (palette !== this.stage.options.palette) this.stale();
+    Object.assign(this.stage.options, { palette, line: look.line });
+    this.stage.redraw();
+  }
+
+  /** The outline on its way from the silhouette to the tile. */
+  #between() {
+    const { share } = this.look;
+    const { silhouette_track: from, tile_track: to, polygon } = this.view;
+    this.tiling.outline(share >= 1 ? this.space?.polygon ?? polygon : from.map(([x, y], k) => [x + share * (to[k][0] - x), y + share * (to[k][1] - y)]), { exact: share >= 1 });
+    this.stale();
+  }
+
+  stale() {
+    this.skin = null;
+    this.stage.redraw();
+  }
+
+  /** The picture of what lies on the tile, painted anew when it is too coarse. */
+  #skin() {
+    if (this.pen.moving || (this.look.share < 1 && !this.look.art)) return null;
+    const scale = this.stage.camera.scale * Math.min(globalThis.devicePixelRatio || 1, 2);
+    if (!this.skin || Math.abs(Math.log(this.skin.asked / scale)) > Math.log(SHARPER)) {
+      const { look, view, tiling } = this;
+      const map = view.map && look.share < 1 ? { ...view.map, images: view.map.images.map(([x, y], k) => view.map.rest[k].map((v, j) => v + look.share * ([x, y][j] - v))) } : view.map;
+      const art = look.art && this.#hasArt() && this.#picture() ? { picture: this.backdrop, map, covered: view.covered } : null;
+      const marks = look.share < 1 ? { lines: [], eyes: [] } : this.pen.marks;
+      this.skin = { asked: scale, own: paintSkin(tiling, { art, marks, palette: this.stage.options.palette, yDown: view.y_down }, scale) };
+    }
+    return this.skin.own;
+  }
+
+  #picture() {
+    const url = this.project.silhouette.backdrop;
+    if (this.backdrop?.dataset.url !== url) {
+      this.backdrop = new Image();
+      this.backdrop.dataset.url = url;
+      this.backdrop.onload = () => this.stale();
+      this.backdrop.src = url;
+    }
+    return this.backdrop.complete && this.backdrop.naturalWidth > 0;
+  }
+
+  #overlay(context) {
+    if (this.mode !== "look" || !this.look.signs) return;
+    this.places = placed(this.view.elements, this.tiling, this.stage.camera, this.stage.width, this.stage.height);
+    paintSigns(context, this.places, this.lit);
+  }
+
+  #hover(place) {
+    if (this.mode !== "look" || !this.look.signs || !this.places) return;
+    const key = place && signAt(this.places, place);
+    if (key !== this.lit) this.#light(key);
+    if (!key) return;
+    this.hint.style.setProperty("left", `${Math.min(place[0] + 16, this.stage.width - 260)}px`);
+    this.hint.style.setProperty("top", `${Math.min(place[1] + 16, this.stage.height - 90)}px`);
+  }
+
+  #light(key) {
+    this.lit = key;
+    this.signs?.light?.(key);
+    const kind = key && kindsOf(this.view.elements).find((own) => own.key === key);
+    this.hint.hidden = !kind || !this.stage.canvas.matches(":hover");
+    if (kind) put(this.hint, h("strong", {}, kind.name), h("span", {}, kind.says));
+    this.stage.redraw();
+  }
+
+  say(text) {
+    this.said.textContent = text;
+  }
+
+  /** The badge over the picture: proved, checking or refused. */
+  tell(kind, text) {
+    if (this.badge.dataset.kind === kind && this.badge.textContent === text) return;
+    this.badge.dataset.kind = kind;
+    this.badge.textContent = text;
+  }
+
+  #proved() {
+    this.tell("proved", "Proved to tile");
+  }
+
+  #pulledTo({ crossed, body }) {
+    this.pen.ride(this.pulling.puller, body, this.space);
+    if (this.pulling.hand) {
+      if (crossed) this.tell("crossed", "The outline crosses itself here");
+      else this.tell("moving", "Let go to check it");
+    }
+    if (!body && this.badge.dataset.kind !== "refused") this.#proved();
+    if (!body) this.stale();
+    if (!body && this.later) {
+      this.later();
+      this.later = null;
+    }
+  }
+
+  async #released(parameters) {
+    const before = this.view;
+    this.tell("checking", "Checking …");
+    try {
+      const card = await this.api.post(`${this.home}/tiles/${before.id}/pulled`, { parameters });
+      if (this.closed) return;
+      this.#did({ tile: [before.id, card.id] });
+      await this.open(card.id, { quiet: true });
+      this.say("Proved to tile.");
+    } catch (error) {
+      if (this.closed) return;
+      const why = sentence(error.message);
+      this.pulling.back();
+      this.tell("refused", why);
+      this.say(why);
+    }
+  }
+
+  #restore() {
+    this.pulling.back();
+    if (this.badge.dataset.kind === "refused") this.#proved();
+    const first = this.past.done.find((step) => step.tile);
+    if (first && first.tile[0] !== this.view.id) {
+      this.#did({ tile: [this.view.id, first.tile[0]] });
+      this.open(first.tile[0], { quiet: true });
+    }
+  }
+
+  #drawn(drawing, before) {
+    this.#did({ drawing: [before, drawing] });
+    this.#keepDrawn(drawing);
+  }
+
+  #setDrawing(drawing) {
+    this.#drawn(drawing, this.pen.drawing);
+    this.pen.use(this.carry, drawing);
+  }
+
+  #keepDrawn(drawing) {
+    this.project.view = { ...this.project.view, drawing };
+    this.keepDrawing(drawing);
+  }
+
+  #did(step) {
+    this.past.done.push(step);
+    this.past.undone.length = 0;
+    this.#past();
+  }
+
+  #past() {
+    this.undoButton.disabled = !this.past.done.length && !this.view?.parent;
+    this.redoButton.disabled = !this.past.undone.length;
+  }
+
+  async undo() {
+    if (!this.past.done.length && this.view.parent) this.past.done.push({ tile: [this.view.parent, this.view.id] });
+    await this.#go(this.past.done, this.past.undone, 0, "Undone.");
+  }
+
+  async redo() {
+    await this.#go(this.past.undone, this.past.done, 1, "Done again.");
+  }
+
+  async #go(from, to, side, words) {
+    if (this.going || this.pulling.waiting || this.pulling.hand) return;
+    const step = from.pop();
+    if (!step) return;
+    this.going = true;
+    to.push(step);
+    try {
+      if (step.tile) await this.open(step.tile[side], { quiet: true });
+      else {
+        this.pen.use(this.carry, step.drawing[side]);
+        this.#keepDrawn(step.drawing[side]);
+      }
+      this.say(words);
+    } catch (error) {
+      toast(error.message, { bad: true });
+    }
+    this.going = false;
+    this.#past();
+  }
+
+  #shortcut(event) {
+    const typing = event.target.matches?.("input[type=text], input[type=number], textarea, select");
+    if (typing || !(event.ctrlKey || event.metaKey) || event.altKey) return;
+    const key = event.key.toLowerCase();
+    if (key === "z") (event.shiftKey ? this.redo() : this.undo());
+    else if (key === "y") this.redo();
+    else return;
+    event.preventDefault();
+  }
+}
+
+function sentence(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}

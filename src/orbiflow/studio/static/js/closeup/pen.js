@@ -1,0 +1,209 @@
+/** The tool that draws on the tile: pencil, rubber and eyes, in all copies at once. */
+
+import { inverse, moved } from "../tiling.js";
+import { eyeInto, lineInto } from "./skin.js";
+import { beside, rubbed, short, simplified } from "./lines.js";
+import { Riders } from "./carry.js";
+
+export const WIDTHS = { thin: 0.008, medium: 0.018, thick: 0.04 }; // in sizes of the tile
+const EYE = 0.045;
+const NEAR = 0.0015; // by which a line may be simplified
+const LONGEST = 0.03; // side of a line
+const RUBBER = 0.03;
+const ROOM = 0.75; // share of the distance to the outline that an eye may fill
+const KEY_STEP = 7; // pixels that a key moves the pen
+
+export class Pen {
+  /** `settings`: {tool: "pencil" | "rubber" | "eye", colour, width}; `on`: {drawn(drawing), said(text), marks()}. */
+  constructor(stage, settings, on) {
+    Object.assign(this, { stage, settings, on });
+    this.drawing = { strokes: [], eyes: [] };
+    this.marks = { lines: [], eyes: [] };
+    this.line = null;
+  }
+
+  /** Take a tile's map and what was drawn. */
+  use(carry, drawing) {
+    this.carry = carry;
+    this.drawing = { strokes: drawing?.strokes ?? [], eyes: drawing?.eyes ?? [] };
+    this.#carried();
+  }
+
+  get size() {
+    return Math.sqrt(this.stage.tiling.area);
+  }
+
+  #carried() {
+    this.marks = {
+      lines: this.drawing.strokes.map(({ points, colour, width }) => ({
+        points: points.map((point) => this.carry.forward(point)), colour, width, // as exports keep it
+      })),
+      eyes: this.drawing.eyes.map(([x, y, radius]) => this.#eye([x, y], radius)),
+    };
+    this.moving = null;
+    this.on.marks();
+  }
+
+  #eye(point, radius) {
+    const at = this.carry.forward(point);
+    const grown = radius * this.carry.growth(point, 0.5 * EYE * this.size);
+    return { at, radius: Math.min(grown, ROOM * this.#room(at)) };
+  }
+
+  /** The distance of a point of the tile from its outline. */
+  #room(at) {
+    const ring = this.stage.tiling.polygon;
+    return Math.min(...ring.map((a, k) => beside(at, a, ring[(k + 1) % ring.length]).apart));
+  }
+
+  down(place) {
+    const found = this.stage.copyAt(place);
+    if (!found) return false;
+    this.before = this.drawing;
+    if (this.settings.tool === "eye") this.#addEye(found.at);
+    else if (this.settings.tool === "rubber") this.#rub(found.at);
+    else this.line = { copy: found.copy, points: [found.at] };
+    this.stage.redraw();
+    return true;
+  }
+
+  move(place) {
+    const found = this.stage.copyAt(place);
+    if (!found) return;
+    if (this.settings.tool === "rubber") this.#rub(found.at);
+    else if (this.line) this.#draw(found);
+    this.stage.redraw();
+  }
+
+  #draw({ copy, at }) {
+    const same = copy.aspect === this.line.copy.aspect && String(copy.cell) === String(this.line.copy.cell);
+    if (same) {
+      this.line.points.push(at);
+      return;
+    }
+    // over the edge: the line goes on in the next tile
+    this.#keepLine();
+    this.line = { copy, points: [at] };
+  }
+
+  up() {
+    if (this.line) this.#keepLine();
+    this.line = null;
+    if (this.before !== this.drawing) this.on.drawn(this.drawing, this.before);
+    this.stage.redraw();
+  }
+
+  cancel() {
+    this.line = null;
+    if (this.before) this.drawing = this.before;
+    this.#carried();
+  }
+
+  #keepLine() {
+    const points = simplified(this.line.points, NEAR * this.size, LONGEST * this.size);
+    const own = points.map((point) => this.carry.inverse(point).map((value) => short(value, this.size)));
+    const stroke = { colour: this.settings.colour, width: short(WIDTHS[this.settings.width] * this.size, this.size), points: own };
+    this.#change({ strokes: [...this.drawing.strokes, stroke], eyes: this.drawing.eyes });
+  }
+
+  #addEye(at) {
+    const [x, y] = this.carry.inverse(at).map((value) => short(value, this.size));
+    const radius = short(EYE * this.size, this.size);
+    this.#change({ strokes: this.drawing.strokes, eyes: [...this.drawing.eyes, [x, y, radius]] });
+  }
+
+  #rub(at) {
+    const reach = RUBBER * this.size;
+    let hit = false;
+    const strokes = this.drawing.strokes.flatMap((stroke, k) => {
+      const parts = rubbed(this.marks.lines[k].points, at, reach + stroke.width / 2);
+      if (!parts) return [stroke];
+      hit = true;
+      return parts.map((part) => ({ ...stroke, points: part.map((i) => stroke.points[i]) }));
+    });
+    const eyes = this.drawing.eyes.filter((_, k) => {
+      const { at: [x, y], radius } = this.marks.eyes[k];
+      return Math.hypot(x - at[0], y - at[1]) > radius + reach / 2;
+    });
+    if (hit || eyes.length < this.drawing.eyes.length) this.#change({ strokes, eyes });
+  }
+
+  #change(drawing) {
+    this.drawing = drawing;
+    this.#carried();
+  }
+
+  /** Show what is drawn where the tile is pulled to; `body` is null when it rests. */
+  ride(puller, body, space) {
+    if (!body) {
+      this.moving = null;
+      return;
+    }
+    if (this.moving?.puller !== puller) {
+      const riders = new Riders(space.body);
+      this.moving = {
+        puller,
+        lines: this.marks.lines.map((line) => ({ ...line, seats: line.points.map((point) => riders.seat(point)) })),
+        eyes: this.marks.eyes.map((eye) => ({ ...eye, seat: riders.seat(eye.at) })),
+      };
+    }
+    for (const line of this.moving.lines) line.points = line.seats.map((seat) => Riders.at(seat, body));
+    for (const eye of this.moving.eyes) eye.at = Riders.at(eye.seat, body);
+  }
+
+  /** Draw on a copy the line in hand, and all marks while the tile is pulled. */
+  over(context) {
+    const { palette } = this.stage.options;
+    for (const { points, colour, width } of this.moving?.lines ?? []) lineInto(context, points, colour, width);
+    for (const { at, radius } of this.moving?.eyes ?? []) eyeInto(context, at, radius, palette, this.stage.tiling.yDown);
+    if (this.line) lineInto(context, this.line.points, this.settings.colour, WIDTHS[this.settings.width] * this.size);
+  }
+
+  hover(place) {
+    this.at = place;
+    this.stage.canvas.style.cursor = "crosshair";
+  }
+
+  /** Arrows move the pen, space puts it down and up again. */
+  key(event) {
+    const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+    const way = ways[event.key];
+    if (way) {
+      this.pen ??= [this.stage.width / 2, this.stage.height / 2];
+      const far = event.shiftKey ? 3 * KEY_STEP : KEY_STEP;
+      this.pen = [this.pen[0] + far * way[0], this.pen[1] + far * way[1]];
+      if (this.penDown) this.move(this.pen);
+      this.stage.redraw();
+      return true;
+    }
+    if (event.key === " " || event.key === "Enter") {
+      this.pen ??= [this.stage.width / 2, this.stage.height / 2];
+      if (this.penDown) {
+        this.up();
+        this.penDown = false;
+        this.on.said("The pen is up.");
+      } else if (this.down(this.pen)) {
+        this.penDown = this.settings.tool !== "eye";
+        if (!this.penDown) this.up();
+        this.on.said(this.penDown ? "The pen is down. Arrow keys draw; press space to lift it." : "An eye is in its place.");
+      }
+      return true;
+    }
+    return false;
+  }
+
+  paint(context) {
+    if (!this.pen || document.activeElement !== this.stage.canvas) return;
+    const [x, y] = this.pen;
+    for (const [colour, width] of [["#ffffff", 5], ["#0b6b66", 2]]) {
+      context.strokeStyle = colour;
+      context.lineWidth = width;
+      context.beginPath();
+      context.moveTo(x - 11, y);
+      context.lineTo(x + 11, y);
+      context.moveTo(x, y - 11);
+      context.lineTo(x, y + 11);
+      context.stroke();
+    }
+  }
+}

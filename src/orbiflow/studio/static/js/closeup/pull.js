@@ -1,0 +1,441 @@
+/**
+ * Pulling a tile: the outline moves in the linear space of the polygons that tile as it does, and its
+ * inside as rigidly as it can. No page is needed here, so that node can test and time it.
+ *
+ * All points are linear in the unknowns: x = B z, where z are the parameters of the space and the points
+ * inside. Minimised is what triangles lack of rotations (as-rigid-as-possible: Sorkine and Alexa, 2007;
+ * Liu et al., 2008), with springs that hold what lies beyond the reach, and one to the pointer. Rotations
+ * and points are found in turns, the latter by conjugate gradients from where they are.
+ */
+
+const GRAB = 600; // strength of the spring to the pointer; that of a triangle is about one
+const GRIP = 0.3; // width of the hand, in reaches
+const HOLD = 4; // of those beyond the reach
+const LEAST_HOLD = 1e-3; // of all others, so that the whole does not float away
+const STEEPEST = 8; // largest weight of a triangle's side: slivers would be too stiff
+const AFTER = [1, 2, 0, 1]; // corners of a triangle after corner 0, 1, 2
+const ENOUGH = 1e-4; // of the residual, at which conjugate gradients stop
+
+/** Rows of a sparse matrix as typed arrays, from {indptr, indices, values}. */
+function sparse({ indptr, indices, values }, cols) {
+  return { start: Int32Array.from(indptr), at: Int32Array.from(indices), value: Float64Array.from(values), cols };
+}
+
+/** out = matrix x, as many rows as fit */
+function multiply(matrix, x, out) {
+  const { start, at, value } = matrix;
+  for (let i = 0; i < out.length; i += 1) {
+    let sum = 0;
+    for (let k = start[i]; k < start[i + 1]; k += 1) sum += value[k] * x[at[k]];
+    out[i] = sum;
+  }
+  return out;
+}
+
+/** out = transposed matrix x */
+function multiplyBack(matrix, x, out) {
+  const { start, at, value } = matrix;
+  out.fill(0);
+  for (let i = 0; i < start.length - 1; i += 1) {
+    const own = x[i];
+    if (own !== 0) for (let k = start[i]; k < start[i + 1]; k += 1) out[at[k]] += value[k] * own;
+  }
+  return out;
+}
+
+function dot(a, b) {
+  let sum = 0;
+  for (let i = 0; i < a.length; i += 1) sum += a[i] * b[i];
+  return sum;
+}
+
+export class Puller {
+  /** `space` is what the server tells of a tile's space; see space_json in changing.py. */
+  constructor(space) {
+    this.maps = space.maps;
+    this.count = space.rows / 2; // vertices
+    this.parametersCount = space.cols;
+    this.group = space.cols - space.maps.length - 2; // first of the parameters that move the group
+    this.start = Float64Array.from(space.start);
+    this.rest = Float64Array.from(space.body.points.flat());
+    this.triangles = Int32Array.from(space.body.triangles.flat());
+    this.size = this.rest.length / 2; // points
+    this.area = 0;
+    this.middle = [0, 0];
+    this.#measure(space.polygon);
+    this.points = this.#everyPoint(space);
+    this.#weigh();
+    this.#findOrbits();
+    const columns = this.points.cols;
+    this.z = new Float64Array(columns);
+    this.reset();
+    this.free = new Float64Array(columns).fill(1);
+    const fresh = () => new Float64Array(columns);
+    Object.assign(this, { residual: fresh(), step: fresh(), image: fresh(), goal: fresh(), scaled: fresh(), diagonal: fresh() });
+    Object.assign(this, { x: new Float64Array(2 * this.size), y: new Float64Array(2 * this.size) });
+    this.hold = new Float64Array(this.size);
+    this.pin = null;
+  }
+
+  #measure(polygon) {
+    let [area, x, y] = [0, 0, 0];
+    polygon.forEach(([x0, y0], k) => {
+      const [x1, y1] = polygon[(k + 1) % polygon.length];
+      const cross = x0 * y1 - x1 * y0;
+      area += cross / 2;
+      x += ((x0 + x1) * cross) / 6;
+      y += ((y0 + y1) * cross) / 6;
+    });
+    this.area = Math.abs(area);
+    this.middle = [x / area, y / area];
+  }
+
+  /** Every point of the body as rows of one matrix; the group moves about the middle of the tile. */
+  #everyPoint(space) {
+    const { body, cols } = space;
+    const own = sparse(space, cols);
+    const rows = [];
+    for (let i = 0; i < space.rows; i += 1) {
+      const row = new Map();
+      for (let k = own.start[i]; k < own.start[i + 1]; k += 1) row.set(own.at[k], own.value[k]);
+      // p -> M p + b is M (p - middle) + middle + b', so that M does not shift what is far from 0
+      this.maps.forEach((map, m) => {
+        const by = [0, 1].map((j) => map[j][0] * this.middle[0] + map[j][1] * this.middle[1]);
+        const [u, v] = [cols - 2, cols - 1].map((column) => row.get(column) ?? 0);
+        const shift = u * by[0] + v * by[1];
+        if (shift) row.set(this.group + m, (row.get(this.group + m) ?? 0) - shift);
+      });
+      rows.push(row);
+    }
+    body.sides.forEach((side, k) => {
+      const share = body.shares[k];
+      for (const j of [0, 1]) {
+        const row = new Map();
+        for (const [vertex, part] of [[side, 1 - share], [(side + 1) % this.count, share]]) {
+          for (const [column, value] of rows[2 * vertex + j]) row.set(column, (row.get(column) ?? 0) + part * value);
+        }
+        rows.push(row);
+      }
+    });
+    const tied = rows.length;
+    for (let i = tied; i < 2 * this.size; i += 1) rows.push(new Map([[cols + i - tied, 1]]));
+    this.tied = tied;
+    const indptr = [0];
+    rows.forEach((row) => indptr.push(indptr.at(-1) + row.size));
+    return sparse(
+      { indptr, indices: rows.flatMap((row) => [...row.keys()]), values: rows.flatMap((row) => [...row.values()]) },
+      cols + 2 * this.size - tied,
+    );
+  }
+
+  /** The cotangent of each corner of each triangle, and the Laplacian that they make. */
+  #weigh() {
+    const { triangles, rest, size } = this;
+    this.cotangents = new Float64Array(triangles.length);
+    const near = Array.from({ length: size }, () => new Map());
+    for (let t = 0; t < triangles.length; t += 3) {
+      const corners = [triangles[t], triangles[t + 1], triangles[t + 2]];
+      const cot = corners.map((a, k) => {
+        const [b, c] = [corners[(k + 1) % 3], corners[(k + 2) % 3]];
+        const [ux, uy] = [rest[2 * b] - rest[2 * a], rest[2 * b + 1] - rest[2 * a + 1]];
+        const [vx, vy] = [rest[2 * c] - rest[2 * a], rest[2 * c + 1] - rest[2 * a + 1]];
+        return (ux * vx + uy * vy) / Math.max(Math.abs(ux * vy - uy * vx), 1e-12 * this.area);
+      });
+      const share = 0.5 * Math.min(1, STEEPEST / Math.max(...cot.map(Math.abs)));
+      corners.forEach((_, k) => {
+        const [b, c] = [corners[(k + 1) % 3], corners[(k + 2) % 3]];
+        this.cotangents[t + k] = share * cot[k]; // of the side opposite of corner k
+        for (const [i, j, sign] of [[b, c, -1], [c, b, -1], [b, b, 1], [c, c, 1]]) {
+          near[i].set(j, (near[i].get(j) ?? 0) + sign * share * cot[k]);
+        }
+      });
+    }
+    const indptr = [0];
+    near.forEach((row) => indptr.push(indptr.at(-1) + row.size));
+    this.laplacian = sparse(
+      { indptr, indices: near.flatMap((row) => [...row.keys()]), values: near.flatMap((row) => [...row.values()]) },
+      size,
+    );
+  }
+
+  /** Which vertices are images of one free vertex: they move together. */
+  #findOrbits() {
+    const { start, at } = this.points;
+    this.orbit = Int32Array.from({ length: this.count }, (_, vertex) => {
+      for (let row = 2 * vertex; row < 2 * vertex + 2; row += 1) {
+        for (let k = start[row]; k < start[row + 1]; k += 1) if (at[k] < this.group) return at[k] >> 1;
+      }
+      return -1 - vertex; // held by a centre
+    });
+  }
+
+  /** Back to the tile as it is. */
+  reset() {
+    this.z.set(this.start);
+    this.z.set(this.middle, this.parametersCount - 2);
+    for (let i = this.tied; i < 2 * this.size; i += 1) this.z[this.parametersCount + i - this.tied] = this.rest[i];
+  }
+
+  /** Whether a vertex is the centre of a rotation, and so stays where it is. */
+  isHeld(vertex) {
+    return this.orbit[vertex] < 0;
+  }
+
+  /**
+   * Take hold of the outline, `share` of the way from a vertex to the next. Beyond `reach`, a distance,
+   * all stays; with `lattice` the way in which copies lie may change as well.
+   */
+  grab(vertex, share, reach, { lattice = true } = {}) {
+    this.pin = { vertex, next: (vertex + 1) % this.count, share, target: null };
+    this.#grip(GRIP * reach);
+    this.pin.target = this.held();
+    this.free.fill(1);
+    if (!lattice) this.free.fill(0, this.group, this.parametersCount);
+    this.#holdBeyond(reach);
+    this.#measureDiagonal();
+  }
+
+  /** The hand is soft: it holds the mean of the outline nearby, so that no spike comes out. */
+  #grip(width) {
+    const { pin, count, rest } = this;
+    const [x, y] = this.grip();
+    const weight = (i) => Math.exp(-3 * ((rest[2 * i] - x) ** 2 + (rest[2 * i + 1] - y) ** 2) / width ** 2);
+    const found = new Map([[pin.vertex, 1 - pin.share], [pin.next, pin.share]]);
+    for (const [from, step] of [[pin.vertex, -1], [pin.next, 1]]) {
+      for (let k = 0, i = from; k < count / 4; k += 1, i = (i + step + count) % count) {
+        const own = weight(i);
+        if (k > 1 && own < 0.05) break;
+        found.set(i, (found.get(i) ?? 0) + own);
+      }
+    }
+    const total = [...found.values()].reduce((sum, own) => sum + own, 0);
+    pin.parts = [...found].map(([i, own]) => [i, own / total]);
+  }
+
+  #holdBeyond(reach) {
+    const { rest, orbit, count } = this;
+    const { vertex, next, share } = this.pin;
+    const target = this.grip();
+    const nearest = share < 0.5 ? vertex : next;
+    const from = (i, x, y) => Math.hypot(rest[2 * i] - x, rest[2 * i + 1] - y);
+    const places = [target];
+    const near = new Map(); // the least distance in each orbit
+    for (let i = 0; i < count; i += 1) {
+      if (orbit[i] === orbit[nearest] && i !== nearest) places.push([rest[2 * i], rest[2 * i + 1]]);
+      near.set(orbit[i], Math.min(near.get(orbit[i]) ?? Infinity, from(i, ...target)));
+    }
+    for (let i = 0; i < this.size; i += 1) {
+      const apart = Math.min(...places.map((place) => from(i, ...place)));
+      const own = Math.min(apart, i < count ? near.get(orbit[i]) : Infinity) / reach;
+      this.hold[i] = LEAST_HOLD + HOLD * Math.min(1, own) ** 4;
+    }
+  }
+
+  /** The point of the outline that was taken hold of, where it is now. */
+  grip() {
+    const { vertex, next, share } = this.pin;
+    const at = this.#pointsOf(2 * vertex, 2 * vertex + 2).concat(this.#pointsOf(2 * next, 2 * next + 2));
+    return [0, 1].map((j) => (1 - share) * at[j] + share * at[2 + j]);
+  }
+
+  /** What the hand holds, the mean of the outline nearby, where it is now. */
+  held() {
+    const found = [0, 0];
+    for (const [i, part] of this.pin.parts) this.#pointsOf(2 * i, 2 * i + 2).forEach((own, j) => { found[j] += part * own; });
+    return found;
+  }
+
+  #pointsOf(from, to) {
+    const { start, at, value } = this.points;
+    const found = [];
+    for (let i = from; i < to; i += 1) {
+      let sum = 0;
+      for (let k = start[i]; k < start[i + 1]; k += 1) sum += value[k] * this.z[at[k]];
+      found.push(sum);
+    }
+    return found;
+  }
+
+  /** The diagonal of the quadratic form, for which conjugate gradients are scaled; exact for the group. */
+  #measureDiagonal() {
+    const { start, at, value } = this.points;
+    const own = new Float64Array(this.size);
+    for (let i = 0; i < this.size; i += 1) {
+      for (let k = this.laplacian.start[i]; k < this.laplacian.start[i + 1]; k += 1) {
+        if (this.laplacian.at[k] === i) own[i] = this.laplacian.value[k] + this.hold[i];
+      }
+    }
+    for (const [i, part] of this.pin.parts) own[i] += GRAB * part ** 2;
+    this.diagonal.fill(0);
+    for (let i = 0; i < 2 * this.size; i += 1) {
+      for (let k = start[i]; k < start[i + 1]; k += 1) this.diagonal[at[k]] += value[k] ** 2 * Math.max(own[i >> 1], 1e-6);
+    }
+    const unit = new Float64Array(this.z.length);
+    for (let column = this.group; column < this.parametersCount; column += 1) {
+      unit[column] = 1;
+      this.diagonal[column] = this.#form(unit, this.image)[column];
+      unit[column] = 0;
+    }
+    for (let i = 0; i < this.diagonal.length; i += 1) this.diagonal[i] ||= 1;
+  }
+
+  /** out = B' (L + holds + grab) B given */
+  #form(given, out) {
+    const { x, y, laplacian, hold, pin } = this;
+    multiply(this.points, given, x);
+    const { start, at, value } = laplacian;
+    for (let i = 0; i < this.size; i += 1) {
+      let u = hold[i] * x[2 * i];
+      let v = hold[i] * x[2 * i + 1];
+      for (let k = start[i]; k < start[i + 1]; k += 1) {
+        u += value[k] * x[2 * at[k]];
+        v += value[k] * x[2 * at[k] + 1];
+      }
+      y[2 * i] = u;
+      y[2 * i + 1] = v;
+    }
+    this.#addGrab(y, pin.parts.reduce((sum, [i, part]) => sum + part * x[2 * i], 0), pin.parts.reduce((sum, [i, part]) => sum + part * x[2 * i + 1], 0));
+    return multiplyBack(this.points, y, out);
+  }
+
+  #addGrab(y, u, v) {
+    for (const [i, part] of this.pin.parts) {
+      y[2 * i] += GRAB * part * u;
+      y[2 * i + 1] += GRAB * part * v;
+    }
+  }
+
+  /** The right side: B' of what rotated triangles, holds and the grab want. */
+  #wanted(out) {
+    const { x, y, rest, triangles, cotangents, hold, pin } = this;
+    multiply(this.points, this.z, x);
+    for (let i = 0; i < 2 * this.size; i += 1) y[i] = hold[i >> 1] * rest[i];
+    for (let t = 0; t < triangles.length; t += 3) {
+      let cos = 0;
+      let sin = 0;
+      for (let k = 0; k < 3; k += 1) {
+        const b = 2 * triangles[t + AFTER[k]];
+        const c = 2 * triangles[t + AFTER[k + 1]];
+        const u = rest[b] - rest[c];
+        const v = rest[b + 1] - rest[c + 1];
+        const p = x[b] - x[c];
+        const q = x[b + 1] - x[c + 1];
+        cos += cotangents[t + k] * (u * p + v * q);
+        sin += cotangents[t + k] * (u * q - v * p);
+      }
+      const long = Math.sqrt(cos * cos + sin * sin);
+      cos = long ? cos / long : 1;
+      sin = long ? sin / long : 0;
+      for (let k = 0; k < 3; k += 1) {
+        const b = 2 * triangles[t + AFTER[k]];
+        const c = 2 * triangles[t + AFTER[k + 1]];
+        const u = cotangents[t + k] * (cos * (rest[b] - rest[c]) - sin * (rest[b + 1] - rest[c + 1]));
+        const v = cotangents[t + k] * (sin * (rest[b] - rest[c]) + cos * (rest[b + 1] - rest[c + 1]));
+        y[b] += u;
+        y[b + 1] += v;
+        y[c] -= u;
+        y[c + 1] -= v;
+      }
+    }
+    this.#addGrab(y, pin.target[0], pin.target[1]);
+    return multiplyBack(this.points, y, out);
+  }
+
+  /** Move what is held towards a target; returns how far the outline still moved, in sizes of the tile. */
+  pull(target, { turns = 2, steps = 20 } = {}) {
+    this.pin.target = target;
+    const before = this.polygon();
+    for (let turn = 0; turn < turns; turn += 1) this.#solve(steps);
+    const after = this.polygon();
+    let most = 0;
+    for (let i = 0; i < after.length; i += 1) most = Math.max(most, Math.abs(after[i] - before[i]));
+    return most / Math.sqrt(this.area);
+  }
+
+  #solve(steps) {
+    const { z, residual, step, image, scaled, goal, diagonal, free } = this;
+    this.#wanted(goal);
+    this.#form(z, image);
+    for (let i = 0; i < z.length; i += 1) {
+      residual[i] = free[i] * (goal[i] - image[i]);
+      scaled[i] = residual[i] / diagonal[i];
+      step[i] = scaled[i];
+    }
+    let strength = dot(residual, scaled);
+    const enough = ENOUGH ** 2 * this.area * LEAST_HOLD;
+    for (let k = 0; k < steps && strength > enough; k += 1) {
+      this.#form(step, image);
+      const length = strength / dot(step, image);
+      for (let i = 0; i < z.length; i += 1) {
+        z[i] += length * step[i];
+        residual[i] -= length * free[i] * image[i];
+        scaled[i] = residual[i] / diagonal[i];
+      }
+      const next = dot(residual, scaled);
+      const share = next / strength;
+      strength = next;
+      for (let i = 0; i < z.length; i += 1) step[i] = scaled[i] + share * step[i];
+    }
+  }
+
+  /** The outline: x0, y0, x1, y1 ... */
+  polygon() {
+    return multiply(this.points, this.z, new Float64Array(2 * this.count));
+  }
+
+  /** All points of the body, for what lies on the tile. */
+  body() {
+    return multiply(this.points, this.z, new Float64Array(2 * this.size));
+  }
+
+  /** How the group has moved: p -> linear p + shift, as {linear: [[a, b], [c, d]], shift}. */
+  placement() {
+    const linear = [[0, 0], [0, 0]];
+    const shift = [...this.z.subarray(this.parametersCount - 2, this.parametersCount)];
+    const [x, y] = this.middle;
+    this.maps.forEach((map, m) => {
+      const own = this.z[this.group + m];
+      for (const i of [0, 1]) {
+        for (const j of [0, 1]) linear[i][j] += own * map[i][j];
+        shift[i] -= own * (map[i][0] * x + map[i][1] * y);
+      }
+    });
+    return { linear, shift };
+  }
+
+  /** The parameters as the server takes them. */
+  parameters() {
+    const found = Array.from(this.z.subarray(0, this.parametersCount));
+    found.splice(-2, 2, ...this.placement().shift);
+    return found;
+  }
+}
+
+/** Whether an outline x0, y0, x1, y1 ... crosses itself. */
+export function crosses(ring) {
+  const count = ring.length / 2;
+  const order = Array.from({ length: count }, (_, k) => k);
+  const [low, high] = [new Float64Array(count), new Float64Array(count)];
+  for (let k = 0; k < count; k += 1) {
+    const [x, u] = [ring[2 * k], ring[2 * ((k + 1) % count)]];
+    low[k] = Math.min(x, u);
+    high[k] = Math.max(x, u);
+  }
+  order.sort((a, b) => low[a] - low[b]);
+  for (let i = 0; i < count; i += 1) {
+    for (let j = i + 1; j < count && low[order[j]] <= high[order[i]]; j += 1) {
+      if (meet(ring, count, order[i], order[j])) return true;
+    }
+  }
+  return false;
+}
+
+function meet(ring, count, a, b) {
+  const apart = Math.abs(a - b);
+  if (apart <= 1 || apart === count - 1) return false;
+  const point = (k) => [ring[2 * (k % count)], ring[2 * (k % count) + 1]];
+  const [p, q, r, s] = [point(a), point(a + 1), point(b), point(b + 1)];
+  if (Math.max(p[1], q[1]) < Math.min(r[1], s[1]) || Math.max(r[1], s[1]) < Math.min(p[1], q[1])) return false;
+  const side = (o, u, v) => (u[0] - o[0]) * (v[1] - o[1]) - (u[1] - o[1]) * (v[0] - o[0]);
+  return side(p, q, r) * side(p, q, s) <= 0 && side(r, s, p) * side(r, s, q) <= 0;
+}

@@ -1,0 +1,97 @@
+/** What lies on a tile, as one picture of the prototile: the artwork, lines and eyes. */
+
+import { inverse } from "../tiling.js";
+
+const MOST = 1400; // pixels along a side
+const BLEED = 0.7; // pixels by which triangles overlap, so that no seam shows
+
+/** An eye as exports draw it: white, dark ring, pupil and a light. */
+export function eyeInto(context, [x, y], radius, palette, yDown) {
+  const disc = (u, v, r, colour) => {
+    context.fillStyle = colour;
+    context.beginPath();
+    context.arc(u, v, r, 0, 2 * Math.PI);
+    context.fill();
+  };
+  disc(x, y, 1.1 * radius, palette.outline);
+  disc(x, y, 0.9 * radius, palette.paper ?? "#ffffff");
+  disc(x, y, 0.58 * radius, palette.outline);
+  disc(x - 0.27 * radius, y - (yDown ? 0.315 : -0.315) * radius, 0.2 * radius, palette.paper ?? "#ffffff");
+}
+
+export function lineInto(context, points, colour, width) {
+  context.strokeStyle = colour;
+  context.lineWidth = width;
+  context.lineCap = "round";
+  context.lineJoin = "round";
+  context.beginPath();
+  points.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+  if (points.length === 1) context.lineTo(points[0][0] + 1e-3 * width, points[0][1]);
+  context.stroke();
+}
+
+/** Lay triangles of a picture onto their images. `shares` are places in the picture, 0 to 1. */
+function triangles(context, picture, { images, shares, list }, scale) {
+  const [wide, high] = [picture.naturalWidth || picture.width, picture.naturalHeight || picture.height];
+  const base = context.getTransform();
+  for (const corners of list) {
+    const [a, b, c] = corners.map((k) => images[k]);
+    const [p, q, r] = corners.map((k) => [shares[k][0] * wide, shares[k][1] * high]);
+    const size = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+    if (Math.abs(size) < 1e-9) continue;
+    const part = (j) => {
+      const [u, v] = [b[j] - a[j], c[j] - a[j]];
+      const x = (u * (r[1] - p[1]) - v * (q[1] - p[1])) / size;
+      const y = (v * (q[0] - p[0]) - u * (r[0] - p[0])) / size;
+      return [x, y, a[j] - x * p[0] - y * p[1]];
+    };
+    const [[ax, ay, ae], [bx, by, be]] = [part(0), part(1)];
+    const middle = [(a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3];
+    context.save();
+    context.beginPath();
+    for (const [x, y] of [a, b, c]) {
+      const [u, v] = [x - middle[0], y - middle[1]];
+      const grow = 1 + BLEED / Math.max(1, scale * Math.hypot(u, v));
+      context.lineTo(middle[0] + grow * u, middle[1] + grow * v);
+    }
+    context.clip();
+    context.transform(ax, bx, ay, by, ae, be);
+    context.drawImage(picture, 0, 0);
+    context.restore();
+    context.setTransform(base);
+  }
+}
+
+/**
+ * Paint the prototile's skin at a scale (pixels a unit), or null if nothing lies on it.
+ * `art`: {picture, map, covered, yDown} or null; `marks`: {lines: [{points, colour, width}], eyes: [{at, radius}]}.
+ */
+export function paintSkin(tiling, { art, marks, palette, yDown }, scale) {
+  if (!art && !marks.lines.length && !marks.eyes.length) return null;
+  const xs = tiling.polygon.map((p) => p[0]);
+  const ys = tiling.polygon.map((p) => p[1]);
+  const [low, high] = [[Math.min(...xs), Math.min(...ys)], [Math.max(...xs), Math.max(...ys)]];
+  const size = Math.max(high[0] - low[0], high[1] - low[1]);
+  const own = Math.min(scale, MOST / size);
+  const pad = 2 / own;
+  const canvas = document.createElement("canvas");
+  canvas.width = Math.ceil((high[0] - low[0] + 2 * pad) * own);
+  canvas.height = Math.ceil((high[1] - low[1] + 2 * pad) * own);
+  const context = canvas.getContext("2d");
+  const matrix = [own, 0, 0, own, (pad - low[0]) * own, (pad - low[1]) * own];
+  context.setTransform(...matrix);
+  if (art) {
+    const [from, to] = art.covered;
+    const shares = art.map.rest.map(([x, y]) => {
+      const v = (y - from[1]) / (to[1] - from[1]);
+      return [(x - from[0]) / (to[0] - from[0]), yDown ? v : 1 - v];
+    });
+    triangles(context, art.picture, { images: art.map.images, shares, list: art.map.triangles }, own);
+    context.globalCompositeOperation = "destination-in";
+    context.fill(tiling.path);
+    context.globalCompositeOperation = "source-over";
+  }
+  for (const { points, colour, width } of marks.lines) lineInto(context, points, colour, width);
+  for (const { at, radius } of marks.eyes) eyeInto(context, at, radius, palette, yDown);
+  return { canvas, matrix: inverse(matrix), scale: own };
+}

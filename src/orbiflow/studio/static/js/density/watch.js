@@ -1,0 +1,58 @@
+/** A fit as it goes on: how far it is, what it tries, and buttons to hold or stop it. */
+
+import { button, h, put, trying } from "../dom.js";
+import { STATES, capital } from "../words.js";
+import { PARTS } from "./words.js";
+
+const TRIED = /^held-out part (\d+) of (\d+): (\w+)(?: of (\d+))?/;
+
+/** A part of a density, with a bar that says how much of it there is. */
+export const partBar = (name, share, words, more = "") => {
+  const [title, about] = PARTS[name] ?? [name, ""];
+  return h("li", {}, h("div", { class: "share" }, h("strong", {}, title), h("span", {}, words)),
+    h("meter", { value: share, "aria-label": title }), h("p", { class: "soft small" }, `${capital(about)}. ${more}`));
+};
+
+export class Watch {
+  constructor(page, task) {
+    Object.assign(this, { page, found: new Map() });
+    this.bar = h("progress", { max: 1, "aria-label": "How far the fit is" });
+    this.says = h("p");
+    this.kinds = h("ul", { class: "parts stack" });
+    this.buttons = h("div", { class: "row" });
+    this.root = h("section", { class: "panel stack watch" }, h("h2", {}, "Fitting"), this.bar, this.says, this.buttons,
+      h("p", { class: "soft small" }, "Several kinds of density are tried. Rows that were kept aside choose among them."), this.kinds);
+    this.update(task);
+  }
+
+  update(task) {
+    this.task = task;
+    const what = task.what ?? "", step = { drawing: ": drawing it", "putting together": ": putting it together" }[what] ?? (this.hear(what) ? ": trying what suits the rows" : "");
+    this.bar.value = task.share;
+    const state = task.state === "waiting" && task.place ? `${STATES.waiting}: ${task.place} before it` : STATES[task.state];
+    this.says.textContent = task.state === "running" ? `${Math.round(100 * task.share)} % done${step}` : state;
+    this.steer();
+  }
+
+  /** Draw the buttons, if others are needed: the focus stays where it is. */
+  steer() {
+    if (this.state === this.task.state) return;
+    this.state = this.task.state;
+    const act = (verb) => () => trying(() => this.page.api.post(`tasks/${this.task.id}/${verb}`));
+    const focused = this.buttons.contains(document.activeElement);
+    put(this.buttons, this.state === "paused" ? button("Go on", act("resume"), { image: "play", kind: "primary" }) : button("Pause", act("pause"), { image: "pause" }),
+      button("Stop", act("cancel"), { image: "stop" }));
+    if (focused) this.buttons.firstChild.focus();
+  }
+
+  hear(what) {
+    const tried = TRIED.exec(what), kind = tried ? tried[3] : what.startsWith("flow") ? "flow" : null;
+    if (!kind) return false;
+    const own = this.found.get(kind) ?? {};
+    this.found.set(kind, tried ? { part: Number(tried[1]), parts: Number(tried[2]), size: tried[4] ?? own.size } : {});
+    put(this.kinds, [...this.found].map(([name, { part, parts, size }]) => (part
+      ? partBar(name, part / parts, `part ${part} of ${parts}${size ? `, up to ${size} bumps` : ""}`)
+      : partBar(name, this.task.share, "being stirred"))));
+    return true;
+  }
+}

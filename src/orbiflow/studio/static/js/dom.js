@@ -1,0 +1,181 @@
+/** Elements, controls, toasts and dialogs: what every page builds with. */
+
+const SVG = "http://www.w3.org/2000/svg";
+
+/** Make an element. Attributes that are functions listen, `style` is an object, the rest is as in HTML. */
+export function h(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (value === undefined || value === null || value === false) continue;
+    if (typeof value === "function") made.addEventListener(name.replace(/^on/, ""), value);
+    else if (name === "style") Object.entries(value).forEach(([key, entry]) => made.style.setProperty(key, entry));
+    else if (["value", "checked", "srcObject", "muted"].includes(name)) made[name] = value;
+    else made.setAttribute(name, value === true ? "" : value);
+  }
+  made.append(...children.flat().filter((child) => child !== null && child !== undefined && child !== false));
+  return made;
+}
+
+const ICONS = {
+  upload: "M12 16V4m-5 5 5-5 5 5M4 16v3a1 1 0 0 0 1 1h14a1 1 0 0 0 1-1v-3",
+  camera: "M4 8h3l2-3h6l2 3h3v11H4zM12 10a3.5 3.5 0 1 0 0 7 3.5 3.5 0 0 0 0-7",
+  pencil: "m4 20 1-5L16 4l4 4L9 19zM14 6l4 4",
+  paste: "M9 4h6v3H9zM9 5H6v15h12V5h-3",
+  open: "M3 19V5h6l2 3h10v11z",
+  undo: "M9 14 4 9l5-5M4 9h10a6 6 0 0 1 0 12h-3",
+  redo: "m15 14 5-5-5-5m5 5H10a6 6 0 0 0 0 12h3",
+  pause: "M8 5v14M16 5v14",
+  play: "M7 4.5v15l12-7.5z",
+  stop: "M6 6h12v12H6z",
+  download: "M12 4v12m-5-5 5 5 5-5M4 20h16",
+  bin: "M5 7h14M10 7V4h4v3M7 7l1 13h8l1-13",
+  more: "M12 5v14M5 12h14",
+  close: "m6 6 12 12M18 6 6 18",
+  arrow: "M5 12h14m-6-6 6 6-6 6",
+  brush: "M14 10 20 4M14 10c2 2 2 4 0 6-3 3-7 3-10 3 2-2 1-4 3-7 2-3 5-4 7-2",
+  lasso: "M12 5c5 0 8 2 8 5s-3 5-8 5-8-2-8-5 3-5 8-5M8 15c-2 1-2 4 0 5",
+  pin: "M9 4h6l-1 6 3 3H7l3-3zM12 13v7",
+  star: "m12 4 2.4 5.2 5.6.7-4.1 3.9 1 5.6L12 16.700l-4.900 2.700 1-5.600L4 9.900l5.600-.7z",
+  rub: "m4 15 8-9 7 6-7 8H7zM9 20h11",
+  cut: "M6 6a2 2 0 1 0 .1 0zM6 14a2 2 0 1 0 .1 0zM8 9l12 9M8 15 20 6",
+  picture: "M4 5h16v14H4zM4 16l5-5 4 4 3-3 4 4",
+  solid: "m12 3 8 4.500v9L12 21l-8-4.500v-9zM12 12l8-4.500M12 12v9M12 12 4 7.500",
+  film: "M4 5h16v14H4zM8 5v14M16 5v14M4 12h16",
+};
+
+/** An icon; words stand beside it, so readers of screens skip it. */
+export function icon(name) {
+  const made = document.createElementNS(SVG, "svg");
+  const path = document.createElementNS(SVG, "path");
+  made.setAttribute("viewBox", "0 0 24 24");
+  made.setAttribute("aria-hidden", "true");
+  made.classList.add("icon-svg");
+  path.setAttribute("d", ICONS[name]);
+  made.append(path);
+  return made;
+}
+
+/** A button with a text, and an icon if one is named; `kind`: classes such as "primary". */
+export function button(text, onclick, { kind = "", image, ...rest } = {}) {
+  const shown = kind.includes("icon") ? [h("span", { class: "unseen" }, text)] : [text];
+  const title = kind.includes("icon") ? text : undefined;
+  return h("button", { type: "button", class: `button ${kind}`, onclick, title, ...rest }, image && icon(image), ...shown);
+}
+
+let count = 0;
+/** A name that no other element of the page has. */
+export const unique = (stem) => `${stem}-${(count += 1)}`;
+
+/** One of a few, as buttons side by side. Options: [value, words, icon]. `.set(value)` changes it. */
+export function choice(label, options, value, onchange, { unseen = false } = {}) {
+  const name = unique("choice");
+  const boxes = options.map(([own]) =>
+    h("input", { type: "radio", name, value: String(own), checked: own === value, onchange: () => onchange(own) }));
+  const made = h("fieldset", { class: "choice" }, h("legend", { class: unseen && "unseen" }, label),
+    h("div", {}, options.map(([, words, image], k) => h("label", {}, boxes[k], h("span", {}, image && icon(image), words)))));
+  made.set = (chosen) => boxes.forEach((box, k) => { box.checked = options[k][0] === chosen; });
+  return made;
+}
+
+/** A slider that says its value in words. `.set(value)` changes it. */
+export function slider(label, { min, max, step, value, said = String }, oninput) {
+  const id = unique("slider");
+  const shown = h("output", { for: id });
+  const box = h("input", { type: "range", id, min, max, step, oninput: () => { tell(); oninput(Number(box.value)); } });
+  const tell = () => {
+    shown.textContent = said(Number(box.value));
+    box.setAttribute("aria-valuetext", shown.textContent);
+  };
+  const made = h("div", { class: "slider" }, h("label", { for: id, class: "label" }, label), shown, box);
+  made.set = (number) => { box.value = number; tell(); };
+  made.set(value);
+  return made;
+}
+
+/** Show a sentence for a while; one that is bad stays until it is closed. */
+export function toast(text, { bad = false } = {}) {
+  const box = document.querySelector("#toasts");
+  if ([...box.children].some((other) => other.firstChild.textContent === text)) return;
+  const made = h("div", { class: bad ? "toast bad" : "toast" }, h("span", {}, text),
+    h("button", { type: "button", "aria-label": "Close", onclick: () => made.remove() }, icon("close")));
+  box.append(made);
+  while (box.children.length > 3) box.firstChild.remove();
+  if (!bad) setTimeout(() => made.remove(), 6000);
+}
+
+/** Call a function that may fail; if it does, say why. */
+export async function trying(work) {
+  try {
+    return await work();
+  } catch (error) {
+    if (error.name !== "AbortError") toast(error.message, { bad: true });
+    return undefined;
+  }
+}
+
+/** Open a dialog; resolves with what `close(value)` is given, undefined if it was dismissed. */
+export function dialog(title, build) {
+  return new Promise((resolve) => {
+    const id = unique("dialog");
+    let result;
+    const made = h("dialog", { "aria-labelledby": id, onclose: () => { made.remove(); resolve(result); } });
+    const close = (value) => { result = value; made.close(); };
+    made.append(h("div", {},
+      h("header", {}, h("h2", { id }, title), button("Close", () => close(), { kind: "quiet icon", image: "close" })),
+      build(close)));
+    document.body.append(made);
+    made.showModal();
+  });
+}
+
+/** Ask before something that cannot be taken back. */
+export function confirmed(title, text, verb) {
+  return dialog(title, (close) => [
+    h("p", {}, text),
+    h("footer", {}, button("Keep it", () => close(false), { autofocus: true }), button(verb, () => close(true), { kind: "primary" })),
+  ].reduce((box, part) => { box.append(part); return box; }, h("div", { class: "stack" })));
+}
+
+/**
+ * A function that does `work` for its newest arguments only, when calls have paused for `ms`;
+ * `.done()` does at once what waits, and resolves when all is done.
+ */
+export function newest(work, ms = 250) {
+  let timer = 0;
+  let running = null;
+  let waiting = null;
+  const go = async () => {
+    clearTimeout(timer);
+    while (running || waiting) {
+      if (!running) {
+        const given = waiting;
+        waiting = null;
+        running = trying(() => work(...given)).then(() => { running = null; });
+      }
+      await running;
+    }
+  };
+  const made = (...given) => {
+    waiting = given;
+    clearTimeout(timer);
+    timer = setTimeout(go, ms);
+  };
+  made.done = go;
+  return made;
+}
+
+const sheets = new Map();
+/** Use a page's style sheet, and no other page's; resolves when it applies. */
+export async function style(name) {
+  if (!sheets.has(name)) {
+    const link = h("link", { rel: "stylesheet", href: `css/${name}.css` });
+    const ready = new Promise((resolve) => { link.onload = link.onerror = resolve; });
+    sheets.set(name, { link, ready });
+    document.head.append(link);
+  }
+  await sheets.get(name).ready;
+  for (const [other, { link }] of sheets) link.disabled = other !== name;
+}
+
+/** Replace all children. */
+export const put = (place, ...children) => place.replaceChildren(...children.flat().filter(Boolean));

@@ -1,0 +1,108 @@
+/** Forms from the JSON Schema of an operation's settings. */
+
+import { h, unique } from "./dom.js";
+import { capital } from "./words.js";
+
+/** The kinds of values that a schema allows, `null` apart. */
+function kinds(schema) {
+  const inner = schema.anyOf ? schema.anyOf.flatMap(kinds) : [schema];
+  return inner.filter(({ type }) => type !== "null");
+}
+
+const text = (value) => (Array.isArray(value) ? value.join(" x ") : value ?? "");
+const label = (name) => capital(name.replaceAll("_", " "));
+
+/** The control of one setting, {root, box, value()}: undefined where it has its default. */
+function control(name, schema, words, changed) {
+  const id = unique(name);
+  const found = kinds(schema);
+  const options = found.find((kind) => kind.enum)?.enum;
+  const meaning = words?.about ?? schema.description;
+  const described = meaning ? `${id}-about` : undefined;
+  const about = meaning && h("p", { class: "soft small", id: described }, meaning);
+  const shared = { id, name, "aria-describedby": described, onchange: changed };
+  const unit = schema["x-unit"];
+  const title = words?.title ?? label(name);
+  if (found.some(({ type }) => type === "boolean")) {
+    const box = h("input", { ...shared, type: "checkbox", checked: Boolean(schema.default) });
+    const value = () => (box.checked === Boolean(schema.default) ? undefined : box.checked);
+    return { root: h("div", { class: "field" }, h("label", { class: "check" }, box, title), about), value, box };
+  }
+  if (options) {
+    const first = schema.default === null || schema.default === undefined ? [h("option", { value: "" }, words?.usual ?? capital(schema["x-default"] || "as it comes"))] : [];
+    const box = h("select", shared, first, options.map((option) => h("option", { value: option }, words?.options?.[option] ?? capital(option))));
+    box.value = schema.default ?? "";
+    const value = () => (box.value === (schema.default ?? "") ? undefined : box.value);
+    return { root: h("div", { class: "field" }, h("label", { for: id, class: "label" }, title), box, about), value, box };
+  }
+  const bare = found.find(({ type }) => type === "number" || type === "integer");
+  const numeric = bare && found.length === 1;
+  const start = text(schema.default);
+  const box = h("input", {
+    ...shared, type: numeric ? "number" : "text", value: start, placeholder: start === "" ? schema["x-default"] : start,
+    min: numeric ? bare.minimum ?? bare.exclusiveMinimum : undefined, max: numeric ? bare.maximum : undefined,
+    step: !numeric ? undefined : bare.type === "integer" ? 1 : "any", autocomplete: "off", inputmode: bare ? "decimal" : undefined,
+  });
+  const value = () => {
+    const given = box.value.trim();
+    if (given === "" || given === String(start)) return undefined;
+    if (found.some(({ type }) => type === "array") && !found.some(({ type }) => type === "string")) return given.split(/[;\s]+/);
+    return bare && !Number.isNaN(Number(given)) ? Number(given) : given;
+  };
+  return { root: h("div", { class: "field" }, h("label", { for: id, class: "label" }, unit ? `${title} (${unit})` : title), box, about), value, box };
+}
+
+/**
+ * A form: the settings named in `first` on top, the rest folded away in their groups.
+ * `words`: titles and the like by setting; `not` in them: values of others with which it does not apply.
+ * `hidden`: settings that the page sets itself. `start`: values to begin with.
+ * `.values()`: what differs from the defaults and applies. `.refuse(text)`: show what is wrong beside the
+ * setting that the text begins with; false if it names none.
+ */
+export function form(schema, { first, words = {}, hidden = [], start = {} }, changed = () => {}) {
+  const controls = new Map();
+  const names = Object.keys(schema.properties).filter((name) => !hidden.includes(name) && !("const" in schema.properties[name]));
+  const heard = () => { fit(); changed(made.values()); };
+  for (const name of names) {
+    controls.set(name, control(name, schema.properties[name], words[name], heard));
+    if (start[name] !== undefined) controls.get(name).box.value = start[name];
+  }
+
+  /** Hide what does not apply to the rest, so that only what works can be set. */
+  function fit() {
+    for (const name of names) {
+      const rules = Object.entries(schema.properties[name]["x-only-with"] ?? {});
+      const applies = rules.every(([other, allowed]) => !controls.has(other) || [allowed].flat().includes(now(other)));
+      const never = Object.entries(words[name]?.not ?? {}).some(([other, values]) => controls.has(other) && values.includes(now(other)));
+      controls.get(name).root.hidden = !applies || never;
+    }
+    for (const box of made.querySelectorAll("details")) box.hidden = ![...box.querySelectorAll(".field")].some((field) => !field.hidden);
+  }
+  const now = (name) => controls.get(name).value() ?? schema.properties[name].default;
+  const groups = Map.groupBy
+    ? Map.groupBy(names.filter((name) => !first.includes(name)), (name) => schema.properties[name]["x-group"] || "More")
+    : new Map([["More", names.filter((name) => !first.includes(name))]]);
+  const made = h("div", { class: "stack form" },
+    first.filter((name) => controls.has(name)).map((name) => controls.get(name).root),
+    [...groups].map(([group, own]) => h("details", {}, h("summary", {}, group), h("div", { class: "stack" }, own.map((name) => controls.get(name).root)))));
+  made.now = (name) => (controls.has(name) ? now(name) : undefined);
+  made.values = () => {
+    const shown = names.filter((name) => !controls.get(name).root.hidden);
+    return Object.fromEntries(shown.map((name) => [name, controls.get(name).value()]).filter(([, value]) => value !== undefined));
+  };
+  made.refuse = (text) => {
+    const name = names.filter((own) => text.toLowerCase().startsWith(own.replaceAll("_", " "))).sort((a, b) => b.length - a.length)[0];
+    if (!name) return false;
+    const { root, box } = controls.get(name);
+    const said = h("p", { class: "error small", role: "alert" }, text);
+    root.querySelector(".error")?.remove();
+    root.append(said);
+    root.closest("details")?.setAttribute("open", "");
+    box.setAttribute("aria-invalid", "true");
+    box.addEventListener("input", () => { said.remove(); box.removeAttribute("aria-invalid"); }, { once: true });
+    box.focus();
+    return true;
+  };
+  fit();
+  return made;
+}

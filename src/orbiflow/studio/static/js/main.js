@@ -1,0 +1,134 @@
+/** The shell: which page is shown, its project, and the bar on top. */
+
+import { about, api } from "./api.js";
+import { h, newest, put, toast } from "./dom.js";
+import { Feed } from "./events.js";
+import { sentence } from "./words.js";
+
+const ROUTES = [
+  [/^$/, () => import("./start/page.js")],
+  [/^p\/([\w-]+)\/picture$/, () => import("./start/picture.js"), "picture"],
+  [/^p\/([\w-]+)$/, () => import("./search/page.js"), "tiles"],
+  [/^p\/([\w-]+)\/t\/(\d+)$/, () => import("./closeup/page.js"), "closeup"],
+  [/^p\/([\w-]+)\/take\/(\d+)$/, () => import("./takeaway/page.js"), "take"],
+  [/^d\/([\w-]+)$/, () => import("./density/page.js")],
+];
+
+const page = document.querySelector("#page");
+const bar = document.querySelector("#top");
+let close = () => {};
+let feed = null;
+let turn = 0;
+
+/** Go to a page; `replace` leaves no step in the history. */
+export function navigate(path, { replace = false, quiet = false } = {}) {
+  if (quiet) {
+    history.replaceState(null, "", `#/${path}`);
+    shownTile = Number(path.match(/\/t\/(\d+)$/)?.[1]) || shownTile;
+    links();
+    return;
+  }
+  if (replace) location.replace(`#/${path}`);
+  else location.hash = `#/${path}`;
+}
+
+async function show() {
+  const path = decodeURIComponent(location.hash.replace(/^#\/?/, ""));
+  const mine = (turn += 1);
+  const [pattern, load, step] = ROUTES.find(([known]) => known.test(path)) ?? [null];
+  const [, id, tileId] = pattern ? path.match(pattern) : [];
+  close();
+  close = () => {};
+  const root = h("div", { class: "page" });
+  const waiting = setTimeout(() => put(page, h("p", { class: "lonely soft" }, "One moment …")), 300);
+  try {
+    if (!pattern) throw new Error("There is no such page.");
+    const [module, known] = await Promise.all([load(), about(), follow(id)]);
+    if (mine !== turn) return;
+    drawBar(step, Number(tileId) || null);
+    clearTimeout(waiting);
+    put(page, root);
+    const shown = await module.show(root, {
+      api, events: feed, project: feed?.project ?? null, tileId: Number(tileId) || null, navigate, about: known,
+    });
+    if (mine !== turn) shown?.();
+    else close = shown ?? (() => {});
+    head();
+  } catch (error) {
+    if (mine !== turn) return;
+    drawBar();
+    put(page, h("div", { class: "lonely stack" }, h("h1", { tabindex: "-1" }, "This page cannot be shown"),
+      h("p", {}, error.message), h("p", {}, h("a", { href: "#/" }, "Back to the start"))));
+    head();
+  } finally {
+    clearTimeout(waiting);
+  }
+}
+
+/** The title of the window, and where readers of screens begin. */
+function head() {
+  const title = page.querySelector("h1");
+  const name = feed?.project.name;
+  document.title = [title?.textContent, name, "orbiflow studio"].filter(Boolean).join(" · ");
+  title?.focus({ preventScroll: true });
+  scrollTo(0, 0);
+}
+
+/** Fetch the project of a page and hear its events, unless it is the one that is heard already. */
+async function follow(id) {
+  if (feed && feed.project.id === id) return;
+  feed?.close();
+  feed = null;
+  if (!id) return;
+  const project = await api.get(`projects/${id}`);
+  const own = new Feed(project);
+  feed = own;
+  own.on("lost", () => { document.querySelector(".lost").hidden = false; });
+  own.on("back", () => { document.querySelector(".lost").hidden = true; });
+  own.on("notice", ({ text, warning }) => toast(sentence(text), { bad: warning }));
+  own.on("gone", (what) => { if (what.project) { toast("This project was deleted."); navigate(""); } });
+  own.on("project", rename);
+  own.on("refresh", () => { rename(); links(); });
+  own.on("card", links);
+}
+
+let shownStep;
+let shownTile;
+
+function rename() {
+  const box = bar.querySelector(".title");
+  if (box && document.activeElement !== box) box.value = feed.project.name;
+}
+
+/** The steps of a project: those that have nothing to show yet are left out. */
+function links() {
+  const place = bar.querySelector(".steps");
+  if (!place) return;
+  const { id, tiles, silhouette } = feed.project;
+  const tile = shownTile ?? tiles[0]?.id;
+  const steps = [["picture", "Picture", `p/${id}/picture`]];
+  if (silhouette || tiles.length) steps.push(["tiles", "Tiles", `p/${id}`]);
+  if (tile) steps.push(["closeup", "Close up", `p/${id}/t/${tile}`], ["take", "Take away", `p/${id}/take/${tile}`]);
+  put(place, steps.map(([key, words, path]) =>
+    h("a", { href: `#/${path}`, "aria-current": key === shownStep && "page" }, words)));
+}
+
+function drawBar(step, tile) {
+  [shownStep, shownTile] = [step, tile];
+  const project = feed?.project;
+  const save = newest((name) => api.patch(`projects/${project.id}`, { name }), 500);
+  put(bar, h("div", { class: `bar at-${step}` },
+    h("a", { class: "brand", href: "#/", "aria-label": "orbiflow studio: start" },
+      h("img", { src: "icon.svg", alt: "" }), h("span", {}, "orbiflow")),
+    project && h("input", {
+      class: "title", type: "text", "aria-label": "Name of the project", maxlength: 80, value: project.name,
+      oninput: ({ target }) => { if (target.value.trim()) { project.name = target.value.trim(); save(project.name); } },
+    }),
+    project && step && h("nav", { class: "steps", "aria-label": "Steps" })),
+  h("p", { class: "lost", role: "status", hidden: true }, "The studio does not answer. Trying again …"));
+  if (project) links();
+}
+
+addEventListener("hashchange", show);
+addEventListener("unhandledrejection", ({ reason }) => toast(reason?.message ?? "Something went wrong."));
+show();

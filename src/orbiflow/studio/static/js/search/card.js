@@ -1,0 +1,55 @@
+/** One tile of a search: a small tiling, its stars, and what can be done with it. */
+
+import { button, h } from "../dom.js";
+import { paintCard } from "../tiling.js";
+import { STAGES, capital, starText, starWords } from "../words.js";
+
+/** A card that can be told to change: {root, update(card, palette), paint()}. */
+export function cardView(project, actions) {
+  const canvas = h("canvas", { "aria-hidden": "true" });
+  const stars = h("span", { class: "stars", role: "img" });
+  const word = h("span", { class: "word" });
+  const lies = h("span", { class: "lies" });
+  const name = h("span", { class: "tag" });
+  const stage = h("span", { class: "stage-word" });
+  const link = h("a", { class: "open" }, canvas, h("span", { class: "facts" },
+    h("span", { class: "row" }, stars, word, h("span", { class: "grow" }), stage),
+    h("span", { class: "row" }, lies, h("span", { class: "grow" }), name)));
+  const more = button("More like this", () => actions.more(shown), { kind: "quiet" });
+  const drop = button("Remove this tile", () => actions.remove(shown), { kind: "quiet icon", image: "bin" });
+  const take = h("a", { class: "button quiet" }, "Take away");
+  const root = h("li", { class: "card" }, link, h("div", { class: "row deeds" }, take, more, h("span", { class: "grow" }), drop));
+  let shown = null;
+  let palette = null;
+  let painted = "";
+
+  function paint(anew = true) {
+    if (!shown || !canvas.clientWidth) return;
+    const key = `${canvas.clientWidth} ${canvas.clientHeight}`;
+    if (!anew && key === painted) return;
+    painted = key;
+    paintCard(canvas, shown, palette, { across: canvas.clientWidth > 480 ? 6 : 4.5 });
+  }
+
+  function update(card, colours) {
+    const anew = !shown || shown.polygon !== card.polygon || palette !== colours;
+    [shown, palette] = [card, colours];
+    root.dataset.tile = card.id;
+    root.dataset.stage = card.stage;
+    root.classList.toggle("rough", card.stage !== "final");
+    link.href = `#/p/${project.id}/t/${card.id}`;
+    take.href = `#/p/${project.id}/take/${card.id}`;
+    stars.textContent = starText(card.stars);
+    stars.setAttribute("aria-label", starWords(card.stars));
+    word.textContent = card.stars ? capital(card.word) : "";
+    lies.textContent = capital(card.arrangement);
+    name.textContent = card.parent ? `${card.class_name}, pulled` : card.class_name;
+    stage.textContent = card.stage === "final" ? "" : STAGES[card.stage] ?? "";
+    const about = `${capital(card.word || "a tile")}, ${card.arrangement}`;
+    link.setAttribute("aria-label", `Open: ${about}. ${starWords(card.stars)}. Class ${card.class_name}.`);
+    more.setAttribute("aria-label", `More like this: ${about}`);
+    take.setAttribute("aria-label", `Take away: ${about}`);
+    if (anew) paint();
+  }
+  return { root, update, paint };
+}

@@ -1,0 +1,235 @@
+/** What was read of a picture, and how to mend it: sliders, brushes, lassos, parts to keep. */
+
+import { button, h, newest, put, style, toast, trying } from "../dom.js";
+import { sized } from "../tiling.js";
+import { alive, number, sentence } from "../words.js";
+import { paintingControls, readingControls } from "./controls.js";
+import { Marks } from "./marks.js";
+import { paintBrush, paintSilhouette, paintStrokes, tinted, touches } from "./overlay.js";
+import { pointing } from "./pointing.js";
+
+const LAYERS = ["mend", "pins", "emphasis"];
+const KEYS = "With the keyboard: arrow keys move the brush, Space begins and ends a stroke.";
+
+export async function show(root, page) {
+  await style("start");
+  const own = new PicturePage(page);
+  own.build(root);
+  return () => own.close();
+}
+
+class PicturePage {
+  constructor({ api, events, project, navigate }) {
+    Object.assign(this, { api, events, project, navigate });
+    this.place = `projects/${project.id}`;
+    this.pen = { tool: "add", shape: "brush", size: 4 };
+    this.marks = new Marks(1, 1);
+    this.tints = new Map(); // the marks in their colours, painted anew when strokes change
+    this.known = 0; // strokes that the outline on the screen knows
+    this.sent = 0; // strokes that the server has
+    this.reading = { threshold: null, invert: null, smooth: 0, ...project.reading };
+    this.read = newest(async () => this.began(await api.put(`${this.place}/reading`, this.reading)));
+    this.send = Object.fromEntries(LAYERS.map((layer) => [layer, newest(() => this.upload(layer), 200)]));
+  }
+
+  build(root) {
+    this.canvas = h("canvas", {
+      class: "reading", tabindex: "0", role: "application",
+      "aria-label": `The picture with the outline that was read. ${KEYS}`,
+    });
+    this.stage = h("div", { class: "stage", hidden: true }, this.canvas);
+    this.said = h("div", { class: "said stack", role: "status" });
+    this.find = button("Find tiles", () => this.search(), { kind: "primary big", image: "arrow" });
+    this.back = button("Undo", () => this.changed(this.marks.undo()), { kind: "quiet", image: "undo" });
+    this.again = button("Redo", () => this.changed(this.marks.redo()), { kind: "quiet", image: "redo" });
+    const clear = button("Start over", () => this.startOver(), { kind: "quiet", image: "bin" });
+    this.controls = readingControls(this.reading, () => this.read());
+    this.unread = h("p", { class: "lonely soft" }, "Reading the picture …");
+    put(root, h("div", { class: "picture" },
+      h("div", { class: "stack" },
+        h("h1", { tabindex: "-1" }, "Is this your animal?"),
+        h("p", { class: "soft" }, "The green shape is what we read. If something is missing or too much, mend it here."),
+        this.stage, this.unread),
+      h("div", { class: "stack side" }, h("div", { class: "go" }, this.find), this.said, this.controls.root,
+        paintingControls(this.pen, () => this.paint(), [this.back, this.again, clear]))));
+    this.listen();
+    this.ready();
+  }
+
+  listen() {
+    pointing(this.canvas, () => [this.marks.width, this.marks.height], {
+      begin: (point) => this.begin(point),
+      move: (points) => { this.stroke?.points.push(...points); this.paint(); },
+      end: () => this.end(),
+      hover: (point) => { this.cross = point; this.paint(); },
+    });
+    this.keys = (event) => {
+      if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || event.target.type === "text") return;
+      event.preventDefault();
+      this.changed(event.shiftKey ? this.marks.redo() : this.marks.undo());
+    };
+    document.addEventListener("keydown", this.keys);
+    this.watch = new ResizeObserver(() => this.paint());
+    this.watch.observe(this.stage);
+    const ready = () => this.ready();
+    this.off = [["silhouette", ready], ["refresh", ready], ["task", () => this.tell()]].map(([kind, heard]) => this.events.on(kind, heard));
+  }
+
+  close() {
+    this.watch.disconnect();
+    document.removeEventListener("keydown", this.keys);
+    this.off.forEach((stop) => stop());
+  }
+
+  /** Show the silhouette that the project has now. */
+  async ready() {
+    const { silhouette } = this.project;
+    if (silhouette && silhouette.backdrop !== this.shown) {
+      const image = new Image();
+      image.src = silhouette.backdrop;
+      await trying(() => image.decode());
+      [this.picture, this.shown] = [image, silhouette.backdrop];
+      if (this.marks.width !== silhouette.width || this.marks.height !== silhouette.height) await this.fit(silhouette);
+    }
+    this.known = Math.min(this.sent, this.marks.strokes.length);
+    this.stage.hidden = !silhouette;
+    this.unread.hidden = Boolean(silhouette);
+    this.tell();
+  }
+
+  /** Begin with marks of the picture's size, those that the server has. */
+  async fit({ width, height }) {
+    this.stage.style.setProperty("--shape", `${width} / ${height}`);
+    this.stage.style.setProperty("--ratio", width / height);
+    const marks = new Marks(width, height);
+    const found = LAYERS.filter((layer) => this.project[layer]);
+    await Promise.all(found.map((layer) => trying(() => marks.load(layer, this.project[layer], { both: layer === "mend" }))));
+    this.marks = marks;
+  }
+
+  paint() {
+    const { project: { silhouette }, picture, marks, pen } = this;
+    if (!silhouette || !picture) return;
+    const { context, width, ratio } = sized(this.canvas);
+    const pixel = marks.width / width;
+    context.setTransform(ratio / pixel, 0, 0, ratio / pixel, 0, 0);
+    paintSilhouette(context, picture, silhouette, pixel);
+    paintStrokes(context, {
+      marks: ["pins", "emphasis"].filter((layer) => marks.has(layer)).map((layer) => this.tint(layer)),
+      fresh: marks.strokes.slice(this.known).filter(({ layer }) => layer === "mend"),
+      stroke: this.stroke, tool: pen.tool,
+    });
+    if (this.cross) paintBrush(context, this.cross, pen.shape === "lasso" ? 4 * pixel : this.brush() / 2, pixel);
+  }
+
+  tint(layer) {
+    if (!this.tints.has(layer)) this.tints.set(layer, tinted(this.marks, layer));
+    return this.tints.get(layer);
+  }
+
+  /** The width of the brush in pixels of the picture. */
+  brush() {
+    return (this.pen.size / 100) * Math.max(this.marks.width, this.marks.height);
+  }
+
+  begin(point) {
+    const { tool, shape } = this.pen;
+    const layer = { add: "mend", remove: "mend", rub: "all" }[tool] ?? tool;
+    this.stroke = { layer, shape, size: this.brush(), points: [point], black: tool === "remove", erases: tool === "rub" };
+    this.paint();
+  }
+
+  end() {
+    const { stroke } = this;
+    this.stroke = null;
+    if (!stroke || (stroke.shape === "lasso" && stroke.points.length < 3)) return this.paint();
+    if (["pins", "emphasis"].includes(stroke.layer) && !touches(stroke, this.project.silhouette.outline)) {
+      toast("Paint on the animal itself: that is outside of it.");
+      return this.paint();
+    }
+    this.marks.add(stroke);
+    return this.changed(stroke);
+  }
+
+  /** A stroke came or went: send the layers that it touches. */
+  changed(stroke) {
+    if (!stroke) return;
+    this.tints.clear();
+    this.known = Math.min(this.known, this.marks.strokes.length);
+    LAYERS.filter((layer) => stroke.layer === layer || (stroke.erases && this.marks.has(layer))).forEach((layer) => this.send[layer]());
+    this.tell();
+  }
+
+  async upload(layer) {
+    const count = this.marks.strokes.length;
+    const address = `${this.place}/${layer}`;
+    if (this.marks.has(layer)) this.began(await this.api.put(address, await this.marks.png(layer, { clear: layer === "mend" })));
+    else this.began(await this.api.remove(address));
+    if (layer === "mend") this.sent = count;
+  }
+
+  startOver() {
+    this.marks.clear();
+    this.tints.clear();
+    this.known = 0;
+    Object.values(this.send).forEach((go) => go());
+    this.controls.reset();
+    this.tell();
+  }
+
+  /** Take note of a reading that has begun, if its events have not told of it already. */
+  began({ task }) {
+    if (task && !this.project.tasks.some(({ id }) => id === task.id)) this.events.apply("task", task);
+    this.tell();
+  }
+
+  get task() {
+    return this.project.tasks.find(({ operation }) => operation === "read");
+  }
+
+  /** Say what was read, and which buttons do something. */
+  tell() {
+    const { project: { silhouette }, marks, task } = this;
+    const busy = alive(task);
+    this.find.disabled = !silhouette || this.searching;
+    this.back.disabled = !marks.strokes.length;
+    this.again.disabled = !marks.undone.length;
+    this.canvas.setAttribute("aria-busy", String(Boolean(busy)));
+    put(this.said,
+      busy && h("p", { class: "soft" }, silhouette ? "Reading it again …" : "Reading the picture …"),
+      !busy && task?.state === "failed" && h("p", { class: "error" }, sentence(task.error)),
+      silhouette && notes(silhouette));
+    this.paint();
+  }
+
+  /** Search for tiles of what is on the screen: first all of it must have been read. */
+  search() {
+    this.searching = this.find.disabled = true;
+    return trying(async () => {
+      await Promise.all([this.read, ...Object.values(this.send)].map((pending) => pending.done()));
+      await this.settled();
+      const { objective = "likeness", effort = "normal" } = this.project.view?.search ?? {};
+      await this.api.post(`${this.place}/tasks`, { operation: "search", settings: { objective, effort } });
+      this.navigate(`p/${this.project.id}`);
+    }).then(() => { this.searching = this.find.disabled = false; });
+  }
+
+  /** Resolves when nothing is being read. */
+  settled() {
+    return new Promise((resolve) => {
+      const check = () => { if (!alive(this.task)) { stop(); resolve(); } };
+      const stop = this.events.on("task", check);
+      check();
+    });
+  }
+}
+
+/** What there is to say of a silhouette. */
+function notes({ doubts, notes: said, left_out: others = [] }) {
+  const out = others.length;
+  const kept = out === 1 ? "it" : "them";
+  return h("ul", { class: "notes stack" },
+    doubts.map((text) => h("li", { class: "notice" }, sentence(text))),
+    out > 0 && h("li", {}, h("span", { class: "swatch" }), `${number(out, "part is", "parts are")} left out: a tile is one piece. Paint a bridge with “Add” to keep ${kept}.`),
+    said.length > 0 && h("li", {}, h("details", {}, h("summary", {}, "How it was read"), h("p", { class: "soft" }, said.map(sentence).join(" ")))));
+}

@@ -1,0 +1,176 @@
+/** The endless tiling of a card: which copies are in view, their colours, and how they are drawn. */
+
+const MOST_COPIES = 6000;
+
+/** A camera shows the input's point (x, y) in the middle, `scale` pixels a unit, turned by `turn`. */
+export class Camera {
+  constructor({ x = 0, y = 0, scale = 1, turn = 0, yDown = true } = {}) {
+    Object.assign(this, { x, y, scale, turn, yDown });
+  }
+
+  /** The camera that shows about `across` tiles along the longer side of a canvas. */
+  static fit(tiling, width, height, across = 5) {
+    const { x, y } = tiling.middle;
+    const scale = Math.max(width, height) / (across * Math.sqrt(tiling.area));
+    return new Camera({ x, y, scale, yDown: tiling.yDown });
+  }
+
+  /** [a, b, c, d, e, f] of canvas, from the input to a canvas of this size. */
+  matrix(width, height) {
+    const cos = this.scale * Math.cos(this.turn);
+    const sin = this.scale * Math.sin(this.turn);
+    const flip = this.yDown ? 1 : -1;
+    const [a, b, c, d] = [cos, sin, -sin * flip, cos * flip];
+    return [a, b, c, d, width / 2 - a * this.x - c * this.y, height / 2 - b * this.x - d * this.y];
+  }
+}
+
+/** The product of two canvas matrices: first `second`, then `first`. */
+export function times(first, second) {
+  const [a, b, c, d, e, f] = first;
+  const [g, h, i, j, k, l] = second;
+  return [
+    a * g + c * h, b * g + d * h, a * i + c * j, b * i + d * j, a * k + c * l + e, b * k + d * l + f,
+  ];
+}
+
+/** Where a canvas matrix takes a point. */
+export function moved([a, b, c, d, e, f], [x, y]) {
+  return [a * x + c * y + e, b * x + d * y + f];
+}
+
+/** The inverse of a canvas matrix. */
+export function inverse([a, b, c, d, e, f]) {
+  const size = a * d - b * c;
+  return [
+    d / size, -b / size, -c / size, a / size, (c * f - d * e) / size, (b * e - a * f) / size,
+  ];
+}
+
+/** A polygon and its group, ready to be drawn. */
+export class Tiling {
+  constructor(card) {
+    const { lattice, cosets } = card.group;
+    this.yDown = card.y_down;
+    this.basis = [lattice[0][0], lattice[1][0], lattice[0][1], lattice[1][1]]; // columns are vectors
+    this.aspects = cosets.map(({ linear: [[a, c], [b, d]], translation: [e, f] }) => [a, b, c, d, e, f]);
+    this.colours = card.colours;
+    this.change(card.polygon);
+  }
+
+  /** Take another polygon for the same group. */
+  change(polygon) {
+    this.polygon = polygon;
+    let area = 0;
+    let x = 0;
+    let y = 0;
+    polygon.forEach(([x0, y0], k) => {
+      const [x1, y1] = polygon[(k + 1) % polygon.length];
+      const cross = x0 * y1 - x1 * y0;
+      area += cross / 2;
+      x += ((x0 + x1) * cross) / 6;
+      y += ((y0 + y1) * cross) / 6;
+    });
+    this.area = Math.abs(area);
+    this.middle = { x: x / area, y: y / area };
+    this.radius = Math.max(...polygon.map(([u, v]) => Math.hypot(u - x / area, v - y / area)));
+    this.path = pathOf(polygon);
+  }
+
+  /** The number of the colour of the copy of an aspect in the lattice cell (m, n). */
+  colour(aspect, m, n) {
+    if (!this.colours) return aspect % 3;
+    const [a, b, c] = this.colours.sublattice;
+    const wraps = Math.floor(n / c);
+    const first = (((m - wraps * b) % a) + a) % a;
+    return this.colours.table[aspect][first][n - wraps * c];
+  }
+
+  /** The matrix, from the prototile to the input, of the copy of an aspect in a cell. */
+  copy(aspect, m, n) {
+    const [a, b, c, d, e, f] = this.aspects[aspect];
+    const [p, q, r, s] = this.basis;
+    return [a, b, c, d, e + p * m + r * n, f + q * m + s * n];
+  }
+
+  /** All copies that meet a canvas: {aspect, cell: [m, n], colour, matrix: prototile to canvas}. */
+  copies(camera, width, height) {
+    const view = camera.matrix(width, height);
+    const back = inverse(view);
+    const [p, q, r, s] = this.basis;
+    const cells = inverse([p, q, r, s, 0, 0]);
+    const reach = this.radius * camera.scale;
+    const edge = [[-reach, -reach], [width + reach, -reach], [width + reach, height + reach], [-reach, height + reach]];
+    const corners = edge.map((corner) => moved(back, corner));
+    const found = [];
+    this.aspects.forEach((element, aspect) => {
+      const [x, y] = moved(element, [this.middle.x, this.middle.y]);
+      const at = corners.map(([u, v]) => moved(cells, [u - x, v - y]));
+      const [low, high] = [0, 1].map((k) => at.map((point) => point[k])).reduce(
+        ([lows, highs], line) => [[...lows, Math.ceil(Math.min(...line))], [...highs, Math.floor(Math.max(...line))]],
+        [[], []],
+      );
+      for (let m = low[0]; m <= high[0]; m += 1) {
+        for (let n = low[1]; n <= high[1]; n += 1) {
+          const [u, v] = moved(view, [x + p * m + r * n, y + q * m + s * n]);
+          if (u < -reach || v < -reach || u > width + reach || v > height + reach) continue;
+          if (found.length >= MOST_COPIES) return;
+          const matrix = times(view, this.copy(aspect, m, n));
+          found.push({ aspect, cell: [m, n], colour: this.colour(aspect, m, n), matrix });
+        }
+      }
+    });
+    return found;
+  }
+}
+
+/** A closed polygon as a path. */
+export function pathOf(polygon) {
+  const path = new Path2D();
+  polygon.forEach(([x, y], k) => (k ? path.lineTo(x, y) : path.moveTo(x, y)));
+  path.closePath();
+  return path;
+}
+
+/** Colour number `index` of a palette; after the last they start again, paler. */
+export function fill(palette, index) {
+  const count = palette.colours.length;
+  const colour = palette.colours[index % count];
+  const turn = Math.floor(index / count);
+  return turn ? `color-mix(in srgb, ${colour} ${100 * 0.5 ** turn}%, ${palette.paper ?? "#fff"})` : colour;
+}
+
+/**
+ * Draw a tiling over the whole of a canvas, `ratio` device pixels a CSS pixel.
+ * `line`: width of the outline in CSS pixels, 0 for none. `only`: which copies, by default all.
+ */
+export function paint(context, tiling, camera, palette, { width, height, ratio = 1, line = 1.2, only } = {}) {
+  const path = tiling.path;
+  context.lineJoin = "round";
+  for (const { colour, matrix, ...copy } of tiling.copies(camera, width, height)) {
+    if (only && !only({ colour, matrix, ...copy })) continue;
+    context.setTransform(...matrix.map((entry) => entry * ratio));
+    context.fillStyle = fill(palette, colour);
+    context.fill(path);
+    context.strokeStyle = line ? palette.outline : context.fillStyle; // without a line: hide the seam
+    context.lineWidth = (line || 0.7) / camera.scale;
+    context.stroke(path);
+  }
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+}
+
+/** Give a canvas as many pixels as the screen has where it lies; returns {context, width, height, ratio}. */
+export function sized(canvas) {
+  const ratio = Math.min(globalThis.devicePixelRatio || 1, 2);
+  const [width, height] = [canvas.clientWidth || 1, canvas.clientHeight || 1];
+  const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
+  if (canvas.width !== w || canvas.height !== h) Object.assign(canvas, { width: w, height: h });
+  return { context: canvas.getContext("2d"), width, height, ratio };
+}
+
+/** Draw a card's tiling into a canvas as large as it lies in the page. */
+export function paintCard(canvas, card, palette, { across = 5, line = 1.2 } = {}) {
+  const { context, width, height, ratio } = sized(canvas);
+  const tiling = new Tiling(card);
+  paint(context, tiling, Camera.fit(tiling, width, height, across), palette, { width, height, ratio, line });
+}

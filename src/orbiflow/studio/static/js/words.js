@@ -1,0 +1,57 @@
+/** Words that several pages share. */
+
+export const STAGES = { sketch: "first sketch", better: "getting better", final: "finished" };
+
+export const EFFORTS = { fast: "Quick", normal: "Careful", best: "Thorough" };
+export const EFFORT_TIMES = {
+  fast: "Half a minute or so.",
+  normal: "About a minute: usually better.",
+  best: "Several minutes: the best we can do.",
+};
+
+export const OBJECTIVES = { likeness: "Looks alike", overlap: "Covers it best" };
+export const OBJECTIVE_MEANINGS = {
+  likeness: "The shape bends until it fits, and keeps its head, legs and tail.",
+  overlap: "The tile covers as much of the shape as it can. Thin parts may get lost.",
+};
+
+export const STATES = {
+  waiting: "Waiting its turn",
+  running: "At work",
+  paused: "Paused",
+  done: "Done",
+  failed: "Did not work",
+  cancelled: "Stopped",
+};
+
+/** Whether a task may still do something. */
+export const alive = (task) => ["waiting", "running", "paused"].includes(task?.state);
+
+export const number = (count, one, many = `${one}s`) => `${count} ${count === 1 ? one : many}`;
+
+/** "★★★½" for sight and "3.5 of 5 stars" for hearing. */
+export const starText = (stars) => `${"★".repeat(Math.floor(stars))}${stars % 1 ? "½" : ""}`;
+export const starWords = (stars) => (stars ? `${stars} of 5 stars` : "not rated yet");
+
+export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** What the server says, as a sentence: names of settings become words, names of files stay. */
+export function sentence(text) {
+  if (!text) return "";
+  const plain = text.replace(/\b[a-z]+(_[a-z]+)+\b(?!\.)/g, (name) => name.replaceAll("_", " "));
+  const begun = /^[a-z]+[ ,:]/.test(plain) ? capital(plain) : plain;
+  return /[.!?…]$/.test(begun) ? begun : `${begun}.`;
+}
+
+/** How long ago a moment was. Moments: ISO texts, or seconds since 1970. */
+export function ago(moment) {
+  const seconds = (Date.now() - (typeof moment === "number" ? moment * 1000 : Date.parse(moment))) / 1000;
+  const units = [["day", 86400], ["hour", 3600], ["minute", 60]];
+  const [unit, size] = units.find(([, length]) => seconds >= length) ?? [null, 1];
+  if (!unit) return "just now";
+  return new Intl.RelativeTimeFormat("en", { numeric: "auto" }).format(-Math.floor(seconds / size), unit);
+}
+
+/** How large a file is. */
+export const bytes = (count) =>
+  count < 1e3 ? `${count} bytes` : count < 1e6 ? `${(count / 1e3).toFixed(0)} kB` : `${(count / 1e6).toFixed(1)} MB`;

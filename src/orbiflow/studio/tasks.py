@@ -1,0 +1,196 @@
+"""What the studio's workers do first: read a picture, and search for tiles."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from orbiflow.runtime import (
+    NEVER,
+    Cancel,
+    Event,
+    Note,
+    Outcome,
+    Progress,
+    Sink,
+    cores,
+    ignore,
+    operation,
+)
+from orbiflow.studio.settings import SearchChoice
+from orbiflow.studio.tile_files import (
+    PLACES,
+    STAGES,
+    best_stage,
+    put_tile,
+    tell_tile,
+    tile_folder,
+    tile_number,
+)
+from orbiflow.tiles import ReadingSettings
+
+if TYPE_CHECKING:
+    from orbiflow.tiles import EscherizeSettings, EscherTile
+
+PER_CLASS = 50  # numbers that a class has for its tiles
+MORE = 4  # tiles of a class, for "more like this one"
+LONGER = {"fast": "normal", "normal": "best", "best": "best"}
+
+
+@operation("studio read")
+def read(
+    project: Path,
+    task: int,
+    called: str = "picture",
+    reading: ReadingSettings = ReadingSettings(),
+    *,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Read the silhouette in a project's picture.
+
+    Args:
+        project: The project's folder.
+        task: The number of the task.
+        called: What messages call the picture.
+    """
+    from orbiflow.studio.silhouette_file import read_input
+
+    del task
+    cancel.check()
+    on_event(Progress(0.1, "reading the picture"))
+    target = read_input(project, called, reading)
+    return Outcome({"read": True, "vertices": len(target.outline)})
+
+
+@operation("studio search", keeps_partial=True, starts_processes=True)
+def search(
+    project: Path,
+    task: int,
+    settings: SearchChoice = SearchChoice(),
+    *,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Search for tiles of a project's silhouette, and write each as soon as it is found.
+
+    Args:
+        project: The project's folder.
+        task: The number of the task.
+    """
+    from orbiflow.studio.silhouette_file import load_target
+    from orbiflow.tiles import escherize, searched_classes
+
+    target = load_target(project)
+    whole = _search_settings(project, settings)
+    names = searched_classes(target, whole)
+    left = [name for k, name in enumerate(names) if not _is_done(project, task, k)]
+    _tell_again(project, task, on_event)
+    if not left:
+        return Outcome({"tiles": len(names)})
+    seen: dict[tuple[str, str], int] = {}
+
+    def show(tile: EscherTile, stage: str) -> None:
+        name = tile.isohedral_class
+        place = seen[name, stage] = seen.get((name, stage), -1) + 1
+        number = tile_number(task, names.index(name) * PER_CLASS + place)
+        put_tile(project, number, stage, tile, on_event)
+
+    result = escherize(
+        target,
+        whole.replace(classes=tuple(left), workers=cores()),
+        on_tile=show,
+        on_event=lambda event: _tell_progress(event, 1 - len(left) / len(names), on_event),
+        cancel=cancel,
+    )
+    if result.interrupted:
+        return Outcome({"tiles": len(result.tiles)}, "cancelled")
+    return Outcome({"tiles": len(result.tiles)}, "done" if result.tiles else "nothing found")
+
+
+def _search_settings(project: Path, choice: SearchChoice) -> EscherizeSettings:
+    from orbiflow.tiles import EscherizeSettings
+
+    settings = EscherizeSettings(effort=choice.effort, objective=choice.objective, seed=choice.seed)
+    emphasis, pins = project / "emphasis.png", project / "pins.png"
+    if emphasis.exists():
+        settings = settings.replace(emphasis=emphasis)
+    if pins.exists() and choice.objective == "likeness":
+        settings = settings.replace(pin=(str(pins),))
+    if choice.like is None:
+        return settings.replace(classes=choice.classes) if choice.classes else settings
+    return settings.replace(
+        classes=_classes_like(project, choice.like),
+        effort=LONGER[choice.effort],
+        per_class=MORE,
+        seed=choice.seed + 1,
+    )
+
+
+def _classes_like(project: Path, number: int) -> tuple[str, ...]:
+    """Return the class of a tile, and those of the nine with the same group."""
+    from orbiflow.tiles import CLASSES, EscherTile, isohedral_class
+
+    own = EscherTile.load(tile_folder(project, number)).isohedral_class
+    group = isohedral_class(own).group().name
+    near = [name for name in CLASSES if isohedral_class(name).group().name == group]
+    return tuple(dict.fromkeys([own, *near]))
+
+
+def _is_done(project: Path, task: int, place: int) -> bool:
+    found = best_stage(project, tile_number(task, place * PER_CLASS))
+    return found is not None and found.name == STAGES[-1]
+
+
+def _tell_again(project: Path, task: int, on_event: Sink) -> None:
+    """Tell of tiles that this task found before it was interrupted."""
+    for number in sorted(
+        int(folder.name) for folder in (project / "tiles").glob("[0-9]*") if folder.is_dir()
+    ):
+        if number // PLACES == task and (found := best_stage(project, number)):
+            tell_tile(number, found.name, on_event)
+
+
+def _tell_progress(event: Event, done: float, on_event: Sink) -> None:
+    if isinstance(event, Progress):
+        on_event(Progress(done + (1 - done) * event.share, event.what))
+    elif isinstance(event, Note):
+        on_event(event)
+
+
+@operation("studio open")
+def open_file(
+    project: Path, task: int, *, on_event: Sink = ignore, cancel: Cancel = NEVER
+) -> Outcome:
+    """Take up a project's file that was uploaded into an empty project.
+
+    Args:
+        project: The project's folder, with the file.
+        task: The number of the task.
+    """
+    from orbiflow.studio.project_file import ENDING, read_tiles, reading_of, unpack
+    from orbiflow.studio.silhouette_file import read_input
+
+    with tempfile.TemporaryDirectory(dir=project) as folder:
+        home = Path(folder)
+        document = unpack(project / f"opened{ENDING}", home)
+        (picture,) = [*home.glob("input.*")][:1] or [None]
+        called, reading = reading_of(document)
+        tiles = read_tiles(home, document)
+        for file in [*home.glob("input.*"), *home.glob("*.png")]:
+            file.replace(project / file.name)
+        if picture is not None:
+            read_input(project, called, reading)
+    numbers = {number: tile_number(task, place) for place, (_, number, _) in enumerate(tiles)}
+    for tile, number, parent in tiles:
+        cancel.check()
+        known = None if parent is None else numbers.get(parent)
+        put_tile(project, numbers[number], STAGES[-1], tile, on_event, parent=known)
+    opened = {
+        "name": str(document["name"]),
+        "view": document["view"],
+        "reading": reading.to_json(),
+        "input": picture and {"name": called, "type": picture.suffix.lstrip(".")},
+    }
+    return Outcome({"read": picture is not None, "opened": opened})

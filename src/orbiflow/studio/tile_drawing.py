@@ -1,0 +1,148 @@
+"""What was drawn on a tile in the browser, as exports take it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+
+from orbiflow.arguments import as_array, as_number
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import is_list, is_object, write_atomic
+from orbiflow.studio.tile_view import covered
+from orbiflow.tiles import (
+    Bending,
+    EscherTile,
+    Frame,
+    TileMap,
+    border,
+    open_image,
+    orient,
+    triangulate,
+)
+
+MOST_STROKES, MOST_POINTS, MOST_EYES = 2000, 100_000, 60
+FINER = 2  # pixels, across, of which one pixel of a picture with lines is the mean
+COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
+
+
+class Stroke(NamedTuple):
+    """A line with its width and points (N, 2), in the silhouette's coordinates."""
+
+    colour: str
+    width: float
+    points: Array
+
+
+def with_any_map(tile: EscherTile) -> EscherTile:
+    """Return a tile that can be drawn on: one without a map is its own silhouette."""
+    if tile.bending is not None and tile.frame is not None:
+        return tile
+    frame = Frame(np.diag([1.0, -1.0 if tile.y_down else 1.0]), np.zeros(2))
+    mesh = triangulate(orient(frame.to_normal(tile.tile.polygon), counter_clockwise=True))
+    still = Bending(mesh.points, mesh.points, mesh.triangles)
+    return tile.changed(map_source=TileMap(frame=frame, bending=still), no_map="")
+
+
+def drawing_settings(
+    drawing: Any, tile: EscherTile, folder: Path, picture: Path | None = None
+) -> dict[str, Any]:
+    """Write the lines of a drawing into a folder as exports take them; return `picture` and `eyes`.
+
+    Args:
+        drawing: `strokes`, each with `colour`, `width` and `points`, and `eyes` (x, y, radius), in the
+            coordinates of the silhouette, or of a tile that has none.
+        tile: The tile, as `with_any_map` returns it.
+        folder: The folder for the file, which is written only if there are lines.
+        picture: The artwork that is carried as well, so that the lines are drawn over it.
+
+    Raises `OrbiflowError` for a drawing that is none, or too large.
+    """
+    strokes, eyes = read_drawing(drawing)
+    bending, frame = tile.require_map()
+    ring = shapely.Polygon(frame.to_input(bending.rest[border(bending.triangles)]))
+    if strokes:
+        name = "drawing.svg" if picture is None else "drawing.png"
+        made = drawing_svg(strokes, tile) if picture is None else _png(strokes, tile, picture)
+        write_atomic(folder / name, made)
+        picture = folder / name
+    # none but by rounding is outside
+    return {
+        "picture": picture,
+        "eyes": tuple(e for e in eyes if ring.contains(shapely.Point(e[:2]))),
+    }
+
+
+def read_drawing(drawing: Any) -> tuple[list[Stroke], tuple[tuple[float, ...], ...]]:
+    """Return the lines and eyes of a drawing from a browser, checked."""
+    parts = drawing if is_object(drawing) else {}
+    strokes, eyes = parts.get("strokes", []), parts.get("eyes", [])
+    if not is_list(strokes) or not is_list(eyes):
+        raise OrbiflowError("a drawing has a list of strokes and a list of eyes")
+    found = [_stroke(one) for one in strokes[: MOST_STROKES + 1]]
+    count = sum(len(one.points) for one in found)
+    if len(found) > MOST_STROKES or count > MOST_POINTS or len(eyes) > MOST_EYES:
+        raise OrbiflowError(
+            f"the drawing is too large: it may have {MOST_STROKES} lines with {MOST_POINTS} points in "
+            f"all, and {MOST_EYES} eyes; rub some out"
+        )
+    return found, tuple(tuple(as_array(eye, "an eye", (3,)).tolist()) for eye in eyes)
+
+
+def _stroke(given: Any) -> Stroke:
+    stroke = given if is_object(given) else {}
+    colour, points = str(stroke.get("colour")), stroke.get("points")
+    if not COLOUR.fullmatch(colour):
+        raise OrbiflowError(f"the colour of a line must be like #2a9d8f, got {colour!a:.40}")
+    width = as_number(stroke.get("width"), "the width of a line", 0)
+    return Stroke(colour, width, as_array(points, "the points of a line", ("N", 2)))
+
+
+def drawing_svg(strokes: list[Stroke], tile: EscherTile) -> str:
+    """Return the lines as an SVG that covers what the silhouette's picture covers."""
+    low, high = covered(tile)
+    wide, tall = high - low
+    parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {wide:.9g} {tall:.9g}">']
+    for stroke in strokes:
+        points = _on_page(stroke.points, tile)
+        ends = points if len(points) > 1 else np.stack([points[0], points[0] + 1e-3])
+        path = "L".join(f"{x:.6g} {y:.6g}" for x, y in ends)
+        parts.append(
+            f'<path d="M{path}" fill="none" stroke="{stroke.colour}" '
+            f'stroke-width="{stroke.width:.6g}" stroke-linecap="round" stroke-linejoin="round"/>'
+        )
+    return "\n".join([*parts, "</svg>\n"])
+
+
+def _on_page(points: Array, tile: EscherTile) -> Array:
+    """Return points of the silhouette from the upper left corner of what its picture covers."""
+    low, high = covered(tile)
+    down = tile.require_map()[1].y_down
+    return points - low if down else np.array([0.0, 1.0]) * (high - low) + (points - low) * (1, -1)
+
+
+def _png(strokes: list[Stroke], tile: EscherTile, picture: Path) -> bytes:
+    """Return a picture with the lines drawn over it."""
+    import io
+
+    from PIL import Image, ImageDraw
+
+    low, high = covered(tile)
+    image = open_image(picture)[0].convert("RGBA")
+    layer = Image.new("RGBA", (FINER * image.width, FINER * image.height))
+    pen, scale = ImageDraw.Draw(layer), layer.width / float(high[0] - low[0])
+    for stroke in strokes:
+        points, radius = scale * _on_page(stroke.points, tile), scale * stroke.width / 2
+        if len(points) > 1:
+            ends = [tuple(p) for p in points.tolist()]
+            pen.line(ends, stroke.colour, max(1, round(2 * radius)), joint="curve")
+        for x, y in points[[0, -1]].tolist():  # round ends
+            pen.ellipse((x - radius, y - radius, x + radius, y + radius), stroke.colour)
+    image.alpha_composite(layer.resize(image.size))
+    buffer = io.BytesIO()
+    image.save(buffer, "PNG")
+    return buffer.getvalue()

@@ -1,0 +1,78 @@
+"""What browsers ask of tiles and take-aways."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter, Request
+from fastapi.responses import FileResponse
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.studio.guard import Refused
+from orbiflow.studio.requests import Here, Studio, body_object
+from orbiflow.studio.takeaways import PREVIEW
+from orbiflow.studio.tile_files import VIEW, best_stage, tile_number
+
+SANDBOX = {"content-security-policy": "sandbox; default-src 'none'; style-src 'unsafe-inline'"}
+
+routes = APIRouter()
+
+
+def stage_of(here: Studio, project: str, tile: int) -> Path:
+    """Return the folder of a tile's last stage."""
+    here.store.card(project, tile)
+    found = best_stage(here.store.home(project), tile)
+    if found is None:
+        raise Refused(404, "there is no such tile (any more); choose another one")
+    return found
+
+
+@routes.get("/projects/{project}/tiles/{tile}")
+async def view(project: str, tile: int, here: Here) -> FileResponse:
+    """Return what the page of a tile shows."""
+    return FileResponse(stage_of(here, project, tile) / VIEW, media_type="application/json")
+
+
+@routes.delete("/projects/{project}/tiles/{tile}")
+async def delete(project: str, tile: int, here: Here) -> dict[str, Any]:
+    """Delete a tile."""
+    here.store.delete_tile(project, tile)
+    shutil.rmtree(here.store.home(project) / "tiles" / str(tile), ignore_errors=True)
+    return {}
+
+
+@routes.post("/projects/{project}/tiles/{tile}/pulled")
+async def pulled(request: Request, project: str, tile: int, here: Here) -> dict[str, Any]:
+    """Make a tile of one that was pulled, and return its card."""
+    given = await body_object(request)
+    stage_of(here, project, tile)
+    task = await here.done(project, "pull", {**given, "tile": tile})
+    if task["state"] != "done":
+        raise OrbiflowError(task["error"] or "the change was cancelled; pull again")
+    return here.store.card(project, tile_number(task["id"], 0))
+
+
+def _made(here: Studio, task: int, name: str) -> Path:
+    """Return a file that a task has made."""
+    own = here.store.task(task)
+    result = own["result"] or {}
+    names = [file["name"] for file in result.get("files", ())]
+    names += [PREVIEW] * bool(result.get("preview"))
+    file = here.store.home(own["project"]) / "exports" / str(task) / name
+    if name not in names or not file.is_file():
+        raise Refused(404, "there is no such file (any more); make it again")
+    return file
+
+
+@routes.get("/takeaways/{task}/files/{name}")
+async def download(task: int, name: str, here: Here) -> FileResponse:
+    """Return a file to keep."""
+    return FileResponse(_made(here, task, name), filename=name, headers=SANDBOX)
+
+
+@routes.get("/takeaways/{task}/preview.png")
+async def preview(task: int, here: Here) -> FileResponse:
+    """Return a picture of what a task has made."""
+    return FileResponse(_made(here, task, PREVIEW), headers=SANDBOX)

@@ -1,0 +1,78 @@
+"""Projects and tasks as browsers are told of them."""
+
+from __future__ import annotations
+
+from pathlib import PurePosixPath
+from typing import Any
+
+from orbiflow.studio.store import Store
+
+NAMES = {"tile": "New tile", "density": "New density"}
+"""What a project of each kind is called before it has a name."""
+
+MASKS = ("mend", "pins", "emphasis")
+"""What is painted over a picture."""
+
+
+def plain_name(given: Any, otherwise: str) -> str:
+    """Return a name on one line, without folders.
+
+    >>> plain_name("C:\\\\cats\\\\cat.png", "picture"), plain_name("../..", "picture")
+    ('cat.png', 'picture')
+    """
+    text = given if isinstance(given, str) else ""
+    text = PurePosixPath(text.replace("\\", "/")).name
+    name = "".join(letter for letter in text if letter.isprintable()).strip(" .")
+    return name[:80] or otherwise
+
+
+def shown_task(store: Store, task: dict[str, Any]) -> dict[str, Any]:
+    """Return what a browser needs of a task."""
+    place = 0
+    if task["state"] == "waiting":
+        place = sum(
+            other["state"] == "waiting"
+            and other["lane"] == task["lane"]
+            and other["id"] < task["id"]
+            for other in store.undone()
+        )
+    names = ("id", "operation", "state", "share", "what", "error", "result")
+    return {name: task[name] for name in names} | {"place": place}
+
+
+def shown_project(store: Store, project: dict[str, Any], kind: str = "") -> dict[str, Any]:
+    """Return what a browser needs of a project; of one kind of event, the part that it changed."""
+    own = project["id"]
+    home, address = store.home(own), f"/api/projects/{own}"
+
+    def url(file: str) -> str | None:
+        path = home / f"{file}.png"
+        return f"{address}/{file}.png?{path.stat().st_mtime_ns}" if path.exists() else None
+
+    if kind == "project":
+        return {name: project[name] for name in ("name", "view", "changed_by")}
+    silhouette = project["silhouette"]
+    if silhouette is not None:
+        silhouette = {**silhouette, "backdrop": url("backdrop")}
+    part = {
+        "input": project["input"],
+        "reading": {"threshold": None, "invert": None, "smooth": 0.0, **project["reading"]},
+        "silhouette": silhouette,
+        **{mask: url(mask) for mask in MASKS},
+    }
+    if kind == "silhouette":
+        return part
+    names = ("id", "kind", "name", "created", "changed", "view")
+    return {
+        **{name: project[name] for name in names},
+        **part,
+        "tiles": store.cards(own),
+        "tasks": [shown_task(store, task) for task in store.tasks(own)],
+        "head": store.head,
+    }
+
+
+def shown_summary(summary: dict[str, Any]) -> dict[str, Any]:
+    """Return what the list of projects shows of one."""
+    thumb = f"/api/projects/{summary['id']}/backdrop.png" if summary.pop("drawn") else None
+    return {**summary, "busy": bool(summary["busy"]), "thumb": thumb}

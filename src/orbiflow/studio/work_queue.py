@@ -1,0 +1,335 @@
+"""The queue of tasks: each runs in a worker process, projects take turns, and nothing is lost.
+
+A task's state is in the store before and after everything, and workers write their results whole. So a
+server that dies finds its tasks again when it starts, and those that ran go on from what they had.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import signal
+import threading
+from collections import Counter
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import (
+    Call,
+    CallProcess,
+    Event,
+    Failed,
+    Finished,
+    ItemDone,
+    Note,
+    Progress,
+    cores,
+)
+from orbiflow.studio.kinds_of_work import kind_of_work
+from orbiflow.studio.store import Missing, Store
+from orbiflow.studio.words import plain_name
+
+WARM = (
+    "orbiflow.studio.tasks",
+    "orbiflow.studio.changing",
+    "orbiflow.studio.closeup_tasks",
+    "orbiflow.studio.silhouette_file",
+    "orbiflow.studio.tile_view",
+    "orbiflow.tiles.search.escherizing",
+    "orbiflow.tiles.search.bending",
+)
+"""What a worker has imported before there is work for it."""
+
+STEP = 0.002  # of a task: smaller progress is not told
+MOST_CALLS = 40  # of a process, one after another
+MOST_HELD = 3  # processes that are kept in memory while their tasks are paused
+FAULT = (
+    "something went wrong inside orbiflow; the server's own output says what. Try other settings."
+)
+
+log = logging.getLogger("orbiflow.studio")
+Spawn = Callable[[], CallProcess]
+
+
+def warm_process() -> CallProcess:
+    """Return a process that gets ready and waits for calls."""
+    return CallProcess(modules=WARM, again=True)
+
+
+class WorkQueue:
+    """Tasks in worker processes; any thread may use it.
+
+    Args:
+        store: Where tasks are kept.
+        slots: The number of tasks of each lane that run at a time.
+        spares: The number of processes that are started ahead.
+        spawn: A function that starts one.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        *,
+        slots: dict[str, int] | None = None,
+        spares: int = 2,
+        spawn: Spawn = warm_process,
+    ) -> None:
+        self.store = store
+        self.slots = slots or {"long": cores(), "quick": max(2, cores() // 2)}
+        self._spare_count, self._spawn = spares, spawn
+        self._spares: list[CallProcess] = []
+        self._calls: Counter[CallProcess] = Counter()  # that each has done
+        self._running: dict[int, CallProcess] = {}
+        self._held: dict[int, CallProcess] = {}  # in the order in which they were paused
+        # project, lane and operation of what runs
+        self._lanes: dict[int, tuple[str, str, str]] = {}
+        self._turns: dict[str, int] = {}  # when each project was served last
+        self._turn = 0
+        self._lock = threading.RLock()
+        self._closed = False
+
+    def start(self) -> None:
+        """Begin, with the tasks that were not done when the last server ended."""
+        for task in self.store.undone():
+            if task["pid"] and os.name == "posix":
+                with suppress(OSError):  # held when its server died: it then sees that, and ends
+                    os.killpg(task["pid"], signal.SIGCONT)
+            if task["state"] == "running":
+                self.store.change_task(task["id"], state="waiting", pid=None)
+        self._schedule()
+
+    def close(self) -> None:
+        """End all processes; their tasks go on when the next server starts."""
+        with self._lock:
+            self._closed = True
+            alive = [*self._running.values(), *self._held.values(), *self._spares]
+            self._spares.clear()
+        for process in alive:
+            process.kill()
+            process.wait()
+
+    def submit(
+        self, project: str, operation: str, settings: dict[str, Any], *, most: int = 20
+    ) -> int:
+        """Put a task at the end of the queue and return its number.
+
+        Raises:
+            OrbiflowError: For settings that cannot be used, or too many tasks.
+        """
+        kind = kind_of_work(operation)
+        kind.call(self.store.home(project), 1, settings)
+        task = self.store.add_task(project, operation, settings, kind.lane, most)
+        self._schedule()
+        return task
+
+    def replace_waiting(self, project: str, operation: str) -> None:
+        """Drop the tasks of a kind that wait, and that a newer one makes useless."""
+        for task in self.store.undone(project):
+            if task["operation"] == operation and task["state"] == "waiting":
+                self.cancel(task["id"])
+
+    def pause(self, task: int) -> None:
+        """Hold a task; its process waits in memory, where there is room for it."""
+        with self._lock:
+            process = self._running.get(task)
+            if process is None:
+                if self.store.task(task)["state"] == "waiting":
+                    self.store.change_task(task, state="paused")
+                return
+            self.store.change_task(task, state="paused")
+            if process.pause():
+                self._held[task] = self._running.pop(task)
+                for oldest in list(self._held)[:-MOST_HELD]:
+                    self._held.pop(oldest).kill()
+            else:
+                self._running.pop(task).kill()
+            self._lanes.pop(task, None)
+        self._schedule()
+
+    def resume(self, task: int) -> None:
+        """Let a task that was held go on when its turn comes."""
+        if self.store.task(task)["state"] == "paused":
+            self.store.change_task(task, state="waiting")
+            self._schedule()
+
+    def cancel(self, task: int) -> None:
+        """End a task; what it has found is kept."""
+        with self._lock:
+            if self.store.task(task)["state"] not in ("waiting", "running", "paused"):
+                return
+            self.store.change_task(task, state="cancelled", pid=None)
+            process = self._running.pop(task, None) or self._held.pop(task, None)
+            self._lanes.pop(task, None)
+        if process is not None:
+            process.kill()
+        self._schedule()
+
+    def forget(self, project: str, *operations: str) -> None:
+        """End the tasks of a project: of some kinds, or all."""
+        for task in self.store.undone(project):
+            if not operations or task["operation"] in operations:
+                self.cancel(task["id"])
+
+    def _schedule(self) -> None:
+        """Start what can be started."""
+        with self._lock:
+            try:
+                while not self._closed and (task := self._next()) is not None:
+                    self._begin(task)
+                while not self._closed and len(self._spares) < self._spare_count:
+                    self._spares.append(self._spawn())
+                for process in self._spares[self._spare_count :]:
+                    process.kill()
+                del self._spares[self._spare_count :]
+            except OSError:  # no memory, or too many processes: tried again when something ends
+                log.exception("no process can be started")
+
+    def _next(self) -> dict[str, Any] | None:
+        """Return the task whose turn it is: of the project that has least, then waited longest."""
+        running = [self._lanes[task] for task in self._running]
+        full = Counter(lane for _, lane, _ in running)
+        own = Counter((project, lane) for project, lane, _ in running)
+        read = {project for project, _, operation in running if operation == "read"}
+        waiting = [
+            task
+            for task in self.store.undone()
+            if task["state"] == "waiting"
+            and task["id"] not in self._running
+            and full[task["lane"]] < self.slots[task["lane"]]
+            # an older reading must not end after a newer one
+            and not (task["operation"] == "read" and task["project"] in read)
+        ]
+
+        def turn(task: dict[str, Any]) -> tuple[int, int, int]:
+            project = task["project"]
+            return own[project, task["lane"]], self._turns.get(project, 0), task["id"]
+
+        return min(waiting, key=turn, default=None)
+
+    def _begin(self, task: dict[str, Any]) -> None:
+        number, project = task["id"], task["project"]
+        self._turn += 1
+        self._turns[project] = self._turn
+        self._lanes[number] = project, task["lane"], task["operation"]
+        if (process := self._held.pop(number, None)) is not None:
+            self._running[number] = process
+            self.store.change_task(number, state="running")
+            process.resume()
+            return
+        try:
+            kind = kind_of_work(task["operation"])
+            call = kind.call(self.store.home(project), number, task["settings"])
+        except OrbiflowError as error:
+            self.store.change_task(number, state="failed", error=str(error))
+            return
+        self._run(number, project, call)
+
+    def _run(self, number: int, project: str, call: Call) -> None:
+        self._spares = [spare for spare in self._spares if spare.alive]
+        process = self._spares.pop(0) if self._spares else self._spawn()
+        process.begin(call)
+        self._running[number] = process
+        self.store.change_task(number, state="running", pid=process.pid, share=0.0)
+        reader = threading.Thread(
+            target=self._follow, args=(number, project, process), daemon=True, name=f"task {number}"
+        )
+        reader.start()
+
+    def _follow(self, number: int, project: str, process: CallProcess) -> None:
+        """Record what a process tells, to its end."""
+        told = _Told(self.store, project, number)
+        ending: Event | None = None
+        for event in process.events():
+            if self._owner(number) is not process:
+                continue  # cancelled, or held and then let go: the rest says nothing
+            if isinstance(event, Finished | Failed):
+                ending = event
+            else:
+                told.record(event)
+        with self._lock:
+            if self._owner(number) is process and not self._closed:
+                told.end(ending)
+                self._let_go(number, process)
+        self._schedule()
+
+    def _let_go(self, number: int, process: CallProcess) -> None:
+        """Keep the process of a task that has ended for another quick one, or end it."""
+        _, lane, _ = self._lanes.pop(number)
+        for processes in (self._running, self._held):
+            processes.pop(number, None)
+        self._calls[process] += 1
+        if lane == "quick" and process.alive and self._calls[process] < MOST_CALLS:
+            self._spares.insert(0, process)
+        else:
+            del self._calls[process]
+            process.kill()
+
+    def _owner(self, number: int) -> CallProcess | None:
+        with self._lock:
+            return self._running.get(number) or self._held.get(number)
+
+
+class _Told:
+    """What a task's process tells, put into the store."""
+
+    def __init__(self, store: Store, project: str, number: int) -> None:
+        self.store, self.project, self.number = store, project, number
+        self.home = store.home(project)
+        self.share, self.what = -1.0, ""
+        self.notes: list[str] = []
+
+    def record(self, event: Event) -> None:
+        """Keep what an event tells, if anybody is to know it."""
+        with suppress(Missing):
+            match event:
+                case Progress(share=share, what=what):
+                    if share >= self.share + STEP or what != self.what:
+                        self.share, self.what = share, what
+                        self.store.change_task(self.number, share=share, what=what)
+                case ItemDone(name=name, state="done", what="tile"):
+                    tile, stage = name.split("/")
+                    card = json.loads(
+                        (self.home / "tiles" / tile / stage / "card.json").read_text()
+                    )
+                    self.store.put_card(self.project, int(tile), card)
+                case Note(text=text, warning=warning) if not text.startswith("written "):
+                    self.notes.append(self._plain(text))
+                    if warning:
+                        self.store.notice(self.project, self._plain(text), warning=warning)
+                case _:
+                    pass
+
+    def end(self, ending: Event | None) -> None:
+        """Keep how the task ended."""
+        changes: dict[str, Any] = {"pid": None}
+        if isinstance(ending, Finished):
+            result = {**ending.summary, "notes": self.notes}
+            state = "cancelled" if ending.state == "cancelled" else "done"
+            changes |= {"state": state, "share": 1.0, "result": result}
+            self._take_up(ending.summary)
+        elif isinstance(ending, Failed) and ending.failure == "mistake":
+            changes |= {"state": "failed", "error": self._plain(ending.message)}
+        else:
+            log.error("task %s: %s", self.number, ending)
+            changes |= {"state": "failed", "error": FAULT}
+        self.store.change_task(self.number, **changes)
+
+    def _take_up(self, summary: dict[str, Any]) -> None:
+        """Keep a silhouette that was read, and what an opened file says of its project."""
+        with suppress(Missing):
+            if opened := summary.get("opened"):
+                opened["name"] = plain_name(opened["name"], "Opened project")
+                self.store.change(self.project, **opened)
+            if summary.get("read"):
+                found = json.loads((self.home / "silhouette.json").read_text())
+                self.store.change(self.project, "silhouette", silhouette=found["shown"])
+
+    def _plain(self, text: str) -> str:
+        """Return a text without the paths of this machine."""
+        for folder in (self.home, self.home.resolve(), self.store.folder, Path.home()):
+            text = text.replace(f"{folder}{os.sep}", "")
+        return text

@@ -1,0 +1,148 @@
+"""What a search has found so far, and how it is told."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from orbiflow.runtime import ClassFailed, Preview, Progress, Sink, TileFound
+from orbiflow.tiles.likeness import diverse, mutual_iou
+from orbiflow.tiles.search.both_search import ALIKE
+from orbiflow.tiles.search.finished_tiles import ClassFailure
+from orbiflow.tiles.tile import EscherTile
+
+INTERRUPTED = "interrupted"  # the reason given for a class that was left undone
+Outcome = EscherTile | ClassFailure
+OnTile = Callable[[EscherTile, str], object]
+WHAT = {
+    "sketch": "sketching a tile of each kind",
+    "better": "improving the tiles",
+    "final": "finishing the tiles",
+}
+"""What is being done in each stage, for who watches."""
+
+
+class Record:
+    """What a search has found, and how far each class is, told as events.
+
+    Args:
+        names: The classes.
+        on_event: Who is told.
+        on_tile: Who is shown each tile and its stage.
+        most: The number of tiles of a class that are kept.
+    """
+
+    def __init__(
+        self, names: Sequence[str], on_event: Sink, on_tile: OnTile | None = None, most: int = 1
+    ) -> None:
+        self.shares = dict.fromkeys(names, 0.0)
+        self.firsts: dict[str, Outcome] = {}  # what the search is going to improve on
+        self.outcomes: dict[str, Outcome] = {}
+        self.on_event, self.on_tile, self.most = on_event, on_tile, most
+        self.begin = time.perf_counter()
+        self._done, self._share, self._last = 0.0, 1.0, True  # of the level
+        on_event(Progress(0.0, "fitting"))
+
+    def next_level(self, share: float, *, last: bool = False) -> Record:
+        """Go on to work that has this share of the whole."""
+        self._done, self._last = 0.0 if self._last else self._done + self._share, last
+        self._share = share
+        return self
+
+    @property
+    def found(self) -> list[EscherTile]:
+        """All tiles of the classes that have an outcome."""
+        best = [found for found in self.outcomes.values() if isinstance(found, EscherTile)]
+        return [tile for first in best for tile in first.family()]
+
+    def first_look(self, tile: EscherTile) -> None:
+        """Keep a tile that the search is going to improve on."""
+        self.firsts[tile.name] = tile
+        seconds = time.perf_counter() - self.begin
+        self.on_event(Preview(tile.name, tile.metrics.iou, seconds))
+
+    def progress(self, name: str, share: float, loss: float = math.nan) -> None:
+        """Tell how far a class is, which never falls."""
+        share = max(self._done + self._share * share, self.shares[name])
+        self.shares[name] = share = min(1.0, share)
+        whole = sum(self.shares.values()) / len(self.shares)
+        known = loss if math.isfinite(loss) else None  # no NaN in JSON
+        self.on_event(Progress(whole, self._what, name, share, known))
+
+    @property
+    def stage(self) -> str:
+        """How good the tiles are that are found now."""
+        return "final" if self._last else "better" if self._done else "sketch"
+
+    @property
+    def _what(self) -> str:
+        return WHAT[self.stage] if self.on_tile else "fitting"
+
+    def level_outcome(self, found: Outcome) -> None:
+        """Keep what a level of effort gave for a class, unless an earlier one gave better."""
+        whole = found
+        if self.on_tile:
+            count = self.most if self._last else 1
+            whole = self.firsts[found.name] = best_of(self.firsts.get(found.name), found, count)
+        if self._last:
+            self.outcome(whole)
+        else:
+            self.progress(found.name, 1.0)
+        if self.on_tile and isinstance(whole, EscherTile) and (self._last or whole is found):
+            for tile in whole.family():
+                if tile.certificate.valid:
+                    self.on_tile(tile, self.stage)
+
+    def outcome(self, found: Outcome, share: float = 1.0) -> None:
+        """Keep what a class gave, and then tell it."""
+        self.outcomes[found.name] = found
+        self.progress(found.name, share)
+        if isinstance(found, ClassFailure):
+            self.on_event(ClassFailed(found.name, found.reason))
+        else:
+            iou, certified = found.metrics.iou, found.certificate.valid
+            self.on_event(TileFound(found.name, iou, found.score, certified))
+
+    def finish(self) -> tuple[list[EscherTile], list[ClassFailure], frozenset[str]]:
+        """Return tiles, best first, those for likeness before those for overlap; failures; who is left.
+
+        Of a class that is left, a first look is its tile.
+        """
+        names = list(self.shares)
+        left = [name for name in names if name not in self.outcomes]
+        for name in left:
+            first = self.firsts.get(name)
+            sound = isinstance(first, EscherTile)
+            self.outcome(first if sound else ClassFailure(name, INTERRUPTED), 0.0)
+        tiles = self.found
+        tiles.sort(key=lambda t: (t.objective != "likeness", -t.score, names.index(t.name)))
+        failures = [found for found in self.outcomes.values() if isinstance(found, ClassFailure)]
+        return tiles, failures, frozenset(left)
+
+
+def best_of(earlier: Outcome | None, later: Outcome, count: int) -> Outcome:
+    """Return the best tiles of a class that two searches found, no two of them alike."""
+    if not isinstance(earlier, EscherTile):
+        return later
+    if isinstance(later, ClassFailure):
+        return earlier
+    tiles = [tile.changed(others=()) for tile in (*earlier.family(), *later.family())]
+    tiles.sort(key=lambda tile: (not tile.certificate.valid, -tile.score))
+    best, *others = (tiles[k] for k in without_twins(tiles, count))
+    if best.tile is later.tile and len(others) == len(later.others):
+        return later
+    return best.changed(others=tuple(others))
+
+
+def without_twins(tiles: Sequence[EscherTile], count: int) -> list[int]:
+    """Return the indices of so many tiles of those given, best first, no two of them alike."""
+    if count == 1 or len(tiles) == 1:
+        return [0]
+    sound = [k for k, tile in enumerate(tiles) if tile.certificate.simple]
+    alike = mutual_iou([tiles[k].normal_tile.polygon for k in sound], ALIKE)
+    below = float(np.nextafter(ALIKE, 0))
+    chosen = diverse([tiles[k].score for k in sound], count, alike, twin=below)
+    return [sound[k] for k in chosen] or [0]

@@ -1,0 +1,167 @@
+"""A studio that runs as the real command, and a browser that looks at it."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+import shapely
+
+from exported import polygons, svg_lines
+
+CHROMIUM = Path("/usr/bin/chromium")
+PATIENCE = 120.0  # seconds until something that never comes counts as missing
+BOOT = b"[[0, 0], [60, 0], [60, 20], [30, 25], [28, 70], [0, 70]]"
+
+
+class RunningStudio:
+    """The real server in a process of its own; it can be killed and started again."""
+
+    def __init__(self, folder: Path) -> None:
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port = free.getsockname()[1]
+        self.folder = folder
+        self.address = f"http://127.0.0.1:{self.port}"
+        self.client = httpx.Client(
+            base_url=f"{self.address}/api/",
+            headers={"X-Orbiflow": "1"},
+            timeout=PATIENCE,
+            trust_env=False,
+        )
+
+    def start(self) -> None:
+        """Start the server and wait until it answers."""
+        own = ["--port", str(self.port), "--data", str(self.folder), "--no-browser"]
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "orbiflow", "studio", *own], stdout=subprocess.DEVNULL
+        )
+        self.until(self._answers)
+
+    def _answers(self) -> bool:
+        assert self.process.poll() is None, "the server has ended"
+        try:
+            return self.client.get("about").is_success
+        except httpx.TransportError:
+            return False
+
+    def kill(self) -> None:
+        """End the server as a power cut would."""
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait()
+
+    def stop(self) -> None:
+        """End the server as a user would."""
+        self.process.send_signal(signal.SIGINT)
+        self.process.wait()
+
+    def until(self, holds: Callable[[], Any]) -> Any:
+        """Return what a function returns, as soon as that is true."""
+        end = time.monotonic() + PATIENCE
+        while not (found := holds()):
+            assert time.monotonic() < end, f"never became true: {holds}"
+            time.sleep(0.05)
+        return found
+
+    def project(self, own: str) -> dict[str, Any]:
+        """Return a project as pages are told of it."""
+        return self.client.get(f"projects/{own}").json()
+
+    def with_picture(self, data: bytes = BOOT, name: str = "boot.json") -> str:
+        """Return a new project whose picture has been read."""
+        own = self.client.post("projects", json={"kind": "tile"}).json()["id"]
+        self.client.put(f"projects/{own}/input", params={"name": name}, content=data)
+        self.until(lambda: self.project(own)["silhouette"])
+        return own
+
+    def search(self, own: str, *classes: str) -> None:
+        """Start a short search."""
+        settings = {"effort": "fast", **({"classes": classes} if classes else {})}
+        body = {"operation": "search", "settings": settings}
+        self.client.post(f"projects/{own}/tasks", json=body).raise_for_status()
+
+    def found(self, own: str) -> list[dict[str, Any]]:
+        """Return the tiles of a project, once its search is done."""
+        self.until(lambda: self.project(own)["tasks"][0]["state"] == "done")
+        return self.project(own)["tiles"]
+
+
+@contextmanager
+def running_studio(folder: Path) -> Iterator[RunningStudio]:
+    """Give a studio that runs."""
+    own = RunningStudio(folder)
+    own.start()
+    try:
+        yield own
+    finally:
+        own.stop()
+        own.client.close()
+
+
+def chromium() -> Path:
+    """Return the browser, or skip the test."""
+    pytest.importorskip("playwright", reason="playwright is not installed: no browser tests")
+    if not CHROMIUM.exists():
+        pytest.skip(f"{CHROMIUM} is missing: no browser tests")
+    return CHROMIUM
+
+
+def small_searches(page: Any, *classes: str) -> None:
+    """Let the searches that a page asks for be short ones, in these classes only."""
+
+    def shorten(route: Any) -> None:
+        body = route.request.post_data_json
+        if body["operation"] == "search":
+            body["settings"] |= {"effort": "fast", "classes": list(classes)}
+        route.continue_(post_data=body)
+
+    page.route("**/tasks", shorten)
+
+
+def hidden_parts(page: Any) -> int:
+    """Return by how many pixels a page is wider than its window."""
+    return page.evaluate("document.documentElement.scrollWidth - innerWidth")
+
+
+def serious_issues(page: Any) -> list[str]:
+    """Return what axe finds on a page that keeps people out, with the elements."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    found = Axe().run(page).response["violations"]
+    return [
+        f"{issue['id']}: {node['target']} {node['failureSummary']}"
+        for issue in found
+        if issue["impact"] in ("serious", "critical")
+        for node in issue["nodes"]
+    ]
+
+
+def area_of(project: dict[str, Any]) -> float:
+    """Return the area of a project's silhouette in pixels of its picture."""
+    return shapely.Polygon(project["silhouette"]["outline"]).area
+
+
+def covers_page_once(text: str) -> bool:
+    """Return whether the tiles of an SVG, clipped at its page, leave no gap and do not overlap.
+
+    Lengths in the file are rounded to micrometres.
+    """
+    lines = [line for line in svg_lines(text) if line.layer != "paper"]
+    found = polygons(lines)
+    size = np.array(text.split('viewBox="')[1].split('"')[0].split(), dtype=float)
+    page = shapely.box(*size)
+    pieces = shapely.intersection(found, page)
+    slivers = 2e-3 * sum(polygon.length for polygon in found)
+    missing = page.area - shapely.union_all(pieces, grid_size=1e-6).area
+    twice = shapely.area(pieces).sum() - (page.area - missing)
+    return len(found) > 20 and abs(missing) <= slivers and abs(twice) <= slivers

@@ -1,0 +1,87 @@
+"""One server and one browser for all tests of pages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from studio.browser import RunningStudio, chromium, running_studio
+
+
+@pytest.fixture(scope="session", name="studio")
+def studio_fixture(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStudio]:
+    """A studio that runs as the real command."""
+    with running_studio(tmp_path_factory.mktemp("studio")) as own:
+        yield own
+
+
+@pytest.fixture(scope="module", name="browser")
+def browser_fixture() -> Iterator[Any]:
+    """A browser without windows; while it is there, no other loop of events can run."""
+    program = chromium()
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        own = playwright.chromium.launch(
+            executable_path=program,
+            args=[
+                *("--no-sandbox", "--disable-gpu"),
+                *("--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"),
+            ],
+        )
+        yield own
+        own.close()
+
+
+@pytest.fixture(name="page")
+def page_fixture(browser: Any, studio: RunningStudio) -> Iterator[Any]:
+    """A page of the studio that tells of every error, and asks no other host for anything."""
+    context = browser.new_context(
+        base_url=studio.address, viewport={"width": 1280, "height": 900}, reduced_motion="reduce"
+    )
+    context.set_default_timeout(120_000)
+    page, wrong = context.new_page(), list[str]()
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("response", lambda got: got.status in (200, 206, 304, 422) or wrong.append(got.url))
+    page.on(
+        "console",
+        lambda said: said.type != "error" or "422" in said.text or wrong.append(said.text),
+    )
+    page.on(
+        "request",
+        lambda asked: (
+            asked.url.startswith((studio.address, "blob:", "data:")) or wrong.append(asked.url)
+        ),
+    )
+    page.wrong = wrong
+    yield page
+    context.close()
+    assert wrong == []
+
+
+@pytest.fixture(scope="session", name="searched")
+def searched_fixture(studio: RunningStudio) -> str:
+    """A project with a finished search of one class."""
+    own = studio.with_picture()
+    studio.search(own, "IH4")
+    assert studio.found(own)
+    return own
+
+
+@pytest.fixture(name="drawing")
+def drawing_fixture(tmp_path: Path) -> Path:
+    """A picture: a dark shape with a leg, and a speck beside it, on white."""
+    from PIL import Image, ImageDraw
+
+    picture = Image.new("L", (240, 200), 255)
+    draw = ImageDraw.Draw(picture)
+    draw.polygon(
+        [(30, 40), (170, 30), (180, 110), (120, 120), (120, 180), (80, 180), (80, 120), (30, 110)],
+        fill=40,
+    )
+    draw.ellipse([205, 20, 230, 45], fill=40)
+    picture.save(tmp_path / "beast.png")
+    return tmp_path / "beast.png"

@@ -1,0 +1,190 @@
+"""A studio for tests: the real application, with tasks that run in this very process."""
+
+from __future__ import annotations
+
+import asyncio
+import queue
+import threading
+from collections.abc import AsyncIterator, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, cast
+
+import httpx
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import Call, CallProcess, Cancel, Event, Failed, Finished
+from orbiflow.studio import Limits, Store, WorkQueue, create_app
+
+SQUARE = b"[[0, 0], [80, 0], [80, 60], [40, 90], [0, 60]]"
+
+
+class InThread:
+    """A process that is none: it does its call when its events are read."""
+
+    pid, alive = 0, True
+
+    def __init__(self) -> None:
+        self.cancel = Cancel()
+        self.done: Call | None = None
+
+    def begin(self, call: Call) -> None:
+        self.done = call
+
+    def events(self) -> Iterator[Event]:
+        assert self.done is not None
+        told: list[Event] = []
+        try:
+            self.done.run(told.append, self.cancel)
+        except OrbiflowError:
+            pass
+        except Exception as error:
+            told.append(Failed(str(error), "error"))
+        yield from told
+
+    def wait(self) -> int:
+        return 0
+
+    def kill(self) -> None:
+        self.cancel.cancel()
+
+
+class ByHand:
+    """A process that does what a test says."""
+
+    alive = True
+
+    def __init__(self, number: int) -> None:
+        self.pid, self.call, self.log = 0, None, list[str]()
+        self.number = number
+        self._said: queue.Queue[Event | None] = queue.Queue()
+
+    def begin(self, call: Call) -> None:
+        self.call = call
+        self.log.append("begin")
+
+    def say(self, event: Event | None) -> None:
+        self._said.put(event)
+
+    def finish(self) -> None:
+        self.say(Finished("done", {}))
+        self.say(None)
+        join_tasks(f"task {self.task}")
+
+    @property
+    def task(self) -> int:
+        assert self.call is not None
+        return cast(Call, self.call).arguments["task"]
+
+    def events(self) -> Iterator[Event]:
+        while (event := self._said.get()) is not None:
+            yield event
+
+    def wait(self) -> int:
+        return 0
+
+    def pause(self) -> bool:
+        self.log.append("pause")
+        return True
+
+    def resume(self) -> bool:
+        self.log.append("resume")
+        return True
+
+    def kill(self) -> None:
+        self.log.append("kill")
+        self.say(None)
+
+
+class Bench:
+    """A queue whose processes are a test's own, in the order in which they began."""
+
+    def __init__(self, folder: Path, **slots: int) -> None:
+        self.store = Store(folder)
+        self.made: list[ByHand] = []
+        self.queue = WorkQueue(
+            self.store,
+            slots={"long": 1, "quick": 1, **slots},
+            spares=0,
+            spawn=lambda: cast(CallProcess, self._make()),
+        )
+
+    def _make(self) -> ByHand:
+        self.made.append(ByHand(len(self.made)))
+        return self.made[-1]
+
+    def project(self) -> str:
+        return self.store.create("tile", "a project", 100)
+
+    def search(self, project: str) -> int:
+        return self.queue.submit(project, "search", {})
+
+    def states(self, *tasks: int) -> list[str]:
+        return [self.store.task(task)["state"] for task in tasks]
+
+    @property
+    def begun(self) -> list[int]:
+        return [process.task for process in self.made]
+
+
+def join_tasks(name: str = "task ") -> None:
+    """Wait for the threads that follow tasks."""
+    for thread in threading.enumerate():
+        if thread.name == name or (name == "task " and thread.name.startswith(name)):
+            thread.join()
+
+
+class Client:
+    """A browser's part: requests to an application, one after another."""
+
+    def __init__(self, app: Any, runner: asyncio.Runner, headers: dict[str, str]) -> None:
+        self.studio = app.app.state.studio
+        """The application's `store`, `queue`, `hub` and `limits`."""
+        self.headers = headers
+        self.runner = runner
+        transport = httpx.ASGITransport(app, raise_app_exceptions=False)
+        self._client = httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1:8437")
+
+    def request(
+        self, method: str, path: str, headers: dict[str, str] | None = None, **more: Any
+    ) -> httpx.Response:
+        if isinstance(content := more.get("content"), Iterator):
+            more["content"] = _later(content)
+        asked = self._client.request(
+            method, path, headers={**self.headers, **(headers or {})}, **more
+        )
+        return self.runner.run(asked)
+
+    def __getattr__(self, method: str) -> Any:
+        return lambda path, **more: self.request(method.upper(), path, **more)
+
+
+async def _later(parts: Iterator[bytes]) -> AsyncIterator[bytes]:
+    for part in parts:
+        yield part
+
+
+@contextmanager
+def studio(folder: Path, *, token: str = "", **limits: Any) -> Iterator[Client]:
+    """Serve a studio; the client sends what the studio's own page sends."""
+    store = Store(folder)
+    work = WorkQueue(store, spares=0, spawn=lambda: cast(CallProcess, InThread()))
+    app = cast(Any, create_app(store, work, Limits(**limits), token=token))
+    life = app.app.router.lifespan_context(app.app)
+    with asyncio.Runner() as runner:
+        runner.run(life.__aenter__())
+        yield Client(app, runner, {"X-Orbiflow": "1"})
+        runner.run(life.__aexit__(None, None, None))
+
+
+def done(client: Client, answer: Any) -> dict[str, Any]:
+    """Return a task once it has ended."""
+    join_tasks()
+    number, path = answer.json()["task"]["id"], answer.request.url.path
+    project = client.get("/".join(path.split("/")[:4])).json()
+    return next(task for task in project["tasks"] if task["id"] == number)
+
+
+def new_project(client: Client) -> str:
+    """Return the address of a new project."""
+    return f"/api/projects/{client.post('/api/projects', json={}).json()['id']}"

@@ -1,0 +1,207 @@
+"""The page of one tile in a real browser: look, pull, undo, draw, and what is in the file then."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from orbiflow.studio.tile_files import tile_folder
+from orbiflow.tiles import EscherTile, certify
+from studio.browser import RunningStudio, covers_page_once, hidden_parts, serious_issues
+
+CANVAS, BADGE = ".closeup-canvas", ".badge"
+
+
+@pytest.fixture(name="tile")
+def tile_fixture(studio: RunningStudio, searched: str) -> dict[str, Any]:
+    """The best tile that a search has found."""
+    return studio.project(searched)["tiles"][0]
+
+
+@pytest.fixture(name="closeup")
+def closeup_fixture(page: Any, searched: str, tile: dict[str, Any]) -> Any:
+    """The page of that tile."""
+    page.goto(f"/#/p/{searched}/t/{tile['id']}")
+    page.wait_for_selector(CANVAS)
+    return page
+
+
+def shown(page: Any) -> int:
+    """Return the number of the tile that the page shows."""
+    return int(page.url.rsplit("/", 1)[1])
+
+
+def proved(page: Any, but: int) -> int:
+    """Wait until another tile than `but` is shown and proved; return its number."""
+    page.wait_for_url(lambda url: not url.endswith(f"/{but}"))
+    page.wait_for_selector(f"{BADGE}[data-kind=proved]")
+    return shown(page)
+
+
+def picture(page: Any) -> str:
+    """Return what the canvas shows, with the pointer elsewhere."""
+    page.mouse.move(5, 5)
+    page.wait_for_timeout(100)
+    return page.locator(CANVAS).evaluate("canvas => canvas.toDataURL()")
+
+
+def choose(page: Any, what: str) -> None:
+    page.get_by_role("radio", name=what, exact=True).check()
+    if what == "Pull":
+        page.wait_for_selector("[data-ready=pull]")
+
+
+def place_on_outline(page: Any) -> tuple[float, float]:
+    """Return a place of the window where the outline can be taken hold of."""
+    box = page.locator(CANVAS).bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    for step in range(100):
+        place = x + 3.0 * step, y + 1.0 * step
+        page.mouse.move(*place)
+        if page.locator(CANVAS).evaluate("canvas => canvas.style.cursor") == "grab":
+            return place
+    raise AssertionError("no outline was found")
+
+
+def pulled(page: Any, x: float, y: float) -> None:
+    """Take hold of the outline, pull it and let it go."""
+    px, py = place_on_outline(page)
+    page.mouse.move(px, py)
+    page.mouse.down()
+    page.mouse.move(px + x / 2, py + y / 2)
+    page.mouse.move(px + x, py + y)
+    page.mouse.up()
+
+
+def taken_away(studio: RunningStudio, own: str, tile: int, **settings: Any) -> str:
+    """Return the text of a file that is made of a tile."""
+    body = {"operation": "export", "settings": {"tile": tile, "purpose": "web", **settings}}
+    number = studio.client.post(f"projects/{own}/tasks", json=body).json()["task"]["id"]
+
+    def ended() -> Any:
+        tasks = studio.project(own)["tasks"]
+        return next(
+            (t for t in tasks if t["id"] == number and t["state"] in ("done", "failed")), None
+        )
+
+    task = studio.until(ended)
+    assert task["state"] == "done", task["error"]
+    [file] = task["result"]["files"]
+    return studio.client.get(f"takeaways/{number}/files/{file['name']}").text
+
+
+def test_pull_certify_undo_redo(closeup, studio: RunningStudio, searched: str, tile) -> None:
+    page, first = closeup, tile["id"]
+    choose(page, "Pull")
+    pulled(page, 26.0, 14.0)
+    second = proved(page, first)
+    card = next(c for c in studio.project(searched)["tiles"] if c["id"] == second)
+    assert (card["parent"], card["certified"]) == (first, True)
+    found = EscherTile.load(tile_folder(studio.folder / "projects" / searched, second))
+    assert certify(found.tile).valid
+    assert covers_page_once(taken_away(studio, searched, second))
+    page.keyboard.press("Control+z")
+    assert proved(page, second) == first
+    page.keyboard.press("Control+Shift+Z")
+    assert proved(page, first) == second
+    page.get_by_role("button", name="Undo").click()
+    assert proved(page, second) == first
+    # the pulled tile is there after a reload, and knows where it came from
+    page.goto(f"/#/p/{searched}/t/{second}")
+    page.reload()
+    page.wait_for_selector(".past button:enabled")
+    page.get_by_role("button", name="Undo").click()
+    assert proved(page, second) == first
+
+
+def test_by_keyboard_and_what_crosses_springs_back(closeup, tile) -> None:
+    page = closeup
+    choose(page, "Pull")
+    page.locator(CANVAS).focus()
+    for _ in range(3):
+        page.keyboard.press("ArrowRight")
+    assert "Point" in page.locator("[aria-live=polite]").first.inner_text()
+    page.keyboard.press("Shift+ArrowDown")
+    page.keyboard.press("Shift+ArrowDown")
+    page.keyboard.press("Enter")
+    second = proved(page, tile["id"])
+    assert second != tile["id"]
+    page.wait_for_selector("[data-ready=pull]")
+    before = picture(page)
+    pulled(page, 0.0, 700.0)
+    page.wait_for_selector(f"{BADGE}[data-kind=refused]")
+    assert picture(page) == before
+    assert "crosses itself" in page.locator(BADGE).inner_text()
+    assert shown(page) == second
+    # the refusal is an answer of the server, which browsers note
+    page.wrong[:] = [said for said in page.wrong if "422" not in said]
+
+
+def test_lines_and_eyes_repeat_and_are_in_the_file(
+    closeup, studio: RunningStudio, searched, tile
+) -> None:
+    page = closeup
+    before = picture(page)
+    choose(page, "Draw")
+    page.get_by_role("radio", name="Red").check()
+    box = page.locator(CANVAS).bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x - 40, y)
+    page.mouse.down()
+    for k in range(20):
+        page.mouse.move(x - 40 + 4 * k, y + 12 * math.sin(k / 3))
+    page.mouse.up()
+    page.get_by_role("radio", name="Eye").check()
+    page.mouse.click(x, y - 20)
+    drawn = studio.until(lambda: studio.project(searched)["view"].get("drawing"))
+    drawn = studio.until(
+        lambda: found if (found := studio.project(searched)["view"]["drawing"])["eyes"] else None
+    )
+    assert {stroke["colour"] for stroke in drawn["strokes"]} == {"#c8322b"}
+    assert picture(page) != before
+    text = taken_away(studio, searched, tile["id"], drawing=True)
+    assert "#c8322b" in text
+    page.keyboard.press("Control+z")
+    page.keyboard.press("Control+z")
+    studio.until(lambda: not studio.project(searched)["view"]["drawing"]["eyes"])
+    page.get_by_role("button", name="Clear the drawing").click()
+    studio.until(lambda: not studio.project(searched)["view"]["drawing"]["strokes"])
+
+
+def test_symmetry_is_said_and_looks_are_kept(closeup, studio: RunningStudio, searched: str) -> None:
+    page = closeup
+    choose(page, "Look")
+    page.get_by_label("Show the symmetry").check()
+    page.get_by_role("button", name="Half-turn points").focus()
+    assert "lit" in page.locator(".sign[data-key=turn2]").get_attribute("class")
+    page.get_by_role("radio", name="lagoon").check()
+    page.get_by_label("Outline").fill("3")
+    page.get_by_label("From your picture to the tile").fill("0.5")
+    kept = studio.until(
+        lambda: (
+            look
+            if (look := studio.project(searched)["view"].get("closeup", {}).get("look", {})).get(
+                "line"
+            )
+            == 3
+            else None
+        )
+    )
+    assert (kept["palette"], kept["signs"], kept["share"]) == ("lagoon", True, 1)
+    page.reload()
+    page.wait_for_selector(".sign")
+    assert page.get_by_role("radio", name="lagoon").is_checked()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nobody_is_kept_out(closeup, scheme: str) -> None:
+    page = closeup
+    page.emulate_media(color_scheme=scheme)
+    for width in (1440, 360):
+        page.set_viewport_size({"width": width, "height": 800})
+        for mode in ("Look", "Pull", "Draw"):
+            choose(page, mode)
+            assert serious_issues(page) == []
+            assert hidden_parts(page) <= 0

@@ -1,0 +1,238 @@
+"""The pages of the search and of what is taken away, in a real browser."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+
+from exported import tile_of
+from orbiflow.arrays import Array
+from orbiflow.studio.tile_view import tile_card
+from orbiflow.symmetry import Isometry
+from orbiflow.tiles import CLASSES, EscherTile, colouring
+from studio.browser import (
+    RunningStudio,
+    covers_page_once,
+    hidden_parts,
+    running_studio,
+    serious_issues,
+    small_searches,
+)
+
+CARD = ".card[data-tile]"
+DONE = ".card[data-stage=final]"
+
+
+def state(page: Any) -> str:
+    """Return what a page says about its search."""
+    return page.locator(".state-words").inner_text()
+
+
+def reach(page: Any, name: str, typed: str = "") -> None:
+    """Go on with the Tab key until an element is reached, by its label or words; then press Enter.
+
+    With `typed`, choose the option of a list that begins so.
+    """
+    said = """() => { const own = document.activeElement;
+        return own.getAttribute("aria-label") ?? own.labels?.[0]?.innerText ?? own.innerText; }"""
+    for _ in range(100):
+        page.keyboard.press("Tab")
+        if (page.evaluate(said) or "").startswith(name):
+            page.keyboard.type(typed) if typed else page.keyboard.press("Enter")
+            return
+    raise AssertionError(f"the Tab key never reaches {name}")
+
+
+def test_keyboard_alone_leads_to_a_file_that_covers_its_page(page, drawing, tmp_path) -> None:
+    small_searches(page, "IH4")
+    page.goto("/")
+    page.wait_for_selector("h1")
+    with page.expect_file_chooser() as chooser:
+        reach(page, "Choose a picture")
+    chooser.value.set_files(drawing)
+    page.wait_for_selector(".stage:not([hidden])")
+    reach(page, "Find tiles")
+    page.wait_for_selector(DONE)
+    reach(page, "Take away:")
+    page.wait_for_selector(".form")
+    reach(page, "What is it for?", "Poster")
+    reach(page, "Kind of file", "SVG")
+    reach(page, "Make it")
+    page.wait_for_selector(".preview img")
+    page.focus("h1")
+    with page.expect_download() as caught:
+        reach(page, "tile-")
+    caught.value.save_as(tmp_path / "tiling.svg")
+    assert covers_page_once((tmp_path / "tiling.svg").read_text())
+
+
+def test_a_search_is_paused_continued_and_stopped(page, studio: RunningStudio) -> None:
+    own = studio.with_picture()
+    page.goto(f"/#/p/{own}/picture")
+    page.get_by_role("button", name="Find tiles").click()
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Go on").wait_for()
+    assert state(page) == "Paused."
+    page.get_by_role("button", name="Go on").click()
+    page.wait_for_selector(CARD)
+    page.get_by_role("button", name="Stop").click()
+    page.get_by_role("button", name="Search again").wait_for()
+    assert state(page) == "Stopped."
+    assert page.locator(CARD).count() == len(studio.project(own)["tiles"])
+
+
+def test_two_tabs_and_a_reload_in_the_middle(page, studio: RunningStudio) -> None:
+    from playwright.sync_api import expect
+
+    own = studio.with_picture()
+    other = page.context.new_page()
+    other.goto(f"/#/p/{own}")
+    other.wait_for_selector(".cards", state="attached")
+    small_searches(page, "IH1", "IH4")
+    page.goto(f"/#/p/{own}/picture")
+    page.get_by_role("button", name="Find tiles").click()
+    other.wait_for_selector(CARD)
+    page.reload()
+    page.wait_for_selector(f"{DONE} >> nth=1")
+    other.wait_for_selector(f"{DONE} >> nth=1")
+    names = [tab.locator(f"{CARD} .tag").all_inner_texts() for tab in (page, other)]
+    assert names[0] == names[1]
+    page.get_by_label("Name of the project").fill("Boots")
+    expect(other.get_by_label("Name of the project")).to_have_value("Boots")
+
+
+def test_a_tab_that_was_hidden_catches_up(page, studio: RunningStudio, searched) -> None:
+    from playwright.sync_api import expect
+
+    page.goto(f"/#/p/{searched}")
+    page.wait_for_selector(CARD)
+    hide = """(hidden) => {
+        Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
+        document.dispatchEvent(new Event("visibilitychange"));
+    }"""
+    page.evaluate(hide, True)
+    studio.client.patch(f"projects/{searched}", json={"name": "Renamed elsewhere"})
+    assert page.get_by_label("Name of the project").input_value() != "Renamed elsewhere"
+    page.evaluate(hide, False)
+    expect(page.get_by_label("Name of the project")).to_have_value("Renamed elsewhere")
+
+
+def test_a_server_that_was_killed_loses_nothing(browser, tmp_path) -> None:
+    with running_studio(tmp_path) as studio:
+        own = studio.with_picture()
+        page = browser.new_page()
+        page.set_default_timeout(120_000)
+        page.goto(f"{studio.address}/#/p/{own}")
+        page.wait_for_selector(".cards", state="attached")
+        studio.search(own, "IH1")
+        page.wait_for_selector(CARD)
+        before = {card["id"] for card in studio.project(own)["tiles"]}
+        studio.kill()
+        page.get_by_text("The studio does not answer").wait_for()
+        studio.start()
+        page.get_by_text("The studio does not answer").wait_for(state="hidden")
+        page.wait_for_selector(DONE)
+        assert before <= {card["id"] for card in studio.found(own)}
+        page.get_by_text("1 tile, best first").wait_for()
+        page.close()
+
+
+def test_more_like_one_and_no_more_of_another(page, studio: RunningStudio, searched) -> None:
+    small_searches(page, "IH4")
+    page.goto(f"/#/p/{searched}")
+    page.wait_for_selector(CARD)
+    with page.expect_request("**/tasks") as caught:
+        page.get_by_role("button", name=re.compile("^More like this")).first.click()
+    first = studio.project(searched)["tiles"][0]["id"]
+    assert caught.value.post_data_json["settings"]["like"] == first
+    page.get_by_role("button", name="Stop").click()
+    page.get_by_role("button", name="Search again").wait_for()
+
+
+def whole(matrix: list[float]) -> Array:
+    """Return a matrix of a canvas in homogeneous coordinates."""
+    return np.array([matrix[0::2], matrix[1::2], [0, 0, 1]])
+
+
+def test_tilings_are_drawn_as_the_library_has_them(page) -> None:
+    page.goto("/")
+    for name in CLASSES:
+        own = EscherTile(tile_of(name), name=name)
+        told = page.evaluate(
+            """async (card) => {
+                const { Camera, Tiling } = await import("/js/tiling.js");
+                const tiling = new Tiling(card);
+                const camera = new Camera({ ...tiling.middle, scale: 9, turn: 0.3, yDown: false });
+                const copies = tiling.copies(camera, 300, 200);
+                return { copies, view: camera.matrix(300, 200) };
+            }""",
+            tile_card(own, 1, "final"),
+        )
+        view, colours, seen = whole(told["view"]), colouring(own.tile), list[shapely.Polygon]()
+        for copy in told["copies"]:
+            matrix = whole(copy["matrix"])
+            seen.append(shapely.Polygon(own.tile.polygon @ matrix[:2, :2].T + matrix[:2, 2]))
+            element = np.linalg.solve(view, matrix)
+            assert copy["colour"] == colours.colour(Isometry(element[:2, :2], element[:2, 2]))
+        window = shapely.box(0, 0, 300, 200)
+        assert window.difference(shapely.union_all(seen, grid_size=1e-6)).area < 0.01
+
+
+def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched) -> None:
+    tile = studio.project(searched)["tiles"][0]["id"]
+    studio.client.patch(f"projects/{searched}", json={"view": {"search": {"palette": "dusk"}}})
+    page.goto(f"/#/p/{searched}/take/{tile}")
+    page.get_by_text("Page and file").click()
+    assert page.get_by_label("What is drawn").input_value() == "none"
+    assert not page.get_by_label("Kerf").is_visible()
+    assert page.get_by_label("Colours").input_value() == "dusk"
+    page.get_by_label("What is it for?").select_option("laser")
+    assert not page.get_by_label("Colours").is_visible()
+    page.get_by_label("What is it for?").select_option("")
+    page.get_by_label("What is drawn").select_option("pieces")
+    page.get_by_text("Pieces", exact=True).click()
+    page.get_by_label("Kerf").fill("0.2")
+    page.get_by_label("How long is one tile?").fill("much")
+    page.get_by_role("button", name="Make it").click()
+    said = page.locator(".field .error")
+    assert "Tile size: 'much' is not a length" in said.inner_text()
+    size = page.get_by_label("How long is one tile?")
+    assert size.get_attribute("aria-invalid") == "true"
+    size.fill("30")
+    said.wait_for(state="detached")
+
+
+def test_the_true_size_follows_the_screen_that_was_measured(page, studio, searched) -> None:
+    tile = studio.project(searched)["tiles"][0]["id"]
+    page.goto(f"/#/p/{searched}/take/{tile}")
+    long = "(() => { const { width, height } = document.querySelector('.true-tile').style;"
+    long += " return Math.max(parseFloat(width), parseFloat(height)); })()"
+    page.wait_for_selector(".true-tile")
+    assert page.evaluate(long) == pytest.approx(40 * 96 / 25.4 + 4, abs=0.1)
+    page.get_by_label("How long is one tile?").fill("60")
+    page.keyboard.press("Tab")
+    assert page.evaluate(long) == pytest.approx(60 * 96 / 25.4 + 4, abs=0.1)
+    page.get_by_role("button", name="Measure my screen").click()
+    page.get_by_label(re.compile("bank card")).fill("5")
+    assert page.evaluate(long) == pytest.approx(60 * 5 + 4, abs=0.1)
+    card = page.locator(".bank-card").bounding_box()
+    assert card["width"] / card["height"] == pytest.approx(85.6 / 53.98, rel=1e-2)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_pages_are_for_everyone(page, studio: RunningStudio, searched, scheme) -> None:
+    tile = studio.project(searched)["tiles"][0]["id"]
+    page.emulate_media(color_scheme=scheme)
+    for path, ready in ((f"/#/p/{searched}", CARD), (f"/#/p/{searched}/take/{tile}", ".form")):
+        page.set_viewport_size({"width": 1280, "height": 900})
+        page.goto(path)
+        page.wait_for_selector(ready)
+        for closed in page.locator("summary:visible").all():
+            closed.click()
+        assert serious_issues(page) == []
+        page.set_viewport_size({"width": 360, "height": 700})
+        assert hidden_parts(page) <= 0

@@ -1,0 +1,189 @@
+"""The first page and the page of the picture, in a real browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from studio.browser import BOOT, RunningStudio, area_of, hidden_parts, serious_issues
+
+STATIC = Path(__file__).parents[2] / "src" / "orbiflow" / "studio" / "static"
+READ = ".stage:not([hidden])"
+SETTLED = "canvas.reading[aria-busy=false]"
+
+
+def own_project(page: Any) -> str:
+    """Return the id of the project that a page shows."""
+    page.wait_for_url("**/#/p/**")
+    return page.url.split("/p/")[1].split("/")[0]
+
+
+def begun(page: Any, drawing: Path) -> str:
+    """Choose a picture on the first page and wait until it is read."""
+    page.goto("/")
+    page.set_input_files("#file", drawing)
+    page.wait_for_selector(READ)
+    page.wait_for_selector(SETTLED)
+    return own_project(page)
+
+
+def stroke(page: Any, canvas: str, *points: tuple[float, float]) -> None:
+    """Draw a line on a canvas, through points given as shares of its size."""
+    page.locator(canvas).scroll_into_view_if_needed()
+    box = page.locator(canvas).bounding_box()
+    for k, (x, y) in enumerate(points):
+        page.mouse.move(box["x"] + x * box["width"], box["y"] + y * box["height"], steps=4)
+        if k == 0:
+            page.mouse.down()
+    page.mouse.up()
+
+
+def test_what_was_read_is_shown_and_what_was_left_out_is_said(page, drawing, studio) -> None:
+    own = begun(page, drawing)
+    assert "1 part is left out" in page.locator(".said").inner_text()
+    assert page.locator("h1").inner_text() == "Is this your animal?"
+    assert studio.project(own)["name"] == "beast"
+
+
+def test_sliders_read_anew(page, drawing, studio: RunningStudio) -> None:
+    own = begun(page, drawing)
+    before = studio.project(own)["silhouette"]["outline"]
+    page.get_by_label("Smoothing").focus()
+    for _ in range(12):
+        page.keyboard.press("ArrowRight")
+    found = studio.until(lambda: abs(studio.project(own)["reading"]["smooth"] - 0.024) < 1e-9)
+    assert found
+    studio.until(lambda: studio.project(own)["silhouette"]["outline"] != before)
+    page.get_by_label("Where it ends").focus()
+    page.keyboard.press("ArrowRight")
+    studio.until(lambda: studio.project(own)["reading"]["threshold"] == 0.51)
+    page.get_by_role("radio", name="light").check()
+    studio.until(lambda: studio.project(own)["reading"]["invert"] is True)
+
+
+def test_painting_mends_the_shape_and_can_be_undone(page, drawing, studio: RunningStudio) -> None:
+    own = begun(page, drawing)
+    before = area_of(studio.project(own))
+    page.get_by_role("radio", name="Take away").check()
+    page.get_by_role("radio", name="lasso").check()
+    stroke(page, "canvas.reading", (0.3, 0.68), (0.6, 0.68), (0.6, 0.97), (0.3, 0.97))
+    studio.until(lambda: area_of(studio.project(own)) < 0.95 * before)
+    page.keyboard.press("Control+z")
+    studio.until(lambda: area_of(studio.project(own)) == pytest.approx(before))
+    page.get_by_role("radio", name="Add").check()
+    page.get_by_role("radio", name="brush").check()
+    stroke(page, "canvas.reading", (0.7, 0.3), (0.9, 0.16))
+    studio.until(lambda: area_of(studio.project(own)) > 1.02 * before)
+    page.reload()  # what was painted is still there to go on with
+    page.wait_for_selector(READ)
+    assert studio.project(own)["mend"]
+
+
+def test_marks_are_kept_and_only_on_the_animal(page, drawing, studio: RunningStudio) -> None:
+    own = begun(page, drawing)
+    page.get_by_role("radio", name="Keep its shape").check()
+    stroke(page, "canvas.reading", (0.95, 0.9), (0.97, 0.95))
+    page.get_by_text("Paint on the animal itself").wait_for()
+    assert studio.project(own)["pins"] is None
+    stroke(page, "canvas.reading", (0.2, 0.3), (0.3, 0.4))
+    studio.until(lambda: studio.project(own)["pins"])
+    page.get_by_role("button", name="Undo").click()
+    studio.until(lambda: studio.project(own)["pins"] is None)
+
+
+@pytest.mark.parametrize("how", ["mouse", "keyboard"])
+def test_a_shape_can_be_drawn(page, studio: RunningStudio, how) -> None:
+    page.goto("/")
+    page.get_by_role("button", name="Draw a shape").click()
+    sheet = "dialog canvas"
+    if how == "mouse":
+        stroke(page, sheet, (0.2, 0.2), (0.8, 0.3), (0.7, 0.8), (0.5, 0.5), (0.3, 0.8))
+    else:
+        page.focus(sheet)
+        keys = ["Space", *["Shift+ArrowRight"] * 4, *["Shift+ArrowDown"] * 4]
+        for key in [*keys, *["Shift+ArrowLeft"] * 6, "Space"]:
+            page.keyboard.press(key)
+    page.get_by_role("button", name="Use this shape").click()
+    page.wait_for_selector(READ)
+    assert area_of(studio.project(own_project(page))) > 10_000
+
+
+def test_a_photo_is_taken(page, studio: RunningStudio) -> None:
+    page.goto("/")
+    page.get_by_role("button", name="Take a photo").click()
+    page.get_by_role("button", name="Take the photo").click()
+    own = own_project(page)
+    assert studio.project(own)["input"] == {"name": "photo.png", "type": "png"}
+
+
+def test_pictures_are_dropped_and_pasted(page, drawing) -> None:
+    for event, holder in (("drop", "dataTransfer"), ("paste", "clipboardData")):
+        page.goto("/#/")
+        page.wait_for_selector(".drop")
+        page.evaluate(
+            """([event, holder, bytes]) => {
+                const files = new DataTransfer();
+                files.items.add(new File([new Uint8Array(bytes)], "beast.png", { type: "image/png" }));
+                const given = new Event(event, { bubbles: true, cancelable: true });
+                Object.defineProperty(given, holder, { value: files });
+                document.body.dispatchEvent(given);
+            }""",
+            [event, holder, list(drawing.read_bytes())],
+        )
+        page.wait_for_selector(READ)
+
+
+def test_a_file_that_is_no_picture_is_refused_in_words(page, tmp_path) -> None:
+    (tmp_path / "notes.png").write_bytes(b"this is no picture")
+    page.goto("/")
+    page.set_input_files("#file", tmp_path / "notes.png")
+    page.wait_for_selector(".said .error")
+    assert "notes.png" in page.locator(".said .error").inner_text()
+    assert page.get_by_role("button", name="Find tiles").is_disabled()
+
+
+def test_an_animal_is_taken_by_keyboard_and_the_project_renamed_and_deleted(page, studio) -> None:
+    page.goto("/")
+    first = page.locator(".animal").first
+    first.focus()
+    page.keyboard.press("Enter")
+    page.wait_for_selector(READ)
+    own = own_project(page)
+    page.get_by_label("Name of the project").fill("My beast")
+    studio.until(lambda: studio.project(own)["name"] == "My beast")
+    page.goto("/#/")
+    page.get_by_role("button", name="Delete My beast").click()
+    page.get_by_role("button", name="Delete it").click()
+    page.get_by_role("link", name="My beast").wait_for(state="detached")
+    assert studio.client.get(f"projects/{own}").status_code == 404
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_pages_are_for_everyone(page, studio: RunningStudio, scheme) -> None:
+    own = studio.with_picture()
+    page.emulate_media(color_scheme=scheme)
+    for path, ready in (("/", ".project"), (f"/#/p/{own}/picture", READ)):
+        page.set_viewport_size({"width": 1280, "height": 900})
+        page.goto(path)
+        page.wait_for_selector(ready)
+        assert serious_issues(page) == []
+        page.set_viewport_size({"width": 360, "height": 700})
+        assert hidden_parts(page) <= 0
+    page.goto("/")
+    page.get_by_role("button", name="Draw a shape").click()
+    assert serious_issues(page) == []
+
+
+def test_pages_are_light() -> None:
+    assert sum(file.stat().st_size for file in STATIC.rglob("*") if file.is_file()) < 300_000
+
+
+def test_a_project_file_opens_again(page, studio: RunningStudio, tmp_path) -> None:
+    own = studio.with_picture(BOOT)
+    (tmp_path / "a.orbiflow").write_bytes(studio.client.get(f"projects/{own}/file").content)
+    page.goto("/")
+    page.set_input_files("input[accept='.orbiflow']", tmp_path / "a.orbiflow")
+    page.wait_for_selector(READ)
+    assert own_project(page) != own

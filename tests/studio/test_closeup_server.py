@@ -1,0 +1,111 @@
+"""What the server does for the page of one tile: how it can be pulled, the pulled tile, the drawing."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bent_tiles import bent_tile
+from orbiflow.studio.closeup_tasks import with_drawing
+from orbiflow.studio.tile_files import put_tile, tile_folder, tile_number
+from orbiflow.tiles import EscherTile, certify
+from studio.served import SQUARE, Client, done, new_project, studio
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
+    with studio(tmp_path_factory.mktemp("data")) as served:
+        yield served
+
+
+@pytest.fixture(scope="module")
+def address(client: Client) -> str:
+    """The address of a tile of a project."""
+    project = new_project(client)
+    done(client, client.put(f"{project}/input?name=house.json", content=SQUARE))
+    store, name = client.studio.store, project.split("/")[-1]
+    number = tile_number(900, 0)
+    tile = EscherTile(bent_tile("IH4", 40.0), name="house-IH4")
+    put_tile(store.home(name), number, "final", tile, lambda _: None)
+    folder = store.home(name) / "tiles" / str(number) / "final"
+    store.put_card(name, number, json.loads((folder / "card.json").read_text()))
+    return f"{project}/tiles/{number}"
+
+
+def pulled_by(client: Client, address: str, size: float) -> Any:
+    """Pull one point of a tile's outline; return the server's answer."""
+    space = client.get(f"{address}/space").json()
+    parameters = list(space["start"])
+    parameters[0] += size
+    return client.post(f"{address}/pulled", json={"parameters": parameters})
+
+
+def test_a_pulled_tile_is_certified_and_can_be_pulled_again(client: Client, address: str) -> None:
+    card = pulled_by(client, address, 0.4).json()
+    project, number = address.split("/tiles/")
+    assert (card["parent"], card["certified"]) == (int(number), True)
+    own = tile_folder(client.studio.store.home(project.split("/")[-1]), card["id"])
+    assert certify(EscherTile.load(own).tile).valid
+    view = client.get(f"{project}/tiles/{card['id']}").json()
+    assert {"elements", "map", "silhouette_track", "tile_track", "polygon"} <= set(view)
+    again = pulled_by(client, f"{project}/tiles/{card['id']}", -0.4)
+    assert again.json()["parent"] == card["id"]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "what"),
+    [(None, "crosses itself"), ([1.0], "parameters"), (["x"], "number"), ("far", "parameters")],
+)
+def test_what_cannot_be_is_refused_in_plain_words(
+    client: Client, address: str, parameters: Any, what: str
+) -> None:
+    if parameters is None:
+        answer = pulled_by(client, address, 500.0)
+    else:
+        answer = client.post(f"{address}/pulled", json={"parameters": parameters})
+    assert answer.status_code in (400, 422)
+    assert what in answer.json()["error"]
+
+
+def test_no_tile_no_space(client: Client, address: str) -> None:
+    assert client.get(f"{address}77/space").status_code == 404
+
+
+STROKE = {"colour": "#d02030", "width": 0.8, "points": [[0.0, 0.0], [2.0, 1.0]]}
+
+
+def test_a_drawing_is_in_the_file_that_is_taken_away(client: Client, address: str) -> None:
+    project, number = address.split("/tiles/")
+    client.patch(project, json={"view": {"drawing": {"strokes": [STROKE], "eyes": [[0, 0, 1]]}}})
+    settings = {"tile": int(number), "drawing": True, "purpose": "web"}
+    task = done(
+        client, client.post(f"{project}/tasks", json={"operation": "export", "settings": settings})
+    )
+    assert task["state"] == "done", task["error"]
+    [file] = task["result"]["files"]
+    text = client.get(f"/api/takeaways/{task['id']}/files/{file['name']}").text
+    assert "#d02030" in text
+    settings["drawing"] = False
+    task = done(
+        client, client.post(f"{project}/tasks", json={"operation": "export", "settings": settings})
+    )
+    [file] = task["result"]["files"]
+    assert "#d02030" not in client.get(f"/api/takeaways/{task['id']}/files/{file['name']}").text
+
+
+def test_nothing_drawn_changes_nothing(tmp_path: Path) -> None:
+    tile = EscherTile(bent_tile("IH4", 40.0)).save(tmp_path / "tile")
+    for nothing in ("", "{}", '{"strokes": [], "eyes": []}'):
+        assert with_drawing(nothing, tile, {}, {"a": 1}, tmp_path / "s") == (tile, {}, {"a": 1})
+    assert not (tmp_path / "s").exists()
+    drawing = json.dumps({"strokes": [STROKE]})
+    result, files, settings = with_drawing(drawing, tile, {}, {}, tmp_path / "s")
+    assert files["picture"].name == "drawing.svg"
+    assert settings == {}
+    drawn = EscherTile.load(result)
+    assert np.array_equal(drawn.tile.polygon, EscherTile.load(tile).tile.polygon)

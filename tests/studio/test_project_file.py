@@ -1,0 +1,151 @@
+"""A project's file: what was saved comes back, and a file from others does no harm."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bent_tiles import bent_tile
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.runtime import ignore
+from orbiflow.studio import open_project, project_file
+from orbiflow.studio.project_file import FORMAT, PROJECT, write_project
+from orbiflow.studio.tile_files import put_tile
+from orbiflow.tiles import EscherTile
+from studio.served import SQUARE
+
+DOCUMENT: dict[str, Any] = {
+    "name": "house",
+    "kind": "tile",
+    "view": {},
+    "reading": {},
+    "input": {"name": "house.json"},
+    "tiles": [{"id": 7000, "parent": None}],
+}
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    home = tmp_path_factory.mktemp("project")
+    (home / "input.json").write_bytes(SQUARE)
+    put_tile(home, 7000, "final", EscherTile(bent_tile("IH4", 40.0)), ignore)
+    write_project(home, DOCUMENT, home / "house.orbiflow")
+    return (home / "house.orbiflow").read_bytes()
+
+
+def opened(tmp_path: Path, content: bytes) -> project_file.StudioProject:
+    file = tmp_path / "house.orbiflow"
+    file.write_bytes(content)
+    return open_project(file)
+
+
+def changed(saved: bytes, **entries: bytes | None) -> bytes:
+    """Return a file with some entries changed, left out or added."""
+    data = io.BytesIO()
+    names = {
+        name.replace("__", "/").replace("_json", ".json"): own for name, own in entries.items()
+    }
+    with zipfile.ZipFile(io.BytesIO(saved)) as old, zipfile.ZipFile(data, "w") as new:
+        whole = {entry.filename: old.read(entry) for entry in old.infolist()}
+        for name, content in {**whole, **names}.items():
+            if content is not None:
+                new.writestr(name, content)
+    return data.getvalue()
+
+
+def test_what_was_saved_is_there_again(saved: bytes, tmp_path: Path) -> None:
+    project = opened(tmp_path, saved)
+    assert (project.name, project.numbers) == ("house", ((7000, None),))
+    assert project.target is not None
+    assert project.target.source == "house.json"
+    (tile,) = project.tiles
+    assert tile.certificate.valid
+    assert tile.save(tmp_path / "tile")  # whole, though the file was unpacked for a moment only
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"PK", b"not a zip", b"PK\x03\x04" + b"\0" * 100, SQUARE * 1000]
+)
+def test_what_is_no_project(content: bytes, tmp_path: Path) -> None:
+    with pytest.raises(InputFileError, match="not a project"):
+        opened(tmp_path, content)
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        b"",
+        b"[]",
+        b"{}",
+        b"\xff",
+        b"[" * 100_000,
+        json.dumps({**DOCUMENT, "format": "orbiflow-project/9"}).encode(),
+        json.dumps({**DOCUMENT, "format": FORMAT, "tiles": {}}).encode(),
+        json.dumps({**DOCUMENT, "format": FORMAT, "view": 3}).encode(),
+        json.dumps({**DOCUMENT, "format": FORMAT, "reading": {"smooth": 9}}).encode(),
+        json.dumps({**DOCUMENT, "format": FORMAT, "reading": {"no such": 1}}).encode(),
+    ],
+)
+def test_what_is_said_of_a_project_is_checked(
+    saved: bytes, document: bytes, tmp_path: Path
+) -> None:
+    with pytest.raises(OrbiflowError):
+        opened(tmp_path, changed(saved, **{PROJECT: document}))
+
+
+def test_entries_lead_nowhere(saved: bytes, tmp_path: Path) -> None:
+    names = (
+        "../evil",
+        "/etc/evil",
+        "tiles/../../evil",
+        "tiles/1/../../../evil",
+        "C:\\evil",
+        "x.sh",
+    )
+    project = opened(tmp_path, changed(saved, **dict.fromkeys(names, b"x")))
+    assert len(project.tiles) == 1
+    assert not list(tmp_path.parent.rglob("evil"))
+
+
+def test_a_bomb_is_not_unpacked(
+    saved: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(project_file, "MOST_OF_ONE", 20_000)
+    data = io.BytesIO(saved)
+    with zipfile.ZipFile(data, "a", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("mend.png", b"\0" * 1_000_000)
+    with pytest.raises(InputFileError, match="too large"):
+        opened(tmp_path, data.getvalue())
+    monkeypatch.setattr(project_file, "MOST_ENTRIES", 2)
+    with pytest.raises(InputFileError, match="files"):
+        opened(tmp_path, saved)
+
+
+def test_a_tile_that_does_not_tile_is_refused(saved: bytes, tmp_path: Path) -> None:
+    name = "tiles/7000/result.json"
+    with zipfile.ZipFile(io.BytesIO(saved)) as archive:
+        document = json.loads(archive.read(name))
+    document["tiles"][0]["polygon"][3][0] += 5.0
+    with pytest.raises(OrbiflowError, match="not certified"):
+        opened(tmp_path, changed(saved, **{name: json.dumps(document).encode()}))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), min_size=1, max_size=5))
+def test_damage_is_an_error_of_ours_or_does_no_harm(
+    saved: bytes, tmp_path_factory: pytest.TempPathFactory, damage: list[tuple[int, int]]
+) -> None:
+    content = bytearray(saved)
+    for place, byte in damage:
+        content[place % len(content)] = byte
+    with suppress(OrbiflowError):
+        project = opened(tmp_path_factory.mktemp("damaged"), bytes(content))
+        assert all(tile.certificate.valid for tile in project.tiles)

@@ -1,0 +1,216 @@
+"""A tile that was pulled by hand tiles still, keeps its map, and is refused in plain words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.sparse import csr_matrix
+
+from orbiflow.arrays import Array
+from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.studio.changing import pulled, space_json, variations
+from orbiflow.studio.tile_drawing import drawing_settings, with_any_map
+from orbiflow.studio.tile_view import elements_json, tile_view
+from orbiflow.symmetry import Line, reflection, rotation
+from orbiflow.tiles import EscherTile, ExportSettings, Frame, Tile, TileMap, read_over
+from orbiflow.tiles.search.bent_map import map_of_bent
+from outlines import bent_squirrel
+from strategies import seeds, wallpaper_groups
+from swirled_tiles import is_sound, swirled
+
+
+def squirrel(name: str, *, y_down: bool = False) -> EscherTile:
+    """A tile with the map of its silhouette, in an input of its own coordinates."""
+    case = bent_squirrel(name)
+    linear = np.array([[40.0, 0.0], [0.0, -40.0 if y_down else 40.0]])
+    frame = Frame(linear, np.array([100.0, 80.0]), size=(200.0, 160.0))
+    bending = map_of_bent(case.bent, case.factor, case.shift, case.tile)
+    placed = case.tile.transformed(linear, frame.offset)
+    return EscherTile(placed, y_down=y_down, map_source=TileMap(frame=frame, bending=bending))
+
+
+def nudged(tile: EscherTile, seed: int, reach: float) -> Array:
+    """Parameters of a tile, moved at random by a share of its size that keeps sides apart."""
+    space = variations(tile)
+    ring = space.first.polygon
+    room = min(shapely.Polygon(ring).minimum_clearance, tile.tile.radius)
+    rng = np.random.default_rng(seed)
+    move = rng.normal(size=space.start.shape)
+    return space.start + reach * room * move / abs(space.polygon(move)).max()
+
+
+@settings(max_examples=4)
+@given(swirled.filter(is_sound), seeds)
+def test_what_the_browser_is_told_is_the_space_of_the_tile(tile: Tile, seed: int) -> None:
+    told = space_json(EscherTile(tile))
+    shape = told["rows"], told["cols"]
+    matrix = csr_matrix((told["values"], told["indices"], told["indptr"]), shape=shape)
+    ring = np.array(told["polygon"])
+    assert np.abs((matrix @ told["start"]).reshape(-1, 2) - ring).max() < 1e-9 * tile.radius
+    moved = nudged(EscherTile(tile), seed, 0.3)
+    assert (
+        np.abs(matrix @ moved - pulled(EscherTile(tile), moved).tile.polygon.ravel()).max() < 1e-9
+    )
+    # the body fills the tile, its first points are the vertices, and others lie on sides
+    points, triangles = (np.array(told["body"][name]) for name in ("points", "triangles"))
+    assert np.array_equal(points[: len(ring)], ring)
+    pieces = shapely.polygons(points[triangles])
+    assert shapely.area(pieces).sum() == pytest.approx(abs(tile.signed_area), rel=1e-9)
+    sides, shares = (
+        np.array(told["body"]["sides"], dtype=int),
+        np.array(told["body"]["shares"])[:, None],
+    )
+    on_sides = ring[sides] + shares * (ring[(sides + 1) % len(ring)] - ring[sides])
+    assert np.abs(points[len(ring) :][: len(sides)] - on_sides).max(initial=0) < 1e-9 * tile.radius
+
+
+@settings(max_examples=5)
+@given(swirled.filter(is_sound), seeds, st.floats(0.0, 0.3))
+def test_a_pulled_tile_is_certified(tile: Tile, seed: int, reach: float) -> None:
+    given_tile = EscherTile(tile)
+    found = pulled(given_tile, nudged(given_tile, seed, reach))
+    assert found.certificate.valid
+    # and can be pulled again
+    assert pulled(found, nudged(found, seed + 1, reach)).certificate.valid
+
+
+@pytest.mark.parametrize("y_down", [False, True])
+@pytest.mark.parametrize("name", ["IH4", "IH6", "IH21"])
+def test_the_map_goes_where_its_outline_went(name: str, y_down: bool, tmp_path: Path) -> None:
+    tile = squirrel(name, y_down=y_down)
+    before = variations(tile).first.polygon
+    found = pulled(tile, nudged(tile, 3, 0.4))
+    after = found.tile.polygon
+    assert found.map is not None
+    assert found.map.ends_on(found.tile)
+    # each point of the outline comes from where it came from
+    assert np.abs(found.inverse(after) - tile.inverse(before)).max() < 1e-6
+    share = np.random.default_rng(0).random((len(after), 1))
+    between = [(1 - share) * ring + share * np.roll(ring, -1, axis=0) for ring in (before, after)]
+    assert np.abs(found.inverse(between[1]) - tile.inverse(between[0])).max() < 1e-6
+    assert found.fidelity is not None
+    assert found.rating is not None
+    loaded = EscherTile.load(found.save(tmp_path / "tile"))
+    assert np.array_equal(loaded.tile.polygon, after)
+    assert np.array_equal(loaded.forward(before), found.forward(before))
+
+
+def test_not_pulled_is_the_same_tile_and_map() -> None:
+    tile = squirrel("IH4")
+    found = pulled(tile, variations(tile).start)
+    assert tile.bending is not None
+    assert tile.frame is not None
+    inside = tile.frame.to_input(tile.bending.images[tile.bending.triangles].mean(axis=1))
+    assert np.abs(found.inverse(inside) - tile.inverse(inside)).max() < 1e-9
+
+
+def test_refusals_are_plain() -> None:
+    tile = squirrel("IH4")
+    start = variations(tile).start
+    crossed = start.copy()
+    crossed[:2] += 3 * tile.tile.radius
+    with pytest.raises(CertificationError, match=r"outline crosses itself there.*pull it less far"):
+        pulled(tile, crossed)
+    for size in (0.0, 0.1, 9.0):
+        with pytest.raises(CertificationError, match=r"much too small or too large"):
+            pulled(tile, size * start)
+    for wrong in (start[1:], [*start[1:], np.nan], "far"):
+        with pytest.raises(OrbiflowError, match="parameters of a pulled tile"):
+            pulled(tile, wrong)
+
+
+@settings(max_examples=12)
+@given(wallpaper_groups())
+def test_elements_are_one_of_each_and_belong_to_the_group(group) -> None:
+    told = elements_json(group, np.zeros(2))
+    places = []
+    for centre in told["centres"]:
+        turn = rotation(centre["at"], centre["order"])
+        assert group.contains(turn)
+        places.append([centre["order"], *centre["at"]])
+    shares = np.array(places).reshape(-1, 3)[:, 1:] @ group.inverse_lattice.T
+    apart = shares[:, None] - shares
+    off = np.abs(apart - np.round(apart)).max(axis=2, initial=0) + np.eye(len(shares))
+    assert np.min(off, initial=1) > 1e-3
+    for line in told["mirrors"]:
+        assert group.contains(reflection(Line(np.array(line["at"]), np.array(line["along"]))))
+    has_glides = any(g.determinant < 0 for g in group.cosets)
+    assert has_glides == bool(told["mirrors"] or told["glides"])
+
+
+def test_the_view_says_where_the_silhouette_went() -> None:
+    tile = squirrel("IH4", y_down=True)
+    told = tile_view({}, tile)
+    silhouette, track = np.array(told["silhouette_track"]), np.array(told["tile_track"])
+    assert np.abs(tile.forward(silhouette) - track).max() < 1e-9
+    line = shapely.LinearRing(tile.tile.polygon)
+    assert shapely.distance(shapely.points(track), line).max() < 1e-9
+    assert told["covered"] == [[0.0, 0.0], [200.0, 160.0]]
+    bare = tile_view({}, EscherTile(tile.tile))
+    assert bare["map"] is None
+    assert bare["silhouette_track"] == tile.tile.polygon.tolist()
+
+
+def line_across(tile: EscherTile, colour: str = "#d02030") -> dict:
+    center = tile.inverse(tile.tile.polygon).mean(axis=0)
+    points = center + np.linspace(-1, 1, 9)[:, None] * [4.0, 1.0]
+    strokes = [{"colour": colour, "width": 1.5, "points": points.tolist()}]
+    return {"strokes": strokes, "eyes": [[*center.tolist(), 2.0], [-900.0, 0.0, 2.0]]}
+
+
+@pytest.mark.parametrize("y_down", [False, True])
+@pytest.mark.parametrize("mapped", [True, False])
+def test_drawings_reach_the_export(mapped: bool, y_down: bool, tmp_path: Path) -> None:
+    tile = squirrel("IH4", y_down=y_down)
+    tile = tile if mapped else with_any_map(EscherTile(tile.tile, y_down=y_down))
+    drawing = line_across(tile)
+    filled = drawing_settings(drawing, tile, tmp_path)
+    assert len(filled["eyes"]) == 1  # the other is beyond the silhouette
+    tile.export(
+        tmp_path / "out.svg", ExportSettings(eyes=filled["eyes"]), picture=filled["picture"]
+    )
+    assert "#d02030" in (tmp_path / "out.svg").read_text()
+    motif = read_over(filled["picture"], tile).drawing
+    assert motif is not None
+    found = np.concatenate([curve.pieces.reshape(-1, 2) for curve in motif.parts[0].curves])
+    goal = tile.forward(drawing["strokes"][0]["points"])
+    line = shapely.LineString(goal)
+    assert shapely.distance(shapely.points(found), line).max() < 0.02 * tile.tile.radius
+
+
+def test_lines_go_over_the_artwork(tmp_path: Path) -> None:
+    from PIL import Image
+
+    tile = squirrel("IH4")
+    picture = tmp_path / "art.png"
+    Image.new("RGB", (400, 320), "#ffffff").save(picture)
+    filled = drawing_settings(line_across(tile), tile, tmp_path, picture)
+    with Image.open(filled["picture"]) as image:
+        assert image.size == (400, 320)
+        colours = np.asarray(image.convert("RGB")).reshape(-1, 3).astype(int)
+    for colour in ((0xD0, 0x20, 0x30), (255, 255, 255)):
+        assert np.abs(colours - colour).sum(axis=1).min() < 9
+    nothing = drawing_settings({}, tile, tmp_path, picture)
+    assert nothing == {"picture": picture, "eyes": ()}
+
+
+@pytest.mark.parametrize(
+    ("drawing", "what"),
+    [
+        ({"strokes": 3}, "a list of strokes"),
+        ({"strokes": [{"colour": "red"}]}, "colour of a line"),
+        ({"strokes": [{"colour": '#fff"/><script>', "width": 1, "points": [[0, 0]]}]}, "colour"),
+        ({"strokes": [{"colour": "#ffffff", "width": -1, "points": [[0, 0]]}]}, "width"),
+        ({"strokes": [{"colour": "#ffffff", "width": 1, "points": [[0, "a"]]}]}, "points"),
+        ({"eyes": [[1, 2]]}, "an eye"),
+        ({"eyes": [[1, 2, 3]] * 100}, "too large"),
+    ],
+)
+def test_drawings_are_checked(drawing: dict, what: str, tmp_path: Path) -> None:
+    with pytest.raises(OrbiflowError, match=what):
+        drawing_settings(drawing, squirrel("IH4"), tmp_path)

@@ -1,0 +1,217 @@
+"""The way of a project through the server: from an upload to what is taken away."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image, ImageDraw
+
+from bent_tiles import bent_tile
+from orbiflow.runtime import ItemDone
+from orbiflow.studio.tile_files import put_tile, tile_number
+from orbiflow.tiles import EscherTile, certify
+from studio.served import SQUARE, Client, done, join_tasks, new_project, studio
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
+    with studio(tmp_path_factory.mktemp("data")) as served:
+        yield served
+
+
+@pytest.fixture(scope="module")
+def project(client: Client) -> str:
+    """A project with a silhouette and a tile."""
+    address = new_project(client)
+    done(client, client.put(f"{address}/input?name=house.json", content=SQUARE))
+    put_card(client, address, 900)
+    return address
+
+
+def put_card(client: Client, address: str, task: int) -> int:
+    """Put a tile into a project as a worker does; return its number."""
+    store, name = client.studio.store, address.split("/")[-1]
+    number, told = tile_number(task, 0), list[Any]()
+    tile = EscherTile(bent_tile("IH4", 40.0), name="house-IH4")
+    put_tile(store.home(name), number, "final", tile, told.append)
+    assert told == [ItemDone(f"{number}/final", "done", "tile")]
+    folder = store.home(name) / "tiles" / str(number) / "final"
+    store.put_card(name, number, json.loads((folder / "card.json").read_text()))
+    return number
+
+
+def make(client: Client, address: str, operation: str, **settings: Any) -> dict[str, Any]:
+    ask = {"operation": operation, "settings": settings}
+    return done(client, client.post(f"{address}/tasks", json=ask))
+
+
+def test_about(client: Client) -> None:
+    about = client.get("/api/about").json()
+    assert len(about["animals"]) >= 8
+    for animal in about["animals"]:
+        picture = client.get(animal["picture"])
+        assert max(Image.open(io.BytesIO(picture.content)).size) == 384
+    assert set(about["palettes"][0]) == {"name", "colours", "outline", "paper"}
+
+
+def test_an_upload_becomes_a_silhouette(client: Client, project: str) -> None:
+    found = client.get(project).json()
+    assert found["name"] == "house"
+    assert found["input"] == {"name": "house.json", "type": "json"}
+    own = found["silhouette"]
+    # y points up in the file and down on the screen
+    assert own["height"] / own["width"] == pytest.approx(90 / 80, abs=0.01)
+    assert sorted(own["outline"])[-1][1] in (own["height"], pytest.approx(own["height"] / 3, abs=1))
+    backdrop = Image.open(io.BytesIO(client.get(own["backdrop"]).content))
+    assert backdrop.size == (own["width"], own["height"])
+    assert backdrop.getpixel((own["width"] // 2, own["height"] // 2)) == (70, 78, 92)
+    (summary,) = (one for one in client.get("/api/projects").json() if one["name"] == "house")
+    assert summary["thumb"].endswith("backdrop.png")
+
+
+def painted(shape: Any) -> bytes:
+    data = io.BytesIO()
+    shape.save(data, "png")
+    return data.getvalue()
+
+
+def test_a_silhouette_is_mended_by_brush(client: Client) -> None:
+    address = new_project(client)
+    picture = Image.new("L", (400, 300), 255)
+    ImageDraw.Draw(picture).rectangle((100, 100, 299, 199), fill=0)
+    done(client, client.put(f"{address}/input?name=a.png", content=painted(picture)))
+    before = np.array(client.get(address).json()["silhouette"]["outline"])
+    brush = Image.new("RGBA", (400, 300))
+    ImageDraw.Draw(brush).rectangle((280, 100, 349, 199), fill="white")
+    ImageDraw.Draw(brush).rectangle((100, 100, 149, 199), fill="black")
+    done(client, client.put(f"{address}/mend", content=painted(brush)))
+    found = client.get(address).json()
+    after = np.array(found["silhouette"]["outline"])
+    assert before[:, 0].min() == pytest.approx(100, abs=1)
+    assert after[:, 0].min() == pytest.approx(150, abs=1)
+    assert after[:, 0].max() == pytest.approx(350, abs=1)
+    assert found["mend"]
+    done(client, client.delete(f"{address}/mend"))
+    again = np.array(client.get(address).json()["silhouette"]["outline"])
+    np.testing.assert_allclose(again, before)
+
+
+def test_reading_can_be_set_and_a_new_picture_begins_anew(client: Client) -> None:
+    address = new_project(client)
+    assert client.put(f"{address}/reading", json={"smooth": 0.01}).status_code == 422
+    done(client, client.put(f"{address}/input?name=a.json", content=SQUARE))
+    assert client.put(f"{address}/reading", json={"smooth": 7}).status_code == 422
+    done(client, client.put(f"{address}/reading", json={"threshold": None, "smooth": 0.1}))
+    found = client.get(address).json()
+    assert found["reading"] == {"threshold": None, "invert": None, "smooth": 0.1}
+    assert len(found["silhouette"]["outline"]) > 10
+    done(client, client.post(f"{address}/animal", json={"name": "bat"}))
+    found = client.get(address).json()
+    assert found["reading"]["smooth"] == 0.0
+    assert found["silhouette"]["width"] == 384
+    assert client.post(f"{address}/animal", json={"name": "../x"}).status_code == 404
+
+
+def test_a_picture_without_a_shape_says_what_to_do(client: Client) -> None:
+    address = new_project(client)
+    blank = painted(Image.new("L", (50, 50), 255))
+    task = done(client, client.put(f"{address}/input?name=blank.png", content=blank))
+    assert task["state"] == "failed"
+    assert task["error"].startswith("blank.png: ")
+    assert client.get(address).json()["silhouette"] is None
+    assert make(client, address, "search")["error"].startswith("there is no silhouette yet")
+
+
+@pytest.mark.parametrize(
+    ("operation", "settings", "ending"),
+    [
+        ("export", {"area": "80x60mm", "cut": "skeleton"}, "svg"),
+        ("export", {"area": "80x60mm", "format": "pdf"}, "pdf"),
+        ("art", {"size": "60x40"}, "png"),
+        ("art", {"size": "60x40", "format": "svg"}, "svg"),
+        ("solid", {}, "stl"),
+        ("animate", {"kind": "grow", "seconds": 0.5, "fps": 2, "size": 64}, "gif"),
+    ],
+)
+def test_what_is_taken_away(
+    client: Client, project: str, operation: str, settings: dict[str, Any], ending: str
+) -> None:
+    task = make(client, project, operation, tile=tile_number(900, 0), **settings)
+    assert task["state"] == "done", task["error"]
+    (file,) = task["result"]["files"]
+    assert file["name"].endswith(ending)
+    address = f"/api/takeaways/{task['id']}"
+    answer = client.get(f"{address}/files/{file['name']}")
+    assert len(answer.content) == file["bytes"]
+    assert answer.headers["content-disposition"].startswith("attachment")
+    assert "sandbox" in answer.headers["content-security-policy"]
+    seen = client.get(f"{address}/preview.png")
+    assert seen.status_code == (200 if task["result"]["preview"] else 404)
+    assert task["result"]["preview"] or operation in ("solid", "animate") or ending == "svg"
+    assert client.get(f"{address}/files/other.svg").status_code == 404
+
+
+def test_a_tile_that_is_gone_cannot_be_taken_away(client: Client, project: str) -> None:
+    tile = put_card(client, project, 901)
+    assert client.get(f"{project}/tiles/{tile}").json()["id"] == tile
+    assert client.delete(f"{project}/tiles/{tile}").status_code == 200
+    assert client.get(f"{project}/tiles/{tile}").status_code == 404
+    assert "no such tile" in make(client, project, "export", tile=tile)["error"]
+
+
+@pytest.mark.parametrize("name", ["search", "export", "art", "solid", "animate"])
+def test_forms_come_from_settings(client: Client, name: str) -> None:
+    schema = client.get(f"/api/operations/{name}/schema").json()
+    assert schema["properties"]
+    for own in schema["properties"].values():
+        assert own["description"].endswith(".")
+    assert not {"out", "result", "force", "workers", "project", "task"} & set(schema["properties"])
+
+
+def test_views_are_merged_and_say_who_changed_them(client: Client, project: str) -> None:
+    tab = {"X-Orbiflow-Client": "tab one"}
+    client.patch(project, json={"view": {"a": 1, "b": {"c": 2}}}, headers=tab)
+    client.patch(project, json={"view": {"b": 3}, "name": "a/b\n"}, headers=tab)
+    found = client.get(project).json()
+    assert found["view"] == {"a": 1, "b": 3}
+    assert found["name"] == "b"
+
+
+def test_a_project_is_deleted_with_its_files(client: Client) -> None:
+    address = new_project(client)
+    done(client, client.put(f"{address}/input?name=a.json", content=SQUARE))
+    home: Path = client.studio.store.home(address.split("/")[-1])
+    assert home.is_dir()
+    assert client.delete(address).status_code == 200
+    assert not home.exists()
+    assert client.get(address).status_code == 404
+
+
+def test_no_answer_names_a_folder_of_this_machine(client: Client, project: str) -> None:
+    paths = (project, "/api/projects", "/api/about", f"{project}/tiles/{tile_number(900, 0)}")
+    for path in paths:
+        assert str(client.studio.store.folder) not in client.get(path).text
+
+
+def test_a_project_goes_into_a_file_and_comes_back(client: Client, project: str) -> None:
+    client.patch(project, json={"view": {"zoom": 2}})
+    answer = client.get(f"{project}/file")
+    assert answer.headers["content-disposition"].endswith('.orbiflow"')
+    opened = client.post("/api/projects/open", content=answer.content).json()
+    address = f"/api/projects/{opened['id']}"
+    join_tasks()
+    one, other = client.get(project).json(), client.get(address).json()
+    for name in ("name", "view", "input", "reading"):
+        assert one[name] == other[name]
+    for name in ("outline", "width", "height"):
+        assert one["silhouette"][name] == other["silhouette"][name]
+    (before,), (after,) = one["tiles"], other["tiles"]
+    assert {**after, "id": 0} == {**before, "id": 0}
+    folder = client.studio.store.home(opened["id"]) / "tiles" / str(after["id"]) / "final" / "tile"
+    assert certify(EscherTile.load(folder).tile).valid
