@@ -122,7 +122,7 @@ class Closeup {
     this.pen.use(this.carry, drawing);
     this.heading.textContent = view.arrangement ? sentence(view.arrangement) : "Close up";
     this.kind.textContent = [view.class_name, view.group.name].filter(Boolean).join(" · ");
-    this.tell("proved", "Proved to tile");
+    this.#proved();
     this.#panels();
     this.#past();
     if (quiet) this.navigate(`p/${this.project.id}/t/${id}`, { quiet: true });
@@ -153,6 +153,7 @@ class Closeup {
   #choose(mode) {
     this.mode = mode;
     this.stage.canvas.style.cursor = "";
+    if (this.badge.dataset.kind === "refused") this.#proved();
     if (mode !== "look" && this.look.share < 1) this.#change({ share: 1 });
     this.#panels();
     if (mode === "pull") this.#ready();
@@ -270,13 +271,17 @@ class Closeup {
     this.badge.textContent = text;
   }
 
+  #proved() {
+    this.tell("proved", "Proved to tile");
+  }
+
   #pulledTo({ crossed, body }) {
     this.pen.ride(this.pulling.puller, body, this.space);
     if (this.pulling.hand) {
       if (crossed) this.tell("crossed", "The outline crosses itself here");
       else this.tell("moving", "Let go to check it");
     }
-    if (!body && this.badge.dataset.kind !== "refused") this.tell("proved", "Proved to tile");
+    if (!body && this.badge.dataset.kind !== "refused") this.#proved();
     if (!body) this.stale();
     if (!body && this.later) {
       this.later();
@@ -304,7 +309,7 @@ class Closeup {
 
   #restore() {
     this.pulling.back();
-    if (this.badge.dataset.kind === "refused") this.tell("proved", "Proved to tile");
+    if (this.badge.dataset.kind === "refused") this.#proved();
     const first = this.past.done.find((step) => step.tile);
     if (first && first.tile[0] !== this.view.id) {
       this.#did({ tile: [this.view.id, first.tile[0]] });
