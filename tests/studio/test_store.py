@@ -50,6 +50,34 @@ def test_what_somebody_waits_for_waits_for_no_search(bench: Bench) -> None:
     assert bench.states(*long, quick) == ["running", "waiting", "running"]
 
 
+def test_the_newest_reading_is_the_last_to_end(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, quick=2)
+    project, other = bench.project(), bench.project()
+    tasks = [bench.queue.submit(project, "read", {}) for _ in range(2)]
+    assert bench.states(*tasks) == ["running", "waiting"]  # not side by side
+    bench.queue.replace_waiting(project, "read")
+    tasks.append(bench.queue.submit(project, "read", {}))
+    beside = bench.queue.submit(other, "read", {})
+    assert bench.states(*tasks, beside) == ["running", "cancelled", "waiting", "running"]
+    bench.made[0].finish()
+    assert bench.states(*tasks) == ["done", "cancelled", "running"]
+    # and the process that has ended one reading does the next
+    assert len(bench.made) == 2
+    bench.made[0].finish()
+    bench.made[1].finish()
+    bench.queue.close()
+    bench.store.close()
+
+
+def test_old_tasks_that_are_not_done_are_listed(bench: Bench) -> None:
+    project = bench.project()
+    search = bench.search(project)
+    for _ in range(120):
+        bench.store.change_task(bench.store.add_task(project, "read", {}, "quick", 9), state="done")
+    listed = [task["id"] for task in bench.store.tasks(project)]
+    assert (len(listed), listed[-1]) == (101, search)
+
+
 def test_a_task_that_is_held_lets_others_go_on(bench: Bench) -> None:
     project = bench.project()
     first, second = bench.search(project), bench.search(project)

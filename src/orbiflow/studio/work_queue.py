@@ -85,7 +85,8 @@ class WorkQueue:
         self._calls: Counter[CallProcess] = Counter()  # that each has done
         self._running: dict[int, CallProcess] = {}
         self._held: dict[int, CallProcess] = {}  # in the order in which they were paused
-        self._lanes: dict[int, tuple[str, str]] = {}  # project and lane of what runs
+        # project, lane and operation of what runs
+        self._lanes: dict[int, tuple[str, str, str]] = {}
         self._turns: dict[str, int] = {}  # when each project was served last
         self._turn = 0
         self._lock = threading.RLock()
@@ -126,9 +127,9 @@ class WorkQueue:
         return task
 
     def replace_waiting(self, project: str, operation: str) -> None:
-        """Drop the tasks of a kind that a newer one makes useless."""
+        """Drop the tasks of a kind that wait, and that a newer one makes useless."""
         for task in self.store.undone(project):
-            if task["operation"] == operation:
+            if task["operation"] == operation and task["state"] == "waiting":
                 self.cancel(task["id"])
 
     def pause(self, task: int) -> None:
@@ -167,10 +168,11 @@ class WorkQueue:
             process.kill()
         self._schedule()
 
-    def forget(self, project: str) -> None:
-        """End all tasks of a project."""
+    def forget(self, project: str, *operations: str) -> None:
+        """End the tasks of a project: of some kinds, or all."""
         for task in self.store.undone(project):
-            self.cancel(task["id"])
+            if not operations or task["operation"] in operations:
+                self.cancel(task["id"])
 
     def _schedule(self) -> None:
         """Start what can be started."""
@@ -189,14 +191,17 @@ class WorkQueue:
     def _next(self) -> dict[str, Any] | None:
         """Return the task whose turn it is: of the project that has least, then waited longest."""
         running = [self._lanes[task] for task in self._running]
-        full = Counter(lane for _, lane in running)
-        own = Counter(running)
+        full = Counter(lane for _, lane, _ in running)
+        own = Counter((project, lane) for project, lane, _ in running)
+        read = {project for project, _, operation in running if operation == "read"}
         waiting = [
             task
             for task in self.store.undone()
             if task["state"] == "waiting"
             and task["id"] not in self._running
             and full[task["lane"]] < self.slots[task["lane"]]
+            # an older reading must not end after a newer one
+            and not (task["operation"] == "read" and task["project"] in read)
         ]
 
         def turn(task: dict[str, Any]) -> tuple[int, int, int]:
@@ -209,7 +214,7 @@ class WorkQueue:
         number, project = task["id"], task["project"]
         self._turn += 1
         self._turns[project] = self._turn
-        self._lanes[number] = project, task["lane"]
+        self._lanes[number] = project, task["lane"], task["operation"]
         if (process := self._held.pop(number, None)) is not None:
             self._running[number] = process
             self.store.change_task(number, state="running")
@@ -253,7 +258,7 @@ class WorkQueue:
 
     def _let_go(self, number: int, process: CallProcess) -> None:
         """Keep the process of a task that has ended for another quick one, or end it."""
-        _, lane = self._lanes.pop(number)
+        _, lane, _ = self._lanes.pop(number)
         for processes in (self._running, self._held):
             processes.pop(number, None)
         self._calls[process] += 1

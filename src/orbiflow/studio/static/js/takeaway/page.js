@@ -62,7 +62,12 @@ export async function show(root, { api, events, project, tileId, navigate, about
   async function start() {
     const own = state.own.filter(([, box]) => box.checked).map(([name]) => [name, true]);
     const settings = { tile: tileId, ...Object.fromEntries(own), ...state.form.values() };
-    state.task = (await api.post(`${place}/tasks`, { operation: state.kind, settings })).task;
+    try {
+      state.task = (await api.post(`${place}/tasks`, { operation: state.kind, settings })).task;
+    } catch (error) {
+      if (state.form.refuse(error.message)) return;
+      throw error;
+    }
     Object.assign(state, { stale: false, news: true });
     tell();
   }
