@@ -66,7 +66,7 @@ class WorkQueue:
     Args:
         store: Where tasks are kept.
         slots: The number of tasks of each lane that run at a time.
-        spares: The number of processes that are started ahead.
+        spares: The number of processes that are started ahead; with 0, each when it is needed.
         spawn: A function that starts one.
     """
 
@@ -91,6 +91,7 @@ class WorkQueue:
         self._turn = 0
         self._lock = threading.RLock()
         self._closed = False
+        self._wanted = threading.Event()  # a look at whether more processes should be ready
 
     def start(self) -> None:
         """Begin, with the tasks that were not done when the last server ended."""
@@ -100,6 +101,7 @@ class WorkQueue:
                     os.killpg(task["pid"], signal.SIGCONT)
             if task["state"] == "running":
                 self.store.change_task(task["id"], state="waiting", pid=None)
+        threading.Thread(target=self._keep_ready, daemon=True, name="processes").start()
         self._schedule()
 
     def close(self) -> None:
@@ -108,6 +110,7 @@ class WorkQueue:
             self._closed = True
             alive = [*self._running.values(), *self._held.values(), *self._spares]
             self._spares.clear()
+        self._wanted.set()
         for process in alive:
             process.kill()
             process.wait()
@@ -175,18 +178,38 @@ class WorkQueue:
                 self.cancel(task["id"])
 
     def _schedule(self) -> None:
-        """Start what can be started."""
+        """Start what can be started. Nobody waits here for a process to start."""
         with self._lock:
-            try:
-                while not self._closed and (task := self._next()) is not None:
-                    self._begin(task)
-                while not self._closed and len(self._spares) < self._spare_count:
-                    self._spares.append(self._spawn())
-                for process in self._spares[self._spare_count :]:
-                    process.kill()
-                del self._spares[self._spare_count :]
-            except OSError:  # no memory, or too many processes: tried again when something ends
-                log.exception("no process can be started")
+            while not self._closed and (task := self._next()) is not None and self._begin(task):
+                pass
+            for process in self._spares[self._spare_count :]:
+                process.kill()
+            del self._spares[self._spare_count :]
+        self._wanted.set()
+
+    def _keep_ready(self) -> None:
+        """Start processes ahead, in a thread of its own, until the queue is closed."""
+        while not self._closed:
+            self._wanted.wait()
+            self._wanted.clear()
+            while not self._closed and len(self._spares) < self._spare_count:
+                try:
+                    process = self._spawn()
+                except OSError:  # no memory, or too many processes: again when something ends
+                    log.exception("no process can be started")
+                    break
+                with self._lock:
+                    self._spares.append(process)
+                    if self._closed:
+                        process.kill()
+                self._schedule()
+
+    def _ready(self) -> CallProcess | None:
+        """Return a process that waits for a call, if there is one."""
+        self._spares = [spare for spare in self._spares if spare.alive]
+        if self._spares:
+            return self._spares.pop(0)
+        return None if self._spare_count else self._spawn()
 
     def _next(self) -> dict[str, Any] | None:
         """Return the task whose turn it is: of the project that has least, then waited longest."""
@@ -210,37 +233,42 @@ class WorkQueue:
 
         return min(waiting, key=turn, default=None)
 
-    def _begin(self, task: dict[str, Any]) -> None:
+    def _begin(self, task: dict[str, Any]) -> bool:
+        """Start a task or let it go on; return False if it must wait for a process."""
         number, project = task["id"], task["project"]
+        held = self._held.pop(number, None)
+        if held is None:
+            try:
+                kind = kind_of_work(task["operation"])
+                call = kind.call(self.store.home(project), number, task["settings"])
+            except OrbiflowError as error:
+                self.store.change_task(number, state="failed", error=str(error))
+                return True
+            if (process := self._ready()) is None:
+                return False
+            self._start(number, project, process, call)
+        else:
+            self._running[number] = held
+            self.store.change_task(number, state="running")
+            held.resume()
         self._turn += 1
         self._turns[project] = self._turn
         self._lanes[number] = project, task["lane"], task["operation"]
-        if (process := self._held.pop(number, None)) is not None:
-            self._running[number] = process
-            self.store.change_task(number, state="running")
-            process.resume()
-            return
-        try:
-            kind = kind_of_work(task["operation"])
-            call = kind.call(self.store.home(project), number, task["settings"])
-        except OrbiflowError as error:
-            self.store.change_task(number, state="failed", error=str(error))
-            return
-        self._run(number, project, call)
+        return True
 
-    def _run(self, number: int, project: str, call: Call) -> None:
-        self._spares = [spare for spare in self._spares if spare.alive]
-        process = self._spares.pop(0) if self._spares else self._spawn()
-        process.begin(call)
+    def _start(self, number: int, project: str, process: CallProcess, call: Call) -> None:
         self._running[number] = process
         self.store.change_task(number, state="running", pid=process.pid, share=0.0)
-        reader = threading.Thread(
-            target=self._follow, args=(number, project, process), daemon=True, name=f"task {number}"
-        )
-        reader.start()
+        threading.Thread(
+            target=self._follow,
+            args=(number, project, process, call),
+            daemon=True,
+            name=f"task {number}",
+        ).start()
 
-    def _follow(self, number: int, project: str, process: CallProcess) -> None:
-        """Record what a process tells, to its end."""
+    def _follow(self, number: int, project: str, process: CallProcess, call: Call) -> None:
+        """Give a process its call and record what it tells, to its end."""
+        process.begin(call)  # which waits until the process reads it
         told = _Told(self.store, project, number)
         ending: Event | None = None
         for event in process.events():

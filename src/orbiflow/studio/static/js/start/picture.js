@@ -195,11 +195,14 @@ class PicturePage {
     this.back.disabled = !marks.strokes.length;
     this.again.disabled = !marks.undone.length;
     this.canvas.setAttribute("aria-busy", String(Boolean(busy)));
+    this.paint();
+    const told = JSON.stringify([busy, task?.state, task?.error, silhouette && { ...silhouette, outline: null }]);
+    if (told === this.told) return; // what is open stays open
+    this.told = told;
     put(this.said,
       busy && h("p", { class: "soft" }, silhouette ? "Reading it again …" : "Reading the picture …"),
       !busy && task?.state === "failed" && h("p", { class: "error" }, sentence(task.error)),
       silhouette && notes(silhouette));
-    this.paint();
   }
 
   /** Search for tiles of what is on the screen: first all of it must have been read. */
