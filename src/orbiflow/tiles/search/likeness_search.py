@@ -152,8 +152,8 @@ class LikenessSearch(Settings, SearchMethod):
     def _alone(self) -> list[LikenessSearch]:
         """Return the levels below, least first, and this one, each without those below it."""
         normal = {name: getattr(LikenessSearch, name) for name in {**FAST, **BEST}}
-        levels = (*({**normal, **FAST}, normal)[: self.below], {})
-        return [replace(self, below=0, **own) for own in levels]
+        below: list[dict[str, Any]] = [{**normal, **FAST}, normal][: self.below]
+        return [replace(self, below=0, **own) for own in (*below, {})]
 
     def levels(self) -> Sequence[tuple[float, SearchMethod]]:
         """Return the sketch, the levels of effort below, and what this one has beyond them."""
