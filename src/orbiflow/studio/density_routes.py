@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fastapi import APIRouter, Request
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse, JSONResponse, Response
 
 from orbiflow.errors import OrbiflowError
@@ -72,7 +73,7 @@ async def upload(request: Request, project: str, here: Here, name: str = "") -> 
     called = plain_name(name, "table.csv")
     file = _home(here, project) / f"table{ending_of(called)}"
     await save_body(request, file)
-    return _new_table(here, project, file, called)
+    return await _new_table(here, project, file, called)
 
 
 @routes.post("/projects/{project}/density/example")
@@ -83,7 +84,7 @@ async def example(request: Request, project: str, here: Here) -> dict[str, Any]:
         raise OrbiflowError(f"there is no such example; there are {', '.join(EXAMPLES)}")
     file = _home(here, project) / "table.csv"
     shutil.copyfile(TABLES / f"{name}.csv", file)
-    return _new_table(here, project, file, f"{EXAMPLES[name][0]}.csv")
+    return await _new_table(here, project, file, f"{EXAMPLES[name][0]}.csv")
 
 
 @routes.get("/projects/{project}/density/{fit}/surface")
@@ -107,9 +108,9 @@ def _home(here: Studio, project: str) -> Path:
     return here.store.home(project)
 
 
-def _new_table(here: Studio, project: str, file: Path, name: str) -> dict[str, Any]:
+async def _new_table(here: Studio, project: str, file: Path, name: str) -> dict[str, Any]:
     """Forget what was made of an earlier table, and look at this one."""
-    here.queue.forget(project, *TASKS)
+    await run_in_threadpool(here.queue.forget, project, *TASKS)
     home, own = here.store.home(project), here.store.project(project)
     for old in (home / TABLE, *(home / f"table{ending}" for ending in ENDINGS)):
         if old != file:
@@ -120,7 +121,7 @@ def _new_table(here: Studio, project: str, file: Path, name: str) -> dict[str, A
     if own["name"] in (*UNNAMED, before):
         changes["name"] = Path(name).stem
     here.store.change(project, **changes)
-    return here.submit(project, "density table", {})
+    return await here.submit(project, "density table", {})
 
 
 def _document(file: Path) -> Response:

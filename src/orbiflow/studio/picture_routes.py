@@ -7,6 +7,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from fastapi import APIRouter, Request
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
 from orbiflow.errors import OrbiflowError
@@ -30,7 +31,7 @@ async def upload(request: Request, project: str, here: Here, name: str = "") -> 
     ending = PurePosixPath(called).suffix.lower()
     file = here.store.home(project) / f"input{ending if ENDING.fullmatch(ending) else '.bin'}"
     await save_body(request, file)
-    return _new_input(here, project, called, file)
+    return await _new_input(here, project, called, file)
 
 
 @routes.post("/animal")
@@ -41,12 +42,12 @@ async def animal(request: Request, project: str, here: Here) -> dict[str, Any]:
     content = animal_file(name).read_bytes()
     file = here.store.home(project) / "input.png"
     file.write_bytes(content)
-    return _new_input(here, project, f"{ANIMALS[name]}.png", file)
+    return await _new_input(here, project, f"{ANIMALS[name]}.png", file)
 
 
-def _new_input(here: Studio, project: str, name: str, file: Path) -> dict[str, Any]:
+async def _new_input(here: Studio, project: str, name: str, file: Path) -> dict[str, Any]:
     """Forget the picture before, what was painted over it, and the search for its tiles."""
-    here.queue.forget(project, "read", "search")
+    await run_in_threadpool(here.queue.forget, project, "read", "search")
     home = here.store.home(project)
     for old in [*home.glob("input.*"), *(home / f"{mask}.png" for mask in MASKS)]:
         if old != file:
@@ -56,15 +57,17 @@ def _new_input(here: Studio, project: str, name: str, file: Path) -> dict[str, A
         changes["name"] = PurePosixPath(name).stem
     here.store.change(project, "silhouette", silhouette=None, reading={}, **changes)
     here.store.change(project)
-    return _read_anew(here, project)
+    return await _read_anew(here, project)
 
 
-def _read_anew(here: Studio, project: str) -> dict[str, Any]:
+async def _read_anew(here: Studio, project: str) -> dict[str, Any]:
     whole = here.store.project(project)
     if whole["input"] is None:
         raise OrbiflowError("there is no picture yet; choose one first")
-    here.queue.replace_waiting(project, "read")
-    return here.submit(project, "read", {"called": whole["input"]["name"], **whole["reading"]})
+    await run_in_threadpool(here.queue.replace_waiting, project, "read")
+    return await here.submit(
+        project, "read", {"called": whole["input"]["name"], **whole["reading"]}
+    )
 
 
 @routes.put("/reading")
@@ -72,7 +75,7 @@ async def reading(request: Request, project: str, here: Here) -> dict[str, Any]:
     """Read the picture anew, with other settings."""
     given = {k: v for k, v in (await body_object(request)).items() if v is not None}
     here.store.change(project, "silhouette", reading=ReadingSettings(**given).to_json())
-    return _read_anew(here, project)
+    return await _read_anew(here, project)
 
 
 @routes.put("/{mask}")
@@ -85,14 +88,14 @@ async def put_mask(request: Request, project: str, mask: str, here: Here) -> dic
         if start.read(len(PNG)) != PNG:
             raise OrbiflowError("what is painted must be a PNG")
     fresh.replace(file)
-    return _mask_changed(here, project, mask)
+    return await _mask_changed(here, project, mask)
 
 
 @routes.delete("/{mask}")
 async def delete_mask(project: str, mask: str, here: Here) -> dict[str, Any]:
     """Forget what was painted over the picture."""
     _mask_file(here, project, mask).unlink(missing_ok=True)
-    return _mask_changed(here, project, mask)
+    return await _mask_changed(here, project, mask)
 
 
 def _mask_file(here: Studio, project: str, mask: str) -> Path:
@@ -102,9 +105,9 @@ def _mask_file(here: Studio, project: str, mask: str) -> Path:
     return here.store.home(project) / f"{mask}.png"
 
 
-def _mask_changed(here: Studio, project: str, mask: str) -> dict[str, Any]:
+async def _mask_changed(here: Studio, project: str, mask: str) -> dict[str, Any]:
     here.store.change(project, "silhouette")
-    return _read_anew(here, project) if mask == "mend" else {}
+    return await _read_anew(here, project) if mask == "mend" else {}
 
 
 @routes.get("/{picture}.png")

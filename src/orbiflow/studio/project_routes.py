@@ -7,6 +7,7 @@ import secrets
 from typing import Any
 
 from fastapi import APIRouter, Request
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse, StreamingResponse
 from starlette.background import BackgroundTask
 
@@ -44,7 +45,7 @@ async def open_file(request: Request, here: Here) -> dict[str, Any]:
     made = here.store.create("tile", "Opened project", here.limits.projects)
     try:
         await save_body(request, here.store.home(made) / f"opened{ENDING}")
-        here.submit(made, "open", {})
+        await here.submit(made, "open", {})
     except BaseException:
         here.store.delete(made)
         raise
@@ -99,7 +100,7 @@ async def patch(request: Request, project: str, here: Here) -> dict[str, Any]:
 async def delete(project: str, here: Here) -> dict[str, Any]:
     """Delete a project with all its files."""
     here.store.project(project)
-    here.queue.forget(project)
+    await run_in_threadpool(here.queue.forget, project)
     here.store.delete(project)
     return {}
 
@@ -115,7 +116,7 @@ async def task(request: Request, project: str, here: Here) -> dict[str, Any]:
     if "drawing" in settings:  # as it is now
         drawn = view.get("drawing", {}) if settings["drawing"] is True else {}
         settings = {**settings, "drawing": json.dumps(drawn)}
-    return here.submit(project, operation, settings)
+    return await here.submit(project, operation, settings)
 
 
 @routes.post("/tasks/{number}/{action}")
@@ -125,7 +126,7 @@ async def steer(number: int, action: str, here: Here) -> dict[str, Any]:
     actions = {"pause": queue.pause, "resume": queue.resume, "cancel": queue.cancel}
     if action not in actions:
         raise Refused(404, "a task can be paused, resumed and cancelled")
-    actions[action](number)
+    await run_in_threadpool(actions[action], number)
     return {"task": shown_task(here.store, here.store.task(number))}
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import Depends, Request
+from fastapi.concurrency import run_in_threadpool
 
 from orbiflow.runtime import is_object
 from orbiflow.studio.guard import Refused
@@ -28,14 +29,21 @@ class Studio:
     hub: Hub
     limits: Limits
 
-    def submit(self, project: str, operation: str, settings: dict[str, Any]) -> dict[str, Any]:
+    async def submit(
+        self, project: str, operation: str, settings: dict[str, Any]
+    ) -> dict[str, Any]:
         """Put a task into the queue and return it as the answer to who asked for it."""
-        task = self.queue.submit(project, operation, settings, most=self.limits.waiting)
+        task = await self._submitted(project, operation, settings)
         return {"task": shown_task(self.store, self.store.task(task))}
+
+    async def _submitted(self, project: str, operation: str, settings: dict[str, Any]) -> int:
+        """Put a task into the queue, whose lock other requests need not wait for."""
+        most = self.limits.waiting
+        return await run_in_threadpool(self.queue.submit, project, operation, settings, most=most)
 
     async def done(self, project: str, operation: str, settings: dict[str, Any]) -> dict[str, Any]:
         """Put a task into the queue and return it once it has ended."""
-        task = self.queue.submit(project, operation, settings, most=self.limits.waiting)
+        task = await self._submitted(project, operation, settings)
         changes = self.hub.changes(project)
         async for _ in changes:
             if self.store.task(task)["state"] not in UNDONE:
