@@ -21,8 +21,8 @@ from PIL import Image
 from playwright.sync_api import Page, ViewportSize, sync_playwright
 
 import orbiflow
-from studio_pictures import IMAGES, PATIENCE, WIDE, keep, make_pictures
-from studio_screen import Film, centre, eye_in_window, limb_in_window
+from studio_pictures import IMAGES, PATIENCE, TALL, keep, make_pictures
+from studio_screen import EYE, NOSE, Film, centre, in_window, outline_in_window
 
 ANIMAL = Path(orbiflow.__file__).parent / "studio" / "animals" / "turtle.png"
 FILMED: ViewportSize = {"width": 1080, "height": 675}
@@ -82,13 +82,13 @@ def watch_search(film: Film) -> None:
     page = film.page
     page.wait_for_selector(".cards")
     other = page.context.new_page()
-    other.set_viewport_size(WIDE)
+    other.set_viewport_size(TALL)
     other.goto(page.url)
     page.wait_for_selector(".card[data-tile]", timeout=PATIENCE)
     taken = False
     while page.get_by_role("button", name="Pause").count():
         film.sample()
-        if not taken and other.locator(".card[data-tile]").count() >= 5:
+        if not taken and other.locator(".card[data-stage=final]").count():
             keep(other, "search")
             taken = True
         page.wait_for_timeout(300)
@@ -102,18 +102,18 @@ def pull_point(film: Film) -> None:
     page = film.page
     film.click(*centre(page, ".card[data-tile] canvas"))
     page.wait_for_selector(".closeup-canvas")
-    page.mouse.move(*film.pointer)
-    film.rest(600)
+    page.wait_for_timeout(300)
+    film.rest(500)
     film.click(*centre(page, ".closeup-side label:has-text('Pull')"))
     page.wait_for_selector("[data-ready=pull]")
-    (x, y), (u, v) = limb_in_window(page)
+    x, y = outline_in_window(page, NOSE)
     film.go(x, y, frames=6)
     page.mouse.down()
     film.pressed = True
-    long = ((x - u) ** 2 + (y - v) ** 2) ** 0.5
-    out, aside = (x - u) / long, (y - v) / long
-    for way in (1, -1):
-        film.go(x + 34 * out - 38 * way * aside, y + 34 * aside + 38 * way * out, frames=8)
+    for aside, up, frames in ((-26, 8, 9), (4, 30, 10)):
+        film.go(x + aside, y - up, frames=frames)
+    while page.locator(".badge[data-kind=crossed]").count():
+        film.go(0.7 * film.pointer[0] + 0.3 * x, 0.7 * film.pointer[1] + 0.3 * y, frames=2)
     page.mouse.up()
     film.pressed = False
     page.wait_for_selector(".badge[data-kind=proved]")
@@ -125,7 +125,7 @@ def draw_eye(film: Film) -> None:
     page = film.page
     film.click(*centre(page, ".closeup-side label:has-text('Draw')"))
     film.click(*centre(page, ".closeup-side label:has-text('Eye')"))
-    film.click(*eye_in_window(page))
+    film.click(*in_window(page, EYE))
     page.wait_for_timeout(700)  # until the drawing is kept
     film.go(film.pointer[0] + 130, film.pointer[1] + 190, frames=4)
     film.rest(600)
@@ -173,7 +173,7 @@ def main() -> None:
             page.set_default_timeout(PATIENCE)
             page.goto("/")
             film = make_film(page)
-            film.write(IMAGES / "studio.gif", width=720)
+            film.write(IMAGES / "studio.gif", width=720, seconds=10.0)
             page.context.close()
         make_pictures(browser, address)
         browser.close()

@@ -8,10 +8,11 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import Browser, Page, ViewportSize
 
-from studio_screen import eye_in_window, limb_in_window
+from studio_screen import EYE, NOSE, in_window, outline_in_window
 
 IMAGES = Path(__file__).parents[1] / "images"
 WIDE: ViewportSize = {"width": 1280, "height": 860}
+TALL: ViewportSize = {"width": 1280, "height": 1240}
 PHONE: ViewportSize = {"width": 390, "height": 844}
 PATIENCE = 600_000  # milliseconds for a search on a busy machine
 HEAD = ((0.09, 0.11), (0.13, 0.18), (0.18, 0.26))
@@ -68,10 +69,10 @@ def close_up(page: Page, path: str) -> None:
     page.get_by_label("Show the symmetry").uncheck()
     page.locator(".closeup-side label:has-text('Pull')").first.click()
     page.wait_for_selector("[data-ready=pull]")
-    (x, y), (u, v) = limb_in_window(page)
+    x, y = outline_in_window(page, NOSE)
     page.mouse.move(x, y)
     page.mouse.down()
-    page.mouse.move(x + 0.2 * (x - u), y + 0.2 * (y - v), steps=8)
+    page.mouse.move(x - 18, y - 28, steps=8)
     page.wait_for_timeout(600)
     keep(page, "pull")
     page.keyboard.press("Escape")
@@ -83,7 +84,7 @@ def draw(page: Page, path: str) -> None:
     page.goto(f"/#/{path}")
     page.wait_for_selector(".closeup-canvas")
     page.locator(".closeup-side label:has-text('Draw')").first.click()
-    x, y = eye_in_window(page)
+    x, y = in_window(page, EYE)
     if not page.evaluate(DRAWN, path.split("/")[1]):
         page.locator(".closeup-side label:has-text('Eye')").first.click()
         page.mouse.click(x, y)

@@ -9,7 +9,7 @@ from typing import Any
 from PIL import Image, ImageChops, ImageDraw
 from playwright.sync_api import Page
 
-EYE = (57.0, 54.0)  # where the turtle's eye is, in pixels of its picture
+EYE, NOSE = (57.0, 54.0), (33.0, 27.0)  # of the turtle, in pixels of its picture
 COLOURS = 128
 POINTER = ((0, 0), (0, 21), (5, 16), (9, 25), (13, 23), (9, 15), (16, 15))
 VIEW = """async ([tile, place, across]) => {
@@ -41,20 +41,24 @@ def tile_in_window(page: Page, across: float = 4.0) -> dict[str, Any]:
     return page.evaluate(VIEW, [place, ".closeup-canvas", across])
 
 
-def eye_in_window(page: Page) -> tuple[float, float]:
-    """Return where the animal's eye is in the tile in the middle of the window."""
+def in_window(page: Page, place: tuple[float, float]) -> tuple[float, float]:
+    """Return where the tile in the middle of the window has a point of the picture that was read."""
     seen = tile_in_window(page)
-    apart = [(x - EYE[0]) ** 2 + (y - EYE[1]) ** 2 for x, y in seen["rest"]]
-    x, y = seen["images"][apart.index(min(apart))]
+    x, y = seen["images"][nearest(seen["rest"], place)]
     return x, y
 
 
-def limb_in_window(page: Page) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the middle tile's point that is farthest from its middle, and its middle."""
+def outline_in_window(page: Page, place: tuple[float, float]) -> tuple[float, float]:
+    """Return the point of that tile's outline that is nearest to a point of the picture."""
     outline = tile_in_window(page)["outline"]
-    x, y = (sum(own) / len(outline) for own in zip(*outline, strict=True))
-    far = max(outline, key=lambda point: (point[0] - x) ** 2 + (point[1] - y) ** 2)
-    return (far[0], far[1]), (x, y)
+    x, y = outline[nearest(outline, in_window(page, place))]
+    return x, y
+
+
+def nearest(points: list[tuple[float, float]], place: tuple[float, float]) -> int:
+    """Return the number of the nearest of many points."""
+    apart = [(x - place[0]) ** 2 + (y - place[1]) ** 2 for x, y in points]
+    return apart.index(min(apart))
 
 
 class Film:
@@ -68,7 +72,7 @@ class Film:
         self.frames: list[tuple[Image.Image, int]] = []
         self._samples: list[Image.Image] = []
 
-    def go(self, x: float, y: float, frames: int = 6) -> None:
+    def go(self, x: float, y: float, frames: int = 5) -> None:
         """Move the pointer, slowly at both ends."""
         u, v = self.pointer
         for k in range(1, frames + 1):
@@ -76,7 +80,7 @@ class Film:
             share *= share * (3 - 2 * share)
             self.pointer = u + share * (x - u), v + share * (y - v)
             self.page.mouse.move(*self.pointer)
-            self.rest(60)
+            self.rest(50)
 
     def click(self, x: float, y: float) -> None:
         """Go somewhere and click."""
@@ -102,8 +106,8 @@ class Film:
         chosen = sorted({round(k * last / (count - 1)) for k in range(count)})
         self.frames += [(self._samples[k], milliseconds) for k in chosen]
 
-    def write(self, path: Path, width: int) -> None:
-        """Write an animation without end, in colours that all its frames share."""
+    def write(self, path: Path, width: int, seconds: float) -> None:
+        """Write an animation of a length, without end, in colours that all its frames share."""
         small = [
             frame.resize(
                 (width, round(width * frame.height / frame.width)), Image.Resampling.LANCZOS
@@ -117,7 +121,8 @@ class Film:
         first, *rest = (
             frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in small
         )
-        durations = [milliseconds for _, milliseconds in self.frames]
+        speed = sum(milliseconds for _, milliseconds in self.frames) / (1000 * seconds)
+        durations = [10 * max(2, round(lasts / speed / 10)) for _, lasts in self.frames]
         first.save(
             path, save_all=True, append_images=rest, duration=durations, loop=0, optimize=True
         )
