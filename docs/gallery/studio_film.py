@@ -22,7 +22,7 @@ from playwright.sync_api import Page, ViewportSize, sync_playwright
 
 import orbiflow
 from studio_pictures import IMAGES, PATIENCE, TALL, keep, make_pictures
-from studio_screen import EYE, NOSE, Film, centre, in_window, outline_in_window
+from studio_screen import BACK, EYE, Film, centre, in_window, outline_in_window
 
 ANIMAL = Path(orbiflow.__file__).parent / "studio" / "animals" / "turtle.png"
 FILMED: ViewportSize = {"width": 1080, "height": 675}
@@ -106,11 +106,11 @@ def pull_point(film: Film) -> None:
     film.rest(500)
     film.click(*centre(page, ".closeup-side label:has-text('Pull')"))
     page.wait_for_selector("[data-ready=pull]")
-    x, y = outline_in_window(page, NOSE)
+    x, y = outline_in_window(page, BACK)
     film.go(x, y, frames=6)
     page.mouse.down()
     film.pressed = True
-    for aside, up, frames in ((-26, 8, 9), (4, 30, 10)):
+    for aside, up, frames in ((14, 30, 10), (-20, 22, 9)):
         film.go(x + aside, y - up, frames=frames)
     while page.locator(".badge[data-kind=crossed]").count():
         film.go(0.7 * film.pointer[0] + 0.3 * x, 0.7 * film.pointer[1] + 0.3 * y, frames=2)

@@ -8,7 +8,7 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import Browser, Page, ViewportSize
 
-from studio_screen import EYE, NOSE, in_window, outline_in_window
+from studio_screen import BACK, EYE, in_window, outline_in_window
 
 IMAGES = Path(__file__).parents[1] / "images"
 WIDE: ViewportSize = {"width": 1280, "height": 860}
@@ -17,6 +17,9 @@ PHONE: ViewportSize = {"width": 390, "height": 844}
 PATIENCE = 600_000  # milliseconds for a search on a busy machine
 HEAD = ((0.09, 0.11), (0.13, 0.18), (0.18, 0.26))
 FOOT = ((0.5, 0.83), (0.53, 0.88), (0.51, 0.93))
+STRIPES = [
+    ((x, x / 3 + 68), (x + 12, x / 2 + 82)) for x in (130.0, 175.0, 220.0, 265.0)
+]  # of a shell
 MARGIN = 24
 DRAWN = """async (own) =>
     (await (await fetch(`/api/projects/${own}`)).json()).view.drawing?.eyes.length"""
@@ -69,10 +72,10 @@ def close_up(page: Page, path: str) -> None:
     page.get_by_label("Show the symmetry").uncheck()
     page.locator(".closeup-side label:has-text('Pull')").first.click()
     page.wait_for_selector("[data-ready=pull]")
-    x, y = outline_in_window(page, NOSE)
+    x, y = outline_in_window(page, BACK)
     page.mouse.move(x, y)
     page.mouse.down()
-    page.mouse.move(x - 18, y - 28, steps=8)
+    page.mouse.move(x + 12, y - 46, steps=8)
     page.wait_for_timeout(600)
     keep(page, "pull")
     page.keyboard.press("Escape")
@@ -89,11 +92,12 @@ def draw(page: Page, path: str) -> None:
         page.locator(".closeup-side label:has-text('Eye')").first.click()
         page.mouse.click(x, y)
     page.locator(".closeup-side label:has-text('Pencil')").first.click()
-    page.get_by_role("radio", name="White").check()
-    for k in range(4):  # stripes along the back
-        page.mouse.move(x - 60 - 22 * k, y + 40 + 24 * k)
-        page.mouse.down()
-        page.mouse.move(x - 35 - 22 * k, y + 62 + 24 * k, steps=6)
+    page.get_by_role("radio", name="Yellow").check()
+    for stripe in STRIPES:
+        for k, place in enumerate(stripe):
+            page.mouse.move(*in_window(page, place), steps=8)
+            if k == 0:
+                page.mouse.down()
         page.mouse.up()
     page.mouse.move(5, 5)
     page.wait_for_timeout(900)

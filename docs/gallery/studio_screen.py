@@ -9,8 +9,8 @@ from typing import Any
 from PIL import Image, ImageChops, ImageDraw
 from playwright.sync_api import Page
 
-EYE, NOSE = (57.0, 54.0), (33.0, 27.0)  # of the turtle, in pixels of its picture
-COLOURS = 128
+EYE, BACK = (57.0, 54.0), (210.0, 85.0)  # of the turtle, in pixels of its picture
+COLOURS = 224
 POINTER = ((0, 0), (0, 21), (5, 16), (9, 25), (13, 23), (9, 15), (16, 15))
 VIEW = """async ([tile, place, across]) => {
     const { Camera, Tiling } = await import("/js/tiling.js");
