@@ -110,7 +110,7 @@ def pull_point(film: Film) -> None:
     film.go(x, y, frames=6)
     page.mouse.down()
     film.pressed = True
-    for aside, up, frames in ((14, 30, 10), (-20, 22, 9)):
+    for aside, up, frames in ((12, 22, 10), (-16, 20, 9)):
         film.go(x + aside, y - up, frames=frames)
     while page.locator(".badge[data-kind=crossed]").count():
         film.go(0.7 * film.pointer[0] + 0.3 * x, 0.7 * film.pointer[1] + 0.3 * y, frames=2)

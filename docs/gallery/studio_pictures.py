@@ -75,7 +75,7 @@ def close_up(page: Page, path: str) -> None:
     x, y = outline_in_window(page, BACK)
     page.mouse.move(x, y)
     page.mouse.down()
-    page.mouse.move(x + 12, y - 46, steps=8)
+    page.mouse.move(x + 8, y - 28, steps=8)
     page.wait_for_timeout(600)
     keep(page, "pull")
     page.keyboard.press("Escape")

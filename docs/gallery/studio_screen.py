@@ -9,7 +9,7 @@ from typing import Any
 from PIL import Image, ImageChops, ImageDraw
 from playwright.sync_api import Page
 
-EYE, BACK = (57.0, 54.0), (210.0, 85.0)  # of the turtle, in pixels of its picture
+EYE, BACK = (57.0, 54.0), (140.0, 90.0)  # of the turtle, in pixels of its picture
 COLOURS = 224
 POINTER = ((0, 0), (0, 21), (5, 16), (9, 25), (13, 23), (9, 15), (16, 15))
 VIEW = """async ([tile, place, across]) => {
