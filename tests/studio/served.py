@@ -56,12 +56,13 @@ class ByHand:
 
     def __init__(self, number: int) -> None:
         self.pid, self.call, self.log = 0, None, list[str]()
-        self.number = number
+        self.number, self._begun = number, threading.Event()
         self._said: queue.Queue[Event | None] = queue.Queue()
 
     def begin(self, call: Call) -> None:
         self.call = call
         self.log.append("begin")
+        self._begun.set()
 
     def say(self, event: Event | None) -> None:
         self._said.put(event)
@@ -73,7 +74,7 @@ class ByHand:
 
     @property
     def task(self) -> int:
-        assert self.call is not None
+        self._begun.wait()
         return cast(Call, self.call).arguments["task"]
 
     def events(self) -> Iterator[Event]:
@@ -84,6 +85,7 @@ class ByHand:
         return 0
 
     def pause(self) -> bool:
+        self._begun.wait()
         self.log.append("pause")
         return True
 
@@ -92,6 +94,7 @@ class ByHand:
         return True
 
     def kill(self) -> None:
+        self._begun.wait()
         self.log.append("kill")
         self.say(None)
 

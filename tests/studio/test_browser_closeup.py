@@ -163,6 +163,14 @@ def test_lines_and_eyes_repeat_and_are_in_the_file(
     assert picture(page) != before
     text = taken_away(studio, searched, tile["id"], drawing=True)
     assert "#c8322b" in text
+    # by keyboard: down, three steps, up
+    choose(page, "Draw")
+    page.get_by_role("radio", name="Pencil").check()
+    page.locator(CANVAS).focus()
+    for key in ("Space", "ArrowRight", "ArrowDown", "ArrowRight", "Space"):
+        page.keyboard.press(key)
+    count = len(drawn["strokes"])
+    studio.until(lambda: len(studio.project(searched)["view"]["drawing"]["strokes"]) > count)
     page.keyboard.press("Control+z")
     page.keyboard.press("Control+z")
     studio.until(lambda: not studio.project(searched)["view"]["drawing"]["eyes"])

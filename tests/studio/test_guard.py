@@ -41,7 +41,15 @@ def test_the_own_host_is_answered(client: Client, host: str) -> None:
     assert client.get("/api/projects", headers={"Host": host}).status_code == 200
 
 
-@pytest.mark.parametrize("origin", ["http://evil.example", "http://127.0.0.1:9000", "null"])
+OTHERS = ["http://evil.example", "http://127.0.0.1:9000", "http://127.0.0.1:84370", "null", ""]
+
+
+def test_the_own_page_is_answered(client: Client) -> None:
+    own = {"Origin": "http://127.0.0.1:8437"}
+    assert client.post("/api/projects", json={}, headers=own).status_code == 200
+
+
+@pytest.mark.parametrize("origin", OTHERS)
 @pytest.mark.parametrize("method", ["GET", "POST"])
 def test_another_origin_is_refused(client: Client, origin: str, method: str) -> None:
     answer = client.request(method, "/api/projects", headers={"Origin": origin})

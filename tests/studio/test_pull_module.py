@@ -63,14 +63,14 @@ def run_in_node(program: str, given: Any) -> Any:
     return json.loads(done.stdout)
 
 
-CASES = [(name, lattice) for name in ("IH1", "IH4", "IH6", "IH21") for lattice in (True, False)]
+CASES = [(name, lattice) for name in ("IH1", "IH4", "IH6", "IH21", "IH26") for lattice in (True, False)]
 
 
 @pytest.fixture(scope="module", name="told")
 def told_fixture() -> dict[str, Any]:
     """For some classes what a pull with and one without the lattice gave."""
     found = {}
-    for name in ("IH1", "IH4", "IH6", "IH21"):
+    for name in ("IH1", "IH4", "IH6", "IH21", "IH26"):
         tile = EscherTile(bent_tile(name, 30.0))
         space = space_json(tile)
         pulls = [
@@ -89,7 +89,7 @@ def ring_of(answer: dict[str, Any]) -> Array:
     return np.array(answer["polygon"]).reshape(-1, 2)
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH4", "IH6", "IH21"])
+@pytest.mark.parametrize("name", ["IH1", "IH4", "IH6", "IH21", "IH26"])
 def test_it_starts_as_the_tile_is(told, name: str) -> None:
     space, start = told[name]["space"], told[name]["start"]
     assert np.abs(ring_of(start) - space["polygon"]).max() < 1e-9

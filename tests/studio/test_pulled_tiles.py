@@ -103,7 +103,8 @@ def test_the_map_goes_where_its_outline_went(name: str, y_down: bool, tmp_path: 
 def test_not_pulled_is_the_same_tile_and_map() -> None:
     tile = squirrel("IH4")
     found = pulled(tile, variations(tile).start)
-    assert tile.bending is not None and tile.frame is not None
+    assert tile.bending is not None
+    assert tile.frame is not None
     inside = tile.frame.to_input(tile.bending.images[tile.bending.triangles].mean(axis=1))
     assert np.abs(found.inverse(inside) - tile.inverse(inside)).max() < 1e-9
 
@@ -113,7 +114,7 @@ def test_refusals_are_plain() -> None:
     start = variations(tile).start
     crossed = start.copy()
     crossed[:2] += 3 * tile.tile.radius
-    with pytest.raises(CertificationError, match="outline crosses itself there.*pull it less far"):
+    with pytest.raises(CertificationError, match=r"outline crosses itself there.*pull it less far"):
         pulled(tile, crossed)
     for size in (0.0, 0.1, 9.0):
         with pytest.raises(CertificationError, match=r"much too small or too large"):
@@ -151,7 +152,8 @@ def test_the_view_says_where_the_silhouette_went() -> None:
     assert shapely.distance(shapely.points(track), line).max() < 1e-9
     assert told["covered"] == [[0.0, 0.0], [200.0, 160.0]]
     bare = tile_view({}, EscherTile(tile.tile))
-    assert bare["map"] is None and bare["silhouette_track"] == tile.tile.polygon.tolist()
+    assert bare["map"] is None
+    assert bare["silhouette_track"] == tile.tile.polygon.tolist()
 
 
 def line_across(tile: EscherTile, colour: str = "#d02030") -> dict:

@@ -118,6 +118,17 @@ def test_reading_can_be_set_and_a_new_picture_begins_anew(client: Client) -> Non
     assert client.post(f"{address}/animal", json={"name": "../x"}).status_code == 404
 
 
+def test_a_new_picture_ends_the_search_of_the_old_one(tmp_path: Path) -> None:
+    with studio(tmp_path) as client:
+        client.studio.queue.slots["long"] = 0  # it waits
+        address = new_project(client)
+        done(client, client.put(f"{address}/input?name=a.json", content=SQUARE))
+        client.post(f"{address}/tasks", json={"operation": "search"})
+        done(client, client.post(f"{address}/animal", json={"name": "bat"}))
+        states = {t["operation"]: t["state"] for t in client.get(address).json()["tasks"]}
+        assert states == {"read": "done", "search": "cancelled"}
+
+
 def test_a_picture_without_a_shape_says_what_to_do(client: Client) -> None:
     address = new_project(client)
     blank = painted(Image.new("L", (50, 50), 255))

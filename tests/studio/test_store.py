@@ -7,6 +7,7 @@ import json
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,11 +18,11 @@ from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Failed, Finished, ItemDone, Note, Progress
-from orbiflow.studio import Store
+from orbiflow.studio import Store, WorkQueue
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.store import Missing
 from orbiflow.studio.words import shown_project
-from studio.served import Bench, join_tasks
+from studio.served import Bench, ByHand, join_tasks
 
 
 @pytest.fixture
@@ -48,6 +49,34 @@ def test_what_somebody_waits_for_waits_for_no_search(bench: Bench) -> None:
     quick = bench.queue.submit(project, "read", {})
     assert bench.begun == [long[0], quick]
     assert bench.states(*long, quick) == ["running", "waiting", "running"]
+
+
+def test_the_newest_reading_is_the_last_to_end(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, quick=2)
+    project, other = bench.project(), bench.project()
+    tasks = [bench.queue.submit(project, "read", {}) for _ in range(2)]
+    assert bench.states(*tasks) == ["running", "waiting"]  # not side by side
+    bench.queue.replace_waiting(project, "read")
+    tasks.append(bench.queue.submit(project, "read", {}))
+    beside = bench.queue.submit(other, "read", {})
+    assert bench.states(*tasks, beside) == ["running", "cancelled", "waiting", "running"]
+    bench.made[0].finish()
+    assert bench.states(*tasks) == ["done", "cancelled", "running"]
+    # and the process that has ended one reading does the next
+    assert len(bench.made) == 2
+    bench.made[0].finish()
+    bench.made[1].finish()
+    bench.queue.close()
+    bench.store.close()
+
+
+def test_old_tasks_that_are_not_done_are_listed(bench: Bench) -> None:
+    project = bench.project()
+    search = bench.search(project)
+    for _ in range(120):
+        bench.store.change_task(bench.store.add_task(project, "read", {}, "quick", 9), state="done")
+    listed = [task["id"] for task in bench.store.tasks(project)]
+    assert (len(listed), listed[-1]) == (101, search)
 
 
 def test_a_task_that_is_held_lets_others_go_on(bench: Bench) -> None:
@@ -79,6 +108,33 @@ def test_only_a_few_processes_are_kept_in_memory(bench: Bench) -> None:
     ]
     bench.queue.resume(tasks[0])  # begins anew, with the tiles that it has
     assert bench.begun == [*tasks, tasks[0]]
+
+
+def test_tasks_begin_with_processes_that_are_ready(tmp_path: Path) -> None:
+    store, made, ready = Store(tmp_path), list[ByHand](), threading.Semaphore(0)
+
+    def spawn() -> Any:
+        ready.acquire()  # a process that takes its time to start
+        made.append(ByHand(len(made)))
+        return made[-1]
+
+    queue = WorkQueue(store, slots={"long": 3, "quick": 1}, spares=1, spawn=spawn)
+    queue.start()
+    project = store.create("tile", "a project", 9)
+    tasks = [queue.submit(project, "search", {}) for _ in range(2)]
+    states = [store.task(task)["state"] for task in tasks]
+    assert states == ["waiting", "waiting"]  # and who submitted did not wait
+    for _ in range(3):
+        ready.release()
+    while len(made) < 3 or len(queue._running) < 2:  # pyright: ignore[reportPrivateUsage]
+        pass
+    assert [process.task for process in made[:2]] == tasks
+    ready.release()
+    made[2].begin(made[0].call)  # pyright: ignore[reportArgumentType] - the spare, so that it ends
+    queue.close()
+    join_tasks()
+    join_tasks("processes")
+    store.close()
 
 
 def test_cancelling(bench: Bench) -> None:
@@ -166,6 +222,7 @@ def test_the_next_server_goes_on(tmp_path: Path) -> None:
 
 SERVER = """
 import sys
+import threading
 from pathlib import Path
 from studio.served import Bench
 from orbiflow.runtime import Progress

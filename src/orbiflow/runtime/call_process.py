@@ -149,9 +149,9 @@ class CallProcess:
         """Send its group a signal; return whether there are groups and signals."""
         if os.name != "posix":
             return False
-        with self._lock, suppress(OSError):
-            # once it was waited for, its number may be another's
-            if self._process.returncode is None:
+        with suppress(OSError):
+            # once it has ended, its number may be another's
+            if self._process.poll() is None:
                 os.killpg(self._process.pid, signal.Signals[name])
         return True
 

@@ -14,7 +14,6 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 from starlette.exceptions import HTTPException
-from starlette.types import ASGIApp
 
 from orbiflow import __version__
 from orbiflow.drawing import PALETTES
@@ -44,7 +43,7 @@ def create_app(
     *,
     port: int = 8437,
     token: str = "",
-) -> ASGIApp:
+) -> Guard:
     """Return the application as a server runs it, behind its guard.
 
     Args:

@@ -102,6 +102,11 @@ def pulled(tile: EscherTile, parameters: Any) -> EscherTile:
         CertificationError: if the outline crosses itself or has collapsed, in plain words.
     """
     space = variations(tile)
+    if np.shape(parameters) != space.start.shape:
+        raise OrbiflowError(
+            "the parameters of a pulled tile are not of this one, which may have become better "
+            "meanwhile; pull again"
+        )
     given = as_array(parameters, "the parameters of a pulled tile", space.start.shape)
     _check(space, given)
     found = EscherTile(

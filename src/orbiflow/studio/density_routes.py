@@ -109,8 +109,7 @@ def _home(here: Studio, project: str) -> Path:
 
 def _new_table(here: Studio, project: str, file: Path, name: str) -> dict[str, Any]:
     """Forget what was made of an earlier table, and look at this one."""
-    for operation in TASKS:
-        here.queue.replace_waiting(project, operation)
+    here.queue.forget(project, *TASKS)
     home, own = here.store.home(project), here.store.project(project)
     for old in (home / TABLE, *(home / f"table{ending}" for ending in ENDINGS)):
         if old != file:

@@ -96,7 +96,7 @@ class Guard:
         if not self.token and host not in self.hosts:
             raise Refused(421, "this is not the address of the studio; use the one that it printed")
         origin = headers.get("origin")
-        if origin is not None and origin != f"{scope['scheme']}://{host}":
+        if origin is not None and origin.partition("://")[2] != host:
             raise Refused(403, "the request comes from another site's page; open the studio itself")
         if headers.get("sec-fetch-site", "none") not in ("same-origin", "none") and not (
             scope["path"] == "/" and headers.get("sec-fetch-mode") == "navigate"

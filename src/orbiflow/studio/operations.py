@@ -57,9 +57,8 @@ def _serve(
     settings: StudioSettings, folder: Path, token: str, on_event: Sink, cancel: Cancel
 ) -> None:
     """Run the server until it is told to stop."""
-    import uvicorn
-
     from orbiflow.studio.app import create_app
+    from orbiflow.studio.serving import serve
     from orbiflow.studio.store import Store
     from orbiflow.studio.work_queue import WorkQueue
 
@@ -76,16 +75,8 @@ def _serve(
         ) from error
     store = Store(folder)
     app = create_app(store, WorkQueue(store), port=settings.port, token=token)
-    config = uvicorn.Config(
-        app,
-        log_level="warning",
-        server_header=False,
-        timeout_keep_alive=60,
-        timeout_graceful_shutdown=1,
-        limit_concurrency=400,
-    )
     on_event(Note(f"the studio is at {address} and keeps its projects in {folder}; Ctrl-C ends it"))
     if settings.browser:
         threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
     with own, suppress(KeyboardInterrupt):
-        uvicorn.Server(config).run(sockets=[own])
+        serve(app, own)

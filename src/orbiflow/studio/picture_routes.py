@@ -45,7 +45,8 @@ async def animal(request: Request, project: str, here: Here) -> dict[str, Any]:
 
 
 def _new_input(here: Studio, project: str, name: str, file: Path) -> dict[str, Any]:
-    """Forget the picture before, and what was painted over it."""
+    """Forget the picture before, what was painted over it, and the search for its tiles."""
+    here.queue.forget(project, "read", "search")
     home = here.store.home(project)
     for old in [*home.glob("input.*"), *(home / f"{mask}.png" for mask in MASKS)]:
         if old != file:

@@ -247,10 +247,11 @@ class Store:
         return self._row("SELECT * FROM tasks WHERE id = ?", task, what="task")
 
     def tasks(self, project: str) -> list[dict[str, Any]]:
-        """Return the last hundred tasks of a project, newest first."""
-        return self._rows(
-            "SELECT * FROM tasks WHERE project = ? ORDER BY id DESC LIMIT 100", project
-        )
+        """Return the last hundred tasks of a project, and all that are not done, newest first."""
+        query = "SELECT * FROM tasks WHERE project = ? ORDER BY id DESC LIMIT 100"
+        last = self._rows(query, project)
+        older = [task for task in self.undone(project) if last and task["id"] < last[-1]["id"]]
+        return [*last, *reversed(older)]
 
     def undone(self, project: str | None = None) -> list[dict[str, Any]]:
         """Return the tasks, of a project or all, that wait, run or are held, oldest first."""

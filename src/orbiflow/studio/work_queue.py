@@ -66,7 +66,7 @@ class WorkQueue:
     Args:
         store: Where tasks are kept.
         slots: The number of tasks of each lane that run at a time.
-        spares: The number of processes that are started ahead.
+        spares: The number of processes that are started ahead; with 0, each when it is needed.
         spawn: A function that starts one.
     """
 
@@ -85,11 +85,13 @@ class WorkQueue:
         self._calls: Counter[CallProcess] = Counter()  # that each has done
         self._running: dict[int, CallProcess] = {}
         self._held: dict[int, CallProcess] = {}  # in the order in which they were paused
-        self._lanes: dict[int, tuple[str, str]] = {}  # project and lane of what runs
+        # project, lane and operation of what runs
+        self._lanes: dict[int, tuple[str, str, str]] = {}
         self._turns: dict[str, int] = {}  # when each project was served last
         self._turn = 0
         self._lock = threading.RLock()
         self._closed = False
+        self._wanted = threading.Event()  # a look at whether more processes should be ready
 
     def start(self) -> None:
         """Begin, with the tasks that were not done when the last server ended."""
@@ -99,6 +101,7 @@ class WorkQueue:
                     os.killpg(task["pid"], signal.SIGCONT)
             if task["state"] == "running":
                 self.store.change_task(task["id"], state="waiting", pid=None)
+        threading.Thread(target=self._keep_ready, daemon=True, name="processes").start()
         self._schedule()
 
     def close(self) -> None:
@@ -107,6 +110,7 @@ class WorkQueue:
             self._closed = True
             alive = [*self._running.values(), *self._held.values(), *self._spares]
             self._spares.clear()
+        self._wanted.set()
         for process in alive:
             process.kill()
             process.wait()
@@ -126,9 +130,9 @@ class WorkQueue:
         return task
 
     def replace_waiting(self, project: str, operation: str) -> None:
-        """Drop the tasks of a kind that a newer one makes useless."""
+        """Drop the tasks of a kind that wait, and that a newer one makes useless."""
         for task in self.store.undone(project):
-            if task["operation"] == operation:
+            if task["operation"] == operation and task["state"] == "waiting":
                 self.cancel(task["id"])
 
     def pause(self, task: int) -> None:
@@ -167,36 +171,60 @@ class WorkQueue:
             process.kill()
         self._schedule()
 
-    def forget(self, project: str) -> None:
-        """End all tasks of a project."""
+    def forget(self, project: str, *operations: str) -> None:
+        """End the tasks of a project: of some kinds, or all."""
         for task in self.store.undone(project):
-            self.cancel(task["id"])
+            if not operations or task["operation"] in operations:
+                self.cancel(task["id"])
 
     def _schedule(self) -> None:
-        """Start what can be started."""
+        """Start what can be started. Nobody waits here for a process to start."""
         with self._lock:
-            try:
-                while not self._closed and (task := self._next()) is not None:
-                    self._begin(task)
-                while not self._closed and len(self._spares) < self._spare_count:
-                    self._spares.append(self._spawn())
-                for process in self._spares[self._spare_count :]:
-                    process.kill()
-                del self._spares[self._spare_count :]
-            except OSError:  # no memory, or too many processes: tried again when something ends
-                log.exception("no process can be started")
+            while not self._closed and (task := self._next()) is not None and self._begin(task):
+                pass
+            for process in self._spares[self._spare_count :]:
+                process.kill()
+            del self._spares[self._spare_count :]
+        self._wanted.set()
+
+    def _keep_ready(self) -> None:
+        """Start processes ahead, in a thread of its own, until the queue is closed."""
+        while not self._closed:
+            self._wanted.wait()
+            self._wanted.clear()
+            while not self._closed and len(self._spares) < self._spare_count:
+                try:
+                    process = self._spawn()
+                except OSError:  # no memory, or too many processes: again when something ends
+                    log.exception("no process can be started")
+                    break
+                with self._lock:
+                    self._spares.append(process)
+                    if self._closed:
+                        process.kill()
+                self._schedule()
+
+    def _ready(self) -> CallProcess | None:
+        """Return a process that waits for a call, if there is one."""
+        self._spares = [spare for spare in self._spares if spare.alive]
+        if self._spares:
+            return self._spares.pop(0)
+        return None if self._spare_count else self._spawn()
 
     def _next(self) -> dict[str, Any] | None:
         """Return the task whose turn it is: of the project that has least, then waited longest."""
         running = [self._lanes[task] for task in self._running]
-        full = Counter(lane for _, lane in running)
-        own = Counter(running)
+        full = Counter(lane for _, lane, _ in running)
+        own = Counter((project, lane) for project, lane, _ in running)
+        read = {project for project, _, operation in running if operation == "read"}
         waiting = [
             task
             for task in self.store.undone()
             if task["state"] == "waiting"
             and task["id"] not in self._running
             and full[task["lane"]] < self.slots[task["lane"]]
+            # an older reading must not end after a newer one
+            and not (task["operation"] == "read" and task["project"] in read)
         ]
 
         def turn(task: dict[str, Any]) -> tuple[int, int, int]:
@@ -205,37 +233,42 @@ class WorkQueue:
 
         return min(waiting, key=turn, default=None)
 
-    def _begin(self, task: dict[str, Any]) -> None:
+    def _begin(self, task: dict[str, Any]) -> bool:
+        """Start a task or let it go on; return False if it must wait for a process."""
         number, project = task["id"], task["project"]
+        held = self._held.pop(number, None)
+        if held is None:
+            try:
+                kind = kind_of_work(task["operation"])
+                call = kind.call(self.store.home(project), number, task["settings"])
+            except OrbiflowError as error:
+                self.store.change_task(number, state="failed", error=str(error))
+                return True
+            if (process := self._ready()) is None:
+                return False
+            self._start(number, project, process, call)
+        else:
+            self._running[number] = held
+            self.store.change_task(number, state="running")
+            held.resume()
         self._turn += 1
         self._turns[project] = self._turn
-        self._lanes[number] = project, task["lane"]
-        if (process := self._held.pop(number, None)) is not None:
-            self._running[number] = process
-            self.store.change_task(number, state="running")
-            process.resume()
-            return
-        try:
-            kind = kind_of_work(task["operation"])
-            call = kind.call(self.store.home(project), number, task["settings"])
-        except OrbiflowError as error:
-            self.store.change_task(number, state="failed", error=str(error))
-            return
-        self._run(number, project, call)
+        self._lanes[number] = project, task["lane"], task["operation"]
+        return True
 
-    def _run(self, number: int, project: str, call: Call) -> None:
-        self._spares = [spare for spare in self._spares if spare.alive]
-        process = self._spares.pop(0) if self._spares else self._spawn()
-        process.begin(call)
+    def _start(self, number: int, project: str, process: CallProcess, call: Call) -> None:
         self._running[number] = process
         self.store.change_task(number, state="running", pid=process.pid, share=0.0)
-        reader = threading.Thread(
-            target=self._follow, args=(number, project, process), daemon=True, name=f"task {number}"
-        )
-        reader.start()
+        threading.Thread(
+            target=self._follow,
+            args=(number, project, process, call),
+            daemon=True,
+            name=f"task {number}",
+        ).start()
 
-    def _follow(self, number: int, project: str, process: CallProcess) -> None:
-        """Record what a process tells, to its end."""
+    def _follow(self, number: int, project: str, process: CallProcess, call: Call) -> None:
+        """Give a process its call and record what it tells, to its end."""
+        process.begin(call)  # which waits until the process reads it
         told = _Told(self.store, project, number)
         ending: Event | None = None
         for event in process.events():
@@ -253,7 +286,7 @@ class WorkQueue:
 
     def _let_go(self, number: int, process: CallProcess) -> None:
         """Keep the process of a task that has ended for another quick one, or end it."""
-        _, lane = self._lanes.pop(number)
+        _, lane, _ = self._lanes.pop(number)
         for processes in (self._running, self._held):
             processes.pop(number, None)
         self._calls[process] += 1

@@ -201,15 +201,14 @@ def carried_on(bending: Bending, before: Array, after: Array) -> Bending:
     images = bending.images[order]
     old, new = (p[:: -1 if signed_area(before) < 0 else 1] for p in (before, after))
     # both run along the same curve, from a point that they share
-    offset, start = np.unravel_index(
-        cdist(images[: mesh.size], old).argmin(), (mesh.size, len(old))
-    )
+    offset, start = divmod(int(cdist(images[: mesh.size], old).argmin()), len(old))
     old, new = np.roll(old, -start, axis=0), np.roll(new, -start, axis=0)
     knots = arc_lengths(np.roll(images[: mesh.size], -offset, axis=0))
-    places = arc_lengths(old) * (knots[-1] / arc_lengths(old)[-1])
-    at: Array = np.interp(places[:-1], knots, np.arange(len(knots))) + offset
+    places: Array = arc_lengths(old) * (knots[-1] / arc_lengths(old)[-1])
+    numbers = np.arange(len(knots))
+    at = offset + np.interp(places[:-1], knots, numbers)
     mesh, images = divided(mesh, _unknown(mesh, at), images)
-    along = np.interp((shares(mesh) - offset) % mesh.size, np.arange(len(knots)), knots)
+    along = np.interp((shares(mesh) - offset) % mesh.size, numbers, knots)
     steps = [np.interp(along, places, np.append(step, step[0])) for step in (new - old).T]
     images = images + harmonic(mesh, np.stack(steps, axis=-1))
     return Bending(mesh.points, unfolded(mesh, images), mesh.triangles)

@@ -136,25 +136,32 @@ export function confirmed(title, text, verb) {
   ].reduce((box, part) => { box.append(part); return box; }, h("div", { class: "stack" })));
 }
 
-/** A function that does `work` for its newest argument only, when calls have paused for `ms`. */
+/**
+ * A function that does `work` for its newest arguments only, when calls have paused for `ms`;
+ * `.done()` does at once what waits, and resolves when all is done.
+ */
 export function newest(work, ms = 250) {
   let timer = 0;
-  let running = false;
+  let running = null;
   let waiting = null;
   const go = async () => {
-    if (running || !waiting) return;
-    const given = waiting;
-    waiting = null;
-    running = true;
-    await trying(() => work(...given));
-    running = false;
-    go();
+    clearTimeout(timer);
+    while (running || waiting) {
+      if (!running) {
+        const given = waiting;
+        waiting = null;
+        running = trying(() => work(...given)).then(() => { running = null; });
+      }
+      await running;
+    }
   };
-  return (...given) => {
+  const made = (...given) => {
     waiting = given;
     clearTimeout(timer);
     timer = setTimeout(go, ms);
   };
+  made.done = go;
+  return made;
 }
 
 const sheets = new Map();

@@ -39,7 +39,7 @@ function control(name, schema, words, changed) {
   const numeric = bare && found.length === 1;
   const start = text(schema.default);
   const box = h("input", {
-    ...shared, type: numeric ? "number" : "text", value: start, placeholder: start === "" ? schema["x-default"] : undefined,
+    ...shared, type: numeric ? "number" : "text", value: start, placeholder: start === "" ? schema["x-default"] : start,
     min: numeric ? bare.minimum ?? bare.exclusiveMinimum : undefined, max: numeric ? bare.maximum : undefined,
     step: !numeric ? undefined : bare.type === "integer" ? 1 : "any", autocomplete: "off", inputmode: bare ? "decimal" : undefined,
   });
@@ -56,7 +56,8 @@ function control(name, schema, words, changed) {
  * A form: the settings named in `first` on top, the rest folded away in their groups.
  * `words`: titles and the like by setting; `not` in them: values of others with which it does not apply.
  * `hidden`: settings that the page sets itself. `start`: values to begin with.
- * `.values()`: what differs from the defaults and applies.
+ * `.values()`: what differs from the defaults and applies. `.refuse(text)`: show what is wrong beside the
+ * setting that the text begins with; false if it names none.
  */
 export function form(schema, { first, words = {}, hidden = [], start = {} }, changed = () => {}) {
   const controls = new Map();
@@ -88,6 +89,19 @@ export function form(schema, { first, words = {}, hidden = [], start = {} }, cha
   made.values = () => {
     const shown = names.filter((name) => !controls.get(name).root.hidden);
     return Object.fromEntries(shown.map((name) => [name, controls.get(name).value()]).filter(([, value]) => value !== undefined));
+  };
+  made.refuse = (text) => {
+    const name = names.filter((own) => text.toLowerCase().startsWith(own.replaceAll("_", " "))).sort((a, b) => b.length - a.length)[0];
+    if (!name) return false;
+    const { root, box } = controls.get(name);
+    const said = h("p", { class: "error small", role: "alert" }, text);
+    root.querySelector(".error")?.remove();
+    root.append(said);
+    root.closest("details")?.setAttribute("open", "");
+    box.setAttribute("aria-invalid", "true");
+    box.addEventListener("input", () => { said.remove(); box.removeAttribute("aria-invalid"); }, { once: true });
+    box.focus();
+    return true;
   };
   fit();
   return made;

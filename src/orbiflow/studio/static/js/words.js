@@ -35,8 +35,13 @@ export const starWords = (stars) => (stars ? `${stars} of 5 stars` : "not rated 
 
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
-/** What the server says, as a sentence. */
-export const sentence = (text) => (text ? `${capital(text)}${/[.!?…]$/.test(text) ? "" : "."}` : "");
+/** What the server says, as a sentence: names of settings become words, names of files stay. */
+export function sentence(text) {
+  if (!text) return "";
+  const plain = text.replace(/\b[a-z]+(_[a-z]+)+\b(?!\.)/g, (name) => name.replaceAll("_", " "));
+  const begun = /^[a-z]+[ ,:]/.test(plain) ? capital(plain) : plain;
+  return /[.!?…]$/.test(begun) ? begun : `${begun}.`;
+}
 
 /** How long ago a moment was. Moments: ISO texts, or seconds since 1970. */
 export function ago(moment) {

@@ -1,5 +1,12 @@
 /** Lines that were drawn: made simple, rubbed out. No page is needed here. */
 
+/** Where on a side from a to b, 0 to 1, a point is nearest, and how far away. */
+export function beside([x, y], a, b) {
+  const [u, v] = [b[0] - a[0], b[1] - a[1]];
+  const share = Math.max(0, Math.min(1, ((x - a[0]) * u + (y - a[1]) * v) / (u * u + v * v || 1)));
+  return { share, apart: Math.hypot(a[0] + share * u - x, a[1] + share * v - y) };
+}
+
 /** A line through fewer points, nowhere farther than `near` from the one given, no side above `longest`. */
 export function simplified(points, near, longest) {
   if (points.length < 3) return points;
@@ -13,10 +20,8 @@ export function simplified(points, near, longest) {
     const length = Math.hypot(b[0] - a[0], b[1] - a[1]);
     let [far, at] = [near, -1];
     for (let k = from + 1; k < to; k += 1) {
-      const [u, v] = [points[k][0] - a[0], points[k][1] - a[1]];
-      const along = length ? Math.max(0, Math.min(1, (u * (b[0] - a[0]) + v * (b[1] - a[1])) / length ** 2)) : 0;
-      const off = Math.hypot(u - along * (b[0] - a[0]), v - along * (b[1] - a[1]));
-      if (off > far) [far, at] = [off, k];
+      const { apart } = beside(points[k], a, b);
+      if (apart > far) [far, at] = [apart, k];
     }
     if (at < 0 && length > longest && to > from + 1) at = (from + to) >> 1;
     if (at > 0) {
@@ -28,13 +33,9 @@ export function simplified(points, near, longest) {
 }
 
 /** The parts of a line that are left when a rubber of this radius was at a place; null if all is. */
-export function rubbed(points, [x, y], radius) {
-  const away = ([u, v]) => Math.hypot(u - x, v - y) > radius;
-  const near = (a, b) => {
-    const [u, v] = [b[0] - a[0], b[1] - a[1]];
-    const along = Math.max(0, Math.min(1, ((x - a[0]) * u + (y - a[1]) * v) / (u * u + v * v || 1)));
-    return !away([a[0] + along * u, a[1] + along * v]);
-  };
+export function rubbed(points, place, radius) {
+  const away = ([x, y]) => Math.hypot(x - place[0], y - place[1]) > radius;
+  const near = (a, b) => beside(place, a, b).apart <= radius;
   if (points.every(away) && !points.some((p, k) => k > 0 && near(points[k - 1], p))) return null;
   const parts = [[]];
   points.forEach((point, k) => {

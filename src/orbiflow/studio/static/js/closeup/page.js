@@ -1,5 +1,6 @@
 /** The close-up of one tile: look, pull, draw. */
 
+import { client } from "../api.js";
 import { button, choice, h, newest, put, style, toast, trying } from "../dom.js";
 import { Carry } from "./carry.js";
 import { LiveTiling } from "./live.js";
@@ -28,7 +29,7 @@ class Closeup {
     Object.assign(this, { root, api, events, project, navigate, about });
     this.home = `projects/${project.id}`;
     const kept = project.view?.closeup ?? {};
-    this.look = { palette: about.palettes[0].name, custom: null, line: 1.4, art: false, signs: false, ...kept.look, share: 1 };
+    this.look = { palette: project.view?.search?.palette ?? about.palettes[0].name, custom: null, line: 1.4, art: false, signs: false, ...kept.look, share: 1 };
     this.pull = { reach: 0.5, lattice: true, ...kept.pull };
     this.penSettings = { tool: "pencil", colour: "#1b1b1b", width: "medium", ...kept.pen };
     this.mode = kept.mode ?? "look";
@@ -38,14 +39,14 @@ class Closeup {
     this.keep = newest(() => api.patch(this.home, { view: { closeup: { look: { ...this.look, share: 1 }, pull: this.pull, pen: this.penSettings, mode: this.mode } } }), 600);
     this.keepDrawing = newest((drawing) => api.patch(this.home, { view: { drawing } }), 500);
     this.#build();
-    this.off = events.on("card", (card) => this.#better(card));
+    this.offs = [events.on("card", (card) => this.#better(card)), events.on("project", (now) => this.#elsewhere(now))];
     this.keys = (event) => this.#shortcut(event);
     addEventListener("keydown", this.keys);
   }
 
   close() {
     removeEventListener("keydown", this.keys);
-    this.off();
+    this.offs.forEach((off) => off());
     this.stage.close();
     this.closed = true;
   }
@@ -59,6 +60,11 @@ class Closeup {
     }
     await trying(() => this.open(card.id));
     toast("The search has made this tile better.");
+  }
+
+  /** Another tab has drawn. */
+  #elsewhere({ view, changed_by: by }) {
+    if (by !== client && view?.drawing && this.carry && !this.pen.line) this.pen.use(this.carry, view.drawing);
   }
 
   #build() {
@@ -101,6 +107,9 @@ class Closeup {
   async open(id, { quiet = false } = {}) {
     const view = await this.api.get(`${this.home}/tiles/${id}`);
     if (this.closed) return;
+    const drawing = this.view ? this.pen.drawing : this.project.view?.drawing;
+    if ((this.past.at ??= id) !== id && !quiet) Object.assign(this.past, { done: [], undone: [] });
+    this.past.at = id;
     this.view = view;
     this.carry = new Carry(view.map);
     this.tiling = new LiveTiling(view);
@@ -110,10 +119,10 @@ class Closeup {
     this.pulling.use(null);
     this.stage.show(this.tiling);
     this.#palette();
-    this.pen.use(this.carry, this.project.view?.drawing);
+    this.pen.use(this.carry, drawing);
     this.heading.textContent = view.arrangement ? sentence(view.arrangement) : "Close up";
     this.kind.textContent = [view.class_name, view.group.name].filter(Boolean).join(" · ");
-    this.tell("proved", "Proved to tile");
+    this.#proved();
     this.#panels();
     this.#past();
     if (quiet) this.navigate(`p/${this.project.id}/t/${id}`, { quiet: true });
@@ -144,6 +153,7 @@ class Closeup {
   #choose(mode) {
     this.mode = mode;
     this.stage.canvas.style.cursor = "";
+    if (this.badge.dataset.kind === "refused") this.#proved();
     if (mode !== "look" && this.look.share < 1) this.#change({ share: 1 });
     this.#panels();
     if (mode === "pull") this.#ready();
@@ -261,13 +271,17 @@ class Closeup {
     this.badge.textContent = text;
   }
 
+  #proved() {
+    this.tell("proved", "Proved to tile");
+  }
+
   #pulledTo({ crossed, body }) {
     this.pen.ride(this.pulling.puller, body, this.space);
     if (this.pulling.hand) {
       if (crossed) this.tell("crossed", "The outline crosses itself here");
       else this.tell("moving", "Let go to check it");
     }
-    if (!body && this.badge.dataset.kind !== "refused") this.tell("proved", "Proved to tile");
+    if (!body && this.badge.dataset.kind !== "refused") this.#proved();
     if (!body) this.stale();
     if (!body && this.later) {
       this.later();
@@ -295,7 +309,7 @@ class Closeup {
 
   #restore() {
     this.pulling.back();
-    if (this.badge.dataset.kind === "refused") this.tell("proved", "Proved to tile");
+    if (this.badge.dataset.kind === "refused") this.#proved();
     const first = this.past.done.find((step) => step.tile);
     if (first && first.tile[0] !== this.view.id) {
       this.#did({ tile: [this.view.id, first.tile[0]] });

@@ -2,7 +2,7 @@
 
 import { inverse, moved } from "../tiling.js";
 import { eyeInto, lineInto } from "./skin.js";
-import { rubbed, short, simplified } from "./lines.js";
+import { beside, rubbed, short, simplified } from "./lines.js";
 import { Riders } from "./carry.js";
 
 export const WIDTHS = { thin: 0.008, medium: 0.018, thick: 0.04 }; // in sizes of the tile
@@ -51,14 +51,9 @@ export class Pen {
   }
 
   /** The distance of a point of the tile from its outline. */
-  #room([x, y]) {
+  #room(at) {
     const ring = this.stage.tiling.polygon;
-    return ring.reduce((least, a, k) => {
-      const b = ring[(k + 1) % ring.length];
-      const [u, v] = [b[0] - a[0], b[1] - a[1]];
-      const along = Math.max(0, Math.min(1, ((x - a[0]) * u + (y - a[1]) * v) / (u * u + v * v || 1)));
-      return Math.min(least, Math.hypot(a[0] + along * u - x, a[1] + along * v - y));
-    }, Infinity);
+    return Math.min(...ring.map((a, k) => beside(at, a, ring[(k + 1) % ring.length]).apart));
   }
 
   down(place) {

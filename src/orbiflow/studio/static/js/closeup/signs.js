@@ -1,18 +1,14 @@
 /** The symmetry of a tiling, drawn over it and said in plain sentences. */
 
 import { moved } from "../tiling.js";
+import { beside } from "./lines.js";
 
 const COLOURS = { 2: "#c2410c", 3: "#6d28d9", 4: "#0f766e", 6: "#b91c1c" };
 const LINES = "#b91c1c";
 const NEAREST = 26; // pixels between signs below which they are left out
 const AT_MOST = 1500;
 
-const TURNS = {
-  2: ["Half-turn points", "Turn the whole pattern half way round this point: it looks just the same."],
-  3: ["Third-turn points", "Turn the whole pattern a third of the way round this point: it looks just the same."],
-  4: ["Quarter-turn points", "Turn the whole pattern a quarter of the way round this point: it looks just the same."],
-  6: ["Sixth-turn points", "Turn the whole pattern a sixth of the way round this point: it looks just the same."],
-};
+const TURNS = { 2: ["Half", "half way"], 3: ["Third", "a third of the way"], 4: ["Quarter", "a quarter of the way"], 6: ["Sixth", "a sixth of the way"] };
 
 /** The kinds of symmetry that a tiling has: [{key, name, says, colour}]. */
 export function kindsOf(elements) {
@@ -23,7 +19,15 @@ export function kindsOf(elements) {
     says: "Slide the whole pattern along a side of this box: it looks just the same. One box holds all of the pattern.",
     colour: "currentcolor",
   }];
-  for (const order of orders) kinds.push({ key: `turn${order}`, name: TURNS[order][0], says: TURNS[order][1], colour: COLOURS[order] });
+  for (const order of orders) {
+    const [name, way] = TURNS[order];
+    kinds.push({
+      key: `turn${order}`,
+      name: `${name}-turn points`,
+      says: `Turn the whole pattern ${way} round this point: it looks just the same.`,
+      colour: COLOURS[order],
+    });
+  }
   if (elements.mirrors.length) {
     kinds.push({ key: "mirrors", name: "Mirror lines", says: "What is on one side of this line is the mirror image of the other side.", colour: LINES });
   }
@@ -81,9 +85,7 @@ export function placed(elements, tiling, camera, width, height) {
   const cells = (point) => {
     // the cells whose copy of a point is in view
     const far = reach / 2 + 40;
-    const [x, y] = [width / 2 - point[0], height / 2 - point[1]];
-    const m = (x * steps[1][1] - y * steps[1][0]) / (steps[0][0] * steps[1][1] - steps[0][1] * steps[1][0]);
-    const n = (steps[0][0] * y - steps[0][1] * x) / (steps[0][0] * steps[1][1] - steps[0][1] * steps[1][0]);
+    const [m, n] = inSteps(steps, [width / 2 - point[0], height / 2 - point[1]]);
     const [dm, dn] = [(far * Math.hypot(...steps[1])) / flat, (far * Math.hypot(...steps[0])) / flat];
     return [Math.floor(m - dm), Math.ceil(m + dm), Math.floor(n - dn), Math.ceil(n + dn)];
   };
@@ -120,16 +122,19 @@ export function placed(elements, tiling, camera, width, height) {
       }
     }
   }
-  return { centres, lines: [...lines.values()], cell: cellNear(elements, to, steps, flat, width, height) };
+  return { centres, lines: [...lines.values()], cell: cellNear(elements, to, steps, width, height) };
 }
 
-function cellNear(elements, to, steps, flat, width, height) {
+/** A vector as multiples of the two steps of the lattice. */
+function inSteps([[a, b], [c, d]], [x, y]) {
+  const size = a * d - b * c;
+  return [(x * d - y * c) / size, (a * y - b * x) / size];
+}
+
+function cellNear(elements, to, steps, width, height) {
   const ring = elements.cell.map(to);
   const middle = [0, 1].map((j) => ring.reduce((sum, point) => sum + point[j] / 4, 0));
-  const [x, y] = [width / 2 - middle[0], height / 2 - middle[1]];
-  const size = steps[0][0] * steps[1][1] - steps[0][1] * steps[1][0];
-  const m = Math.round((x * steps[1][1] - y * steps[1][0]) / size);
-  const n = Math.round((steps[0][0] * y - steps[0][1] * x) / size);
+  const [m, n] = inSteps(steps, [width / 2 - middle[0], height / 2 - middle[1]]).map(Math.round);
   return ring.map(([u, v]) => [u + m * steps[0][0] + n * steps[1][0], v + m * steps[0][1] + n * steps[1][1]]);
 }
 
@@ -182,11 +187,5 @@ export function signAt(signs, [x, y]) {
   for (const { key, from, along } of signs.lines) {
     if (Math.abs((x - from[0]) * along[1] - (y - from[1]) * along[0]) < 7) return key;
   }
-  const near = signs.cell.some((a, k) => {
-    const b = signs.cell[(k + 1) % 4];
-    const [u, v] = [b[0] - a[0], b[1] - a[1]];
-    const along = Math.max(0, Math.min(1, ((x - a[0]) * u + (y - a[1]) * v) / (u * u + v * v)));
-    return Math.hypot(a[0] + along * u - x, a[1] + along * v - y) < 7;
-  });
-  return near ? "cell" : null;
+  return signs.cell.some((a, k) => beside([x, y], a, signs.cell[(k + 1) % 4]).apart < 7) ? "cell" : null;
 }

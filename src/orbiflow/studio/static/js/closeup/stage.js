@@ -2,6 +2,7 @@
 
 import { Camera, inverse, moved, sized } from "../tiling.js";
 import { h } from "../dom.js";
+import { beside } from "./lines.js";
 import { paintScene } from "./live.js";
 
 const LEAST_TILE = 26; // pixels of a tile when far away
@@ -183,12 +184,9 @@ export class Stage {
     const ring = this.tiling.polygon;
     const reach = within / this.camera.scale;
     for (const copy of this.copies) {
-      const [x, y] = moved(inverse(copy.matrix), place);
+      const at = moved(inverse(copy.matrix), place);
       ring.forEach((a, vertex) => {
-        const b = ring[(vertex + 1) % ring.length];
-        const [u, v] = [b[0] - a[0], b[1] - a[1]];
-        const share = Math.max(0, Math.min(1, ((x - a[0]) * u + (y - a[1]) * v) / (u * u + v * v || 1)));
-        const apart = Math.hypot(a[0] + share * u - x, a[1] + share * v - y);
+        const { share, apart } = beside(at, a, ring[(vertex + 1) % ring.length]);
         if (apart < (best?.apart ?? reach)) best = { copy, vertex, share, apart };
       });
     }

@@ -6,141 +6,191 @@ import { EFFORTS, EFFORT_TIMES, OBJECTIVES, OBJECTIVE_MEANINGS, STATES, alive, c
 import { cardView } from "./card.js";
 import { reordered } from "./moving.js";
 
-const SEARCHES = ["search", "studio search"];
+const NINE = 9; // classes that are searched for every picture
+const REST = 1500; // ms after the last move of the mouse, for which cards stay where they are
 
-export async function show(root, { api, events, project, navigate, about }) {
+export async function show(root, page) {
+  const { project, navigate } = page;
   if (!project.silhouette && !project.tiles.length) {
     navigate(`p/${project.id}/picture`, { replace: true });
     return () => {};
   }
   await style("search");
-  const place = `projects/${project.id}`;
-  const wanted = { effort: "normal", objective: "likeness", palette: about.palettes[0].name, ...project.view?.search };
-  const keep = newest(() => api.patch(place, { view: { search: wanted } }), 400);
-  const palette = () => about.palettes.find(({ name }) => name === wanted.palette) ?? about.palettes[0];
-  const views = new Map();
-  let due = 0;
-  let later = 0;
+  const own = new SearchPage(page);
+  own.build(root);
+  return () => own.close();
+}
 
-  let touched = -Infinity; // when the mouse last moved over the cards
-  const grid = h("ul", { class: "cards", onpointermove: ({ pointerType }) => { if (pointerType === "mouse") touched = performance.now(); } });
-  const said = h("p", { class: "state-words", role: "status" });
-  const bar = h("progress", { max: 1, "aria-label": "How far the search is" });
-  const deeds = h("div", { class: "row" });
-  const heading = h("h1", { tabindex: "-1" }, "Tiles");
-  const empty = h("div", { class: "lonely stack" });
-
-  const act = (task, deed) => trying(async () => api.post(`tasks/${task.id}/${deed}`));
-  const start = (settings, words) => trying(async () => {
-    await api.post(`${place}/tasks`, { operation: "search", settings });
-    toast(words);
-  });
-  const search = () => start({ effort: wanted.effort, objective: wanted.objective }, "The search begins.");
-  const actions = {
-    more: (card) => start({ effort: wanted.effort, objective: wanted.objective, like: card.id }, `Looking for more like “${card.arrangement}”.`),
-    async remove(card) {
-      if (!(await confirmed("Remove this tile?", "It will be gone for good. A new search may find it again.", "Remove it"))) return;
-      await trying(() => api.remove(`${place}/tiles/${card.id}`));
-      heading.focus();
-    },
-  };
-
-  const task = () => project.tasks.find((own) => SEARCHES.includes(own.operation) && alive(own))
-    ?? project.tasks.find((own) => SEARCHES.includes(own.operation));
-
-  function progress(own) {
-    if (!own) return "Nothing has been searched yet.";
-    if (own.state === "failed") return sentence(own.error);
-    if (own.state === "waiting") return own.place > 0 ? `Waiting: ${number(own.place, "other thing")} to do first.` : "It starts in a moment.";
-    if (own.state === "running") return own.what ? capital(own.what) : "Looking for tiles";
-    if (own.state === "done" && !project.tiles.length) return "No tile was found. Smooth the picture a little, or search more thoroughly.";
-    if (own.state === "done") return `${capital(number(project.tiles.length, "tile"))}, best first. Each one covers the plane: we proved it.`;
-    return `${STATES[own.state]}.`;
+class SearchPage {
+  constructor({ api, events, project, about }) {
+    Object.assign(this, { api, events, project, about });
+    this.place = `projects/${project.id}`;
+    this.wanted = { effort: "normal", objective: "likeness", palette: about.palettes[0].name, ...project.view?.search };
+    this.keep = newest(() => api.patch(this.place, { view: { search: this.wanted } }), 400);
+    this.views = new Map();
+    this.spare = []; // cards that hold a place
+    this.touched = -Infinity; // when the mouse last moved over the cards
+    this.soon = () => {
+      cancelAnimationFrame(this.due);
+      this.due = requestAnimationFrame(() => { this.arrange(); this.tell(); });
+    };
   }
 
-  let drawn = "";
-  function tell() {
-    const own = task();
-    const words = progress(own);
-    if (said.textContent !== words) said.textContent = words;
-    said.classList.toggle("error", own?.state === "failed");
-    bar.hidden = !alive(own);
-    if (own?.state === "waiting") bar.removeAttribute("value");
-    else bar.value = own?.share ?? 0;
-    const key = `${own?.id} ${own?.state}`;
-    if (key !== drawn) {
-      drawn = key;
-      const held = deeds.contains(document.activeElement);
-      put(deeds, buttons(own));
-      if (held) deeds.querySelector("button")?.focus();
-      panel.hidden = alive(own);
-      if (panel.hidden) panel.open = false;
-    }
-    empty.hidden = Boolean(project.tiles.length) || alive(own);
+  build(root) {
+    const moved = ({ pointerType }) => { if (pointerType === "mouse") this.touched = performance.now(); };
+    this.grid = h("ul", { class: "cards", onpointermove: moved });
+    this.said = h("p", { class: "state-words", role: "status" });
+    this.bar = h("progress", { max: 1, "aria-label": "How far the search is" });
+    this.deeds = h("div", { class: "row" });
+    this.heading = h("h1", { tabindex: "-1" }, "Tiles");
+    this.panel = this.wishes();
+    this.empty = h("div", { class: "lonely stack" }, h("p", { class: "soft" }, "No tiles yet."),
+      h("p", {}, h("a", { href: `#/p/${this.project.id}/picture` }, "Back to the picture")));
+    put(root, h("div", { class: "head" }, h("div", { class: "grow" }, this.heading, this.said), this.colours(), this.deeds),
+      this.bar, this.panel, this.empty, this.grid);
+    this.watch = new ResizeObserver(() => this.views.forEach((view) => view.paint(false)));
+    this.watch.observe(this.grid);
+    this.off = ["card", "gone", "refresh", "task"].map((kind) => this.events.on(kind, this.soon));
+    this.arrange();
+    this.tell();
   }
 
-  const buttons = (own) => ({
-    waiting: [button("Stop", () => act(own, "cancel"), { image: "stop" })],
-    running: [button("Pause", () => act(own, "pause"), { image: "pause" }), button("Stop", () => act(own, "cancel"), { image: "stop" })],
-    paused: [button("Go on", () => act(own, "resume"), { kind: "primary", image: "play" }), button("Stop", () => act(own, "cancel"), { image: "stop" })],
-  })[own?.state] ?? [button(own ? "Search again" : "Search", search, { kind: "primary", image: "arrow" })];
-
-  /** Empty cards hold the place of the nine classes until the first tiles are there. */
-  function ghosts() {
-    const { tiles } = project;
-    const missing = alive(task()) && !tiles.some(({ stage }) => stage === "final") ? Math.max(0, 9 - tiles.length) : 0;
-    while (spare.length < missing) spare.push(h("li", { class: "card ghost", "aria-hidden": "true" }, h("div", {})));
-    return spare.slice(0, missing);
+  close() {
+    this.off.forEach((stop) => stop());
+    this.watch.disconnect();
+    cancelAnimationFrame(this.due);
+    clearTimeout(this.later);
   }
-  const spare = [];
 
-  const placeOf = ({ id }) => (views.has(id) ? [...grid.children].indexOf(views.get(id).root) : 1e9);
+  /** How to search: how long, and what counts. */
+  wishes() {
+    const wish = (label, name, options, meanings) => {
+      const meaning = h("p", { class: "soft small" }, meanings[this.wanted[name]]);
+      return h("div", { class: "stack" }, choice(label, options, this.wanted[name], (own) => {
+        this.wanted[name] = own;
+        meaning.textContent = meanings[own] ?? "";
+        this.keep();
+      }), meaning);
+    };
+    return h("details", { class: "panel wishes", open: !this.project.tiles.length },
+      h("summary", {}, "How to search"),
+      h("div", { class: "wish" },
+        wish("How long", "effort", this.about.efforts.map((own) => [own, EFFORTS[own] ?? own]), EFFORT_TIMES),
+        wish("What counts", "objective", Object.entries(OBJECTIVES), OBJECTIVE_MEANINGS)));
+  }
+
+  get palette() {
+    const { palettes } = this.about;
+    return palettes.find(({ name }) => name === this.wanted.palette) ?? palettes[0];
+  }
+
+  /** The choice of colours. */
+  colours() {
+    const dots = h("span", { class: "dots", "aria-hidden": "true" });
+    const show = () => put(dots, this.palette.colours.slice(0, 4).map((colour) => h("i", { style: { background: colour } })));
+    const list = h("select", { "aria-label": "Colours", onchange: () => {
+      this.wanted.palette = list.value;
+      show();
+      this.arrange();
+      this.keep();
+    } }, this.about.palettes.map(({ name }) => h("option", { value: name }, capital(name))));
+    list.value = this.palette.name;
+    show();
+    return h("label", { class: "palette row" }, dots, list);
+  }
+
+  /** The search that is going on, or the last one. */
+  get task() {
+    const searches = this.project.tasks.filter(({ operation }) => operation === "search");
+    return searches.find(alive) ?? searches[0];
+  }
+
+  start(words, more = {}) {
+    const { effort, objective } = this.wanted;
+    return trying(async () => {
+      await this.api.post(`${this.place}/tasks`, { operation: "search", settings: { effort, objective, ...more } });
+      toast(words);
+    });
+  }
+
+  more({ id, arrangement }) {
+    return this.start(`Looking for more like “${arrangement}”.`, { like: id });
+  }
+
+  async remove({ id }) {
+    if (!(await confirmed("Remove this tile?", "It will be gone for good. A new search may find it again.", "Remove it"))) return;
+    await trying(() => this.api.remove(`${this.place}/tiles/${id}`));
+    this.heading.focus();
+  }
+
+  /** Say how far the search is. */
+  tell() {
+    const { task, project } = this;
+    const words = stateWords(task, project.tiles.length);
+    if (this.said.textContent !== words) this.said.textContent = words;
+    this.said.classList.toggle("error", task?.state === "failed");
+    this.bar.hidden = !alive(task);
+    if (task?.state === "waiting") this.bar.removeAttribute("value");
+    else this.bar.value = task?.share ?? 0;
+    this.empty.hidden = Boolean(project.tiles.length) || alive(task);
+    this.offer(task);
+  }
+
+  /** Show the buttons that a state has, if it is another one. */
+  offer(task) {
+    const key = `${task?.id} ${task?.state}`;
+    if (key === this.offered) return;
+    this.offered = key;
+    const act = (deed) => () => trying(() => this.api.post(`tasks/${task.id}/${deed}`));
+    const stop = button("Stop", act("cancel"), { image: "stop" });
+    const offers = {
+      waiting: [stop],
+      running: [button("Pause", act("pause"), { image: "pause" }), stop],
+      paused: [button("Go on", act("resume"), { kind: "primary", image: "play" }), stop],
+    };
+    const search = () => this.start("The search begins.");
+    const held = this.deeds.contains(document.activeElement);
+    put(this.deeds, offers[task?.state] ?? [button(task ? "Search again" : "Search", search, { kind: "primary", image: "arrow" })]);
+    if (held) this.deeds.querySelector("button").focus();
+    this.panel.hidden = alive(task);
+    if (this.panel.hidden) this.panel.open = false;
+  }
 
   /** Show the cards in their order; cards that stay move there calmly, but not away from the mouse. */
-  function arrange() {
-    const cards = [...project.tiles].sort(better);
-    if (performance.now() - touched < 1500) {
-      cards.sort((a, b) => placeOf(a) - placeOf(b) || better(a, b));
-      clearTimeout(later);
-      later = setTimeout(soon, 1500);
+  arrange() {
+    const { views, grid } = this;
+    const cards = [...this.project.tiles].sort(better);
+    if (performance.now() - this.touched < REST) {
+      const places = new Map([...grid.children].map((child, k) => [child, k]));
+      const place = ({ id }) => places.get(views.get(id)?.root) ?? Infinity;
+      cards.sort((a, b) => (place(a) === place(b) ? better(a, b) : place(a) - place(b)));
+      clearTimeout(this.later);
+      this.later = setTimeout(this.soon, REST);
     }
     const kept = new Set(cards.map(({ id }) => id));
-    for (const [id, view] of views) if (!kept.has(id)) { view.root.remove(); views.delete(id); }
-    for (const card of cards) if (!views.has(card.id)) views.set(card.id, cardView(project, actions));
-    reordered(grid, [...cards.map((card) => views.get(card.id).root), ...ghosts()]);
-    cards.forEach((card) => views.get(card.id).update(card, palette()));
+    for (const id of [...views.keys()]) if (!kept.has(id)) views.delete(id);
+    for (const { id } of cards) if (!views.has(id)) views.set(id, cardView(this.project, this));
+    reordered(grid, [...cards.map(({ id }) => views.get(id).root), ...this.ghosts()]);
+    cards.forEach((card) => views.get(card.id).update(card, this.palette));
   }
-  const soon = () => { cancelAnimationFrame(due); due = requestAnimationFrame(() => { arrange(); tell(); }); };
 
-  const effortWords = h("p", { class: "soft small" }, EFFORT_TIMES[wanted.effort]);
-  const objectiveWords = h("p", { class: "soft small" }, OBJECTIVE_MEANINGS[wanted.objective]);
-  const panel = h("details", { class: "panel wishes", open: !project.tiles.length },
-    h("summary", {}, "How to search"),
-    h("div", { class: "wish" },
-      h("div", { class: "stack" }, choice("How long", about.efforts.map((own) => [own, EFFORTS[own] ?? own]), wanted.effort, (own) => {
-        wanted.effort = own; effortWords.textContent = EFFORT_TIMES[own] ?? ""; keep();
-      }), effortWords),
-      h("div", { class: "stack" }, choice("What counts", Object.entries(OBJECTIVES), wanted.objective, (own) => {
-        wanted.objective = own; objectiveWords.textContent = OBJECTIVE_MEANINGS[own]; keep();
-      }), objectiveWords)));
-  const colours = h("select", { "aria-label": "Colours", onchange: () => { wanted.palette = colours.value; swatches(); arrange(); keep(); } },
-    about.palettes.map(({ name }) => h("option", { value: name }, capital(name))));
-  colours.value = palette().name;
-  const dots = h("span", { class: "dots", "aria-hidden": "true" });
-  const swatches = () => put(dots, palette().colours.slice(0, 4).map((colour) => h("i", { style: { background: colour } })));
-  swatches();
-  put(empty, h("p", { class: "soft" }, "No tiles yet."), h("p", {}, h("a", { href: `#/${place.replace("projects", "p")}/picture` }, "Back to the picture")));
+  /** Empty cards hold the places of the nine classes until the first tiles are done. */
+  ghosts() {
+    const { tiles } = this.project;
+    const begun = alive(this.task) && !tiles.some(({ stage }) => stage === "final");
+    const missing = begun ? Math.max(0, NINE - tiles.length) : 0;
+    while (this.spare.length < missing) this.spare.push(h("li", { class: "card ghost", "aria-hidden": "true" }, h("div", {})));
+    return this.spare.slice(0, missing);
+  }
+}
 
-  put(root,
-    h("div", { class: "head" },
-      h("div", { class: "grow" }, heading, said),
-      h("label", { class: "palette row" }, dots, colours), deeds),
-    bar, panel, empty, grid);
-  const watch = new ResizeObserver(() => views.forEach((view) => view.paint(false)));
-  watch.observe(grid);
-  arrange();
-  tell();
-  const off = ["card", "gone", "refresh"].map((kind) => events.on(kind, soon));
-  off.push(events.on("task", soon));
-  return () => { off.forEach((stop) => stop()); watch.disconnect(); cancelAnimationFrame(due); clearTimeout(later); };
+/** What there is to say of a search. */
+function stateWords(task, tiles) {
+  if (!task) return "Nothing has been searched yet.";
+  if (task.state === "failed") return sentence(task.error);
+  if (task.state === "waiting") return task.place > 0 ? `Waiting: ${number(task.place, "other thing")} to do first.` : "It starts in a moment.";
+  if (task.state === "running") return task.what ? capital(task.what) : "Looking for tiles";
+  if (task.state !== "done") return `${STATES[task.state]}.`;
+  if (!tiles) return "No tile was found. Smooth the picture a little, or search more thoroughly.";
+  return `${number(tiles, "tile")}, best first. Each one covers the plane: we proved it.`;
 }

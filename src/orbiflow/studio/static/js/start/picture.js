@@ -1,274 +1,238 @@
 /** What was read of a picture, and how to mend it: sliders, brushes, lassos, parts to keep. */
 
-import { button, choice, h, newest, put, slider, style, toast, trying } from "../dom.js";
-import { pathOf, sized } from "../tiling.js";
+import { button, h, newest, put, style, toast, trying } from "../dom.js";
+import { sized } from "../tiling.js";
 import { alive, number, sentence } from "../words.js";
-import { Marks, drawStroke } from "./marks.js";
+import { paintingControls, readingControls } from "./controls.js";
+import { Marks } from "./marks.js";
+import { paintBrush, paintSilhouette, paintStrokes, tinted, touches } from "./overlay.js";
 import { pointing } from "./pointing.js";
 
-const TOOLS = [
-  ["add", "Add", "more"], ["remove", "Take away", "cut"], ["pins", "Keep its shape", "pin"],
-  ["emphasis", "Matters most", "star"], ["rub", "Rub out", "rub"],
-];
-const TOOL_MEANINGS = {
-  add: "Paint over what belongs to the animal and was missed.",
-  remove: "Paint over what does not belong to it.",
-  pins: "Paint over a part that must not bend, such as a head. The rest bends more.",
-  emphasis: "Paint over a part by which one knows the animal, such as ears or a tail.",
-  rub: "Rub out what you painted.",
-};
-const COLOURS = { add: "#0f8f86", remove: "#c2362c", pins: "#3a6fd8", emphasis: "#e09a1b" };
+const LAYERS = ["mend", "pins", "emphasis"];
+const KEYS = "With the keyboard: arrow keys move the brush, Space begins and ends a stroke.";
 
-export async function show(root, { api, events, project, navigate }) {
+export async function show(root, page) {
   await style("start");
-  const place = `projects/${project.id}`;
-  const state = { tool: "add", shape: "brush", size: 4, stroke: null, cross: null, sent: 0 };
-  let marks = new Marks(1, 1);
-  let picture = null;
-  let shownPicture = "";
+  const own = new PicturePage(page);
+  own.build(root);
+  return () => own.close();
+}
 
-  const canvas = h("canvas", {
-    class: "reading", tabindex: "0", role: "application",
-    "aria-label": "The picture with the outline that was read. With the keyboard: arrow keys move the brush, Space begins and ends a stroke.",
-  });
-  const said = h("div", { class: "said stack", role: "status" });
-  const meaning = h("p", { class: "soft small" }, TOOL_MEANINGS.add);
-  const find = button("Find tiles", search, { kind: "primary big", image: "arrow" });
-  const back = button("Undo", () => changed(marks.undo()), { kind: "quiet", image: "undo" });
-  const again = button("Redo", () => changed(marks.redo()), { kind: "quiet", image: "redo" });
-  const clear = button("Start over", startOver, { kind: "quiet", image: "bin" });
-
-  const { threshold, invert, smooth } = project.reading ?? {};
-  const reading = { threshold: threshold ?? null, invert: invert ?? null, smooth: smooth ?? 0 };
-  const read = newest((values) => api.put(`${place}/reading`, values), 250);
-  const change = (part) => { Object.assign(reading, part); read({ ...reading }); };
-  const level = slider("Where it ends", { min: 0, max: 1, step: 0.01, value: reading.threshold ?? 0.5, said: (value) => (reading.threshold === null ? "found by itself" : value.toFixed(2)) },
-    (value) => { reading.threshold = value; level.set(value); auto.checked = false; change({}); });
-  const auto = h("input", { type: "checkbox", checked: reading.threshold === null, onchange: () => {
-    change({ threshold: auto.checked ? null : 0.5 });
-    level.set(reading.threshold ?? 0.5);
-  } });
-  const smoothing = slider("Smoothing", { min: 0, max: 0.06, step: 0.002, value: reading.smooth, said: (value) => (value ? `${(100 * value).toFixed(1)} %` : "none") },
-    (value) => change({ smooth: value }));
-  const part = choice("The animal is", [[null, "found by itself"], [false, "dark"], [true, "light"]], reading.invert,
-    (value) => change({ invert: value }));
-
-  /** Strokes that the outline on the screen does not know yet. */
-  const fresh = () => marks.strokes.slice(state.sent).filter(({ layer, erases }) => layer === "mend" || erases);
-
-  function paint() {
-    const { silhouette } = project;
-    if (!silhouette || !picture) return;
-    const { width, height } = marks;
-    const { context, width: shown, ratio } = sized(canvas);
-    const pixel = width / shown;
-    context.setTransform(ratio / pixel, 0, 0, ratio / pixel, 0, 0);
-    context.fillStyle = "#ffffff";
-    context.fillRect(0, 0, width, height);
-    context.drawImage(picture, 0, 0, width, height);
-    const outline = pathOf(silhouette.outline);
-    const rest = new Path2D(outline);
-    rest.rect(0, 0, width, height);
-    context.fillStyle = "rgb(255 255 255 / 62%)";
-    context.fill(rest, "evenodd");
-    context.fillStyle = "rgb(15 143 134 / 55%)";
-    context.fill(outline);
-    context.lineJoin = "round";
-    for (const ring of silhouette.left_out ?? []) {
-      context.setLineDash([5 * pixel, 4 * pixel]);
-      context.lineWidth = 2 * pixel;
-      context.strokeStyle = COLOURS.remove;
-      context.stroke(pathOf(ring));
-      context.setLineDash([]);
-    }
-    context.globalAlpha = 0.65;
-    for (const layer of ["pins", "emphasis"]) {
-      if (marks.has(layer)) context.drawImage(tinted(layer), 0, 0);
-    }
-    for (const stroke of fresh()) if (!stroke.erases) drawStroke(context, stroke, COLOURS[stroke.black ? "remove" : "add"]);
-    if (state.stroke) {
-      const colour = COLOURS[state.tool] ?? "#777777";
-      const { shape } = state.stroke;
-      drawStroke(context, { ...state.stroke, erases: false, size: shape === "lasso" ? 1 : state.stroke.size }, colour);
-    }
-    context.globalAlpha = 1;
-    for (const [line, colour] of [[4, "#ffffff"], [2, "#0b6b66"]]) {
-      context.lineWidth = line * pixel;
-      context.strokeStyle = colour;
-      context.stroke(outline);
-    }
-    if (state.cross) {
-      context.beginPath();
-      context.arc(...state.cross, state.shape === "lasso" ? 4 * pixel : brush() / 2, 0, 7);
-      for (const [line, colour] of [[3, "#ffffff"], [1.5, "#1d1c1a"]]) {
-        context.lineWidth = line * pixel;
-        context.strokeStyle = colour;
-        context.stroke();
-      }
-    }
+class PicturePage {
+  constructor({ api, events, project, navigate }) {
+    Object.assign(this, { api, events, project, navigate });
+    this.place = `projects/${project.id}`;
+    this.pen = { tool: "add", shape: "brush", size: 4 };
+    this.marks = new Marks(1, 1);
+    this.tints = new Map(); // the marks in their colours, painted anew when strokes change
+    this.known = 0; // strokes that the outline on the screen knows
+    this.sent = 0; // strokes that the server has
+    this.reading = { threshold: null, invert: null, smooth: 0, ...project.reading };
+    this.read = newest(async () => this.began(await api.put(`${this.place}/reading`, this.reading)));
+    this.send = Object.fromEntries(LAYERS.map((layer) => [layer, newest(() => this.upload(layer), 200)]));
   }
 
-  const layers = new Map(); // tinted pictures of the marks, drawn anew when strokes change
-  function tinted(layer) {
-    if (!layers.has(layer)) {
-      const own = marks.layer(layer, () => COLOURS[layer]);
-      const context = own.getContext("2d");
-      context.globalCompositeOperation = "source-in";
-      context.fillStyle = COLOURS[layer];
-      context.fillRect(0, 0, own.width, own.height);
-      layers.set(layer, own);
-    }
-    return layers.get(layer);
+  build(root) {
+    this.canvas = h("canvas", {
+      class: "reading", tabindex: "0", role: "application",
+      "aria-label": `The picture with the outline that was read. ${KEYS}`,
+    });
+    this.stage = h("div", { class: "stage", hidden: true }, this.canvas);
+    this.said = h("div", { class: "said stack", role: "status" });
+    this.find = button("Find tiles", () => this.search(), { kind: "primary big", image: "arrow" });
+    this.back = button("Undo", () => this.changed(this.marks.undo()), { kind: "quiet", image: "undo" });
+    this.again = button("Redo", () => this.changed(this.marks.redo()), { kind: "quiet", image: "redo" });
+    const clear = button("Start over", () => this.startOver(), { kind: "quiet", image: "bin" });
+    this.controls = readingControls(this.reading, () => this.read());
+    this.unread = h("p", { class: "lonely soft" }, "Reading the picture …");
+    put(root, h("div", { class: "picture" },
+      h("div", { class: "stack" },
+        h("h1", { tabindex: "-1" }, "Is this your animal?"),
+        h("p", { class: "soft" }, "The green shape is what we read. If something is missing or too much, mend it here."),
+        this.stage, this.unread),
+      h("div", { class: "stack side" }, h("div", { class: "go" }, this.find), this.said, this.controls.root,
+        paintingControls(this.pen, () => this.paint(), [this.back, this.again, clear]))));
+    this.listen();
+    this.ready();
   }
 
-  /** Whether a stroke meets the animal. */
-  function touches({ points, size }) {
-    const context = canvas.getContext("2d");
-    const outline = pathOf(project.silhouette.outline);
-    context.save();
-    context.resetTransform();
-    context.lineWidth = size;
-    const found = points.some(([x, y]) => context.isPointInPath(outline, x, y) || context.isPointInStroke(outline, x, y));
-    context.restore();
-    return found;
+  listen() {
+    pointing(this.canvas, () => [this.marks.width, this.marks.height], {
+      begin: (point) => this.begin(point),
+      move: (points) => { this.stroke?.points.push(...points); this.paint(); },
+      end: () => this.end(),
+      hover: (point) => { this.cross = point; this.paint(); },
+    });
+    this.keys = (event) => {
+      if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || event.target.type === "text") return;
+      event.preventDefault();
+      this.changed(event.shiftKey ? this.marks.redo() : this.marks.undo());
+    };
+    document.addEventListener("keydown", this.keys);
+    this.watch = new ResizeObserver(() => this.paint());
+    this.watch.observe(this.stage);
+    const ready = () => this.ready();
+    this.off = [["silhouette", ready], ["refresh", ready], ["task", () => this.tell()]].map(([kind, heard]) => this.events.on(kind, heard));
   }
 
-  const brush = () => (state.size / 100) * Math.max(marks.width, marks.height);
-
-  /** Send the layers that a stroke touches; the newest state wins. */
-  const send = Object.fromEntries(["mend", "pins", "emphasis"].map((layer) => [layer, newest(async () => {
-    const until = marks.strokes.length;
-    if (marks.has(layer)) await api.put(`${place}/${layer}`, await marks.png(layer, { clear: layer === "mend" }));
-    else await api.remove(`${place}/${layer}`);
-    if (layer === "mend") state.until = until;
-  }, 200)]));
-
-  function changed(stroke) {
-    if (!stroke) return;
-    layers.clear();
-    state.sent = Math.min(state.sent, marks.strokes.length);
-    for (const layer of stroke.erases ? Object.keys(send) : [stroke.layer]) if (stroke.layer === layer || marks.has(layer)) send[layer]();
-    tell();
+  close() {
+    this.watch.disconnect();
+    document.removeEventListener("keydown", this.keys);
+    this.off.forEach((stop) => stop());
   }
 
-  function startOver() {
-    marks.clear();
-    layers.clear();
-    Object.assign(state, { sent: 0 });
-    Object.values(send).forEach((go) => go());
-    Object.assign(reading, { threshold: null, invert: null, smooth: 0 });
-    change({});
-    auto.checked = true;
-    level.set(0.5);
-    smoothing.set(0);
-    part.set(null);
-    tell();
-  }
-
-  pointing(canvas, () => [marks.width, marks.height], {
-    begin(point) {
-      const layer = { add: "mend", remove: "mend", rub: "all" }[state.tool] ?? state.tool;
-      state.stroke = { layer, shape: state.shape, size: brush(), points: [point], black: state.tool === "remove", erases: state.tool === "rub" };
-      paint();
-    },
-    move(points) { state.stroke?.points.push(...points); paint(); },
-    end() {
-      const { stroke } = state;
-      state.stroke = null;
-      if (!stroke || (stroke.shape === "lasso" && stroke.points.length < 3)) return paint();
-      if (["pins", "emphasis"].includes(stroke.layer) && !touches(stroke)) {
-        toast("Paint on the animal itself: that is outside of it.");
-        return paint();
-      }
-      marks.add(stroke);
-      return changed(stroke);
-    },
-    hover(point) { state.cross = point; paint(); },
-  });
-
-  /** Say what was read, and which buttons do something. */
-  function tell() {
-    const { silhouette, tasks } = project;
-    const task = tasks.find((own) => own.operation.includes("read"));
-    const busy = alive(task);
-    find.disabled = !silhouette;
-    back.disabled = !marks.strokes.length;
-    again.disabled = !marks.undone.length;
-    canvas.setAttribute("aria-busy", String(Boolean(busy)));
-    const out = silhouette?.left_out?.length ?? 0;
-    put(said,
-      busy && h("p", { class: "soft" }, silhouette ? "Reading it again …" : "Reading the picture …"),
-      !busy && task?.state === "failed" && h("p", { class: "error" }, sentence(task.error)),
-      silhouette && h("ul", { class: "notes stack" },
-        silhouette.doubts.map((text) => h("li", { class: "notice" }, sentence(text))),
-        out > 0 && h("li", {}, h("span", { class: "swatch dashed" }), `${number(out, "part is", "parts are")} left out: a tile is one piece. Paint a bridge with “Add” to keep ${out === 1 ? "it" : "them"}.`),
-        silhouette.notes.length > 0 && h("li", {}, h("details", {}, h("summary", {}, "How it was read"), h("p", { class: "soft" }, silhouette.notes.map(sentence).join(" "))))));
-    paint();
-  }
-
-  async function silhouetteChanged() {
-    const { silhouette } = project;
-    if (silhouette && silhouette.backdrop !== shownPicture) {
+  /** Show the silhouette that the project has now. */
+  async ready() {
+    const { silhouette } = this.project;
+    if (silhouette && silhouette.backdrop !== this.shown) {
       const image = new Image();
       image.src = silhouette.backdrop;
       await trying(() => image.decode());
-      [picture, shownPicture] = [image, silhouette.backdrop];
-      if (marks.width !== silhouette.width || marks.height !== silhouette.height) await fit(silhouette);
+      [this.picture, this.shown] = [image, silhouette.backdrop];
+      if (this.marks.width !== silhouette.width || this.marks.height !== silhouette.height) await this.fit(silhouette);
     }
-    state.sent = Math.min(state.until ?? 0, marks.strokes.length);
-    stage.hidden = !silhouette;
-    tell();
+    this.known = Math.min(this.sent, this.marks.strokes.length);
+    this.stage.hidden = !silhouette;
+    this.unread.hidden = Boolean(silhouette);
+    this.tell();
   }
 
-  /** A canvas of the picture's size, with the marks that the server has. */
-  async function fit({ width, height }) {
-    stage.style.setProperty("--shape", `${width} / ${height}`);
-    stage.style.setProperty("--ratio", width / height);
-    marks = new Marks(width, height);
-    const found = [["mend", project.mend], ["pins", project.pins], ["emphasis", project.emphasis]].filter(([, url]) => url);
-    await Promise.all(found.map(([layer, url]) => trying(() => marks.load(layer, url, { both: layer === "mend" }))));
+  /** Begin with marks of the picture's size, those that the server has. */
+  async fit({ width, height }) {
+    this.stage.style.setProperty("--shape", `${width} / ${height}`);
+    this.stage.style.setProperty("--ratio", width / height);
+    const marks = new Marks(width, height);
+    const found = LAYERS.filter((layer) => this.project[layer]);
+    await Promise.all(found.map((layer) => trying(() => marks.load(layer, this.project[layer], { both: layer === "mend" }))));
+    this.marks = marks;
   }
 
-  async function search() {
-    find.disabled = true;
-    await trying(async () => {
-      const { objective, effort } = { objective: "likeness", effort: "normal", ...project.view?.search };
-      await api.post(`${place}/tasks`, { operation: "search", settings: { objective, effort } });
-      navigate(`p/${project.id}`);
+  paint() {
+    const { project: { silhouette }, picture, marks, pen } = this;
+    if (!silhouette || !picture) return;
+    const { context, width, ratio } = sized(this.canvas);
+    const pixel = marks.width / width;
+    context.setTransform(ratio / pixel, 0, 0, ratio / pixel, 0, 0);
+    paintSilhouette(context, picture, silhouette, pixel);
+    paintStrokes(context, {
+      marks: ["pins", "emphasis"].filter((layer) => marks.has(layer)).map((layer) => this.tint(layer)),
+      fresh: marks.strokes.slice(this.known).filter(({ layer }) => layer === "mend"),
+      stroke: this.stroke, tool: pen.tool,
     });
-    find.disabled = false;
+    if (this.cross) paintBrush(context, this.cross, pen.shape === "lasso" ? 4 * pixel : this.brush() / 2, pixel);
   }
 
-  const stage = h("div", { class: "stage", hidden: true }, canvas);
-  const size = slider("Size of the brush", { min: 1, max: 20, step: 0.5, value: state.size, said: (value) => `${value} %` }, (value) => { state.size = value; paint(); });
-  const unread = h("p", { class: "lonely soft" }, "Reading the picture …");
-  const tools = choice("Paint on the picture", TOOLS, "add", (tool) => { state.tool = tool; meaning.textContent = TOOL_MEANINGS[tool]; paint(); });
-  tools.classList.add("tools");
-  put(root, h("div", { class: "picture" },
-    h("div", { class: "stack" },
-      h("h1", { tabindex: "-1" }, "Is this your animal?"),
-      h("p", { class: "soft" }, "The green shape is what we read. If something is missing or too much, mend it here."),
-      stage, unread),
-    h("div", { class: "stack side" },
-      h("div", { class: "go" }, find),
-      said,
-      h("section", { class: "panel stack", "aria-label": "How the picture is read" },
-        part, h("label", { class: "check" }, auto, "Find the edge of the animal by itself"), level, smoothing),
-      h("section", { class: "panel stack", "aria-label": "Paint on the picture" },
-        tools, meaning,
-        choice("With a", [["brush", "brush", "brush"], ["lasso", "lasso", "lasso"]], "brush", (shape) => { state.shape = shape; size.hidden = shape === "lasso"; }, { unseen: true }),
-        size,
-        h("div", { class: "row" }, back, again, clear)))));
-  const ready = () => { unread.hidden = Boolean(project.silhouette); silhouetteChanged(); };
-  ready();
-  const keys = (event) => {
-    if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || event.target.type === "text") return;
-    event.preventDefault();
-    changed(event.shiftKey ? marks.redo() : marks.undo());
-  };
-  document.addEventListener("keydown", keys);
-  const watch = new ResizeObserver(paint);
-  watch.observe(stage);
-  const off = [events.on("silhouette", ready), events.on("refresh", ready), events.on("task", tell)];
-  return () => { watch.disconnect(); document.removeEventListener("keydown", keys); off.forEach((stop) => stop()); };
+  tint(layer) {
+    if (!this.tints.has(layer)) this.tints.set(layer, tinted(this.marks, layer));
+    return this.tints.get(layer);
+  }
+
+  /** The width of the brush in pixels of the picture. */
+  brush() {
+    return (this.pen.size / 100) * Math.max(this.marks.width, this.marks.height);
+  }
+
+  begin(point) {
+    const { tool, shape } = this.pen;
+    const layer = { add: "mend", remove: "mend", rub: "all" }[tool] ?? tool;
+    this.stroke = { layer, shape, size: this.brush(), points: [point], black: tool === "remove", erases: tool === "rub" };
+    this.paint();
+  }
+
+  end() {
+    const { stroke } = this;
+    this.stroke = null;
+    if (!stroke || (stroke.shape === "lasso" && stroke.points.length < 3)) return this.paint();
+    if (["pins", "emphasis"].includes(stroke.layer) && !touches(stroke, this.project.silhouette.outline)) {
+      toast("Paint on the animal itself: that is outside of it.");
+      return this.paint();
+    }
+    this.marks.add(stroke);
+    return this.changed(stroke);
+  }
+
+  /** A stroke came or went: send the layers that it touches. */
+  changed(stroke) {
+    if (!stroke) return;
+    this.tints.clear();
+    this.known = Math.min(this.known, this.marks.strokes.length);
+    LAYERS.filter((layer) => stroke.layer === layer || (stroke.erases && this.marks.has(layer))).forEach((layer) => this.send[layer]());
+    this.tell();
+  }
+
+  async upload(layer) {
+    const count = this.marks.strokes.length;
+    const address = `${this.place}/${layer}`;
+    if (this.marks.has(layer)) this.began(await this.api.put(address, await this.marks.png(layer, { clear: layer === "mend" })));
+    else this.began(await this.api.remove(address));
+    if (layer === "mend") this.sent = count;
+  }
+
+  startOver() {
+    this.marks.clear();
+    this.tints.clear();
+    this.known = 0;
+    Object.values(this.send).forEach((go) => go());
+    this.controls.reset();
+    this.tell();
+  }
+
+  /** Take note of a reading that has begun, if its events have not told of it already. */
+  began({ task }) {
+    if (task && !this.project.tasks.some(({ id }) => id === task.id)) this.events.apply("task", task);
+    this.tell();
+  }
+
+  get task() {
+    return this.project.tasks.find(({ operation }) => operation === "read");
+  }
+
+  /** Say what was read, and which buttons do something. */
+  tell() {
+    const { project: { silhouette }, marks, task } = this;
+    const busy = alive(task);
+    this.find.disabled = !silhouette || this.searching;
+    this.back.disabled = !marks.strokes.length;
+    this.again.disabled = !marks.undone.length;
+    this.canvas.setAttribute("aria-busy", String(Boolean(busy)));
+    this.paint();
+    const told = JSON.stringify([busy, task?.state, task?.error, silhouette && { ...silhouette, outline: null }]);
+    if (told === this.told) return; // what is open stays open
+    this.told = told;
+    put(this.said,
+      busy && h("p", { class: "soft" }, silhouette ? "Reading it again …" : "Reading the picture …"),
+      !busy && task?.state === "failed" && h("p", { class: "error" }, sentence(task.error)),
+      silhouette && notes(silhouette));
+  }
+
+  /** Search for tiles of what is on the screen: first all of it must have been read. */
+  search() {
+    this.searching = this.find.disabled = true;
+    return trying(async () => {
+      await Promise.all([this.read, ...Object.values(this.send)].map((pending) => pending.done()));
+      await this.settled();
+      const { objective = "likeness", effort = "normal" } = this.project.view?.search ?? {};
+      await this.api.post(`${this.place}/tasks`, { operation: "search", settings: { objective, effort } });
+      this.navigate(`p/${this.project.id}`);
+    }).then(() => { this.searching = this.find.disabled = false; });
+  }
+
+  /** Resolves when nothing is being read. */
+  settled() {
+    return new Promise((resolve) => {
+      const check = () => { if (!alive(this.task)) { stop(); resolve(); } };
+      const stop = this.events.on("task", check);
+      check();
+    });
+  }
+}
+
+/** What there is to say of a silhouette. */
+function notes({ doubts, notes: said, left_out: others = [] }) {
+  const out = others.length;
+  const kept = out === 1 ? "it" : "them";
+  return h("ul", { class: "notes stack" },
+    doubts.map((text) => h("li", { class: "notice" }, sentence(text))),
+    out > 0 && h("li", {}, h("span", { class: "swatch" }), `${number(out, "part is", "parts are")} left out: a tile is one piece. Paint a bridge with “Add” to keep ${kept}.`),
+    said.length > 0 && h("li", {}, h("details", {}, h("summary", {}, "How it was read"), h("p", { class: "soft" }, said.map(sentence).join(" ")))));
 }

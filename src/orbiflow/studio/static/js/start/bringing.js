@@ -1,0 +1,133 @@
+/** All ways to bring a picture, a table or a project: choose, drop, paste, photograph, draw. */
+
+import { button, h, toast, trying } from "../dom.js";
+import { bytes } from "../words.js";
+
+const PICTURES = "image/*,.svg,.json,.dat";
+const TABLES = /\.(csv|tsv|txt|npy|parquet)$/i;
+const stem = (name) => name.replace(/\.\w+$/, "");
+const hasCamera = () => Boolean(navigator.mediaDevices?.getUserMedia);
+
+/** A field for files that a button opens. */
+function chooser(label, use, attributes) {
+  const box = h("input", {
+    type: "file", class: "unseen", tabindex: "-1", "aria-label": label, onchange: () => box.files[0] && use(box.files[0]), ...attributes,
+  });
+  return box;
+}
+
+export class Bringing {
+  constructor({ api, navigate, about }) {
+    Object.assign(this, { api, navigate, most: about.limits?.bytes ?? Infinity });
+    this.touch = matchMedia("(pointer: coarse)").matches;
+    this.file = chooser("A picture from your computer", (file) => this.take(file), { accept: PICTURES, id: "file" });
+    this.photo = chooser("A photo", (file) => this.take(file), { accept: "image/*", capture: "environment" });
+    this.saved = chooser("A project file", (file) => this.open(file), { accept: ".orbiflow" });
+    this.heard = {
+      dragover: (event) => { event.preventDefault(); document.body.classList.add("over"); },
+      dragleave: (event) => { if (!event.relatedTarget) document.body.classList.remove("over"); },
+      drop: (event) => this.dropped(event),
+      paste: ({ clipboardData: { files: [first] } }) => { if (first) this.either(first); },
+    };
+    Object.entries(this.heard).forEach(([name, hear]) => document.addEventListener(name, hear));
+  }
+
+  close() {
+    Object.entries(this.heard).forEach(([name, hear]) => document.removeEventListener(name, hear));
+    document.body.classList.remove("over", "busy");
+  }
+
+  panel() {
+    return h("div", { class: "drop" },
+      h("p", { class: "drop-words" }, this.touch ? "Bring a picture" : "Drop a picture here"),
+      h("p", { class: "soft small" }, "One animal, or any other shape, on a plain background works best."),
+      h("div", { class: "row" },
+        button("Choose a picture", () => this.file.click(), { kind: "primary big", image: "upload" }),
+        (this.touch || hasCamera()) && button("Take a photo", () => this.snap(), { image: "camera" }),
+        button("Draw a shape", () => this.draw(), { image: "pencil" }),
+        navigator.clipboard?.read && button("Paste", () => trying(() => this.paste()), { image: "paste" })),
+      this.file, this.photo, this.saved);
+  }
+
+  /** Make a project of what `send` puts into it, and go and see what was read. */
+  async begin(name, send) {
+    document.body.classList.add("busy");
+    await trying(async () => {
+      const { id } = await this.api.post("projects", { kind: "tile", name });
+      try {
+        await send(id);
+      } catch (error) {
+        await this.api.remove(`projects/${id}`);
+        throw error;
+      }
+      this.navigate(`p/${id}/picture`);
+    });
+    document.body.classList.remove("busy");
+  }
+
+  animal({ name, title }) {
+    return this.begin(title, (id) => this.api.post(`projects/${id}/animal`, { name }));
+  }
+
+  take(file) {
+    const name = file.name || "picture.png";
+    if (file.size > this.most) {
+      toast(`${name} has ${bytes(file.size)}; at most ${bytes(this.most)} can be read. Make it smaller first.`, { bad: true });
+      return undefined;
+    }
+    return this.begin(stem(name), (id) => this.api.put(`projects/${id}/input?name=${encodeURIComponent(name)}`, file));
+  }
+
+  open(file) {
+    return trying(async () => {
+      const { id, kind } = await this.api.post("projects/open", file);
+      this.navigate(kind === "density" ? `d/${id}` : `p/${id}`);
+    });
+  }
+
+  /** Begin with a table, or with none yet. */
+  count(file) {
+    return trying(async () => {
+      const { id } = await this.api.post("projects", { kind: "density", name: file ? stem(file.name) : "My table" });
+      if (file) await this.api.put(`projects/${id}/density/table?name=${encodeURIComponent(file.name)}`, file);
+      this.navigate(`d/${id}`);
+    });
+  }
+
+  either(file) {
+    if (file.name?.endsWith(".orbiflow")) return this.open(file);
+    return TABLES.test(file.name) ? this.count(file) : this.take(file);
+  }
+
+  dropped(event) {
+    event.preventDefault();
+    document.body.classList.remove("over");
+    const [first] = event.dataTransfer.files;
+    if (first) this.either(first);
+    else toast("That was no file. Save the picture first, then drop it here.");
+  }
+
+  async snap() {
+    if (this.touch || !hasCamera()) return this.photo.click();
+    const { photograph } = await import("./camera.js");
+    const shot = await photograph();
+    return shot && this.take(new File([shot], "photo.png"));
+  }
+
+  async draw() {
+    const { drawn } = await import("./drawing.js");
+    const picture = await drawn();
+    return picture && this.take(new File([picture], "drawing.png"));
+  }
+
+  async paste() {
+    const items = await navigator.clipboard.read().catch(() => {
+      throw new Error("Your browser keeps what was copied. Press Ctrl+V instead.");
+    });
+    for (const item of items) {
+      const type = item.types.find((known) => known.startsWith("image/"));
+      if (type) return this.take(new File([await item.getType(type)], "pasted.png"));
+    }
+    throw new Error("There is no picture to paste. Copy one first.");
+  }
+}

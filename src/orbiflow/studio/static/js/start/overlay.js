@@ -1,0 +1,71 @@
+/** The picture with what was read of it, and with what is painted over it. */
+
+import { pathOf } from "../tiling.js";
+import { drawStroke } from "./marks.js";
+
+export const COLOURS = { add: "#0f8f86", remove: "#c2362c", pins: "#3a6fd8", emphasis: "#e09a1b", rub: "#777777" };
+const EDGE = [[4, "#ffffff"], [2, "#0b6b66"]];
+const BRUSH = [[3, "#ffffff"], [1.5, "#1d1c1a"]];
+
+/** Stroke a path, or what was begun, once for each pair of a width in pixels of the screen and a colour. */
+function lines(context, pairs, pixel, ...path) {
+  for (const [width, colour] of pairs) {
+    context.lineWidth = width * pixel;
+    context.strokeStyle = colour;
+    context.stroke(...path);
+  }
+}
+
+/** Paint the picture, veiled outside of the silhouette. Lengths are in pixels of the picture, `pixel` is one of the screen. */
+export function paintSilhouette(context, picture, silhouette, pixel) {
+  const { width, height, outline: ring, left_out: others = [] } = silhouette;
+  const outline = pathOf(ring);
+  const rest = new Path2D(outline);
+  rest.rect(0, 0, width, height);
+  context.fillStyle = "#ffffff";
+  context.fillRect(0, 0, width, height);
+  context.drawImage(picture, 0, 0, width, height);
+  context.fillStyle = "rgb(255 255 255 / 62%)";
+  context.fill(rest, "evenodd");
+  context.fillStyle = "rgb(15 143 134 / 55%)";
+  context.fill(outline);
+  context.lineJoin = "round";
+  lines(context, EDGE, pixel, outline);
+  context.setLineDash([5 * pixel, 4 * pixel]);
+  others.forEach((other) => lines(context, [[2, COLOURS.remove]], pixel, pathOf(other)));
+  context.setLineDash([]);
+}
+
+/** Paint what is not read yet: strokes, the one that is being drawn, and marks, which are tinted pictures. */
+export function paintStrokes(context, { marks, fresh, stroke, tool }) {
+  context.globalAlpha = 0.65;
+  marks.forEach((mark) => context.drawImage(mark, 0, 0));
+  for (const one of fresh) drawStroke(context, one, COLOURS[one.black ? "remove" : "add"]);
+  if (stroke) drawStroke(context, { ...stroke, erases: false, size: stroke.shape === "lasso" ? 1 : stroke.size }, COLOURS[tool]);
+  context.globalAlpha = 1;
+}
+
+/** Paint where the brush is. */
+export function paintBrush(context, [x, y], radius, pixel) {
+  context.beginPath();
+  context.arc(x, y, radius, 0, 7);
+  lines(context, BRUSH, pixel);
+}
+
+/** A layer of marks in its colour. */
+export function tinted(marks, layer) {
+  const own = marks.layer(layer, () => COLOURS[layer]);
+  const context = own.getContext("2d");
+  context.globalCompositeOperation = "source-in";
+  context.fillStyle = COLOURS[layer];
+  context.fillRect(0, 0, own.width, own.height);
+  return own;
+}
+
+/** Whether a stroke meets a ring. */
+export function touches({ points, size }, ring) {
+  const context = document.createElement("canvas").getContext("2d");
+  const path = pathOf(ring);
+  context.lineWidth = size;
+  return points.some(([x, y]) => context.isPointInPath(path, x, y) || context.isPointInStroke(path, x, y));
+}

@@ -1,0 +1,46 @@
+/** What was made of a tile: its files, a picture of it, what is to be said. */
+
+import { h, icon } from "../dom.js";
+import { alive, bytes, capital, sentence } from "../words.js";
+import { KINDS } from "./kinds.js";
+
+const SEEN = /\.(png|gif|svg)$/; // files that browsers show
+
+const address = ({ result }, name) => `api/takeaways/${result.takeaway}/files/${encodeURIComponent(name)}`;
+
+/** Whether a task has made files. */
+export const isMade = (task) => Boolean(KINDS[task?.operation] && task.state === "done" && task.result?.files?.length);
+
+/** Links to the files that a task has made. */
+export function files(task, kind) {
+  return task.result.files.map(({ name, bytes: size }) =>
+    h("a", { class: `button ${kind}`, href: address(task, name), download: name }, icon("download"), name, size && h("span", { class: "small" }, bytes(size))));
+}
+
+/** A picture of what a task has made, null if there is none. */
+export function picture(task) {
+  const { takeaway, preview, files: [{ name }] } = task.result;
+  if (!preview && !SEEN.test(name)) return null;
+  const src = preview ? `api/takeaways/${takeaway}/preview.png` : address(task, name);
+  return h("img", { src, alt: `What was made: ${KINDS[task.operation].title.toLowerCase()}`, loading: "lazy" });
+}
+
+/** What there is to say of a task; `stale`: whether its settings were changed since. */
+export function words(task, stale) {
+  if (alive(task)) {
+    return [h("p", {}, task.state === "waiting" ? "Waiting its turn …" : capital(task.what || "At work …")),
+      h("progress", { max: 1, value: task.share, "aria-label": "How far it is" })];
+  }
+  if (task?.state === "failed") return [h("p", { class: "error" }, sentence(task.error))];
+  if (task?.state === "cancelled") return [h("p", { class: "soft" }, "Stopped.")];
+  if (!isMade(task)) return [];
+  return [...(task.result.notes ?? []).map((text) => h("p", { class: "notice" }, sentence(text))),
+    stale && h("p", { class: "soft" }, "You changed something since. Make it again to have it."),
+    h("div", { class: "row" }, files(task, "primary"))];
+}
+
+/** A list of what was made before. */
+export function madeBefore(tasks) {
+  return h("ul", { class: "made" }, tasks.map((task) =>
+    h("li", { class: "panel stack" }, picture(task), h("span", { class: "soft small" }, KINDS[task.operation].title), files(task, ""))));
+}
