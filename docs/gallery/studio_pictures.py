@@ -131,11 +131,12 @@ def density(page: Page) -> None:
 def phones(browser: Browser, address: str, own: str, tile: int) -> None:
     """Three pages on a phone, side by side; two of them in the dark."""
     seen: list[Image.Image] = []
-    for path, ready, scheme in (
-        (f"p/{own}", ".card[data-tile]", "dark"),
-        (f"p/{own}/t/{tile}", ".closeup-canvas", "light"),
-        (f"p/{own}/take/{tile}", ".form", "dark"),
+    for path, ready, dark in (
+        (f"p/{own}", ".card[data-tile]", True),
+        (f"p/{own}/t/{tile}", ".closeup-canvas", False),
+        (f"p/{own}/take/{tile}", ".form", True),
     ):
+        scheme = "dark" if dark else "light"
         page = browser.new_page(viewport=PHONE, base_url=address, color_scheme=scheme)
         page.goto(f"/#/{path}")
         page.wait_for_selector(ready)
