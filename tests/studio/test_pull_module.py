@@ -63,7 +63,9 @@ def run_in_node(program: str, given: Any) -> Any:
     return json.loads(done.stdout)
 
 
-CASES = [(name, lattice) for name in ("IH1", "IH4", "IH6", "IH21", "IH26") for lattice in (True, False)]
+CASES = [
+    (name, lattice) for name in ("IH1", "IH4", "IH6", "IH21", "IH26") for lattice in (True, False)
+]
 
 
 @pytest.fixture(scope="module", name="told")
