@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import zipfile
 from contextlib import suppress
 from pathlib import Path
@@ -59,6 +60,22 @@ def changed(saved: bytes, **entries: bytes | None) -> bytes:
             if content is not None:
                 new.writestr(name, content)
     return data.getvalue()
+
+
+def test_what_the_page_of_docs_says_of_it_runs(
+    saved: bytes,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "studio.md").read_text(encoding="utf-8")
+    [snippet] = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "turtle.orbiflow").write_bytes(saved)
+    exec(compile(snippet, "studio.md", "exec"), {})
+    assert capsys.readouterr().out == "house IH4-IH4 True\n"
+    assert EscherTile.load(tmp_path / "turtle").certificate.valid
+    assert (tmp_path / "turtles.png").stat().st_size > 1000
 
 
 def test_what_was_saved_is_there_again(saved: bytes, tmp_path: Path) -> None:
