@@ -82,6 +82,15 @@ def test_tables_are_the_integral_at_every_level(
     assert errors[0] < 0.5  # of the roughest, at the worst of 40 points
 
 
+def test_even_chains_need_no_fine_grid() -> None:
+    logs, means = torch.full((1, 3), -math.log(3)).double(), torch.zeros(1, 3, 7).double()
+    even = VonMisesChains(Torus(3), logs, means, torch.zeros(1, 3).double())
+    split = Split(3, (1, 2), (), ())
+    ((log, found),) = even.approximated(split, Torus(2), 0, lambda: None)
+    assert log == pytest.approx(0, abs=1e-6)
+    assert len(found.centers) <= 24**2  # pyright: ignore[reportAttributeAccessIssue]
+
+
 @given(seeds, st.data())
 @settings(deadline=None, max_examples=6)
 def test_an_error_is_at_least_the_true_one(seed: int, data: st.DataObject) -> None:

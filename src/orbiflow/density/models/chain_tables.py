@@ -118,7 +118,8 @@ class _Walk:
             joint += kappa[:, axis] * own.prod(dim=1)
         apart = sharp[:, list(split.kept)]
         # kernels along the axes stand for a slanted bump only if they are narrower than its narrow side
-        slanted = joint / apart.prod(dim=1).sqrt() if apart.shape[1] > 1 else 0 * joint
+        both = apart.prod(dim=1).sqrt().clamp_min(1e-12)  # 0 where both angles are even
+        slanted = joint / both if apart.shape[1] > 1 else 0 * joint
         apart = apart * (1 + slanted.clamp_max(1))[:, None]
         self.kappa = kappa.clone()
         count = 2 * math.pi / KERNEL_STEP * apart.sqrt()
