@@ -27,8 +27,12 @@ FINEST = {1: 3072, 2: 768}
 FAINTEST = 25.0
 """Components whose logarithm is further than this below that of the largest are left out."""
 
-ALONE, FEWEST = 48, 8
+ALONE, FEWEST = 24, 4
 """The fewest nodes of an angle that is the only one hidden, and of several."""
+
+LEFT, GENTLE = (0.9, 0.7, 0.4, 0.2), 10.0
+"""Share of hidden noise that is left about quasi-random nodes, level by level, and the concentration
+below which it is less."""
 
 SHARPNESS = 1.2 ** torch.arange(-30, 116, dtype=torch.float64)
 """Concentrations by which quasi-random nodes are spread."""
@@ -131,7 +135,9 @@ class _Walk:
     ) -> None:
         """Add the components' densities, relative to exp(top), to tables of their sizes."""
         likely = torch.nonzero(self.likely > top - FAINTEST)[:, 0]
-        rule = _Rule(len(self.hidden), level)
+        last = max(self.order.index(axis) for axis in self.split.kept)
+        early = all(self.order.index(axis) < last for axis in self.hidden)
+        rule = _Rule(len(self.hidden), level, early)
         sizes, number = unique(self.wanted[likely], dim=0, return_inverse=True)
         for k, size in enumerate(listed(sizes)):
             table = tables.setdefault(tuple(size), torch.zeros(*size, dtype=torch.float64))
@@ -139,12 +145,15 @@ class _Walk:
 
     def _add(self, table: Tensor, chosen: Tensor, top: float, rule: _Rule, start: float) -> None:
         kept, sizes = list(self.split.kept), torch.tensor(table.shape)
-        reach = (self.reach[chosen][:, kept] / (2 * math.pi) * sizes).ceil().long().amax(dim=0) + 1
-        widths = torch.minimum(2 * reach + 1, sizes)
-        middle = self.middle[chosen][:, kept] / (2 * math.pi) - start
+        reach = (self.reach[:, kept] / (2 * math.pi) * sizes).ceil().long() + 1
+        widest = torch.minimum(2 * reach + 1, sizes)
+        middle = self.middle[:, kept] / (2 * math.pi) - start
         middle = (middle * sizes).round().long()
-        block = max(1, AT_ONCE // (rule.count * int(widths.prod())))
-        for some, at in zip(torch.split(chosen, block), torch.split(middle, block), strict=True):
+        chosen = chosen[widest[chosen].prod(dim=1).argsort()]
+        while len(chosen):
+            block = max(1, AT_ONCE // (rule.count * int(widest[chosen[-1]].prod())))
+            some, chosen = chosen[-block:], chosen[:-block]
+            at, widths = middle[some], widest[some].amax(dim=0)
             places = [
                 (at[:, i, None] - width // 2 + torch.arange(width)) % size
                 for i, (width, size) in enumerate(zip(listed(widths), table.shape, strict=True))
@@ -170,20 +179,30 @@ class _Walk:
         total = (self.logs[rows] - top)[:, None, None, None]
         # sines and cosines over components, nodes and grids
         seen = dict[int, tuple[Tensor, Tensor]]()
+        near = _Nearby(len(self.hidden) if rule.left else 0)
         for axis in self.order:
             kappa, mean = self.kappa[rows, axis, None, None, None], self._mean(rows, axis, seen)
+            lean = self._lean(rows, axis, seen, near)
             if axis in self.hidden:
-                offset, logs = rule.nodes(self.hidden.index(axis), self.kappa[rows, axis, None])
+                number, spread = self.hidden.index(axis), rule.spread(kappa)
+                apart = (kappa / (1 - kappa * spread))[:, :, 0, 0]
+                offset, logs = rule.nodes(number, apart)
                 at, total = mean + offset[:, :, None, None], total + logs[:, :, None, None]
-                seen[axis] = at.sin(), at.cos()
+                damped = near.add(axis, number, lean, spread)
+                seen[axis] = damped * at.sin(), damped * at.cos()
                 continue
             if axis in given:
                 at = torch.full((1, 1, 1, 1), 2 * math.pi * given[axis], dtype=torch.float64)
             else:
                 at = angles[kept.index(axis)][:, None, :, None]
-                kappa = kappa.clamp_max(sharpest_on(shape[kept.index(axis)]))
             if axis == first_last[-1]:
                 at = at.mT
+            mean, kappa, gain = near.seen_at(mean, kappa, lean)
+            if axis in kept:
+                kappa = kappa.clamp_max(sharpest_on(shape[kept.index(axis)]))
+            if axis != self.order[-1]:
+                near.observe(at - mean, lean, gain)
+            if axis == first_last[-1]:
                 images = torch.cat([at.cos(), at.sin(), torch.ones_like(at)], dim=2)[:, 0]
                 total = total - kappa - special.i0e(kappa).log()
                 linear = [kappa * mean.cos(), kappa * mean.sin(), total]
@@ -205,12 +224,67 @@ class _Walk:
             mean = mean + own[:, 1 + j] * sin + own[:, 1 + self.split.dim + j] * cos
         return mean
 
+    def _lean(
+        self, rows: Tensor, axis: int, seen: dict[int, tuple[Tensor, Tensor]], near: _Nearby
+    ) -> Tensor:
+        """Return how far an angle moves (C, Q, A, B, H) with what is left about the nodes."""
+        own = self.means[rows, axis][:, :, None, None, None]
+        found = torch.zeros(1, 1, 1, 1, near.count, dtype=torch.float64)
+        for j, lean in near.leans.items():
+            sin, cos = seen[j]
+            slope = own[:, 1 + j] * cos - own[:, 1 + self.split.dim + j] * sin
+            found = found + slope[..., None] * lean
+        return found
+
+
+class _Nearby:
+    """What is left of hidden angles' noise about quasi-random nodes: H normal numbers.
+
+    To first order, angles after a hidden one move in proportion, so that this part has a closed form:
+    it makes bumps wider and aslant, and angles that are observed tell of it (Kalman, 1960).
+
+    - `leans`: By hidden angle, how far (..., H) it moves with each number.
+    - `middle`, `spread`: Mean (..., H) and covariance (..., H, H) of the numbers, given what was
+      observed.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self.leans: dict[int, Tensor] = {}
+        self.middle = torch.zeros(count, dtype=torch.float64)
+        self.spread = torch.eye(count, dtype=torch.float64)
+
+    def add(self, axis: int, number: int, lean: Tensor, own: Tensor) -> Tensor:
+        """Add a hidden angle with noise of a variance; return the factor of its mean sine."""
+        if not self.count:
+            return own.new_ones(())
+        noise = own.sqrt()[..., None] * torch.eye(self.count, dtype=own.dtype)[number]
+        self.leans[axis] = lean + noise
+        return (-self.leans[axis].square().sum(dim=-1) / 2).exp()
+
+    def seen_at(self, mean: Tensor, kappa: Tensor, lean: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Return the mean and concentration of an angle, and the gain of what it tells."""
+        gain = (self.spread @ lean[..., None])[..., 0]
+        wider = 1 + kappa * (lean * gain).sum(dim=-1)
+        mean = mean + (lean * self.middle).sum(dim=-1)
+        return mean, kappa / wider, gain * (kappa / wider)[..., None]
+
+    def observe(self, off: Tensor, lean: Tensor, gain: Tensor) -> None:
+        """Learn that an angle is off its mean."""
+        off = torch.remainder(off + math.pi, 2 * math.pi) - math.pi
+        told = (self.spread @ lean[..., None])[..., 0]
+        self.middle = self.middle + off[..., None] * gain
+        self.spread = self.spread - gain[..., :, None] * told[..., None, :]
+
 
 class _Rule:
     """Nodes of hidden angles: even ones of a single angle, quasi-random ones of several."""
 
-    def __init__(self, hidden: int, level: int) -> None:
-        self.count = (1, ALONE * 2**level, FEWEST * 4**level)[min(hidden, 2)]
+    def __init__(self, hidden: int, level: int, early: bool) -> None:
+        # of angles after those kept, it would have to be known at each point of the grid
+        self.left = LEFT[level] if early and hidden > 1 else 0.0
+        several = FEWEST * 4**level
+        self.count = (1, ALONE * 2**level, several)[min(hidden, 2)]
         self.tables: list[Tensor] = []
         if hidden > 1:
             even = torch.quasirandom.SobolEngine(hidden, scramble=True, seed=level)
@@ -218,6 +292,10 @@ class _Rule:
             self.tables = [
                 quantiles(SHARPNESS, own) * SHARPNESS.sqrt()[:, None] for own in nodes.mT
             ]
+
+    def spread(self, kappa: Tensor) -> Tensor:
+        """Return the variance that is left about the nodes of hidden angles."""
+        return self.left / (kappa + GENTLE)
 
     def nodes(self, number: int, kappa: Tensor) -> tuple[Tensor, Tensor]:
         """Return offsets (C, Q) of a hidden angle from its mean, and the logarithms of their weights.
