@@ -89,9 +89,8 @@ class _Walk:
         self.hidden = [axis for axis in order if axis not in split.observed]
         given = dict(zip(split.given, split.values, strict=True))
         self.middle = means[:, :, 0].clone()
-        noise = torch.diag_embed(
-            kappa.clamp_min(1e-12).rsqrt()
-        )  # (C, d, d): of each angle, from each
+        # (C, d, d): of each angle, from each
+        noise = torch.diag_embed(kappa.clamp_min(1e-12).rsqrt())
         bend = torch.zeros_like(kappa)
         self.reach = torch.zeros_like(kappa)
         self.likely = logs.clone()
@@ -107,10 +106,8 @@ class _Walk:
             self.reach[:, axis] = REACH * noise[:, axis].square().sum(dim=1).sqrt() + bend[:, axis]
             if axis in given:
                 at = torch.tensor(2 * math.pi * given[axis], dtype=torch.float64)
-                rough = 1 / (
-                    noise[:, axis].square().sum(dim=1) + bend[:, axis].square() + 1 / WIDE**2
-                )
-                self.likely += rough * ((at - self.middle[:, axis]).cos() - 1) + rough.log() / 2
+                rough = noise[:, axis].square().sum(dim=1) + bend[:, axis].square() + 1 / WIDE**2
+                self.likely += ((at - self.middle[:, axis]).cos() - 1) / rough - rough.log() / 2
                 self.middle[:, axis] = at
                 noise[:, axis], bend[:, axis], self.reach[:, axis] = 0, 0, 0
         sharp = kappa.clone()
@@ -125,7 +122,6 @@ class _Walk:
         both = apart.prod(dim=1).sqrt().clamp_min(1e-12)  # 0 where both angles are even
         slanted = joint / both if apart.shape[1] > 1 else 0 * joint
         apart = apart * (1 + slanted.clamp_max(1))[:, None]
-        self.kappa = kappa.clone()
         count = 2 * math.pi / KERNEL_STEP * apart.sqrt()
         sizes = torch.tensor([size for size in SIZES if size <= FINEST[len(split.kept)]])
         self.wanted = sizes[torch.searchsorted(sizes, count).clamp_max(len(sizes) - 1)]
@@ -163,11 +159,9 @@ class _Walk:
                 for p, size in zip(places, table.shape, strict=True)
             ]
             values = self._values(some, angles, top, rule, table.shape)
-            flat = (
-                places[0]
-                if len(places) == 1
-                else (places[0][:, :, None] * table.shape[1] + places[1][:, None])
-            )
+            flat = places[0]
+            if len(places) > 1:
+                flat = flat[:, :, None] * table.shape[1] + places[1][:, None]
             table.view(-1).index_add_(0, flat.flatten(), values.flatten())
 
     def _values(
@@ -179,17 +173,19 @@ class _Walk:
         total = (self.logs[rows] - top)[:, None, None, None]
         # sines and cosines over components, nodes and grids
         seen = dict[int, tuple[Tensor, Tensor]]()
-        near = _Nearby(len(self.hidden) if rule.left else 0)
+        near = _Near()
         for axis in self.order:
-            kappa, mean = self.kappa[rows, axis, None, None, None], self._mean(rows, axis, seen)
-            lean = self._lean(rows, axis, seen, near)
+            kappa = self.kappa[rows, axis, None, None, None]
+            mean, lean = self._mean(rows, axis, seen, near)
             if axis in self.hidden:
-                number, spread = self.hidden.index(axis), rule.spread(kappa)
-                apart = (kappa / (1 - kappa * spread))[:, :, 0, 0]
-                offset, logs = rule.nodes(number, apart)
+                number, left = self.hidden.index(axis), rule.left / (kappa + GENTLE)
+                offset, logs = rule.nodes(number, (kappa / (1 - kappa * left))[:, :, 0, 0])
                 at, total = mean + offset[:, :, None, None], total + logs[:, :, None, None]
-                damped = near.add(axis, number, lean, spread)
-                seen[axis] = damped * at.sin(), damped * at.cos()
+                if rule.left:
+                    lean = lean + left.sqrt()[..., None] * torch.eye(len(self.hidden))[number]
+                    near[axis] = lean, torch.zeros_like(left)
+                mean_sine = (-lean.square().sum(dim=-1) / 2).exp()
+                seen[axis] = mean_sine * at.sin(), mean_sine * at.cos()
                 continue
             if axis in given:
                 at = torch.full((1, 1, 1, 1), 2 * math.pi * given[axis], dtype=torch.float64)
@@ -197,11 +193,11 @@ class _Walk:
                 at = angles[kept.index(axis)][:, None, :, None]
             if axis == first_last[-1]:
                 at = at.mT
-            mean, kappa, gain = near.seen_at(mean, kappa, lean)
+            if axis != self.order[-1]:
+                _observe(near, at - mean, kappa, lean)
+            kappa = kappa / (1 + kappa * lean.square().sum(dim=-1))
             if axis in kept:
                 kappa = kappa.clamp_max(sharpest_on(shape[kept.index(axis)]))
-            if axis != self.order[-1]:
-                near.observe(at - mean, lean, gain)
             if axis == first_last[-1]:
                 images = torch.cat([at.cos(), at.sin(), torch.ones_like(at)], dim=2)[:, 0]
                 total = total - kappa - special.i0e(kappa).log()
@@ -216,65 +212,40 @@ class _Walk:
             return values[:, 0]
         return values if first_last[0] == kept[0] else values.mT
 
-    def _mean(self, rows: Tensor, axis: int, seen: dict[int, tuple[Tensor, Tensor]]) -> Tensor:
-        """Return the mean of an angle given those before it, whose sines and cosines are seen."""
+    def _mean(
+        self, rows: Tensor, axis: int, seen: dict[int, tuple[Tensor, Tensor]], near: _Near
+    ) -> tuple[Tensor, Tensor]:
+        """Return the mean of an angle given those before it, whose sines and cosines are seen.
+
+        And how far it leans (..., H) with what is left about nodes.
+        """
         own = self.means[rows, axis][:, :, None, None, None]
-        mean = own[:, 0]
+        mean, lean = own[:, 0], own.new_zeros(1, 1, 1, 1, len(self.hidden))
         for j, (sin, cos) in seen.items():
-            mean = mean + own[:, 1 + j] * sin + own[:, 1 + self.split.dim + j] * cos
-        return mean
-
-    def _lean(
-        self, rows: Tensor, axis: int, seen: dict[int, tuple[Tensor, Tensor]], near: _Nearby
-    ) -> Tensor:
-        """Return how far an angle moves (C, Q, A, B, H) with what is left about the nodes."""
-        own = self.means[rows, axis][:, :, None, None, None]
-        found = torch.zeros(1, 1, 1, 1, near.count, dtype=torch.float64)
-        for j, lean in near.leans.items():
-            sin, cos = seen[j]
-            slope = own[:, 1 + j] * cos - own[:, 1 + self.split.dim + j] * sin
-            found = found + slope[..., None] * lean
-        return found
+            along, across = own[:, 1 + j], own[:, 1 + self.split.dim + j]
+            mean = mean + along * sin + across * cos
+            if j in near:
+                slope = along * cos - across * sin
+                mean, lean = mean + slope * near[j][1], lean + slope[..., None] * near[j][0]
+        return mean, lean
 
 
-class _Nearby:
-    """What is left of hidden angles' noise about quasi-random nodes: H normal numbers.
+_Near = dict[int, tuple[Tensor, Tensor]]
+"""What is left of hidden angles' noise about quasi-random nodes, in terms of H normal numbers.
 
-    To first order, angles after a hidden one move in proportion, so that this part has a closed form:
-    it makes bumps wider and aslant, and angles that are observed tell of it (Kalman, 1960).
+How far (..., H) each angle leans with them, and its shift by what was observed. To first order all
+angles after it move in proportion: bumps become wider and aslant, in closed form.
+"""
 
-    - `leans`: By hidden angle, how far (..., H) it moves with each number.
-    - `middle`, `spread`: Mean (..., H) and covariance (..., H, H) of the numbers, given what was
-      observed.
-    """
 
-    def __init__(self, count: int) -> None:
-        self.count = count
-        self.leans: dict[int, Tensor] = {}
-        self.middle = torch.zeros(count, dtype=torch.float64)
-        self.spread = torch.eye(count, dtype=torch.float64)
-
-    def add(self, axis: int, number: int, lean: Tensor, own: Tensor) -> Tensor:
-        """Add a hidden angle with noise of a variance; return the factor of its mean sine."""
-        if not self.count:
-            return own.new_ones(())
-        noise = own.sqrt()[..., None] * torch.eye(self.count, dtype=own.dtype)[number]
-        self.leans[axis] = lean + noise
-        return (-self.leans[axis].square().sum(dim=-1) / 2).exp()
-
-    def seen_at(self, mean: Tensor, kappa: Tensor, lean: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Return the mean and concentration of an angle, and the gain of what it tells."""
-        gain = (self.spread @ lean[..., None])[..., 0]
-        wider = 1 + kappa * (lean * gain).sum(dim=-1)
-        mean = mean + (lean * self.middle).sum(dim=-1)
-        return mean, kappa / wider, gain * (kappa / wider)[..., None]
-
-    def observe(self, off: Tensor, lean: Tensor, gain: Tensor) -> None:
-        """Learn that an angle is off its mean."""
-        off = torch.remainder(off + math.pi, 2 * math.pi) - math.pi
-        told = (self.spread @ lean[..., None])[..., 0]
-        self.middle = self.middle + off[..., None] * gain
-        self.spread = self.spread - gain[..., :, None] * told[..., None, :]
+def _observe(near: _Near, off: Tensor, kappa: Tensor, lean: Tensor) -> None:
+    """Learn from an angle that is off its mean (Kalman, 1960; of the covariance the square root)."""
+    wider = 1 + kappa * lean.square().sum(dim=-1)
+    off = (torch.remainder(off + math.pi, 2 * math.pi) - math.pi) * kappa / wider
+    less = kappa / (wider + wider.sqrt())
+    for axis, (own, shift) in near.items():
+        told = (own * lean).sum(dim=-1)
+        near[axis] = own - (less * told)[..., None] * lean, shift + told * off
 
 
 class _Rule:
@@ -283,8 +254,7 @@ class _Rule:
     def __init__(self, hidden: int, level: int, early: bool) -> None:
         # of angles after those kept, it would have to be known at each point of the grid
         self.left = LEFT[level] if early and hidden > 1 else 0.0
-        several = FEWEST * 4**level
-        self.count = (1, ALONE * 2**level, several)[min(hidden, 2)]
+        self.count = (1, ALONE * 2**level, FEWEST * 4**level)[min(hidden, 2)]
         self.tables: list[Tensor] = []
         if hidden > 1:
             even = torch.quasirandom.SobolEngine(hidden, scramble=True, seed=level)
@@ -292,10 +262,6 @@ class _Rule:
             self.tables = [
                 quantiles(SHARPNESS, own) * SHARPNESS.sqrt()[:, None] for own in nodes.mT
             ]
-
-    def spread(self, kappa: Tensor) -> Tensor:
-        """Return the variance that is left about the nodes of hidden angles."""
-        return self.left / (kappa + GENTLE)
 
     def nodes(self, number: int, kappa: Tensor) -> tuple[Tensor, Tensor]:
         """Return offsets (C, Q) of a hidden angle from its mean, and the logarithms of their weights.
