@@ -116,7 +116,7 @@ def test_few_nodes_do_where_hidden_angles_move_others_far(
     for axis, value in known.items():
         whole[:, :, axis] = value
     truth = chains.log_prob(whole).logsumexp(dim=1) - math.log(len(nodes))
-    assert float((found - truth).square().mean().sqrt()) < 0.6  # nodes alone: 1 to 5
+    assert float((found - truth).square().mean().sqrt()) < 0.8  # nodes alone: 1 to 5
 
 
 @given(seeds, st.data())

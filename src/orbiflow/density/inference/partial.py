@@ -185,7 +185,7 @@ def _refined(
 
     A component whose error is small is left as it is. Changes are of the whole, at its own samples.
     """
-    enough = accuracy / math.sqrt(len(left))
+    enough, error = accuracy / math.sqrt(len(left)), math.inf
     for level in range(LEVELS):
         wanted = [one for one in left if one.error > enough]
         for number, one in enumerate(wanted):
@@ -202,10 +202,10 @@ def _refined(
                 ratio = (old - now).exp() - (new - now).exp()
                 change = ratio.clamp_min(-1 + 1e-12).log1p().square().mean()
                 one.error = float((change / 2).sqrt())
-        if all(one.error <= enough for one in left):
+        error = math.hypot(*(one.error for one in left))
+        if error <= accuracy:
             break
-    whole = _mixture([*closed, *(part for one in left for part in one.found)])
-    return whole, math.sqrt(sum(one.error**2 for one in left))
+    return _mixture([*closed, *(part for one in left for part in one.found)]), error
 
 
 def _log_total(closed: list[tuple[float, Density]], left: list[_Left]) -> float:

@@ -27,10 +27,10 @@ FINEST = {1: 3072, 2: 768}
 FAINTEST = 25.0
 """Components whose logarithm is further than this below that of the largest are left out."""
 
-ALONE, FEWEST = 24, 4
-"""The fewest nodes of an angle that is the only one hidden, and of several."""
+ALONE, SEVERAL = 24, (8, 16, 128, 512)
+"""The fewest nodes of an angle that is the only one hidden, and those of several, level by level."""
 
-LEFT, GENTLE = (0.9, 0.7, 0.4, 0.2), 10.0
+LEFT, GENTLE = (0.9, 0.7, 0.3, 0.1), 20.0
 """Share of hidden noise that is left about quasi-random nodes, level by level, and the concentration
 below which it is less."""
 
@@ -254,7 +254,7 @@ class _Rule:
     def __init__(self, hidden: int, level: int, early: bool) -> None:
         # of angles after those kept, it would have to be known at each point of the grid
         self.left = LEFT[level] if early and hidden > 1 else 0.0
-        self.count = (1, ALONE * 2**level, FEWEST * 4**level)[min(hidden, 2)]
+        self.count = (1, ALONE * 2**level, SEVERAL[level])[min(hidden, 2)]
         self.tables: list[Tensor] = []
         if hidden > 1:
             even = torch.quasirandom.SobolEngine(hidden, scramble=True, seed=level)
