@@ -158,8 +158,8 @@ class _Left:
     """A component without a closed form: its log weight, how its angles are split, and kernels for it.
 
     - `found`: Kernels with log weights, of the last level; `before`: Of the level before.
-    - `error`: The root mean square error of the whole that is its own, in nats. A change from one level
-      to the next is of two independent errors, of which the later one is not the larger.
+    - `error`: The root mean square error of the whole that is its own, in nats: its change from the
+      level before, undivided, since two levels may be off in the same direction.
     """
 
     log: float
@@ -200,8 +200,7 @@ def _refined(
                 new, old = (_log_sum(parts, points) - total for parts in (one.found, one.before))
                 # what the whole would be with the old instead of the new
                 ratio = (old - now).exp() - (new - now).exp()
-                change = ratio.clamp_min(-1 + 1e-12).log1p().square().mean()
-                one.error = float((change / 2).sqrt())
+                one.error = float(ratio.clamp_min(-1 + 1e-12).log1p().square().mean().sqrt())
         error = math.hypot(*(one.error for one in left))
         if error <= accuracy:
             break
