@@ -188,7 +188,7 @@ for place, found in zip(np.degrees(sites), tree.query_ball_point(at, 2 * np.sin(
     share = len(found) / len(fires) / cap
     print(place, f"counted {np.log(share):.2f}" if share else "counted none")
 CODE
-    fit wildfires-mixture "$FIRES" "${FIRES_COLUMNS:-1,2}" --space sphere --parts mixture
+    fit wildfires-mixture "$FIRES" "${FIRES_COLUMNS:-1,2}" --space sphere --components mixture
     draw density --regions 0.5,0.9 ${COASTLINES:+--coastlines "$COASTLINES"}
     region 0.5,0.9
     sites

@@ -154,7 +154,9 @@ def test_plot_of_three_angles_is_of_their_pairs(tmp_path: Path, orbiflow) -> Non
     rows = rng.normal(0, 0.5, (80, 3))
     data.write_text("a,b,c\n" + "\n".join(",".join(f"{v:.4f}" for v in row) for row in rows) + "\n")
     fit = ("density", "fit", data, "--space", "torus", "--max-frequency", 1, "--segments", 1)
-    assert orbiflow(*fit, "--out", model).status == 0
+    fitted = orbiflow(*fit, "--out", model)
+    assert fitted.status == 0
+    assert "more than the uniform density\n" in fitted.out  # no word of an integral not taken
     plot = ("density", "plot", "--model", model, "--out", out)
     for options in ((), ("--data", data, "--center", "pi,0,-pi")):
         drawn = orbiflow(*plot, *options)

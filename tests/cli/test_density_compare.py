@@ -307,7 +307,12 @@ def test_two_data_sets_on_a_quotient(tmp_path: Path, orbiflow: Any) -> None:
         (("p4g", "--cell", "10,10", "--unit", "degrees"), "--unit applies only to angles"),
         (("torus", "--cell", "10,10"), "--cell applies to groups, not to the torus"),
         (("p5",), "--space must be torus"),
+        (("p4g", "--cell", "1e308,1e308"), "lengths must be between 1e-50 and 1e+50, got 1e+308"),
     ):
         refused = orbiflow(*command, *given)
         assert refused.status == 2
         assert message in " ".join(refused.err.split())
+    for words in (("plot",), ("score", one)):
+        refused = orbiflow("density", *words, "-m", tmp_path / "m", "--measure", "square")
+        assert refused.status == 2
+        assert "--measure square is for spaces that have one (torus, sphere" in refused.err

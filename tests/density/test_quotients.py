@@ -309,6 +309,7 @@ def test_what_is_refused() -> None:
         (lambda: TabulatedDensity(UniformDensity(QuotientSpace("p4")), 16), "square"),
         (lambda: make_space("quotient"), "group"),
         (lambda: DensityEstimator("quotient").fit(np.zeros((20, 2))), "needs its group"),
+        (lambda: QuotientSpace("p4", cell=(1e-60, 1e-60)), "got 1e-60: choose another unit"),
     ):
         with pytest.raises((OrbiflowError, TypeError), match=message):
             make()
@@ -319,7 +320,8 @@ def test_what_is_refused() -> None:
 def test_a_plane_orbifold_is_drawn_in_the_units_of_its_data(tmp_path: Path) -> None:
     space = QuotientSpace("p31m", cell=(20.0, 20.0))
     density = Mixture([some_kernels(space), UniformDensity(space)], [0.7, 0.3])
-    cell = Cell(space, PlotSettings())
+    cell = Cell(space, PlotSettings(names=("phi", "psi")))
+    assert cell.view.names == ("φ", "ψ")
     ring = cell.domain.corners()
     x, y = ring.T
     area = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2

@@ -264,6 +264,7 @@ def test_a_glide_by_a_fraction_of_the_lattice_multiplies_the_order(parts):
         ([[1.0, 1.0], [0.0, 1e-8]], "linearly dependent"),
         ([[1.0, 0.0], [0.0, 0.0]], "zero"),
         ([[1.0, np.nan], [0.0, 1.0]], "zero, NaN or infinite"),
+        ([[1e308, 1e308], [0.0, 1e308]], "lengths must be between"),
         ([[1.0, 0.0]], r"\(d, d\) matrix"),
         ([1.0, 1.0], r"\(d, d\) matrix"),
         (np.zeros((0, 0)), r"\(d, d\) matrix"),

@@ -32,7 +32,7 @@ from orbiflow.density.inference import (
     marginal,
 )
 from orbiflow.density.models import Density, flow_obstacle, log_density_gradient
-from orbiflow.density.spaces import Space, space_for
+from orbiflow.density.spaces import Space, check_measure, space_for
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import check_names, fields_of
 
@@ -236,6 +236,7 @@ class DensityEstimator:
         Of rows that lack angles (NaN), with `missing="marginalise"`, of the angles that they have.
         """
         density = self._fitted()
+        check_measure(measure, density.space)
         with torch.no_grad():
             points = self._chart(np.asarray(X))
             return at_observed(density, points, measure=measure).numpy()

@@ -104,11 +104,13 @@ class _Near:
     def sum(self, *orders: int) -> Tensor:
         """Return the derivative (N,) of these orders along the axes; the last axis is summed first."""
         if orders not in self.kept:
-            rest, w = self.sum(*orders[1:]), self.weights[-len(orders)][orders[0]]
+            # of few points, four views would cost what the sum does: unbind makes them at once
+            rest = self.sum(*orders[1:]).unbind(-2)
+            w = self.weights[-len(orders), orders[0]].unbind()
             # tap by tap: a table of products would go through the memory twice
-            total = rest[..., 0, :] * w[0]
-            for tap in range(1, TAPS):
-                total = torch.addcmul(total, rest[..., tap, :], w[tap])
+            total = rest[0] * w[0]
+            for values, weight in zip(rest[1:], w[1:], strict=True):
+                total = torch.addcmul(total, values, weight)
             self.kept[orders] = total
         return self.kept[orders]
 

@@ -29,6 +29,9 @@ from orbiflow.symmetry.isometry import (
 
 MAX_ORDER, MAX_DIM, MAX_NAME = 2048, 64, 200
 
+LONGEST = 1e50
+"""Length of a basis vector of a lattice, and its inverse the shortest: volumes stay finite."""
+
 
 def checked_lattice(lattice: ArrayLike) -> Array:
     """Return a read-only float64 copy of a lattice basis; raise GroupError if it is degenerate."""
@@ -37,9 +40,15 @@ def checked_lattice(lattice: ArrayLike) -> Array:
         raise GroupError(
             f"a lattice is a (d, d) matrix with basis vectors as columns, got shape {basis.shape}"
         )
-    lengths = np.linalg.norm(basis, axis=0)
-    if not np.isfinite(basis).all() or lengths.min() == 0.0:
+    longest = np.abs(basis).max(axis=0)
+    if not np.isfinite(basis).all() or longest.min() == 0.0:
         raise GroupError("the lattice basis has a zero, NaN or infinite column")
+    if longest.max() > LONGEST or longest.min() < 1 / LONGEST:
+        raise GroupError(
+            f"the lattice's lengths must be between {1 / LONGEST:g} and {LONGEST:g}, got "
+            f"{longest.max() if longest.max() > LONGEST else longest.min():g}: choose another unit"
+        )
+    lengths = np.linalg.norm(basis, axis=0)
     if abs(np.linalg.det(basis / lengths)) < 1e-6:
         raise GroupError("the lattice basis vectors are (nearly) linearly dependent")
     basis.setflags(write=False)

@@ -131,14 +131,14 @@ def fit_automatic(
         candidates = candidates_of(space, families, folds, course, budget, beside)
         weights = supported_weights(candidates.table, candidates.floor, candidates.row_weights)
         weights = without_idle(candidates, weights)  # each part costs time at every query
+        others = judged(candidates, weights)  # while the flow is fitted
         tried = TriedFlow()
         if fitted is not None:
             tried = try_flow(folds, candidates, weights, fitted)
     say(BEFORE_END, "putting together")
     density = assembled(space, families, candidates, weights, folds.rows, tried.flow, tried.share)
-    beside = 1 - tried.share
-    others = [replace(one, share=one.share * beside) for one in judged(candidates, weights)]
-    parts = (*tried.evidence, *others)
+    rest = 1 - tried.share
+    parts = (*tried.evidence, *(replace(one, share=one.share * rest) for one in others))
     report = _report(density, folds, candidates, weights, tried, parts, found)
     after = (
         *weights_note(folds.rows),

@@ -120,8 +120,8 @@ def candidates_of(
                 partial(_fitted, family, folds, number, budget),
                 course.part(1.0 if number else FIRST_FOLD),
             )
-            for family in families
-        ]
+            for family in reversed(families)  # the longest first
+        ][::-1]
 
     waiting = [begun(0)]
     blocks: list[dict[tuple[str, str], Tensor]] = []

@@ -158,8 +158,8 @@ class _Left:
     """A component without a closed form: its log weight, how its angles are split, and kernels for it.
 
     - `found`: Kernels with log weights, of the last level; `before`: Of the level before.
-    - `error`: The root mean square error of the whole that is its own, in nats. A change from one level
-      to the next is of two independent errors, of which the later one is not the larger.
+    - `error`: The root mean square error of the whole that is its own, in nats: its change from the
+      level before, undivided, since two levels may be off in the same direction.
     """
 
     log: float
@@ -185,7 +185,7 @@ def _refined(
 
     A component whose error is small is left as it is. Changes are of the whole, at its own samples.
     """
-    enough = accuracy / math.sqrt(len(left))
+    enough, error = accuracy / math.sqrt(len(left)), math.inf
     for level in range(LEVELS):
         wanted = [one for one in left if one.error > enough]
         for number, one in enumerate(wanted):
@@ -200,12 +200,11 @@ def _refined(
                 new, old = (_log_sum(parts, points) - total for parts in (one.found, one.before))
                 # what the whole would be with the old instead of the new
                 ratio = (old - now).exp() - (new - now).exp()
-                change = ratio.clamp_min(-1 + 1e-12).log1p().square().mean()
-                one.error = float((change / 2).sqrt())
-        if all(one.error <= enough for one in left):
+                one.error = float(ratio.clamp_min(-1 + 1e-12).log1p().square().mean().sqrt())
+        error = math.hypot(*(one.error for one in left))
+        if error <= accuracy:
             break
-    whole = _mixture([*closed, *(part for one in left for part in one.found)])
-    return whole, math.sqrt(sum(one.error**2 for one in left))
+    return _mixture([*closed, *(part for one in left for part in one.found)]), error
 
 
 def _log_total(closed: list[tuple[float, Density]], left: list[_Left]) -> float:

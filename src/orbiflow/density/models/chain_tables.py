@@ -27,8 +27,12 @@ FINEST = {1: 3072, 2: 768}
 FAINTEST = 25.0
 """Components whose logarithm is further than this below that of the largest are left out."""
 
-ALONE, FEWEST = 48, 8
-"""The fewest nodes of an angle that is the only one hidden, and of several."""
+ALONE, SEVERAL = 24, (8, 16, 128, 512)
+"""The fewest nodes of an angle that is the only one hidden, and those of several, level by level."""
+
+LEFT, GENTLE = (0.9, 0.7, 0.3, 0.1), 20.0
+"""Share of hidden noise that is left about quasi-random nodes, level by level, and the concentration
+below which it is less."""
 
 SHARPNESS = 1.2 ** torch.arange(-30, 116, dtype=torch.float64)
 """Concentrations by which quasi-random nodes are spread."""
@@ -85,9 +89,8 @@ class _Walk:
         self.hidden = [axis for axis in order if axis not in split.observed]
         given = dict(zip(split.given, split.values, strict=True))
         self.middle = means[:, :, 0].clone()
-        noise = torch.diag_embed(
-            kappa.clamp_min(1e-12).rsqrt()
-        )  # (C, d, d): of each angle, from each
+        # (C, d, d): of each angle, from each
+        noise = torch.diag_embed(kappa.clamp_min(1e-12).rsqrt())
         bend = torch.zeros_like(kappa)
         self.reach = torch.zeros_like(kappa)
         self.likely = logs.clone()
@@ -103,10 +106,8 @@ class _Walk:
             self.reach[:, axis] = REACH * noise[:, axis].square().sum(dim=1).sqrt() + bend[:, axis]
             if axis in given:
                 at = torch.tensor(2 * math.pi * given[axis], dtype=torch.float64)
-                rough = 1 / (
-                    noise[:, axis].square().sum(dim=1) + bend[:, axis].square() + 1 / WIDE**2
-                )
-                self.likely += rough * ((at - self.middle[:, axis]).cos() - 1) + rough.log() / 2
+                rough = noise[:, axis].square().sum(dim=1) + bend[:, axis].square() + 1 / WIDE**2
+                self.likely += ((at - self.middle[:, axis]).cos() - 1) / rough - rough.log() / 2
                 self.middle[:, axis] = at
                 noise[:, axis], bend[:, axis], self.reach[:, axis] = 0, 0, 0
         sharp = kappa.clone()
@@ -118,9 +119,9 @@ class _Walk:
             joint += kappa[:, axis] * own.prod(dim=1)
         apart = sharp[:, list(split.kept)]
         # kernels along the axes stand for a slanted bump only if they are narrower than its narrow side
-        slanted = joint / apart.prod(dim=1).sqrt() if apart.shape[1] > 1 else 0 * joint
+        both = apart.prod(dim=1).sqrt().clamp_min(1e-12)  # 0 where both angles are even
+        slanted = joint / both if apart.shape[1] > 1 else 0 * joint
         apart = apart * (1 + slanted.clamp_max(1))[:, None]
-        self.kappa = kappa.clone()
         count = 2 * math.pi / KERNEL_STEP * apart.sqrt()
         sizes = torch.tensor([size for size in SIZES if size <= FINEST[len(split.kept)]])
         self.wanted = sizes[torch.searchsorted(sizes, count).clamp_max(len(sizes) - 1)]
@@ -130,7 +131,9 @@ class _Walk:
     ) -> None:
         """Add the components' densities, relative to exp(top), to tables of their sizes."""
         likely = torch.nonzero(self.likely > top - FAINTEST)[:, 0]
-        rule = _Rule(len(self.hidden), level)
+        last = max(self.order.index(axis) for axis in self.split.kept)
+        early = all(self.order.index(axis) < last for axis in self.hidden)
+        rule = _Rule(len(self.hidden), level, early)
         sizes, number = unique(self.wanted[likely], dim=0, return_inverse=True)
         for k, size in enumerate(listed(sizes)):
             table = tables.setdefault(tuple(size), torch.zeros(*size, dtype=torch.float64))
@@ -138,12 +141,15 @@ class _Walk:
 
     def _add(self, table: Tensor, chosen: Tensor, top: float, rule: _Rule, start: float) -> None:
         kept, sizes = list(self.split.kept), torch.tensor(table.shape)
-        reach = (self.reach[chosen][:, kept] / (2 * math.pi) * sizes).ceil().long().amax(dim=0) + 1
-        widths = torch.minimum(2 * reach + 1, sizes)
-        middle = self.middle[chosen][:, kept] / (2 * math.pi) - start
+        reach = (self.reach[:, kept] / (2 * math.pi) * sizes).ceil().long() + 1
+        widest = torch.minimum(2 * reach + 1, sizes)
+        middle = self.middle[:, kept] / (2 * math.pi) - start
         middle = (middle * sizes).round().long()
-        block = max(1, AT_ONCE // (rule.count * int(widths.prod())))
-        for some, at in zip(torch.split(chosen, block), torch.split(middle, block), strict=True):
+        chosen = chosen[widest[chosen].prod(dim=1).argsort()]
+        while len(chosen):
+            block = max(1, AT_ONCE // (rule.count * int(widest[chosen[-1]].prod())))
+            some, chosen = chosen[-block:], chosen[:-block]
+            at, widths = middle[some], widest[some].amax(dim=0)
             places = [
                 (at[:, i, None] - width // 2 + torch.arange(width)) % size
                 for i, (width, size) in enumerate(zip(listed(widths), table.shape, strict=True))
@@ -153,11 +159,9 @@ class _Walk:
                 for p, size in zip(places, table.shape, strict=True)
             ]
             values = self._values(some, angles, top, rule, table.shape)
-            flat = (
-                places[0]
-                if len(places) == 1
-                else (places[0][:, :, None] * table.shape[1] + places[1][:, None])
-            )
+            flat = places[0]
+            if len(places) > 1:
+                flat = flat[:, :, None] * table.shape[1] + places[1][:, None]
             table.view(-1).index_add_(0, flat.flatten(), values.flatten())
 
     def _values(
@@ -169,20 +173,32 @@ class _Walk:
         total = (self.logs[rows] - top)[:, None, None, None]
         # sines and cosines over components, nodes and grids
         seen = dict[int, tuple[Tensor, Tensor]]()
+        near = _Near()
         for axis in self.order:
-            kappa, mean = self.kappa[rows, axis, None, None, None], self._mean(rows, axis, seen)
+            kappa = self.kappa[rows, axis, None, None, None]
+            mean, lean = self._mean(rows, axis, seen, near)
             if axis in self.hidden:
-                offset, logs = rule.nodes(self.hidden.index(axis), self.kappa[rows, axis, None])
+                number, left = self.hidden.index(axis), rule.left / (kappa + GENTLE)
+                offset, logs = rule.nodes(number, (kappa / (1 - kappa * left))[:, :, 0, 0])
                 at, total = mean + offset[:, :, None, None], total + logs[:, :, None, None]
-                seen[axis] = at.sin(), at.cos()
+                if rule.left:
+                    lean = lean + left.sqrt()[..., None] * torch.eye(len(self.hidden))[number]
+                    near[axis] = lean, torch.zeros_like(left)
+                mean_sine = (-lean.square().sum(dim=-1) / 2).exp()
+                seen[axis] = mean_sine * at.sin(), mean_sine * at.cos()
                 continue
             if axis in given:
                 at = torch.full((1, 1, 1, 1), 2 * math.pi * given[axis], dtype=torch.float64)
             else:
                 at = angles[kept.index(axis)][:, None, :, None]
-                kappa = kappa.clamp_max(sharpest_on(shape[kept.index(axis)]))
             if axis == first_last[-1]:
                 at = at.mT
+            if axis != self.order[-1]:
+                _observe(near, at - mean, kappa, lean)
+            kappa = kappa / (1 + kappa * lean.square().sum(dim=-1))
+            if axis in kept:
+                kappa = kappa.clamp_max(sharpest_on(shape[kept.index(axis)]))
+            if axis == first_last[-1]:
                 images = torch.cat([at.cos(), at.sin(), torch.ones_like(at)], dim=2)[:, 0]
                 total = total - kappa - special.i0e(kappa).log()
                 linear = [kappa * mean.cos(), kappa * mean.sin(), total]
@@ -196,20 +212,49 @@ class _Walk:
             return values[:, 0]
         return values if first_last[0] == kept[0] else values.mT
 
-    def _mean(self, rows: Tensor, axis: int, seen: dict[int, tuple[Tensor, Tensor]]) -> Tensor:
-        """Return the mean of an angle given those before it, whose sines and cosines are seen."""
+    def _mean(
+        self, rows: Tensor, axis: int, seen: dict[int, tuple[Tensor, Tensor]], near: _Near
+    ) -> tuple[Tensor, Tensor]:
+        """Return the mean of an angle given those before it, whose sines and cosines are seen.
+
+        And how far it leans (..., H) with what is left about nodes.
+        """
         own = self.means[rows, axis][:, :, None, None, None]
-        mean = own[:, 0]
+        mean, lean = own[:, 0], own.new_zeros(1, 1, 1, 1, len(self.hidden))
         for j, (sin, cos) in seen.items():
-            mean = mean + own[:, 1 + j] * sin + own[:, 1 + self.split.dim + j] * cos
-        return mean
+            along, across = own[:, 1 + j], own[:, 1 + self.split.dim + j]
+            mean = mean + along * sin + across * cos
+            if j in near:
+                slope = along * cos - across * sin
+                mean, lean = mean + slope * near[j][1], lean + slope[..., None] * near[j][0]
+        return mean, lean
+
+
+_Near = dict[int, tuple[Tensor, Tensor]]
+"""What is left of hidden angles' noise about quasi-random nodes, in terms of H normal numbers.
+
+How far (..., H) each angle leans with them, and its shift by what was observed. To first order all
+angles after it move in proportion: bumps become wider and aslant, in closed form.
+"""
+
+
+def _observe(near: _Near, off: Tensor, kappa: Tensor, lean: Tensor) -> None:
+    """Learn from an angle that is off its mean (Kalman, 1960; of the covariance the square root)."""
+    wider = 1 + kappa * lean.square().sum(dim=-1)
+    off = (torch.remainder(off + math.pi, 2 * math.pi) - math.pi) * kappa / wider
+    less = kappa / (wider + wider.sqrt())
+    for axis, (own, shift) in near.items():
+        told = (own * lean).sum(dim=-1)
+        near[axis] = own - (less * told)[..., None] * lean, shift + told * off
 
 
 class _Rule:
     """Nodes of hidden angles: even ones of a single angle, quasi-random ones of several."""
 
-    def __init__(self, hidden: int, level: int) -> None:
-        self.count = (1, ALONE * 2**level, FEWEST * 4**level)[min(hidden, 2)]
+    def __init__(self, hidden: int, level: int, early: bool) -> None:
+        # of angles after those kept, it would have to be known at each point of the grid
+        self.left = LEFT[level] if early and hidden > 1 else 0.0
+        self.count = (1, ALONE * 2**level, SEVERAL[level])[min(hidden, 2)]
         self.tables: list[Tensor] = []
         if hidden > 1:
             even = torch.quasirandom.SobolEngine(hidden, scramble=True, seed=level)

@@ -153,9 +153,10 @@ def _words(document: Mapping[str, Any], rows: int, out: Path) -> tuple[str, str]
     gain = likelihood["natural"] - likelihood["uniform"]
     scored = likelihood["natural_rows"]
     which = "these rows" if scored == rows else f"{scored} of them"
+    integral = "" if mass is None else f"; integral {mass:.5f}"
     return (
         f"{rows} rows: mean log density at {which} {likelihood['natural']:.4f} nats, {gain:z.4f} more "
-        f"than the uniform density; integral {'not checked' if mass is None else f'{mass:.5f}'}",
+        f"than the uniform density{integral}",
         f"written to {out} in {document['seconds']:.0f} s",
     )
 

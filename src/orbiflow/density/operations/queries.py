@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from orbiflow import runtime
-from orbiflow.density import comparing, fitting, models, regions, tables
+from orbiflow.density import comparing, fitting, models, regions, spaces, tables
 from orbiflow.density.run_folder import write_file, written_files
 from orbiflow.density.tables import RowSettings, check_table_name
 from orbiflow.errors import literal
@@ -82,6 +82,7 @@ def score(
     runtime.check_output_file(out, data, model)
     with runtime.one_thread():
         density, extra = model_at(model)
+        spaces.check_measure(settings.measure, density.space)
         rows = tables.read_rows(data, with_columns_of(reading, data, extra, on_event), on_event)
         check_fits(data, rows.table, density.space, extra, on_event)
         progress = runtime.progress_events(on_event, cancel)

@@ -18,7 +18,7 @@ from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import Square
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import Sheet, mark_symmetry
-from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import DirichletDomain
 
 if TYPE_CHECKING:
@@ -42,13 +42,8 @@ class Cell(Square):
             raise OrbiflowError(
                 f"a picture needs two dimensions, this {space.name} has {space.dimensions}"
             )
-        if settings.center is not None:
-            raise SettingError(
-                f"{{center}} applies to the torus and to maps, not to a {space.name}"
-            )
-        names = space.columns if settings.names is None else settings.names
         self.space, self.group = space, group
-        self.view = frames.View(space, tuple(names), np.zeros(2))
+        self.view = frames.view_of(space, settings.names, settings.center)
         site = space.from_chart(torch.tensor(space.domain.site)[None])[0]
         self.domain = DirichletDomain(group, site)
         corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) - 0.5

@@ -24,7 +24,7 @@ from orbiflow.density.pictures.projections import PlateCarree, chosen_map
 from orbiflow.density.pictures.roses import rose_picture
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.surfaces import density_page
-from orbiflow.density.spaces import Space
+from orbiflow.density.spaces import Space, check_measure
 from orbiflow.drawing import FORMATS, Picture, pdf_pages
 from orbiflow.errors import OrbiflowError, OutputError, SettingError
 from orbiflow.runtime import LITTER, make_folder, one_thread, write_atomic, write_set
@@ -198,6 +198,7 @@ def _check_space(space: Space, settings: PlotSettings) -> None:
             "columns of `orbiflow density sample` beside those of the data"
         )
     view_of(space, settings.names, settings.center)
+    check_measure(settings.measure, space)
     if not space.is_round and (settings.projection != "auto" or settings.radius is not None):
         name = "radius" if settings.projection == "auto" else "projection"
         raise SettingError(

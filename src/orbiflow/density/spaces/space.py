@@ -18,7 +18,7 @@ from torch import Tensor
 from orbiflow.arguments import as_choice, as_tensor, as_whole, is_a
 from orbiflow.arrays import Array
 from orbiflow.density.spaces.frame import Frame, frame_of
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.symmetry import (
     CrystallographicGroup,
     DirichletDomain,
@@ -374,9 +374,14 @@ def space_for(
     return make_space(name, cell=cell)
 
 
-def check_measure(measure: str) -> None:
-    """Check that a measure is one of `MEASURES`."""
+def check_measure(measure: str, space: Space | None = None) -> None:
+    """Check that a measure is one of `MEASURES`, and that the space has such a one if it is given."""
     as_choice(measure, MEASURES, "measure")
+    if space is not None and measure == CHART and not space.has_square:
+        raise SettingError(
+            f"{{measure}} square is for spaces that have one ({', '.join(SPACES)}), not for the "
+            f"{space.name}: choose natural or uniform"
+        )
 
 
 def rectangle(space: Space) -> Tensor:
