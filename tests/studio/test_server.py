@@ -226,3 +226,26 @@ def test_a_project_goes_into_a_file_and_comes_back(client: Client, project: str)
     assert {**after, "id": 0} == {**before, "id": 0}
     folder = client.studio.store.home(opened["id"]) / "tiles" / str(after["id"]) / "final" / "tile"
     assert certify(EscherTile.load(folder).tile).valid
+
+
+def test_a_project_with_a_picture_that_was_painted_over_comes_back(client: Client) -> None:
+    address = new_project(client)
+    done(client, client.post(f"{address}/animal", json={"name": "bat"}))
+    done(client, client.put(f"{address}/mend", content=painted(Image.new("RGBA", (9, 9)))))
+    content = client.get(f"{address}/file").content
+    opened = client.post("/api/projects/open", content=content).json()
+    assert opened["mend"]
+    for name in ("name", "input", "reading"):
+        assert opened[name] == client.get(address).json()[name]
+    assert opened["silhouette"]["outline"] == client.get(address).json()["silhouette"]["outline"]
+
+
+@pytest.mark.parametrize("content", [SQUARE, b"PK", b""])
+def test_a_file_that_is_no_project_leaves_none_behind(client: Client, content: bytes) -> None:
+    store = client.studio.store
+    before = store.summaries()
+    answer = client.post("/api/projects/open", content=content)
+    assert answer.status_code == 422
+    assert answer.json()["error"].startswith(("this file: not a project", "the file is empty"))
+    assert store.summaries() == before
+    assert {path.name for path in store.folder.glob("projects/*")} == {one["id"] for one in before}

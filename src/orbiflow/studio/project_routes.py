@@ -41,11 +41,14 @@ async def create(request: Request, here: Here) -> dict[str, Any]:
 
 @routes.post("/projects/open")
 async def open_file(request: Request, here: Here) -> dict[str, Any]:
-    """Make a project of a file; a task takes up what is in it."""
+    """Make a project of a file, once a task has taken up what is in it; of no other file."""
     made = here.store.create("tile", "Opened project", here.limits.projects)
     try:
         await save_body(request, here.store.home(made) / f"opened{ENDING}")
-        await here.submit(made, "open", {})
+        task = await here.done(made, "open", {})
+        if task["state"] in ("failed", "cancelled"):
+            told = task["error"] or "opening was cancelled; open the file again"
+            raise OrbiflowError(told.replace(f"opened{ENDING}", "this file"))
     except BaseException:
         here.store.delete(made)
         raise
