@@ -150,6 +150,27 @@ def test_cancelling(bench: Bench) -> None:
     assert bench.states(running) == ["cancelled"]
 
 
+def test_what_goes_on_while_it_is_cancelled_ends(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    task = bench.search(bench.project())
+    bench.queue.pause(task)
+    asked, cancelling = bench.store.task, threading.Thread(target=bench.queue.cancel, args=[task])
+
+    def ask(number: int) -> dict[str, Any]:
+        found = asked(number)
+        if threading.current_thread() is not cancelling and not cancelling.ident:
+            cancelling.start()
+            cancelling.join(0.2)  # it comes between a look and what is done about it, if it can
+        return found
+
+    monkeypatch.setattr(bench.store, "task", ask)
+    bench.queue.resume(task)
+    cancelling.join()
+    assert bench.states(task) == ["cancelled"]
+    assert len(bench.made) == 1
+
+
 def test_faults_are_told_without_insides(bench: Bench) -> None:
     project = bench.project()
     for ending in (Failed("ValueError: x = /home/me", "error"), Failed("no memory", "died")):

@@ -155,9 +155,10 @@ class WorkQueue:
 
     def resume(self, task: int) -> None:
         """Let a task that was held go on when its turn comes."""
-        if self.store.task(task)["state"] == "paused":
-            self.store.change_task(task, state="waiting")
-            self._schedule()
+        with self._lock:  # or a task that is cancelled meanwhile would wait again
+            if self.store.task(task)["state"] == "paused":
+                self.store.change_task(task, state="waiting")
+        self._schedule()
 
     def cancel(self, task: int) -> None:
         """End a task; what it has found is kept."""
