@@ -140,23 +140,23 @@ def test_a_picture_without_a_shape_says_what_to_do(client: Client) -> None:
 
 
 @pytest.mark.parametrize(
-    ("operation", "settings", "ending"),
+    ("operation", "settings", "name"),
     [
-        ("export", {"area": "80x60mm", "cut": "skeleton"}, "svg"),
-        ("export", {"area": "80x60mm", "format": "pdf"}, "pdf"),
-        ("art", {"size": "60x40"}, "png"),
-        ("art", {"size": "60x40", "format": "svg"}, "svg"),
-        ("solid", {}, "stl"),
-        ("animate", {"kind": "grow", "seconds": 0.5, "fps": 2, "size": 64}, "gif"),
+        ("export", {"area": "80x60mm", "cut": "skeleton"}, "house-40mm.svg"),
+        ("export", {"area": "80x60mm", "purpose": "print"}, "house-print-40mm.pdf"),
+        ("art", {"size": "60x40"}, "house-picture.png"),
+        ("art", {"size": "60x40", "format": "svg"}, "house-picture.svg"),
+        ("solid", {"kind": "stamp"}, "house-stamp.stl"),
+        ("animate", {"kind": "grow", "seconds": 0.5, "fps": 2, "size": 64}, "house.gif"),
     ],
 )
 def test_what_is_taken_away(
-    client: Client, project: str, operation: str, settings: dict[str, Any], ending: str
+    client: Client, project: str, operation: str, settings: dict[str, Any], name: str
 ) -> None:
     task = make(client, project, operation, tile=tile_number(900, 0), **settings)
     assert task["state"] == "done", task["error"]
     (file,) = task["result"]["files"]
-    assert file["name"].endswith(ending)
+    assert file["name"] == name
     address = f"/api/takeaways/{task['id']}"
     answer = client.get(f"{address}/files/{file['name']}")
     assert len(answer.content) == file["bytes"]
@@ -164,7 +164,7 @@ def test_what_is_taken_away(
     assert "sandbox" in answer.headers["content-security-policy"]
     seen = client.get(f"{address}/preview.png")
     assert seen.status_code == (200 if task["result"]["preview"] else 404)
-    assert task["result"]["preview"] or operation in ("solid", "animate") or ending == "svg"
+    assert task["result"]["preview"] or operation in ("solid", "animate") or name.endswith("svg")
     assert client.get(f"{address}/files/other.svg").status_code == 404
 
 

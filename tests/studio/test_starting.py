@@ -46,7 +46,7 @@ def test_a_port_that_is_taken_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["file", "file/below", "/proc/foo", "/sys/foo"])
 def test_a_folder_that_cannot_be_had_is_told(name: str, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(OrbiflowError, match="cannot write into .*; give another folder as data"):
+    with pytest.raises(OrbiflowError, match=r"cannot write into .*; give another folder as data"):
         studio(StudioSettings(data=tmp_path / name, browser=False))
 
 

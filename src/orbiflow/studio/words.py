@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -24,6 +26,16 @@ def plain_name(given: Any, otherwise: str) -> str:
     text = PurePosixPath(text.replace("\\", "/")).name
     name = "".join(letter for letter in text if letter.isprintable()).strip(" .")
     return name[:80] or otherwise
+
+
+def plain_letters(name: str, otherwise: str) -> str:
+    """Return a name in letters and digits that any system takes in a file's name.
+
+    >>> plain_letters("My Schildkröte!", "tile"), plain_letters("龜", "tile")
+    ('my-schildkrote', 'tile')
+    """
+    letters = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
+    return re.sub(r"[^a-z0-9]+", "-", letters)[:40].strip("-") or otherwise
 
 
 def shown_task(store: Store, task: dict[str, Any]) -> dict[str, Any]:
