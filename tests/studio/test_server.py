@@ -139,6 +139,46 @@ def test_a_picture_without_a_shape_says_what_to_do(client: Client) -> None:
     assert make(client, address, "search")["error"].startswith("there is no silhouette yet")
 
 
+def test_doubts_are_said_once_in_the_words_of_the_page(client: Client) -> None:
+    address = new_project(client)
+    picture = Image.new("L", (400, 300), 255)
+    pen = ImageDraw.Draw(picture)
+    pen.ellipse((30, 30, 270, 270), fill=0)
+    pen.ellipse((100, 100, 200, 200), fill=255)
+    pen.rectangle((300, 100, 380, 200), fill=0)
+    done(client, client.put(f"{address}/input?name=a.png", content=painted(picture)))
+    own = client.get(address).json()["silhouette"]
+    apart, hole = own["doubts"]
+    assert "more smoothing may join them, or try another edge (Where it ends)" in apart
+    assert hole.endswith("try another edge (Where it ends) or another side (The animal is)")
+    assert len(own["left_out"]) == 1
+    said = " ".join([*own["notes"], apart, hole])
+    assert "kept the largest" not in said
+    assert said.count("filled") == 1
+    assert "--" not in said
+
+
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        ({"tile_size": 1e9}, "the length of a tile (in mm) must be above 0 and at most 20000, got"),
+        (
+            {"tile_size": "1000000000mm"},
+            "the length of a tile: '1000000000mm' is longer than 100 m",
+        ),
+        ({"warn_neck": -1}, "warn neck (in mm) must be from 0 to 20000, got -1"),
+        ({"dpi": 0}, "the number of dots per inch must be from 1 to 10000, got 0"),
+    ],
+)
+def test_refusals_name_settings_in_plain_words(
+    client: Client, project: str, settings: dict[str, Any], told: str
+) -> None:
+    ask = {"operation": "export", "settings": {"tile": tile_number(900, 0), **settings}}
+    answer = client.post(f"{project}/tasks", json=ask)
+    assert answer.status_code == 422
+    assert answer.json()["error"].startswith(told)
+
+
 @pytest.mark.parametrize(
     ("operation", "settings", "name"),
     [

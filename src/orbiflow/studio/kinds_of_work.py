@@ -12,7 +12,7 @@ from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.kinds import PathKind
 from orbiflow.runtime import Call, Operation, find
 from orbiflow.settings import Field, FileSettings, Hidden, OnlyWith
-from orbiflow.studio.words import plain_letters
+from orbiflow.studio.words import LABELS, plain_letters
 
 OWN = ("project", "task", "force", "workers", "tile", "picture")
 """Parameters of operations that the server sets, or nobody."""
@@ -133,7 +133,25 @@ def making_call(makes: str, settings: Mapping[str, Any], result: Path, **files: 
     if strange := [name for name in own if name not in known]:
         names = literal(", ".join(sorted(known)))
         raise SettingError(f"{makes} takes {names} here, not {literal(strange[0])}")
-    return made.call({"result": result, **own, **files})
+    try:
+        return made.call({"result": result, **own, **files})
+    except SettingError as error:
+        raise SettingError(literal(setting_words(error, made))) from error
+
+
+def setting_words(error: SettingError, operation: Operation) -> str:
+    """Return a refusal with the page's names of settings, and units where it has none.
+
+    >>> setting_words(SettingError("{tile_size} must be at most 20000"), find("export"))
+    'the length of a tile (in mm) must be at most 20000'
+    """
+    units = {entry.name: entry.schema.get("x-unit", "") for entry in operation.fields}
+
+    def called(name: str) -> str:
+        words, unit = LABELS.get(name, name.replace("_", " ")), units.get(name, "")
+        return words if unit in error.template else f"{words} (in {unit})"
+
+    return error.named(called)
 
 
 def file_name(makes: str, settings: Mapping[str, Any], result: Path, called: str) -> str:

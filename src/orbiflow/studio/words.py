@@ -15,6 +15,34 @@ NAMES = {"tile": "New tile", "density": "New density"}
 MASKS = ("mend", "pins", "emphasis")
 """What is painted over a picture."""
 
+LABELS = {
+    "tile_size": "the length of a tile",
+    "area": "the width and height",
+    "dpi": "the number of dots per inch",
+    "fps": "the number of pictures per second",
+}
+"""What messages call settings whose names say too little."""
+
+ON_THE_PAGE = {
+    "join them to it in the drawing, or by a larger --smooth": "more smoothing may join them",
+    "with smooth 0.01": "with a little smoothing",
+    "another --threshold or --invert": "another edge (Where it ends) or another side (The animal is)",
+    "another --threshold": "another edge (Where it ends)",
+    "set threshold": "set another edge (Where it ends)",
+}
+"""What messages of the reader say of its options, and what the page has for them."""
+
+
+def page_words(text: str) -> str:
+    """Return a message of the reader in the page's own words.
+
+    >>> page_words("it was read badly: try another --threshold")
+    'it was read badly: try another edge (Where it ends)'
+    """
+    for said, meant in ON_THE_PAGE.items():
+        text = text.replace(said, meant)
+    return text
+
 
 def plain_name(given: Any, otherwise: str) -> str:
     """Return a name on one line, without folders.
