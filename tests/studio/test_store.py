@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -22,6 +23,7 @@ from orbiflow.studio import Store, WorkQueue
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.store import Missing
 from orbiflow.studio.words import shown_project
+from orbiflow.tiles.silhouette.outlines import sampled
 from studio.served import Bench, ByHand, join_tasks
 
 
@@ -193,6 +195,18 @@ def test_mistakes_are_told_without_paths(bench: Bench) -> None:
     assert bench.store.task(task)["error"] == "input.png: no shape in it"
     (notice,) = (e for e in bench.store.events(project, 0) if e["kind"] == "notice")
     assert notice["data"] == {"text": "took input.png", "warning": True}
+
+
+def test_mistakes_are_told_in_the_words_of_the_page(bench: Bench) -> None:
+    with pytest.raises(OrbiflowError) as caught:
+        sampled(np.array([(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)]))
+    task = bench.search(bench.project())
+    bench.made[-1].say(Failed(str(caught.value), "mistake"))
+    bench.made[-1].say(None)
+    join_tasks()
+    told = bench.store.task(task)["error"]
+    assert "with a little smoothing" in told
+    assert told.endswith("set another edge (Where it ends)")
 
 
 def test_a_tile_is_on_its_card_before_the_search_ends(bench: Bench) -> None:
