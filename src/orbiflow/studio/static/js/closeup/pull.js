@@ -14,6 +14,9 @@ const HOLD = 4; // of those beyond the reach
 const LEAST_HOLD = 1e-3; // of all others, so that the whole does not float away
 const STEEPEST = 8; // largest weight of a triangle's side: slivers would be too stiff
 const AFTER = [1, 2, 0, 1]; // corners of a triangle after corner 0, 1, 2
+const STRIDE = 0.04; // of a hand that is followed, in sizes of the tile
+const SLACK = 1.02; // times the way from rest that must be free as well, so that sides do not touch
+const HALVINGS = 6; // by which the last good place is found
 const ENOUGH = 1e-4; // of the residual, at which conjugate gradients stop
 
 /** Rows of a sparse matrix as typed arrays, from {indptr, indices, values}. */
@@ -352,6 +355,34 @@ export class Puller {
     return most / Math.sqrt(this.area);
   }
 
+  /**
+   * As `pull`, stride by stride, and only as far as the outline does not cross itself: {left, stopped}.
+   * `left` is how far it is still on its way, 0 when it is stopped.
+   */
+  follow([x, y]) {
+    const [from, good] = [this.pin.target, this.z.slice()];
+    const [u, v] = [x - from[0], y - from[1]];
+    const share = Math.min(1, (STRIDE * Math.sqrt(this.area)) / Math.hypot(u, v) || 1);
+    const left = this.pull([from[0] + share * u, from[1] + share * v]);
+    if (!this.#blocked()) return { left: share < 1 ? Math.max(left, STRIDE) : left, stopped: false };
+    const bad = this.z.slice();
+    let free = 0;
+    const part = (own) => this.z.forEach((_, k) => { this.z[k] = good[k] + own * (bad[k] - good[k]); });
+    for (let k = 1; k <= HALVINGS; k += 1) {
+      part(free + 2 ** -k);
+      if (!this.#blocked()) free += 2 ** -k;
+    }
+    part(free);
+    this.pin.target = from;
+    return { left: 0, stopped: true };
+  }
+
+  /** Whether the outline crosses itself here or a little farther. */
+  #blocked() {
+    const ring = this.polygon();
+    return crosses(ring) || crosses(ring.map((value, k) => this.rest[k] + SLACK * (value - this.rest[k])));
+  }
+
   #solve(steps) {
     const { z, residual, step, image, scaled, goal, diagonal, free } = this;
     this.#wanted(goal);
@@ -381,6 +412,11 @@ export class Puller {
   /** The outline: x0, y0, x1, y1 ... */
   polygon() {
     return multiply(this.points, this.z, new Float64Array(2 * this.count));
+  }
+
+  /** How far the outline is from where it rests, at most, in sizes of the tile. */
+  moved() {
+    return this.polygon().reduce((most, value, k) => Math.max(most, Math.abs(value - this.rest[k])), 0) / Math.sqrt(this.area);
   }
 
   /** All points of the body, for what lies on the tile. */
