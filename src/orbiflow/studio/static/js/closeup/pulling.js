@@ -9,6 +9,7 @@ const STILL = 2e-5; // movement, in sizes of the tile, below which nothing is le
 const LAST = 60; // steps at most after a hand has let go
 const SETTLED = 900; // ms after the last key until a tile is checked
 const EDGE = 50; // pixels of the picture's edge that a chosen point keeps free
+const [FREE, STOPPED] = ["#0b6b66", "#8a5a00"]; // the point in hand
 const KEY_STEP = 6; // pixels that a key moves a point
 
 export class Pulling {
@@ -85,11 +86,11 @@ export class Pulling {
   }
 
   #release() {
-    const moved_ = this.puller.moved() > 1e-4;
+    const pulled = this.puller.moved() > 1e-4;
     this.hand = null;
     this.stopped = false;
     this.aim = null;
-    if (!moved_) {
+    if (!pulled) {
       this.back();
       return;
     }
@@ -221,7 +222,7 @@ export class Pulling {
     this.timer = setTimeout(() => this.hand && this.up(), SETTLED);
   }
 
-  /** The circle of the reach, and the point in hand. */
+  /** The circle of the reach, the point in hand, and a line to a hand that went on. */
   paint(context) {
     const at = this.hand
       ? { copy: this.hand.copy, point: this.puller.grip() }
@@ -237,10 +238,19 @@ export class Pulling {
       context.arc(x, y, radius, 0, 2 * Math.PI);
       context.stroke();
     };
+    if (this.stopped) {
+      context.setLineDash([]);
+      context.lineWidth = 2;
+      context.strokeStyle = STOPPED;
+      context.beginPath();
+      context.moveTo(x, y);
+      context.lineTo(...this.aim);
+      context.stroke();
+    }
     ring(reach, 4, "rgb(255 255 255 / 70%)");
-    ring(reach, 1.6, this.stopped ? "#8a5a00" : "#0b6b66", [7, 5]);
+    ring(reach, 1.6, this.stopped ? STOPPED : FREE, [7, 5]);
     context.setLineDash([]);
-    context.fillStyle = this.stopped ? "#8a5a00" : "#0b6b66";
+    context.fillStyle = this.stopped ? STOPPED : FREE;
     context.beginPath();
     context.arc(x, y, 6, 0, 2 * Math.PI);
     context.fill();
