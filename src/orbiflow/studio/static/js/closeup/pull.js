@@ -174,6 +174,7 @@ export class Puller {
 
   /** Back to the tile as it is. */
   reset() {
+    this.ahead = null;
     this.z.set(this.start);
     this.z.set(this.middle, this.parametersCount - 2);
     for (let i = this.tied; i < 2 * this.size; i += 1) this.z[this.parametersCount + i - this.tied] = this.rest[i];
@@ -189,6 +190,7 @@ export class Puller {
    * all stays; with `lattice` the way in which copies lie may change as well.
    */
   grab(vertex, share, reach, { lattice = true } = {}) {
+    this.ahead = null;
     this.pin = { vertex, next: (vertex + 1) % this.count, share, target: null };
     this.#grip(GRIP * reach);
     this.pin.target = this.held();
@@ -356,25 +358,31 @@ export class Puller {
   }
 
   /**
-   * As `pull`, stride by stride, and only as far as the outline does not cross itself: {left, stopped}.
-   * `left` is how far it is still on its way, 0 when it is stopped.
+   * As `pull`, stride by stride: {left, stopped}. The tile stays at the last place where its outline does
+   * not cross itself; what would follow the hand (`ahead`) goes on unseen, so that it finds back.
    */
   follow([x, y]) {
-    const [from, good] = [this.pin.target, this.z.slice()];
-    const [u, v] = [x - from[0], y - from[1]];
-    const share = Math.min(1, (STRIDE * Math.sqrt(this.area)) / Math.hypot(u, v) || 1);
-    const left = this.pull([from[0] + share * u, from[1] + share * v]);
-    if (!this.#blocked()) return { left: share < 1 ? Math.max(left, STRIDE) : left, stopped: false };
-    const bad = this.z.slice();
+    const good = this.z.slice();
+    const first = !this.ahead;
+    if (this.ahead) this.z.set(this.ahead);
+    const [from, to] = this.pin.target;
+    const share = Math.min(1, (STRIDE * Math.sqrt(this.area)) / Math.hypot(x - from, y - to) || 1);
+    const left = this.pull([from + share * (x - from), to + share * (y - to)]);
+    const stopped = this.#blocked();
+    this.ahead = stopped ? this.z.slice() : null;
+    if (stopped) this.#between(good, first ? HALVINGS : 0);
+    return { left: share < 1 ? STRIDE : left, stopped };
+  }
+
+  /** From a good place as far ahead as is free. */
+  #between(good, halvings) {
     let free = 0;
-    const part = (own) => this.z.forEach((_, k) => { this.z[k] = good[k] + own * (bad[k] - good[k]); });
-    for (let k = 1; k <= HALVINGS; k += 1) {
+    const part = (own) => good.forEach((value, k) => { this.z[k] = value + own * (this.ahead[k] - value); });
+    for (let k = 1; k <= halvings; k += 1) {
       part(free + 2 ** -k);
       if (!this.#blocked()) free += 2 ** -k;
     }
     part(free);
-    this.pin.target = from;
-    return { left: 0, stopped: true };
   }
 
   /** Whether the outline crosses itself here or a little farther. */
