@@ -185,5 +185,11 @@ def test_a_project_file_opens_again(page, studio: RunningStudio, tmp_path) -> No
     (tmp_path / "a.orbiflow").write_bytes(studio.client.get(f"projects/{own}/file").content)
     page.goto("/")
     page.set_input_files("input[accept='.orbiflow']", tmp_path / "a.orbiflow")
+    opened = own_project(page)
+    assert opened != own
+    assert studio.project(opened)["silhouette"] == {
+        **studio.project(own)["silhouette"],
+        "backdrop": studio.project(opened)["silhouette"]["backdrop"],
+    }
+    page.goto(f"/#/p/{opened}/picture")
     page.wait_for_selector(READ)
-    assert own_project(page) != own
