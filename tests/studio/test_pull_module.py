@@ -56,7 +56,8 @@ console.log(JSON.stringify(pulls.map(({ share, by }) => {
   const goal = [from[0] + by[0] * size, from[1] + by[1] * size];
   let now = { left: 1, stopped: false };
   for (let k = 0; k < 60 && now.left > 2e-5; k += 1) now = puller.follow(goal);
-  const there = { polygon: [...puller.polygon()], parameters: puller.parameters(), moved: puller.moved(), stopped: now.stopped };
+  const there = { polygon: [...puller.polygon()], parameters: puller.parameters() };
+  Object.assign(there, { moved: puller.moved(), stopped: now.stopped });
   if (now.stopped) for (let k = 0; k < 45; k += 1) puller.follow(from);
   return { ...there, back: puller.moved() };
 })));
