@@ -22,7 +22,8 @@ from outlines import bent_squirrel
 
 CLOSEUP = Path(__file__).parents[2] / "src/orbiflow/studio/static/js/closeup"
 PULL = """
-import { Puller, crosses } from "MODULES/pull.js";
+import { crosses } from "MODULES/crossing.js";
+import { Puller } from "MODULES/pull.js";
 const { space, pulls } = JSON.parse((await import("node:fs")).readFileSync(0));
 const puller = new Puller(space);
 const size = Math.sqrt(puller.area);
