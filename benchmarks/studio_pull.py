@@ -29,7 +29,8 @@ PAGE = """<!doctype html><link rel="stylesheet" href="css/base.css">
 READY = """async ([view, space, palette, across]) => {
   const { LiveTiling } = await import("./js/closeup/live.js");
   const { Stage } = await import("./js/closeup/stage.js");
-  const { Puller, crosses } = await import("./js/closeup/pull.js");
+  const { Puller } = await import("./js/closeup/pull.js");
+  const { crosses } = await import("./js/closeup/crossing.js");
   const stage = new Stage({ label: "tiling", help: "", tool: () => null });
   document.body.append(stage.box);
   const tiling = new LiveTiling(view);

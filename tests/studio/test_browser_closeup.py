@@ -142,9 +142,7 @@ def test_by_keyboard_and_too_far_stops_at_the_last_tile(closeup, tile) -> None:
 def test_a_refusal_springs_back_is_said_once_and_makes_way(closeup, tile) -> None:
     page, why = closeup, "the tile has become much too small or too large"
     page.clock.install()
-    page.route(
-        "**/pulled", lambda route: route.fulfill(status=422, json={"error": {"message": why}})
-    )
+    page.route("**/pulled", lambda route: route.fulfill(status=422, json={"error": why}))
     choose(page, "Pull")
     before = picture(page)
     pulled(page, 26.0, 14.0)

@@ -134,7 +134,7 @@ class Closeup {
     this.#panels();
     this.#past();
     if (quiet) this.navigate(`p/${this.project.id}/t/${id}`, { quiet: true });
-    if (this.mode === "pull") await this.#ready();
+    if (this.mode === "pull") this.#ready(); // not waited for: what is next may be asked at once
   }
 
   /** Fetch how the tile can be pulled. */
