@@ -69,6 +69,8 @@ def test_keyboard_alone_leads_to_a_file_that_covers_its_page(page, drawing, tmp_
         reach(page, "tile-")
     caught.value.save_as(tmp_path / "tiling.svg")
     assert covers_page_once((tmp_path / "tiling.svg").read_text())
+    page.reload()
+    page.locator(".made").get_by_text("Print or cut · Poster or mug").wait_for()
 
 
 def test_a_search_is_paused_continued_and_stopped(page, studio: RunningStudio) -> None:
