@@ -48,6 +48,17 @@ def test_what_was_read_is_shown_and_what_was_left_out_is_said(page, drawing, stu
     assert studio.project(own)["name"] == "beast"
 
 
+def test_a_busy_picture_is_led_to_the_lasso(page, drawing) -> None:
+    picture = Image.open(drawing)
+    for k in range(8):
+        picture.paste(
+            40, (195 + 12 * (k % 4), 60 + 20 * (k // 4), 203 + 12 * (k % 4), 72 + 20 * (k // 4))
+        )
+    picture.save(drawing)
+    begun(page, drawing)
+    assert "lasso" in page.locator(".said").inner_text()
+
+
 def test_sliders_read_anew(page, drawing, studio: RunningStudio) -> None:
     own = begun(page, drawing)
     before = studio.project(own)["silhouette"]["outline"]

@@ -40,11 +40,13 @@ export function words(task, stale) {
 }
 
 /** What a task made, for what or how large, and when. */
-function about({ operation, result: { chosen = {}, made } }) {
+function about({ operation, result: { chosen = {}, facts = {}, made } }) {
   const { title, words: names } = KINDS[operation];
   const options = ["purpose", "kind", "cut"].map((name) => names[name]?.options?.[chosen[name]]);
-  const size = chosen.tile_size && (lengthIn(chosen.tile_size) ? `tiles of ${lengthIn(chosen.tile_size)} mm` : String(chosen.tile_size));
-  return [title, ...options, size, chosen.area ?? chosen.size, made && ago(made)].filter(Boolean).join(" · ");
+  const length = lengthIn(chosen.tile_size ?? (KINDS[operation].solid && facts.tile_size));
+  const pixels = operation === "art" && `${facts.width} × ${facts.height} pixels`;
+  const solid = operation === "solid" && facts.size && `${facts.size.map(Math.round).join(" × ")} mm`;
+  return [title, ...options, length && `tiles of ${Number(length.toFixed(1))} mm`, chosen.area, pixels, solid, made && ago(made)].filter(Boolean).join(" · ");
 }
 
 /** A list of what was made before. */
