@@ -116,7 +116,7 @@ def test_pull_certify_undo_redo(closeup, studio: RunningStudio, searched: str, t
     assert proved(page, second) == first
 
 
-def test_by_keyboard_and_what_crosses_springs_back(closeup, tile) -> None:
+def test_by_keyboard_and_too_far_stops_at_the_last_tile(closeup, tile) -> None:
     page = closeup
     choose(page, "Pull")
     page.locator(CANVAS).focus()
@@ -127,16 +127,54 @@ def test_by_keyboard_and_what_crosses_springs_back(closeup, tile) -> None:
     page.keyboard.press("Shift+ArrowDown")
     page.keyboard.press("Enter")
     second = proved(page, tile["id"])
-    assert second != tile["id"]
     page.wait_for_selector("[data-ready=pull]")
+    x, y = place_on_outline(page)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x, y + 350)
+    page.mouse.move(x, y + 700)
+    page.wait_for_selector(f"{BADGE}[data-kind=stopped]")
+    assert page.locator(BADGE).inner_text() == "No further here"
+    page.mouse.up()
+    assert proved(page, second) != second
+
+
+def test_a_refusal_springs_back_is_said_once_and_makes_way(closeup, tile) -> None:
+    page, why = closeup, "the tile has become much too small or too large"
+    page.clock.install()
+    page.route(
+        "**/pulled", lambda route: route.fulfill(status=422, json={"error": {"message": why}})
+    )
+    choose(page, "Pull")
     before = picture(page)
-    pulled(page, 0.0, 700.0)
+    pulled(page, 26.0, 14.0)
     page.wait_for_selector(f"{BADGE}[data-kind=refused]")
     assert picture(page) == before
-    assert "crosses itself" in page.locator(BADGE).inner_text()
-    assert shown(page) == second
+    assert shown(page) == tile["id"]
+    live = page.locator("[role=status], [aria-live]").filter(has_text="much too small")
+    assert live.count() == 1
+    page.clock.fast_forward(9000)
+    page.wait_for_selector(f"{BADGE}[data-kind=proved]")
     # the refusal is an answer of the server, which browsers note
     page.wrong[:] = [said for said in page.wrong if "422" not in said]
+
+
+def test_the_help_says_what_moves_the_view(closeup) -> None:
+    page = closeup
+    box = page.locator(CANVAS).bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    for mode in ("Look", "Pull", "Draw"):
+        choose(page, mode)
+        assert ("Shift" in page.locator("#closeup-help").inner_text()) is (mode != "Look")
+        before = picture(page)
+        page.keyboard.down("Shift")
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 40, y + 30)
+        page.mouse.up()
+        page.keyboard.up("Shift")
+        assert picture(page) != before
+        assert page.get_by_role("button", name="Undo").is_disabled()
 
 
 def test_lines_and_eyes_repeat_and_are_in_the_file(

@@ -18,6 +18,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError
 from orbiflow.studio.changing import pulled, space_json
 from orbiflow.tiles import EscherTile
+from outlines import bent_squirrel
 
 CLOSEUP = Path(__file__).parents[2] / "src/orbiflow/studio/static/js/closeup"
 PULL = """
@@ -40,6 +41,25 @@ for (const { vertex, reach, by, lattice } of pulls) {
   });
 }
 console.log(JSON.stringify(told));
+"""
+
+
+FOLLOW = """
+import { Puller } from "MODULES/pull.js";
+const { space, pulls } = JSON.parse((await import("node:fs")).readFileSync(0));
+const puller = new Puller(space);
+const size = Math.sqrt(puller.area);
+console.log(JSON.stringify(pulls.map(({ share, by }) => {
+  puller.reset();
+  puller.grab(Math.floor(share * puller.count), 0, 0.5 * size);
+  const from = puller.held();
+  const goal = [from[0] + by[0] * size, from[1] + by[1] * size];
+  let now = { left: 1, stopped: false };
+  for (let k = 0; k < 60 && now.left > 2e-5; k += 1) now = puller.follow(goal);
+  const there = { polygon: [...puller.polygon()], parameters: puller.parameters(), moved: puller.moved(), stopped: now.stopped };
+  if (now.stopped) for (let k = 0; k < 45; k += 1) puller.follow(from);
+  return { ...there, back: puller.moved() };
+})));
 """
 
 
@@ -138,6 +158,43 @@ def test_it_follows_the_hand_and_what_is_far_stays(told, name: str, lattice: boo
     before = np.array(told[name]["space"]["polygon"])
     moves = [np.linalg.norm(ring - before, axis=1) / size for ring in (wide, narrow)]
     assert (moves[1] > 0.02).sum() < (moves[0] > 0.02).sum()
+
+
+@pytest.fixture(scope="module", name="followed")
+def followed_fixture() -> dict[tuple[str, float], Any]:
+    """Where random pulls of some lengths, in sizes of the tile, led on some tiles of a search."""
+    rng, found = np.random.default_rng(1), {}
+    for name in ("IH4", "IH5", "IH6", "IH21"):
+        tile = EscherTile(bent_squirrel(name).tile)
+        space = space_json(tile)
+        for reach, count in ((0.05, 10), (1.0, 2)):
+            turns = rng.uniform(0, 2 * np.pi, count)
+            pulls = [
+                {"share": rng.random(), "by": [reach * np.cos(turn), reach * np.sin(turn)]}
+                for turn in turns
+            ]
+            answers = run_in_node(FOLLOW, {"space": space, "pulls": pulls})
+            found[name, reach] = tile, answers
+    return found
+
+
+@pytest.mark.parametrize("name", ["IH4", "IH5", "IH6", "IH21"])
+def test_ordinary_pulls_succeed_whole(followed, name: str) -> None:
+    _, answers = followed[name, 0.05]
+    assert all(shapely.Polygon(ring_of(answer)).is_valid for answer in answers)
+    assert sum(not answer["stopped"] for answer in answers) >= 8
+    assert min(answer["moved"] for answer in answers if not answer["stopped"]) > 0.03
+
+
+@pytest.mark.parametrize("name", ["IH4", "IH5", "IH6", "IH21"])
+def test_a_pull_too_far_stops_at_a_tile_and_can_go_back(followed, name: str) -> None:
+    tile, answers = followed[name, 1.0]
+    for answer in answers:
+        assert answer["stopped"]
+        assert shapely.Polygon(ring_of(answer)).is_valid
+        assert answer["back"] < 0.01
+    assert max(answer["moved"] for answer in answers) > 0.1
+    assert pulled(tile, answers[0]["parameters"]).certificate.valid
 
 
 def test_a_hand_that_rests_moves_nothing() -> None:

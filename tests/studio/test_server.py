@@ -139,24 +139,64 @@ def test_a_picture_without_a_shape_says_what_to_do(client: Client) -> None:
     assert make(client, address, "search")["error"].startswith("there is no silhouette yet")
 
 
+def test_doubts_are_said_once_in_the_words_of_the_page(client: Client) -> None:
+    address = new_project(client)
+    picture = Image.new("L", (400, 300), 255)
+    pen = ImageDraw.Draw(picture)
+    pen.ellipse((30, 30, 270, 270), fill=0)
+    pen.ellipse((100, 100, 200, 200), fill=255)
+    pen.rectangle((300, 100, 380, 200), fill=0)
+    done(client, client.put(f"{address}/input?name=a.png", content=painted(picture)))
+    own = client.get(address).json()["silhouette"]
+    apart, hole = own["doubts"]
+    assert "more smoothing may join them, or try another edge (Where it ends)" in apart
+    assert hole.endswith("try another edge (Where it ends) or another side (The animal is)")
+    assert len(own["left_out"]) == 1
+    said = " ".join([*own["notes"], apart, hole])
+    assert "kept the largest" not in said
+    assert said.count("filled") == 1
+    assert "--" not in said
+
+
 @pytest.mark.parametrize(
-    ("operation", "settings", "ending"),
+    ("settings", "told"),
     [
-        ("export", {"area": "80x60mm", "cut": "skeleton"}, "svg"),
-        ("export", {"area": "80x60mm", "format": "pdf"}, "pdf"),
-        ("art", {"size": "60x40"}, "png"),
-        ("art", {"size": "60x40", "format": "svg"}, "svg"),
-        ("solid", {}, "stl"),
-        ("animate", {"kind": "grow", "seconds": 0.5, "fps": 2, "size": 64}, "gif"),
+        ({"tile_size": 1e9}, "the length of a tile (in mm) must be above 0 and at most 20000, got"),
+        (
+            {"tile_size": "1000000000mm"},
+            "the length of a tile: '1000000000mm' is longer than 100 m",
+        ),
+        ({"warn_neck": -1}, "warn neck (in mm) must be from 0 to 20000, got -1"),
+        ({"dpi": 0}, "the number of dots per inch must be from 1 to 10000, got 0"),
+    ],
+)
+def test_refusals_name_settings_in_plain_words(
+    client: Client, project: str, settings: dict[str, Any], told: str
+) -> None:
+    ask = {"operation": "export", "settings": {"tile": tile_number(900, 0), **settings}}
+    answer = client.post(f"{project}/tasks", json=ask)
+    assert answer.status_code == 422
+    assert answer.json()["error"].startswith(told)
+
+
+@pytest.mark.parametrize(
+    ("operation", "settings", "name"),
+    [
+        ("export", {"area": "80x60mm", "cut": "skeleton"}, "house-40mm.svg"),
+        ("export", {"area": "80x60mm", "purpose": "print"}, "house-print-40mm.pdf"),
+        ("art", {"size": "60x40"}, "house-picture.png"),
+        ("art", {"size": "60x40", "format": "svg"}, "house-picture.svg"),
+        ("solid", {"kind": "stamp"}, "house-stamp.stl"),
+        ("animate", {"kind": "grow", "seconds": 0.5, "fps": 2, "size": 64}, "house.gif"),
     ],
 )
 def test_what_is_taken_away(
-    client: Client, project: str, operation: str, settings: dict[str, Any], ending: str
+    client: Client, project: str, operation: str, settings: dict[str, Any], name: str
 ) -> None:
     task = make(client, project, operation, tile=tile_number(900, 0), **settings)
     assert task["state"] == "done", task["error"]
     (file,) = task["result"]["files"]
-    assert file["name"].endswith(ending)
+    assert file["name"] == name
     address = f"/api/takeaways/{task['id']}"
     answer = client.get(f"{address}/files/{file['name']}")
     assert len(answer.content) == file["bytes"]
@@ -164,7 +204,7 @@ def test_what_is_taken_away(
     assert "sandbox" in answer.headers["content-security-policy"]
     seen = client.get(f"{address}/preview.png")
     assert seen.status_code == (200 if task["result"]["preview"] else 404)
-    assert task["result"]["preview"] or operation in ("solid", "animate") or ending == "svg"
+    assert task["result"]["preview"] or operation in ("solid", "animate") or name.endswith("svg")
     assert client.get(f"{address}/files/other.svg").status_code == 404
 
 
@@ -226,3 +266,26 @@ def test_a_project_goes_into_a_file_and_comes_back(client: Client, project: str)
     assert {**after, "id": 0} == {**before, "id": 0}
     folder = client.studio.store.home(opened["id"]) / "tiles" / str(after["id"]) / "final" / "tile"
     assert certify(EscherTile.load(folder).tile).valid
+
+
+def test_a_project_with_a_picture_that_was_painted_over_comes_back(client: Client) -> None:
+    address = new_project(client)
+    done(client, client.post(f"{address}/animal", json={"name": "bat"}))
+    done(client, client.put(f"{address}/mend", content=painted(Image.new("RGBA", (9, 9)))))
+    content = client.get(f"{address}/file").content
+    opened = client.post("/api/projects/open", content=content).json()
+    assert opened["mend"]
+    for name in ("name", "input", "reading"):
+        assert opened[name] == client.get(address).json()[name]
+    assert opened["silhouette"]["outline"] == client.get(address).json()["silhouette"]["outline"]
+
+
+@pytest.mark.parametrize("content", [SQUARE, b"PK", b""])
+def test_a_file_that_is_no_project_leaves_none_behind(client: Client, content: bytes) -> None:
+    store = client.studio.store
+    before = store.summaries()
+    answer = client.post("/api/projects/open", content=content)
+    assert answer.status_code == 422
+    assert answer.json()["error"].startswith(("this file: not a project", "the file is empty"))
+    assert store.summaries() == before
+    assert {path.name for path in store.folder.glob("projects/*")} == {one["id"] for one in before}

@@ -43,6 +43,13 @@ def test_a_port_that_is_taken_is_told(tmp_path: Path) -> None:
     assert "--port" in caught.value.named(lambda name: f"--{name}")
 
 
+@pytest.mark.parametrize("name", ["file", "file/below", "/proc/foo", "/sys/foo"])
+def test_a_folder_that_cannot_be_had_is_told(name: str, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(OrbiflowError, match=r"cannot write into .*; give another folder as data"):
+        studio(StudioSettings(data=tmp_path / name, browser=False))
+
+
 def test_two_studios_do_not_share_a_folder(tmp_path: Path) -> None:
     with (
         FileLock(tmp_path / "studio.lock"),

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -22,6 +23,7 @@ from orbiflow.studio import Store, WorkQueue
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.store import Missing
 from orbiflow.studio.words import shown_project
+from orbiflow.tiles.silhouette.outlines import sampled
 from studio.served import Bench, ByHand, join_tasks
 
 
@@ -150,6 +152,27 @@ def test_cancelling(bench: Bench) -> None:
     assert bench.states(running) == ["cancelled"]
 
 
+def test_what_goes_on_while_it_is_cancelled_ends(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    task = bench.search(bench.project())
+    bench.queue.pause(task)
+    asked, cancelling = bench.store.task, threading.Thread(target=bench.queue.cancel, args=[task])
+
+    def ask(number: int) -> dict[str, Any]:
+        found = asked(number)
+        if threading.current_thread() is not cancelling and not cancelling.ident:
+            cancelling.start()
+            cancelling.join(0.2)  # it comes between a look and what is done about it, if it can
+        return found
+
+    monkeypatch.setattr(bench.store, "task", ask)
+    bench.queue.resume(task)
+    cancelling.join()
+    assert bench.states(task) == ["cancelled"]
+    assert len(bench.made) == 1
+
+
 def test_faults_are_told_without_insides(bench: Bench) -> None:
     project = bench.project()
     for ending in (Failed("ValueError: x = /home/me", "error"), Failed("no memory", "died")):
@@ -172,6 +195,18 @@ def test_mistakes_are_told_without_paths(bench: Bench) -> None:
     assert bench.store.task(task)["error"] == "input.png: no shape in it"
     (notice,) = (e for e in bench.store.events(project, 0) if e["kind"] == "notice")
     assert notice["data"] == {"text": "took input.png", "warning": True}
+
+
+def test_mistakes_are_told_in_the_words_of_the_page(bench: Bench) -> None:
+    with pytest.raises(OrbiflowError) as caught:
+        sampled(np.array([(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)]))
+    task = bench.search(bench.project())
+    bench.made[-1].say(Failed(str(caught.value), "mistake"))
+    bench.made[-1].say(None)
+    join_tasks()
+    told = bench.store.task(task)["error"]
+    assert "with a little smoothing" in told
+    assert told.endswith("set another edge (Where it ends)")
 
 
 def test_a_tile_is_on_its_card_before_the_search_ends(bench: Bench) -> None:

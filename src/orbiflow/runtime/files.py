@@ -53,9 +53,9 @@ def _check_replaceable(path: Path) -> None:
         raise OutputError(f"cannot write {path}: there is no folder {path.parent}; create it first")
 
 
-def make_folder(path: Path) -> Path:
+def make_folder(path: Path, cure: str = "choose another --out") -> Path:
     """Create a folder (and its parents) that can be written to, or raise an `OutputError`."""
-    with system_errors(OutputError, f"cannot write into {path}", "choose another --out"):
+    with system_errors(OutputError, f"cannot write into {path}", cure):
         path.mkdir(parents=True, exist_ok=True)
         probe = path / ".orbiflow-write-test"
         probe.touch()

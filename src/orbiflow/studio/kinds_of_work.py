@@ -12,6 +12,7 @@ from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.kinds import PathKind
 from orbiflow.runtime import Call, Operation, find
 from orbiflow.settings import Field, FileSettings, Hidden, OnlyWith
+from orbiflow.studio.words import LABELS, plain_letters
 
 OWN = ("project", "task", "force", "workers", "tile", "picture")
 """Parameters of operations that the server sets, or nobody."""
@@ -42,13 +43,16 @@ class Kind:
             if taken := [name for name in place if name in settings]:
                 raise SettingError(f"the studio itself sets {taken[0]}; leave it out")
             return find(self.work).call({**place, **settings})
-        own = {name: settings[name] for name in ("tile", "picture", "drawing") if name in settings}
+        own = {name: settings[name] for name in OF_TAKING if name in settings}
         rest = {name: value for name, value in settings.items() if name not in own}
         making_call(self.makes, rest, Path("tile"))
         return find(self.work).call(
             {**place, **own, "makes": self.makes, "settings": json.dumps(rest)}
         )
 
+
+OF_TAKING = ("tile", "picture", "drawing", "called")
+"""What is said of a take-away, besides the settings of its operation."""
 
 DRAWN = ("export", "art")
 """What shows the drawing on a tile."""
@@ -129,12 +133,35 @@ def making_call(makes: str, settings: Mapping[str, Any], result: Path, **files: 
     if strange := [name for name in own if name not in known]:
         names = literal(", ".join(sorted(known)))
         raise SettingError(f"{makes} takes {names} here, not {literal(strange[0])}")
-    return made.call({"result": result, **own, **files})
+    try:
+        return made.call({"result": result, **own, **files})
+    except SettingError as error:
+        raise SettingError(literal(setting_words(error, made))) from error
 
 
-def file_ending(makes: str, settings: Mapping[str, Any], result: Path) -> str:
-    """Return the ending of the file that a call with these settings writes."""
+def setting_words(error: SettingError, operation: Operation) -> str:
+    """Return a refusal with the page's names of settings, and units where it has none.
+
+    >>> setting_words(SettingError("{tile_size} must be at most 20000"), find("export"))
+    'the length of a tile (in mm) must be at most 20000'
+    """
+    units = {entry.name: entry.schema.get("x-unit", "") for entry in operation.fields}
+
+    def called(name: str) -> str:
+        words, unit = LABELS.get(name, name.replace("_", " ")), units.get(name, "")
+        return words if unit in error.template else f"{words} (in {unit})"
+
+    return error.named(called)
+
+
+def file_name(makes: str, settings: Mapping[str, Any], result: Path, called: str) -> str:
+    """Return a name for the file that a call with these settings writes, such as cat-laser-60mm.svg."""
     own = making_call(makes, settings, result).arguments["settings"]
-    if isinstance(own, FileSettings):
-        return own.file_format
-    return settings.get("format", ART_FORMATS[0])
+    is_file = isinstance(own, FileSettings)
+    ending = own.file_format if is_file else settings.get("format", ART_FORMATS[0])
+    more = {
+        "export": lambda: [own.purpose, f"{own.tile_size:g}mm"],
+        "art": lambda: ["picture"],
+        "solid": lambda: [own.kind],
+    }.get(makes, list)()
+    return f"{'-'.join([plain_letters(called, 'tile'), *filter(None, more)])}.{ending}"

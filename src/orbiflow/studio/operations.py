@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.runtime import NEVER, Cancel, Note, Outcome, Sink, ignore, operation
+from orbiflow.runtime import NEVER, Cancel, Note, Outcome, Sink, ignore, make_folder, operation
 from orbiflow.studio.settings import StudioSettings
 
 EXTRA = ("fastapi", "uvicorn", "platformdirs")
@@ -36,7 +36,7 @@ def studio(
 
     from filelock import FileLock, Timeout
 
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder, "give another folder as data")
     try:
         with FileLock(folder / "studio.lock", timeout=0):
             _serve(settings, folder, token, on_event, cancel)

@@ -14,6 +14,7 @@ from starlette.background import BackgroundTask
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_object
 from orbiflow.studio.guard import Refused
+from orbiflow.studio.kinds_of_work import kind_of_work
 from orbiflow.studio.project_file import ENDING, MOST_VIEW, write_project
 from orbiflow.studio.requests import Here, body_object, save_body
 from orbiflow.studio.words import NAMES, plain_name, shown_project, shown_summary, shown_task
@@ -41,11 +42,14 @@ async def create(request: Request, here: Here) -> dict[str, Any]:
 
 @routes.post("/projects/open")
 async def open_file(request: Request, here: Here) -> dict[str, Any]:
-    """Make a project of a file; a task takes up what is in it."""
+    """Make a project of a file, once a task has taken up what is in it; of no other file."""
     made = here.store.create("tile", "Opened project", here.limits.projects)
     try:
         await save_body(request, here.store.home(made) / f"opened{ENDING}")
-        await here.submit(made, "open", {})
+        task = await here.done(made, "open", {})
+        if task["state"] in ("failed", "cancelled"):
+            told = task["error"] or "opening was cancelled; open the file again"
+            raise OrbiflowError(told.replace(f"opened{ENDING}", "this file"))
     except BaseException:
         here.store.delete(made)
         raise
@@ -112,10 +116,13 @@ async def task(request: Request, project: str, here: Here) -> dict[str, Any]:
     operation, settings = given.get("operation"), given.get("settings", {})
     if not isinstance(operation, str) or not is_object(settings):
         raise OrbiflowError("a task has an operation and settings")
-    view = here.store.project(project)["view"]
+    own = here.store.project(project)
+    view = own["view"]
     if "drawing" in settings:  # as it is now
         drawn = view.get("drawing", {}) if settings["drawing"] is True else {}
         settings = {**settings, "drawing": json.dumps(drawn)}
+    if kind_of_work(operation).makes:
+        settings = {**settings, "called": own["name"]}
     return await here.submit(project, operation, settings)
 
 

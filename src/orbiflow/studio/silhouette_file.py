@@ -14,6 +14,7 @@ from PIL import Image, ImageDraw
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 from orbiflow.runtime import write_atomic
+from orbiflow.studio.words import page_words
 from orbiflow.tiles import (
     FileContent,
     ReadingSettings,
@@ -156,11 +157,14 @@ def _shown(target: Target, size: tuple[int, int]) -> dict[str, Any]:
     def pixels(ring: Any) -> list[list[float]]:
         return np.round(_to_backdrop(target, np.asarray(ring), size), 2).tolist()
 
+    lost, doubted = parts_left_out(target), [page_words(text) for text in doubts(target)]
+    # what the page says of these in other words
+    twice = ("kept the largest",) * bool(lost) + ("filled ",) * ("holes were" in "".join(doubted))
     return {
         "outline": pixels(target.outline),
         "width": size[0],
         "height": size[1],
-        "notes": list(target.notes),
-        "left_out": [pixels(part.exterior.coords) for part in parts_left_out(target)],
-        "doubts": doubts(target),
+        "notes": [page_words(note) for note in target.notes if not note.startswith(twice)],
+        "left_out": [pixels(part.exterior.coords) for part in lost],
+        "doubts": doubted,
     }

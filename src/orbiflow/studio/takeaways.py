@@ -23,7 +23,7 @@ from orbiflow.runtime import (
     operation,
 )
 from orbiflow.studio.closeup_tasks import with_drawing
-from orbiflow.studio.kinds_of_work import DRAWN, file_ending, making_call
+from orbiflow.studio.kinds_of_work import DRAWN, file_name, making_call
 from orbiflow.studio.tile_files import tile_folder
 
 PREVIEW = "preview.png"
@@ -40,6 +40,7 @@ def take(
     settings: str = "{}",
     picture: bool = False,
     drawing: str = "",
+    called: str = "",
     *,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
@@ -54,6 +55,7 @@ def take(
         settings: Its settings, as JSON.
         picture: Whether the picture that was uploaded goes onto the tile.
         drawing: What was drawn on the tile, as JSON.
+        called: The name of the project, with which that of the file begins.
     """
     from orbiflow.studio.silhouette_file import input_file
 
@@ -62,7 +64,7 @@ def take(
     given, result = json.loads(settings), tile_folder(project, tile)
     if drawing and makes in DRAWN:
         result, files, given = with_drawing(drawing, result, files, given, folder / SCRATCH)
-    name = f"tile-{tile}-{makes}.{file_ending(makes, given, result)}"
+    name = file_name(makes, given, result, called)
     call = making_call(makes, given, result, out=folder / name, **files)
 
     def tell(event: Event) -> None:

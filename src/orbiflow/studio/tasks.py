@@ -178,7 +178,7 @@ def open_file(
         (picture,) = [*home.glob("input.*")][:1] or [None]
         called, reading = reading_of(document)
         tiles = read_tiles(home, document)
-        for file in [*home.glob("input.*"), *home.glob("*.png")]:
+        for file in {*home.glob("input.*"), *home.glob("*.png")}:
             file.replace(project / file.name)
         if picture is not None:
             read_input(project, called, reading)

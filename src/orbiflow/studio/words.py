@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -12,6 +14,34 @@ NAMES = {"tile": "New tile", "density": "New density"}
 
 MASKS = ("mend", "pins", "emphasis")
 """What is painted over a picture."""
+
+LABELS = {
+    "tile_size": "the length of a tile",
+    "area": "the width and height",
+    "dpi": "the number of dots per inch",
+    "fps": "the number of pictures per second",
+}
+"""What messages call settings whose names say too little."""
+
+ON_THE_PAGE = {
+    "join them to it in the drawing, or by a larger --smooth": "more smoothing may join them",
+    "with smooth 0.01": "with a little smoothing",
+    "another --threshold or --invert": "another edge (Where it ends) or another side (The animal is)",
+    "another --threshold": "another edge (Where it ends)",
+    "set threshold": "set another edge (Where it ends)",
+}
+"""What messages of the reader say of its options, and what the page has for them."""
+
+
+def page_words(text: str) -> str:
+    """Return a message of the reader in the page's own words.
+
+    >>> page_words("it was read badly: try another --threshold")
+    'it was read badly: try another edge (Where it ends)'
+    """
+    for said, meant in ON_THE_PAGE.items():
+        text = text.replace(said, meant)
+    return text
 
 
 def plain_name(given: Any, otherwise: str) -> str:
@@ -24,6 +54,16 @@ def plain_name(given: Any, otherwise: str) -> str:
     text = PurePosixPath(text.replace("\\", "/")).name
     name = "".join(letter for letter in text if letter.isprintable()).strip(" .")
     return name[:80] or otherwise
+
+
+def plain_letters(name: str, otherwise: str) -> str:
+    """Return a name in letters and digits that any system takes in a file's name.
+
+    >>> plain_letters("My Schildkröte!", "tile"), plain_letters("龜", "tile")
+    ('my-schildkrote', 'tile')
+    """
+    letters = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
+    return re.sub(r"[^a-z0-9]+", "-", letters)[:40].strip("-") or otherwise
 
 
 def shown_task(store: Store, task: dict[str, Any]) -> dict[str, Any]:

@@ -31,7 +31,7 @@ from orbiflow.runtime import (
 )
 from orbiflow.studio.kinds_of_work import kind_of_work
 from orbiflow.studio.store import Missing, Store
-from orbiflow.studio.words import plain_name
+from orbiflow.studio.words import page_words, plain_name
 
 WARM = (
     "orbiflow.studio.tasks",
@@ -155,9 +155,10 @@ class WorkQueue:
 
     def resume(self, task: int) -> None:
         """Let a task that was held go on when its turn comes."""
-        if self.store.task(task)["state"] == "paused":
-            self.store.change_task(task, state="waiting")
-            self._schedule()
+        with self._lock:  # or a task that is cancelled meanwhile would wait again
+            if self.store.task(task)["state"] == "paused":
+                self.store.change_task(task, state="waiting")
+        self._schedule()
 
     def cancel(self, task: int) -> None:
         """End a task; what it has found is kept."""
@@ -357,7 +358,7 @@ class _Told:
                 self.store.change(self.project, "silhouette", silhouette=found["shown"])
 
     def _plain(self, text: str) -> str:
-        """Return a text without the paths of this machine."""
+        """Return a text in the page's words, without the paths of this machine."""
         for folder in (self.home, self.home.resolve(), self.store.folder, Path.home()):
             text = text.replace(f"{folder}{os.sep}", "")
-        return text
+        return page_words(text)

@@ -69,6 +69,19 @@ def test_palette_with_transparent_colour(tmp_path: Path) -> None:
     assert iou(reading.outline, SHAPE) > 0.995
 
 
+def test_rounded_corners_cut_nothing_out(tmp_path: Path) -> None:
+    """A screenshot's transparent corners once made a rectangle of whatever it showed."""
+    image = draw("RGBA", (0, 0, 0, 255), (255, 255, 255, 255))
+    for corner in ((0, 0), (99, 0), (0, 99), (99, 99)):
+        image.putpixel(corner, (0, 0, 0, 0))
+    reading = read_outline(save(tmp_path, image))
+    assert iou(reading.outline, SHAPE) > 0.995
+    assert "took the few transparent pixels for white" in reading.notes
+    plain = Image.new("RGBA", (100, 100), (9, 9, 9, 255))
+    plain.putpixel((0, 0), (0, 0, 0, 0))  # nothing else to be seen
+    assert "alpha" in read_outline(save(tmp_path, plain)).notes[0]
+
+
 @pytest.mark.parametrize(
     ("name", "mode"),
     [("a.jpg", "L"), ("a.jpg", "CMYK"), ("a.webp", "RGBA"), ("a.bmp", "L"), ("a.gif", "P")],

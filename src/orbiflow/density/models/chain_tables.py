@@ -27,7 +27,7 @@ FINEST = {1: 3072, 2: 768}
 FAINTEST = 25.0
 """Components whose logarithm is further than this below that of the largest are left out."""
 
-ALONE, SEVERAL = 24, (8, 16, 128, 512)
+ALONE, SEVERAL = 24, (8, 32, 128, 512)
 """The fewest nodes of an angle that is the only one hidden, and those of several, level by level."""
 
 LEFT, GENTLE = (0.9, 0.7, 0.3, 0.1), 20.0

@@ -34,6 +34,7 @@ MAX_PIXELS = 40_000_000
 MAX_SIDE = 1500  # pixels; beyond this an image is averaged down before it is traced
 MAX_SIDE_OF_PHOTOGRAPH = 1000  # pixels, in the same way
 MIN_SIDE_OF_PHOTOGRAPH = 16
+MIN_TRANSPARENT = 0.005  # of the picture: less, such as rounded corners, cuts nothing out
 MIN_CONTRAST = 0.04  # of full scale, between the shape's and the background's usual level
 _STARTS = {"PNG": b"\x89PNG", "JPEG": b"\xff\xd8", "WebP": b"RIFF", "GIF": b"GIF", "BMP": b"BM"}
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
@@ -63,13 +64,15 @@ def read_image(
 ) -> Reading:
     """Read the outline of the shape in a PNG, JPEG or WebP image, in pixels with y down.
 
-    The shape is the opaque part where some of the image is transparent and some is opaque, else it is
+    The shape is the opaque part where enough of the image is transparent and some is opaque, else it is
     told from the background, which is what most of the border is: in a drawing by its luminance, in
     a photograph by its colours. `threshold`, between 0 and 1, is the luminance (or opacity) that
     parts them; with `invert` the shape is the light (or transparent) part; with either, a photograph
     is read like a drawing. Coordinates are those of the image turned as its EXIF orientation asks.
     """
     image, notes = open_image(path)
+    if _is_hardly_cut_out(image):
+        image, notes = _on_white(image), [*notes, "took the few transparent pixels for white"]
     band, name, band_notes = _channel(path, image)
     picture = None
     if threshold is None and invert is None and name == "luminance":
@@ -202,9 +205,21 @@ def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, str, list[s
         return luminance, "luminance", []
     if low < 128 <= high:
         return alpha, "alpha", []
+    return _on_white(image).convert("L"), "luminance", ["laid the half-transparent image on white"]
+
+
+def _on_white(image: Image.Image) -> Image.Image:
     white = Image.new("RGBA", image.size, "white")
-    note = "laid the half-transparent image on white"
-    return Image.alpha_composite(white, image.convert("RGBA")).convert("L"), "luminance", [note]
+    return Image.alpha_composite(white, image.convert("RGBA")).convert("RGB")
+
+
+def _is_hardly_cut_out(image: Image.Image) -> bool:
+    """Whether some pixels are transparent, but too few for a background, and the rest has a shape."""
+    if image.mode.startswith(("I", "F")) or not image.has_transparency_data:
+        return False
+    rgba = np.asarray(image.convert("RGBA"))
+    opaque = rgba[..., 3] >= 128
+    return 1 - MIN_TRANSPARENT < opaque.mean() < 1 and np.ptp(rgba[opaque][:, :3], axis=0).any()
 
 
 def deep_channel(path: Source, image: Image.Image) -> Image.Image:

@@ -12,6 +12,12 @@ import { paintSkin } from "./skin.js";
 import { Stage } from "./stage.js";
 
 const PEN_COLOURS = [["#1b1b1b", "Black"], ["#ffffff", "White"], ["#c8322b", "Red"], ["#e9a13b", "Yellow"], ["#2f7d4f", "Green"], ["#2563a8", "Blue"]];
+const HELP = {
+  look: "Drag to move, scroll or pinch to zoom. Keys: arrows, + and −, 0 fits.",
+  pull: "Drag beside the outline, or hold Shift and drag, to move the view. Scroll or pinch to zoom. Keys: + and −, 0 fits.",
+  draw: "Hold Shift and drag, or use two fingers, to move the view. Scroll or pinch to zoom. Keys: + and −, 0 fits.",
+};
+const CALM = 8000; // ms after which a refusal makes way
 const SHARPER = 1.5; // times that the scale may change before the skin is painted anew
 
 /** What was undone and redone, by project: it outlives a change of the address. */
@@ -46,6 +52,7 @@ class Closeup {
 
   close() {
     removeEventListener("keydown", this.keys);
+    clearTimeout(this.calming);
     this.offs.forEach((off) => off());
     this.stage.close();
     this.closed = true;
@@ -69,7 +76,7 @@ class Closeup {
 
   #build() {
     this.said = h("p", { class: "unseen", role: "status", "aria-live": "polite" });
-    this.badge = h("p", { class: "badge", role: "status" });
+    this.badge = h("p", { class: "badge" });
     this.hint = h("p", { class: "hint", hidden: true });
     this.stage = new Stage({ label: "The tiling, without end", help: "closeup-help", tool: () => this.tool });
     this.pulling = new Pulling(this.stage, this.pull, {
@@ -97,8 +104,9 @@ class Closeup {
     this.kind = h("p", { class: "soft small" });
     this.modes = choice("What to do", [["look", "Look"], ["pull", "Pull"], ["draw", "Draw"]], this.mode, (mode) => this.#choose(mode), { unseen: true });
     this.panel = h("div", { class: "stack" });
+    this.help = h("p", { class: "small soft", id: "closeup-help" });
     const side = h("div", { class: "closeup-side" }, h("div", {}, this.heading, this.kind), this.modes, this.panel,
-      h("p", { class: "small soft", id: "closeup-help" }, "Drag to move, scroll or pinch to zoom. Keys: arrows, + and −, 0 fits."));
+      this.help);
     this.root.classList.add("closeup");
     put(this.root, h("div", { class: "closeup-page" }, this.stage.box, side), this.said);
   }
@@ -163,6 +171,7 @@ class Closeup {
 
   #panels() {
     const { look, view, about } = this;
+    this.help.textContent = HELP[this.mode];
     const needed = 1 + Math.max(...view.colours.table.flat(2));
     const change = (what) => this.#change(what);
     if (this.mode === "look") {
@@ -264,21 +273,24 @@ class Closeup {
     this.said.textContent = text;
   }
 
-  /** The badge over the picture: proved, checking or refused. */
+  /** The badge over the picture, for eyes only: what must be heard is said. A refusal makes way again. */
   tell(kind, text) {
     if (this.badge.dataset.kind === kind && this.badge.textContent === text) return;
     this.badge.dataset.kind = kind;
     this.badge.textContent = text;
+    clearTimeout(this.calming);
+    if (kind === "refused") this.calming = setTimeout(() => this.#proved(), CALM);
   }
 
   #proved() {
     this.tell("proved", "Proved to tile");
   }
 
-  #pulledTo({ crossed, body }) {
+  #pulledTo({ stopped, body }) {
     this.pen.ride(this.pulling.puller, body, this.space);
     if (this.pulling.hand) {
-      if (crossed) this.tell("crossed", "The outline crosses itself here");
+      if (stopped && this.badge.dataset.kind !== "stopped") this.say("No further here.");
+      if (stopped) this.tell("stopped", "No further here");
       else this.tell("moving", "Let go to check it");
     }
     if (!body && this.badge.dataset.kind !== "refused") this.#proved();

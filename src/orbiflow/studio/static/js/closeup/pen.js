@@ -153,10 +153,14 @@ export class Pen {
 
   /** Draw on a copy the line in hand, and all marks while the tile is pulled. */
   over(context) {
+    if (!this.line && !this.moving) return;
     const { palette } = this.stage.options;
+    context.save();
+    context.clip(this.stage.tiling.path);
     for (const { points, colour, width } of this.moving?.lines ?? []) lineInto(context, points, colour, width);
-    for (const { at, radius } of this.moving?.eyes ?? []) eyeInto(context, at, radius, palette, this.stage.tiling.yDown);
     if (this.line) lineInto(context, this.line.points, this.settings.colour, WIDTHS[this.settings.width] * this.size);
+    context.restore();
+    for (const { at, radius } of this.moving?.eyes ?? []) eyeInto(context, at, radius, palette, this.stage.tiling.yDown);
   }
 
   hover(place) {

@@ -14,6 +14,9 @@ const HOLD = 4; // of those beyond the reach
 const LEAST_HOLD = 1e-3; // of all others, so that the whole does not float away
 const STEEPEST = 8; // largest weight of a triangle's side: slivers would be too stiff
 const AFTER = [1, 2, 0, 1]; // corners of a triangle after corner 0, 1, 2
+const STRIDE = 0.04; // of a hand that is followed, in sizes of the tile
+const SLACK = 1.02; // times the way from rest that must be free as well, so that sides do not touch
+const HALVINGS = 6; // by which the last good place is found
 const ENOUGH = 1e-4; // of the residual, at which conjugate gradients stop
 
 /** Rows of a sparse matrix as typed arrays, from {indptr, indices, values}. */
@@ -171,6 +174,7 @@ export class Puller {
 
   /** Back to the tile as it is. */
   reset() {
+    this.ahead = null;
     this.z.set(this.start);
     this.z.set(this.middle, this.parametersCount - 2);
     for (let i = this.tied; i < 2 * this.size; i += 1) this.z[this.parametersCount + i - this.tied] = this.rest[i];
@@ -186,6 +190,7 @@ export class Puller {
    * all stays; with `lattice` the way in which copies lie may change as well.
    */
   grab(vertex, share, reach, { lattice = true } = {}) {
+    this.ahead = null;
     this.pin = { vertex, next: (vertex + 1) % this.count, share, target: null };
     this.#grip(GRIP * reach);
     this.pin.target = this.held();
@@ -352,6 +357,40 @@ export class Puller {
     return most / Math.sqrt(this.area);
   }
 
+  /**
+   * As `pull`, stride by stride: {left, stopped}. The tile stays at the last place where its outline does
+   * not cross itself; what would follow the hand (`ahead`) goes on unseen, so that it finds back.
+   */
+  follow([x, y]) {
+    const good = this.z.slice();
+    const first = !this.ahead;
+    if (this.ahead) this.z.set(this.ahead);
+    const [from, to] = this.pin.target;
+    const share = Math.min(1, (STRIDE * Math.sqrt(this.area)) / Math.hypot(x - from, y - to) || 1);
+    const left = this.pull([from + share * (x - from), to + share * (y - to)]);
+    const stopped = this.#blocked();
+    this.ahead = stopped ? this.z.slice() : null;
+    if (stopped) this.#between(good, first ? HALVINGS : 0);
+    return { left: share < 1 ? STRIDE : left, stopped };
+  }
+
+  /** From a good place as far ahead as is free. */
+  #between(good, halvings) {
+    let free = 0;
+    const part = (own) => good.forEach((value, k) => { this.z[k] = value + own * (this.ahead[k] - value); });
+    for (let k = 1; k <= halvings; k += 1) {
+      part(free + 2 ** -k);
+      if (!this.#blocked()) free += 2 ** -k;
+    }
+    part(free);
+  }
+
+  /** Whether the outline crosses itself here or a little farther. */
+  #blocked() {
+    const ring = this.polygon();
+    return crosses(ring) || crosses(ring.map((value, k) => this.rest[k] + SLACK * (value - this.rest[k])));
+  }
+
   #solve(steps) {
     const { z, residual, step, image, scaled, goal, diagonal, free } = this;
     this.#wanted(goal);
@@ -381,6 +420,11 @@ export class Puller {
   /** The outline: x0, y0, x1, y1 ... */
   polygon() {
     return multiply(this.points, this.z, new Float64Array(2 * this.count));
+  }
+
+  /** How far the outline is from where it rests, at most, in sizes of the tile. */
+  moved() {
+    return this.polygon().reduce((most, value, k) => Math.max(most, Math.abs(value - this.rest[k])), 0) / Math.sqrt(this.area);
   }
 
   /** All points of the body, for what lies on the tile. */

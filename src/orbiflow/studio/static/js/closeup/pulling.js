@@ -1,13 +1,15 @@
 /** The tool that pulls a point of the outline. */
 
 import { inverse, moved } from "../tiling.js";
-import { Puller, crosses } from "./pull.js";
+import { Puller } from "./pull.js";
 
 const GRIP = 18; // pixels around the outline in which a mouse takes hold
 const FINGER = 34;
 const STILL = 2e-5; // movement, in sizes of the tile, below which nothing is left to follow
+const LAST = 60; // steps at most after a hand has let go
 const SETTLED = 900; // ms after the last key until a tile is checked
 const EDGE = 50; // pixels of the picture's edge that a chosen point keeps free
+const [FREE, STOPPED] = ["#0b6b66", "#8a5a00"]; // the point in hand
 const KEY_STEP = 6; // pixels that a key moves a point
 
 export class Pulling {
@@ -74,7 +76,7 @@ export class Pulling {
   up() {
     if (!this.hand) return;
     // what was still to follow
-    for (let k = 0; k < 8 && this.#step() > STILL; k += 1);
+    for (let k = 0; k < LAST && this.#step() > STILL; k += 1);
     this.#show();
     this.#release();
   }
@@ -84,10 +86,11 @@ export class Pulling {
   }
 
   #release() {
-    const moved_ = this.hand.far > 1e-4;
+    const pulled = this.puller.moved() > 1e-4;
     this.hand = null;
+    this.stopped = false;
     this.aim = null;
-    if (!moved_) {
+    if (!pulled) {
       this.back();
       return;
     }
@@ -112,8 +115,8 @@ export class Pulling {
   #step() {
     const own = moved(inverse(this.stage.matrixOf(this.hand.copy)), this.aim);
     const goal = [own[0] + this.hand.offset[0], own[1] + this.hand.offset[1]];
-    const left = this.puller.pull(goal);
-    this.hand.far = Math.max(this.hand.far ?? 0, left);
+    const { left, stopped } = this.puller.follow(goal);
+    this.stopped = stopped;
     return left;
   }
 
@@ -122,15 +125,12 @@ export class Pulling {
     const { tiling } = this.stage;
     tiling.place(this.puller.placement());
     tiling.outline(ring, { exact: false });
-    this.crossed = crosses(ring);
-    this.on.changed({ crossed: this.crossed, body: this.puller.body() });
+    this.on.changed({ stopped: this.stopped, body: this.puller.body() });
   }
 
   /** Spring back to the tile as it was. */
   back() {
-    this.waiting = false;
-    this.hand = null;
-    this.aim = null;
+    Object.assign(this, { waiting: false, hand: null, aim: null, stopped: false });
     if (!this.puller) return;
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     const from = this.puller.z.slice();
@@ -147,7 +147,7 @@ export class Pulling {
       else {
         this.stage.before = null;
         this.stage.tiling.outline(this.puller.polygon());
-        this.on.changed({ crossed: false, body: null });
+        this.on.changed({ stopped: false, body: null });
       }
     };
     this.stage.redraw();
@@ -222,7 +222,7 @@ export class Pulling {
     this.timer = setTimeout(() => this.hand && this.up(), SETTLED);
   }
 
-  /** The circle of the reach, and the point in hand. */
+  /** The circle of the reach, the point in hand, and a line to a hand that went on. */
   paint(context) {
     const at = this.hand
       ? { copy: this.hand.copy, point: this.puller.grip() }
@@ -238,10 +238,19 @@ export class Pulling {
       context.arc(x, y, radius, 0, 2 * Math.PI);
       context.stroke();
     };
+    if (this.stopped) {
+      context.setLineDash([]);
+      context.lineWidth = 2;
+      context.strokeStyle = STOPPED;
+      context.beginPath();
+      context.moveTo(x, y);
+      context.lineTo(...this.aim);
+      context.stroke();
+    }
     ring(reach, 4, "rgb(255 255 255 / 70%)");
-    ring(reach, 1.6, this.crossed ? "#a3241d" : "#0b6b66", [7, 5]);
+    ring(reach, 1.6, this.stopped ? STOPPED : FREE, [7, 5]);
     context.setLineDash([]);
-    context.fillStyle = this.crossed ? "#a3241d" : "#0b6b66";
+    context.fillStyle = this.stopped ? STOPPED : FREE;
     context.beginPath();
     context.arc(x, y, 6, 0, 2 * Math.PI);
     context.fill();

@@ -91,7 +91,10 @@ export function paintSkin(tiling, { art, marks, palette, yDown }, scale) {
     context.fill(tiling.path);
     context.globalCompositeOperation = "source-over";
   }
+  context.save();
+  context.clip(tiling.path); // a line ends where its tile does
   for (const { points, colour, width } of marks.lines) lineInto(context, points, colour, width);
+  context.restore();
   for (const { at, radius } of marks.eyes) eyeInto(context, at, radius, palette, yDown);
   return { canvas, matrix: inverse(matrix), scale: own };
 }

@@ -116,7 +116,7 @@ export class Stage {
       if (pointers.size === 2) {
         this.tool()?.cancel?.();
         this.busy = false;
-      } else if (pointers.size === 1) this.busy = Boolean(event.button === 0 && this.tool()?.down?.(this.place(event), event));
+      } else if (pointers.size === 1) this.busy = Boolean(event.button === 0 && !event.shiftKey && this.tool()?.down?.(this.place(event), event));
     });
     canvas.addEventListener("pointermove", (event) => {
       const at = this.place(event);
