@@ -66,7 +66,7 @@ def test_keyboard_alone_leads_to_a_file_that_covers_its_page(page, drawing, tmp_
     page.wait_for_selector(".preview img")
     page.focus("h1")
     with page.expect_download() as caught:
-        reach(page, "tile-")
+        reach(page, "beast")
     caught.value.save_as(tmp_path / "tiling.svg")
     assert covers_page_once((tmp_path / "tiling.svg").read_text())
     page.reload()
