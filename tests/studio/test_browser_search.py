@@ -14,6 +14,7 @@ from orbiflow.arrays import Array
 from orbiflow.studio.tile_view import tile_card
 from orbiflow.symmetry import Isometry
 from orbiflow.tiles import CLASSES, EscherTile, colouring
+from orbiflow.tiles.exporting import longer_side
 from studio.browser import (
     RunningStudio,
     covers_page_once,
@@ -65,9 +66,11 @@ def test_keyboard_alone_leads_to_a_file_that_covers_its_page(page, drawing, tmp_
     page.wait_for_selector(".preview img")
     page.focus("h1")
     with page.expect_download() as caught:
-        reach(page, "tile-")
+        reach(page, "beast")
     caught.value.save_as(tmp_path / "tiling.svg")
     assert covers_page_once((tmp_path / "tiling.svg").read_text())
+    page.reload()
+    page.locator(".made").get_by_text("Print or cut · Poster or mug").wait_for()
 
 
 def test_a_search_is_paused_continued_and_stopped(page, studio: RunningStudio) -> None:
@@ -206,21 +209,27 @@ def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched
     said.wait_for(state="detached")
 
 
-def test_the_true_size_follows_the_screen_that_was_measured(page, studio, searched) -> None:
-    tile = studio.project(searched)["tiles"][0]["id"]
-    page.goto(f"/#/p/{searched}/take/{tile}")
-    long = "(() => { const { width, height } = document.querySelector('.true-tile').style;"
-    long += " return Math.max(parseFloat(width), parseFloat(height)); })()"
+def test_the_true_size_is_of_the_file_and_follows_the_screen(page, studio, searched) -> None:
+    card = studio.project(searched)["tiles"][0]
+    ring = np.array(card["polygon"])
+    long, lying = longer_side(ring), np.ptp(ring, axis=0)
+    page.goto(f"/#/p/{searched}/take/{card['id']}")
+    wide = "parseFloat(document.querySelector('.true-tile').style.width) - 4"
     page.wait_for_selector(".true-tile")
-    assert page.evaluate(long) == pytest.approx(40 * 96 / 25.4 + 4, abs=0.1)
+    first = page.evaluate(wide)
+    assert first >= 40 * lying[0] / long * 96 / 25.4 - 0.1  # the rectangle may be wider
     page.get_by_label("How long is one tile?").fill("60")
     page.keyboard.press("Tab")
-    assert page.evaluate(long) == pytest.approx(60 * 96 / 25.4 + 4, abs=0.1)
+    assert page.evaluate(wide) == pytest.approx(1.5 * first, abs=0.1)
+    width, height = 60 * lying / long
+    said = page.locator(".real").inner_text()
+    assert f"{width:.1f} × {height:.1f} mm as it lies" in said
+    assert "60.0 ×" in said
     page.get_by_role("button", name="Measure my screen").click()
     page.get_by_label(re.compile("bank card")).fill("5")
-    assert page.evaluate(long) == pytest.approx(60 * 5 + 4, abs=0.1)
-    card = page.locator(".bank-card").bounding_box()
-    assert card["width"] / card["height"] == pytest.approx(85.6 / 53.98, rel=1e-2)
+    assert page.evaluate(wide) == pytest.approx(1.5 * first * 5 / (96 / 25.4), abs=0.1)
+    bank = page.locator(".bank-card").bounding_box()
+    assert bank["width"] / bank["height"] == pytest.approx(85.6 / 53.98, rel=1e-2)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

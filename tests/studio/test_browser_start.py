@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PIL import Image
 
 from studio.browser import BOOT, RunningStudio, area_of, hidden_parts, serious_issues
 
@@ -47,6 +48,17 @@ def test_what_was_read_is_shown_and_what_was_left_out_is_said(page, drawing, stu
     assert studio.project(own)["name"] == "beast"
 
 
+def test_a_busy_picture_is_led_to_the_lasso(page, drawing) -> None:
+    picture = Image.open(drawing)
+    for k in range(8):
+        picture.paste(
+            40, (195 + 12 * (k % 4), 60 + 20 * (k // 4), 203 + 12 * (k % 4), 72 + 20 * (k // 4))
+        )
+    picture.save(drawing)
+    begun(page, drawing)
+    assert "lasso" in page.locator(".said").inner_text()
+
+
 def test_sliders_read_anew(page, drawing, studio: RunningStudio) -> None:
     own = begun(page, drawing)
     before = studio.project(own)["silhouette"]["outline"]
@@ -66,7 +78,7 @@ def test_sliders_read_anew(page, drawing, studio: RunningStudio) -> None:
 def test_painting_mends_the_shape_and_can_be_undone(page, drawing, studio: RunningStudio) -> None:
     own = begun(page, drawing)
     before = area_of(studio.project(own))
-    page.get_by_role("radio", name="Take away").check()
+    page.get_by_role("radio", name="Remove").check()
     page.get_by_role("radio", name="lasso").check()
     stroke(page, "canvas.reading", (0.3, 0.68), (0.6, 0.68), (0.6, 0.97), (0.3, 0.97))
     studio.until(lambda: area_of(studio.project(own)) < 0.95 * before)
@@ -135,13 +147,36 @@ def test_pictures_are_dropped_and_pasted(page, drawing) -> None:
         page.wait_for_selector(READ)
 
 
-def test_a_file_that_is_no_picture_is_refused_in_words(page, tmp_path) -> None:
+def test_what_cannot_be_read_is_refused_in_words_where_it_was_chosen(
+    page, studio, tmp_path
+) -> None:
+    before = studio.client.get("projects").json()
+    Image.new("L", (90, 90), 255).save(tmp_path / "white.png")
     (tmp_path / "notes.png").write_bytes(b"this is no picture")
+    (tmp_path / "old.orbiflow").write_bytes(b"this is no project")
     page.goto("/")
-    page.set_input_files("#file", tmp_path / "notes.png")
-    page.wait_for_selector(".said .error")
-    assert "notes.png" in page.locator(".said .error").inner_text()
-    assert page.get_by_role("button", name="Find tiles").is_disabled()
+    saved = "input[accept='.orbiflow']"
+    files = [("#file", "notes.png"), ("#file", "white.png"), (saved, "old.orbiflow")]
+    for field, name in files * 2:  # each may be chosen again
+        page.set_input_files(field, tmp_path / name)
+        said = "not a project" if field == saved else name
+        page.locator(".drop .told .error").filter(has_text=said).wait_for()
+        assert "Reading" not in page.locator("#page").inner_text()
+    assert page.url.endswith(("/", "#/"))
+    assert studio.client.get("projects").json() == before
+
+
+def test_a_picture_that_failed_before_says_so_and_leads_back(page, studio) -> None:
+    own = studio.client.post("projects", json={"kind": "tile"}).json()["id"]
+    studio.client.put(f"projects/{own}/input?name=notes.png", content=b"this is no picture")
+    studio.until(lambda: studio.project(own)["tasks"][0]["state"] == "failed")
+    page.goto(f"/#/p/{own}/picture")
+    page.get_by_text("notes.png").wait_for()
+    assert "Reading" not in page.locator("#page").inner_text()
+    assert not page.get_by_role("button", name="Find tiles").is_visible()
+    page.get_by_role("button", name="Choose another picture").click()
+    page.wait_for_selector(".drop")
+    assert studio.client.get(f"projects/{own}").status_code == 404
 
 
 def test_an_animal_is_taken_by_keyboard_and_the_project_renamed_and_deleted(page, studio) -> None:

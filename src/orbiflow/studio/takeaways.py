@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -82,6 +83,8 @@ def take(
             "files": [{"name": file.name, "bytes": file.stat().st_size} for file in written],
             "preview": preview,
             "facts": facts,
+            "chosen": json.loads(settings),
+            "made": time.time(),
         }
     )
 

@@ -1,7 +1,8 @@
 /** All ways to bring a picture, a table or a project: choose, drop, paste, photograph, draw. */
 
-import { button, h, toast, trying } from "../dom.js";
-import { bytes } from "../words.js";
+import { button, h, put } from "../dom.js";
+import { Feed } from "../events.js";
+import { alive, bytes, sentence } from "../words.js";
 
 const PICTURES = "image/*,.svg,.json,.dat";
 const TABLES = /\.(csv|tsv|txt|npy|parquet)$/i;
@@ -11,9 +12,30 @@ const hasCamera = () => Boolean(navigator.mediaDevices?.getUserMedia);
 /** A field for files that a button opens. */
 function chooser(label, use, attributes) {
   const box = h("input", {
-    type: "file", class: "unseen", tabindex: "-1", "aria-label": label, onchange: () => box.files[0] && use(box.files[0]), ...attributes,
+    type: "file", class: "unseen", tabindex: "-1", "aria-label": label, ...attributes,
+    onchange: () => {
+      const [file] = box.files;
+      box.value = ""; // the same file can be chosen again
+      if (file) use(file);
+    },
   });
   return box;
+}
+
+/** Resolves when nothing is done for a new project any more; fails if what was done did. */
+function filled(project) {
+  const feed = new Feed(project);
+  return new Promise((resolve, reject) => {
+    const check = () => {
+      const { tasks, silhouette, tiles } = project;
+      const failed = tasks.find(({ state }) => state === "failed");
+      if (failed && !silhouette && !tiles.length) reject(new Error(sentence(failed.error)));
+      else if (!tasks.some(alive)) resolve();
+    };
+    ["task", "refresh"].forEach((kind) => feed.on(kind, check));
+    feed.on("gone", () => reject(new Error("This project was deleted.")));
+    check();
+  }).finally(() => feed.close());
 }
 
 export class Bringing {
@@ -22,6 +44,7 @@ export class Bringing {
     this.touch = matchMedia("(pointer: coarse)").matches;
     this.file = chooser("A picture from your computer", (file) => this.take(file), { accept: PICTURES, id: "file" });
     this.photo = chooser("A photo", (file) => this.take(file), { accept: "image/*", capture: "environment" });
+    this.said = h("div", { class: "told", role: "status" });
     this.saved = chooser("A project file", (file) => this.open(file), { accept: ".orbiflow" });
     this.heard = {
       dragover: (event) => { event.preventDefault(); document.body.classList.add("over"); },
@@ -35,6 +58,26 @@ export class Bringing {
   close() {
     Object.entries(this.heard).forEach(([name, hear]) => document.removeEventListener(name, hear));
     document.body.classList.remove("over", "busy");
+    this.closed = true;
+  }
+
+  /** Say a sentence beside the buttons. */
+  tell(text, kind) {
+    put(this.said, text && h("p", { class: kind }, text));
+    this.said.scrollIntoView({ block: "nearest" });
+  }
+
+  /** Do what may fail and takes a while, both told beside the buttons. */
+  async trying(work, words = "") {
+    document.body.classList.toggle("busy", Boolean(words));
+    this.tell(words, "soft");
+    try {
+      await work();
+      if (words) this.tell();
+    } catch (error) {
+      this.tell(error.message, "error");
+    }
+    document.body.classList.remove("busy");
   }
 
   panel() {
@@ -45,24 +88,35 @@ export class Bringing {
         button("Choose a picture", () => this.file.click(), { kind: "primary big", image: "upload" }),
         (this.touch || hasCamera()) && button("Take a photo", () => this.snap(), { image: "camera" }),
         button("Draw a shape", () => this.draw(), { image: "pencil" }),
-        navigator.clipboard?.read && button("Paste", () => trying(() => this.paste()), { image: "paste" })),
-      this.file, this.photo, this.saved);
+        navigator.clipboard?.read && button("Paste", () => this.trying(() => this.paste()), { image: "paste" })),
+      this.said, this.file, this.photo, this.saved);
   }
 
   /** Make a project of what `send` puts into it, and go and see what was read. */
-  async begin(name, send) {
-    document.body.classList.add("busy");
-    await trying(async () => {
+  begin(name, send) {
+    return this.trying(async () => {
       const { id } = await this.api.post("projects", { kind: "tile", name });
-      try {
-        await send(id);
-      } catch (error) {
-        await this.api.remove(`projects/${id}`);
-        throw error;
-      }
-      this.navigate(`p/${id}/picture`);
-    });
-    document.body.classList.remove("busy");
+      await this.kept(id, () => send(id));
+      this.go(`p/${id}/picture`);
+    }, `Reading ${name} …`);
+  }
+
+  /** Wait until a new project is filled; if it cannot be, delete it and say why. */
+  async kept(id, fill = () => {}) {
+    try {
+      await fill();
+      const project = await this.api.get(`projects/${id}`);
+      await filled(project);
+      return project;
+    } catch (error) {
+      await this.api.remove(`projects/${id}`).catch(() => {});
+      throw error;
+    }
+  }
+
+  /** Go to a page, unless the user has gone to another. */
+  go(path) {
+    if (!this.closed) this.navigate(path);
   }
 
   animal({ name, title }) {
@@ -72,22 +126,22 @@ export class Bringing {
   take(file) {
     const name = file.name || "picture.png";
     if (file.size > this.most) {
-      toast(`${name} has ${bytes(file.size)}; at most ${bytes(this.most)} can be read. Make it smaller first.`, { bad: true });
-      return undefined;
+      return this.tell(`${name} has ${bytes(file.size)}; at most ${bytes(this.most)} can be read. Make it smaller first.`, "error");
     }
     return this.begin(stem(name), (id) => this.api.put(`projects/${id}/input?name=${encodeURIComponent(name)}`, file));
   }
 
   open(file) {
-    return trying(async () => {
+    return this.trying(async () => {
       const { id, kind } = await this.api.post("projects/open", file);
-      this.navigate(kind === "density" ? `d/${id}` : `p/${id}`);
-    });
+      const { tiles } = await this.kept(id);
+      this.go(kind === "density" ? `d/${id}` : tiles.length ? `p/${id}` : `p/${id}/picture`);
+    }, `Opening ${file.name} …`);
   }
 
   /** Begin with a table, or with none yet. */
   count(file) {
-    return trying(async () => {
+    return this.trying(async () => {
       const { id } = await this.api.post("projects", { kind: "density", name: file ? stem(file.name) : "My table" });
       if (file) await this.api.put(`projects/${id}/density/table?name=${encodeURIComponent(file.name)}`, file);
       this.navigate(`d/${id}`);
@@ -104,7 +158,7 @@ export class Bringing {
     document.body.classList.remove("over");
     const [first] = event.dataTransfer.files;
     if (first) this.either(first);
-    else toast("That was no file. Save the picture first, then drop it here.");
+    else this.tell("That was no file. Save the picture first, then drop it here.", "notice");
   }
 
   async snap() {

@@ -3,7 +3,7 @@
 import { choice, h, slider } from "../dom.js";
 
 const TOOLS = [
-  ["add", "Add", "more"], ["remove", "Take away", "cut"], ["pins", "Keep its shape", "pin"],
+  ["add", "Add", "more"], ["remove", "Remove", "cut"], ["pins", "Keep its shape", "pin"],
   ["emphasis", "Matters most", "star"], ["rub", "Rub out", "rub"],
 ];
 const MEANINGS = {

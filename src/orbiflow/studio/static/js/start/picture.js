@@ -9,6 +9,7 @@ import { paintBrush, paintSilhouette, paintStrokes, tinted, touches } from "./ov
 import { pointing } from "./pointing.js";
 
 const LAYERS = ["mend", "pins", "emphasis"];
+const MANY = 6; // parts left out, from which a picture is a photograph with a background
 const KEYS = "With the keyboard: arrow keys move the brush, Space begins and ends a stroke.";
 
 export async function show(root, page) {
@@ -39,19 +40,19 @@ class PicturePage {
     });
     this.stage = h("div", { class: "stage", hidden: true }, this.canvas);
     this.said = h("div", { class: "said stack", role: "status" });
+    this.lead = h("p", { class: "soft" }, "The green shape is what we read. If something is missing or too much, mend it here.");
     this.find = button("Find tiles", () => this.search(), { kind: "primary big", image: "arrow" });
     this.back = button("Undo", () => this.changed(this.marks.undo()), { kind: "quiet", image: "undo" });
     this.again = button("Redo", () => this.changed(this.marks.redo()), { kind: "quiet", image: "redo" });
     const clear = button("Start over", () => this.startOver(), { kind: "quiet", image: "bin" });
     this.controls = readingControls(this.reading, () => this.read());
-    this.unread = h("p", { class: "lonely soft" }, "Reading the picture …");
+    this.unread = h("div", { class: "lonely stack", role: "status" });
+    this.side = h("div", { class: "stack side" }, h("div", { class: "go" }, this.find), this.said, this.controls.root,
+      paintingControls(this.pen, () => this.paint(), [this.back, this.again, clear]));
     put(root, h("div", { class: "picture" },
       h("div", { class: "stack" },
-        h("h1", { tabindex: "-1" }, "Is this your animal?"),
-        h("p", { class: "soft" }, "The green shape is what we read. If something is missing or too much, mend it here."),
-        this.stage, this.unread),
-      h("div", { class: "stack side" }, h("div", { class: "go" }, this.find), this.said, this.controls.root,
-        paintingControls(this.pen, () => this.paint(), [this.back, this.again, clear]))));
+        h("h1", { tabindex: "-1" }, "Is this your animal?"), this.lead, this.stage, this.unread),
+      this.side));
     this.listen();
     this.ready();
   }
@@ -92,7 +93,7 @@ class PicturePage {
       if (this.marks.width !== silhouette.width || this.marks.height !== silhouette.height) await this.fit(silhouette);
     }
     this.known = Math.min(this.sent, this.marks.strokes.length);
-    this.stage.hidden = !silhouette;
+    [this.lead, this.stage, this.side].forEach((part) => { part.hidden = !silhouette; });
     this.unread.hidden = Boolean(silhouette);
     this.tell();
   }
@@ -196,13 +197,21 @@ class PicturePage {
     this.again.disabled = !marks.undone.length;
     this.canvas.setAttribute("aria-busy", String(Boolean(busy)));
     this.paint();
-    const told = JSON.stringify([busy, task?.state, task?.error, silhouette && { ...silhouette, outline: null }]);
+    const told = JSON.stringify([busy, task?.state, task?.error, this.project.tasks.some(alive), silhouette && { ...silhouette, outline: null }]);
     if (told === this.told) return; // what is open stays open
     this.told = told;
-    put(this.said,
-      busy && h("p", { class: "soft" }, silhouette ? "Reading it again …" : "Reading the picture …"),
-      !busy && task?.state === "failed" && h("p", { class: "error" }, sentence(task.error)),
-      silhouette && notes(silhouette));
+    const error = !busy && task?.state === "failed" && h("p", { class: "error" }, sentence(task.error));
+    if (silhouette) put(this.said, busy && h("p", { class: "soft" }, "Reading it again …"), error, notes(silhouette));
+    else put(this.unread, ...(this.project.tasks.some(alive) ? [h("p", { class: "soft" }, "Reading the picture …")] : this.nothing(error)));
+  }
+
+  /** What is shown if there is no silhouette, and none to come. */
+  nothing(error) {
+    const leave = async () => {
+      if (!this.project.tiles.length) await this.api.remove(this.place);
+      this.navigate("");
+    };
+    return [error || h("p", { class: "soft" }, "There is no picture yet."), h("p", {}, button("Choose another picture", () => trying(leave), { kind: "primary" }))];
   }
 
   /** Search for tiles of what is on the screen: first all of it must have been read. */
@@ -230,9 +239,10 @@ class PicturePage {
 /** What there is to say of a silhouette. */
 function notes({ doubts, notes: said, left_out: others = [] }) {
   const out = others.length;
-  const kept = out === 1 ? "it" : "them";
   return h("ul", { class: "notes stack" },
     doubts.map((text) => h("li", { class: "notice" }, sentence(text))),
-    out > 0 && h("li", {}, h("span", { class: "swatch" }), `${number(out, "part is", "parts are")} left out: a tile is one piece. Paint a bridge with “Add” to keep ${kept}.`),
+    out > 0 && h("li", {}, h("span", { class: "swatch" }), `${number(out, "part is", "parts are")} left out: a tile is one piece. `, out < MANY
+      ? `Paint a bridge with “Add” to keep ${out === 1 ? "it" : "them"}.`
+      : "A busy photograph? Draw round the head first: choose “Add” and the lasso. Then “Remove” what is too much."),
     said.length > 0 && h("li", {}, h("details", {}, h("summary", {}, "How it was read"), h("p", { class: "soft" }, said.map(sentence).join(" ")))));
 }

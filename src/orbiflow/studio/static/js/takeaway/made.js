@@ -1,8 +1,8 @@
 /** What was made of a tile: its files, a picture of it, what is to be said. */
 
 import { h, icon } from "../dom.js";
-import { alive, bytes, capital, sentence } from "../words.js";
-import { KINDS } from "./kinds.js";
+import { ago, alive, bytes, capital, sentence } from "../words.js";
+import { KINDS, lengthIn } from "./kinds.js";
 
 const SEEN = /\.(png|gif|svg)$/; // files that browsers show
 
@@ -39,8 +39,19 @@ export function words(task, stale) {
     h("div", { class: "row" }, files(task, "primary"))];
 }
 
+/** What a task made, for what or how large, and when. */
+function about({ operation, result: { chosen = {}, facts = {}, made } }) {
+  const { title, words: names } = KINDS[operation];
+  const options = ["purpose", "kind", "cut"].map((name) => names[name]?.options?.[chosen[name]]);
+  const length = lengthIn(chosen.tile_size ?? (KINDS[operation].solid && facts.tile_size));
+  const pixels = operation === "art" && `${facts.width} × ${facts.height} pixels`;
+  const solid = operation === "solid" && facts.size && `${facts.size.map(Math.round).join(" × ")} mm`;
+  return [title, ...options, length && `tiles of ${Number(length.toFixed(1))} mm`, chosen.area, pixels, solid, made && ago(made)].filter(Boolean).join(" · ");
+}
+
 /** A list of what was made before. */
 export function madeBefore(tasks) {
   return h("ul", { class: "made" }, tasks.map((task) =>
-    h("li", { class: "panel stack" }, picture(task), h("span", { class: "soft small" }, KINDS[task.operation].title), files(task, ""))));
+    h("li", { class: "panel stack" }, picture(task) ?? h("span", { class: "no-picture" }, icon(KINDS[task.operation].image)),
+      h("span", { class: "soft small" }, about(task)), files(task, ""))));
 }

@@ -9,11 +9,56 @@ const USUAL = 96 / 25.4; // what CSS takes a millimetre for
 
 export const pixels = () => Number(localStorage.getItem(KEY)) || USUAL;
 
+/** The corners of a polygon's hull, in order. */
+function hull(polygon) {
+  const half = (points) => {
+    const found = [];
+    for (const [x, y] of points) {
+      const turns = ([a, b], [c, d]) => (c - a) * (y - b) - (d - b) * (x - a) > 0;
+      while (found.length > 1 && !turns(found.at(-2), found.at(-1))) found.pop();
+      found.push([x, y]);
+    }
+    return found.slice(0, -1);
+  };
+  const sorted = [...polygon].sort(([a, b], [c, d]) => a - c || b - d);
+  return [...half(sorted), ...half(sorted.reverse())];
+}
+
+/**
+ * The smallest rectangle of any direction around a polygon, by which files measure a tile: {long, short, corners}.
+ * It lies along a side of the hull. Of the same area, the shortest.
+ */
+export function smallest(polygon) {
+  const ring = hull(polygon);
+  const found = ring.map(([x, y], k) => {
+    const [p, q] = ring[(k + 1) % ring.length];
+    const far = Math.hypot(p - x, q - y);
+    const [u, v] = [(p - x) / far, (q - y) / far];
+    const along = ring.map(([a, b]) => a * u + b * v);
+    const across = ring.map(([a, b]) => b * u - a * v);
+    const [left, right, low, high] = [Math.min(...along), Math.max(...along), Math.min(...across), Math.max(...across)];
+    const corners = [[left, low], [right, low], [right, high], [left, high]].map(([a, b]) => [a * u - b * v, a * v + b * u]);
+    const [short, long] = [right - left, high - low].sort((a, b) => a - b);
+    return { short, long, corners };
+  });
+  const area = ({ short, long }) => short * long;
+  const least = Math.min(...found.map(area));
+  return found.filter((own) => area(own) <= least * (1 + 1e-6)).reduce((best, own) => (own.long < best.long ? own : best));
+}
+
+/** The least coordinates and the sides of the upright box around points: [left, top, width, height]. */
+function upright(points) {
+  const [xs, ys] = [0, 1].map((k) => points.map((point) => point[k]));
+  const [left, top] = [Math.min(...xs), Math.min(...ys)];
+  return [left, top, Math.max(...xs) - left, Math.max(...ys) - top];
+}
+
 /** A view of a polygon: {root, show(size in mm)}; `yDown`: how its y lies. */
 export function trueSize(polygon, yDown) {
   const canvas = h("canvas", { class: "true-tile", role: "img" });
   const said = h("p", { class: "soft small" });
   const card = h("div", { class: "bank-card", "aria-hidden": "true" }, h("span", {}, "bank card"));
+  const { long, short, corners } = smallest(polygon);
   let size = 40;
   const fit = slider("Make this as large as a bank card held to the screen", { min: 2, max: 9, step: 0.01, value: pixels(), said: (value) => `${Math.round((value / USUAL) * 100)} %` }, (value) => {
     localStorage.setItem(KEY, value);
@@ -26,10 +71,8 @@ export function trueSize(polygon, yDown) {
     const scale = pixels();
     card.style.setProperty("width", `${CARD[0] * scale}px`);
     card.style.setProperty("height", `${CARD[1] * scale}px`);
-    const [xs, ys] = [0, 1].map((k) => polygon.map((point) => point[k]));
-    const [left, top] = [Math.min(...xs), Math.min(...ys)];
-    const [wide, high] = [Math.max(...xs) - left, Math.max(...ys) - top];
-    const unit = (size * scale) / Math.max(wide, high);
+    const [left, top, wide, high] = upright([...polygon, ...corners]);
+    const unit = (size * scale) / long;
     const ratio = globalThis.devicePixelRatio || 1;
     const [width, height] = [wide * unit + 4, high * unit + 4].map((side) => Math.min(side, 4000 / ratio));
     Object.assign(canvas, { width: width * ratio, height: height * ratio });
@@ -46,9 +89,12 @@ export function trueSize(polygon, yDown) {
     context.fillStyle = look.getPropertyValue("--accent-soft");
     context.fill(path);
     context.stroke(path);
-    const measured = [wide, high].map((side) => ((side * size) / Math.max(wide, high)).toFixed(1));
-    canvas.setAttribute("aria-label", `The tile in its true size, ${measured[0]} by ${measured[1]} mm`);
-    said.textContent = `${measured[0]} × ${measured[1]} mm. ${localStorage.getItem(KEY) ? "Your screen is measured." : "Screens differ: measure yours once."}`;
+    context.setLineDash([4 / unit, 4 / unit]);
+    context.lineWidth = 1 / unit;
+    context.stroke(pathOf(corners));
+    const [length, across, lying, standing] = [long, short, ...upright(polygon).slice(2)].map((side) => ((side * size) / long).toFixed(1));
+    canvas.setAttribute("aria-label", `The tile in its true size, ${lying} by ${standing} mm as it lies, in a rectangle of ${length} by ${across} mm`);
+    said.textContent = `${lying} × ${standing} mm as it lies; the smallest rectangle around it has ${length} × ${across} mm. ${localStorage.getItem(KEY) ? "Your screen is measured." : "Screens differ: measure yours once."}`;
   }
   const root = h("div", { class: "stack" });
   put(root, h("div", { class: "true-place", tabindex: "0", role: "group", "aria-label": "The tile in its true size" }, canvas), h("div", { class: "row" }, said, h("span", { class: "grow" }), measure), tools);
