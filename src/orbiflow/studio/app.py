@@ -24,7 +24,7 @@ from orbiflow.studio.animals import ANIMALS, animal_file
 from orbiflow.studio.closeup_routes import closeup_routes
 from orbiflow.studio.guard import Guard, Refused
 from orbiflow.studio.hub import Hub
-from orbiflow.studio.kinds_of_work import KINDS, kind_of_work, own_schema
+from orbiflow.studio.kinds_of_work import KINDS, RefusedSetting, kind_of_work, own_schema
 from orbiflow.studio.requests import Here, Studio
 from orbiflow.studio.settings import Limits
 from orbiflow.studio.store import Missing, Store
@@ -129,6 +129,8 @@ async def _told(_request: Request, error: Exception) -> JSONResponse:
         return JSONResponse({"error": error.text}, error.status)
     if isinstance(error, Missing):
         return JSONResponse({"error": str(error)}, 404)
+    if isinstance(error, RefusedSetting):
+        return JSONResponse({"error": str(error), "setting": error.setting}, 422)
     if isinstance(error, OrbiflowError):
         return JSONResponse({"error": str(error)}, 422)
     if isinstance(error, RequestValidationError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -136,7 +137,16 @@ def making_call(makes: str, settings: Mapping[str, Any], result: Path, **files: 
     try:
         return made.call({"result": result, **own, **files})
     except SettingError as error:
-        raise SettingError(literal(setting_words(error, made))) from error
+        raise RefusedSetting(setting_words(error, made), error) from error
+
+
+class RefusedSetting(SettingError):
+    """A refusal in the page's words, and the `setting` that it is about, "" if it is about none."""
+
+    def __init__(self, text: str, error: SettingError) -> None:
+        super().__init__(literal(text))
+        found = re.search(r"(?<!\{)\{(\w+)\}(?!\})", error.template)
+        self.setting = found[1] if found else ""
 
 
 def setting_words(error: SettingError, operation: Operation) -> str:

@@ -5,9 +5,9 @@ import { sentence } from "./words.js";
 export const client = crypto.getRandomValues(new Uint32Array(2)).join("");
 
 export class Refusal extends Error {
-  constructor(message, status) {
+  constructor(message, status, setting = "") {
     super(message);
-    this.status = status;
+    Object.assign(this, { status, setting });
   }
 }
 
@@ -29,7 +29,7 @@ async function call(method, path, body, { signal } = {}) {
   } catch {
     throw new Refusal("The studio answered something that this page cannot read. Reload the page.", answer.status);
   }
-  if (!answer.ok) throw new Refusal(sentence(found?.error) || `The studio refused this (${answer.status}).`, answer.status);
+  if (!answer.ok) throw new Refusal(sentence(found?.error) || `The studio refused this (${answer.status}).`, answer.status, found?.setting);
   return found;
 }
 

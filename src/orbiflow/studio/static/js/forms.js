@@ -56,7 +56,7 @@ function control(name, schema, words, changed) {
  * A form: the settings named in `first` on top, the rest folded away in their groups.
  * `words`: titles and the like by setting; `not` in them: values of others with which it does not apply.
  * `hidden`: settings that the page sets itself. `start`: values to begin with.
- * `.values()`: what differs from the defaults and applies. `.refuse(text)`: show what is wrong beside the
+ * `.values()`: what differs from the defaults and applies. `.refuse(name, text)`: show what is wrong beside the
  * setting that the text begins with; false if it names none.
  */
 export function form(schema, { first, words = {}, hidden = [], start = {} }, changed = () => {}) {
@@ -90,9 +90,8 @@ export function form(schema, { first, words = {}, hidden = [], start = {} }, cha
     const shown = names.filter((name) => !controls.get(name).root.hidden);
     return Object.fromEntries(shown.map((name) => [name, controls.get(name).value()]).filter(([, value]) => value !== undefined));
   };
-  made.refuse = (text) => {
-    const name = names.filter((own) => text.toLowerCase().startsWith(own.replaceAll("_", " "))).sort((a, b) => b.length - a.length)[0];
-    if (!name) return false;
+  made.refuse = (name, text) => {
+    if (!controls.has(name)) return false;
     const { root, box } = controls.get(name);
     const said = h("p", { class: "error small", role: "alert" }, text);
     root.querySelector(".error")?.remove();

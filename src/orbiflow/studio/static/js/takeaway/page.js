@@ -123,7 +123,7 @@ class TakeawayPage {
     try {
       this.task = (await this.api.post(`${this.place}/tasks`, { operation: this.kind, settings })).task;
     } catch (error) {
-      if (this.form.refuse(error.message)) return;
+      if (this.form.refuse(error.setting, error.message)) return;
       throw error;
     }
     [this.stale, this.news] = [false, true];
