@@ -8,6 +8,8 @@ import re
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
+NAME_IN_BRACES = re.compile(r"(?<!\{)\{(\w+)\}(?!\})")
+
 
 class OrbiflowError(ValueError):
     """An argument, a file or a setting that cannot be used: the base of all other errors."""
@@ -23,6 +25,8 @@ class SettingError(OrbiflowError):
     >>> error = SettingError("{tile_size} must be above 0")
     >>> str(error), error.named(lambda name: "--" + name.replace("_", "-"))
     ('tile_size must be above 0', '--tile-size must be above 0')
+    >>> error.about
+    'tile_size'
     """
 
     def __init__(self, template: str) -> None:
@@ -32,9 +36,15 @@ class SettingError(OrbiflowError):
     def __str__(self) -> str:
         return self.named(lambda name: name)
 
+    @property
+    def about(self) -> str:
+        """The first setting that the message names, "" if it names none."""
+        found = NAME_IN_BRACES.search(self.template)
+        return found[1] if found else ""
+
     def named(self, name: Callable[[str], str]) -> str:
         """Return the message, with each setting called what `name` returns for it."""
-        text = re.sub(r"(?<!\{)\{(\w+)\}(?!\})", lambda found: name(found[1]), self.template)
+        text = NAME_IN_BRACES.sub(lambda found: name(found[1]), self.template)
         return text.replace("{{", "{").replace("}}", "}")
 
 

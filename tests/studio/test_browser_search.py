@@ -203,7 +203,7 @@ def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched
     page.get_by_label("How long is one tile?").fill("much")
     page.get_by_role("button", name="Make it").click()
     said = page.locator(".field .error")
-    assert "'much' is not a length" in said.inner_text()
+    assert "The length of a tile: 'much' is not a length" in said.inner_text()
     size = page.get_by_label("How long is one tile?")
     assert size.get_attribute("aria-invalid") == "true"
     size.fill("30")

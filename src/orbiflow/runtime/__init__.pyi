@@ -29,12 +29,14 @@ from .files import make_folder as make_folder
 from .files import read_json as read_json
 from .files import stays_inside as stays_inside
 from .files import write_atomic as write_atomic
+from .files import write_json as write_json
 from .files import write_set as write_set
 from .operations import SCHEMA_VERSION as SCHEMA_VERSION
 from .operations import Call as Call
 from .operations import Operation as Operation
 from .operations import Outcome as Outcome
 from .operations import Sink as Sink
+from .operations import as_part as as_part
 from .operations import call_from_json as call_from_json
 from .operations import find as find
 from .operations import ignore as ignore

@@ -242,6 +242,11 @@ MOST_JSON_BYTES = 256 * 2**20
 """The largest file of JSON that is read."""
 
 
+def write_json(path: str | os.PathLike[str], document: Mapping[str, Any]) -> Path:
+    """Write a JSON object to `path` as `write_atomic` does, and return the path."""
+    return write_atomic(path, json.dumps(document, allow_nan=False))
+
+
 def read_json(file: Path, what: str) -> dict[str, Any]:
     """Return the JSON object in a file that is to hold `what`, such as "a report".
 

@@ -42,7 +42,16 @@ from typing import Any, Literal, ParamSpec, TypeVar, cast
 
 from orbiflow.arguments import as_instance, described, meant
 from orbiflow.errors import OrbiflowError, SettingError, literal
-from orbiflow.runtime.events import Cancel, Cancelled, Event, Failed, Finished, Progress, Started
+from orbiflow.runtime.events import (
+    Cancel,
+    Cancelled,
+    Event,
+    Failed,
+    Finished,
+    Note,
+    Progress,
+    Started,
+)
 from orbiflow.settings import Field, Settings, check_names, check_rules, fields_of
 
 SCHEMA_VERSION = 2
@@ -300,6 +309,26 @@ def progress_events(tell: Sink, cancel: Cancel) -> Callable[[float, str], None]:
         tell(Progress(min(1.0, reached), what))
 
     return progress
+
+
+def as_part(tell: Sink, begin: float = 0.0, end: float = 1.0) -> Sink:
+    """Return a sink for an operation that another one calls, which is a part of its work.
+
+    Its progress is told as from one share of the whole to another, and its notes; nothing else is.
+
+    >>> told = []
+    >>> as_part(told.append, 0.5, 1.0)(Progress(0.5, "drawing"))
+    >>> told[0].share
+    0.75
+    """
+
+    def told(event: Event) -> None:
+        if isinstance(event, Progress):
+            tell(Progress(begin + (end - begin) * event.share, event.what))
+        elif isinstance(event, Note):
+            tell(event)
+
+    return told
 
 
 @cache

@@ -15,7 +15,7 @@ from orbiflow.runtime import (
     ignore,
     make_folder,
     operation,
-    write_atomic,
+    write_json,
 )
 from orbiflow.studio.tile_files import STAGES, best_stage, put_tile, tile_folder, tile_number
 
@@ -41,7 +41,7 @@ def space(
     cancel.check()
     own = tile_folder(project, tile)
     told = space_json(EscherTile.load(own))
-    write_atomic(own.parent / SPACE, json.dumps(told, allow_nan=False))
+    write_json(own.parent / SPACE, told)
     return Outcome({"tile": tile})
 
 
@@ -71,7 +71,7 @@ def pull(
     number, stage = tile_number(task, 0), STAGES[-1]
     put_tile(project, number, stage, found, on_event, parent=tile)
     if place := best_stage(project, number):  # at hand when it is pulled again
-        write_atomic(place / SPACE, json.dumps(space_json(found), allow_nan=False))
+        write_json(place / SPACE, space_json(found))
     return Outcome({"tile": number})
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -13,16 +12,16 @@ from orbiflow.runtime import (
     NEVER,
     Call,
     Cancel,
-    Event,
-    Note,
     Outcome,
     Progress,
     Sink,
+    as_part,
     find,
     ignore,
     make_folder,
     operation,
     write_atomic,
+    write_json,
 )
 from orbiflow.settings import OnlyWith, Range, Settings
 from orbiflow.studio.density_files import (
@@ -35,6 +34,7 @@ from orbiflow.studio.density_files import (
     map_file,
     table_file,
 )
+from orbiflow.studio.takeaways import export_folder, files_of
 
 if TYPE_CHECKING:
     from orbiflow.density import Density
@@ -77,7 +77,7 @@ def table(project: Path, task: int, *, on_event: Sink = ignore, cancel: Cancel =
 
     view = table_view(table_file(project))
     cancel.check()
-    _write(project / TABLE, view)
+    write_json(project / TABLE, view)
     return Outcome({"rows": view["rows"], "columns": len(view["columns"])})
 
 
@@ -97,12 +97,12 @@ def density(
     data = table_file(project)
     asked = {"data": data, "out": folder / FIT, "drop_missing": True, **choice.to_json()}
     call = find("density fit").call(asked)
-    told = _part(on_event, 0.0, FITTED)
+    told = as_part(on_event, 0.0, FITTED)
     call.operation.function(**call.arguments, on_event=told, cancel=cancel)
     cancel.check()
-    view = _view(folder, data, choice, _part(on_event, FITTED, 1.0))
+    view = _view(folder, data, choice, as_part(on_event, FITTED, 1.0))
     cancel.check()
-    _write(folder / VIEW, view)
+    write_json(folder / VIEW, view)
     for other in (project / "fits").iterdir():
         if other.name != folder.name:
             shutil.rmtree(other, ignore_errors=True)
@@ -123,10 +123,10 @@ def _view(folder: Path, data: Path, choice: FitChoice, tell: Sink) -> dict[str, 
             fitted, PlotSettings(names=names, dots=True), samples=points, resolution=SURFACE_CELLS,
             levels=True,
         )  # fmt: skip
-        _write(folder / SURFACE, surface)
+        write_json(folder / SURFACE, surface)
     tell(Progress(0.5, "drawing"))
     axes = tuple(range(min(2, space.dim)))
-    _write(map_file(folder, axes), flat_data(fitted, axes if space.dim > 1 else None))
+    write_json(map_file(folder, axes), flat_data(fitted, axes if space.dim > 1 else None))
     return {
         "space": space.name,
         "columns": list(names),
@@ -164,7 +164,7 @@ def density_map(
 
     found = flat_data(_model(folder), axes)
     cancel.check()
-    _write(map_file(folder, axes), found)
+    write_json(map_file(folder, axes), found)
     return Outcome({"fit": fit, "axes": list(axes)})
 
 
@@ -216,16 +216,15 @@ def take(
         task: The number of the task.
         fit: The number of the fit.
     """
-    source, out = fit_folder(project, fit), make_folder(project / "exports" / str(task))
+    source, out = fit_folder(project, fit), make_folder(export_folder(project, task))
     if choice.what == "model":
         for file in (source / FIT).iterdir():
             write_atomic(out / file.name, file.read_bytes())
     else:
         columns = json.loads((source / VIEW).read_text())["columns"]
         call = choice.call(source / FIT, table_file(project), columns, out)
-        call.operation.function(**call.arguments, on_event=_part(on_event), cancel=cancel)
-    written = sorted(file for file in out.iterdir() if file.is_file())
-    files = [{"name": file.name, "bytes": file.stat().st_size} for file in written]
+        call.operation.function(**call.arguments, on_event=as_part(on_event), cancel=cancel)
+    files = files_of(out)
     return Outcome({"takeaway": task, "what": choice.what, "files": files, "preview": False})
 
 
@@ -233,19 +232,3 @@ def _model(folder: Path) -> Density:
     from orbiflow.density import read_density
 
     return read_density(folder / FIT / "density.safetensors")[0]
-
-
-def _write(path: Path, document: dict[str, Any]) -> None:
-    write_atomic(path, json.dumps(document, allow_nan=False))
-
-
-def _part(tell: Sink, begin: float = 0.0, end: float = 1.0) -> Callable[[Event], None]:
-    """Return a sink that tells an operation's progress as that of a part, and its notes."""
-
-    def told(event: Event) -> None:
-        if isinstance(event, Progress):
-            tell(Progress(begin + (end - begin) * event.share, event.what))
-        elif isinstance(event, Note):
-            tell(event)
-
-    return told

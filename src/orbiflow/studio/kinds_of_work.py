@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -137,16 +136,15 @@ def making_call(makes: str, settings: Mapping[str, Any], result: Path, **files: 
     try:
         return made.call({"result": result, **own, **files})
     except SettingError as error:
-        raise RefusedSetting(setting_words(error, made), error) from error
+        raise RefusedSetting(setting_words(error, made), error.about) from error
 
 
 class RefusedSetting(SettingError):
     """A refusal in the page's words, and the `setting` that it is about, "" if it is about none."""
 
-    def __init__(self, text: str, error: SettingError) -> None:
+    def __init__(self, text: str, setting: str) -> None:
         super().__init__(literal(text))
-        found = re.search(r"(?<!\{)\{(\w+)\}(?!\})", error.template)
-        self.setting = found[1] if found else ""
+        self.setting = setting
 
 
 def setting_words(error: SettingError, operation: Operation) -> str:

@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw
 
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
-from orbiflow.runtime import write_atomic
+from orbiflow.runtime import write_atomic, write_json
 from orbiflow.studio.words import page_words
 from orbiflow.tiles import (
     FileContent,
@@ -51,7 +51,7 @@ def read_input(home: Path, called: str, reading: ReadingSettings) -> Target:
     picture.save(data, "png")
     write_atomic(home / BACKDROP, data.getvalue())
     document = {"shown": _shown(mended, picture.size), "target": _stored(mended)}
-    write_atomic(home / SILHOUETTE, json.dumps(document, allow_nan=False))
+    write_json(home / SILHOUETTE, document)
     return mended
 
 

@@ -164,10 +164,9 @@ class Store:
 
     def change(self, project: str, kind: str = "project", **changes: Any) -> None:
         """Change columns of a project, and tell an event of this kind."""
-        with self._changing(project) as data:
+        with self._changing(project):
             self.project(project)
             self._update("projects", project, {**changes, "changed": time.time()})
-            del data
             self._tell(project, kind)
 
     def delete(self, project: str) -> None:

@@ -7,17 +7,16 @@ import shutil
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import (
     NEVER,
     Call,
     Cancel,
-    Event,
-    Note,
     Outcome,
-    Progress,
     Sink,
+    as_part,
     ignore,
     make_folder,
     operation,
@@ -29,6 +28,17 @@ from orbiflow.studio.tile_files import tile_folder
 PREVIEW = "preview.png"
 SCRATCH = ".drawn"  # a folder for what is written on the way
 SIDE = 1000.0  # pixels of a preview's longer side
+
+
+def export_folder(home: Path, task: int) -> Path:
+    """Return the folder of the files that a task of a project makes to be taken away."""
+    return home / "exports" / str(task)
+
+
+def files_of(folder: Path) -> list[dict[str, Any]]:
+    """Return the name and the size in bytes of each file in a folder, by name."""
+    files = sorted(file for file in folder.iterdir() if file.is_file())
+    return [{"name": file.name, "bytes": file.stat().st_size} for file in files]
 
 
 @operation("studio take")
@@ -59,28 +69,23 @@ def take(
     """
     from orbiflow.studio.silhouette_file import input_file
 
-    folder = make_folder(project / "exports" / str(task))
+    folder = make_folder(export_folder(project, task))
     files = {"picture": input_file(project)} if picture else {}
     given, result = json.loads(settings), tile_folder(project, tile)
     if drawing and makes in DRAWN:
         result, files, given = with_drawing(drawing, result, files, given, folder / SCRATCH)
     name = file_name(makes, given, result, called)
     call = making_call(makes, given, result, out=folder / name, **files)
-
-    def tell(event: Event) -> None:
-        if isinstance(event, Progress | Note):
-            on_event(event)
-
-    done = call.operation.function(**call.arguments, on_event=tell, cancel=cancel)
-    written = sorted(file for file in folder.iterdir() if file.is_file())
+    done = call.operation.function(**call.arguments, on_event=as_part(on_event), cancel=cancel)
+    written = files_of(folder)
     preview = False
     with suppress(OrbiflowError):  # what was asked for is there
-        preview = _preview(call, written[0], folder, cancel)
+        preview = _preview(call, folder / written[0]["name"], folder, cancel)
     facts = {name: value for name, value in done.summary.items() if name not in ("file", "files")}
     return Outcome(
         {
             "takeaway": task,
-            "files": [{"name": file.name, "bytes": file.stat().st_size} for file in written],
+            "files": written,
             "preview": preview,
             "facts": facts,
             "chosen": json.loads(settings),

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 from orbiflow.runtime import (
     NEVER,
     Cancel,
-    Event,
-    Note,
     Outcome,
     Progress,
     Sink,
+    as_part,
     cores,
     ignore,
     operation,
@@ -101,7 +100,7 @@ def search(
         target,
         whole.replace(classes=tuple(left), workers=cores()),
         on_tile=show,
-        on_event=lambda event: _tell_progress(event, 1 - len(left) / len(names), on_event),
+        on_event=as_part(on_event, 1 - len(left) / len(names)),
         cancel=cancel,
     )
     if result.interrupted:
@@ -150,13 +149,6 @@ def _tell_again(project: Path, task: int, on_event: Sink) -> None:
     ):
         if number // PLACES == task and (found := best_stage(project, number)):
             tell_tile(number, found.name, on_event)
-
-
-def _tell_progress(event: Event, done: float, on_event: Sink) -> None:
-    if isinstance(event, Progress):
-        on_event(Progress(done + (1 - done) * event.share, event.what))
-    elif isinstance(event, Note):
-        on_event(event)
 
 
 @operation("studio open")

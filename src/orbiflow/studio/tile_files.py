@@ -6,14 +6,17 @@ task makes. So a task that starts again gives its tiles the same numbers.
 
 from __future__ import annotations
 
-import json
 import secrets
 import shutil
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import ItemDone, Sink, write_atomic
+from orbiflow.runtime import ItemDone, Sink, write_json
+
+if TYPE_CHECKING:
+    from orbiflow.tiles import EscherTile
 
 PLACES = 1000
 STAGES = ("sketch", "better", "final")
@@ -44,20 +47,18 @@ def tile_folder(home: Path, number: int) -> Path:
 
 
 def put_tile(
-    home: Path, number: int, stage: str, tile: object, tell: Sink, parent: int | None = None
+    home: Path, number: int, stage: str, tile: EscherTile, tell: Sink, parent: int | None = None
 ) -> None:
     """Write a certified `EscherTile` as a stage of a tile, and tell that it is there."""
     from orbiflow.studio.tile_view import tile_card, tile_view
-    from orbiflow.tiles import EscherTile
 
-    assert isinstance(tile, EscherTile)
     place = home / "tiles" / str(number) / stage
     if not place.is_dir():
         staged = home / "tiles" / f".{number}.{secrets.token_hex(4)}.tmp"
         staged.mkdir(parents=True)
         card = tile_card(tile, number, stage, parent)
-        write_atomic(staged / CARD, json.dumps(card, allow_nan=False))
-        write_atomic(staged / VIEW, json.dumps(tile_view(card, tile), allow_nan=False))
+        write_json(staged / CARD, card)
+        write_json(staged / VIEW, tile_view(card, tile))
         tile.save(staged / SAVED)
         place.parent.mkdir(parents=True, exist_ok=True)
         with suppress(OSError):  # a worker of a server that died was faster

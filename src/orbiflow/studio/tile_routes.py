@@ -12,7 +12,7 @@ from fastapi.responses import FileResponse
 from orbiflow.errors import OrbiflowError
 from orbiflow.studio.guard import Refused
 from orbiflow.studio.requests import Here, Studio, body_object
-from orbiflow.studio.takeaways import PREVIEW
+from orbiflow.studio.takeaways import PREVIEW, export_folder
 from orbiflow.studio.tile_files import VIEW, best_stage, tile_number
 
 SANDBOX = {"content-security-policy": "sandbox; default-src 'none'; style-src 'unsafe-inline'"}
@@ -60,7 +60,7 @@ def _made(here: Studio, task: int, name: str) -> Path:
     result = own["result"] or {}
     names = [file["name"] for file in result.get("files", ())]
     names += [PREVIEW] * bool(result.get("preview"))
-    file = here.store.home(own["project"]) / "exports" / str(task) / name
+    file = export_folder(here.store.home(own["project"]), task) / name
     if name not in names or not file.is_file():
         raise Refused(404, "there is no such file (any more); make it again")
     return file

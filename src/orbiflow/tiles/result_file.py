@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -15,7 +14,15 @@ import numpy as np
 from orbiflow.arguments import as_path, described
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.runtime import ResultFolder, is_list, is_object, make_folder, read_json, write_atomic
+from orbiflow.runtime import (
+    ResultFolder,
+    is_list,
+    is_object,
+    make_folder,
+    read_json,
+    write_atomic,
+    write_json,
+)
 from orbiflow.symmetry import CrystallographicGroup, Isometry, checked_lattice
 from orbiflow.tiles.likeness import Fidelity, Rating, Recognisability, ShapeMetrics, Thinnest
 from orbiflow.tiles.tile import EscherTile
@@ -178,7 +185,7 @@ def save_tiles(tiles: Sequence[EscherTile], folder: str | Path) -> Path:
             if tile.map is not None:
                 make_folder(staged / name)
                 write_atomic(staged / name / TILE_MODEL, tile.map.to_bytes())
-        write_atomic(staged / RESULT, json.dumps(document, allow_nan=False))
+        write_json(staged / RESULT, document)
     return own.path
 
 

@@ -19,6 +19,7 @@ from orbiflow.runtime import (
     make_folder,
     work,
     write_atomic,
+    write_json,
 )
 from orbiflow.tiles.pages.page import TILE_FILES, index_page
 from orbiflow.tiles.pages.sheets import is_read_png, overview_png
@@ -236,7 +237,7 @@ def write_run(
             write_atomic(staged / READ, picture)
         if tiles:
             write_gallery(result, staged, figures=figures, shown_out=shown_out or str(out))
-        write_atomic(staged / RESULT, json.dumps(report(result), allow_nan=False))
+        write_json(staged / RESULT, report(result))
         files = [path.relative_to(staged) for path in staged.rglob("*") if path.is_file()]
     if earlier:
         on_event(Note(f"the earlier run in {out} was replaced"))

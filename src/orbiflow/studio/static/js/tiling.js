@@ -47,6 +47,19 @@ export function inverse([a, b, c, d, e, f]) {
   ];
 }
 
+/** The area of a polygon, and the coordinates of its centroid: {area, x, y}. */
+export function measured(polygon) {
+  let [area, x, y] = [0, 0, 0];
+  polygon.forEach(([x0, y0], k) => {
+    const [x1, y1] = polygon[(k + 1) % polygon.length];
+    const cross = x0 * y1 - x1 * y0;
+    area += cross / 2;
+    x += ((x0 + x1) * cross) / 6;
+    y += ((y0 + y1) * cross) / 6;
+  });
+  return { area: Math.abs(area), x: x / area, y: y / area };
+}
+
 /** A polygon and its group, ready to be drawn. */
 export class Tiling {
   constructor(card) {
@@ -61,19 +74,10 @@ export class Tiling {
   /** Take another polygon for the same group. */
   change(polygon) {
     this.polygon = polygon;
-    let area = 0;
-    let x = 0;
-    let y = 0;
-    polygon.forEach(([x0, y0], k) => {
-      const [x1, y1] = polygon[(k + 1) % polygon.length];
-      const cross = x0 * y1 - x1 * y0;
-      area += cross / 2;
-      x += ((x0 + x1) * cross) / 6;
-      y += ((y0 + y1) * cross) / 6;
-    });
-    this.area = Math.abs(area);
-    this.middle = { x: x / area, y: y / area };
-    this.radius = Math.max(...polygon.map(([u, v]) => Math.hypot(u - x / area, v - y / area)));
+    const { area, x, y } = measured(polygon);
+    this.area = area;
+    this.middle = { x, y };
+    this.radius = Math.max(...polygon.map(([u, v]) => Math.hypot(u - x, v - y)));
     this.path = pathOf(polygon);
   }
 

@@ -8,6 +8,7 @@
  * and points are found in turns, the latter by conjugate gradients from where they are.
  */
 
+import { measured } from "../tiling.js";
 import { crosses } from "./crossing.js";
 
 const GRAB = 600; // strength of the spring to the pointer; that of a triangle is about one
@@ -83,16 +84,8 @@ export class Puller {
   }
 
   #measure(polygon) {
-    let [area, x, y] = [0, 0, 0];
-    polygon.forEach(([x0, y0], k) => {
-      const [x1, y1] = polygon[(k + 1) % polygon.length];
-      const cross = x0 * y1 - x1 * y0;
-      area += cross / 2;
-      x += ((x0 + x1) * cross) / 6;
-      y += ((y0 + y1) * cross) / 6;
-    });
-    this.area = Math.abs(area);
-    this.middle = [x / area, y / area];
+    const { area, x, y } = measured(polygon);
+    Object.assign(this, { area, middle: [x, y] });
   }
 
   /** Every point of the body as rows of one matrix; the group moves about the middle of the tile. */
