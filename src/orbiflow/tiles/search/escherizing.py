@@ -122,7 +122,8 @@ def escherize(
         pins = Pins.read(settings.pin, target, keep_angle=settings.pin_angle)
     method = method or settings.search_method
     task = _task(Goal(target, emphasis, pins), method, settings.per_class, settings.force)
-    near = near_symmetry(target.normal) if method.takes_symmetric else None
+    with one_blas_thread():
+        near = near_symmetry(target.normal) if method.takes_symmetric else None
     names = _class_names(settings.classes, near)
     if on_checked is not None:
         on_checked()
@@ -303,8 +304,7 @@ def _search_in_processes(
     if context.get_start_method() == "fork":
         with one_thread(), one_blas_thread():
             task.method.prepare(task.goal)  # once, for all workers
-    # classes with more lattice freedom take longer
-    order = sorted(names, key=lambda name: -isohedral_class(name).stretch_dim)
+    order = task.method.in_order(names)
     function = functools.partial(_work_on, task)
     with contextlib.closing(work(function, order, workers, context=context, cancel=cancel)) as news:
         for one in news:

@@ -134,6 +134,10 @@ class SearchMethod(ABC):
         """Return how many tiles of a class each part keeps."""
         return per_class
 
+    def in_order(self, names: Sequence[str]) -> list[str]:
+        """Return classes in the order in which worker processes take them: the longest first."""
+        return sorted(names, key=lambda name: -isohedral_class(name).stretch_dim)
+
     def finish(
         self,
         tiles: Sequence[EscherTile],
@@ -163,6 +167,12 @@ class Sketches(SearchMethod):
     ) -> Fit:
         """Sketch tiles of the class."""
         return self.whole.sketch(goal, kind, cancel)._replace(enough=1)
+
+    def in_order(self, names: Sequence[str]) -> list[str]:
+        """Return those first that soonest give a tile to look at."""
+        return [name for name in PREFERRED if name in names] + [
+            name for name in names if name not in PREFERRED
+        ]
 
     def prepare(self, goal: Goal) -> None:
         """Compute what all fits share."""
