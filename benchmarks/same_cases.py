@@ -49,7 +49,9 @@ PRESENT = Renamed(
         "settings.kernels": None,
     },
     # the shares, by the names of the components; what is said of tiles; offsets of exports
-    added=frozenset({"weights", "rating", "arrangement", "stars", "word", "offset"}),
+    added=frozenset(
+        {"weights", "rating", "arrangement", "stars", "word", "offset", "near_symmetry"}
+    ),
     expected={
         "* read.png": "what was read is drawn before the search",
         "* index.html": "the page has commands, palettes and stars",

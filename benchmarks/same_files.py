@@ -17,7 +17,8 @@ from PIL import Image, ImageSequence
 from same_cases import Renamed
 
 IGNORED = {
-    *("seconds", "wall_seconds", "core_seconds", "timings", "versions", "version"),
+    *("seconds", "wall_seconds", "core_seconds", "timings"),
+    *("versions", "version", "schema_version"),
     *("source", "sources", "file", "notes", "note", "reasons", "reason"),
 }
 """Keys and columns of times, versions, paths and words."""
