@@ -220,6 +220,7 @@ def tile_json(tile: EscherTile) -> dict[str, Any]:
         "score": _or_none(tile.score),
         "objective": tile.objective,
         "front": tile.front,
+        "smoothed": tile.smoothed,
         "metrics": {
             **_or_none(tile.metrics.as_dict()),
             "deformation": tile.deformation,
@@ -279,7 +280,7 @@ def _measurements(entry: dict[str, Any]) -> dict[str, Any]:
 
 
 # Fields of an `EscherTile` that an entry states under the same name
-_PLAIN = ("objective", "front", "starts", "dropped", "seconds")
+_PLAIN = ("objective", "front", "smoothed", "starts", "dropped", "seconds")
 
 
 def _tile(entry: dict[str, Any]) -> Tile:

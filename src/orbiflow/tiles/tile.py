@@ -154,6 +154,9 @@ class EscherTile:
       outlines (n, 2) in the input's coordinates, point by point.
     - `bent_iou`: The IoU of the tile with the bent silhouette.
     - `pinned`: How far the worst pinned part is from similar to what it was; None without pins.
+    - `smoothed`: The share of the silhouette's length below which parts were rounded off, because its
+      class has no tile of the silhouette as it is; 0 otherwise. The measures of likeness, `rest` and
+      `bent` are of the silhouette without these parts.
     - `known_score`: The score that a file states.
     - `rating`: Its stars among the tiles of its run.
 
@@ -186,6 +189,7 @@ class EscherTile:
     rest: Array | None = None
     bent_iou: float | None = None
     pinned: float | None = None
+    smoothed: float = 0.0
     known_score: float | None = None
     rating: Rating | None = None
     objective: str = "overlap"

@@ -17,7 +17,7 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import PALETTES, STRIP, rendered, window_of
 from orbiflow.tiles.pages.sheets import FILLED, LEFT_OUT, OUTLINE
 from orbiflow.tiles.pictures import RAMP, default_window
-from orbiflow.tiles.search import ClassFailure, why_poor
+from orbiflow.tiles.search import ClassFailure, rounded_for, why_poor
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Colouring, colouring, copies_meeting
@@ -66,7 +66,7 @@ def index_page(
         silhouette=_silhouette(target),
         compared=any(result.front is not None for result in results),
         notes=target.notes,
-        poor=why_poor(results[0]) if results else "",
+        remarks=[text for text in (rounded_for(results), results and why_poor(results[0])) if text],
         tiles=tiles,
         palettes={way: PALETTES[way] for way in TRIED},
         ramp=RAMP,

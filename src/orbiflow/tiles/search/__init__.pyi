@@ -14,6 +14,7 @@ from .escherizing import report as report
 from .escherizing import searched_classes as searched_classes
 from .finished_tiles import ClassFailure as ClassFailure
 from .finished_tiles import certified_tiles as certified_tiles
+from .finished_tiles import rounded_for as rounded_for
 from .finished_tiles import why_poor as why_poor
 from .likeness_search import LikenessSearch as LikenessSearch
 from .occupancy import OccupancySamples as OccupancySamples

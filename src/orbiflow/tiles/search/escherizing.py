@@ -347,15 +347,28 @@ def _outcome(task: _Task, kind: IsohedralClass, progress: OnProgress, cancel: Ca
 def _chosen_tiles(
     task: _Task, kind: IsohedralClass, method: SearchMethod, progress: OnProgress, cancel: Cancel
 ) -> Sequence[EscherTile]:
-    """Return the tiles of one fit that are shown, best first, no two of them alike."""
+    """Return the tiles of one fit that are shown, best first, no two of them alike.
+
+    If there are none, of the first eased goal that has some.
+    """
     goal, count = task.goal, task.method.shown(task.per_class)
-    # many small systems: several threads would wait for each other, ten times as long as they work
-    with one_thread(), one_blas_thread():
-        found = method.fit(goal, kind, count, progress, cancel)
-        tiles = best_tiles(goal.target, found, force=task.force, min_neck=method.least_neck(goal))
-        chosen = [tiles[k] for k in without_twins(tiles, count)]
+
+    def found(goal: Goal, share: float) -> Sequence[EscherTile]:
+        fit = method.fit(goal, kind, count, progress, cancel)
+        tiles = best_tiles(goal.target, fit, force=task.force, min_neck=method.least_neck(goal))
+        chosen = [tiles[k].changed(smoothed=share) for k in without_twins(tiles, count)]
         cancel.check()
         return task.method.finish(chosen, goal)
+
+    # many small systems: several threads would wait for each other, ten times as long as they work
+    with one_thread(), one_blas_thread():
+        try:
+            return found(goal, 0.0)
+        except CertificationError:
+            for share, own in method.eased(goal):
+                with contextlib.suppress(CertificationError):
+                    return found(own, share)
+            raise
 
 
 def report(result: SearchResult) -> dict[str, Any]:

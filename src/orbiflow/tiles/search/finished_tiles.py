@@ -141,6 +141,19 @@ def why_poor(best: EscherTile) -> str:
     )
 
 
+def rounded_for(tiles: Sequence[EscherTile]) -> str:
+    """Return which tiles are of the silhouette with thin parts rounded off; "" if none are."""
+    shares: dict[float, list[str]] = {}
+    for tile in tiles:
+        if tile.smoothed:
+            shares.setdefault(tile.smoothed, []).append(tile.isohedral_class)
+    return "; ".join(
+        f"no tile of {', '.join(dict.fromkeys(names))} has all of the silhouette's thin parts: what is "
+        f"narrower than {100 * share:g} % of its length was rounded off first"
+        for share, names in sorted(shares.items())
+    )
+
+
 def certified_tiles(
     target: Target, found: Fit | StillTiles | TileModel, *, force: bool = False
 ) -> list[EscherTile]:

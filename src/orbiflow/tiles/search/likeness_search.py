@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from math import lcm
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
+from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.settings import Range, Settings
 from orbiflow.tiles.likeness import least_neck
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.search.escherize_settings import Count, Seed
 from orbiflow.tiles.search.search_method import Goal, SearchMethod, Sketches
+from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass
 
 if TYPE_CHECKING:
@@ -51,7 +54,18 @@ BEST = {
     "bodies": (*ALL_BODIES, "rigid"),
     "judged": True,
 }
+# Widths, in lengths of the silhouette, below which parts are rounded off in classes without a tile
+ROUNDED_OFF = (0.02, 0.04)
 HALVED = ("placements", "held", "starts")  # in a search for symmetric tiles
+
+
+@lru_cache(maxsize=4)  # targets hash by identity; one serves all classes
+def rounded_off(target: Target, share: float) -> Target:
+    """Return a silhouette without what is narrower than a share of its length, or as it is."""
+    try:
+        return target.smoothed(share)
+    except OrbiflowError:  # nothing would be left
+        return target
 
 
 class LikenessSearch(Settings, SearchMethod):
@@ -113,6 +127,12 @@ class LikenessSearch(Settings, SearchMethod):
         quick = replace(self, below=0, **SKETCH)
         both = self.hands(goal, kind.divisor)
         return fit_bending(goal.target, kind, quick, both, 1, silent, cancel)
+
+    def eased(self, goal: Goal) -> Sequence[tuple[float, Goal]]:
+        """Return the silhouette with toes and hairs rounded off, if nobody said what must survive."""
+        if goal.emphasis is not None or goal.pins is not None:
+            return ()
+        return [(share, Goal(rounded_off(goal.target, share))) for share in ROUNDED_OFF]
 
     def prepare(self, goal: Goal) -> None:
         """Triangulate the silhouette and its mirror image."""

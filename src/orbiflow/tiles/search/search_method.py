@@ -106,6 +106,14 @@ class SearchMethod(ABC):
         """Return candidates in a moment, for `preview`, or raise `CertificationError`."""
         raise CertificationError(f"{self.method_name} has no quick way to tiles of {kind.name}")
 
+    def eased(self, goal: Goal) -> Sequence[tuple[float, Goal]]:  # noqa: ARG002
+        """Return what is looked for in turn in a class that has no tile of the goal.
+
+        Each is a silhouette with what is narrower than a share of its length rounded off, and that
+        share.
+        """
+        return ()
+
     def load(self) -> None:
         """Import what `fit` needs, before worker processes start."""
         for name in self.modules:
@@ -173,6 +181,10 @@ class Sketches(SearchMethod):
         return [name for name in PREFERRED if name in names] + [
             name for name in names if name not in PREFERRED
         ]
+
+    def eased(self, goal: Goal) -> Sequence[tuple[float, Goal]]:
+        """Return the other's."""
+        return self.whole.eased(goal)
 
     def prepare(self, goal: Goal) -> None:
         """Compute what all fits share."""

@@ -124,11 +124,16 @@ class Record:
 
 
 def best_of(earlier: Outcome | None, later: Outcome, count: int) -> Outcome:
-    """Return the best tiles of a class that two searches found, no two of them alike."""
+    """Return the best tiles of a class that two searches found, no two of them alike.
+
+    Those of the silhouette as it is go before those of one that was rounded off.
+    """
     if not isinstance(earlier, EscherTile):
         return later
-    if isinstance(later, ClassFailure):
+    if isinstance(later, ClassFailure) or earlier.smoothed < later.smoothed:
         return earlier
+    if later.smoothed < earlier.smoothed:
+        return later
     tiles = [tile.changed(others=()) for tile in (*earlier.family(), *later.family())]
     tiles.sort(key=lambda tile: (not tile.certificate.valid, -tile.score))
     best, *others = (tiles[k] for k in without_twins(tiles, count))

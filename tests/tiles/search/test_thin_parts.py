@@ -1,0 +1,121 @@
+"""A class that has no tile with all thin parts of a silhouette gets one without them, and says so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orbiflow.errors import CertificationError
+from orbiflow.runtime import Cancel
+from orbiflow.tiles import (
+    Emphasis,
+    EscherizeSettings,
+    EscherTile,
+    Fit,
+    LikenessSearch,
+    Pins,
+    SearchResult,
+    Target,
+    escherize,
+    index_page,
+)
+from orbiflow.tiles.search import Goal, SearchMethod, rounded_for
+from orbiflow.tiles.search.candidates import OnProgress, StillTiles
+from orbiflow.tiles.search.likeness_search import ROUNDED_OFF
+from orbiflow.tiles.search.search_record import best_of
+from orbiflow.tiles.search.starts import template_starts
+from orbiflow.tiles.tilings import IsohedralClass
+
+HAIR = Target.from_polygon(
+    [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.1, 2.8], [2.09, 4], [2.07, 2.8], [0.8, 2.5]]
+)
+
+
+class Hairless(SearchMethod):
+    """Lay templates over silhouettes that reach no higher than a limit, in normal form."""
+
+    highest: float
+
+    def __init__(self, highest: float) -> None:
+        self.highest = highest
+
+    def fit(
+        self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
+    ) -> Fit:
+        del progress, cancel
+        if goal.target.normal[:, 1].max() > self.highest:
+            raise CertificationError("all tiles near the silhouette cross themselves")
+        starts = template_starts(kind, turns=2, stretch=0.2)
+        return Fit(StillTiles(kind, starts), len(starts), 0, per_class)
+
+    def eased(self, goal: Goal):
+        return LikenessSearch().eased(goal)
+
+
+@pytest.fixture(scope="module")
+def found() -> SearchResult:
+    limit = (HAIR.normal[:, 1].max() + HAIR.smoothed(ROUNDED_OFF[0]).normal[:, 1].max()) / 2
+    return searched(limit)
+
+
+def searched(highest: float) -> SearchResult:
+    settings = EscherizeSettings(classes=("IH4", "IH6"))
+    return escherize(HAIR, settings, method=Hairless(highest))
+
+
+def test_such_a_class_gets_a_tile_of_what_is_left(found: SearchResult) -> None:
+    assert found.failures == []
+    assert [tile.smoothed for tile in found.tiles] == [ROUNDED_OFF[0]] * 2
+    assert all(tile.certificate.valid for tile in found.tiles)
+
+
+def test_a_class_with_a_tile_of_the_whole_silhouette_keeps_it() -> None:
+    tiles = searched(100).tiles
+    assert [tile.smoothed for tile in tiles] == [0, 0]
+    assert rounded_for(tiles) == ""
+
+
+def test_where_nothing_helps_the_first_reason_is_given() -> None:
+    none = searched(0)
+    assert not none.tiles
+    assert {failure.reason for failure in none.failures} == {
+        "all tiles near the silhouette cross themselves"
+    }
+
+
+def test_a_tile_of_the_whole_silhouette_goes_first_whichever_was_found_first(
+    found: SearchResult,
+) -> None:
+    rounded = found.tiles[0]
+    whole = rounded.changed(smoothed=0.0, known_score=0.0)
+    for count in (1, 2):
+        assert best_of(rounded, whole, count) is whole
+        assert best_of(whole, rounded, count) is whole
+
+
+def test_it_is_said_and_kept(found: SearchResult, tmp_path: Path) -> None:
+    words = rounded_for(found.tiles)
+    assert words.startswith("no tile of IH")
+    assert "narrower than 2 % of its length was rounded off" in words
+    assert "narrower than 2 % of its length was rounded off" in index_page(
+        found.tiles, HAIR, ["IH4", "IH6"]
+    )
+    found.tiles[0].save(tmp_path / "tile")
+    assert EscherTile.load(tmp_path / "tile").smoothed == ROUNDED_OFF[0]
+
+
+def test_what_was_said_to_matter_is_not_rounded_off() -> None:
+    own, plain = LikenessSearch(), Goal(HAIR)
+    spot = (2.08, 3.5, 0.6)
+    assert [share for share, _ in own.eased(plain)] == list(ROUNDED_OFF)
+    assert own.eased(replace(plain, pins=Pins.at(HAIR, [spot]))) == ()
+    everything = Emphasis(np.ones((4, 4), np.float32), (-3.0, -3.0, 3.0, 3.0), 4.0, "mask.png")
+    assert own.eased(replace(plain, emphasis=everything)) == ()
+
+
+def test_nothing_is_left_of_a_silhouette_that_is_all_hair() -> None:
+    hair = Target.from_polygon([[0, 0], [100, 0], [100, 1], [0, 1]])
+    assert all(own.target is hair for _, own in LikenessSearch().eased(Goal(hair)))
