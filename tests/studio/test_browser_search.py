@@ -88,6 +88,47 @@ def test_a_search_is_paused_continued_and_stopped(page, studio: RunningStudio) -
     assert page.locator(CARD).count() == len(studio.project(own)["tiles"])
 
 
+def test_stop_stays_under_the_mouse_whatever_the_search_does(page, studio: RunningStudio) -> None:
+    own = studio.with_picture()
+    studio.search(own)
+    task = studio.project(own)["tasks"][0]["id"]
+    studio.client.post(f"tasks/{task}/pause")
+    page.goto(f"/#/p/{own}")
+    page.get_by_role("button", name="Go on").wait_for()
+    stop = page.get_by_role("button", name="Stop")
+    stop.hover()
+    page.mouse.down()
+    studio.client.post(f"tasks/{task}/resume")  # it waits, then runs
+    page.get_by_role("button", name="Pause").wait_for()
+    page.mouse.up()
+    page.get_by_role("button", name="Search again").wait_for()
+    assert state(page) == "Stopped."
+
+
+def test_buttons_of_a_task_keep_their_places(page) -> None:
+    page.goto("/")
+    page.wait_for_selector(".drop")
+    places = page.evaluate(
+        """async () => {
+            const { steering } = await import("/js/steering.js");
+            const own = steering(null);
+            document.querySelector("#page").prepend(own.root);
+            return ["waiting", "running", "paused", "waiting"].map((state) => {
+                own.update({ id: 1, state });
+                return [...own.root.children].map((button) => {
+                    const { x, y, width, height } = button.getBoundingClientRect();
+                    return [button.textContent, button.disabled, x, y, width, height];
+                });
+            });
+        }"""
+    )
+    assert [[name for name, *_ in state] for state in places] == [
+        ["Pause", "Stop"], ["Pause", "Stop"], ["Go on", "Stop"], ["Pause", "Stop"]
+    ]  # fmt: skip
+    first = [place for _, *place in places[0]]
+    assert all([place for _, *place in state] == first for state in places)
+
+
 def test_two_tabs_and_a_reload_in_the_middle(page, studio: RunningStudio) -> None:
     from playwright.sync_api import expect
 
