@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +13,7 @@ from bent_tiles import bent_tile
 from orbiflow.studio.closeup_tasks import with_drawing
 from orbiflow.studio.tile_files import put_tile, tile_folder, tile_number
 from orbiflow.tiles import EscherTile, certify
-from studio.served import SQUARE, Client, done, new_project, studio
-
-
-@pytest.fixture(scope="module")
-def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
-    with studio(tmp_path_factory.mktemp("data")) as served:
-        yield served
+from studio.served import SQUARE, Client, done, new_project
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,8 @@ export const KINDS = {
     title: "Print or cut",
     image: "cut",
     solid: true,
-    first: ["purpose", "format", "tile_size", "area", "palette"],
+    first: ["purpose", "format", "tile_size", "area", "clip", "palette"],
+    start: { purpose: "print" },
     words: {
       purpose: {
         title: "What is it for?",
@@ -18,6 +19,7 @@ export const KINDS = {
       format: { about: "", title: "Kind of file", usual: "What suits it", options: { svg: "SVG", pdf: "PDF", dxf: "DXF", png: "PNG", json: "JSON (numbers)" } },
       tile_size: { title: "How long is one tile?" },
       area: { title: "How large is the page?", about: "Such as A4, letter, mug, phone or 300x200mm." },
+      clip: { title: "Fill the page to its edge", about: "Tiles at the edge are cut. Otherwise only whole tiles are on the page." },
       palette: {
         about: "",
         title: "Colours",
