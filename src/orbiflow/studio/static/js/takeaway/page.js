@@ -10,7 +10,7 @@ import { isMade, madeBefore, picture, words } from "./made.js";
 import { trueSize } from "./truesize.js";
 
 const DRAWN = ["export", "art"]; // what a drawing or the picture can be laid on
-const NEVER = ["tile", "result", "out", "force", "picture", "drawing"]; // settings that the page itself makes
+const NEVER = ["tile", "result", "out", "force", "picture", "drawing", "eyes"]; // what the page itself sets, or drawings hold
 const PICTURES = ["png", "jpg", "jpeg", "webp", "svg"];
 
 export async function show(root, page) {

@@ -55,15 +55,21 @@ function upright(points) {
   return [left, top, Math.max(...xs) - left, Math.max(...ys) - top];
 }
 
-/** Put a circle round the middle of the narrowest place, and how wide it is beside it, where there is room. */
-function markNeck(context, [x, y], words, wide, colour) {
+/** Put a circle round a narrow place, and its width beside it where there is room. */
+function markNeck(context, [x, y], words, wide, look) {
   const left = x > wide / 2;
-  Object.assign(context, { strokeStyle: colour, fillStyle: colour, lineWidth: 2, font: "600 13px system-ui, sans-serif", textAlign: left ? "right" : "left", textBaseline: "middle" });
+  const at = [x + (left ? -1 : 1) * (NECK + 6), y];
+  Object.assign(context, { font: "600 13px system-ui, sans-serif", textAlign: left ? "right" : "left", textBaseline: "middle" });
   context.setLineDash([]);
-  context.beginPath();
-  context.arc(x, y, NECK, 0, 2 * Math.PI);
-  context.stroke();
-  if (wide > ROOM) context.fillText(words, x + (left ? -1 : 1) * (NECK + 5), y);
+  for (const [colour, width] of [[look("--surface"), 5], [look("--ink"), 2]]) {
+    Object.assign(context, { strokeStyle: colour, fillStyle: colour, lineWidth: width });
+    context.beginPath();
+    context.arc(x, y, NECK, 0, 2 * Math.PI);
+    context.stroke();
+    if (wide < ROOM) continue;
+    if (width > 2) context.strokeText(words, ...at);
+    else context.fillText(words, ...at);
+  }
 }
 
 /** A view of a card's tile: {root, show(size in mm, the width in mm below which a neck is told)}. */
@@ -118,7 +124,7 @@ export function trueSize({ polygon, y_down: yDown, neck = null }) {
     const narrow = parseFloat(words) < least;
     const { x, y } = at.transformPoint({ x: (a + c) / 2, y: (b + d) / 2 });
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    markNeck(context, [x / ratio, y / ratio], words, wide, getComputedStyle(canvas).getPropertyValue(narrow ? "--bad" : "--ink"));
+    markNeck(context, [x / ratio, y / ratio], words, wide, (name) => getComputedStyle(canvas).getPropertyValue(narrow && name === "--ink" ? "--bad" : name));
     thin.classList.toggle("notice", narrow);
     thin.textContent = `Its thinnest part, in the circle, is ${words} wide.${narrow ? " It may break there: choose a longer tile." : ""}`;
   }
