@@ -55,7 +55,7 @@ def start_and_picture(page: Page, project: str) -> None:
     paint(page, "Matters most", HEAD)
     page.mouse.up()
     page.wait_for_timeout(600)
-    paint(page, "Take away", FOOT)
+    paint(page, "Remove", FOOT)
     page.wait_for_timeout(300)
     keep(page, "picture")
     page.keyboard.press("Escape")

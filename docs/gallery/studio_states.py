@@ -176,6 +176,12 @@ def start_empty(on: Visit) -> None:
     on.goto("")
 
 
+def start_many(on: Visit) -> None:
+    own = {"kind": "tile", "name": "Night monkey", "changed": 0, "thumb": None, "busy": False}
+    on.answer("**/api/projects", body=[{**own, "id": f"{k}", "tiles": k} for k in range(1000)])
+    on.goto("", ".project")
+
+
 def picture_failed(on: Visit) -> None:
     error = "notes.png: not a picture that can be read; choose another one"
     failed = {**TASK, "operation": "read", "state": "failed", "result": None, "error": error}
@@ -260,6 +266,7 @@ def lost(on: Visit) -> None:
 STATES: dict[str, Callable[[Visit], Any]] = {
     "start": lambda on: on.goto("", ".project"),
     "start-empty": start_empty,
+    "start-many": start_many,
     "start-over": start_over,
     "start-refused": start_refused,
     "start-full": start_full,

@@ -13,7 +13,7 @@ from exported import tile_of
 from orbiflow.arrays import Array
 from orbiflow.studio.tile_view import tile_card
 from orbiflow.symmetry import Isometry
-from orbiflow.tiles import CLASSES, EscherTile, colouring
+from orbiflow.tiles import CLASSES, EscherTile, colouring, narrowest_neck
 from orbiflow.tiles.exporting import longer_side
 from studio.browser import RunningStudio, covers_page_once, running_studio, small_searches
 from studio_checks import serious_issues, untidy_parts
@@ -226,7 +226,27 @@ def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched
     studio.client.patch(f"projects/{searched}", json={"view": view})
     page.goto(f"/#/p/{searched}/take/{tile}")
     page.get_by_text("Page and file").click()
-    assert page.get_by_label("What is drawn").input_value() == "none"
+    purpose, drawn = page.get_by_label("What is it for?"), page.get_by_label("What is drawn")
+    filled, thin = page.get_by_label("Fill the page to its edge"), page.get_by_label("thinner than")
+    assert (purpose.input_value(), drawn.input_value()) == ("print", "none")
+    assert filled.is_checked()
+    purpose.select_option("stickers")
+    assert drawn.input_value() == "pieces"
+    assert page.get_by_label("How large is the page?").input_value() == "210x297mm"
+    purpose.select_option("laser")
+    assert (drawn.input_value(), thin.input_value()) == ("skeleton", "1.5")
+    assert not filled.is_checked()
+    purpose.select_option("print")
+    filled.uncheck()  # what was set stays, whatever else is chosen
+    purpose.select_option("web")
+    assert not filled.is_checked()
+    page.route("**/tasks", lambda route: route.fulfill(status=422, json={"error": "not now"}))
+    with page.expect_request("**/tasks") as caught:
+        page.get_by_role("button", name="Make it").click()
+    page.unroute("**/tasks")
+    wanted = {"tile": tile, "purpose": "web", "clip": False, "palette": "dusk"}
+    assert caught.value.post_data_json["settings"] == wanted
+    assert drawn.input_value() == "none"
     assert not page.get_by_label("Width of the machine's cut").is_visible()
     assert page.get_by_label("Colours").input_value() == "dusk"
     page.get_by_label("What is it for?").select_option("laser")
@@ -261,6 +281,16 @@ def test_the_true_size_is_of_the_file_and_follows_the_screen(page, studio, searc
     said = page.locator(".real").inner_text()
     assert f"{width:.1f} × {height:.1f} mm as it lies" in said
     assert "60.0 ×" in said
+    ends = np.array(card["neck"])
+    neck = 60 / long * float(np.linalg.norm(ends[1] - ends[0]))
+    assert neck == pytest.approx(60 / long * narrowest_neck(ring).width, rel=1e-3)
+    thin = page.locator(".real .notice")
+    page.get_by_text(f"Its thinnest part, in the circle, is {neck:.1f} mm wide").wait_for()
+    assert thin.count() == 0
+    page.get_by_text("Page and file").click()
+    page.get_by_label("thinner than").fill(str(neck + 1))
+    page.keyboard.press("Tab")
+    assert "choose a longer tile" in thin.inner_text()
     page.get_by_role("button", name="Measure my screen").click()
     page.get_by_label(re.compile("bank card")).fill("5")
     assert page.evaluate(wide) == pytest.approx(1.5 * first * 5 / (96 / 25.4), abs=0.1)

@@ -16,7 +16,7 @@ pytest.importorskip("playwright", reason="playwright is not installed: no browse
 from studio_states import STATES, Visit
 
 PASSING = [
-    *("start-full", "start-delete", "picture-doubts", "picture-failed"),
+    *("start-full", "start-many", "start-delete", "picture-doubts", "picture-failed"),
     *("search-waiting", "search-sketches", "search-paused", "search-nothing"),
     *("take-thin", "take-running", "take-refused", "density-empty", "lost"),
 ]
@@ -30,6 +30,15 @@ def test_nothing_is_cut_off_and_nobody_kept_out(
     STATES[name](Visit(page, studio.project(searched), density=""))
     assert untidy_parts(page, 1440, 390, 360) == []
     assert serious_issues(page) == []
+
+
+def test_a_thousand_projects_are_shown_when_they_are_asked_for(
+    page: Any, studio: RunningStudio, searched: str
+) -> None:
+    STATES["start-many"](Visit(page, studio.project(searched), density=""))
+    assert page.locator(".project").count() == 24
+    page.get_by_role("button", name="Show all 1000").click()
+    page.wait_for_selector(".project >> nth=999")
 
 
 def test_faults_are_found(page: Any) -> None:

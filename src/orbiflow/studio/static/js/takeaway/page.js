@@ -100,7 +100,7 @@ class TakeawayPage {
     const layer = (name, text, checked) => ({ name, text, box: h("input", { type: "checkbox", checked, onchange: () => this.changed() }) });
     return [
       (strokes?.length || eyes?.length) && layer("drawing", "With what you drew on it", true),
-      PICTURES.includes(this.project.input?.type) && layer("picture", "With the picture itself on each tile", false),
+      PICTURES.includes(this.project.input?.type) && layer("picture", "With your picture on each tile, in its own colours", false),
     ].filter((own) => own && DRAWN.includes(kind));
   }
 
