@@ -34,6 +34,7 @@ def keep(page: Page, name: str) -> None:
 def paint(page: Page, tool: str, points: tuple[tuple[float, float], ...]) -> None:
     """Paint a line over the picture that was read, through shares of its width and height."""
     page.locator(f"label:has-text('{tool}')").first.click()
+    page.locator("canvas.reading").scroll_into_view_if_needed()
     box = page.locator("canvas.reading").bounding_box()
     assert box
     for k, (x, y) in enumerate(points):
@@ -54,7 +55,7 @@ def start_and_picture(page: Page, project: str) -> None:
     paint(page, "Matters most", HEAD)
     page.mouse.up()
     page.wait_for_timeout(600)
-    paint(page, "Take away", FOOT)
+    paint(page, "Remove", FOOT)
     page.wait_for_timeout(300)
     keep(page, "picture")
     page.keyboard.press("Escape")

@@ -10,7 +10,7 @@ from PIL import Image, ImageChops, ImageDraw
 from playwright.sync_api import Page
 
 EYE, BACK = (57.0, 54.0), (140.0, 90.0)  # of the turtle, in pixels of its picture
-COLOURS = 224
+COMMON, RARE = 112, 140  # colours of the film: of surfaces, and of small things such as pens
 POINTER = ((0, 0), (0, 21), (5, 16), (9, 25), (13, 23), (9, 15), (16, 15))
 VIEW = """async ([tile, place, across]) => {
     const { Camera, Tiling } = await import("/js/tiling.js");
@@ -59,6 +59,15 @@ def nearest(points: list[tuple[float, float]], place: tuple[float, float]) -> in
     """Return the number of the nearest of many points."""
     apart = [(x - place[0]) ** 2 + (y - place[1]) ** 2 for x, y in points]
     return apart.index(min(apart))
+
+
+def shared_palette(picture: Image.Image) -> Image.Image:
+    """Return a picture whose palette has the commonest colours of a picture, and some of each kind."""
+    common = picture.quantize(COMMON).getpalette() or []
+    rare = picture.quantize(RARE, method=Image.Quantize.MAXCOVERAGE).getpalette() or []
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*common[: 3 * COMMON], *rare[: 3 * RARE]])
+    return palette
 
 
 class Film:
@@ -117,7 +126,7 @@ class Film:
         strip = Image.new("RGB", (width, len(small[::6]) * small[0].height))
         for k, frame in enumerate(small[::6]):
             strip.paste(frame, (0, k * frame.height))
-        palette = strip.quantize(COLOURS)
+        palette = shared_palette(strip)
         first, *rest = (
             frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in small
         )

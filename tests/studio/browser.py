@@ -128,24 +128,6 @@ def small_searches(page: Any, *classes: str) -> None:
     page.route("**/tasks", shorten)
 
 
-def hidden_parts(page: Any) -> int:
-    """Return by how many pixels a page is wider than its window."""
-    return page.evaluate("document.documentElement.scrollWidth - innerWidth")
-
-
-def serious_issues(page: Any) -> list[str]:
-    """Return what axe finds on a page that keeps people out, with the elements."""
-    from axe_playwright_python.sync_playwright import Axe
-
-    found = Axe().run(page).response["violations"]
-    return [
-        f"{issue['id']}: {node['target']} {node['failureSummary']}"
-        for issue in found
-        if issue["impact"] in ("serious", "critical")
-        for node in issue["nodes"]
-    ]
-
-
 def area_of(project: dict[str, Any]) -> float:
     """Return the area of a project's silhouette in pixels of its picture."""
     return shapely.Polygon(project["silhouette"]["outline"]).area

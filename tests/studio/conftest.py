@@ -1,4 +1,4 @@
-"""One server and one browser for all tests of pages."""
+"""One server and one browser for all tests of pages, and an application that answers without them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,14 @@ from typing import Any
 import pytest
 
 from studio.browser import RunningStudio, chromium, running_studio
+from studio.served import Client, studio
+
+
+@pytest.fixture(scope="module", name="client")
+def client_fixture(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
+    """A studio whose tasks run in this process, and who asks it."""
+    with studio(tmp_path_factory.mktemp("data")) as served:
+        yield served
 
 
 @pytest.fixture(scope="session", name="studio")

@@ -143,8 +143,7 @@ class Client:
     def __init__(self, app: Any, runner: asyncio.Runner, headers: dict[str, str]) -> None:
         self.studio = app.app.state.studio
         """The application's `store`, `queue`, `hub` and `limits`."""
-        self.headers = headers
-        self.runner = runner
+        self.app, self.headers, self.runner = app, headers, runner
         transport = httpx.ASGITransport(app, raise_app_exceptions=False)
         self._client = httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1:8437")
 

@@ -9,7 +9,8 @@ import pytest
 
 from orbiflow.studio.tile_files import tile_folder
 from orbiflow.tiles import EscherTile, certify
-from studio.browser import RunningStudio, covers_page_once, hidden_parts, serious_issues
+from studio.browser import RunningStudio, covers_page_once
+from studio_checks import serious_issues, untidy_parts
 
 CANVAS, BADGE = ".closeup-canvas", ".badge"
 
@@ -247,4 +248,4 @@ def test_nobody_is_kept_out(closeup, scheme: str) -> None:
         for mode in ("Look", "Pull", "Draw"):
             choose(page, mode)
             assert serious_issues(page) == []
-            assert hidden_parts(page) <= 0
+            assert untidy_parts(page) == []

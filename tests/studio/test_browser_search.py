@@ -13,16 +13,10 @@ from exported import tile_of
 from orbiflow.arrays import Array
 from orbiflow.studio.tile_view import tile_card
 from orbiflow.symmetry import Isometry
-from orbiflow.tiles import CLASSES, EscherTile, colouring
+from orbiflow.tiles import CLASSES, EscherTile, colouring, narrowest_neck
 from orbiflow.tiles.exporting import longer_side
-from studio.browser import (
-    RunningStudio,
-    covers_page_once,
-    hidden_parts,
-    running_studio,
-    serious_issues,
-    small_searches,
-)
+from studio.browser import RunningStudio, covers_page_once, running_studio, small_searches
+from studio_checks import serious_issues, untidy_parts
 
 CARD = ".card[data-tile]"
 DONE = ".card[data-stage=final]"
@@ -86,6 +80,47 @@ def test_a_search_is_paused_continued_and_stopped(page, studio: RunningStudio) -
     page.get_by_role("button", name="Search again").wait_for()
     assert state(page) == "Stopped."
     assert page.locator(CARD).count() == len(studio.project(own)["tiles"])
+
+
+def test_stop_stays_under_the_mouse_whatever_the_search_does(page, studio: RunningStudio) -> None:
+    own = studio.with_picture()
+    studio.search(own)
+    task = studio.project(own)["tasks"][0]["id"]
+    studio.client.post(f"tasks/{task}/pause")
+    page.goto(f"/#/p/{own}")
+    page.get_by_role("button", name="Go on").wait_for()
+    stop = page.get_by_role("button", name="Stop")
+    stop.hover()
+    page.mouse.down()
+    studio.client.post(f"tasks/{task}/resume")  # it waits, then runs
+    page.get_by_role("button", name="Pause").wait_for()
+    page.mouse.up()
+    page.get_by_role("button", name="Search again").wait_for()
+    assert state(page) == "Stopped."
+
+
+def test_buttons_of_a_task_keep_their_places(page) -> None:
+    page.goto("/")
+    page.wait_for_selector(".drop")
+    places = page.evaluate(
+        """async () => {
+            const { steering } = await import("/js/steering.js");
+            const own = steering(null);
+            document.querySelector("#page").prepend(own.root);
+            return ["waiting", "running", "paused", "waiting"].map((state) => {
+                own.update({ id: 1, state });
+                return [...own.root.children].map((button) => {
+                    const { x, y, width, height } = button.getBoundingClientRect();
+                    return [button.textContent, button.disabled, x, y, width, height];
+                });
+            });
+        }"""
+    )
+    assert [[name for name, *_ in state] for state in places] == [
+        ["Pause", "Stop"], ["Pause", "Stop"], ["Go on", "Stop"], ["Pause", "Stop"]
+    ]  # fmt: skip
+    first = [place for _, *place in places[0]]
+    assert all([place for _, *place in state] == first for state in places)
 
 
 def test_two_tabs_and_a_reload_in_the_middle(page, studio: RunningStudio) -> None:
@@ -191,15 +226,35 @@ def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched
     studio.client.patch(f"projects/{searched}", json={"view": view})
     page.goto(f"/#/p/{searched}/take/{tile}")
     page.get_by_text("Page and file").click()
-    assert page.get_by_label("What is drawn").input_value() == "none"
-    assert not page.get_by_label("Kerf").is_visible()
+    purpose, drawn = page.get_by_label("What is it for?"), page.get_by_label("What is drawn")
+    filled, thin = page.get_by_label("Fill the page to its edge"), page.get_by_label("thinner than")
+    assert (purpose.input_value(), drawn.input_value()) == ("print", "none")
+    assert filled.is_checked()
+    purpose.select_option("stickers")
+    assert drawn.input_value() == "pieces"
+    assert page.get_by_label("How large is the page?").input_value() == "210x297mm"
+    purpose.select_option("laser")
+    assert (drawn.input_value(), thin.input_value()) == ("skeleton", "1.5")
+    assert not filled.is_checked()
+    purpose.select_option("print")
+    filled.uncheck()  # what was set stays, whatever else is chosen
+    purpose.select_option("web")
+    assert not filled.is_checked()
+    page.route("**/tasks", lambda route: route.fulfill(status=422, json={"error": "not now"}))
+    with page.expect_request("**/tasks") as caught:
+        page.get_by_role("button", name="Make it").click()
+    page.unroute("**/tasks")
+    wanted = {"tile": tile, "purpose": "web", "clip": False, "palette": "dusk"}
+    assert caught.value.post_data_json["settings"] == wanted
+    assert drawn.input_value() == "none"
+    assert not page.get_by_label("Width of the machine's cut").is_visible()
     assert page.get_by_label("Colours").input_value() == "dusk"
     page.get_by_label("What is it for?").select_option("laser")
     assert not page.get_by_label("Colours").is_visible()
     page.get_by_label("What is it for?").select_option("")
     page.get_by_label("What is drawn").select_option("pieces")
     page.get_by_text("Pieces", exact=True).click()
-    page.get_by_label("Kerf").fill("0.2")
+    page.get_by_label("Width of the machine's cut").fill("0.2")
     page.get_by_label("How long is one tile?").fill("much")
     page.get_by_role("button", name="Make it").click()
     said = page.locator(".field .error")
@@ -226,6 +281,16 @@ def test_the_true_size_is_of_the_file_and_follows_the_screen(page, studio, searc
     said = page.locator(".real").inner_text()
     assert f"{width:.1f} × {height:.1f} mm as it lies" in said
     assert "60.0 ×" in said
+    ends = np.array(card["neck"])
+    neck = 60 / long * float(np.linalg.norm(ends[1] - ends[0]))
+    assert neck == pytest.approx(60 / long * narrowest_neck(ring).width, rel=1e-3)
+    thin = page.locator(".real .notice")
+    page.get_by_text(f"Its thinnest part, in the circle, is {neck:.1f} mm wide").wait_for()
+    assert thin.count() == 0
+    page.get_by_text("Page and file").click()
+    page.get_by_label("thinner than").fill(str(neck + 1))
+    page.keyboard.press("Tab")
+    assert "choose a longer tile" in thin.inner_text()
     page.get_by_role("button", name="Measure my screen").click()
     page.get_by_label(re.compile("bank card")).fill("5")
     assert page.evaluate(wide) == pytest.approx(1.5 * first * 5 / (96 / 25.4), abs=0.1)
@@ -245,4 +310,4 @@ def test_pages_are_for_everyone(page, studio: RunningStudio, searched, scheme) -
             closed.click()
         assert serious_issues(page) == []
         page.set_viewport_size({"width": 360, "height": 700})
-        assert hidden_parts(page) <= 0
+        assert untidy_parts(page) == []

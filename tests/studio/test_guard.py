@@ -217,6 +217,39 @@ def test_no_more_projects_than_allowed(client: Client, tmp_path: Path) -> None:
     assert len(list((tmp_path / "projects").iterdir())) == 20
 
 
+def test_ten_thousand_projects_at_the_usual_limits(tmp_path: Path) -> None:
+    head = {"method": "POST", "scheme": "http", "path": "/api/projects", "query_string": b""}
+    headers = [(b"host", b"localhost:8437"), (b"x-orbiflow", b"1")]
+    scope = {"type": "http", **head, "headers": [*headers, (b"content-type", b"application/json")]}
+    body = '{"name": "%s"}' % ("\N{LIZARD}" * 300)
+    told = {"type": "http.request", "body": body.encode(), "more_body": False}
+
+    async def post_all(app: Any) -> list[list[Any]]:
+        sent = list[list[Any]]()
+
+        async def receive() -> dict[str, Any]:
+            return told
+
+        async def send(message: Any) -> None:
+            sent[-1].append(message)
+
+        for _ in range(10_000):
+            sent.append([])
+            await app(scope, receive, send)
+        return sent
+
+    with studio(tmp_path) as client:
+        answers = client.runner.run(post_all(client.app))
+        assert [start["status"] for start, *_ in answers] == [200] * 1000 + [422] * 9000
+        assert b"there are 1000 projects already; delete some" in answers[-1][1]["body"]
+        found = client.get("/api/projects")
+        assert len(found.json()) == 1000
+        assert len(found.content) < 600_000
+        assert len(list((tmp_path / "projects").iterdir())) == 1000
+        client.delete(f"/api/projects/{found.json()[0]['id']}")
+        assert client.post("/api/projects", json={}).status_code == 200
+
+
 def test_no_more_tasks_of_a_project_than_allowed(tmp_path: Path) -> None:
     with studio(tmp_path, waiting=1) as client:
         address = new_project(client)

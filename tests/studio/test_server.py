@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +16,6 @@ from orbiflow.runtime import ItemDone
 from orbiflow.studio.tile_files import put_tile, tile_number
 from orbiflow.tiles import EscherTile, certify
 from studio.served import SQUARE, Client, done, join_tasks, new_project, studio
-
-
-@pytest.fixture(scope="module")
-def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
-    with studio(tmp_path_factory.mktemp("data")) as served:
-        yield served
 
 
 @pytest.fixture(scope="module")
@@ -204,7 +197,7 @@ def test_what_is_taken_away(
     assert "sandbox" in answer.headers["content-security-policy"]
     seen = client.get(f"{address}/preview.png")
     assert seen.status_code == (200 if task["result"]["preview"] else 404)
-    assert task["result"]["preview"] or operation in ("solid", "animate") or name.endswith("svg")
+    assert task["result"]["preview"] or operation == "animate" or name.endswith("svg")
     assert client.get(f"{address}/files/other.svg").status_code == 404
 
 
@@ -223,6 +216,14 @@ def test_forms_come_from_settings(client: Client, name: str) -> None:
     for own in schema["properties"].values():
         assert own["description"].endswith(".")
     assert not {"out", "result", "force", "workers", "project", "task"} & set(schema["properties"])
+
+
+def test_forms_know_what_a_choice_changes(client: Client) -> None:
+    told = client.get("/api/operations/export/schema").json()["x-presets"]["purpose"]
+    assert told["print"] == told["web"] == {"clip": True}
+    assert told["laser"] == {"cut": "skeleton", "warn_neck": 1.5}
+    stickers = {"cut": "pieces", "area": [210, 297], "margin": 10.0, "marks": True, "offset": 2.0}
+    assert told["stickers"] == stickers
 
 
 def test_views_are_merged_and_say_who_changed_them(client: Client, project: str) -> None:

@@ -43,6 +43,16 @@ def test_a_port_that_is_taken_is_told(tmp_path: Path) -> None:
     assert "--port" in caught.value.named(lambda name: f"--{name}")
 
 
+@pytest.mark.parametrize("host", ["no.such.name.invalid", "192.0.2.1", "{}", "a" * 99])
+def test_a_host_that_is_not_this_machine_is_named(host: str, tmp_path: Path) -> None:
+    settings = StudioSettings(data=tmp_path, browser=False, host=host)
+    with pytest.raises(SettingError) as caught:
+        studio(settings)
+    told = caught.value.named(lambda name: f"--{name}")
+    assert told.startswith(f"--host {host} is no address of this machine (")
+    assert told.endswith("; leave --host out")
+
+
 @pytest.mark.parametrize("name", ["file", "file/below", "/proc/foo", "/sys/foo"])
 def test_a_folder_that_cannot_be_had_is_told(name: str, tmp_path: Path) -> None:
     (tmp_path / "file").touch()

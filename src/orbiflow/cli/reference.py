@@ -29,6 +29,8 @@ def _section(operation: Operation) -> str:
     headings = dict.fromkeys(["", *(entry.group for entry in operation.fields)])
     for heading in headings:
         entries = [entry for entry in operation.fields if entry.group == heading]
+        if not entries:
+            continue
         if heading:
             lines += [f"### {operation.name}: {heading}", ""]
         lines += ["| setting | value | default | |", "|---|---|---|---|"]

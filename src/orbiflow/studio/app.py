@@ -24,7 +24,7 @@ from orbiflow.studio.animals import ANIMALS, animal_file
 from orbiflow.studio.closeup_routes import closeup_routes
 from orbiflow.studio.guard import Guard, Refused
 from orbiflow.studio.hub import Hub
-from orbiflow.studio.kinds_of_work import KINDS, RefusedSetting, kind_of_work, own_schema
+from orbiflow.studio.kinds_of_work import KINDS, RefusedSetting, kind_of_work, own_schema, presets
 from orbiflow.studio.requests import Here, Studio
 from orbiflow.studio.settings import Limits
 from orbiflow.studio.store import Missing, Store
@@ -120,7 +120,8 @@ async def animal(name: str) -> FileResponse:
 async def schema(name: str) -> dict[str, Any]:
     """Return the settings of a task."""
     kind = kind_of_work(name)
-    return own_schema(find(kind.makes or kind.work))
+    found = own_schema(find(kind.makes or kind.work))
+    return {**found, "x-presets": presets(kind.makes) if kind.makes else {}}
 
 
 async def _told(_request: Request, error: Exception) -> JSONResponse:

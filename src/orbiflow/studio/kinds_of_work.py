@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -11,7 +12,7 @@ from typing import Any, Literal
 from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.kinds import PathKind
 from orbiflow.runtime import Call, Operation, find
-from orbiflow.settings import Field, FileSettings, Hidden, OnlyWith
+from orbiflow.settings import Field, Hidden, OnlyWith
 from orbiflow.studio.words import LABELS, plain_letters
 
 OWN = ("project", "task", "force", "workers", "tile", "picture")
@@ -56,9 +57,6 @@ OF_TAKING = ("tile", "picture", "drawing", "called")
 
 DRAWN = ("export", "art")
 """What shows the drawing on a tile."""
-
-ART_FORMATS = ("png", "svg")
-"""The endings of a picture's file, whose settings have no format."""
 
 KINDS = {
     "read": Kind("studio read", "quick"),
@@ -110,13 +108,29 @@ def own_schema(operation: Operation) -> dict[str, Any]:
         }
         for entry in own_fields(operation)
     }
-    if operation.name == "art":
-        properties["format"] = {
-            "enum": list(ART_FORMATS),
-            "default": ART_FORMATS[0],
-            "description": "Format of the file.",
-        }
     return {**operation.schema, "properties": properties, "required": []}
+
+
+def presets(makes: str) -> dict[str, dict[str, dict[str, Any]]]:
+    """Return, by setting and choice, the defaults of a take-away's other settings that it changes.
+
+    >>> presets("solid")["kind"]["cutter"]
+    {'tile_size': 80.0, 'height': 13.0, 'wall': 1.2}
+    """
+    fields = own_fields(find(makes))
+
+    def values(**given: Any) -> dict[str, Any]:
+        flat = making_call(makes, given, Path("tile")).flat
+        return {entry.name: entry.kind.plain(flat[entry.name]) for entry in fields}
+
+    usual, found = values(), dict[str, dict[str, dict[str, Any]]]()
+    for entry in fields:
+        for choice in entry.kind.choices:
+            with suppress(SettingError):  # goes only with others
+                own = values(**{entry.name: choice}) | {entry.name: usual[entry.name]}
+                changed = {name: value for name, value in own.items() if value != usual[name]}
+                found.setdefault(entry.name, {})[choice] = changed
+    return found
 
 
 def making_call(makes: str, settings: Mapping[str, Any], result: Path, **files: Any) -> Call:
@@ -126,15 +140,12 @@ def making_call(makes: str, settings: Mapping[str, Any], result: Path, **files: 
         SettingError: For a setting that the studio does not take, or a value that is not allowed.
     """
     made = find(makes)
-    own = dict(settings)
-    if makes == "art" and own.pop("format", "png") not in ART_FORMATS:
-        raise SettingError(f"{{format}} must be {' or '.join(ART_FORMATS)}")
     known = {entry.name for entry in own_fields(made)}
-    if strange := [name for name in own if name not in known]:
+    if strange := [name for name in settings if name not in known]:
         names = literal(", ".join(sorted(known)))
         raise SettingError(f"{makes} takes {names} here, not {literal(strange[0])}")
     try:
-        return made.call({"result": result, **own, **files})
+        return made.call({"result": result, **settings, **files})
     except SettingError as error:
         raise RefusedSetting(setting_words(error, made), error.about) from error
 
@@ -165,11 +176,9 @@ def setting_words(error: SettingError, operation: Operation) -> str:
 def file_name(makes: str, settings: Mapping[str, Any], result: Path, called: str) -> str:
     """Return a name for the file that a call with these settings writes, such as cat-laser-60mm.svg."""
     own = making_call(makes, settings, result).arguments["settings"]
-    is_file = isinstance(own, FileSettings)
-    ending = own.file_format if is_file else settings.get("format", ART_FORMATS[0])
     more = {
         "export": lambda: [own.purpose, f"{own.tile_size:g}mm"],
         "art": lambda: ["picture"],
         "solid": lambda: [own.kind],
     }.get(makes, list)()
-    return f"{'-'.join([plain_letters(called, 'tile'), *filter(None, more)])}.{ending}"
+    return f"{'-'.join([plain_letters(called, 'tile'), *filter(None, more)])}.{own.file_format}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import secrets
 import socket
 import threading
@@ -10,7 +11,7 @@ from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
-from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.runtime import NEVER, Cancel, Note, Outcome, Sink, ignore, make_folder, operation
 from orbiflow.studio.settings import StudioSettings
 
@@ -65,14 +66,7 @@ def _serve(
     cancel.check()
     host = f"[{settings.host}]" if ":" in settings.host else settings.host
     address = f"http://{host}:{settings.port}/" + (f"?token={token}" if token else "")
-    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
-    try:
-        own = socket.create_server((settings.host, settings.port), family=family, backlog=256)
-    except OSError as error:
-        raise SettingError(
-            f"{settings.host} {{port}} {settings.port} cannot be had ({error.strerror}); give another "
-            "{port}"
-        ) from error
+    own = _listening(settings.host, settings.port)
     store = Store(folder)
     app = create_app(store, WorkQueue(store), port=settings.port, token=token)
     on_event(Note(f"the studio is at {address} and keeps its projects in {folder}; Ctrl-C ends it"))
@@ -80,3 +74,19 @@ def _serve(
         threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
     with own, suppress(KeyboardInterrupt):
         serve(app, own)
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    """Return a socket that listens at an address of this machine."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    name = literal(host)
+    try:
+        socket.getaddrinfo(host, port, family)
+        return socket.create_server((host, port), family=family, backlog=256)
+    except (OSError, UnicodeError) as error:
+        why = literal((getattr(error, "strerror", None) or "no such name").partition(" (")[0])
+        told = f"{name} {{port}} {port} cannot be had ({why}); give another {{port}}"
+        unknown = isinstance(error, socket.gaierror | UnicodeError)
+        if unknown or error.errno == errno.EADDRNOTAVAIL:
+            told = f"{{host}} {name} is no address of this machine ({why}); leave {{host}} out"
+        raise SettingError(told) from error

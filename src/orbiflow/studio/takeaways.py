@@ -27,6 +27,7 @@ from orbiflow.studio.tile_files import tile_folder
 
 PREVIEW = "preview.png"
 SCRATCH = ".drawn"  # a folder for what is written on the way
+MOST_SEEN = 30_000_000  # bytes of a solid that is drawn
 SIDE = 1000.0  # pixels of a preview's longer side
 
 
@@ -98,6 +99,11 @@ def _preview(call: Call, first: Path, folder: Path, cancel: Cancel) -> bool:
     """Write a picture of a take-away, if that can be had; return whether it was."""
     if first.suffix == ".png":
         shutil.copyfile(first, folder / PREVIEW)
+        return True
+    if call.operation.name == "solid" and first.stat().st_size < MOST_SEEN:
+        from orbiflow.tiles import read_solid, solid_picture
+
+        solid_picture(read_solid(first)).save(folder / PREVIEW)
         return True
     if call.operation.name != "export":
         return False

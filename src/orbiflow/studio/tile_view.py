@@ -10,7 +10,7 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import cell_ring
 from orbiflow.runtime import is_list
 from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
-from orbiflow.tiles import EscherTile, Rating, as_tiling, border, colouring
+from orbiflow.tiles import EscherTile, Rating, as_tiling, border, colouring, narrowest_neck
 
 
 def tile_card(
@@ -24,7 +24,7 @@ def tile_card(
         stage: How far its search is: sketch, better, final; or pulled.
         parent: The number of the tile that it was made from by hand.
     """
-    rating = tile.rating or Rating(1)
+    rating, neck = tile.rating or Rating(1), tile.thinnest or narrowest_neck(tile.tile.polygon)
     tiling, colours = as_tiling(tile.tile), colouring(tile.tile)
     return {
         "id": number,
@@ -38,6 +38,7 @@ def tile_card(
         "parent": parent,
         "polygon": _rounded(tile.tile.polygon),
         "y_down": tile.y_down,
+        "neck": neck.ends.tolist(),
         "group": {
             "name": tile.group_name,
             "lattice": tile.tile.group.lattice.tolist(),

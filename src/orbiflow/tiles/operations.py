@@ -296,10 +296,12 @@ def art(
         out: The file, .png or .svg.
         picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
     """
+    settings = settings.for_file(out)
+
     from orbiflow.tiles.art import draw_art
 
     tile = choice.read(result)
-    out = out or Path(f"{tile.name}.png")
+    out = out or Path(f"{tile.name}.{settings.format}")
     check_output_file(out, result, picture)
     drawn = draw_art(
         tile, out, settings, picture=picture, force=choice.force, on_event=on_event, cancel=cancel

@@ -22,6 +22,8 @@ from orbiflow.tiles import (
     Tile,
     make_solid,
     polygons_in,
+    read_solid,
+    solid_picture,
     write_3mf,
     write_stl,
 )
@@ -295,6 +297,36 @@ def test_a_stamp_wants_lines(tmp_path: Path) -> None:
         tile.solid(SolidSettings(kind="stamp"), picture=picture)
     with pytest.raises(OrbiflowError, match="a cutter takes no picture; leave it out"):
         tile.solid(SolidSettings(kind="cutter"), picture=picture)
+
+
+@pytest.mark.parametrize(("kind", "name"), [("tile", "a.stl"), ("puzzle", "a.3mf")])
+def test_files_are_read_again_to_be_drawn(kind: Kind, name: str, tmp_path: Path) -> None:
+    own: dict[str, Any] = {"area": (90, 90)} if kind == "puzzle" else {}
+    made = make_solid(tile_of("IH4"), SolidSettings(kind=kind, **own))
+    parts = read_solid(made.write(tmp_path / name))
+    assert len(parts) == len(made.parts)
+    for part, body in zip(parts, made.parts.values(), strict=True):
+        first, second, third = part.transpose(1, 0, 2)
+        volume = np.einsum("ij,ij->i", first, np.cross(second, third)).sum() / 6
+        assert volume == pytest.approx(body.volume(), rel=1e-4)
+
+
+def test_the_picture_of_a_solid_shows_what_is_in_front() -> None:
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 2
+
+    def slab(size: float, low: float, high: float) -> Any:
+        ring = shapely.Polygon(size * corners)
+        mesh = stacked(Level(low, ring), Level(high, ring)).to_mesh64()
+        return np.asarray(mesh.vert_properties)[mesh.tri_verts]
+
+    below, above, hidden = slab(30, 0, 3), slab(12, 3, 6), slab(6, 1, 2)
+    picture = np.asarray(solid_picture([below, above, hidden], (160, 120)), float)
+    low, top = picture[90, 80], picture[50, 80]
+    assert np.ptp(low) > 60  # of the colours of a palette
+    assert np.abs(low / low.sum() - top / top.sum()).max() > 0.1
+    assert picture[2, 2].tolist() == [255] * 3
+    lone = np.asarray(solid_picture([below, above], (160, 120)), float)
+    assert np.array_equal(lone, picture)
 
 
 def test_files_are_the_same_every_time(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from orbiflow.drawing import PaletteName
 from orbiflow.settings import (
     DefaultText,
+    FileSettings,
     Hidden,
     NotWith,
     OnlyWith,
@@ -29,8 +30,11 @@ def line_width(text: str, dpi: float) -> float:
     return 0.0 if text.strip().lower() == "none" else pixels(text, dpi)
 
 
-class ArtSettings(MotifSettings, group="Picture"):
+class ArtSettings(FileSettings, MotifSettings, group="Picture"):
     """How a picture of a tiling is made; numbers of a length are pixels."""
+
+    format: Annotated[Literal["png", "svg"] | None, Hidden()] = None
+    """Format of the file. Default: its ending, or png."""
 
     size: Annotated[
         tuple[Annotated[float, Range(1, LONGEST)], Annotated[float, Range(1, LONGEST)]],

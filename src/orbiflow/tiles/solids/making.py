@@ -24,14 +24,15 @@ from orbiflow.tiles.solids.settings import SolidSettings
 from orbiflow.tiles.solids.shapes import Plan, shape
 from orbiflow.tiles.tile import EscherTile, TileSource
 
+STL_TRIANGLE = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
+
 
 def write_stl(parts: Mapping[str, Manifold], title: str = "") -> bytes:
     """Return a binary STL of all parts, with 80 characters of the title in its header."""
     meshes = [body.to_mesh() for body in parts.values()]
     corners = np.concatenate([mesh.vert_properties[mesh.tri_verts] for mesh in meshes])
     # a normal of 0 leaves it to the reader, who has the order of the corners
-    fields = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
-    triangles = np.zeros(len(corners), dtype=fields)
+    triangles = np.zeros(len(corners), dtype=STL_TRIANGLE)
     triangles["corners"] = corners
     header = title.encode("ascii", "replace")[:80].ljust(80)
     return header + len(corners).to_bytes(4, "little") + triangles.tobytes()

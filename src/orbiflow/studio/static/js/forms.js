@@ -9,10 +9,22 @@ function kinds(schema) {
   return inner.filter(({ type }) => type !== "null");
 }
 
-const text = (value) => (Array.isArray(value) ? value.join(" x ") : value ?? "");
 const label = (name) => capital(name.replaceAll("_", " "));
 
-/** The control of one setting, {root, box, value()}: undefined where it has its default. */
+/** A value as a text that the server reads again: sides with their unit. */
+const text = (value, unit = "") => (Array.isArray(value) ? value.join("x") + unit : String(value ?? ""));
+
+/** What a box holds as a value: an array of texts, a number, or text. */
+function read(given, found) {
+  const types = found.map(({ type }) => type);
+  if (types.includes("array") && !types.includes("string")) return given.split(/[;\s]+/);
+  return ["number", "integer"].some((type) => types.includes(type)) && !Number.isNaN(Number(given)) ? Number(given) : given;
+}
+
+/**
+ * The control of one setting: {root, box, now(), value(), usual(value)}. What it shows is `now`; `value` is undefined
+ * where that is the default, which `usual` changes.
+ */
 function control(name, schema, words, changed) {
   const id = unique(name);
   const found = kinds(schema);
@@ -23,33 +35,36 @@ function control(name, schema, words, changed) {
   const shared = { id, name, "aria-describedby": described, onchange: changed };
   const unit = schema["x-unit"];
   const title = words?.title ?? label(name);
-  if (found.some(({ type }) => type === "boolean")) {
-    const box = h("input", { ...shared, type: "checkbox", checked: Boolean(schema.default) });
-    const value = () => (box.checked === Boolean(schema.default) ? undefined : box.checked);
-    return { root: h("div", { class: "field" }, h("label", { class: "check" }, box, title), about), value, box };
+  const yes = found.some(({ type }) => type === "boolean");
+  let standard = schema.default ?? (yes ? false : null);
+  let [box, show, get] = [];
+  if (yes) {
+    box = h("input", { ...shared, type: "checkbox" });
+    [show, get] = [(value) => { box.checked = value; }, () => box.checked];
+  } else if (options) {
+    const first = standard === null ? [h("option", { value: "" }, words?.usual ?? capital(schema["x-default"] || "as it comes"))] : [];
+    box = h("select", shared, first, options.map((option) => h("option", { value: option }, words?.options?.[option] ?? capital(option))));
+    [show, get] = [(value) => { box.value = value ?? ""; }, () => box.value || null];
+  } else {
+    const bare = found.find(({ type }) => type === "number" || type === "integer");
+    const numeric = bare && found.length === 1;
+    box = h("input", {
+      ...shared, type: numeric ? "number" : "text", min: numeric ? bare.minimum ?? bare.exclusiveMinimum : undefined,
+      max: numeric ? bare.maximum : undefined, step: !numeric ? undefined : bare.type === "integer" ? 1 : "any",
+      autocomplete: "off", inputmode: bare ? "decimal" : undefined,
+    });
+    show = (value) => { box.value = text(value, unit); box.placeholder = box.value || schema["x-default"] || ""; };
+    get = () => (["", text(standard, unit)].includes(box.value.trim()) ? standard : read(box.value.trim(), found));
   }
-  if (options) {
-    const first = schema.default === null || schema.default === undefined ? [h("option", { value: "" }, words?.usual ?? capital(schema["x-default"] || "as it comes"))] : [];
-    const box = h("select", shared, first, options.map((option) => h("option", { value: option }, words?.options?.[option] ?? capital(option))));
-    box.value = schema.default ?? "";
-    const value = () => (box.value === (schema.default ?? "") ? undefined : box.value);
-    return { root: h("div", { class: "field" }, h("label", { for: id, class: "label" }, title), box, about), value, box };
-  }
-  const bare = found.find(({ type }) => type === "number" || type === "integer");
-  const numeric = bare && found.length === 1;
-  const start = text(schema.default);
-  const box = h("input", {
-    ...shared, type: numeric ? "number" : "text", value: start, placeholder: start === "" ? schema["x-default"] : start,
-    min: numeric ? bare.minimum ?? bare.exclusiveMinimum : undefined, max: numeric ? bare.maximum : undefined,
-    step: !numeric ? undefined : bare.type === "integer" ? 1 : "any", autocomplete: "off", inputmode: bare ? "decimal" : undefined,
-  });
-  const value = () => {
-    const given = box.value.trim();
-    if (given === "" || given === String(start)) return undefined;
-    if (found.some(({ type }) => type === "array") && !found.some(({ type }) => type === "string")) return given.split(/[;\s]+/);
-    return bare && !Number.isNaN(Number(given)) ? Number(given) : given;
+  const value = () => (get() === standard ? undefined : get());
+  const usual = (next) => {
+    const own = value();
+    standard = next;
+    if (own === undefined) show(next);
   };
-  return { root: h("div", { class: "field" }, h("label", { for: id, class: "label" }, unit ? `${title} (${unit})` : title), box, about), value, box };
+  show(standard);
+  const named = yes ? [h("label", { class: "check" }, box, title)] : [h("label", { for: id, class: "label" }, unit && !options ? `${title} (${unit})` : title), box];
+  return { root: h("div", { class: "field" }, named, about), box, now: get, value, usual, standard };
 }
 
 /**
@@ -61,6 +76,7 @@ function control(name, schema, words, changed) {
  */
 export function form(schema, { first, words = {}, hidden = [], start = {} }, changed = () => {}) {
   const controls = new Map();
+  const presets = Object.entries(schema["x-presets"] ?? {});
   const names = Object.keys(schema.properties).filter((name) => !hidden.includes(name) && !("const" in schema.properties[name]));
   const heard = () => { fit(); changed(made.values()); };
   for (const name of names) {
@@ -68,8 +84,10 @@ export function form(schema, { first, words = {}, hidden = [], start = {} }, cha
     if (start[name] !== undefined) controls.get(name).box.value = start[name];
   }
 
-  /** Hide what does not apply to the rest, so that only what works can be set. */
+  /** Show the defaults that other choices give, and hide what does not apply to the rest, so that only what works can be set. */
   function fit() {
+    const given = Object.assign({}, ...presets.map(([name, choices]) => (controls.has(name) && choices[now(name)]) || {}));
+    for (const [name, { usual, standard }] of controls) usual(name in given ? given[name] : standard);
     for (const name of names) {
       const rules = Object.entries(schema.properties[name]["x-only-with"] ?? {});
       const applies = rules.every(([other, allowed]) => !controls.has(other) || [allowed].flat().includes(now(other)));
@@ -78,7 +96,7 @@ export function form(schema, { first, words = {}, hidden = [], start = {} }, cha
     }
     for (const box of made.querySelectorAll("details")) box.hidden = ![...box.querySelectorAll(".field")].some((field) => !field.hidden);
   }
-  const now = (name) => controls.get(name).value() ?? schema.properties[name].default;
+  const now = (name) => controls.get(name).now();
   const groups = Map.groupBy
     ? Map.groupBy(names.filter((name) => !first.includes(name)), (name) => schema.properties[name]["x-group"] || "More")
     : new Map([["More", names.filter((name) => !first.includes(name))]]);

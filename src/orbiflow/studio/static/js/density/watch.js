@@ -1,6 +1,7 @@
 /** A fit as it goes on: how far it is, what it tries, and buttons to hold or stop it. */
 
-import { button, h, put, trying } from "../dom.js";
+import { h, put } from "../dom.js";
+import { steering } from "../steering.js";
 import { STATES, capital } from "../words.js";
 import { PARTS } from "./words.js";
 
@@ -19,8 +20,8 @@ export class Watch {
     this.bar = h("progress", { max: 1, "aria-label": "How far the fit is" });
     this.says = h("p");
     this.kinds = h("ul", { class: "parts stack" });
-    this.buttons = h("div", { class: "row" });
-    this.root = h("section", { class: "panel stack watch" }, h("h2", {}, "Fitting"), this.bar, this.says, this.buttons,
+    this.steer = steering(page.api);
+    this.root = h("section", { class: "panel stack watch" }, h("h2", {}, "Fitting"), this.bar, this.says, this.steer.root,
       h("p", { class: "soft small" }, "Several kinds of density are tried. Rows that were kept aside choose among them."), this.kinds);
     this.update(task);
   }
@@ -31,18 +32,7 @@ export class Watch {
     this.bar.value = task.share;
     const state = task.state === "waiting" && task.place ? `${STATES.waiting}: ${task.place} before it` : STATES[task.state];
     this.says.textContent = task.state === "running" ? `${Math.round(100 * task.share)} % done${step}` : state;
-    this.steer();
-  }
-
-  /** Draw the buttons, if others are needed: the focus stays where it is. */
-  steer() {
-    if (this.state === this.task.state) return;
-    this.state = this.task.state;
-    const act = (verb) => () => trying(() => this.page.api.post(`tasks/${this.task.id}/${verb}`));
-    const focused = this.buttons.contains(document.activeElement);
-    put(this.buttons, this.state === "paused" ? button("Go on", act("resume"), { image: "play", kind: "primary" }) : button("Pause", act("pause"), { image: "pause" }),
-      button("Stop", act("cancel"), { image: "stop" }));
-    if (focused) this.buttons.firstChild.focus();
+    this.steer.update(task);
   }
 
   hear(what) {

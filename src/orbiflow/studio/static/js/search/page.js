@@ -2,6 +2,7 @@
 
 import { button, choice, confirmed, h, newest, put, style, toast, trying } from "../dom.js";
 import { better } from "../events.js";
+import { LATE, steering } from "../steering.js";
 import { EFFORTS, EFFORT_TIMES, OBJECTIVES, OBJECTIVE_MEANINGS, STATES, alive, capital, number, sentence } from "../words.js";
 import { cardView } from "./card.js";
 import { reordered } from "./moving.js";
@@ -41,7 +42,9 @@ class SearchPage {
     this.grid = h("ul", { class: "cards", onpointermove: moved });
     this.said = h("p", { class: "state-words", role: "status" });
     this.bar = h("progress", { max: 1, "aria-label": "How far the search is" });
-    this.deeds = h("div", { class: "row" });
+    this.steer = steering(this.api);
+    this.again = button("", () => this.search(), { kind: "primary", image: "arrow" });
+    this.deeds = h("div", { class: "row" }, this.steer.root, this.again);
     this.heading = h("h1", { tabindex: "-1" }, "Tiles");
     this.panel = this.wishes();
     this.empty = h("div", { class: "lonely stack" }, h("p", { class: "soft" }, "No tiles yet."),
@@ -136,24 +139,22 @@ class SearchPage {
     this.offer(task);
   }
 
-  /** Show the buttons that a state has, if it is another one. */
+  /** Show the buttons that a state has; the focus stays on one of them. */
   offer(task) {
-    const key = `${task?.id} ${task?.state}`;
-    if (key === this.offered) return;
-    this.offered = key;
-    const act = (deed) => () => trying(() => this.api.post(`tasks/${task.id}/${deed}`));
-    const stop = button("Stop", act("cancel"), { image: "stop" });
-    const offers = {
-      waiting: [stop],
-      running: [button("Pause", act("pause"), { image: "pause" }), stop],
-      paused: [button("Go on", act("resume"), { kind: "primary", image: "play" }), stop],
-    };
-    const search = () => this.start("The search begins.");
-    const held = this.deeds.contains(document.activeElement);
-    put(this.deeds, offers[task?.state] ?? [button(task ? "Search again" : "Search", search, { kind: "primary", image: "arrow" })]);
-    if (held) this.deeds.querySelector("button").focus();
-    this.panel.hidden = alive(task);
-    if (this.panel.hidden) this.panel.open = false;
+    const [busy, held] = [alive(task), this.deeds.contains(document.activeElement)];
+    if (task) this.steer.update(task);
+    this.again.lastChild.textContent = task ? "Search again" : "Search";
+    if (busy === this.busy) return;
+    this.turned = this.busy === undefined ? -Infinity : performance.now();
+    this.busy = this.again.hidden = this.panel.hidden = busy;
+    this.steer.root.hidden = !busy;
+    if (busy) this.panel.open = false;
+    if (held) this.deeds.querySelector("button:not([hidden], [hidden] *)").focus();
+  }
+
+  /** Search again, unless the click was meant for the button that stood here. */
+  search() {
+    return performance.now() - this.turned > LATE && this.start("The search begins.");
   }
 
   /** Show the cards in their order; cards that stay move there calmly, but not away from the mouse. */

@@ -6,6 +6,8 @@ import { ago, number } from "../words.js";
 import { Bringing } from "./bringing.js";
 import { sample } from "./sample.js";
 
+const SOME = 24; // projects that are shown at first
+
 export async function show(root, page) {
   await style("start");
   const bring = new Bringing(page);
@@ -42,12 +44,18 @@ function animals(about, bring) {
       h("img", { src: own.picture, alt: "", loading: "lazy" }), h("span", {}, own.title)))));
 }
 
-/** Show the projects that there are, newest first. */
-async function list(place, api) {
+/** Show the projects that there are, newest first; the others when they are asked for. */
+async function list(place, api, most = SOME) {
   const found = await api.get("projects");
   place.hidden = !found.length;
-  put(place, h("h2", { id: "yours", tabindex: "-1" }, "Your projects"), h("ul", { class: "projects" }, found.map((own) =>
-    h("li", { class: "project" }, link(own), button(`Delete ${own.name}`, () => remove(own, place, api), { kind: "quiet icon", image: "bin" })))));
+  put(place, h("h2", { id: "yours", tabindex: "-1" }, "Your projects"), h("ul", { class: "projects" }, found.slice(0, most).map((own) =>
+    h("li", { class: "project" }, link(own), button(`Delete ${own.name}`, () => remove(own, place, api, most), { kind: "quiet icon", image: "bin" })))),
+  found.length > most && button(`Show all ${found.length}`, () => all(place, api), { image: "more" }));
+}
+
+async function all(place, api) {
+  await trying(() => list(place, api, Infinity));
+  place.querySelector("h2").focus();
 }
 
 function link({ id, kind, name, thumb, tiles, busy, changed }) {
@@ -59,9 +67,9 @@ function link({ id, kind, name, thumb, tiles, busy, changed }) {
     h("span", { class: "soft small" }, facts.join(" · ")));
 }
 
-async function remove({ id, name }, place, api) {
+async function remove({ id, name }, place, api, most) {
   if (!(await confirmed("Delete this project?", `“${name}” and all its tiles will be gone for good.`, "Delete it"))) return;
   await trying(() => api.remove(`projects/${id}`));
-  await trying(() => list(place, api));
+  await trying(() => list(place, api, most));
   place.querySelector("h2").focus();
 }

@@ -39,6 +39,7 @@ class PicturePage {
       "aria-label": `The picture with the outline that was read. ${KEYS}`,
     });
     this.stage = h("div", { class: "stage", hidden: true }, this.canvas);
+    this.heading = h("h1", { tabindex: "-1" }, this.title);
     this.said = h("div", { class: "said stack", role: "status" });
     this.lead = h("p", { class: "soft" }, "The green shape is what we read. If something is missing or too much, mend it here.");
     this.find = button("Find tiles", () => this.search(), { kind: "primary big", image: "arrow" });
@@ -51,7 +52,7 @@ class PicturePage {
       paintingControls(this.pen, () => this.paint(), [this.back, this.again, clear]));
     put(root, h("div", { class: "picture" },
       h("div", { class: "stack" },
-        h("h1", { tabindex: "-1" }, "Is this your animal?"), this.lead, this.stage, this.unread),
+        this.heading, this.lead, this.stage, this.unread),
       this.side));
     this.listen();
     this.ready();
@@ -82,6 +83,10 @@ class PicturePage {
     this.off.forEach((stop) => stop());
   }
 
+  get title() {
+    return this.project.silhouette ? "Is this your animal?" : "Your picture";
+  }
+
   /** Show the silhouette that the project has now. */
   async ready() {
     const { silhouette } = this.project;
@@ -95,6 +100,7 @@ class PicturePage {
     this.known = Math.min(this.sent, this.marks.strokes.length);
     [this.lead, this.stage, this.side].forEach((part) => { part.hidden = !silhouette; });
     this.unread.hidden = Boolean(silhouette);
+    this.heading.textContent = this.title;
     this.tell();
   }
 

@@ -1,12 +1,50 @@
 /** What can be made of a tile: which settings matter most, and what they are called here. */
 
+/** Plain names of settings, whatever is made. */
+const PLAIN = {
+  area: "How large is the tray at most?",
+  assembled: "Leave the pieces in the tray",
+  bed: "How large is the machine's bed?",
+  blade: "Thickness of the cutting edge",
+  border: "Cut the edge of the page, too",
+  calibrate: "Add a mark that is 100 mm long",
+  chamfer: "Width of the sloping upper edge",
+  clearance: "Gap between neighbours",
+  clip: "Cut tiles at the edge",
+  copies: "How many pieces?",
+  dpi: "Dots per inch",
+  draft: "Slope of the walls",
+  engrave: "Draw lines inside, as on a woodcut",
+  floor: "Thickness of the floor",
+  foot: "Width of the rim for the hand",
+  fps: "Pictures per second",
+  kerf: "Width of the machine's cut",
+  margin: "Empty edge of the page",
+  marks: "Marks for a cutter's eye",
+  nozzle: "Width of the printer's line",
+  offset: "Cut this far outside",
+  outline: "Width of lines between tiles",
+  relief: "How far lines stand out",
+  repeat: "Make a piece that repeats, as for wallpaper",
+  rotate: "Turn the pattern",
+  spacing: "Room between cuts",
+  strokes: "Kind of lines",
+  tolerance: "How exact?",
+  tray: "Add a tray with a rim this wide",
+  wall: "Thickness of the wall",
+  warn_neck: "Tell me where it is thinner than",
+};
+
+const plain = (words) => ({ ...Object.fromEntries(Object.entries(PLAIN).map(([name, title]) => [name, { title }])), ...words });
+
 export const KINDS = {
   export: {
     title: "Print or cut",
     image: "cut",
     solid: true,
-    first: ["purpose", "format", "tile_size", "area", "palette"],
-    words: {
+    first: ["purpose", "format", "tile_size", "area", "clip", "palette"],
+    start: { purpose: "print" },
+    words: plain({
       purpose: {
         title: "What is it for?",
         about: "This sets everything else so that it suits.",
@@ -18,46 +56,50 @@ export const KINDS = {
       format: { about: "", title: "Kind of file", usual: "What suits it", options: { svg: "SVG", pdf: "PDF", dxf: "DXF", png: "PNG", json: "JSON (numbers)" } },
       tile_size: { title: "How long is one tile?" },
       area: { title: "How large is the page?", about: "Such as A4, letter, mug, phone or 300x200mm." },
+      clip: { title: "Fill the page to its edge", about: "Tiles at the edge are cut. Otherwise only whole tiles are on the page." },
       palette: {
         about: "",
         title: "Colours",
         not: { purpose: ["laser", "plotter", "template", "colouring"], cut: ["skeleton", "jigsaw", "template"], filled: [false] },
       },
       cut: { title: "What is drawn", about: "", options: { none: "every tile, filled", skeleton: "each line once", pieces: "tiles apart", jigsaw: "a jigsaw", template: "one tile, by hand" } },
-    },
+    }),
   },
   art: {
     title: "Picture",
     image: "picture",
     first: ["size", "tile_size", "palette", "colour"],
-    words: {
+    words: plain({
+      tolerance: { title: "How much it may be stretched" },
       size: { title: "Width x height", about: "Pixels such as 3000x2000, or lengths such as 300x200mm." },
       tile_size: { title: "How long is one tile?" },
       palette: { about: "", title: "Colours" },
       colour: { about: "", title: "Which tiles share a colour", options: { neighbour: "neighbours differ", aspect: "those that lie alike", one: "all" } },
-    },
+    }),
   },
   solid: {
     title: "3D print",
     image: "solid",
     solid: true,
     first: ["kind", "tile_size", "height", "format"],
-    words: {
+    words: plain({
+      border: { title: "Edge of the tray" },
       kind: { about: "", title: "What kind of thing?", options: { tile: "Tile", cutter: "Cookie cutter", stamp: "Stamp", mould: "Mould", puzzle: "Puzzle in a tray" } },
       tile_size: { title: "How long is one tile?" },
       format: { about: "", title: "Kind of file", usual: "What suits it", options: { stl: "STL", "3mf": "3MF" } },
-    },
+    }),
   },
   animate: {
     title: "Animation",
     image: "film",
     first: ["kind", "seconds", "shape", "palette", "format"],
-    words: {
+    words: plain({
       kind: { about: "", title: "What happens?", options: { morph: "a plain tiling becomes animals", bend: "the animal bends into the tile", grow: "the tiling grows" } },
       seconds: { title: "How long?" },
+      size: { title: "How wide?" },
       palette: { about: "", title: "Colours" },
       format: { about: "", title: "Kind of file", usual: "What suits it", options: { gif: "GIF", mp4: "MP4", svg: "SVG" } },
-    },
+    }),
   },
 };
 

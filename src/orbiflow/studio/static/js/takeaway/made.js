@@ -14,7 +14,7 @@ export const isMade = (task) => Boolean(KINDS[task?.operation] && task.state ===
 /** Links to the files that a task has made. */
 export function files(task, kind) {
   return task.result.files.map(({ name, bytes: size }) =>
-    h("a", { class: `button ${kind}`, href: address(task, name), download: name }, icon("download"), name, size && h("span", { class: "small" }, bytes(size))));
+    h("a", { class: `button ${kind}`, href: address(task, name), download: name }, icon("download"), name, kind && size && h("span", { class: "small" }, bytes(size))));
 }
 
 /** A picture of what a task has made, null if there is none. */

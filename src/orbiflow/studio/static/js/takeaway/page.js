@@ -3,13 +3,14 @@
 import { button, choice, h, icon, put, style, trying } from "../dom.js";
 import { form } from "../forms.js";
 import { paintCard } from "../tiling.js";
+import { LATE } from "../steering.js";
 import { alive } from "../words.js";
 import { KINDS, colours, lengthIn } from "./kinds.js";
 import { isMade, madeBefore, picture, words } from "./made.js";
 import { trueSize } from "./truesize.js";
 
 const DRAWN = ["export", "art"]; // what a drawing or the picture can be laid on
-const NEVER = ["tile", "result", "out", "force", "picture", "drawing"]; // settings that the page itself makes
+const NEVER = ["tile", "result", "out", "force", "picture", "drawing", "eyes"]; // what the page itself sets, or drawings hold
 const PICTURES = ["png", "jpg", "jpeg", "webp", "svg"];
 
 export async function show(root, page) {
@@ -38,7 +39,7 @@ class TakeawayPage {
     this.canvas = h("canvas", { role: "img", "aria-label": `A tiling: ${this.card.arrangement}` });
     this.shown = h("div", { class: "preview" }, this.canvas);
     this.said = h("div", { class: "stack said", role: "status" });
-    this.size = trueSize(this.card.polygon, this.card.y_down);
+    this.size = trueSize(this.card);
     this.real = section("panel real", "true", "In its true size", this.size.root);
     this.before = h("div");
     this.earlier = section("earlier", "earlier", "Made before", this.before);
@@ -84,7 +85,7 @@ class TakeawayPage {
     if (palette) palette.enum = Object.keys(options);
     const { first, words: names } = KINDS[kind];
     this.form = form(schema, {
-      first, words: { ...names, palette: { ...names.palette, options } }, hidden: NEVER, start: palette && { palette: value },
+      first, words: { ...names, palette: { ...names.palette, options } }, hidden: NEVER, start: { ...KINDS[kind].start, ...(palette && { palette: value }) },
     }, () => this.changed());
     this.layers = this.laidOn(kind);
     put(this.wishes, this.layers.map(({ box, text }) => h("label", { class: "check" }, box, text)), this.form);
@@ -99,7 +100,7 @@ class TakeawayPage {
     const layer = (name, text, checked) => ({ name, text, box: h("input", { type: "checkbox", checked, onchange: () => this.changed() }) });
     return [
       (strokes?.length || eyes?.length) && layer("drawing", "With what you drew on it", true),
-      PICTURES.includes(this.project.input?.type) && layer("picture", "With the picture itself on each tile", false),
+      PICTURES.includes(this.project.input?.type) && layer("picture", "With your picture on each tile, in its own colours", false),
     ].filter((own) => own && DRAWN.includes(kind));
   }
 
@@ -107,13 +108,14 @@ class TakeawayPage {
   changed() {
     const size = lengthIn(this.form.now("tile_size"));
     this.real.hidden = !(size && KINDS[this.kind].solid);
-    if (!this.real.hidden) this.size.show(size);
+    if (!this.real.hidden) this.size.show(size, this.form.now("warn_neck"));
     this.stale = true;
     this.tell();
   }
 
   /** Make it, or stop what is being made. */
   async press() {
+    if (performance.now() - this.turned < LATE) return; // meant for what the button said before
     if (alive(this.task)) {
       await this.api.post(`tasks/${this.task.id}/cancel`);
       return;
@@ -136,7 +138,9 @@ class TakeawayPage {
     this.task = tasks.find(({ id }) => id === this.task?.id) ?? this.task; // as the events have told
     const made = isMade(this.task);
     const again = made && this.stale;
-    this.make.lastChild.textContent = alive(this.task) ? "Stop" : again ? "Make it again" : "Make it";
+    const deed = alive(this.task) ? "Stop" : again ? "Make it again" : "Make it";
+    if (deed !== this.make.textContent) this.turned = performance.now();
+    this.make.textContent = deed;
     const key = made && !this.stale ? this.task.id : null;
     if (key !== this.seen) {
       this.seen = key;

@@ -6,6 +6,8 @@ import { pathOf } from "../tiling.js";
 const CARD = [85.6, 53.98]; // mm: ISO/IEC 7810 ID-1
 const KEY = "orbiflow.px-per-mm";
 const USUAL = 96 / 25.4; // what CSS takes a millimetre for
+const NECK = 9; // pixels of the circle around a narrow place
+const ROOM = 150; // pixels of a tile beside whose circle there is room for words
 
 export const pixels = () => Number(localStorage.getItem(KEY)) || USUAL;
 
@@ -53,13 +55,31 @@ function upright(points) {
   return [left, top, Math.max(...xs) - left, Math.max(...ys) - top];
 }
 
-/** A view of a polygon: {root, show(size in mm)}; `yDown`: how its y lies. */
-export function trueSize(polygon, yDown) {
+/** Put a circle round a narrow place, and its width beside it where there is room. */
+function markNeck(context, [x, y], words, wide, look) {
+  const left = x > wide / 2;
+  const at = [x + (left ? -1 : 1) * (NECK + 6), y];
+  Object.assign(context, { font: "600 13px system-ui, sans-serif", textAlign: left ? "right" : "left", textBaseline: "middle" });
+  context.setLineDash([]);
+  for (const [colour, width] of [[look("--surface"), 5], [look("--ink"), 2]]) {
+    Object.assign(context, { strokeStyle: colour, fillStyle: colour, lineWidth: width });
+    context.beginPath();
+    context.arc(x, y, NECK, 0, 2 * Math.PI);
+    context.stroke();
+    if (wide < ROOM) continue;
+    if (width > 2) context.strokeText(words, ...at);
+    else context.fillText(words, ...at);
+  }
+}
+
+/** A view of a card's tile: {root, show(size in mm, the width in mm below which a neck is told)}. */
+export function trueSize({ polygon, y_down: yDown, neck = null }) {
   const canvas = h("canvas", { class: "true-tile", role: "img" });
   const said = h("p", { class: "soft small" });
+  const thin = h("p", { class: "small" });
   const card = h("div", { class: "bank-card", "aria-hidden": "true" }, h("span", {}, "bank card"));
   const { long, short, corners } = smallest(polygon);
-  let size = 40;
+  let [size, least] = [40, 0];
   const fit = slider("Make this as large as a bank card held to the screen", { min: 2, max: 9, step: 0.01, value: pixels(), said: (value) => `${Math.round((value / USUAL) * 100)} %` }, (value) => {
     localStorage.setItem(KEY, value);
     draw();
@@ -92,11 +112,23 @@ export function trueSize(polygon, yDown) {
     context.setLineDash([4 / unit, 4 / unit]);
     context.lineWidth = 1 / unit;
     context.stroke(pathOf(corners));
+    if (neck) tellNeck(context, context.getTransform(), unit, ratio, width);
     const [length, across, lying, standing] = [long, short, ...upright(polygon).slice(2)].map((side) => ((side * size) / long).toFixed(1));
     canvas.setAttribute("aria-label", `The tile in its true size, ${lying} by ${standing} mm as it lies, in a rectangle of ${length} by ${across} mm`);
     said.textContent = `${lying} × ${standing} mm as it lies; the smallest rectangle around it has ${length} × ${across} mm. ${localStorage.getItem(KEY) ? "Your screen is measured." : "Screens differ: measure yours once."}`;
   }
+
+  function tellNeck(context, at, unit, ratio, wide) {
+    const [[a, b], [c, d]] = neck;
+    const words = `${((Math.hypot(c - a, d - b) * size) / long).toFixed(1)} mm`;
+    const narrow = parseFloat(words) < least;
+    const { x, y } = at.transformPoint({ x: (a + c) / 2, y: (b + d) / 2 });
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    markNeck(context, [x / ratio, y / ratio], words, wide, (name) => getComputedStyle(canvas).getPropertyValue(narrow && name === "--ink" ? "--bad" : name));
+    thin.classList.toggle("notice", narrow);
+    thin.textContent = `Its thinnest part, in the circle, is ${words} wide.${narrow ? " It may break there: choose a longer tile." : ""}`;
+  }
   const root = h("div", { class: "stack" });
-  put(root, h("div", { class: "true-place", tabindex: "0", role: "group", "aria-label": "The tile in its true size" }, canvas), h("div", { class: "row" }, said, h("span", { class: "grow" }), measure), tools);
-  return { root, show(millimetres) { size = millimetres; draw(); } };
+  put(root, h("div", { class: "true-place", tabindex: "0", role: "group", "aria-label": "The tile in its true size" }, canvas), thin, h("div", { class: "row" }, said, h("span", { class: "grow" }), measure), tools);
+  return { root, show(millimetres, limit = 0) { [size, least] = [millimetres, limit]; draw(); } };
 }

@@ -1,0 +1,25 @@
+/** The buttons of a task that is not done: hold it or let it go on, and stop it. */
+
+import { button, h, icon, trying } from "./dom.js";
+
+/** Milliseconds for which a click is still meant for the button that stood at its place before. */
+export const LATE = 600;
+
+/**
+ * {root, update(task)}. The same buttons stand at the same places in all states, whenever these change: whoever
+ * presses one meets no other.
+ */
+export function steering(api) {
+  let task = null;
+  const act = (deed) => trying(() => api.post(`tasks/${task.id}/${deed}`));
+  const hold = button("Pause", () => act(task.state === "paused" ? "resume" : "pause"), { kind: "hold" });
+  const root = h("div", { class: "row" }, hold, button("Stop", () => act("cancel"), { image: "stop" }));
+
+  function update(now) {
+    const held = now.state === "paused";
+    if (held !== (task && task.state === "paused")) hold.replaceChildren(icon(held ? "play" : "pause"), held ? "Go on" : "Pause");
+    hold.classList.toggle("primary", held);
+    task = now;
+  }
+  return { root, update };
+}

@@ -1,0 +1,59 @@
+"""States of pages that pass quickly or come seldom: nothing is cut off, and nobody is kept out.
+
+`docs/gallery/studio_states.py` takes pictures of them, and of the others.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from studio.browser import RunningStudio
+from studio_checks import serious_issues, untidy_parts
+
+pytest.importorskip("playwright", reason="playwright is not installed: no browser tests")
+from studio_states import STATES, Visit
+
+PASSING = [
+    *("start-full", "start-many", "start-delete", "picture-doubts", "picture-failed"),
+    *("search-waiting", "search-sketches", "search-paused", "search-nothing"),
+    *("take-thin", "take-running", "take-refused", "density-empty", "lost"),
+]
+
+
+@pytest.mark.parametrize("name", PASSING)
+def test_nothing_is_cut_off_and_nobody_kept_out(
+    page: Any, studio: RunningStudio, searched: str, name: str
+) -> None:
+    page.emulate_media(color_scheme="dark")
+    STATES[name](Visit(page, studio.project(searched), density=""))
+    assert untidy_parts(page, 1440, 390, 360) == []
+    assert serious_issues(page) == []
+
+
+def test_a_thousand_projects_are_shown_when_they_are_asked_for(
+    page: Any, studio: RunningStudio, searched: str
+) -> None:
+    STATES["start-many"](Visit(page, studio.project(searched), density=""))
+    assert page.locator(".project").count() == 24
+    page.get_by_role("button", name="Show all 1000").click()
+    page.wait_for_selector(".project >> nth=999")
+
+
+def test_faults_are_found(page: Any) -> None:
+    page.goto("/")
+    page.wait_for_selector(".drop")
+    assert untidy_parts(page) == []
+    page.evaluate(
+        """() => {
+            const [one, other, third] = document.querySelectorAll(".drop .button");
+            one.style.minWidth = "3000px";
+            other.style.overflow = third.style.overflow = "hidden";
+            other.style.width = "20px";
+            third.style.marginLeft = "-30px";
+        }"""
+    )
+    found = " ".join(untidy_parts(page))
+    for fault in ("beyond the window", "cut off", "one over another", "wider than the window"):
+        assert fault in found
