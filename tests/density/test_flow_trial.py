@@ -8,27 +8,35 @@ import pytest
 import torch
 
 from density.quick_fits import few_kernels
-from orbiflow.density import DensitySettings, FlowSettings, Torus, fit_automatic, weighed
+from orbiflow.density import (
+    DensitySettings,
+    FlowDensity,
+    FlowSettings,
+    Torus,
+    fit_automatic,
+    fit_density,
+    weighed,
+)
 from orbiflow.density.fitting import COMPONENTS
 from orbiflow.density.fitting.automatic import BEFORE_END
 from orbiflow.density.fitting.evidence import (
-    FIRST,
     Candidates,
     Course,
-    TriedFlow,
     candidates_of,
-    flow_beside,
     judged,
     stacked,
     supported_weights,
-    try_flow,
 )
 from orbiflow.density.fitting.families import KernelFamily
+from orbiflow.density.fitting.flow_trial import FIRST, Rivals, TriedFlow, flow_beside, try_flow
 from orbiflow.density.fitting.folds import Folds, folds_of
 from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence
 from orbiflow.density.fitting.rows import Gain
 from orbiflow.density.fitting.settings import Component
+from orbiflow.errors import OrbiflowError
+from orbiflow.fields import SplineField
+from orbiflow.flows import Flow
 from orbiflow.runtime import SideBySide, one_core
 
 QUICK: dict[str, Any] = {
@@ -49,7 +57,7 @@ def evidence(weights: np.ndarray | None = None) -> tuple[Folds, Candidates, torc
         few_kernels(patch)
         course = Course(lambda *_: None, 1.0)
         candidates = candidates_of(
-            SPACE, [KernelFamily(SPACE)], folds, course, Budget(), SideBySide()
+            SPACE, [KernelFamily(SPACE)], folds, course, Budget(), SideBySide(), Rivals().meet
         )
     return (
         folds,
@@ -63,7 +71,10 @@ def tried(
 ) -> TriedFlow:
     settings = FlowSettings(**QUICK)
     return try_flow(
-        folds, candidates, weights, lambda k: flow_beside(SPACE, folds, k, settings, Budget(), told)
+        folds,
+        candidates,
+        weights,
+        lambda k: flow_beside(SPACE, folds, k, settings, Budget(), None, told),
     )
 
 
@@ -72,7 +83,7 @@ def test_progress_goes_on_from_one_tenth_to_the_next(
     tenths: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Gain, "is_sure", property(lambda _: tenths == 1))
-    monkeypatch.setattr("orbiflow.density.fitting.evidence._is_worth_it", lambda _: True)
+    monkeypatch.setattr("orbiflow.density.fitting.flow_trial._is_worth_it", lambda _: True)
     said: list[tuple[float, str]] = []
     tried(*evidence(), told=lambda done, what: said.append((done, what)))
     shares = [done for done, _ in said]
@@ -98,7 +109,7 @@ def test_no_step_of_a_fit_is_half_of_it(
 def test_a_flow_that_has_no_time_is_none() -> None:
     folds, candidates, weights = evidence()
     spent = Budget(seconds=0)
-    none = flow_beside(SPACE, folds, 0, FlowSettings(**QUICK), spent, lambda *_: None)
+    none = flow_beside(SPACE, folds, 0, FlowSettings(**QUICK), spent, None, lambda *_: None)
     assert none is None
     assert try_flow(folds, candidates, weights, lambda _: none) == TriedFlow()
 
@@ -110,7 +121,7 @@ def test_a_flow_is_compared_at_the_rows_that_it_was_tried_on(
 ) -> None:
     # sure at once, or never: then a second tenth is asked
     monkeypatch.setattr(Gain, "is_sure", property(lambda _: tenths == 1))
-    monkeypatch.setattr("orbiflow.density.fitting.evidence._is_worth_it", lambda _: True)
+    monkeypatch.setattr("orbiflow.density.fitting.flow_trial._is_worth_it", lambda _: True)
     own = np.random.default_rng(1).uniform(0.5, 2.0, 700) if weighted else None
     folds, candidates, weights = evidence(own)
     (flow,) = tried(folds, candidates, weights).evidence
@@ -134,3 +145,48 @@ def test_it_is_said_of_which_rows_a_figure_is() -> None:
     )
     kernels = ComponentEvidence("kernels", 0.5, 1.5, 0.01, 0.002, 699)
     assert str(kernels) == "kernels: 50.0%, worth 0.0100 ± 0.0020 nats; alone 1.5000 over uniform"
+
+
+@pytest.mark.parametrize(
+    ("above", "hope", "given_up"), [(0.5, 0.4, True), (0.5, 0.6, False), (-0.5, 0.0, False)]
+)
+def test_a_flow_is_outdone_that_gains_nothing_and_cannot_catch_up(
+    above: float, hope: float, given_up: bool
+) -> None:
+    folds, _, _ = evidence()
+    held = folds.held(0)
+    even = torch.zeros(len(held), dtype=torch.float64)
+    flow = FlowDensity(SPACE, Flow([SplineField(SPACE.group, 1)], steps=1))  # which moves nothing
+    with Rivals() as rivals:
+        rivals.meet(even + above, even, held)
+        assert rivals.outdo(flow, hope) is given_up
+
+
+def test_an_outdone_flow_is_refined_no_further() -> None:
+    points = SPACE.project(0.1 * torch.randn(300, 2, generator=torch.Generator().manual_seed(0)))
+    settings = FlowSettings(**QUICK | {"iterations": 12, "roughness": (1e-3, 1e-4)})
+
+    def fitted(outdone) -> list[tuple[str, int]]:
+        stages = fit_density(SPACE, points.double(), settings, outdone=outdone)[1].stages
+        return [(stage.stopped, len(stage.validation)) for stage in stages]
+
+    hopes: list[float] = []
+    assert fitted(lambda _, hope: hopes.append(hope) or True) == [("outdone", 3)]
+    assert fitted(lambda _, hope: hope == 0) == fitted(None)[:1]
+    assert fitted(lambda *_: False) == fitted(None)
+    assert len(hopes) == 1
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_who_waits_for_rivals_that_fail_waits_no_longer(
+    count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(*_: Any) -> None:
+        raise OrbiflowError("no kernels today")
+
+    monkeypatch.setattr("orbiflow.runtime.side_by_side.cores", lambda: count)
+    monkeypatch.setattr(KernelFamily, "fitted", failing)
+    points = SPACE.project(0.1 * torch.randn(400, 2, generator=torch.Generator().manual_seed(0)))
+    settings = DensitySettings(components=("flow", "kernels"), **QUICK)
+    with pytest.raises(OrbiflowError, match="no kernels today"):
+        fit_automatic(SPACE, points.double(), settings)

@@ -15,16 +15,11 @@ from orbiflow.arguments import as_instance
 from orbiflow.density.fitting.evidence import (
     Candidates,
     Course,
-    FittedFlow,
-    TriedFlow,
     assembled,
     candidates_of,
-    flow_beside,
-    flow_settings,
     judged,
     stacked,
     supported_weights,
-    try_flow,
     without_idle,
     work_of,
 )
@@ -34,6 +29,14 @@ from orbiflow.density.fitting.families import (
     KernelFamily,
     MixtureFamily,
     NetworkFamily,
+)
+from orbiflow.density.fitting.flow_trial import (
+    FittedFlow,
+    Rivals,
+    TriedFlow,
+    flow_beside,
+    flow_settings,
+    try_flow,
 )
 from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, Repeats, folds_of, repeats_of
 from orbiflow.density.fitting.kernels import NARROWEST
@@ -126,9 +129,11 @@ def fit_automatic(
     flows = _wants_flow(space, folds, settings)
     total = work_of(len(families), folds.used) + FLOW_WORK * flows
     course = Course(lambda done, what: say(BEFORE_END * done, what), total)
-    with SideBySide() as beside:
-        fitted = _flow_fits(space, folds, settings, budget, course, beside) if flows else None
-        candidates = candidates_of(space, families, folds, course, budget, beside)
+    with SideBySide(waiting=1) as beside, Rivals() as rivals:
+        fitted = (
+            _flow_fits(space, folds, settings, budget, rivals, course, beside) if flows else None
+        )
+        candidates = candidates_of(space, families, folds, course, budget, beside, rivals.meet)
         weights = supported_weights(candidates.table, candidates.floor, candidates.row_weights)
         weights = without_idle(candidates, weights)  # each part costs time at every query
         others = judged(candidates, weights)  # while the flow is fitted
@@ -157,15 +162,22 @@ def _flow_fits(
     folds: Folds,
     settings: DensitySettings,
     budget: Budget,
+    rivals: Rivals,
     course: Course,
     beside: SideBySide,
 ) -> Callable[[int], FittedFlow | None]:
-    """Begin to fit a flow without the first tenth; return the fits without the first and the second."""
+    """Begin to fit a flow without the first tenth; return the fits without the first and the second.
+
+    The first is given up where the `rivals` outdo it.
+    """
     chosen = flow_settings(space, len(folds.rows), settings.seed).replace(**settings.of_flow)
     tell = course.part(FLOW_WORK)
 
     def begun(number: int) -> Callable[[], FittedFlow | None]:
-        return beside.begin(partial(flow_beside, space, folds, number, chosen, budget), tell)
+        outdone = None if number else rivals.outdo
+        return beside.begin(
+            partial(flow_beside, space, folds, number, chosen, budget, outdone), tell
+        )
 
     first = begun(0)
     return lambda number: begun(number)() if number else first()

@@ -6,7 +6,7 @@ The weights of densities by what they give to rows that were held out: stacking.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import count
 from typing import NamedTuple
@@ -15,16 +15,13 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.fitting.families import Family
-from orbiflow.density.fitting.flow import fit_density
 from orbiflow.density.fitting.folds import Folds
 from orbiflow.density.fitting.likelihood import Budget
-from orbiflow.density.fitting.report import ComponentEvidence, FitReport, Progress
+from orbiflow.density.fitting.report import ComponentEvidence, Progress
 from orbiflow.density.fitting.rows import Gain, Rows, gain_of, mean_of
-from orbiflow.density.fitting.settings import FlowSettings
 from orbiflow.density.inference import at_observed
-from orbiflow.density.models import MOST_DIM, Density, Mixture, UniformDensity, mixture_of
+from orbiflow.density.models import Density, Mixture, UniformDensity, mixture_of
 from orbiflow.density.spaces import Space
-from orbiflow.fields import has_even_grid
 from orbiflow.runtime import SideBySide, Tell
 from orbiflow.typed_torch import listed
 
@@ -108,10 +105,12 @@ def candidates_of(
     course: Course,
     budget: Budget,
     beside: SideBySide,
+    meet: Callable[[Tensor, Tensor, Rows], None],
 ) -> Candidates:
     """Fit all families to all folds; after the first, only what may be of use.
 
-    The families are fitted side by side; so are all folds after the first.
+    The families are fitted side by side; so are all folds after the first. `meet` is told the log
+    densities (N,) of all candidates together and the uniform one, at the first rows held out.
     """
 
     def begun(number: int) -> list[Callable[[], Fitted | None]]:
@@ -141,7 +140,7 @@ def candidates_of(
         blocks.append(block)
         weights.append(held.weights)
         if number == 0:
-            _narrow(families, block, held)
+            meet(_narrow(families, block, held), block[FLOOR, FLOOR], held)
             waiting += map(begun, range(1, folds.used))
     keys = [key for key in blocks[-1] if all(key in block for block in blocks)]
     table = torch.cat([torch.stack([block[key] for key in keys]) for block in blocks], dim=1)
@@ -166,11 +165,15 @@ def _fitted(family: Family, folds: Folds, number: int, budget: Budget, say: Tell
     return Fitted(parts, {name: at_observed(part, held.points) for name, part in parts.items()})
 
 
-def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: Rows) -> None:
-    """Keep of each family what has most weight in the first fold, or may have, and the best alone."""
+def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: Rows) -> Tensor:
+    """Keep of each family what has most weight in the first fold, or may have, and the best alone.
+
+    Return the log densities (N,) of all of them together.
+    """
     keys = list(block)
     table = torch.stack([block[key] for key in keys])
-    weights: list[float] = listed(stacking_weights(table, held.weights))
+    best_weights = stacking_weights(table, held.weights)
+    weights: list[float] = listed(best_weights)
     for family in families:
         own = {name: w for (f, name), w in zip(keys, weights, strict=True) if f == family.name}
         if own:
@@ -179,6 +182,7 @@ def _narrow(families: list[Family], block: dict[tuple[str, str], Tensor], held: 
             if family.kept is not None:
                 some = sorted(some, key=lambda name, w=own: -w[name])[: family.kept]
             family.keep({best, *some})
+    return stacked(table, best_weights)
 
 
 def without_idle(candidates: Candidates, weights: Tensor) -> Tensor:
@@ -244,128 +248,6 @@ def assembled(
     total = sum(weight for weight, _ in found)
     others = [((1 - share) * weight / total, part) for weight, part in found]
     return mixture_of(others if flow is None else [(share, flow), *others])
-
-
-FEW_ROWS, MANY_ROWS = 5_000, 20_000
-"""With fewer a flow is fitted in one stage; from the latter on it may be finer."""
-
-LIKELY = 1.5
-"""Standard errors that a flow must gain over two tenths where one tenth is not sure of it."""
-
-
-FIRST = 2 / 3
-"""Of the work told, for the first tenth: there is seldom a second."""
-
-
-class TriedFlow(NamedTuple):
-    """A flow, its share and what came of it; without a share there is none."""
-
-    flow: Density | None = None
-    share: float = 0.0
-    evidence: tuple[ComponentEvidence, ...] = ()
-    report: FitReport | None = None
-
-
-FittedFlow = tuple[Density, FitReport]
-
-
-def flow_beside(
-    space: Space, folds: Folds, number: int, chosen: FlowSettings, budget: Budget, say: Tell
-) -> FittedFlow | None:
-    """Fit a flow without a tenth; None if the time is over before it begins."""
-    if budget.is_spent:
-        return None
-    train = folds.train(number)
-    begin, end = ((0.0, FIRST), (FIRST, 1.0))[number]
-    return fit_density(
-        space,
-        train.points,
-        chosen.replace(seconds=budget.seconds_left),
-        weights=train.weights,
-        progress=lambda done, what: say(begin + (end - begin) * done, f"flow: {what}"),
-    )
-
-
-def try_flow(
-    folds: Folds,
-    candidates: Candidates,
-    weights: Tensor,
-    fitted: Callable[[int], FittedFlow | None],
-) -> TriedFlow:
-    """A flow fitted without the first tenth, and the share that this tenth gives it.
-
-    Where that tenth is for it, but not surely, a flow fitted without the second is asked, too: what few
-    rows speak for has streaks that are not in the data. The candidates beside it have `weights` (P,).
-    """
-
-    tables: list[Tensor] = []
-    held: list[Rows] = []
-
-    def worth_of(density: Density, number: int) -> ComponentEvidence:
-        rows, start = folds.held(number), sum(map(len, held))
-        columns = candidates.table[:, start : start + len(rows)]
-        with torch.no_grad():
-            own = density.log_prob(rows.points)
-        tables.append(torch.stack([stacked(columns, weights), own, columns[-1]]))
-        held.append(rows)
-        return _worth(tables, held)
-
-    if (first := fitted(0)) is None:
-        return TriedFlow()
-    density, report = first
-    worth = worth_of(density, 0)
-    kept = _is_worth_it(worth)
-    sure = Gain(worth.gain, worth.error).is_sure
-    if kept and not sure and folds.used > 1 and (second := fitted(1)) is not None:
-        worth = worth_of(second[0], 1)
-        kept = _is_worth_it(worth) and worth.gain >= LIKELY * worth.error
-    if not kept:
-        worth = replace(worth, share=0.0, gain=0.0, error=0.0)
-    return TriedFlow(density if kept else None, worth.share, (worth,), report)
-
-
-def _worth(tables: list[Tensor], held: list[Rows]) -> ComponentEvidence:
-    """Judge a flow by log densities (3, N) at rows held out: the others', its own, the uniform one."""
-    others, own, uniform = torch.cat(tables, dim=1)
-    known = [rows.weights for rows in held if rows.weights is not None]
-    row_weights = torch.cat(known) if known else None
-    table = torch.stack([others, own])
-    both = stacking_weights(table, row_weights)
-    gain = gain_of(stacked(table, both), others, row_weights)
-    return ComponentEvidence(
-        "flow",
-        float(both[1]),
-        mean_of(own - uniform, row_weights),
-        gain.nats,
-        gain.error,
-        len(own),
-        mean_of(others - uniform, row_weights),
-    )
-
-
-def _is_worth_it(worth: ComponentEvidence) -> bool:
-    # a weight chosen on these rows gains one nat among all of them by chance
-    return worth.gain * worth.rows >= 1
-
-
-def flow_settings(space: Space, rows: int, seed: int) -> FlowSettings:
-    """Of a flow beside other parts: those have the clusters, it has what is smooth."""
-    if space.dim == MOST_DIM and not has_even_grid(space.group):
-        # each point costs a sum over all waves: as many as of splines would take minutes
-        return FlowSettings(
-            max_frequency=2, segments=2, roughness=(1e-3,), iterations=30, seed=seed
-        )
-    if space.dim == MOST_DIM:
-        return FlowSettings(
-            max_frequency=5, segments=3, roughness=(1e-3,), iterations=60, seed=seed
-        )
-    if rows >= MANY_ROWS:
-        return FlowSettings(roughness=(1e-3, 1e-4), seed=seed)
-    if rows >= FEW_ROWS:
-        return FlowSettings(
-            max_frequency=6, segments=4, roughness=(1e-3, 1e-4), iterations=60, seed=seed
-        )
-    return FlowSettings(max_frequency=6, segments=4, roughness=(1e-3,), iterations=40, seed=seed)
 
 
 TOLERANCE = 1e-4

@@ -55,6 +55,13 @@ MERGED, CROWD = 4096, 2
 """Into how many points the data are merged, roughly; and of how many fair shares a cell is too full."""
 
 
+Outdone = Callable[[FlowDensity, float], bool]
+"""Whether a flow can be given up that may still gain so many nats."""
+
+HOPE = 2.0
+"""What a flow may gain after half of its iterations, in gains of the quarter before."""
+
+
 def refine_in_stages(
     density: FlowDensity,
     train: Rows,
@@ -62,8 +69,11 @@ def refine_in_stages(
     settings: FlowSettings,
     say: Progress,
     budget: Budget,
+    outdone: Outdone | None = None,
 ) -> list[Refinement]:
     """Refine once for each roughness; the density's flow ends with the last one's parameters and steps.
+
+    It may be given up if it is `outdone`, halfway through the first stage or after it.
 
     A stage is scored at doubled steps. What is worse than before at twice as many again has gained
     from the integrator's errors alone: it is undone, and repeated at doubled steps.
@@ -71,14 +81,7 @@ def refine_in_stages(
     stages: list[Refinement] = []
     if not settings.iterations:
         return stages
-    dtype = next(density.flow.parameters()).dtype
-    cells = max(LEAST_CELLS, CELLS * settings.max_frequency)
-    train = merged(train, cells, crowd=math.ceil(CROWD * len(train) / MERGED)).to(dtype)
-    # never merged: means of cells would call overfitting to means of cells good
-    held = validation[:MOST_HELD]
-    if held.weights is not None:
-        held = replace(held, weights=held.weights / held.weights.sum())
-    held = held.to(dtype)
+    train, held = _refined_on(train, validation, settings.max_frequency)
     count = len(settings.roughness)
     while len(stages) < count and not budget.is_spent:
         number = len(stages)
@@ -86,6 +89,9 @@ def refine_in_stages(
         def watch(iteration: int, nll: float, score: float, number: int = number) -> None:
             share = (number + iteration / settings.iterations) / count
             say(share, f"likelihood: train {nll:.4f}, validation {score:.4f}")
+
+        def hopeless(gained: float) -> bool:
+            return outdone is not None and outdone(density, HOPE * gained)
 
         before = [p.detach().clone() for p in density.flow.parameters()]
         stage = refine(
@@ -96,6 +102,7 @@ def refine_in_stages(
             roughness=settings.roughness[number],
             budget=budget,
             watch=watch,
+            hopeless=None if number else hopeless,
         )
         if stage.best and _exploits(density, held, stage):
             with torch.no_grad():
@@ -106,12 +113,25 @@ def refine_in_stages(
             density.flow = density.flow.with_steps(2 * density.flow.steps)
             continue
         stages.append(stage)
+        if stage.stopped == "outdone" or (number == 0 and count > 1 and hopeless(0.0)):
+            break
         unconverged = step_error(density, held.points) > MASS_TOLERANCE
         if unconverged and density.flow.steps < MOST_TRAINING_STEPS:
             density.flow = density.flow.with_steps(2 * density.flow.steps)
         elif number > 1 and stage.best == 0:
             break
     return stages
+
+
+def _refined_on(train: Rows, validation: Rows, max_frequency: int) -> tuple[Rows, Rows]:
+    """Return the merged rows that refinement trains on, and those that it is scored on."""
+    cells = max(LEAST_CELLS, CELLS * max_frequency)
+    train = merged(train, cells, crowd=math.ceil(CROWD * len(train) / MERGED))
+    # never merged: means of cells would call overfitting to means of cells good
+    held = validation[:MOST_HELD]
+    if held.weights is not None:
+        held = replace(held, weights=held.weights / held.weights.sum())
+    return train.to(DTYPE), held.to(DTYPE)
 
 
 def _exploits(density: FlowDensity, held: Rows, stage: Refinement) -> bool:
@@ -135,12 +155,13 @@ def fit_density(
     *,
     weights: Any = None,
     progress: Progress | None = None,
+    outdone: Outdone | None = None,
 ) -> tuple[FlowDensity, FitReport]:
     """Fit a flow of spline fields to canonical points by flow matching, then by likelihood.
 
     Points (N, d) are in the chart of a space of three dimensions at most; of `weights` (N,) only the
     ratios count. Points that share a small cell are merged, so the time hardly grows with their number.
-    The density is float64.
+    The density is float64. A flow that is `outdone` is refined no further.
     """
     settings = as_instance(
         FlowSettings() if settings is None else settings, FlowSettings, "settings"
@@ -158,7 +179,7 @@ def fit_density(
     density = _start(space, train, settings, generator)
     start_nll = mean_nll(density, validation.points.to(DTYPE), validation.weights)
     budget = Budget(settings.evaluations, settings.seconds)
-    stages = refine_in_stages(density, train, validation, settings, say, budget)
+    stages = refine_in_stages(density, train, validation, settings, say, budget, outdone)
     density.flow.double()
     error, mass = settle(density, validation.points[:MOST_HELD], MOST_STEPS)
     notes = [*weights_note(rows)]

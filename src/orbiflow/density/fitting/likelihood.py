@@ -38,6 +38,9 @@ MOST_EVALUATIONS = 10**9
 Watch = Callable[[int, float, float], None]
 """A function called with the iteration and the training and validation scores, in nats."""
 
+HopelessAt = Callable[[float], bool]
+"""Whether to end a descent that has gained so many nats in the second quarter of its iterations."""
+
 
 @dataclass(frozen=True)
 class Refinement:
@@ -46,7 +49,8 @@ class Refinement:
     - `train`, `validation`: Mean negative log densities with respect to the square, at the start, every
       `EVERY` iterations and at the end.
     - `best`: The entry whose parameters were kept.
-    - `stopped`: What ended it: "iterations", "validation", "converged", "evaluations" or "time".
+    - `stopped`: What ended it: "iterations", "validation", "converged", "outdone", "evaluations" or
+      "time".
     - `seconds`: The time that it took.
     """
 
@@ -57,10 +61,12 @@ class Refinement:
     seconds: float
 
 
-class _Idle(Exception):
-    """Validation has not improved for `PATIENCE` iterations."""
+class Stop(Exception):
+    """Ends a descent; `reason` is what `Refinement.stopped` says of it."""
 
-    reason = "validation"
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
 
 
 class Objective:
@@ -132,17 +138,19 @@ def refine(
     roughness: float = 0.0,
     budget: Budget | None = None,
     watch: Watch | None = None,
+    hopeless: HopelessAt | None = None,
 ) -> Refinement:
     """Descend on the negative log-likelihood, and leave the flow's parameters best on `held`.
 
     Canonical points (N, d) are in the parameters' dtype; weights, if there are any, have the sum 1. It
     ends after `iterations`, or `PATIENCE` of them that do not improve the held-out score, or when the
-    `budget` is spent. `watch` is told every score.
+    `budget` is spent, or halfway if it is `hopeless`, which may look at the density. `watch` is told
+    every score.
     """
     budget = budget or Budget()
     began = time.monotonic()
     objective = Objective(density, train, roughness)
-    descent = _Descent(objective, held, watch)
+    descent = _Descent(objective, held, watch, iterations / 2, hopeless)
 
     def loss(values: Array) -> tuple[float, Array]:
         budget.spend()
@@ -168,7 +176,7 @@ def refine(
             )
             if found.nit < iterations:
                 stopped = "converged"
-    except (Spent, _Idle) as stop:
+    except Stop as stop:
         stopped = stop.reason
     descent.finish()
     spent = time.monotonic() - began
@@ -178,8 +186,16 @@ def refine(
 class _Descent:
     """The iterates of a descent: every `EVERY`-th is scored, and so is the last."""
 
-    def __init__(self, objective: Objective, held: Rows, watch: Watch | None) -> None:
+    def __init__(
+        self,
+        objective: Objective,
+        held: Rows,
+        watch: Watch | None,
+        half: float,
+        hopeless: HopelessAt | None,
+    ) -> None:
         self.objective, self.held, self.watch = objective, held, watch
+        self.half, self.hopeless = half, hopeless
         self.done, self.best = 0, 0
         self.latest = self.kept = objective.get()
         with torch.no_grad():
@@ -193,7 +209,11 @@ class _Descent:
         if self.done % EVERY == 0:
             self._look()
             if EVERY * (len(self.scores) - 1 - self.best) >= PATIENCE:
-                raise _Idle
+                raise Stop("validation")
+            if self.hopeless and self.done - EVERY < self.half <= self.done:
+                quarter = self.scores[len(self.scores) // 2]
+                if self.hopeless(quarter - self.scores[-1]):
+                    raise Stop("outdone")
 
     def finish(self) -> None:
         """Leave the best iterate in place."""
@@ -263,12 +283,8 @@ clock = time.monotonic
 """Seconds since some moment; tests put another in its place."""
 
 
-class Spent(Exception):
+class Spent(Stop):
     """Raised where the next evaluation would begin; `reason` is "evaluations" or "time"."""
-
-    def __init__(self, reason: str) -> None:
-        super().__init__(reason)
-        self.reason = reason
 
 
 class Budget:
