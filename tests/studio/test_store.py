@@ -72,6 +72,23 @@ def test_the_newest_reading_is_the_last_to_end(tmp_path: Path) -> None:
     bench.store.close()
 
 
+def test_what_uses_a_reading_waits_for_it(tmp_path: Path) -> None:
+    bench = Bench(tmp_path / "data", long=2, quick=2)
+    project, other = bench.project(), bench.project()
+    table = bench.queue.submit(project, "density table", {})
+    angles = {"space": "torus", "columns": ["phi", "psi"]}
+    fit = bench.queue.submit(project, "density fit", angles)
+    search = bench.search(other)
+    assert bench.states(table, fit, search) == ["running", "waiting", "running"]
+    bench.made[0].finish()
+    assert bench.states(table, fit) == ["done", "running"]
+    for process in bench.made:
+        if process.alive:
+            process.finish()
+    bench.queue.close()
+    bench.store.close()
+
+
 def test_old_tasks_that_are_not_done_are_listed(bench: Bench) -> None:
     project = bench.project()
     search = bench.search(project)

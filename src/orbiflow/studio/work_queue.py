@@ -33,6 +33,9 @@ from orbiflow.studio.kinds_of_work import kind_of_work
 from orbiflow.studio.store import Missing, Store
 from orbiflow.studio.words import page_words, plain_name
 
+READINGS = frozenset({"read", "density table"})
+"""Tasks whose results the later ones of their project use."""
+
 WARM = (
     "orbiflow.studio.tasks",
     "orbiflow.studio.changing",
@@ -217,16 +220,14 @@ class WorkQueue:
         running = [self._lanes[task] for task in self._running]
         full = Counter(lane for _, lane, _ in running)
         own = Counter((project, lane) for project, lane, _ in running)
-        read = {project for project, _, operation in running if operation == "read"}
-        waiting = [
-            task
-            for task in self.store.undone()
-            if task["state"] == "waiting"
-            and task["id"] not in self._running
-            and full[task["lane"]] < self.slots[task["lane"]]
-            # an older reading must not end after a newer one
-            and not (task["operation"] == "read" and task["project"] in read)
-        ]
+        waiting: list[dict[str, Any]] = []
+        reading: set[str] = set()  # projects whose input an older task is yet to read
+        for task in self.store.undone():
+            free = task["state"] == "waiting" and task["id"] not in self._running
+            if free and full[task["lane"]] < self.slots[task["lane"]]:
+                waiting += [task] * (task["project"] not in reading)
+            if task["operation"] in READINGS and task["state"] != "paused":
+                reading.add(task["project"])
 
         def turn(task: dict[str, Any]) -> tuple[int, int, int]:
             project = task["project"]
