@@ -109,6 +109,7 @@ class Closeup {
       this.help);
     this.root.classList.add("closeup");
     put(this.root, h("div", { class: "closeup-page" }, this.stage.box, side), this.said);
+    this.#past(); // nothing can be undone before the tile is there
   }
 
   /** Show a tile of the project. */
@@ -356,7 +357,7 @@ class Closeup {
   }
 
   async undo() {
-    if (!this.past.done.length && this.view.parent) this.past.done.push({ tile: [this.view.parent, this.view.id] });
+    if (!this.past.done.length && this.view?.parent) this.past.done.push({ tile: [this.view.parent, this.view.id] });
     await this.#go(this.past.done, this.past.undone, 0, "Undone.");
   }
 
