@@ -117,6 +117,18 @@ def test_pull_certify_undo_redo(closeup, studio: RunningStudio, searched: str, t
     assert proved(page, second) == first
 
 
+def test_nothing_is_undone_before_the_tile_is_there(page, searched: str, tile) -> None:
+    held = list[Any]()
+    page.route("**/tiles/*", lambda route: held.append(route))
+    page.goto(f"/#/p/{searched}/t/{tile['id']}")
+    page.get_by_role("button", name="Undo").wait_for()
+    assert page.get_by_role("button", name="Undo").is_disabled()
+    page.keyboard.press("Control+z")
+    held[0].continue_()
+    page.wait_for_selector(f"{BADGE}[data-kind=proved]")
+    assert shown(page) == tile["id"]
+
+
 def test_by_keyboard_and_too_far_stops_at_the_last_tile(closeup, tile) -> None:
     page = closeup
     choose(page, "Pull")

@@ -28,6 +28,7 @@ def fitted_fixture(studio: RunningStudio) -> str:
     """A density of two angles."""
     own = new_density(studio)
     studio.client.put(f"projects/{own}/density/table", params={"name": "bends.csv"}, content=TABLE)
+    studio.until(lambda: studio.client.get(f"projects/{own}/density").json()["table"])
     settings = {"space": "torus", "columns": ["phi", "psi"], "unit": "degrees"}
     studio.client.post(
         f"projects/{own}/tasks", json={"operation": "density fit", "settings": settings}

@@ -296,6 +296,10 @@ def test_the_true_size_is_of_the_file_and_follows_the_screen(page, studio, searc
     assert page.evaluate(wide) == pytest.approx(1.5 * first * 5 / (96 / 25.4), abs=0.1)
     bank = page.locator(".bank-card").bounding_box()
     assert bank["width"] / bank["height"] == pytest.approx(85.6 / 53.98, rel=1e-2)
+    page.get_by_role("radio", name="3D print").check()
+    page.get_by_label("What kind of thing?").select_option("cutter")
+    assert page.get_by_label("thinner than").input_value() == "5"
+    assert page.get_by_label("How long is one tile?").input_value() == "80"
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

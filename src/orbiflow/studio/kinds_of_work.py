@@ -115,7 +115,7 @@ def presets(makes: str) -> dict[str, dict[str, dict[str, Any]]]:
     """Return, by setting and choice, the defaults of a take-away's other settings that it changes.
 
     >>> presets("solid")["kind"]["cutter"]
-    {'tile_size': 80.0, 'height': 13.0, 'wall': 1.2}
+    {'tile_size': 80.0, 'height': 13.0, 'wall': 1.2, 'warn_neck': 5.0}
     """
     fields = own_fields(find(makes))
 

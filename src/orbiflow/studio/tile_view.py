@@ -24,7 +24,7 @@ def tile_card(
         stage: How far its search is: sketch, better, final; or pulled.
         parent: The number of the tile that it was made from by hand.
     """
-    rating, neck = tile.rating or Rating(1), tile.thinnest or narrowest_neck(tile.tile.polygon)
+    rating, neck = tile.rating or Rating(1), narrowest_neck(tile.tile.polygon)
     tiling, colours = as_tiling(tile.tile), colouring(tile.tile)
     return {
         "id": number,

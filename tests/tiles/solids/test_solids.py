@@ -256,6 +256,26 @@ def test_notes_say_where_it_is_too_thin() -> None:
     assert made.title.startswith("NOT CERTIFIED")
     (note,) = (note for note in made.notes if "thinner than 5 mm: a neck" in note)
     assert "is 1.00 mm wide" in note
+    quiet = SolidSettings(kind="cutter", tile_size=size, warn_neck=0)
+    assert "thinner" not in " ".join(make_solid(tile, quiet, force=True).notes)
+
+
+@pytest.mark.parametrize(
+    ("given", "least"),
+    [
+        ({}, 2 * 0.5 + 0.2),
+        ({"chamfer": 1, "clearance": 0}, 2.0),
+        ({"nozzle": 2}, 2.0),
+        ({"kind": "cutter"}, 5.0),
+        ({"kind": "stamp"}, 0.4),
+        ({"kind": "mould"}, 2.0),
+        ({"kind": "mould", "height": 20}, 40 * np.tan(np.radians(5)) + 0.2),
+        ({"kind": "puzzle", "clearance": 0.4}, 1.4),
+        ({"kind": "cutter", "warn_neck": "3mm"}, 3.0),
+    ],
+)
+def test_how_thin_a_solid_may_be(given: dict[str, Any], least: float) -> None:
+    assert SolidSettings(**given).warn_neck == pytest.approx(least)
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,6 @@ def write_3mf(parts: Mapping[str, Manifold], title: str = "") -> bytes:
 
 WRITERS = {"stl": write_stl, "3mf": write_3mf}
 DARK = 0.9  # share of the tile beyond which a drawing that is raised shows nothing
-FRAGILE = {"cutter": 5.0, "mould": 2.0}  # widths in mm of necks at which dough and casts break
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,21 +126,10 @@ def make_solid(
 
 
 def _page(settings: SolidSettings) -> ExportSettings:
-    """Return how the tile is laid out: a puzzle's for most whole tiles within the tray's walls.
-
-    Notes say where it is so thin that it breaks, or that the slopes of both sides meet.
-    """
-    kind, slope = settings.kind, settings.chamfer
-    if kind == "mould":
-        slope = settings.height * settings.slope
-    bevelled = 2 * slope + settings.clearance if kind in ("tile", "mould", "puzzle") else 0.0
-    page = ExportSettings(
-        tile_size=settings.tile_size,
-        warn_neck=max(settings.nozzle, bevelled, FRAGILE.get(kind, 0.0)),
-        strokes=settings.strokes,
-        eyes=settings.eyes,
-    )
-    if kind != "puzzle":
+    """Return how the tile is laid out: a puzzle's for most whole tiles within the tray's walls."""
+    names = ("tile_size", "warn_neck", "strokes", "eyes")
+    page = ExportSettings(**{name: getattr(settings, name) for name in names})
+    if settings.kind != "puzzle":
         return page.replace(cut="pieces")
     sides = [side - 2 * settings.wall - settings.clearance for side in settings.area]
     return page.replace(area=(sides[0], sides[1]))

@@ -8,9 +8,10 @@ from typing import Annotated, Any, Literal
 
 from orbiflow.settings import DefaultText, FileSettings, OnlyWith, Range, SettingError, Unit
 from orbiflow.tiles.motifs import MotifSettings
-from orbiflow.units import Length, LengthOrZero, PageSize
+from orbiflow.units import LONGEST_SIDE, Length, LengthOrZero, PageSize
 
 WITH_DRAWING = ("stamp", "mould")
+FRAGILE = {"cutter": 5.0, "mould": 2.0}  # widths in mm of necks at which dough and casts break
 _CUTTER, _MOULD, _PUZZLE = (OnlyWith(kind=name) for name in ("cutter", "mould", "puzzle"))
 
 _WALLED = OnlyWith(kind=("cutter", "stamp", "mould", "puzzle"))
@@ -62,6 +63,12 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
     nozzle: Length = 0.4
     """Width of the printer's line. Thinner lines of a drawing are widened to it."""
 
+    warn_neck: Annotated[
+        LengthOrZero, DefaultText("where it would break; cutter 5, mould 2 mm")
+    ] = 0.4
+    """Say where the tile is thinner than this: less than a line, or than the slopes of both sides, at
+    which dough tears or a cast breaks. 0 says nothing."""
+
     area: Annotated[PageSize, _PUZZLE, DefaultText("180x180mm")] = (180.0, 180.0)
     """Largest width and depth of the tray, such as those of the printer's bed."""
 
@@ -75,7 +82,12 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
     """Leave the pieces in the tray, to look at; else they lie beside it, to print."""
 
     def defaults(self) -> Mapping[str, Any]:
-        return {**super().defaults(), **KINDS[self.kind]}
+        values = {**super().defaults(), **KINDS[self.kind]}
+        own = {**vars(self), **{k: v for k, v in values.items() if k not in self.fields_given}}
+        slope = own["height"] * self.slope if self.kind == "mould" else own["chamfer"]
+        bevelled = 0.0 if self.kind in ("cutter", "stamp") else 2 * slope + own["clearance"]
+        least = max(self.nozzle, bevelled, FRAGILE.get(self.kind, 0.0))
+        return {**values, "warn_neck": min(least, LONGEST_SIDE)}
 
     @property
     def usual_format(self) -> str:

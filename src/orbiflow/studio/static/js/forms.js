@@ -36,6 +36,7 @@ function control(name, schema, words, changed) {
   const unit = schema["x-unit"];
   const title = words?.title ?? label(name);
   const yes = found.some(({ type }) => type === "boolean");
+  const some = words?.some && h("datalist", { id: `${id}-some` }, words.some.map((own) => h("option", { value: own })));
   let standard = schema.default ?? (yes ? false : null);
   let [box, show, get] = [];
   if (yes) {
@@ -51,7 +52,7 @@ function control(name, schema, words, changed) {
     box = h("input", {
       ...shared, type: numeric ? "number" : "text", min: numeric ? bare.minimum ?? bare.exclusiveMinimum : undefined,
       max: numeric ? bare.maximum : undefined, step: !numeric ? undefined : bare.type === "integer" ? 1 : "any",
-      autocomplete: "off", inputmode: bare ? "decimal" : undefined,
+      autocomplete: "off", list: some?.id, inputmode: bare ? "decimal" : undefined,
     });
     show = (value) => { box.value = text(value, unit); box.placeholder = box.value || schema["x-default"] || ""; };
     get = () => (["", text(standard, unit)].includes(box.value.trim()) ? standard : read(box.value.trim(), found));
@@ -64,12 +65,12 @@ function control(name, schema, words, changed) {
   };
   show(standard);
   const named = yes ? [h("label", { class: "check" }, box, title)] : [h("label", { for: id, class: "label" }, unit && !options ? `${title} (${unit})` : title), box];
-  return { root: h("div", { class: "field" }, named, about), box, now: get, value, usual, standard };
+  return { root: h("div", { class: "field" }, named, some, about), box, now: get, value, usual, standard };
 }
 
 /**
  * A form: the settings named in `first` on top, the rest folded away in their groups.
- * `words`: titles and the like by setting; `not` in them: values of others with which it does not apply.
+ * `words`: titles and the like by setting; `some` in them: texts to choose from; `not` in them: values of others with which it does not apply.
  * `hidden`: settings that the page sets itself. `start`: values to begin with.
  * `.values()`: what differs from the defaults and applies. `.refuse(name, text)`: show what is wrong beside the
  * setting that the text begins with; false if it names none.

@@ -74,7 +74,7 @@ export function pullPanel(pull, change, back) {
     h("p", { class: "soft" }, "Take hold of any point of the outline and pull. All copies follow, so there is never a gap."),
     slider("How far the pull reaches", { min: 0.1, max: 2, step: 0.05, value: pull.reach, said: (v) => (v < 0.3 ? "a little" : v < 0.8 ? "a part" : v < 1.5 ? "most of it" : "all of it") }, (reach) => change({ reach })),
     check("The grid may change, too", pull.lattice, (lattice) => change({ lattice })),
-    h("p", { class: "small soft" }, "By keyboard: click the picture or go to it with ", h("kbd", {}, "Tab"), ", choose a point with ", h("kbd", {}, "←"), " ", h("kbd", {}, "→"), ", move it with ", h("kbd", {}, "Shift"), " and arrows."),
+    h("p", { class: "small soft by-keys" }, "By keyboard: click the picture or go to it with ", h("kbd", {}, "Tab"), ", choose a point with ", h("kbd", {}, "←"), " ", h("kbd", {}, "→"), ", move it with ", h("kbd", {}, "Shift"), " and arrows."),
     button("Put it back", back, { kind: "quiet" }));
 }
 
@@ -95,6 +95,6 @@ export function penPanel(pen, colours, change, clear) {
       change({ tool });
     }),
     lines,
-    h("p", { class: "small soft" }, "By keyboard: move the pen with arrows, put it down and up with ", h("kbd", {}, "Space"), "."),
+    h("p", { class: "small soft by-keys" }, "By keyboard: move the pen with arrows, put it down and up with ", h("kbd", {}, "Space"), "."),
     button("Clear the drawing", clear, { kind: "quiet", image: "bin" }));
 }

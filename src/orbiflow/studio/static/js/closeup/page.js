@@ -13,9 +13,9 @@ import { Stage } from "./stage.js";
 
 const PEN_COLOURS = [["#1b1b1b", "Black"], ["#ffffff", "White"], ["#c8322b", "Red"], ["#e9a13b", "Yellow"], ["#2f7d4f", "Green"], ["#2563a8", "Blue"]];
 const HELP = {
-  look: "Drag to move, scroll or pinch to zoom. Keys: arrows, + and −, 0 fits.",
-  pull: "Drag beside the outline, or hold Shift and drag, to move the view. Scroll or pinch to zoom. Keys: + and −, 0 fits.",
-  draw: "Hold Shift and drag, or use two fingers, to move the view. Scroll or pinch to zoom. Keys: + and −, 0 fits.",
+  look: ["Drag to move, scroll or pinch to zoom.", "arrows, + and −, 0 fits."],
+  pull: ["Drag beside the outline, or hold Shift and drag, to move the view. Scroll or pinch to zoom.", "+ and −, 0 fits."],
+  draw: ["Hold Shift and drag, or use two fingers, to move the view. Scroll or pinch to zoom.", "+ and −, 0 fits."],
 };
 const CALM = 8000; // ms after which a refusal makes way
 const SHARPER = 1.5; // times that the scale may change before the skin is painted anew
@@ -109,6 +109,7 @@ class Closeup {
       this.help);
     this.root.classList.add("closeup");
     put(this.root, h("div", { class: "closeup-page" }, this.stage.box, side), this.said);
+    this.#past(); // nothing can be undone before the tile is there
   }
 
   /** Show a tile of the project. */
@@ -171,7 +172,8 @@ class Closeup {
 
   #panels() {
     const { look, view, about } = this;
-    this.help.textContent = HELP[this.mode];
+    const [hands, keys] = HELP[this.mode];
+    put(this.help, hands, h("span", { class: "by-keys" }, ` Keys: ${keys}`));
     const needed = 1 + Math.max(...view.colours.table.flat(2));
     const change = (what) => this.#change(what);
     if (this.mode === "look") {
@@ -356,7 +358,7 @@ class Closeup {
   }
 
   async undo() {
-    if (!this.past.done.length && this.view.parent) this.past.done.push({ tile: [this.view.parent, this.view.id] });
+    if (!this.past.done.length && this.view?.parent) this.past.done.push({ tile: [this.view.parent, this.view.id] });
     await this.#go(this.past.done, this.past.undone, 0, "Undone.");
   }
 

@@ -55,7 +55,7 @@ export const KINDS = {
       },
       format: { about: "", title: "Kind of file", usual: "What suits it", options: { svg: "SVG", pdf: "PDF", dxf: "DXF", png: "PNG", json: "JSON (numbers)" } },
       tile_size: { title: "How long is one tile?" },
-      area: { title: "How large is the page?", about: "Such as A4, letter, mug, phone or 300x200mm." },
+      area: { title: "How large is the page?", about: "Such as A4, letter, mug, phone or 300x200mm.", some: ["A4", "A4-landscape", "A3", "A3-landscape", "letter", "letter-landscape", "mug", "phone"] },
       clip: { title: "Fill the page to its edge", about: "Tiles at the edge are cut. Otherwise only whole tiles are on the page." },
       palette: {
         about: "",

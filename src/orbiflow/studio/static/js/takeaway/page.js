@@ -31,6 +31,7 @@ class TakeawayPage {
     this.schemas = new Map();
     this.task = null; // the one whose result is shown
     this.stale = false; // whether settings were changed since
+    this.busy = false;
   }
 
   build(root) {
@@ -138,9 +139,9 @@ class TakeawayPage {
     this.task = tasks.find(({ id }) => id === this.task?.id) ?? this.task; // as the events have told
     const made = isMade(this.task);
     const again = made && this.stale;
-    const deed = alive(this.task) ? "Stop" : again ? "Make it again" : "Make it";
-    if (deed !== this.make.textContent) this.turned = performance.now();
-    this.make.textContent = deed;
+    const busy = alive(this.task);
+    if (busy !== this.busy) [this.busy, this.turned] = [busy, performance.now()];
+    this.make.lastChild.textContent = busy ? "Stop" : again ? "Make it again" : "Make it";
     const key = made && !this.stale ? this.task.id : null;
     if (key !== this.seen) {
       this.seen = key;
