@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from orbiflow.runtime import (
     NEVER,
     Cancel,
+    Note,
     Outcome,
     Progress,
     Sink,
@@ -103,6 +104,10 @@ def search(
         on_event=as_part(on_event, 1 - len(left) / len(names)),
         cancel=cancel,
     )
+    if rounded := sum(tile.smoothed > 0 for tile in result.tiles):
+        on_event(
+            Note(f"The thinnest parts are rounded off in {rounded} of {len(result.tiles)} tiles")
+        )
     if result.interrupted:
         return Outcome({"tiles": len(result.tiles)}, "cancelled")
     return Outcome({"tiles": len(result.tiles)}, "done" if result.tiles else "nothing found")
