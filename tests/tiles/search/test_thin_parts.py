@@ -25,6 +25,7 @@ from orbiflow.tiles import (
 from orbiflow.tiles.search import Goal, SearchMethod, rounded_for
 from orbiflow.tiles.search.candidates import OnProgress, StillTiles
 from orbiflow.tiles.search.likeness_search import ROUNDED_OFF
+from orbiflow.tiles.search.search_method import Sketches
 from orbiflow.tiles.search.search_record import best_of
 from orbiflow.tiles.search.starts import template_starts
 from orbiflow.tiles.tilings import IsohedralClass
@@ -51,8 +52,8 @@ class Hairless(SearchMethod):
         starts = template_starts(kind, turns=2, stretch=0.2)
         return Fit(StillTiles(kind, starts), len(starts), 0, per_class)
 
-    def eased(self, goal: Goal):
-        return LikenessSearch().eased(goal)
+    def goals(self, goal: Goal):
+        return LikenessSearch().goals(goal)
 
 
 @pytest.fixture(scope="module")
@@ -110,12 +111,14 @@ def test_it_is_said_and_kept(found: SearchResult, tmp_path: Path) -> None:
 def test_what_was_said_to_matter_is_not_rounded_off() -> None:
     own, plain = LikenessSearch(), Goal(HAIR)
     spot = (2.08, 3.5, 0.6)
-    assert [share for share, _ in own.eased(plain)] == list(ROUNDED_OFF)
-    assert own.eased(replace(plain, pins=Pins.at(HAIR, [spot]))) == ()
+    assert [share for share, _ in own.goals(plain)] == [0, *ROUNDED_OFF]
+    assert [share for share, _ in Sketches(own).goals(plain)] == [*ROUNDED_OFF, 0]
+    pinned = replace(plain, pins=Pins.at(HAIR, [spot]))
+    assert own.goals(pinned) == Sketches(own).goals(pinned) == [(0, pinned)]
     everything = Emphasis(np.ones((4, 4), np.float32), (-3.0, -3.0, 3.0, 3.0), 4.0, "mask.png")
-    assert own.eased(replace(plain, emphasis=everything)) == ()
+    assert len(own.goals(replace(plain, emphasis=everything))) == 1
 
 
 def test_nothing_is_left_of_a_silhouette_that_is_all_hair() -> None:
     hair = Target.from_polygon([[0, 0], [100, 0], [100, 1], [0, 1]])
-    assert all(own.target is hair for _, own in LikenessSearch().eased(Goal(hair)))
+    assert all(own.target is hair for _, own in LikenessSearch().goals(Goal(hair)))

@@ -349,9 +349,12 @@ def _chosen_tiles(
 ) -> Sequence[EscherTile]:
     """Return the tiles of one fit that are shown, best first, no two of them alike.
 
-    If there are none, of the first eased goal that has some.
+    They are those of the first goal that has some.
+
+    Raises:
+        CertificationError: If none has, with the first one's reason.
     """
-    goal, count = task.goal, task.method.shown(task.per_class)
+    count = task.method.shown(task.per_class)
 
     def found(goal: Goal, share: float) -> Sequence[EscherTile]:
         fit = method.fit(goal, kind, count, progress, cancel)
@@ -362,13 +365,13 @@ def _chosen_tiles(
 
     # many small systems: several threads would wait for each other, ten times as long as they work
     with one_thread(), one_blas_thread():
-        try:
-            return found(goal, 0.0)
-        except CertificationError:
-            for share, own in method.eased(goal):
-                with contextlib.suppress(CertificationError):
-                    return found(own, share)
-            raise
+        reasons: list[CertificationError] = []
+        for share, own in method.goals(task.goal):
+            try:
+                return found(own, share)
+            except CertificationError as error:
+                reasons.append(error)
+        raise reasons[0]
 
 
 def report(result: SearchResult) -> dict[str, Any]:

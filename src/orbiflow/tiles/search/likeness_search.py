@@ -128,11 +128,12 @@ class LikenessSearch(Settings, SearchMethod):
         both = self.hands(goal, kind.divisor)
         return fit_bending(goal.target, kind, quick, both, 1, silent, cancel)
 
-    def eased(self, goal: Goal) -> Sequence[tuple[float, Goal]]:
-        """Return the silhouette with toes and hairs rounded off, if nobody said what must survive."""
+    def goals(self, goal: Goal) -> Sequence[tuple[float, Goal]]:
+        """Return the silhouette, then without toes and hairs if nobody said what must survive."""
         if goal.emphasis is not None or goal.pins is not None:
-            return ()
-        return [(share, Goal(rounded_off(goal.target, share))) for share in ROUNDED_OFF]
+            return [(0.0, goal)]
+        rounded = [(share, Goal(rounded_off(goal.target, share))) for share in ROUNDED_OFF]
+        return [(0.0, goal), *rounded]
 
     def prepare(self, goal: Goal) -> None:
         """Triangulate the silhouette and its mirror image."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, ClassVar, Self
@@ -97,22 +98,23 @@ class SearchMethod(ABC):
         from orbiflow.tiles.search.finished_tiles import best_tiles
 
         kind = isohedral_class(next((name for name in PREFERRED if name in names), names[0]))
-        try:
-            return best_tiles(goal.target, self.sketch(goal, kind, cancel)._replace(enough=1))[0]
-        except CertificationError:
-            return None
+        for share, own in Sketches(self).goals(goal):
+            with suppress(CertificationError):
+                fit = self.sketch(own, kind, cancel)._replace(enough=1)
+                return best_tiles(own.target, fit)[0].changed(smoothed=share)
+        return None
 
     def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:  # noqa: ARG002
         """Return candidates in a moment, for `preview`, or raise `CertificationError`."""
         raise CertificationError(f"{self.method_name} has no quick way to tiles of {kind.name}")
 
-    def eased(self, goal: Goal) -> Sequence[tuple[float, Goal]]:  # noqa: ARG002
-        """Return what is looked for in turn in a class that has no tile of the goal.
+    def goals(self, goal: Goal) -> Sequence[tuple[float, Goal]]:
+        """Return what is looked for in a class, in turn, until there is a tile.
 
-        Each is a silhouette with what is narrower than a share of its length rounded off, and that
-        share.
+        Each is the goal, or its silhouette with what is narrower than a share of its length rounded
+        off, and that share.
         """
-        return ()
+        return [(0.0, goal)]
 
     def load(self) -> None:
         """Import what `fit` needs, before worker processes start."""
@@ -182,9 +184,10 @@ class Sketches(SearchMethod):
             name for name in names if name not in PREFERRED
         ]
 
-    def eased(self, goal: Goal) -> Sequence[tuple[float, Goal]]:
-        """Return the other's."""
-        return self.whole.eased(goal)
+    def goals(self, goal: Goal) -> Sequence[tuple[float, Goal]]:
+        """Return the other's, rounded silhouettes first: their sketches seldom cross themselves."""
+        first, *rounded = self.whole.goals(goal)
+        return [*rounded, first]
 
     def prepare(self, goal: Goal) -> None:
         """Compute what all fits share."""
