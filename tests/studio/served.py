@@ -75,7 +75,7 @@ class ByHand:
     @property
     def task(self) -> int:
         self._begun.wait()
-        return cast(Call, self.call).arguments["task"]
+        return cast(Call, self.call).flat["task"]
 
     def events(self) -> Iterator[Event]:
         while (event := self._said.get()) is not None:

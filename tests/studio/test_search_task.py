@@ -13,7 +13,7 @@ from bent_tiles import bent_tile
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Event, ItemDone, Outcome, Progress, ignore
 from orbiflow.studio import tasks
-from orbiflow.studio.settings import SearchChoice
+from orbiflow.studio.settings import Job, SearchChoice
 from orbiflow.studio.tasks import read, search
 from orbiflow.studio.tile_files import best_stage, put_tile, tile_folder
 from orbiflow.tiles import EscherTile, LikenessSearch, OverlapSearch
@@ -35,7 +35,7 @@ def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def home(tmp_path: Path) -> Path:
     (tmp_path / "input.json").write_bytes(BOOT)
-    read(tmp_path, 1, "boot.json")
+    read(Job(project=tmp_path, task=1), "boot.json")
     return tmp_path
 
 
@@ -57,7 +57,8 @@ def run(home: Path, stop: Callable[[Seen], bool] = lambda _: False) -> tuple[Out
         if stop(seen):
             cancel.cancel()
 
-    return search(home, 5, CHOICE, on_event=watch, cancel=cancel), seen
+    job = Job(project=home, task=5)
+    return search(job, CHOICE, on_event=watch, cancel=cancel), seen
 
 
 def test_tiles_appear_stage_by_stage(home: Path) -> None:

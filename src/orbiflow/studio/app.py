@@ -21,7 +21,6 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import find
 from orbiflow.studio import density_routes, picture_routes, project_routes, tile_routes
 from orbiflow.studio.animals import ANIMALS, animal_file
-from orbiflow.studio.closeup_routes import closeup_routes
 from orbiflow.studio.guard import Guard, Refused
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.kinds_of_work import KINDS, RefusedSetting, kind_of_work, own_schema, presets
@@ -75,7 +74,6 @@ def create_app(
     )
     app.state.studio = Studio(store, queue, hub, limits)
     app.include_router(routes, prefix="/api")
-    app.include_router(closeup_routes(store, queue, hub), prefix="/api")
     for module in (density_routes, project_routes, tile_routes, picture_routes):
         app.include_router(module.routes, prefix="/api")
     app.mount("/", StaticFiles(directory=STATIC, html=True))

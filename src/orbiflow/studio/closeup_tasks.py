@@ -17,6 +17,7 @@ from orbiflow.runtime import (
     operation,
     write_json,
 )
+from orbiflow.studio.settings import Job
 from orbiflow.studio.tile_files import STAGES, best_stage, put_tile, tile_folder, tile_number
 
 SPACE = "space.json"
@@ -24,22 +25,18 @@ PIXELS = (".png", ".jpg", ".jpeg", ".webp")  # of pictures on which lines can be
 
 
 @operation("studio space")
-def space(
-    project: Path, task: int, tile: int, *, on_event: Sink = ignore, cancel: Cancel = NEVER
-) -> Outcome:
+def space(job: Job, tile: int, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> Outcome:
     """Write what a browser needs to pull a tile into the tile's folder.
 
     Args:
-        project: The project's folder.
-        task: The number of the task.
         tile: The number of the tile.
     """
     from orbiflow.studio.changing import space_json
     from orbiflow.tiles import EscherTile
 
-    del task, on_event
+    del on_event
     cancel.check()
-    own = tile_folder(project, tile)
+    own = tile_folder(job.project, tile)
     told = space_json(EscherTile.load(own))
     write_json(own.parent / SPACE, told)
     return Outcome({"tile": tile})
@@ -47,8 +44,7 @@ def space(
 
 @operation("studio pull")
 def pull(
-    project: Path,
-    task: int,
+    job: Job,
     tile: int,
     parameters: tuple[float, ...],
     *,
@@ -58,8 +54,6 @@ def pull(
     """Certify a tile that was pulled by hand, and write it as a tile of its own.
 
     Args:
-        project: The project's folder.
-        task: The number of the task.
         tile: The number of the tile that was pulled.
         parameters: Where it was pulled to, in the space that `studio space` wrote.
     """
@@ -67,10 +61,10 @@ def pull(
     from orbiflow.tiles import EscherTile
 
     cancel.check()
-    found = pulled(EscherTile.load(tile_folder(project, tile)), parameters)
-    number, stage = tile_number(task, 0), STAGES[-1]
-    put_tile(project, number, stage, found, on_event, parent=tile)
-    if place := best_stage(project, number):  # at hand when it is pulled again
+    found = pulled(EscherTile.load(tile_folder(job.project, tile)), parameters)
+    number, stage = tile_number(job.task, 0), STAGES[-1]
+    put_tile(job.project, number, stage, found, on_event, parent=tile)
+    if place := best_stage(job.project, number):  # at hand when it is pulled again
         write_json(place / SPACE, space_json(found))
     return Outcome({"tile": number})
 

@@ -34,6 +34,7 @@ from orbiflow.studio.density_files import (
     map_file,
     table_file,
 )
+from orbiflow.studio.settings import Job
 from orbiflow.studio.takeaways import export_folder, files_of
 
 if TYPE_CHECKING:
@@ -63,38 +64,27 @@ class FitChoice(Settings, group="Density"):
 
 
 @operation("studio table")
-def table(project: Path, task: int, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> Outcome:
-    """Look at the table of a project.
-
-    Args:
-        project: The project's folder.
-        task: The number of the task.
-    """
-    del task
+def table(job: Job, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> Outcome:
+    """Look at the table of a project."""
     on_event(Progress(0.1, "reading the table"))
 
     from orbiflow.studio.density_table import table_view
 
-    view = table_view(table_file(project))
+    view = table_view(table_file(job.project))
     cancel.check()
-    write_json(project / TABLE, view)
+    write_json(job.project / TABLE, view)
     return Outcome({"rows": view["rows"], "columns": len(view["columns"])})
 
 
 @operation("studio density")
 def density(
-    project: Path, task: int, choice: FitChoice, *, on_event: Sink = ignore, cancel: Cancel = NEVER
+    job: Job, choice: FitChoice, *, on_event: Sink = ignore, cancel: Cancel = NEVER
 ) -> Outcome:
-    """Fit a density to columns of a project's table, and draw it.
-
-    Args:
-        project: The project's folder.
-        task: The number of the task.
-    """
-    if not (project / TABLE).is_file():
+    """Fit a density to columns of a project's table, and draw it."""
+    if not (job.project / TABLE).is_file():
         raise SettingError("this table was not read; upload another one")
-    folder = make_folder(project / "fits" / str(task))
-    data = table_file(project)
+    folder = make_folder(job.project / "fits" / str(job.task))
+    data = table_file(job.project)
     asked = {"data": data, "out": folder / FIT, "drop_missing": True, **choice.to_json()}
     call = find("density fit").call(asked)
     told = as_part(on_event, 0.0, FITTED)
@@ -103,10 +93,10 @@ def density(
     view = _view(folder, data, choice, as_part(on_event, FITTED, 1.0))
     cancel.check()
     write_json(folder / VIEW, view)
-    for other in (project / "fits").iterdir():
+    for other in folder.parent.iterdir():
         if other.name != folder.name:
             shutil.rmtree(other, ignore_errors=True)
-    return Outcome({"fit": task, "rows": view["rows"]})
+    return Outcome({"fit": job.task, "rows": view["rows"]})
 
 
 def _view(folder: Path, data: Path, choice: FitChoice, tell: Sink) -> dict[str, Any]:
@@ -140,8 +130,7 @@ def _view(folder: Path, data: Path, choice: FitChoice, tell: Sink) -> dict[str, 
 
 @operation("studio density map")
 def density_map(
-    project: Path,
-    task: int,
+    job: Job,
     fit: Annotated[int, Range(1)],
     axes: tuple[Annotated[int, Range(0, MAX_SHOWN)], ...],
     *,
@@ -151,13 +140,10 @@ def density_map(
     """Find the density of two angles of a fit, whatever the others are, on a grid.
 
     Args:
-        project: The project's folder.
-        task: The number of the task.
         fit: The number of the fit.
         axes: The numbers of the angles, from 0.
     """
-    del task
-    folder = fit_folder(project, fit)
+    folder = fit_folder(job.project, fit)
     on_event(Progress(0.1, "finding the density of these two angles"))
 
     from orbiflow.density import flat_data
@@ -201,31 +187,23 @@ class TakeChoice(Settings, group="Take away"):
 
 @operation("studio density take")
 def take(
-    project: Path,
-    task: int,
-    fit: int,
-    choice: TakeChoice,
-    *,
-    on_event: Sink = ignore,
-    cancel: Cancel = NEVER,
+    job: Job, fit: int, choice: TakeChoice, *, on_event: Sink = ignore, cancel: Cancel = NEVER
 ) -> Outcome:
     """Write what a user takes away of a density.
 
     Args:
-        project: The project's folder.
-        task: The number of the task.
         fit: The number of the fit.
     """
-    source, out = fit_folder(project, fit), make_folder(export_folder(project, task))
+    source, out = fit_folder(job.project, fit), make_folder(export_folder(job.project, job.task))
     if choice.what == "model":
         for file in (source / FIT).iterdir():
             write_atomic(out / file.name, file.read_bytes())
     else:
         columns = json.loads((source / VIEW).read_text())["columns"]
-        call = choice.call(source / FIT, table_file(project), columns, out)
+        call = choice.call(source / FIT, table_file(job.project), columns, out)
         call.operation.function(**call.arguments, on_event=as_part(on_event), cancel=cancel)
     files = files_of(out)
-    return Outcome({"takeaway": task, "what": choice.what, "files": files, "preview": False})
+    return Outcome({"takeaway": job.task, "what": choice.what, "files": files, "preview": False})
 
 
 def _model(folder: Path) -> Density:

@@ -23,8 +23,7 @@ OWN = ("project", "task", "force", "workers", "tile", "picture")
 class Kind:
     """A kind of task.
 
-    - `work`: The operation that does it, in `orbiflow.commands.WORK`, with parameters `project` (the
-      project's folder) and `task` (the task's number, from which it numbers what it makes).
+    - `work`: The operation that does it, in `orbiflow.commands.WORK`, of a `Job`.
     - `lane`: "quick" for what somebody waits for; it waits for no search.
     - `makes`: Of a take-away, the operation that writes it.
     """

@@ -32,6 +32,16 @@ class StudioSettings(Settings, group="Server"):
         return self.host in LOOPBACK
 
 
+class Job(Settings):
+    """A task as its worker knows it."""
+
+    project: Path
+    """Folder of the project."""
+
+    task: Annotated[int, Range(1)]
+    """Number of the task, from which it numbers what it makes."""
+
+
 class Limits(Settings):
     """What the server takes at most."""
 

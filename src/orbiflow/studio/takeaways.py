@@ -23,6 +23,7 @@ from orbiflow.runtime import (
 )
 from orbiflow.studio.closeup_tasks import with_drawing
 from orbiflow.studio.kinds_of_work import DRAWN, file_name, making_call
+from orbiflow.studio.settings import Job
 from orbiflow.studio.tile_files import tile_folder
 
 PREVIEW = "preview.png"
@@ -44,8 +45,7 @@ def files_of(folder: Path) -> list[dict[str, Any]]:
 
 @operation("studio take")
 def take(
-    project: Path,
-    task: int,
+    job: Job,
     makes: str,
     tile: int,
     settings: str = "{}",
@@ -59,8 +59,6 @@ def take(
     """Write what a user takes away of a tile.
 
     Args:
-        project: The project's folder.
-        task: The number of the task.
         makes: The operation that writes it: export, art, solid or animate.
         tile: The number of the tile.
         settings: Its settings, as JSON.
@@ -70,9 +68,9 @@ def take(
     """
     from orbiflow.studio.silhouette_file import input_file
 
-    folder = make_folder(export_folder(project, task))
-    files = {"picture": input_file(project)} if picture else {}
-    given, result = json.loads(settings), tile_folder(project, tile)
+    folder = make_folder(export_folder(job.project, job.task))
+    files = {"picture": input_file(job.project)} if picture else {}
+    given, result = json.loads(settings), tile_folder(job.project, tile)
     if drawing and makes in DRAWN:
         result, files, given = with_drawing(drawing, result, files, given, folder / SCRATCH)
     name = file_name(makes, given, result, called)
@@ -85,7 +83,7 @@ def take(
     facts = {name: value for name, value in done.summary.items() if name not in ("file", "files")}
     return Outcome(
         {
-            "takeaway": task,
+            "takeaway": job.task,
             "files": written,
             "preview": preview,
             "facts": facts,

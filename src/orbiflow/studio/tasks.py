@@ -18,7 +18,7 @@ from orbiflow.runtime import (
     ignore,
     operation,
 )
-from orbiflow.studio.settings import SearchChoice
+from orbiflow.studio.settings import Job, SearchChoice
 from orbiflow.studio.tile_files import (
     PLACES,
     STAGES,
@@ -40,8 +40,7 @@ LONGER = {"fast": "normal", "normal": "best", "best": "best"}
 
 @operation("studio read")
 def read(
-    project: Path,
-    task: int,
+    job: Job,
     called: str = "picture",
     reading: ReadingSettings = ReadingSettings(),
     *,
@@ -51,42 +50,33 @@ def read(
     """Read the silhouette in a project's picture.
 
     Args:
-        project: The project's folder.
-        task: The number of the task.
         called: What messages call the picture.
     """
     from orbiflow.studio.silhouette_file import read_input
 
-    del task
     cancel.check()
     on_event(Progress(0.1, "reading the picture"))
-    target = read_input(project, called, reading)
+    target = read_input(job.project, called, reading)
     return Outcome({"read": True, "vertices": len(target.outline)})
 
 
 @operation("studio search", keeps_partial=True, starts_processes=True)
 def search(
-    project: Path,
-    task: int,
+    job: Job,
     settings: SearchChoice = SearchChoice(),
     *,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
-    """Search for tiles of a project's silhouette, and write each as soon as it is found.
-
-    Args:
-        project: The project's folder.
-        task: The number of the task.
-    """
+    """Search for tiles of a project's silhouette, and write each as soon as it is found."""
     from orbiflow.studio.silhouette_file import load_target
     from orbiflow.tiles import escherize, searched_classes
 
-    target = load_target(project)
-    whole = _search_settings(project, settings)
+    target = load_target(job.project)
+    whole = _search_settings(job.project, settings)
     names = searched_classes(target, whole)
-    left = [name for k, name in enumerate(names) if not _is_done(project, task, k)]
-    _tell_again(project, task, on_event)
+    left = [name for k, name in enumerate(names) if not _is_done(job, k)]
+    _tell_again(job, on_event)
     if not left:
         return Outcome({"tiles": len(names)})
     seen: dict[tuple[str, str], int] = {}
@@ -94,8 +84,8 @@ def search(
     def show(tile: EscherTile, stage: str) -> None:
         name = tile.isohedral_class
         place = seen[name, stage] = seen.get((name, stage), -1) + 1
-        number = tile_number(task, names.index(name) * PER_CLASS + place)
-        put_tile(project, number, stage, tile, on_event)
+        number = tile_number(job.task, names.index(name) * PER_CLASS + place)
+        put_tile(job.project, number, stage, tile, on_event)
 
     result = escherize(
         target,
@@ -142,33 +132,27 @@ def _classes_like(project: Path, number: int) -> tuple[str, ...]:
     return tuple(dict.fromkeys([own, *near]))
 
 
-def _is_done(project: Path, task: int, place: int) -> bool:
-    found = best_stage(project, tile_number(task, place * PER_CLASS))
+def _is_done(job: Job, place: int) -> bool:
+    found = best_stage(job.project, tile_number(job.task, place * PER_CLASS))
     return found is not None and found.name == STAGES[-1]
 
 
-def _tell_again(project: Path, task: int, on_event: Sink) -> None:
+def _tell_again(job: Job, on_event: Sink) -> None:
     """Tell of tiles that this task found before it was interrupted."""
     for number in sorted(
-        int(folder.name) for folder in (project / "tiles").glob("[0-9]*") if folder.is_dir()
+        int(folder.name) for folder in (job.project / "tiles").glob("[0-9]*") if folder.is_dir()
     ):
-        if number // PLACES == task and (found := best_stage(project, number)):
+        if number // PLACES == job.task and (found := best_stage(job.project, number)):
             tell_tile(number, found.name, on_event)
 
 
 @operation("studio open")
-def open_file(
-    project: Path, task: int, *, on_event: Sink = ignore, cancel: Cancel = NEVER
-) -> Outcome:
-    """Take up a project's file that was uploaded into an empty project.
-
-    Args:
-        project: The project's folder, with the file.
-        task: The number of the task.
-    """
+def open_file(job: Job, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> Outcome:
+    """Take up a project's file that was uploaded into an empty project."""
     from orbiflow.studio.project_file import ENDING, read_tiles, reading_of, unpack
     from orbiflow.studio.silhouette_file import read_input
 
+    project = job.project
     with tempfile.TemporaryDirectory(dir=project) as folder:
         home = Path(folder)
         document = unpack(project / f"opened{ENDING}", home)
@@ -179,7 +163,7 @@ def open_file(
             file.replace(project / file.name)
         if picture is not None:
             read_input(project, called, reading)
-    numbers = {number: tile_number(task, place) for place, (_, number, _) in enumerate(tiles)}
+    numbers = {number: tile_number(job.task, place) for place, (_, number, _) in enumerate(tiles)}
     for tile, number, parent in tiles:
         cancel.check()
         known = None if parent is None else numbers.get(parent)

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse
 
 from orbiflow.errors import OrbiflowError
+from orbiflow.studio.closeup_tasks import SPACE
 from orbiflow.studio.guard import Refused
 from orbiflow.studio.requests import Here, Studio, body_object
 from orbiflow.studio.takeaways import PREVIEW, export_folder
@@ -41,6 +42,17 @@ async def delete(project: str, tile: int, here: Here) -> dict[str, Any]:
     here.store.delete_tile(project, tile)
     shutil.rmtree(here.store.home(project) / "tiles" / str(tile), ignore_errors=True)
     return {}
+
+
+@routes.get("/projects/{project}/tiles/{tile}/space")
+async def space(project: str, tile: int, here: Here) -> FileResponse:
+    """Return the space in which a tile is pulled."""
+    file = stage_of(here, project, tile) / SPACE
+    if not file.is_file():
+        task = await here.done(project, "space", {"tile": tile})
+        if task["state"] != "done":
+            raise OrbiflowError("the tile cannot be made ready to be pulled; reload the page")
+    return FileResponse(file, media_type="application/json")
 
 
 @routes.post("/projects/{project}/tiles/{tile}/pulled")
