@@ -18,7 +18,7 @@ from PIL import Image
 
 from orbiflow.tiles import ArtSettings, EscherTile, artwork, read_result, render_artwork, with_map
 from orbiflow.tiles.art.making import png_of
-from orbiflow.tiles.motifs.source import Picture, covered_area
+from orbiflow.tiles.motifs.source import Picture
 
 
 def main() -> None:
@@ -55,11 +55,11 @@ def row(tile: EscherTile, name: str, settings: ArtSettings, picture: Picture | N
 
 def checkerboard(tile: EscherTile) -> Picture:
     """A picture of the silhouette, 1500 pixels along its longer side."""
-    sides = covered_area(tile).high - covered_area(tile).low
+    sides = tile.covered.high - tile.covered.low
     width, height = np.rint(1500 * sides / sides.max()).astype(int)
     rows, columns = np.indices((height, width)) // 50
     image = Image.fromarray((((rows + columns) % 2) * 200 + 30).astype(np.uint8))
-    return Picture(image.convert("RGBA"), covered_area(tile))
+    return Picture(image.convert("RGBA"), tile.covered)
 
 
 if __name__ == "__main__":

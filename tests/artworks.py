@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from orbiflow.tiles import EscherTile, Frame, TileMap, as_map
-from orbiflow.tiles.motifs.source import Picture, covered_area
+from orbiflow.tiles.motifs.source import Picture
 from orbiflow.tiles.result_file import group_json
 from orbiflow.tiles.search.bent_map import map_of_bent
 from outlines import animal, bent_squirrel, flowless
@@ -41,12 +41,12 @@ def upside_down(tile: EscherTile) -> EscherTile:
 
 def picture(image: Image.Image, tile: EscherTile) -> Picture:
     """An image over the silhouette."""
-    return Picture(image.convert("RGBA"), covered_area(tile))
+    return Picture(image.convert("RGBA"), tile.covered)
 
 
 def size_of(tile: EscherTile, longer: int = 600) -> tuple[int, int]:
     """Of a picture of the silhouette, in pixels."""
-    sides = covered_area(tile).high - covered_area(tile).low
+    sides = tile.covered.high - tile.covered.low
     width, height = np.rint(sides * longer / sides.max()).astype(int)
     return int(width), int(height)
 
@@ -67,7 +67,7 @@ def face(tile: EscherTile) -> Picture:
     """White, with a red disc at the eye."""
     width, height = size_of(tile)
     image = Image.new("RGB", (width, height), "white")
-    low, high = covered_area(tile)[:2]
+    low, high = tile.covered[:2]
     x, y = (np.array(EYE) - low) / (high - low) * (width, height)
     ImageDraw.Draw(image).ellipse([x - 14, y - 14, x + 14, y + 14], fill="red")
     return picture(image, tile)

@@ -16,7 +16,6 @@ from artworks import EYE, size_of, squirrel, write_run
 from orbiflow.drawing import PALETTES
 from orbiflow.runtime import Cancel, Cancelled, Note, Written, find
 from orbiflow.tiles import Target
-from orbiflow.tiles.motifs.source import covered_area
 
 
 @pytest.fixture(name="result", scope="module")
@@ -182,7 +181,7 @@ def test_the_snippet_of_the_documentation(tmp_path: Path, monkeypatch) -> None:
     (snippet,) = re.findall(r"```python\n(.*?)```", DOCS, flags=re.DOTALL)
     monkeypatch.chdir(tmp_path)
     write_run(tmp_path / "out" / "barbet", "IH5")
-    low, high = covered_area(squirrel("IH5"))[:2]
+    low, high = squirrel("IH5").covered[:2]
     box = " ".join(str(value) for value in (*low, *(high - low)))
     (tmp_path / "examples" / "artwork").mkdir(parents=True)
     drawing = f'<svg viewBox="{box}"><circle cx="{EYE[0]}" cy="{EYE[1]}" r="20"/></svg>'

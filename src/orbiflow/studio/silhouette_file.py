@@ -71,28 +71,16 @@ def _stored(target: Target) -> dict[str, Any]:
     return {"outline": target.outline.tolist(), **{name: getattr(target, name) for name in names}}
 
 
-def _frame(target: Target) -> tuple[Array, Array]:
-    """Return the corner of least coordinates and the size that the backdrop covers."""
-    if target.size is not None:
-        return np.array(target.corner), np.array(target.size)
-    low, high = target.outline.min(axis=0), target.outline.max(axis=0)
-    return low, high - low
-
-
 def _to_backdrop(target: Target, points: Array, size: tuple[int, int]) -> Array:
-    corner, extent = _frame(target)
-    at = (points - corner) / extent
-    if not target.y_down:
-        at = at * (1, -1) + (0, 1)
-    return at * size
+    return target.covered.shares(points) * size
 
 
 def _from_backdrop(target: Target, pixels: Array, size: tuple[int, int]) -> Array:
-    corner, extent = _frame(target)
+    low, high, _, y_down = target.covered
     at = pixels / size
-    if not target.y_down:
+    if not y_down:
         at = (at - (0, 1)) * (1, -1)
-    return at * extent + corner
+    return at * (high - low) + low
 
 
 def _picture(target: Target, content: FileContent) -> Image.Image:
@@ -105,7 +93,7 @@ def _picture(target: Target, content: FileContent) -> Image.Image:
         picture = picture.convert("RGBA" if picture.has_transparency_data else "RGB")
         picture.thumbnail((SIDE, SIDE))
         return picture
-    _, extent = _frame(target)
+    extent = target.covered.high - target.covered.low
     width, height = np.maximum(1, np.round(extent * SIDE / extent.max())).astype(int).tolist()
     return _drawn(target, (width, height), "RGB", INK, PAPER)
 

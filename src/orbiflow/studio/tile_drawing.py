@@ -13,17 +13,7 @@ from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list, is_object, write_atomic
-from orbiflow.studio.tile_view import covered
-from orbiflow.tiles import (
-    Bending,
-    EscherTile,
-    Frame,
-    TileMap,
-    border,
-    open_image,
-    orient,
-    triangulate,
-)
+from orbiflow.tiles import Bending, EscherTile, Frame, TileMap, open_image, orient, triangulate
 
 MOST_STROKES, MOST_POINTS, MOST_EYES = 2000, 100_000, 60
 FINER = 2  # pixels, across, of which one pixel of a picture with lines is the mean
@@ -63,8 +53,7 @@ def drawing_settings(
     Raises `OrbiflowError` for a drawing that is none, or too large.
     """
     strokes, eyes = read_drawing(drawing)
-    bending, frame = tile.require_map()
-    ring = shapely.Polygon(frame.to_input(bending.rest[border(bending.triangles)]))
+    ring = shapely.Polygon(tile.silhouette_outline)
     if strokes:
         name = "drawing.svg" if picture is None else "drawing.png"
         made = drawing_svg(strokes, tile) if picture is None else _png(strokes, tile, picture)
@@ -104,7 +93,7 @@ def _stroke(given: Any) -> Stroke:
 
 def drawing_svg(strokes: list[Stroke], tile: EscherTile) -> str:
     """Return the lines as an SVG that covers what the silhouette's picture covers."""
-    low, high = covered(tile)
+    low, high = tile.covered[:2]
     wide, tall = high - low
     parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {wide:.9g} {tall:.9g}">']
     for stroke in strokes:
@@ -120,8 +109,7 @@ def drawing_svg(strokes: list[Stroke], tile: EscherTile) -> str:
 
 def _on_page(points: Array, tile: EscherTile) -> Array:
     """Return points of the silhouette from the upper left corner of what its picture covers."""
-    low, high = covered(tile)
-    down = tile.require_map()[1].y_down
+    low, high, _, down = tile.covered
     return points - low if down else np.array([0.0, 1.0]) * (high - low) + (points - low) * (1, -1)
 
 
@@ -131,7 +119,7 @@ def _png(strokes: list[Stroke], tile: EscherTile, picture: Path) -> bytes:
 
     from PIL import Image, ImageDraw
 
-    low, high = covered(tile)
+    low, high = tile.covered[:2]
     image = open_image(picture)[0].convert("RGBA")
     layer = Image.new("RGBA", (FINER * image.width, FINER * image.height))
     pen, scale = ImageDraw.Draw(layer), layer.width / float(high[0] - low[0])

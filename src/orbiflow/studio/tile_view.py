@@ -82,8 +82,7 @@ def tile_view(card: dict[str, Any], tile: EscherTile) -> dict[str, Any]:
     if bending is None or frame is None:
         return view
     rest, images = frame.to_input(bending.rest), frame.to_input(bending.images)
-    ring = border(bending.triangles)
-    low, high = covered(tile)
+    ring, covered = border(bending.triangles), tile.covered
     return {
         **view,
         "silhouette_track": rest[ring].tolist(),
@@ -93,7 +92,7 @@ def tile_view(card: dict[str, Any], tile: EscherTile) -> dict[str, Any]:
             "images": images.tolist(),
             "triangles": bending.triangles.tolist(),
         },
-        "covered": [low.tolist(), high.tolist()],
+        "covered": [covered.low.tolist(), covered.high.tolist()],
     }
 
 
@@ -117,16 +116,3 @@ def elements_json(group: CrystallographicGroup, middle: Array) -> dict[str, Any]
         "mirrors": [line for line in lines if not line["shift"]],
         "glides": [line for line in lines if line["shift"]],
     }
-
-
-def covered(tile: EscherTile) -> tuple[Array, Array]:
-    """Return the corners of what a picture of a tile's silhouette covers, in the input's units.
-
-    That is the picture or page which was read, or the outline's box where there was none.
-    """
-    bending, frame = tile.require_map()
-    if frame.size is not None:
-        low = np.array(frame.corner)
-        return low, low + frame.size
-    ring = frame.to_input(bending.rest[border(bending.triangles)])
-    return ring.min(axis=0), ring.max(axis=0)

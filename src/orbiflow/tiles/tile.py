@@ -17,6 +17,7 @@ from orbiflow.arguments import as_instance, as_path
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
 from orbiflow.runtime import read_arrays
+from orbiflow.tiles.geometry import border
 from orbiflow.tiles.likeness import (
     Fidelity,
     Rating,
@@ -26,7 +27,7 @@ from orbiflow.tiles.likeness import (
     neck_factor,
     rank_score,
 )
-from orbiflow.tiles.silhouette import Bending, Frame
+from orbiflow.tiles.silhouette import Bending, Covered, Frame
 from orbiflow.tiles.tilings import Certificate, Tile, arrangement, certify
 
 if TYPE_CHECKING:
@@ -292,6 +293,19 @@ class EscherTile:
     def frame(self) -> Frame | None:
         """Where the silhouette's normal form lies in the input."""
         return None if self.map is None else self.map.frame
+
+    @property
+    def silhouette_outline(self) -> Array:
+        """The outline (N, 2) of the silhouette; the tile's own where there is no map."""
+        if self.bending is None or self.frame is None:
+            return self.tile.polygon
+        return self.frame.to_input(self.bending.rest[border(self.bending.triangles)])
+
+    @property
+    def covered(self) -> Covered:
+        """What a picture of the silhouette covers."""
+        frame = self.frame or Frame(np.diag([1.0, -1.0 if self.y_down else 1.0]), np.zeros(2))
+        return frame.covered(self.silhouette_outline)
 
     @property
     def score(self) -> float:

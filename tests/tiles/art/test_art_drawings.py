@@ -31,14 +31,13 @@ from orbiflow.tiles import (
     write_dxf,
     write_pdf,
 )
-from orbiflow.tiles.motifs.source import covered_area, silhouette_outline
 from orbiflow.tiles.scene import INK, Part
 
 PAGE = ArtSettings(size=(300, 200), tile_size=130, outline=0.0, samples=4)
 
 
 def svg_of(name: str, body: str, folder: Path) -> Path:
-    low, high = covered_area(squirrel(name))[:2]
+    low, high = squirrel(name).covered[:2]
     left, top, width, height = *low, *(high - low)
     path = folder / "drawing.svg"
     path.write_text(
@@ -135,7 +134,7 @@ def test_engraving_keeps_to_the_tile_and_off_the_eye(strokes) -> None:
     ink = art.motif.parts[0]
     assert ink.style.fill == INK
     assert len(ink.curves) > 20
-    inside = shapely.Polygon(tile.tile.polygon).buffer(silhouette_outline(tile).max() * 0.004)
+    inside = shapely.Polygon(tile.tile.polygon).buffer(tile.silhouette_outline.max() * 0.004)
     for curve in ink.curves:
         assert inside.contains(shapely.MultiPoint(curve.pieces[:, 0]))
     middle = tile.forward(np.array(EYE))

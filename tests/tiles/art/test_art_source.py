@@ -13,7 +13,6 @@ import shapely
 from artworks import EYE, squirrel, write_run
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles import CLASSES, ArtSettings, artwork, read_result, signed_area, with_map
-from orbiflow.tiles.motifs.source import covered_area, silhouette_outline
 from orbiflow.tiles.search import matched
 from outlines import FOLDER, animal, bent_squirrel, disc, star
 
@@ -26,8 +25,8 @@ def test_the_map_of_a_run(tmp_path: Path) -> None:
     np.testing.assert_allclose(tile.forward(np.array(EYE)), there, atol=1e-9)
     # the outline is the silhouette's, as fine as it was bent
     outline = animal("squirrel.dat").outline
-    np.testing.assert_allclose(silhouette_outline(tile).min(axis=0), outline.min(axis=0), atol=4)
-    np.testing.assert_allclose(covered_area(tile).high, outline.max(axis=0), atol=4)
+    np.testing.assert_allclose(tile.silhouette_outline.min(axis=0), outline.min(axis=0), atol=4)
+    np.testing.assert_allclose(tile.covered.high, outline.max(axis=0), atol=4)
 
 
 def test_without_a_map_outlines_are_matched(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from orbiflow.drawing import palette
 from orbiflow.tiles import CLASSES, ArtSettings, Artwork, artwork, render_artwork
 from orbiflow.tiles.motifs import picture_paint
 from orbiflow.tiles.motifs.raster import NOWHERE, runs, triangle_sides
-from orbiflow.tiles.motifs.source import _places, covered_area, silhouette_outline
+from orbiflow.tiles.motifs.source import _places
 from orbiflow.tiles.silhouette import triangulate
 
 PAGE = ArtSettings(size=(240, 160), tile_size=95, outline=0.0)
@@ -134,9 +134,9 @@ def test_the_fringe_of_a_cut_out_does_not_show() -> None:
     tile = squirrel("IH4")
     width, height = size_of(tile)
     shape = shapely.affinity.affine_transform(
-        shapely.Polygon(silhouette_outline(tile)), [1, 0, 0, 1, *-covered_area(tile).low]
+        shapely.Polygon(tile.silhouette_outline), [1, 0, 0, 1, *-tile.covered.low]
     )
-    scale = width / np.ptp(covered_area(tile)[:2], axis=0)[0]
+    scale = width / np.ptp(tile.covered[:2], axis=0)[0]
     rows, columns = np.indices((height, width)) + 0.5
     inside = shapely.contains_xy(shape, columns / scale, rows / scale)
     alpha = Image.fromarray((inside * 255).astype(np.uint8))

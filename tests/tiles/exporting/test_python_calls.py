@@ -33,7 +33,6 @@ from orbiflow.tiles import (
     with_map,
 )
 from orbiflow.tiles import write_run as write_folder
-from orbiflow.tiles.motifs.source import covered_area
 from outlines import animal
 
 SMALL = ArtSettings(size=(90, 60), tile_size=40.0)
@@ -170,7 +169,7 @@ def test_a_rank_of_a_folder_keeps_its_map(tmp_path: Path) -> None:
 
 
 def test_a_picture_goes_through_the_map(tmp_path: Path, found: EscherTile) -> None:
-    covered = covered_area(found)
+    covered = found.covered
     size = tuple(int(side) for side in np.rint(covered.high - covered.low))
     painted = tmp_path / "painted.png"
     Image.new("RGB", (size[0], size[1]), "#ff0000").save(painted)

@@ -41,7 +41,7 @@ def test_polygon(tmp_path: Path, corner: str, y_down: bool) -> None:
     # CORNERS are named as seen with y down; a mask shows its top where the shape's top is.
     assert_emphasised(emphasis, target, corner if y_down else f"{up[end]} {side}")
     assert emphasis.notes == (
-        "laid the mask (160 x 80 pixels) over the outline's bounding box (160 x 80)",
+        "laid the mask (160 x 80 pixels) over the silhouette's bounding box (160 x 80)",
     )
     assert emphasis.box == pytest.approx((*target.normal.min(axis=0), *target.normal.max(axis=0)))
 
@@ -69,7 +69,7 @@ def test_drawing_without_a_page_is_covered_by_its_outline(tmp_path: Path) -> Non
     target = drawing(tmp_path, "")
     emphasis = Emphasis.read(save(tmp_path, mask(size=(160, 80))), target)
     assert_emphasised(emphasis, target, "top left")
-    assert "the outline's bounding box" in emphasis.notes[0]
+    assert "the silhouette's bounding box" in emphasis.notes[0]
 
 
 def test_the_drawing_is_not_read_again(tmp_path: Path) -> None:
@@ -99,7 +99,7 @@ def test_scaled_copies(tmp_path: Path, scale: float) -> None:
     emphasis = Emphasis.read(save(tmp_path, mask("bottom right", (width, height))), target)
     assert_emphasised(emphasis, target, "bottom right")
     assert emphasis.notes == (
-        f"laid the mask ({width} x {height} pixels) over the input picture (200 x 100)",
+        f"laid the mask ({width} x {height} pixels) over the silhouette's picture (200 x 100)",
     )
     middle = emphasis.weight(target.to_normal([[100.0, 70.0], [150.0, 50.0]]))
     assert middle == pytest.approx([2.5, 2.5], abs=0.1)
@@ -118,7 +118,7 @@ def test_averaged_masks_keep_their_place(tmp_path: Path) -> None:
 @pytest.mark.parametrize("size", [(100, 200), (200, 200), (200, 103), (204, 100), (1000, 2)])
 def test_another_aspect(tmp_path: Path, size: tuple[int, int]) -> None:
     path = save(tmp_path, mask(size=size))
-    said = rf"mask is {size[0]} x {size[1]} pixels and the input picture is 200 x 100; .* copy of"
+    said = rf"mask is {size[0]} x {size[1]} and the silhouette's picture is 200 x 100; .* copy of"
     with pytest.raises(InputFileError, match=said) as caught:
         Emphasis.read(path, picture(tmp_path))
     assert str(caught.value).startswith(f"{path}: ")
@@ -134,7 +134,7 @@ def test_aspect_within_one_percent(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("make", "covered"),
     [
-        (lambda folder: polygon(folder, y_down=False), r"outline's bounding box is 160 x 80"),
+        (lambda folder: polygon(folder, y_down=False), r"silhouette's bounding box is 160 x 80"),
         (
             lambda folder: drawing(folder, 'viewBox="0 0 200 90.5"'),
             r"drawing's page is 200 x 90\.5",
@@ -144,7 +144,7 @@ def test_aspect_within_one_percent(tmp_path: Path) -> None:
 def test_another_aspect_without_a_picture(
     tmp_path: Path, make: Callable[[Path], Target], covered: str
 ) -> None:
-    with pytest.raises(InputFileError, match=rf"64 x 64 pixels and the {covered}"):
+    with pytest.raises(InputFileError, match=rf"64 x 64 and the {covered}"):
         Emphasis.read(save(tmp_path, mask(size=(64, 64))), make(tmp_path))
 
 
@@ -227,7 +227,7 @@ def test_mask_is_read_only_and_report_is_json_ready(tmp_path: Path) -> None:
         "source": str(path),
         "strength": 4.0,
         "share": pytest.approx(0.25, abs=0.01),
-        "notes": ["laid the mask (100 x 50 pixels) over the input picture (200 x 100)"],
+        "notes": ["laid the mask (100 x 50 pixels) over the silhouette's picture (200 x 100)"],
     }
 
 

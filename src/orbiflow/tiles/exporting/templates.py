@@ -11,7 +11,6 @@ from shapely.ops import substring
 
 from orbiflow.arrays import Array
 from orbiflow.tiles.exporting.layouts import Layout, line_style
-from orbiflow.tiles.motifs import silhouette_outline
 from orbiflow.tiles.scene import Curve, Layer, PlacedTile, Scene, Style
 from orbiflow.tiles.tile import EscherTile
 
@@ -42,7 +41,7 @@ def template_scene(layout: Layout, given: EscherTile) -> Scene:
     style = line_style(layout)
     layers = [Layer("outline", "cut", style, (layout.outline.closed,))]
     if given.bending is not None:
-        silhouette = Curve.polyline(silhouette_outline(given), closed=True).moved(*layout.place)
+        silhouette = Curve.polyline(given.silhouette_outline, closed=True).moved(*layout.place)
         layers.insert(0, Layer("silhouette", "tiles", Style(FAINT), (silhouette,)))
     marks = tuple(_marks(layout))
     layers.append(Layer("numbers", "mark", style._replace(width=style.width / 2), marks))

@@ -13,5 +13,4 @@ from .raster import ring_sides as ring_sides
 from .raster import runs as runs
 from .settings import MotifSettings as MotifSettings
 from .source import Picture as Picture
-from .source import silhouette_outline as silhouette_outline
 from .source import with_map as with_map

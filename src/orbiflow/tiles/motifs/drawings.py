@@ -21,7 +21,7 @@ from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.motifs.engraving import engraved, eye
 from orbiflow.tiles.motifs.raster import Grid, Paint
 from orbiflow.tiles.motifs.settings import MotifSettings
-from orbiflow.tiles.motifs.source import Picture, carried_picture, covered_area, read_picture
+from orbiflow.tiles.motifs.source import Picture, carried_picture, read_picture
 from orbiflow.tiles.scene import (
     INK,
     Curve,
@@ -74,7 +74,7 @@ def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
 
 def _onto(path: Path, drawing: Drawing, tile: EscherTile) -> tuple[Array, Array]:
     """Return the map from the drawing's user units to the silhouette's coordinates."""
-    covered = covered_area(tile)
+    covered = tile.covered
     if drawing.box is None:
         return np.eye(2), np.zeros(2)
     low, high = np.array(drawing.box[:2]), np.array(drawing.box[2:])

@@ -29,7 +29,6 @@ from orbiflow.tiles.geometry import (
 )
 from orbiflow.tiles.motifs.raster import Grid
 from orbiflow.tiles.motifs.settings import Strokes
-from orbiflow.tiles.motifs.source import silhouette_outline
 from orbiflow.tiles.scene import INK, Curve, Part, Style
 from orbiflow.tiles.tile import EscherTile
 
@@ -128,7 +127,7 @@ class Eye(NamedTuple):
 def eye(tile: EscherTile, given: tuple[float, ...], palette: Palette) -> Eye:
     """Carry an eye (x, y) or (x, y, radius) from the silhouette onto the tile; it stays round."""
     x, y = given[:2]
-    outline = shapely.Polygon(silhouette_outline(tile))
+    outline = shapely.Polygon(tile.silhouette_outline)
     if not outline.contains(shapely.Point(x, y)):
         left, top, right, bottom = outline.bounds
         raise OrbiflowError(

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import torch
@@ -14,10 +13,9 @@ from scipy.ndimage import distance_transform_edt
 
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.tiles.geometry import border
 from orbiflow.tiles.motifs.raster import Grid, polygon_sides, runs, triangle_sides
 from orbiflow.tiles.search import matched
-from orbiflow.tiles.silhouette import Frame, Target, deep_channel, open_image
+from orbiflow.tiles.silhouette import Covered, Frame, Target, deep_channel, open_image
 from orbiflow.tiles.tile import EscherTile, TileMap, TileSource
 
 
@@ -56,52 +54,6 @@ def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
     return tile.changed(map_source=TileMap(known.settings, known.arrays, frame, bending), **said)
 
 
-def silhouette_outline(tile: EscherTile) -> Array:
-    """Return the outline (N, 2) of the silhouette; the tile's own where there is no map."""
-    bending, frame = tile.bending, tile.frame
-    if bending is None or frame is None:
-        return tile.tile.polygon
-    return frame.to_input(bending.rest[border(bending.triangles)])
-
-
-class Covered(NamedTuple):
-    """The rectangle in the silhouette's coordinates that a picture of it covers, and its name."""
-
-    low: Array
-    high: Array
-    name: str
-    y_down: bool = True
-
-    def shares(self, points: Array) -> Array:
-        """Return points (..., 2) in widths and heights of the picture, from its upper left corner."""
-        found = (points - self.low) / (self.high - self.low)
-        if not self.y_down:
-            found[..., 1] = 1 - found[..., 1]
-        return found
-
-    def require_aspect(self, path: Path, what: str, size: Sequence[float]) -> None:
-        """Refuse a picture or drawing of this width and height unless its aspect is the same."""
-        (width, height), (wide, high) = size, self.high - self.low
-        if abs(width * high / (height * wide) - 1) > SAME_ASPECT:
-            raise InputFileError(
-                f"{path}: the {what} is {width:.6g} x {height:.6g} and {self.name} is "
-                f"{wide:.6g} x {high:.6g}; a {what} covers all of that and must have its aspect "
-                "within 1 %, so paint or draw over a copy of it"
-            )
-
-
-def covered_area(tile: EscherTile) -> Covered:
-    """Return what a picture covers: the input picture, the drawing's page, or the outline's box."""
-    frame = tile.frame
-    if frame is None or frame.size is None:
-        ring = silhouette_outline(tile)
-        y_down = tile.y_down if frame is None else frame.y_down
-        return Covered(ring.min(axis=0), ring.max(axis=0), "the silhouette's bounding box", y_down)
-    low = np.array(frame.corner)
-    name = "the drawing's page" if frame.kind == "svg" else "the silhouette's picture"
-    return Covered(low, low + frame.size, name, frame.y_down)
-
-
 def _silhouette(own: dict[str, Any]) -> Target:
     """Return the silhouette of a run, read again, unless it is missing or has changed."""
     source = Path(str(own["source"]))
@@ -121,7 +73,6 @@ def _silhouette(own: dict[str, Any]) -> Target:
     return target
 
 
-SAME_ASPECT = 0.01  # relative difference up to which two aspect ratios count as the same
 # Width in pixels of the strip inside the outline that its background may have mixed with
 FRINGE = 1.5
 # Distance in pixels from what the fringe leaves beyond which pixels are kept: thin limbs
@@ -155,7 +106,7 @@ def read_picture(path: Path, tile: EscherTile) -> Picture:
     if image.mode.startswith(("I", "F")):  # more than 8 bits
         levels = np.asarray(deep_channel(path, image))
         image = Image.fromarray((levels * 255 + 0.5).astype(np.uint8))
-    image, covered = image.convert("RGBA"), covered_area(tile)
+    image, covered = image.convert("RGBA"), tile.covered
     covered.require_aspect(path, "picture", image.size)
     wide, high = covered.high - covered.low
     width, height = image.size
@@ -177,7 +128,7 @@ def carried_picture(picture: Picture, tile: EscherTile, grid: Grid) -> tuple[Arr
     at = torch.from_numpy((small.covered.shares(places) * 2 - 1).astype(np.float32))
     straight = np.asarray(small.image, dtype=np.float32) / 255
     straight[..., :3] *= straight[..., 3:]
-    straight = _spread(straight, small.covered.shares(silhouette_outline(tile)) * small.image.size)
+    straight = _spread(straight, small.covered.shares(tile.silhouette_outline) * small.image.size)
     values = torch.from_numpy(np.ascontiguousarray(straight.transpose(2, 0, 1)))[None]
     found = torch.nn.functional.grid_sample(
         values, at[None], mode="bilinear", padding_mode="border", align_corners=False

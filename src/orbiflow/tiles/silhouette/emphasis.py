@@ -13,11 +13,10 @@ from orbiflow.arguments import as_array, as_instance, as_number
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.silhouette.outlines import percent
-from orbiflow.tiles.silhouette.readers import Picture, read_mask
-from orbiflow.tiles.silhouette.target import Target
+from orbiflow.tiles.silhouette.readers import read_mask
+from orbiflow.tiles.silhouette.target import Covered, Target
 
 MAX_STRENGTH = 100.0
-MAX_ASPECT_ERROR = 0.01
 # In the normal form, where the silhouette has area 1. The mask's edges are smoothed over a few points
 # of a tile's boundary, so that the force on it is continuous.
 SMOOTHING = 0.02  # standard deviation
@@ -26,7 +25,6 @@ MAX_SMOOTHING = 32.0  # pixels: a bound of the work
 # of full emphasis: what is nowhere above this on the silhouette does not touch it
 MIN_TOUCHING_LEVEL = 0.01
 GRID_SIDE = 512  # pixels along a side of the grids that integrals are taken on
-_OUTLINE_BOX = "the outline's bounding box"
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,19 +85,22 @@ class Emphasis:
         as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
         path = Path(path)
         picture = read_mask(path)
-        box, covered = _covered(target)
-        placed = _check_aspect(path, picture, box, covered)
+        covered = target.covered
+        covered.require_aspect(path, "mask", picture.size)
+        own, (wide, high) = picture.size, covered.high - covered.low
+        laid = f"mask ({own[0]} x {own[1]} pixels) over {covered.name} ({wide:.6g} x {high:.6g})"
+        placed = [f"laid the {laid}"] * (target.size is None or own != (wide, high))
         levels = picture.channel
         # the last row and column of an averaged mask may extend beyond the picture
         overhang = np.array(levels.shape[::-1]) * picture.reduced / picture.size
-        own = _normal_box(target, box, overhang)
-        pixel = np.array([own[3] - own[1], own[2] - own[0]]) / levels.shape
+        box = _normal_box(target, covered, overhang)
+        pixel = np.array([box[3] - box[1], box[2] - box[0]]) / levels.shape
         sigma = np.minimum(SMOOTHING / pixel, MAX_SMOOTHING)
         smooth = np.clip(gaussian_filter(levels, tuple(sigma), mode="nearest"), 0, 1)
-        plain = cls(smooth.astype(np.float32), own, strength, str(path))
+        plain = cls(smooth.astype(np.float32), box, strength, str(path))
         share = _share_of(plain, target)
         notes = (*picture.notes, *placed, *_warnings(levels, share, plain.strength))
-        return cls(plain.mask, own, strength, str(path), share, notes)
+        return cls(plain.mask, box, strength, str(path), share, notes)
 
     def weight(self, points: ArrayLike) -> Array:
         """Return weights (...) at `points` (..., 2) of the normal form, from 1 to the strength.
@@ -136,33 +137,9 @@ class Emphasis:
         return level * (1 - beyond**2 * (3 - 2 * beyond))
 
 
-def _covered(target: Target) -> tuple[Window, str]:
-    """Return what a mask covers, (xmin, ymin, xmax, ymax) in input units, and its name."""
-    if target.size is None:
-        return shapely.Polygon(target.outline).bounds, _OUTLINE_BOX
-    width, height = target.size
-    xmin, ymin = target.corner
-    name = "the drawing's page" if target.kind == "svg" else "the input picture"
-    return (xmin, ymin, xmin + width, ymin + height), name
-
-
-def _check_aspect(path: Path, picture: Picture, box: Window, covered: str) -> list[str]:
-    """Return notes of where the mask was placed, or raise an error if it does not fit."""
-    (width, height), wide, high = picture.size, box[2] - box[0], box[3] - box[1]
-    mask, size = f"{width} x {height} pixels", f"{wide:.6g} x {high:.6g}"
-    if abs(width * high / (height * wide) - 1) > MAX_ASPECT_ERROR:
-        raise InputFileError(
-            f"{path}: the mask is {mask} and {covered} is {size}; their aspects must agree within "
-            "1%, so paint the mask over a copy of that size"
-        )
-    if (width, height) == (wide, high) and covered != _OUTLINE_BOX:
-        return []
-    return [f"laid the mask ({mask}) over {covered} ({size})"]
-
-
-def _normal_box(target: Target, box: Window, overhang: Array) -> Window:
-    """Return `box` in the normal form, extended to the right and downwards by `overhang`."""
-    corners = target.to_normal([box[:2], box[2:]])
+def _normal_box(target: Target, covered: Covered, overhang: Array) -> Window:
+    """Return the box in the normal form, extended to the right and downwards by `overhang`."""
+    corners = target.to_normal([covered.low, covered.high])
     (xmin, ymin), (xmax, ymax) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     right, down = overhang.tolist()
     return xmin, ymax - down * (ymax - ymin), xmin + right * (xmax - xmin), ymax

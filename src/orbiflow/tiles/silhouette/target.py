@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Self
+from typing import IO, TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,6 +28,34 @@ from orbiflow.tiles.silhouette.readers import (
 
 if TYPE_CHECKING:
     import torch
+
+SAME_ASPECT = 0.01  # relative difference up to which two aspect ratios count as the same
+
+
+class Covered(NamedTuple):
+    """The rectangle that a picture of a silhouette covers, in the input's units, and its name."""
+
+    low: Array
+    high: Array
+    name: str
+    y_down: bool = True
+
+    def shares(self, points: Array) -> Array:
+        """Return points (..., 2) in widths and heights of the picture, from its upper left corner."""
+        found = (points - self.low) / (self.high - self.low)
+        if not self.y_down:
+            found[..., 1] = 1 - found[..., 1]
+        return found
+
+    def require_aspect(self, path: Path, what: str, size: Sequence[float]) -> None:
+        """Refuse a picture, drawing or mask of this width and height unless its aspect is the same."""
+        (width, height), (wide, high) = size, self.high - self.low
+        if abs(width * high / (height * wide) - 1) > SAME_ASPECT:
+            raise InputFileError(
+                f"{path}: the {what} is {width:.6g} x {height:.6g} and {self.name} is "
+                f"{wide:.6g} x {high:.6g}; a {what} covers all of that and must have its aspect "
+                "within 1 %, so paint or draw over a copy of it"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +126,15 @@ class Frame:
         if np.array_equal(self.linear, np.diag(scale)):
             return local / scale  # rounded once
         return local @ self.inverse.T
+
+    def covered(self, outline: Array) -> Covered:
+        """Return what a picture covers: the input picture, the drawing's page, or an outline's box."""
+        if self.size is None:
+            low, high = outline.min(axis=0), outline.max(axis=0)
+            return Covered(low, high, "the silhouette's bounding box", self.y_down)
+        low = np.array(self.corner)
+        name = "the drawing's page" if self.kind == "svg" else "the silhouette's picture"
+        return Covered(low, low + self.size, name, self.y_down)
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything, ready for JSON; `from_dict` undoes it bit for bit."""
@@ -283,6 +320,11 @@ class Target(Reading):
         """The map from the normal form to the input: a scale, a flip of y and a translation."""
         linear = np.sqrt(self.area) * np.diag([1.0, -1.0 if self.y_down else 1.0])
         return Frame(linear, centroid(self.outline), self.kind, self.size, self.corner)
+
+    @property
+    def covered(self) -> Covered:
+        """What a picture of the silhouette covers."""
+        return self.frame.covered(self.outline)
 
     @cached_property
     def normal(self) -> Array:
