@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import jsonschema
 import pytest
 
-from orbiflow.cli.reference import reference
+from docs.reference.make import reference
 from orbiflow.commands import OPERATIONS
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import (
@@ -156,7 +156,7 @@ def test_every_operation_describes_itself(made: Operation) -> None:
 
 
 def test_the_reference_page_is_up_to_date() -> None:
-    hint = "run python -m orbiflow.cli.reference docs/reference/settings.md"
+    hint = "run python docs/reference/make.py"
     assert PAGE.read_text("utf-8") == reference(list(map(find, OPERATIONS))), hint
 
 

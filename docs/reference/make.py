@@ -1,8 +1,7 @@
-"""The reference page of all operations and settings: `python -m orbiflow.cli.reference [FILE]`."""
+"""The reference page of all operations and settings, settings.md: `python docs/reference/make.py`."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -11,9 +10,11 @@ from orbiflow.errors import SettingError
 from orbiflow.runtime import Operation, find
 from orbiflow.settings import Field, Hidden
 
+PAGE = Path(__file__).with_name("settings.md")
+
 TOP = """# Operations and settings
 
-This page is made by `python -m orbiflow.cli.reference docs/reference/settings.md` from the operations
+This page is made by `python docs/reference/make.py` from the operations
 themselves. Each is a command, a Python function and a JSON object: an option `--tile-size` is the
 argument or setting `tile_size` in Python and JSON. Settings in *italics* have no option.
 """
@@ -60,14 +61,5 @@ def _code(name: str) -> str:
     return f"`{name}`"
 
 
-def main() -> None:
-    """Write the page to a file, or to standard output."""
-    text = reference(map(find, OPERATIONS))
-    if len(sys.argv) > 1:
-        Path(sys.argv[1]).write_text(text, "utf-8")
-    else:
-        sys.stdout.write(text)
-
-
 if __name__ == "__main__":
-    main()
+    PAGE.write_text(reference(map(find, OPERATIONS)), "utf-8")
