@@ -10,7 +10,7 @@ block: this is as fast as reading them back and needs no memory.
 
 import math
 from collections.abc import Callable, Iterator
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -254,20 +254,9 @@ class FourierField(InvariantField):
 
     stackable = True
 
-    def __init__(
-        self,
-        group: CrystallographicGroup,
-        max_frequency: int,
-        *,
-        batch: int | None = None,
-        smoothness: float = 0.0,
-        dtype: torch.dtype = torch.float64,
-        device: torch.device | str | None = None,
-    ) -> None:
-        super().__init__(
-            group, max_frequency, batch=batch, smoothness=smoothness, dtype=dtype, device=device
-        )
-        self._orders = _orders(self.basis)
+    @cached_property
+    def _orders(self) -> tuple[int, ...]:
+        return _orders(self.basis)
 
     @staticmethod
     def layout(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[Array, Array, Array]:

@@ -193,11 +193,13 @@ class InvariantField(nn.Module, ABC):
         max_frequency: int,
         *,
         batch: int | None = None,
-        smoothness: float,
-        dtype: torch.dtype,
-        device: torch.device | str | None,
+        smoothness: float = 0.0,
+        dtype: torch.dtype = torch.float64,
+        device: torch.device | str | None = None,
     ) -> None:
         super().__init__()
+        if batch is not None and not self.stackable:
+            raise OrbiflowError(f"a {type(self).__name__} cannot be a stack; leave batch out")
         self.group = checked_group(group)
         self.smoothness = smoothness
         self.basis: InvariantBasis = invariant_basis(group, max_frequency)

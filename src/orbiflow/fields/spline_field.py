@@ -7,7 +7,7 @@ ones, because the divergence is a result too. Autograd differentiates the backwa
 
 import math
 from collections.abc import Callable
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -272,19 +272,15 @@ class SplineField(InvariantField):
     (16, 16)
     """
 
-    def __init__(
-        self,
-        group: CrystallographicGroup,
-        max_frequency: int,
-        *,
-        smoothness: float = 0.0,
-        dtype: torch.dtype = torch.float64,
-        device: torch.device | str | None = None,
-    ) -> None:
-        super().__init__(group, max_frequency, smoothness=smoothness, dtype=dtype, device=device)
-        self.sides = grid_sides(group, self.basis)
-        lengths = np.diag(group.lattice)
-        self._per_length = tuple(float(m / a) for m, a in zip(self.sides, lengths, strict=True))
+    @cached_property
+    def sides(self) -> tuple[int, ...]:
+        """The numbers of the grid's points along the axes."""
+        return grid_sides(self.group, self.basis)
+
+    @cached_property
+    def _per_length(self) -> tuple[float, ...]:
+        lengths = np.diag(self.group.lattice)
+        return tuple(float(m / a) for m, a in zip(self.sides, lengths, strict=True))
 
     @staticmethod
     def layout(group: CrystallographicGroup, basis: InvariantBasis) -> tuple[Array, Array, Array]:
