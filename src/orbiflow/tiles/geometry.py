@@ -185,6 +185,18 @@ def border(triangles: Integers) -> Integers:
     return np.array(ring)
 
 
+def triangle_sides(points: Array, triangles: Integers) -> Array:
+    """Return matrices (M, 2, 2) whose columns lead from each triangle's first point to the others."""
+    corners = points[triangles]
+    return np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+
+
+def doubled_areas(points: Array, triangles: Integers) -> Array:
+    """Return twice the area (M,) of triangles, negative where they are clockwise."""
+    (a, b), (c, d) = triangle_sides(points, triangles).transpose(1, 2, 0)
+    return a * d - c * b
+
+
 def polygons_in(geometry: BaseGeometry) -> list[Polygon]:
     """Return the polygons in `geometry`, without its lines and points."""
     if isinstance(geometry, Polygon):

@@ -12,7 +12,7 @@ from artworks import EYE, checkerboard, face, flat, picture, size_of, squirrel, 
 from orbiflow.drawing import palette
 from orbiflow.tiles import CLASSES, ArtSettings, Artwork, artwork, render_artwork
 from orbiflow.tiles.motifs import picture_paint
-from orbiflow.tiles.motifs.raster import NOWHERE, runs, triangle_sides
+from orbiflow.tiles.motifs.raster import NOWHERE, region_sides, runs
 from orbiflow.tiles.motifs.source import _places
 from orbiflow.tiles.silhouette import triangulate
 
@@ -117,7 +117,7 @@ def test_the_map_onto_the_raster_has_no_fold() -> None:
 
 def test_triangles_and_what_is_around_them() -> None:
     mesh = triangulate(np.array([[2.0, 2.0], [30.0, 5.0], [26.0, 28.0], [15.0, 12.0], [4.0, 25.0]]))
-    found = runs(triangle_sides(mesh.points, mesh.triangles), 0, 32, 32)
+    found = runs(region_sides(mesh.points, mesh.triangles), 0, 32, 32)
     label = found.spread(found.label).reshape(32, 32)
     rows, columns = np.indices((32, 32))
     inside = shapely.contains_xy(

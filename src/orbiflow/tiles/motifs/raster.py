@@ -11,6 +11,7 @@ from scipy.ndimage import binary_dilation
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.drawing import Palette, rgb
+from orbiflow.tiles.geometry import doubled_areas
 
 NOWHERE = -1  # the label of samples that lie in no region
 
@@ -59,10 +60,9 @@ def polygon_sides(ring: Array) -> Sides:
     return Sides(ring, ahead, np.where(entering, 0, NOWHERE))
 
 
-def triangle_sides(points: Array, triangles: Integers) -> Sides:
+def region_sides(points: Array, triangles: Integers) -> Sides:
     """Return the sides of triangles (M, 3) that do not overlap, and of what lies around them."""
-    corners = points[triangles]
-    inner = ring_sides(corners)
+    inner = ring_sides(points[triangles])
     # a side of a single triangle is the border, and beyond it is nowhere
     pairs = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     keys = np.sort(pairs, axis=1) @ np.array([len(points), 1])
@@ -70,8 +70,7 @@ def triangle_sides(points: Array, triangles: Integers) -> Sides:
     border = pairs[first[count == 1]]
     own = np.tile(np.arange(len(triangles)), 3)[first[count == 1]]
     start, end = points[border[:, 0]], points[border[:, 1]]
-    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    sense = np.sign(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    sense = np.sign(doubled_areas(points, triangles))
     leaving = (end - start)[:, 1] * sense[own] > 0
     return Sides(
         np.concatenate([inner.start, start[leaving]]),

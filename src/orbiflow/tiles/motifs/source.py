@@ -13,7 +13,8 @@ from scipy.ndimage import distance_transform_edt
 
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.tiles.motifs.raster import Grid, polygon_sides, runs, triangle_sides
+from orbiflow.tiles.geometry import triangle_sides
+from orbiflow.tiles.motifs.raster import Grid, polygon_sides, region_sides, runs
 from orbiflow.tiles.search import matched
 from orbiflow.tiles.silhouette import Covered, Frame, Target, deep_channel, open_image
 from orbiflow.tiles.tile import EscherTile, TileMap, TileSource
@@ -166,12 +167,10 @@ def _places(tile: EscherTile, grid: Grid) -> Array:
     images = grid.texels(frame.to_input(bending.images))
     rest = frame.to_input(bending.rest)
     triangles = bending.triangles
-    found = runs(triangle_sides(images, triangles), 0, grid.height, grid.width)
-    before, after = images[triangles], rest[triangles]
-    sides = np.stack([before[:, 1] - before[:, 0], before[:, 2] - before[:, 0]], axis=2)
-    goals = np.stack([after[:, 1] - after[:, 0], after[:, 2] - after[:, 0]], axis=2)
-    linear = goals @ np.linalg.inv(sides)
-    offset = after[:, 0] - np.einsum("tij,tj->ti", linear, before[:, 0])
+    found = runs(region_sides(images, triangles), 0, grid.height, grid.width)
+    linear = triangle_sides(rest, triangles) @ np.linalg.inv(triangle_sides(images, triangles))
+    first = triangles[:, 0]
+    offset = rest[first] - np.einsum("tij,tj->ti", linear, images[first])
     own = np.maximum(found.label, 0)
     columns = np.tile(np.arange(grid.width) + 0.5, grid.height)
     # along a run only x changes

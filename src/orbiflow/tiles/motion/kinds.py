@@ -14,7 +14,7 @@ from scipy.sparse.linalg import splu
 
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import border
+from orbiflow.tiles.geometry import border, triangle_sides
 from orbiflow.tiles.motion.morph import Morph, OwnFrame
 from orbiflow.tiles.pictures import ASPECT, default_window
 from orbiflow.tiles.silhouette import Bending
@@ -220,10 +220,7 @@ class BendingWay:
         self.rest, self.images = bending.rest, bending.images
         triangles = bending.triangles
         self.ring = border(triangles)
-        corners, images = self.rest[triangles], self.images[triangles]
-        sides, moved = (
-            np.stack([c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]], axis=2) for c in (corners, images)
-        )
+        sides, moved = (triangle_sides(points, triangles) for points in (self.rest, self.images))
         inverse = np.linalg.inv(sides)
         linear = moved @ inverse
         # polar decomposition of 2 x 2 matrices that turn nothing over

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from orbiflow.arguments import as_array, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import best_similarity, complex_points
-from orbiflow.tiles.silhouette.mesh import Mesh, doubled_areas, harmonic
+from orbiflow.tiles.geometry import best_similarity, complex_points, doubled_areas, triangle_sides
+from orbiflow.tiles.silhouette.mesh import Mesh, harmonic
 
 MAX_POINTS, MAX_TRIANGLES = 100_000, 200_000
 """Beyond these a mesh is refused: real ones have some thousands."""
@@ -101,12 +101,9 @@ class _PiecewiseAffine:
 
     def __init__(self, start: Array, end: Array, triangles: NDArray[np.int64]) -> None:
         self.tree = shapely.STRtree(np.asarray(shapely.polygons(start[triangles])))
-        before, after = start[triangles], end[triangles]
-        sides, images = (
-            np.stack([c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]], axis=2) for c in (before, after)
-        )
-        self.origin, self.image = before[:, 0], after[:, 0]
-        self.linear = images @ np.linalg.inv(sides)
+        self.origin, self.image = start[triangles[:, 0]], end[triangles[:, 0]]
+        sides = triangle_sides(start, triangles)
+        self.linear = triangle_sides(end, triangles) @ np.linalg.inv(sides)
         # the linear part of the similarity that takes points nearest to their images
         factor = complex(best_similarity(complex_points(start), complex_points(end)))
         self.similarity = np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])
@@ -205,8 +202,7 @@ class _Distortion:
     def __init__(self, mesh: Mesh, points: Array) -> None:
         self.mesh, self.images = mesh, points.copy()
         self.fixed = mesh.size + len(mesh.sides)
-        rest = mesh.points[mesh.triangles]
-        edges = np.stack([rest[:, 1] - rest[:, 0], rest[:, 2] - rest[:, 0]], axis=2)
+        edges = triangle_sides(mesh.points, mesh.triangles)
         self.inverse = np.linalg.inv(edges)
         self.area = np.linalg.det(edges) / 2
         self.area /= self.area.sum()
@@ -227,9 +223,7 @@ class _Distortion:
         self.epsilon = min(0.5 * self.epsilon, 0.1 * abs(min(smallest, 0.0)) + 1e-6)
 
     def _jacobians(self, x: Array) -> Array:
-        corners = self.points(x)[self.mesh.triangles]
-        edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
-        return edges @ self.inverse
+        return triangle_sides(self.points(x), self.mesh.triangles) @ self.inverse
 
     def value(self, x: Array) -> tuple[float, Array]:
         j = self._jacobians(x)

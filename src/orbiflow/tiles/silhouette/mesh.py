@@ -12,7 +12,7 @@ from scipy.spatial import Delaunay, Voronoi
 
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.geometry import subdivided
+from orbiflow.tiles.geometry import doubled_areas, subdivided
 
 MAX_HALVINGS = 24  # the number of times that missing sides of the outline are halved
 FLAT_AREA = 1e-12  # twice the area, in areas of the polygon, below which a triangle counts as flat
@@ -103,13 +103,6 @@ def _are_sides(ends: Integers, triangles: Integers, count: int) -> NDArray[np.bo
     known = np.unique(pairs[:, 0] * count + pairs[:, 1])
     wanted = np.sort(ends, axis=1)
     return np.isin(wanted[:, 0] * count + wanted[:, 1], known)
-
-
-def doubled_areas(points: Array, triangles: Integers) -> Array:
-    """Return twice the area (M,) of triangles, negative where they are clockwise."""
-    corners = points[triangles]
-    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
 
 
 def _kept(mesh: Mesh, polygon: shapely.Polygon) -> Mesh:
