@@ -143,11 +143,11 @@ def _small(picture: bytes) -> bytes:
     """A PNG that is small in pixels and bytes."""
     from PIL import Image, ImageOps
 
-    out = io.BytesIO()
+    from orbiflow.drawing import png_bytes
+
     with Image.open(io.BytesIO(picture)) as image:
         small = ImageOps.fit(image.convert("RGB"), THUMBNAIL, Image.Resampling.BOX)
-        small.quantize(64, dither=Image.Dither.NONE).save(out, "PNG", optimize=True)
-    return out.getvalue()
+        return png_bytes(small.quantize(64, dither=Image.Dither.NONE), optimize=True)
 
 
 class Journal:

@@ -24,6 +24,7 @@ from .raster import dashes as dashes
 from .raster import font as font
 from .raster import limited as limited
 from .raster import palette_png as palette_png
+from .raster import png_bytes as png_bytes
 from .raster import rgb as rgb
 from .raster import strip_middle as strip_middle
 from .raster import vector_picture as vector_picture

@@ -201,8 +201,13 @@ def _draw_with_holes(band: Image.Image, shape: Filled, top: int) -> None:
 
 def palette_png(picture: Image.Image, colours: Sequence[str]) -> bytes:
     """Return an RGB picture as PNG whose palette is 1 to 256 colours, and steps between any two."""
+    return png_bytes(limited(picture, colours), compress_level=6)
+
+
+def png_bytes(picture: Image.Image, **options: Any) -> bytes:
+    """Return a picture as PNG, with Pillow's options."""
     buffer = io.BytesIO()
-    limited(picture, colours).save(buffer, "PNG", compress_level=6)
+    picture.save(buffer, "PNG", **options)
     return buffer.getvalue()
 
 

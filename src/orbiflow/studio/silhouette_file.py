@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from orbiflow.arrays import Array
+from orbiflow.drawing import png_bytes
 from orbiflow.errors import InputFileError
 from orbiflow.runtime import write_atomic, write_json
 from orbiflow.studio.words import page_words
@@ -47,9 +47,7 @@ def read_input(home: Path, called: str, reading: ReadingSettings) -> Target:
     ).smoothed(reading.smooth)
     picture = _picture(target, content)
     mended = _mended(target, home, picture.size)
-    data = io.BytesIO()
-    picture.save(data, "png")
-    write_atomic(home / BACKDROP, data.getvalue())
+    write_atomic(home / BACKDROP, png_bytes(picture))
     document = {"shown": _shown(mended, picture.size), "target": _stored(mended)}
     write_json(home / SILHOUETTE, document)
     return mended

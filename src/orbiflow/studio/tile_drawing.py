@@ -11,6 +11,7 @@ import shapely
 
 from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array
+from orbiflow.drawing import png_bytes
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list, is_object, write_atomic
 from orbiflow.tiles import Bending, EscherTile, Frame, TileMap, open_image, orient, triangulate
@@ -115,8 +116,6 @@ def _on_page(points: Array, tile: EscherTile) -> Array:
 
 def _png(strokes: list[Stroke], tile: EscherTile, picture: Path) -> bytes:
     """Return a picture with the lines drawn over it."""
-    import io
-
     from PIL import Image, ImageDraw
 
     low, high = tile.covered[:2]
@@ -131,6 +130,4 @@ def _png(strokes: list[Stroke], tile: EscherTile, picture: Path) -> bytes:
         for x, y in points[[0, -1]].tolist():  # round ends
             pen.ellipse((x - radius, y - radius, x + radius, y + radius), stroke.colour)
     image.alpha_composite(layer.resize(image.size))
-    buffer = io.BytesIO()
-    image.save(buffer, "PNG")
-    return buffer.getvalue()
+    return png_bytes(image)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from PIL import Image
 
 from orbiflow import __version__
 from orbiflow.arguments import as_path
-from orbiflow.drawing import palette
+from orbiflow.drawing import palette, png_bytes
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Progress, Sink, ignore, write_atomic
 from orbiflow.tiles.art.page import HIDDEN, ArtPage, art_page
@@ -229,6 +228,4 @@ def draw_art(
 
 def png_of(pixels: np.ndarray, dpi: float) -> bytes:
     """Return pixels (height, width, 3) as a PNG that gives their resolution."""
-    buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, "PNG", dpi=(dpi, dpi), compress_level=5)
-    return buffer.getvalue()
+    return png_bytes(Image.fromarray(pixels), dpi=(dpi, dpi), compress_level=5)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
@@ -15,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
-from orbiflow.drawing import Palette, plane_axes
+from orbiflow.drawing import Palette, plane_axes, png_bytes
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.motifs.engraving import engraved, eye
@@ -250,6 +249,4 @@ def carried_raster(picture: Picture, tile: EscherTile, density: float, colours: 
     straight = values[..., :3] / np.maximum(alpha, 1e-6)
     both = np.concatenate([straight, alpha], axis=2)
     image = Image.fromarray((both * 255 + 0.5).clip(0, 255).astype(np.uint8), "RGBA")
-    buffer = io.BytesIO()
-    image.save(buffer, "PNG")
-    return Raster(buffer.getvalue(), image.size, np.eye(2) / grid.density, grid.corner)
+    return Raster(png_bytes(image), image.size, np.eye(2) / grid.density, grid.corner)

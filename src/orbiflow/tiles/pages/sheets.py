@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path, PurePath
@@ -13,7 +12,7 @@ from PIL.PngImagePlugin import PngInfo
 from shapely import MultiPolygon, Polygon, box
 
 from orbiflow.arrays import Window
-from orbiflow.drawing import Raster, font, strip_middle, window_of
+from orbiflow.drawing import Raster, font, png_bytes, strip_middle, window_of
 from orbiflow.tiles.likeness import MOST_STARS
 from orbiflow.tiles.pictures import comparison, tiling_raster
 from orbiflow.tiles.search import ClassFailure
@@ -61,10 +60,9 @@ def read_png(target: Target, source: Path) -> bytes:
         mask = raster("#000000")
         mask.fill_geometry(geometry, "#" + 3 * f"{round(255 * opacity):02x}")
         page.paste(colour, mask=mask.image().convert("L"))
-    about, file = PngInfo(), io.BytesIO()
+    about = PngInfo()
     about.add_text("Software", SOFTWARE)
-    page.save(file, "PNG", pnginfo=about)
-    return file.getvalue()
+    return png_bytes(page, pnginfo=about)
 
 
 def _window(target: Target) -> Window:
@@ -149,9 +147,7 @@ def overview_png(
         thumb = _small(result, target).image()
         thumb.thumbnail((_THUMB, _THUMB))
         sheet.paste(thumb, (left + (_THUMB - thumb.width) // 2, below))
-    buffer = io.BytesIO()
-    sheet.save(buffer, "PNG", compress_level=4)
-    return buffer.getvalue()
+    return png_bytes(sheet, compress_level=4)
 
 
 def _header(

@@ -11,6 +11,7 @@ import shapely
 from PIL import Image, ImageChops, ImageDraw
 from shapely.geometry.base import BaseGeometry
 
+from orbiflow.drawing import png_bytes
 from orbiflow.tiles.geometry import orient, polygons_in
 from orbiflow.tiles.scene.scene import INK, Curve, Layer, Motif, Part, Raster, Scene, Style, Uses
 from orbiflow.tiles.silhouette import fill
@@ -125,6 +126,4 @@ def _masked(raster: Raster, area: shapely.Polygon) -> Raster:
     pixels = ring @ np.linalg.inv(raster.linear).T - 0.5
     ImageDraw.Draw(mask).polygon([(x, y) for x, y in pixels.tolist()], fill=255)
     image.putalpha(ImageChops.darker(image.getchannel("A"), mask))
-    buffer = io.BytesIO()
-    image.save(buffer, "PNG")
-    return raster._replace(png=buffer.getvalue())
+    return raster._replace(png=png_bytes(image))
