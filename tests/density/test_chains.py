@@ -152,3 +152,15 @@ def test_a_fit_finds_correlations_and_repeats() -> None:
     found = fitted()
     assert float(found.log_prob(fresh).mean()) > best - 0.2
     assert torch.equal(found.log_prob(fresh), fitted().log_prob(fresh))
+
+
+@given(dims, seeds, st.sampled_from([1.0, 1e3, 1e8]))
+def test_products_of_matrices_are_sums_of_components(dim: int, seed: int, most: float) -> None:
+    mixture, at = random_mixture(dim, seed, most=most), points(50, dim, seed)
+    residual = mixture.residuals(at)
+    fit = -2 * ((residual / 2).sin() ** 2 * mixture.concentrations).sum(dim=2)
+    scale = torch.tensor(SCALES, dtype=torch.float64)[:, None]
+    normal = torch.special.i0e(mixture.concentrations / scale[..., None]).log().sum(dim=2)
+    logs = fit[:, None] / scale + mixture.log_weights.mT - normal
+    expected = logs.flatten(1).logsumexp(dim=1)
+    assert torch.allclose(mixture.log_prob(at), expected, rtol=1e-12, atol=1e-12 * max(most, 1))

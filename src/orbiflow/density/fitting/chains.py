@@ -12,12 +12,14 @@ from torch import Tensor
 from orbiflow.density.fitting.rows import Rows, gain_of
 from orbiflow.density.models import (
     SCALES,
+    ChainFits,
     Factor,
     VonMisesChains,
     VonMisesNetwork,
+    at_scales,
     chained,
     log_conditional,
-    waves,
+    seen_angles,
 )
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.typed_torch import linalg, special
@@ -40,9 +42,6 @@ EVERY, IDLE = 5, 1e-3
 
 BLOCK_ENTRIES = 2**15
 """Rows times components worked on at a time: few enough for the cache."""
-
-FAINTEST = -44.0
-"""Logarithm of the least exponential, whose 16th power does not underflow."""
 
 
 def _nll(mixture: VonMisesChains, rows: Rows) -> float:
@@ -109,23 +108,19 @@ def far_apart(
 
 
 class _Block(NamedTuple):
-    """Some rows: angles (N, d), their `waves` (N, p), products of these (N, p^2), weights (N, 1)."""
+    """Some rows: `seen_angles` (N, q), products of `waves` of all angles but the last, weights (N,)."""
 
-    angle: Tensor
-    waves: Tensor
+    seen: Tensor
     products: Tensor
     row_weights: Tensor
 
-    def residual(self, means: Tensor, axis: int) -> Tensor:
-        """Return one angle less its regression (N, K), for means (K, d, p)."""
-        return torch.addmm(self.angle[:, axis, None], self.waves, means[:, axis].mT, alpha=-1)
-
 
 class _Sums(NamedTuple):
-    """What belongs to each component but the first, summed over rows.
+    """What belongs to each component, summed over rows.
 
-    - `counts`: (L, K + 1), of each component and scale. `seen`: (K, p), waves, as far as rows count.
-    - `gram`: (K, p^2), products of waves. `force`: (K, d, p), waves times sines of residuals.
+    - `counts`: (L, K), of each component and scale. `seen`: (K, p), waves, as far as rows count.
+    - `gram`: (K, r), products of waves. `force`: (K, d - 1, p), waves times sines of residuals of all
+      angles but the first, where they are regressed.
     """
 
     counts: Tensor
@@ -138,30 +133,27 @@ class _Maximization:
     """The E and M steps on fixed points, of chains of one order (d,); component 0 stays uniform."""
 
     def __init__(self, rows: Rows, order: Tensor, components: int) -> None:
-        self.allowed = chained(order)
-        angle = 2 * math.pi * rows.points
-        seen = waves(angle)
-        products = (seen[:, :, None] * seen[:, None, :]).flatten(1)
-        weights = torch.ones_like(angle[:, 0]) if rows.weights is None else rows.weights
+        self.order, self.allowed = order, chained(order)
+        seen, d = seen_angles(2 * math.pi * rows.points), len(order)
+        before = order[:-1]
+        self.regressors = torch.cat([before.new_zeros(1), 1 + before, 1 + d + before])
+        known = seen[:, d + self.regressors]
+        products = (known[:, :, None] * known[:, None, :]).flatten(1)
+        weights = torch.ones_like(seen[:, 0]) if rows.weights is None else rows.weights
         size = max(1, BLOCK_ENTRIES // components)
-        parts = (torch.split(part, size) for part in (angle, seen, products, weights[:, None]))
+        parts = (torch.split(part, size) for part in (seen, products, weights))
         self.blocks = [_Block(*block) for block in zip(*parts, strict=True)]
-        self.scale = angle.new_tensor(SCALES)
 
     def __call__(self, mixture: VonMisesChains, *, bent: bool) -> VonMisesChains:
         sums, precise = self._expectation(mixture, bent)
-        d, weight = mixture.means.shape[1], sums.counts[:, 1:].sum(dim=0)
-        sine, cosine = sums.seen[:, 1 : 1 + d], sums.seen[:, 1 + d :]
-        center = torch.atan2(sine, cosine)
+        d, weight = mixture.means.shape[1], sums.counts.sum(dim=0)[1:]
+        own = sums.seen[1:]
+        center = torch.atan2(own[:, 1 : 1 + d], own[:, 1 + d :])
         means = torch.zeros_like(mixture.means)
+        means[1:, :, 0] = center
         if bent:
             means[1:] = self._regressed(mixture, sums, center)
-            spread = self._spread(means[1:], precise)
-        else:
-            means[1:, :, 0] = center
-            # about the mean direction, cosines sum to the resultant's length
-            spread = sums.seen[:, :1] - torch.hypot(sine, cosine)
-        spread = spread + PRIOR * (1 - PRIOR_RESULTANT)
+        spread = self._spread(means, sums, precise)[1:] + PRIOR * (1 - PRIOR_RESULTANT)
         concentrations = mixture.concentrations.clone()
         concentrations[1:] = concentration(1 - spread / (weight[:, None] + PRIOR))
         return VonMisesChains(
@@ -170,48 +162,30 @@ class _Maximization:
 
     def _expectation(self, mixture: VonMisesChains, bent: bool) -> tuple[_Sums, list[Tensor]]:
         """Return sums, and what each row (N, K) counts for each component, one table a block."""
-        scaled = mixture.concentrations / self.scale[:, None, None]
+        scale = mixture.means.new_tensor(SCALES)
+        scaled = mixture.concentrations / scale[:, None, None]
         peaks = (mixture.log_weights.mT - special.i0e(scaled).log().sum(dim=-1)).exp()
-        found = [self._shared(block, mixture, peaks, bent) for block in self.blocks]
+        fits = ChainFits(mixture.means, mixture.concentrations, mixture.order, regressed=bent)
+        found = [_shared(block, fits, peaks, scale) for block in self.blocks]
         totals = (
             torch.stack(parts).sum(dim=0) for parts in zip(*[own for own, _ in found], strict=True)
         )
         return _Sums(*totals), [precise for _, precise in found]
 
-    def _shared(
-        self, block: _Block, mixture: VonMisesChains, peaks: Tensor, bent: bool
-    ) -> tuple[_Sums, Tensor]:
-        means, kappa = mixture.means, mixture.concentrations
-        fit, sines = torch.zeros_like(block.waves[:, :1] * kappa[:, 0]), list[Tensor]()
-        for axis in range(kappa.shape[1]):
-            residual = block.residual(means, axis)
-            if bent:
-                sines.append(residual[:, 1:].sin())
-            fit.addcmul_(residual.cos_().sub_(1), kappa[:, axis])
-        # powers are cheaper than exponentials; a uniform component keeps all sums above 0
-        assert SCALES == (1.0, 4.0, 16.0)
-        wide = fit.div_(16).clamp_min_(FAINTEST).exp_()
-        middle = wide.square().square_()
-        share = torch.stack([middle.square().square_(), middle, wide], dim=1).mul_(peaks)
-        share *= block.row_weights[:, None] / share.sum(dim=(1, 2), keepdim=True)
-        precise = torch.einsum("nlk,l->nk", share[..., 1:], 1 / self.scale)
-        force = [(precise * sine).mT @ block.waves for sine in sines]
-        sums = _Sums(
-            share.sum(dim=0),
-            precise.mT @ block.waves,
-            precise.mT @ block.products,
-            torch.stack(force, dim=1) if force else block.waves[:0],
-        )
-        return sums, precise
-
-    def _spread(self, means: Tensor, precise: list[Tensor]) -> Tensor:
+    def _spread(self, means: Tensor, sums: _Sums, precise: list[Tensor]) -> Tensor:
         """Return sums (K, d) of 1 less the cosine of residuals of means (K, d, p)."""
-        total = torch.zeros_like(means[..., 0])
-        for block, counts in zip(self.blocks, precise, strict=True):
-            for axis in range(means.shape[1]):
-                loss = block.residual(means, axis).cos_().sub_(1).mul_(counts)
-                total[:, axis] -= loss.sum(dim=0)
-        return total
+        d, constant = len(self.order), means[..., 0]
+        sine, cosine = sums.seen[:, 1 : 1 + d], sums.seen[:, 1 + d :]
+        spread = sums.seen[:, :1] - (constant.sin() * sine + constant.cos() * cosine)
+        for axis in range(d):
+            if not bool(means[:, axis, 1:].any()):
+                continue
+            spread[:, axis] = sums.seen[:, 0]
+            rows = -means[:, axis].mT
+            for block, counts in zip(self.blocks, precise, strict=True):
+                residual = torch.addmm(block.seen[:, axis, None], block.seen[:, d:], rows)
+                spread[:, axis] -= residual.cos_().mul_(counts).sum(dim=0)
+        return spread
 
     def _weights(self, count: Tensor) -> Tensor:
         count = count.mT
@@ -223,13 +197,15 @@ class _Maximization:
 
     def _regressed(self, mixture: VonMisesChains, sums: _Sums, center: Tensor) -> Tensor:
         """Take one Fisher scoring step of all circular regressions, their slopes held by a ridge."""
-        count, d = center.shape
-        kappa = mixture.concentrations[1:]
+        count, kappa = len(center), mixture.concentrations[1:]
         bessel = special.i1e(kappa) / special.i0e(kappa)
         local = _local(center)
         back = linalg.inv(local)
-        gram = local @ sums.gram.reshape(count, 1 + 2 * d, -1) @ local.mT
-        force = sums.force @ local.mT
+        at = self.regressors
+        gram = torch.zeros_like(local)
+        gram[:, at[:, None], at] = sums.gram[1:].reshape(count, len(at), -1)
+        gram = local @ gram @ local.mT
+        force = self._forces(mixture, sums)[1:] @ local.mT
         slopes = mixture.means[1:] @ back
         found = torch.zeros_like(slopes)
         for i, used in enumerate(self.allowed):
@@ -242,6 +218,37 @@ class _Maximization:
             matrix = bessel[:, i, None, None] * gram[:, at][:, :, at] + torch.diag_embed(ridge)
             found[:, i, at] = now + linalg.solve(matrix, right)
         return (found @ local) * self.allowed
+
+    def _forces(self, mixture: VonMisesChains, sums: _Sums) -> Tensor:
+        """Return sums (K, d, p) of waves times sines of residuals; the first angle has a constant."""
+        first, d = self.order[0], len(self.order)
+        constant, found = mixture.means[:, first, 0], torch.zeros_like(mixture.means)
+        found[:, self.order[1:]] = sums.force
+        sine, cosine = sums.seen[:, 1 + first], sums.seen[:, 1 + d + first]
+        found[:, first, 0] = constant.cos() * sine - constant.sin() * cosine
+        return found
+
+
+def _shared(block: _Block, fits: ChainFits, peaks: Tensor, scale: Tensor) -> tuple[_Sums, Tensor]:
+    """Return what belongs to components of `peaks` (L, K), and what rows (N, K) count for each."""
+    fit, residuals = fits.at(block.seen)
+    tables = at_scales(fit)[::-1]
+    total = sum(table @ peak for table, peak in zip(tables, peaks, strict=True))
+    row = block.row_weights / total  # a uniform component keeps all sums above 0
+    counts = torch.stack([table.mT @ row for table in tables]).mul_(peaks)
+    precise = tables[0].mul_(peaks[0])
+    for table, factor in zip(tables[1:], peaks[1:] / scale[1:, None], strict=True):
+        precise.addcmul_(table, factor)
+    precise.mul_(row[:, None])
+    waves = block.seen[:, (block.seen.shape[1] - 1) // 3 :]
+    force = [(precise * residual.sin_()).mT @ waves for residual in residuals]
+    sums = _Sums(
+        counts,
+        precise.mT @ waves,
+        precise.mT @ block.products,
+        torch.stack(force, dim=1) if force else waves[:0],
+    )
+    return sums, precise
 
 
 def _local(center: Tensor) -> Tensor:

@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_tensor
+from orbiflow.density.models.chain_sums import ChainFits, ChainSum
 from orbiflow.density.models.density import Density, Restriction, Split, Weighted, in_blocks
 from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
@@ -108,17 +109,12 @@ class VonMisesChains(Density, kind="chains"):
         self.order = order.detach().long().clone()
 
     def log_chart(self, points: Tensor) -> Tensor:
-        return in_blocks(lambda p: log_sum_exp(self.joint(p).flatten(1)), points, BLOCK)
-
-    def joint(self, points: Tensor) -> Tensor:
-        """Return the log density (N, L, K) at points (N, d) of each scale and component, weighted."""
-        residual = self.residuals(points)
-        kappa = self.concentrations.to(points)
-        fit = torch.einsum("nkd,kd->nk", residual.cos() - 1, kappa)
+        means, kappa = self.means.to(points), self.concentrations.to(points)
         # log weights less log normalising constants, per unit of the cube: (L, K)
         scaled = self.concentrations / self.concentrations.new_tensor(SCALES)[:, None, None]
-        constant = self.log_weights.mT - special.i0e(scaled).log().sum(dim=-1)
-        return fit[:, None] / fit.new_tensor(SCALES)[:, None] + constant.to(points)
+        peaks = self.log_weights.mT - special.i0e(scaled).log().sum(dim=-1)
+        own = ChainSum(ChainFits(means, kappa, self.order), peaks.to(points))
+        return in_blocks(own.log, points, BLOCK)
 
     def residuals(self, points: Tensor) -> Tensor:
         """Return angles less their regressions, in radians (N, K, d), for points (N, d)."""

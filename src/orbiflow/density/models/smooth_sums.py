@@ -9,7 +9,7 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.terms import BLOCK_ENTRIES, WIDE, Terms, lengths2
+from orbiflow.density.models.terms import BLOCK_ENTRIES, LOG2_E, Terms, lengths2
 from orbiflow.typed_torch import broadcast, linalg
 
 LEAST = 1e-290
@@ -196,7 +196,7 @@ class Patch:
     def _product(self, terms: Terms, top: float) -> Tensor:
         """Return values (n, n) at the nodes of terms that are products over the two coordinates."""
         first, second = (
-            _exponents(center, kappa, _sphere(side[None])).clamp_min_(-WIDE).exp_()
+            _exponents(center, kappa, _sphere(side[None])).mul_(LOG2_E).exp2_()
             for center, kappa, side in zip(
                 self.chart.turned(terms.centers), terms.kappa, self._sides, strict=True
             )
@@ -211,7 +211,7 @@ class Patch:
         (centers,) = self.chart.turned(terms.centers)
         for at in torch.split(torch.arange(terms.size), block):
             table = _exponents(centers[:, at], terms.kappa[0][at], local)
-            found = table.add_(terms.peaks[at] - top).clamp_min_(-WIDE).exp_().sum(dim=1) + found
+            found = table.add_(terms.peaks[at] - top).mul_(LOG2_E).exp2_().sum(dim=1) + found
         assert isinstance(found, Tensor)
         return found.reshape(NODES, -1)
 

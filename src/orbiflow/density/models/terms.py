@@ -7,6 +7,7 @@ run along the memory.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -15,6 +16,13 @@ from torch import Tensor
 
 FAINT = -80.0
 """Logarithm, relative to the largest, of terms that no sum in double precision can feel."""
+
+
+LOG2_E = math.log2(math.e)
+"""Powers of 2 are twice as fast as exponentials, and no slower where they underflow."""
+
+TINY = 1e-300
+"""The least sum of terms that is not taken for 0."""
 
 
 def log_sum_exp(table: Tensor) -> Tensor:
@@ -41,7 +49,7 @@ def _terms(table: Tensor) -> tuple[Tensor, Tensor]:
     """Return exponentials (..., n) relative to the largest, and its logarithm (..., 1)."""
     top = table.amax(dim=-1, keepdim=True).clamp_min(torch.finfo(table.dtype).min)
     # in place: at this size, fresh memory costs more than the arithmetic
-    return (table - top).clamp_min_(FAINT).exp_(), top
+    return (table - top).clamp_min_(FAINT).mul_(LOG2_E).exp2_(), top
 
 
 WIDE = 600.0
@@ -94,21 +102,20 @@ class Terms(NamedTuple):
         """
         rows, bias, offset, parts = self._about(features, middle)
         top = self.peaks.max()
-        bias = bias - top
+        bias, binary = (bias - top).mul_(LOG2_E), rows * LOG2_E
         values: list[Tensor] = []
         slopes: list[Tensor] = []
         for part in parts:
-            table = torch.addmm(bias, part.mT, rows)
+            table = torch.addmm(bias, part.mT, binary)
             high: Tensor | float = 0.0
             if spread > WIDE:
                 high = table.amax(dim=1)
                 table.sub_(high[:, None])
-            table.clamp_min_(-WIDE - 80).exp_()
-            total = table.sum(dim=1)
-            values.append(total.log() + high)
+            total = table.exp2_().sum(dim=1).clamp_min_(TINY)
+            values.append(total.log2() + high)
             if slope:
                 slopes.append(rows @ table.mT / total)
-        found = torch.cat(values) + top
+        found = torch.cat(values).div_(LOG2_E).add_(top)
         if not slope:
             return found, None
         linear, square = torch.split(torch.cat(slopes, dim=1), [len(middle), self.factors])
