@@ -170,11 +170,12 @@ def test_an_outdone_flow_is_refined_no_further() -> None:
         stages = fit_density(SPACE, points.double(), settings, outdone=outdone)[1].stages
         return [(stage.stopped, len(stage.validation)) for stage in stages]
 
-    hopes: list[float] = []
-    assert fitted(lambda _, hope: hopes.append(hope) or True) == [("outdone", 3)]
+    for times in (1, 2):  # after a quarter of the first stage, and halfway
+        hopes: list[float] = []
+        given_up = fitted(lambda _, hope, own=hopes, n=times: own.append(hope) or len(own) == n)
+        assert given_up == [("outdone", 1 + times)]
     assert fitted(lambda _, hope: hope == 0) == fitted(None)[:1]
     assert fitted(lambda *_: False) == fitted(None)
-    assert len(hopes) == 1
 
 
 @pytest.mark.parametrize("count", [1, 2])

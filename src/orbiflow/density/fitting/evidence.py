@@ -6,7 +6,7 @@ The weights of densities by what they give to rows that were held out: stacking.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import count
 from typing import NamedTuple
@@ -45,6 +45,7 @@ class Candidates:
     table: Tensor
     fitted: dict[str, list[dict[str, Density]]]
     row_weights: Tensor | None = None
+    _best: dict[tuple[bool, ...], Tensor] = field(default_factory=dict[tuple[bool, ...], Tensor])
 
     @property
     def floor(self) -> Tensor:
@@ -56,11 +57,14 @@ class Candidates:
         return torch.tensor([family in (FLOOR, *families) for family, _ in self.keys])
 
     def mixed(self, chosen: Tensor) -> Tensor:
-        """Return the best weights (P,) of those of a mask (P,)."""
-        weights = torch.zeros(len(self.table), dtype=self.table.dtype)
-        table, floor = self.table[chosen], self.floor[chosen]
-        weights[chosen] = sparse_weights(table, floor, self.row_weights)
-        return weights
+        """Return the best weights (P,) of those of a mask (P,); asked again, they are known."""
+        key = tuple(listed(chosen))
+        if key not in self._best:
+            weights = torch.zeros(len(self.table), dtype=self.table.dtype)
+            table, floor = self.table[chosen], self.floor[chosen]
+            weights[chosen] = sparse_weights(table, floor, self.row_weights)
+            self._best[key] = weights
+        return self._best[key]
 
 
 class Course:

@@ -13,7 +13,14 @@ from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
 from orbiflow.arguments import as_instance
-from orbiflow.density.fitting.likelihood import Budget, Refinement, merged, refine, training
+from orbiflow.density.fitting.likelihood import (
+    Budget,
+    HopelessAt,
+    Refinement,
+    merged,
+    refine,
+    training,
+)
 from orbiflow.density.fitting.report import (
     MASS_TOLERANCE,
     MOST_REPORTED,
@@ -58,9 +65,6 @@ MERGED, CROWD = 4096, 2
 Outdone = Callable[[FlowDensity, float], bool]
 """Whether a flow can be given up that may still gain so many nats."""
 
-HOPE = 2.0
-"""What a flow may gain after half of its iterations, in gains of the quarter before."""
-
 
 def refine_in_stages(
     density: FlowDensity,
@@ -73,7 +77,7 @@ def refine_in_stages(
 ) -> list[Refinement]:
     """Refine once for each roughness; the density's flow ends with the last one's parameters and steps.
 
-    It may be given up if it is `outdone`, halfway through the first stage or after it.
+    It may be given up if it is `outdone`, during the first stage or after it.
 
     A stage is scored at doubled steps. What is worse than before at twice as many again has gained
     from the integrator's errors alone: it is undone, and repeated at doubled steps.
@@ -83,44 +87,62 @@ def refine_in_stages(
         return stages
     train, held = _refined_on(train, validation, settings.max_frequency)
     count = len(settings.roughness)
+
+    def hopeless(hope: float) -> bool:
+        return outdone is not None and outdone(density, hope)
+
     while len(stages) < count and not budget.is_spent:
         number = len(stages)
-
-        def watch(iteration: int, nll: float, score: float, number: int = number) -> None:
-            share = (number + iteration / settings.iterations) / count
-            say(share, f"likelihood: train {nll:.4f}, validation {score:.4f}")
-
-        def hopeless(gained: float) -> bool:
-            return outdone is not None and outdone(density, HOPE * gained)
-
-        before = [p.detach().clone() for p in density.flow.parameters()]
-        stage = refine(
-            density,
-            train,
-            held,
-            iterations=settings.iterations,
-            roughness=settings.roughness[number],
-            budget=budget,
-            watch=watch,
-            hopeless=None if number else hopeless,
+        stage = _stage(
+            density, train, held, settings, number, say, budget, None if number else hopeless
         )
-        if stage.best and _exploits(density, held, stage):
-            with torch.no_grad():
-                for parameter, value in zip(density.flow.parameters(), before, strict=True):
-                    parameter.copy_(value)
-            if density.flow.steps >= MOST_TRAINING_STEPS:
-                break
-            density.flow = density.flow.with_steps(2 * density.flow.steps)
-            continue
-        stages.append(stage)
-        if stage.stopped == "outdone" or (number == 0 and count > 1 and hopeless(0.0)):
+        can_double = density.flow.steps < MOST_TRAINING_STEPS
+        if stage is None and not can_double:
             break
-        unconverged = step_error(density, held.points) > MASS_TOLERANCE
-        if unconverged and density.flow.steps < MOST_TRAINING_STEPS:
+        if stage is not None:
+            stages.append(stage)
+            if stage.stopped == "outdone" or (number == 0 and count > 1 and hopeless(0.0)):
+                break
+        if stage is None or (step_error(density, held.points) > MASS_TOLERANCE and can_double):
             density.flow = density.flow.with_steps(2 * density.flow.steps)
         elif number > 1 and stage.best == 0:
             break
     return stages
+
+
+def _stage(
+    density: FlowDensity,
+    train: Rows,
+    held: Rows,
+    settings: FlowSettings,
+    number: int,
+    say: Progress,
+    budget: Budget,
+    hopeless: HopelessAt | None,
+) -> Refinement | None:
+    """Refine at one roughness; undo what has only exploited the integrator, and return None."""
+
+    def watch(iteration: int, nll: float, score: float) -> None:
+        share = (number + iteration / settings.iterations) / len(settings.roughness)
+        say(share, f"likelihood: train {nll:.4f}, validation {score:.4f}")
+
+    before = [p.detach().clone() for p in density.flow.parameters()]
+    stage = refine(
+        density,
+        train,
+        held,
+        iterations=settings.iterations,
+        roughness=settings.roughness[number],
+        budget=budget,
+        watch=watch,
+        hopeless=hopeless,
+    )
+    if not stage.best or not _exploits(density, held, stage):
+        return stage
+    with torch.no_grad():
+        for parameter, value in zip(density.flow.parameters(), before, strict=True):
+            parameter.copy_(value)
+    return None
 
 
 def _refined_on(train: Rows, validation: Rows, max_frequency: int) -> tuple[Rows, Rows]:

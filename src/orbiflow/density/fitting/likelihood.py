@@ -39,7 +39,11 @@ Watch = Callable[[int, float, float], None]
 """A function called with the iteration and the training and validation scores, in nats."""
 
 HopelessAt = Callable[[float], bool]
-"""Whether to end a descent that has gained so many nats in the second quarter of its iterations."""
+"""Whether to end a descent that may still gain so many nats."""
+
+HOPES = {0.25: 4.0, 0.5: 2.0}
+"""What a descent may still gain after these shares of its iterations, in gains of the second half of
+those so far: with each doubling of the iterations the gains become smaller."""
 
 
 @dataclass(frozen=True)
@@ -144,13 +148,13 @@ def refine(
 
     Canonical points (N, d) are in the parameters' dtype; weights, if there are any, have the sum 1. It
     ends after `iterations`, or `PATIENCE` of them that do not improve the held-out score, or when the
-    `budget` is spent, or halfway if it is `hopeless`, which may look at the density. `watch` is told
-    every score.
+    `budget` is spent, or where `HOPES` ask if it is `hopeless`, which may look at the density. `watch`
+    is told every score.
     """
     budget = budget or Budget()
     began = time.monotonic()
     objective = Objective(density, train, roughness)
-    descent = _Descent(objective, held, watch, iterations / 2, hopeless)
+    descent = _Descent(objective, held, watch, iterations, hopeless)
 
     def loss(values: Array) -> tuple[float, Array]:
         budget.spend()
@@ -191,11 +195,12 @@ class _Descent:
         objective: Objective,
         held: Rows,
         watch: Watch | None,
-        half: float,
+        iterations: int,
         hopeless: HopelessAt | None,
     ) -> None:
         self.objective, self.held, self.watch = objective, held, watch
-        self.half, self.hopeless = half, hopeless
+        self.hopes = {share * iterations: hope for share, hope in HOPES.items()}
+        self.hopeless = hopeless
         self.done, self.best = 0, 0
         self.latest = self.kept = objective.get()
         with torch.no_grad():
@@ -210,10 +215,11 @@ class _Descent:
             self._look()
             if EVERY * (len(self.scores) - 1 - self.best) >= PATIENCE:
                 raise Stop("validation")
-            if self.hopeless and self.done - EVERY < self.half <= self.done:
-                quarter = self.scores[len(self.scores) // 2]
-                if self.hopeless(quarter - self.scores[-1]):
-                    raise Stop("outdone")
+            for asked, hope in self.hopes.items():
+                if self.hopeless and self.done - EVERY < asked <= self.done:
+                    halfway = self.scores[min(len(self.scores) // 2, len(self.scores) - 2)]
+                    if self.hopeless(hope * (halfway - self.scores[-1])):
+                        raise Stop("outdone")
 
     def finish(self) -> None:
         """Leave the best iterate in place."""

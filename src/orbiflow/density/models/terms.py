@@ -105,8 +105,10 @@ class Terms(NamedTuple):
         bias, binary = (bias - top).mul_(LOG2_E), rows * LOG2_E
         values: list[Tensor] = []
         slopes: list[Tensor] = []
+        space = features.new_empty(parts[0].shape[1], self.size)  # once: fresh memory is slow
         for part in parts:
-            table = torch.addmm(bias, part.mT, binary)
+            table = space[: part.shape[1]]
+            torch.addmm(bias, part.mT, binary, out=table)
             high: Tensor | float = 0.0
             if spread > WIDE:
                 high = table.amax(dim=1)
