@@ -6,6 +6,7 @@ import torch
 from hypothesis import HealthCheck, register_random, settings
 
 from bent_tiles import bent_tile_fixture, equivariant_fixture  # noqa: F401
+from small_searches import small_searches_fixture  # noqa: F401
 
 torch.set_num_threads(1)
 torch.set_warn_always(True)  # a warning must not depend on which test comes first

@@ -33,7 +33,7 @@ def test_the_symmetric_field_snippet_runs():
     assert "log_det" in run(snippet)
 
 
-def test_the_first_snippet_draws_a_certified_tile(tmp_path, monkeypatch, capsys):
+def test_the_first_snippet_draws_a_certified_tile(tmp_path, monkeypatch, capsys, small_searches):  # noqa: ARG001
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(README_PATH.parent / "examples")
     # the whole search takes a quarter of a minute

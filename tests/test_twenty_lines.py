@@ -24,7 +24,11 @@ SAID = (
     r"held out: (0|1)\.\d\d nats\nintegrals: \[(1\. *|0\.99 *|1\.01 *){3}\]\n",
 )
 # what makes a program quick enough for a test
-SMALLER = (("range(60)", "range(25)"), ("range(40)", "range(15)"))
+SMALLER = (
+    ("range(60)", "range(25)"),
+    ("range(40)", "range(15)"),
+    ('effort="fast"', 'effort="fast", classes=["IH4"]'),
+)
 LEFT = (
     *("carried.png", "p6m.png", None, "stripes/density.png", "tile.svg"),
     *("fish.png", "fitted.png", "contexts.png"),

@@ -22,9 +22,18 @@ from orbiflow.runtime import (
 )
 from runtime.searches import ENDLESS, boot_call, check_order, likeness_call
 
+SMALL = "runtime.small_process"
+
+
+@pytest.fixture(name="small", autouse=True)
+def small_fixture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let processes find the module that makes their searches small."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[1]), prepend=os.pathsep)
+
 
 def test_a_search_in_a_process(tmp_path: Path) -> None:
-    with CallProcess(likeness_call(tmp_path, "IH3", "IH7", workers=2)) as process:
+    call = likeness_call(tmp_path, "IH3", "IH7", workers=2)
+    with CallProcess(call, modules=[SMALL]) as process:
         events = list(process.events())
         assert process.wait() == 0
     check_order(events, "IH3", "IH7")
@@ -38,7 +47,7 @@ def test_two_calls_are_started_from_threads(tmp_path: Path) -> None:
 
     def work(name: str) -> None:
         (tmp_path / name).mkdir()
-        with CallProcess(likeness_call(tmp_path / name, name)) as process:
+        with CallProcess(likeness_call(tmp_path / name, name), modules=[SMALL]) as process:
             found[name] = list(process.events())
 
     threads = [threading.Thread(target=work, args=(name,)) for name in ("IH3", "IH7")]

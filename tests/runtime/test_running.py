@@ -115,6 +115,7 @@ def test_a_search_cancelled_on_the_way_keeps_what_was_found(tmp_path: Path) -> N
     assert (tmp_path / "out" / "IH4" / "tile.svg").is_file()
 
 
+@pytest.mark.usefixtures("small_searches")
 def test_a_first_look_alone_is_kept_unless_there_is_more(tmp_path: Path) -> None:
     path = tmp_path / "boot.json"
     path.write_text(json.dumps(BOOT))

@@ -16,7 +16,7 @@ from orbiflow.studio import tasks
 from orbiflow.studio.settings import Job, SearchChoice
 from orbiflow.studio.tasks import read, search
 from orbiflow.studio.tile_files import best_stage, put_tile, tile_folder
-from orbiflow.tiles import EscherTile, LikenessSearch, OverlapSearch
+from orbiflow.tiles import EscherTile, OverlapSearch
 
 BOOT = b"[[0, 0], [30, 0], [34, 12], [22, 15], [20, 28], [8, 25]]"
 CHOICE = SearchChoice(effort="fast", classes=("IH4", "IH7"))
@@ -26,9 +26,7 @@ Seen = list[tuple[int, str]]
 
 
 @pytest.fixture(autouse=True)
-def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
-    few: dict[str, Any] = {"placements": 10, "held": 3, "starts": 2, "finalists": 1, "rounds": 2}
-    monkeypatch.setitem(LikenessSearch.efforts, "fast", {**few, "bodies": ("firm",)})  # pyright: ignore
+def one_core(small_searches: None, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: ARG001
     monkeypatch.setattr(tasks, "cores", lambda: 1)
 
 

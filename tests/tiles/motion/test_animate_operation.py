@@ -28,7 +28,7 @@ BOOT = "[[60, 20], [210, 20], [230, 80], [170, 95], [160, 190], [100, 145], [45,
 def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
     (folder / "boot.json").write_text(BOOT)
-    given = {"classes": ["IH4", "IH6"], "method": "occupancy", "turns": 2, "iterations": 10}
+    given = {"classes": ["IH4", "IH6"], "method": "occupancy", "turns": 1, "iterations": 4}
     find("escherize").call({"image": folder / "boot.json", "out": folder / "out", **given}).run()
     return folder / "out"
 

@@ -1,0 +1,29 @@
+"""Searches at the effort "fast" made smaller still, for tests of what a search is embedded in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from orbiflow.tiles import LikenessSearch
+
+FEW: dict[str, Any] = {
+    "placements": 10, "held": 3, "starts": 2, "finalists": 1, "rounds": 2, "bodies": ("firm",),
+}  # fmt: skip
+
+
+@contextmanager
+def small_searches() -> Iterator[None]:
+    """Search for likeness at the effort "fast" from few places, in this process and its forks."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(LikenessSearch.efforts, "fast", FEW)  # pyright: ignore[reportArgumentType]
+        yield
+
+
+@pytest.fixture(name="small_searches")
+def small_searches_fixture() -> Iterator[None]:
+    with small_searches():
+        yield
