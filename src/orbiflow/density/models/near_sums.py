@@ -12,20 +12,21 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.smooth_sums import Chart, Patch, Tile
-from orbiflow.density.models.terms import Terms
+from orbiflow.density.models.charts import Chart, Tile
+from orbiflow.density.models.smooth_sums import FEW_NODES, NODES, Patch, is_steep
+from orbiflow.density.models.terms import LOG2_E, Terms
 from orbiflow.typed_torch import applied
 
 TOLERANCE = 1e-12
 """The share of a sum that may be left out, and that interpolation may miss."""
 
-FEW_POINTS, FEW_PAIRS = 256, 200_000
+FEW_POINTS, FEW_PAIRS = 256, 2_500_000
 """Tiles with fewer points, or fewer points times terms, are not divided further."""
 
 FEWEST_PAIRS = 20_000
 """Fewer points times terms are summed one by one at once: looking for tiles would take longer."""
 
-WORTH_FLAT, WORTH_ROUND = 500, 2_000
+WORTH_FLAT, WORTH_ROUND = 2_500, 2_500
 """The fewest points of a tile for which smooth terms are interpolated, flat and round."""
 
 WORTH_TERMS = 200
@@ -164,19 +165,29 @@ class _Walk:
         chart = patch.chart if patch else Chart(tile)
         own = Patch(chart, patch.u if patch else chart.coordinates(features))
         allowed = (self.tolerance + least).clamp_min_(bottom + self.each)[wide]
-        smooth = wide.clone()
-        smooth[wide] = own.errors(terms.only(wide), largest[wide], tile) < allowed
-        if int(smooth.sum()) < WORTH_TERMS:
+        some, top = terms.only(wide), largest[wide]
+        few, many = (errors < allowed for errors in own.errors(some, top, tile))
+        many &= ~is_steep(some, tile)
+        few &= many
+        if int(many.sum()) < WORTH_TERMS:
             return patch, None
         if patch:
             own.take(patch)
-        own.add(terms.only(smooth), float(largest[smooth].max()))
+        for which, count in ((few, FEW_NODES), (many & ~few, NODES)):
+            if bool(which.any()):
+                own.add(some.only(which), float(top[which].max()), count)
+        smooth = wide.clone()
+        smooth[wide] = many
         return own, smooth
 
 
 def log_add(one: float, logs: Tensor) -> float:
     """Return the logarithm of exp(`one`) and all exponentials of logarithms (K,) together."""
-    return float(np.logaddexp(one, float(logs.logsumexp(dim=0))))
+    top = float(logs.max())
+    if top == -math.inf:
+        return one
+    total = float((logs - top).mul_(LOG2_E).exp2_().sum())
+    return float(np.logaddexp(one, top + math.log(total)))
 
 
 def _halves(features: Tensor, tile: Tile) -> tuple[Tensor, Tensor]:

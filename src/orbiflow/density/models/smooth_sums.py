@@ -9,123 +9,40 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.terms import BLOCK_ENTRIES, LOG2_E, Terms, lengths2
-from orbiflow.typed_torch import broadcast, linalg
+from orbiflow.density.models.charts import ELLIPSES, Chart, Tile
+from orbiflow.density.models.terms import BLOCK_ENTRIES, LOG2_E, Terms
 
 LEAST = 1e-290
 """The least interpolated sum, relative to the largest value."""
 
-NODES = 28
-"""Chebyshev points along a side of a tile."""
-
-ELLIPSES = (3.0, 5.0, 9.0)
-"""Sums of the half axes of the ellipses on which terms are bounded, in half sides of the tile."""
-
-TURNS = 9
-"""Points of half an ellipse at which terms are bounded; between them they are within `BETWEEN`."""
+FEW_NODES, NODES = 14, 28
+"""Chebyshev points along a side of a tile, for what is very smooth and for what is smooth."""
 
 BETWEEN = 1.5
-"""Logarithm of how much larger a term may be between those points."""
+"""Logarithm of how much larger a term may be between the points at which it is bounded."""
 
 ROUNDING = math.log(1e-15)
 """Logarithm of the rounding error of interpolation, relative to the largest value in the tile."""
 
-POLE = 0.75
-"""The largest coordinate, complex ones included: the chart has poles at plus and minus i."""
+MOST_POWERS = 18
+"""The most products of matrices that are cheaper than exponentials at all nodes."""
 
-
-class Tile:
-    """A box around features (m, N), N > 0."""
-
-    def __init__(self, features: Tensor, factors: int) -> None:
-        low, high = features.amin(dim=1), features.amax(dim=1)
-        self.factors = factors
-        self.middle, self.sides = (low + high) / 2, high - low
-        self.radius = self._away2(features).amax(dim=1).sqrt()
-
-    def bounds(self, terms: Terms) -> tuple[Tensor, Tensor]:
-        """Return the least and largest logarithms (K,) of the terms in the tile.
-
-        They are bounds by the triangle inequality.
-        """
-        away, radius = self._away2(terms.centers).sqrt_(), self.radius[:, None]
-        nearest = (away - radius).clamp_min_(0).square_().mul_(terms.kappa)
-        farthest = away.add_(radius).square_().mul_(terms.kappa)
-        return (
-            torch.sub(terms.peaks, farthest.sum(dim=0), alpha=0.5),
-            torch.sub(terms.peaks, nearest.sum(dim=0), alpha=0.5),
-        )
-
-    def nearest2(self, terms: Terms, factor: int) -> Tensor:
-        """Return kappa times the squared distance (K,) of centers to the tile in one factor."""
-        middle = self.middle.reshape(-1, self.factors)[:, factor, None]
-        centers = terms.centers.reshape(-1, self.factors, terms.size)[:, factor]
-        away = ((centers - middle) ** 2).sum(dim=0).sqrt_().sub_(self.radius[factor])
-        return away.clamp_min_(0).square_().mul_(terms.kappa[factor])
-
-    def _away2(self, features: Tensor) -> Tensor:
-        """Return squares (F, N) of distances from the middle."""
-        return lengths2(features - self.middle[:, None], self.factors)
-
-    @property
-    def has_chart(self) -> bool:
-        """Whether it can have a `Chart`: two dimensions at most, less than a third of a turn."""
-        dims = len(self.middle) - self.factors
-        return dims <= 2 and bool((self.radius < 0.85).all())
-
-
-class Chart:
-    """Stereographic coordinates, the tangents of half the angles (D, N), about a tile's middle.
-
-    D is F for circles and 2 for a sphere.
-    """
-
-    def __init__(self, tile: Tile) -> None:
-        self.factors = tile.factors
-        pole = tile.middle.reshape(-1, self.factors)
-        self._frame = _frame(pole / linalg.vector_norm(pole, dim=0))
-
-    def coordinates(self, features: Tensor) -> Tensor:
-        """Return the coordinates (D, N) of features (m, N)."""
-        return torch.cat([local[1:] / (1 + local[:1]) for local in self.turned(features)])
-
-    def turned(self, features: Tensor) -> list[Tensor]:
-        """Return features of each factor (s, N) in its frame: along the pole, then across."""
-        split = features.reshape(-1, self.factors, features.shape[1]).unbind(dim=1)
-        return [frame @ part for frame, part in zip(self._frame, split, strict=True)]
-
-    def in_features(self, slope: Tensor, features: Tensor) -> Tensor:
-        """Return a gradient (D, N) in the coordinates as one in the features, (m, N).
-
-        It is that of some continuation beyond the spheres.
-        """
-        found: list[Tensor] = []
-        parts = torch.split(slope, len(slope) // self.factors)
-        for frame, local, part in zip(self._frame, self.turned(features), parts, strict=True):
-            below = 1 + local[:1]
-            across = part / below
-            along = -(across * local[1:] / below).sum(dim=0, keepdim=True)
-            found.append(frame.mT @ torch.cat([along, across]))
-        return torch.stack(found, dim=1).flatten(0, 1)
+STEEPEST = 300.0
+"""Exponents of factors of a term, which must not overflow."""
 
 
 class Patch:
     """Points u (D, N) of a chart, the box about them, and the sum of terms that are smooth across it.
 
     Sums of terms that are analytic well beyond the box are polynomials of degree `NODES` - 1 in each
-    coordinate: they are known by their values (n, n), over exp(`top`), at Chebyshev points.
+    coordinate: `_series` are their Chebyshev coefficients (n, n), over exp(`_top`).
     """
 
     def __init__(self, chart: Chart, u: Tensor) -> None:
         self.chart, self.u = chart, u
-        low, high = u.amin(dim=1), u.amax(dim=1)
+        low, high = torch.aminmax(u, dim=1)
         self.middle, self.half = (low + high) / 2, ((high - low) / 2).clamp_min(1e-9)
-        self._values, self._top = u.new_zeros(1, 1), -math.inf
-
-    @property
-    def _sides(self) -> Tensor:
-        """The coordinates (D, n) of the nodes."""
-        return self.middle[:, None] + self.half[:, None] * _nodes()
+        self._series, self._top = u.new_zeros(NODES, NODES if len(u) > 1 else 1), -math.inf
 
     def only(self, which: Tensor) -> Patch:
         """Return the same sums in the same box, at some of its points."""
@@ -135,156 +52,163 @@ class Patch:
 
     def take(self, whole: Patch) -> None:
         """Take the sums of a patch that this one is a part of."""
-        sides = (self._sides - whole.middle[:, None]) / whole.half[:, None]
-        first, *second = (_chebyshev(t) @ _transform() for t in sides)
-        self._values, self._top = first @ whole._values, whole._top
+        nodes = self.middle[:, None] + self.half[:, None] * _nodes(NODES)
+        sides = (nodes - whole.middle[:, None]) / whole.half[:, None]
+        first, *second = (_transform(NODES) @ _chebyshev(t).mT for t in sides)
+        self._series, self._top = first @ whole._series, whole._top
         if second:
-            self._values = self._values @ second[0].mT
+            self._series = self._series @ second[0].mT
 
-    def add(self, terms: Terms, top: float) -> None:
-        """Add terms, which are below exp(top) in the box."""
-        flat = len(terms.kappa) == 2
-        found = self._product(terms, top) if flat else self._dense(terms, top)
+    def add(self, terms: Terms, top: float, count: int) -> None:
+        """Add terms, which are below exp(top) in the box, by so many nodes along a side."""
+        offset = self.half[:, None] * _nodes(count)
+        values = self._on_sphere if self.chart.is_round else self._on_circles
         highest = max(top, self._top)
-        self._values = self._values * math.exp(self._top - highest)
-        self._values = self._values + found * math.exp(top - highest)
+        found = _transform(count) @ values(terms, top, offset)
+        if len(offset) > 1:
+            found = found @ _transform(count).mT
+        self._series = self._series * math.exp(self._top - highest)
+        self._series[: len(found), : found.shape[1]] += found * math.exp(top - highest)
         self._top = highest
 
     def log_sum(self, features: Tensor, *, slope: bool) -> tuple[Tensor, Tensor | None]:
         """Return the logarithm (N,) of the sum at the points, and its gradient (m, N) if wanted."""
         u = (self.u - self.middle[:, None]) / self.half[:, None]
         along, *other = (_chebyshev(t) for t in u)
-        across = other[0] if other else torch.ones_like(along[:, :1])
-        series = _transform() @ self._values
-        if other:
-            series = series @ _transform().mT
+        across = other[0] if other else torch.ones_like(along[:1])
         # what is negligible beside others may come out below 0
-        sums = ((along @ series) * across).sum(dim=1).clamp_min_(LEAST)
+        sums = (self._series @ across).mul_(along).sum(dim=0).clamp_min_(LEAST)
         if not slope:
             return sums.log() + self._top, None
-        rates = [((along @ (_derivative() @ series)) * across).sum(dim=1)]
+        rates = [(_derivative() @ self._series @ across).mul_(along).sum(dim=0)]
         if other:
-            rates.append(((along @ (series @ _derivative().mT)) * across).sum(dim=1))
+            rates.append((self._series @ _derivative().mT @ across).mul_(along).sum(dim=0))
         gradient = torch.stack(rates) / self.half[:, None] / sums
         return sums.log() + self._top, self.chart.in_features(gradient, features)
 
-    def errors(self, terms: Terms, largest: Tensor, tile: Tile) -> Tensor:
-        """Return logarithms (K,) of bounds on the interpolation error of each term.
+    def errors(self, terms: Terms, largest: Tensor, tile: Tile) -> list[Tensor]:
+        """Return logarithms (K,) of bounds on each term's interpolation error, by few and by all nodes.
 
         Along an axis by 4 M rho^(1 - n) / (rho - 1), M the largest value on the ellipse of rho
         (Trefethen, Approximation Theory and Approximation Practice, 2013, theorem 8.2), times the
         Lebesgue constant of the other axis. The terms in the tile are below exp(`largest`), (K,).
         """
-        centers, factors = self.chart.turned(terms.centers), self.chart.factors
-        lebesgue = 1 + 2 / math.pi * math.log(NODES)
-        worst = largest + ROUNDING
-        for axis in range(len(self.middle)):
-            factor = axis if factors > 1 else 0
-            best = torch.full_like(largest, math.inf)
-            for rho in ELLIPSES:
-                cosine = self._ellipse(axis, rho, centers[factor])
-                if cosine is not None:
-                    scale = math.log(8 * lebesgue / (rho - 1)) - (NODES - 1) * math.log(rho)
-                    found = cosine.sub_(1).mul_(terms.kappa[factor]).add_(scale + BETWEEN)
-                    best = torch.minimum(best, found)
-            if factors > 1:
-                # terms are products: the other factor's largest value counts as it is
-                best += largest - terms.peaks + tile.nearest2(terms, factor) / 2
-            worst = torch.maximum(worst, best + terms.peaks)
-        return worst
+        reach = self.chart.reach(self.middle, self.half, self.chart.turned(terms.centers))
+        exponents = reach.sub_(1).mul_(terms.kappa[:, None])
+        shared: Tensor | float = 0.0
+        if self.chart.factors > 1:
+            # terms are products: the other factor's largest value counts as it is
+            shared = (tile.nearest2(terms) / 2).add_(largest - terms.peaks)
+        found: list[Tensor] = []
+        for scale in (_scale(FEW_NODES), _scale(NODES)):
+            worst = ((exponents + scale[:, None]).amin(dim=1) + shared).amax(dim=0) + terms.peaks
+            found.append(torch.maximum(worst, largest + ROUNDING))
+        return found
 
-    def _product(self, terms: Terms, top: float) -> Tensor:
-        """Return values (n, n) at the nodes of terms that are products over the two coordinates."""
-        first, second = (
-            _exponents(center, kappa, _sphere(side[None])).mul_(LOG2_E).exp2_()
-            for center, kappa, side in zip(
-                self.chart.turned(terms.centers), terms.kappa, self._sides, strict=True
-            )
-        )
-        return (first * (terms.peaks - top).exp()) @ second.mT
+    def _on_circles(self, terms: Terms, top: float, offset: Tensor) -> Tensor:
+        """Return values (n, n), or (n, 1) on a circle, of terms: products over the coordinates."""
+        u = self.middle[:, None] + offset
+        square = u * u
+        local = torch.stack([1 - square, 2 * u], dim=1) / (1 + square)[:, None]
+        # about the nodes' middle, see `Terms.log_sum`
+        middle = local.mean(dim=2, keepdim=True)
+        centers, near = self.chart.turned(terms.centers) - middle, local - middle
+        table = torch.baddbmm((centers**2).sum(dim=1, keepdim=True) / -2, near.mT, centers)
+        table.sub_((near**2).sum(dim=1)[..., None] / 2).mul_(terms.kappa[:, None] * LOG2_E)
+        first, *second = table.exp2_()
+        first.mul_((terms.peaks - top).exp_())
+        return first @ second[0].mT if second else first.sum(dim=1, keepdim=True)
 
-    def _dense(self, terms: Terms, top: float) -> Tensor:
-        """Return values (n, n), or (n, 1) on a circle, at the nodes."""
-        grid = torch.stack(torch.meshgrid(*self._sides, indexing="ij")).flatten(1)
-        local, found = _sphere(grid), 0.0
-        block = max(1, BLOCK_ENTRIES // local.shape[1])
-        (centers,) = self.chart.turned(terms.centers)
-        for at in torch.split(torch.arange(terms.size), block):
-            table = _exponents(centers[:, at], terms.kappa[0][at], local)
-            found = table.add_(terms.peaks[at] - top).mul_(LOG2_E).exp2_().sum(dim=1) + found
-        assert isinstance(found, Tensor)
-        return found.reshape(NODES, -1)
+    def _on_sphere(self, terms: Terms, top: float, offset: Tensor) -> Tensor:
+        """Return values (n, n) of terms on a sphere, which are nearly products over the coordinates.
 
-    def _ellipse(self, axis: int, rho: float, centers: Tensor) -> Tensor | None:
-        """Return the largest real part (K,) of cosines to centers (s, K) along an ellipse.
-
-        One coordinate runs along the ellipse, the other one is real. None if the ellipse comes near the
-        poles of the chart.
+        A term is exp(peak - kappa |x0 - c|^2 / 2 + kappa c.(x - x0)) about a place x0 in the box. The
+        height of x - x0 is a sum over the coordinates, but for a small rest, of whose exponential few
+        powers are enough.
         """
-        if float(self.middle[axis].abs() + self.half[axis] * (rho + 1 / rho) / 2) > POLE:
-            return None
-        u = self.middle[axis] + self.half[axis] * _ellipse(rho)
-        if self.chart.factors > 1 or len(self.middle) == 1:
-            return (_sphere(u[None]).real.mT @ centers).amax(dim=0)
-        other = 1 - axis
-        across = self.middle[other] + self.half[other] * torch.tensor([-1.0, 0.0, 1.0])
-        pair = broadcast(u[:, None], across.to(u))
-        places = torch.stack(pair if axis == 0 else pair[::-1]).flatten(1)
-        return (_sphere(places).real.mT @ centers).amax(dim=0)
+        (centers,), kappa = self.chart.turned(terms.centers), terms.kappa[0]
+        start = torch.cat([(1 - self.middle.square().sum()).sqrt()[None], self.middle])
+        bias = terms.peaks - top - kappa / 2 * ((centers - start[:, None]) ** 2).sum(dim=0)
+        first, second = offset[0][:, None], offset[1][None]
+        zero = torch.zeros_like(first)
+        sides = (self._height(first, zero[:1]), self._height(zero[:1], second))
+        rest = self._height(first, second) - sides[0] - sides[1]
+        shift = float(rest.amax() + rest.amin()) / 2
+        rest = rest - shift
+        sharp = kappa * centers[0]
+        powers = _powers(float(sharp.abs().max()) * float(rest.abs().max()))
+        along, across = (
+            torch.stack([own, side.flatten()], dim=1) @ torch.stack([kappa * center, sharp])
+            for own, side, center in zip(offset, sides, centers[1:], strict=True)
+        )
+        weight = bias.add_(sharp * shift)
+        if powers > MOST_POWERS:
+            return _dense(along, across, weight, sharp, rest)
+        left = along.add_(weight).mul_(LOG2_E).exp2_()
+        right = across.mul_(LOG2_E).exp2_().mT
+        found, factor = left @ right, torch.ones_like(rest)
+        for power in range(1, powers):
+            factor = factor * rest / power
+            found.addcmul_(factor, left.mul_(sharp) @ right)
+        return found
+
+    def _height(self, first: Tensor, second: Tensor) -> Tensor:
+        """Return heights (n, n) of the sphere over offsets (n, 1) and (1, n), above its middle's."""
+        a, b = self.middle
+        fall = first * (2 * a + first) + second * (2 * b + second)
+        below = 1 - a * a - b * b
+        return -fall / ((below - fall).sqrt() + below.sqrt())
 
 
-def _sphere(u: Tensor) -> Tensor:
-    """Return unit vectors (D + 1, N) of stereographic coordinates (D, N), complex ones too."""
-    square = (u * u).sum(dim=0, keepdim=True)
-    return torch.cat([1 - square, 2 * u]) / (1 + square)
+def is_steep(terms: Terms, tile: Tile) -> Tensor:
+    """Return which terms (K,) have factors that may overflow in `Patch.add`."""
+    reach = (tile.nearest2(terms).sqrt_() + tile.radius[:, None]).mul_(tile.radius[:, None])
+    return (reach > STEEPEST).any(dim=0)
 
 
-@lru_cache(maxsize=len(ELLIPSES))
-def _ellipse(rho: float) -> Tensor:
-    """Return half of an ellipse (T,) about -1 and 1, complex."""
+def _dense(along: Tensor, across: Tensor, weight: Tensor, sharp: Tensor, rest: Tensor) -> Tensor:
+    """Return sums (n, n) of exponentials of sums of tables (n, K), term by term."""
+    found = torch.zeros_like(rest)
+    for at in torch.split(torch.arange(len(weight)), max(1, BLOCK_ENTRIES // rest.numel())):
+        table = along[:, None, at] + across[None, :, at] + weight[at]
+        table.addcmul_(rest[..., None], sharp[at]).mul_(LOG2_E)
+        found += table.exp2_().sum(dim=2)
+    return found
+
+
+def _powers(largest: float) -> int:
+    """Return the number of powers of exponents up to the largest that make an exponential."""
+    count, last = 1, 1.0
+    while last > 1e-17 and count <= MOST_POWERS:
+        last *= largest / count
+        count += 1
+    return count
+
+
+@lru_cache(maxsize=2)
+def _scale(count: int) -> Tensor:
+    """Return logarithms (E,) of what bounds on the `ELLIPSES` are times, for so many nodes."""
+    lebesgue = 1 + 2 / math.pi * math.log(count)
     with torch.inference_mode(False):
-        angle = torch.linspace(0, math.pi, TURNS, dtype=torch.float64)
-        turned = torch.polar(torch.full_like(angle, rho), angle)
-        return (turned + 1 / turned) / 2
+        rho = torch.tensor(ELLIPSES, dtype=torch.float64)
+        return (8 * lebesgue / (rho - 1)).log() - (count - 1) * rho.log() + BETWEEN
 
 
-def _exponents(centers: Tensor, kappa: Tensor, local: Tensor) -> Tensor:
-    """Return kappa (cos - 1), (n, K), of unit vectors (s, K) and (s, n)."""
-    # about the nodes' middle, see `Terms.log_sum`
-    middle = local.mean(dim=1, keepdim=True)
-    offset, near = centers - middle, local - middle
-    table = torch.addmm((offset**2).sum(dim=0) / -2, near.mT, offset)
-    return table.sub_((near**2).sum(dim=0)[:, None] / 2).mul_(kappa)
-
-
-def _frame(pole: Tensor) -> Tensor:
-    """Return frames (F, s, s): rows are the pole (s, F) of each factor and unit vectors across."""
-    if len(pole) == 2:
-        x, y = pole
-        return torch.stack([torch.stack([x, y], dim=1), torch.stack([-y, x], dim=1)], dim=1)
-    start = pole[:, 0]
-    across = torch.zeros_like(start)
-    across[start.abs().argmin()] = 1
-    first = linalg.cross(start, across)
-    first = first / linalg.vector_norm(first)
-    return torch.stack([start, first, linalg.cross(start, first)])[None]
-
-
-@lru_cache(maxsize=1)
-def _nodes() -> Tensor:
+@lru_cache(maxsize=2)
+def _nodes(count: int) -> Tensor:
     """Return the Chebyshev points (n,) of [-1, 1]."""
     with torch.inference_mode(False):
-        return torch.cos(math.pi * (torch.arange(NODES, dtype=torch.float64) + 0.5) / NODES)
+        return torch.cos(math.pi * (torch.arange(count, dtype=torch.float64) + 0.5) / count)
 
 
-@lru_cache(maxsize=1)
-def _transform() -> Tensor:
+@lru_cache(maxsize=2)
+def _transform(count: int) -> Tensor:
     """Return the matrix (n, n) that makes Chebyshev coefficients from values at the nodes."""
-    angle = math.pi * (torch.arange(NODES, dtype=torch.float64) + 0.5) / NODES
+    angle = math.pi * (torch.arange(count, dtype=torch.float64) + 0.5) / count
     with torch.inference_mode(False):
-        matrix = torch.cos(torch.arange(NODES, dtype=torch.float64)[:, None] * angle)
+        matrix = torch.cos(torch.arange(count, dtype=torch.float64)[:, None] * angle)
         matrix[0] /= 2
-        return matrix * (2 / NODES)
+        return matrix * (2 / count)
 
 
 @lru_cache(maxsize=1)
@@ -299,5 +223,16 @@ def _derivative() -> Tensor:
 
 
 def _chebyshev(t: Tensor) -> Tensor:
-    """Return the Chebyshev polynomials (N, n) at t (N,), which rounding may put beyond 1."""
-    return torch.outer(t.clamp(-1, 1).acos_(), torch.arange(NODES).to(t)).cos_()
+    """Return the Chebyshev polynomials (n, N) at t (N,), which rounding may put beyond 1."""
+    table = t.new_empty(NODES, len(t))
+    table[0] = 1
+    table[1] = t.clamp(-1, 1)
+    known = 1
+    while known < NODES - 1:  # T_(k + i) = 2 T_k T_i - T_(k - i)
+        more = min(known, NODES - 1 - known)
+        found = torch.mul(
+            table[1 : more + 1], 2 * table[known], out=table[known + 1 : known + 1 + more]
+        )
+        found.sub_(table[known - more : known].flip(0))
+        known += more
+    return table
