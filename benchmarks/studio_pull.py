@@ -17,7 +17,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from orbiflow.studio import changing
+from orbiflow.studio import pulled_tiles
 from orbiflow.studio.tile_view import tile_card, tile_view
 from orbiflow.tiles import EscherizeSettings, EscherTile, Target, escherize
 
@@ -98,10 +98,10 @@ def turtle() -> EscherTile:
 def with_vertices(tile: EscherTile, count: int) -> dict[str, Any]:
     """Return the space of a tile, its outline divided until it has at least so many vertices."""
     for points in range(count // 2, 2 * count, 10):
-        changing.POINTS = points
-        if len(changing.variations(tile).first.polygon) >= count:
+        pulled_tiles.POINTS = points
+        if len(pulled_tiles.variations(tile).first.polygon) >= count:
             break
-    return changing.space_json(tile)
+    return pulled_tiles.space_json(tile)
 
 
 def measured(view: dict[str, Any], space: dict[str, Any], seconds: float, across: float) -> dict:

@@ -16,7 +16,7 @@ from scipy.sparse import csr_matrix
 from bent_tiles import bent_tile
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError
-from orbiflow.studio.changing import pulled, space_json
+from orbiflow.studio.pulled_tiles import pulled, space_json
 from orbiflow.tiles import EscherTile
 from outlines import bent_squirrel
 

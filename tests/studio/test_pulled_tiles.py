@@ -13,7 +13,7 @@ from scipy.sparse import csr_matrix
 
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.studio.changing import pulled, space_json, variations
+from orbiflow.studio.pulled_tiles import pulled, space_json, variations
 from orbiflow.studio.tile_drawing import drawing_settings, with_any_map
 from orbiflow.studio.tile_view import elements_json, tile_view
 from orbiflow.symmetry import Line, reflection, rotation

@@ -31,7 +31,7 @@ def space(job: Job, tile: int, *, on_event: Sink = ignore, cancel: Cancel = NEVE
     Args:
         tile: The number of the tile.
     """
-    from orbiflow.studio.changing import space_json
+    from orbiflow.studio.pulled_tiles import space_json
     from orbiflow.tiles import EscherTile
 
     del on_event
@@ -57,7 +57,7 @@ def pull(
         tile: The number of the tile that was pulled.
         parameters: Where it was pulled to, in the space that `studio space` wrote.
     """
-    from orbiflow.studio.changing import pulled, space_json
+    from orbiflow.studio.pulled_tiles import pulled, space_json
     from orbiflow.tiles import EscherTile
 
     cancel.check()

@@ -38,7 +38,7 @@ READINGS = frozenset({"read", "density table"})
 
 WARM = (
     "orbiflow.studio.tasks",
-    "orbiflow.studio.changing",
+    "orbiflow.studio.pulled_tiles",
     "orbiflow.studio.closeup_tasks",
     "orbiflow.studio.silhouette_file",
     "orbiflow.studio.tile_view",

@@ -58,6 +58,7 @@ from .motifs.source import with_map as with_map
 from .motion.settings import AnimationSettings as AnimationSettings
 from .motion.writers import animate as animate
 from .motion.writers import animation as animation
+from .pages.overview import overview_png as overview_png
 from .pages.page import index_page as index_page
 from .pages.run_folder import FIELD_FILES as FIELD_FILES
 from .pages.run_folder import OVERVIEW as OVERVIEW
@@ -66,7 +67,6 @@ from .pages.run_folder import write_gallery as write_gallery
 from .pages.run_folder import write_run as write_run
 from .pages.run_folder import write_tile_folder as write_tile_folder
 from .pages.run_folder import written_files as written_files
-from .pages.sheets import overview_png as overview_png
 from .pictures.overlays import bending_picture as bending_picture
 from .pictures.overlays import bending_raster as bending_raster
 from .pictures.overlays import overlay_picture as overlay_picture

@@ -15,7 +15,7 @@ import shapely
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import PALETTES, STRIP, rendered, window_of
-from orbiflow.tiles.pages.sheets import FILLED, LEFT_OUT, OUTLINE
+from orbiflow.tiles.pages.overview import FILLED, LEFT_OUT, OUTLINE
 from orbiflow.tiles.pictures import RAMP, default_window
 from orbiflow.tiles.search import ClassFailure, rounded_for, why_poor
 from orbiflow.tiles.silhouette import Target

@@ -21,8 +21,8 @@ from orbiflow.runtime import (
     write_atomic,
     write_json,
 )
+from orbiflow.tiles.pages.overview import is_read_png, overview_png
 from orbiflow.tiles.pages.page import TILE_FILES, index_page
-from orbiflow.tiles.pages.sheets import is_read_png, overview_png
 from orbiflow.tiles.pictures import (
     bending_picture,
     comparison,
