@@ -1,4 +1,4 @@
-"""What Pillow draws of a search: what was read (`read.png`), and all that was found (`overview.png`)."""
+"""What Pillow draws of a search: what was read (`read.png`) and what was found (`overview.png`)."""
 
 from __future__ import annotations
 
