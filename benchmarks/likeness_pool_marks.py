@@ -40,7 +40,8 @@ MARKS = ROOT / "benchmarks" / "data" / "likeness_pool.json"
 POINTS = 48  # of each outline: all tiles together stay below 1.5 MB
 ALSO = ("energy", "displacement", "neck", "iou")  # values that the order has no use for
 GOOD = 6.5  # the least mark that is good
-MEASURES = ("short pieces", "long pieces", "stretched", "thickness")
+VALUES = ("stretched", "thickness", "blunted", "moved", "cost", "length")  # after `pieces`
+MEASURES = ("short pieces", "long pieces", *VALUES[:4])
 SEARCHED = ("soft", "firm", "firm-600")  # the bodies of the search for likeness
 
 Reading = dict[str, Ring]  # the marks of each silhouette's tiles, in the order of their file
@@ -181,10 +182,7 @@ class Marked:
         self.readings = np.array([list(tile["marks"].values()) for tile in tiles]).T
         self.marks = self.readings.mean(axis=0)
         self.kept = [
-            Fidelity(
-                (own["pieces"][0], own["pieces"][1]),
-                *(own[name] for name in ("stretched", "thickness", "cost", "length")),
-            )
+            Fidelity((own["pieces"][0], own["pieces"][1]), *(own[name] for name in VALUES))
             for own in self.values
         ]
         self.losses = np.array([own.losses for own in self.kept])
@@ -248,7 +246,7 @@ def print_orders(found: list[Marked], *, fitted: bool) -> None:
 
 
 def fitted_weights(found: list[Marked]) -> Ring:
-    """Return the weights (4,) of losses that foretell marks best, less each silhouette's mean."""
+    """Return the weights of losses that foretell marks best, less each silhouette's mean."""
     losses = np.concatenate([one.losses - one.losses.mean(axis=0) for one in found])
     return nnls(-losses, np.concatenate([one.marks - one.marks.mean() for one in found]))[0]
 

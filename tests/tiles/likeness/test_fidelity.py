@@ -1,4 +1,4 @@
-"""Fidelity: blind to motions and scale, strict on notches, threads and lost parts; marks and scores."""
+"""Fidelity: blind to motions and scale, strict on notches, threads, lost parts and lost corners."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SQUIRREL = complex_points(resampled(animal("squirrel.dat").normal, 240))
 def test_motions_and_scale_cost_nothing(scale: float, turn: float, shift: complex) -> None:
     found = fidelity(SQUIRREL, scale * np.exp(1j * turn) * SQUIRREL + shift, 0.0)
     assert found.score > 0.999
-    assert max(*found.pieces, found.stretched, found.thickness) < 1e-5
+    assert max(*found.pieces, found.stretched, found.thickness, found.blunted, found.moved) < 1e-5
     assert found.lost == []
 
 
@@ -42,7 +42,7 @@ def bar(height: float = 0.4) -> NDArray[np.complex128]:
 
 def test_a_bent_bar_is_better_than_a_notched_and_a_pinched_one() -> None:
     rest = bar()
-    bent = rest * np.exp(0.08j * rest.real)  # bent as a bow
+    bent = rest * np.exp(0.04j * rest.real)  # bent as a bow
     dent = np.exp(-(((rest.real - 1.5) / 0.05) ** 2))
     notched = rest - 0.25j * dent * (rest.imag > 0.3)
     pinched = rest - 0.38j * dent * (rest.imag > 0.3)
@@ -67,18 +67,29 @@ def test_a_lost_limb_costs_more_than_a_bent_one() -> None:
     assert "some parts have shrunk while others have grown" in lost.lost
 
 
+def test_corners_that_become_round_are_blunted_and_limbs_that_turn_are_moved() -> None:
+    rest = bar()
+    smooth = rest.copy()
+    for _ in range(30):
+        smooth = (np.roll(smooth, 1) + 2 * smooth + np.roll(smooth, -1)) / 4
+    rounded, turned = fidelity(rest, smooth, 0.1), fidelity(limb(), limb(0.8), 0.1)
+    assert rounded.blunted > 1
+    assert rounded.moved < 1e-3
+    assert turned.moved > 10 * fidelity(limb(), limb(0.1), 0.1).moved
+
+
 @st.composite
 def measured(draw: st.DrawFn) -> Fidelity:
     """Any values."""
-    short, long, stretched, thickness = (draw(st.floats(0, 2)) for _ in range(4))
-    return Fidelity((short, long), stretched, thickness, 0.2, draw(st.floats(3, 15)))
+    short, long, *others = (draw(st.floats(0, 2)) for _ in range(6))
+    return Fidelity((short, long), *others, 0.2, draw(st.floats(3, 15)))
 
 
-@given(measured(), st.integers(0, 3), st.floats(0.01, 3))
+@given(measured(), st.integers(0, 5), st.floats(0.01, 3))
 def test_whatever_is_lost_lowers_the_mark(kept: Fidelity, which: int, more: float) -> None:
-    values = [*kept.pieces, kept.stretched, kept.thickness]
+    values = [*kept.pieces, kept.stretched, kept.thickness, kept.blunted, kept.moved]
     values[which] += more
-    worse = replace(kept, pieces=(values[0], values[1]), stretched=values[2], thickness=values[3])
+    worse = Fidelity((values[0], values[1]), *values[2:], kept.cost, kept.length)
     assert worse.mark < kept.mark
     assert worse.score <= kept.score
     assert worse.losses[which] > kept.losses[which]
@@ -106,7 +117,7 @@ def test_a_score_is_a_probability_that_the_stars_know(kept: Fidelity) -> None:
 
 
 def test_what_is_lost_is_named_the_worst_first() -> None:
-    kept = Fidelity((0.4, 0.05), 0.01, 0.9, 0.2, 6.0)
+    kept = Fidelity((0.4, 0.05), 0.01, 0.9, 5.0, 0.001, 0.2, 6.0)
     assert kept.lost == [
         "small parts such as ears and feet have lost their shapes",
         "limbs or body have become thinner or thicker",

@@ -101,7 +101,8 @@ def test_a_score_is_the_share_of_marks_that_are_good(marked: list[Marked]) -> No
     scores = np.concatenate([one.scores for one in marked])
     good = np.concatenate([(one.marks >= 6.5).mean(axis=1) for one in marked])
     for tenth in np.array_split(np.argsort(scores), 10):
-        assert good[tenth].mean() == pytest.approx(scores[tenth].mean(), abs=0.06)
+        # 118 tiles, marked twice: twice the standard error of their share
+        assert good[tenth].mean() == pytest.approx(scores[tenth].mean(), abs=0.08)
 
 
 def test_a_score_means_the_same_for_long_outlines(marked: list[Marked]) -> None:

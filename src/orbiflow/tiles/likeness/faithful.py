@@ -1,7 +1,6 @@
 """How faithful a bent outline is to its silhouette, as people judge it, point by point.
 
-The mark that people would give is foretold from four measures, none of which depends on the pose
-(docs/likeness.md has the evidence):
+The mark that people would give is foretold from six measures (docs/likeness.md has the evidence):
 
 - `pieces`: how well short and long pieces of the outline are kept, each compared after its own best
   motion (Procrustes; Gower, 1975), by the mean of the roots: a few pieces may be lost, the rest should
@@ -10,6 +9,9 @@ The mark that people would give is foretold from four measures, none of which de
 - `stretched`: how unevenly the outline is stretched: shrunken limbs, and bodies that have grown.
 - `thickness`: where limbs and bodies have become thin or fat, by the largest disc inside that touches
   the outline (the medial axis; found as by Ma, Bae and Choi, 3D medial axis point approximation, 2012).
+- `blunted`: how much of its turning the outline has lost: corners that are round now, and curves that
+  are straight.
+- `moved`: how far the outline is from its place, after the best motion of the whole: the pose.
 
 Outlines correspond point by point: this compares a shape with the one that was bent into it.
 """
@@ -23,7 +25,14 @@ from numpy.typing import ArrayLike
 
 from orbiflow.arguments import as_array
 from orbiflow.arrays import Array, Complex
-from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
+from orbiflow.tiles.geometry import (
+    best_similarity,
+    centroid,
+    complex_points,
+    orient,
+    plane_points,
+    signed_area,
+)
 from orbiflow.tiles.likeness.bending_onto import bent_onto
 from orbiflow.tiles.likeness.elastic import Elastic
 from orbiflow.tiles.likeness.metrics import Overlap, as_region, best_overlay
@@ -33,24 +42,27 @@ PIECE_LENGTHS = (0.08, 0.25)  # the lengths of the pieces, as shares of the outl
 # the offset of widths, in square roots of the area, below which differences matter little
 WIDTH_OFFSET = 0.02
 LARGEST_STRETCH = 2.0  # the largest logarithm of a stretch that counts
-# Values of two pieces, `stretched` and `thickness`: those below which differences matter little, those
-# of a tile of medium likeness, and the marks that a unit of their logarithms costs
-NEGLIGIBLE = (0.05, 0.05, 0.02, 0.02)
-USUAL_VALUES = (0.137, 0.12, 0.021, 0.105)
-WEIGHTS = (1.5, 1.9, 0.3, 0.5)
+CHORDS = 48  # the number of chords into which the outline is cut; their turning is compared
+# Values of two pieces, `stretched`, `thickness`, `blunted` and `moved`: those below which differences
+# matter little, those of a tile of medium likeness, and the marks that a unit of their logarithms costs
+NEGLIGIBLE = (0.05, 0.05, 0.02, 0.02, 2.0, 0.002)
+USUAL_VALUES = (0.137, 0.12, 0.021, 0.105, 7.5, 0.0048)
+WEIGHTS = (1.3, 1.65, 0.27, 0.45, 0.55, 0.27)
 # Rough outlines forgive more: marks for the logarithm of the outline's length, and lengths, in square
 # roots of the area: the usual one, and the extremes of those that were marked
 LENGTH_WEIGHT, USUAL_LENGTH, LENGTHS = 2.0, 6.5, (4.2, 10.9)
 USUAL_MARK = 5.9  # of a tile with usual values and of usual length
 # The foretold mark at which half of the people find a tile good, 6.5 or more, and how fast their log
 # odds grow with it
-GOOD_MARK, STEEPNESS = 6.1, 1.9
+GOOD_MARK, STEEPNESS = 6.15, 1.8
 # What has happened where each of the measures costs marks
 LOST = (
     "small parts such as ears and feet have lost their shapes",
     "heads and limbs are bent",
     "some parts have shrunk while others have grown",
     "limbs or body have become thinner or thicker",
+    "corners have become round",
+    "limbs, or the whole, have left their pose",
 )
 
 
@@ -61,6 +73,10 @@ class Fidelity:
     - `pieces`: The misfits of pieces of two lengths, short and long.
     - `stretched`: The mean square of the logarithm of the outline's stretch.
     - `thickness`: The mean square of the logarithm by which the inside became thinner or thicker.
+    - `blunted`: The sum of the angles by which chords of the outline turn less than they did, in
+      radians.
+    - `moved`: The mean square of the distance from the outline at rest, after the best similarity, over
+      its area.
     - `cost`: The cost of bending (`Elastic.cost`). It has no part in the mark.
     - `length`: The length of the silhouette's outline, in square roots of its area.
     """
@@ -68,13 +84,15 @@ class Fidelity:
     pieces: tuple[float, float]
     stretched: float
     thickness: float
+    blunted: float
+    moved: float
     cost: float
     length: float
 
     @property
     def losses(self) -> tuple[float, ...]:
-        """The marks lost by the two pieces, `stretched` and `thickness`; below 0, better than usual."""
-        values = (*self.pieces, self.stretched, self.thickness)
+        """The marks lost by each measure, two of them by pieces; below 0, better than usual."""
+        values = (*self.pieces, self.stretched, self.thickness, self.blunted, self.moved)
         parts = zip(WEIGHTS, values, USUAL_VALUES, NEGLIGIBLE, strict=True)
         return tuple(w * math.log((least + x) / (least + usual)) for w, x, usual, least in parts)
 
@@ -120,9 +138,28 @@ def fidelity(rest: Complex, bent: Complex, cost: float) -> Fidelity:
         (short, long),
         float(np.minimum(stretch**2, LARGEST_STRETCH**2) @ weight),
         float(weight @ thinner**2),
+        _blunted(rest, bent),
+        _moved(rest, bent),
         cost,
         float(sides.sum()),
     )
+
+
+def _blunted(rest: Complex, bent: Complex) -> float:
+    """Return by how much less chords of an outline turn than they did, in radians, in all."""
+    step = max(1, round(len(rest) / CHORDS))
+
+    def turns(z: Complex) -> Array:
+        chords = np.roll(z, -step) - z
+        return abs(np.angle(chords * np.conj(np.roll(chords, step))))
+
+    return float(np.maximum(turns(rest) - turns(bent), 0).sum() / step)
+
+
+def _moved(rest: Complex, bent: Complex) -> float:
+    """Return the mean square distance of two outlines after the best similarity."""
+    factor = complex(best_similarity(bent, rest))
+    return float((abs(factor * (bent - bent.mean()) - (rest - rest.mean())) ** 2).mean())
 
 
 def _misfits(rest: Complex, bent: Complex, length: float) -> Array:
