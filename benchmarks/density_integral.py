@@ -111,29 +111,27 @@ def _chains(chains: VonMisesChains) -> tuple[float, float]:
 
 
 def _chain_integral(chains: VonMisesChains, at: int, scale: int) -> float:
-    """Of one component at one scale, in its residuals, relative to its weight."""
-    weight = float(chains.log_weights[at, scale])
-    if weight == -math.inf:
-        return 1.0
-    kappa = chains.concentrations[at] / SCALES[scale]
-    middle = float(
-        chains.joint(_points(chains, at, torch.zeros(1, chains.space.dim)))[0, scale, at]
-    )
-    log_value = middle - weight
-    for axis, concentration in enumerate(kappa.tolist()):
+    """Of one component at one scale alone, in its residuals."""
+    log_weights = torch.full((1, len(SCALES)), -math.inf)
+    log_weights[0, scale] = 0.0
+    stored = (chains.means, chains.concentrations, chains.order)
+    alone = VonMisesChains(chains.space, log_weights, *(own[at][None] for own in stored))
+    middle = float(alone.log_chart(_points(alone, torch.zeros(1, chains.space.dim))))
+    log_value = middle
+    for axis, concentration in enumerate((alone.concentrations[0] / SCALES[scale]).tolist()):
         nodes, weights = _section(concentration)
         residuals = torch.zeros(len(nodes), chains.space.dim, dtype=torch.float64)
         residuals[:, axis] = torch.tensor(2 * math.pi * nodes)
-        values = chains.joint(_points(chains, at, residuals))[:, scale, at] - middle
+        values = alone.log_chart(_points(alone, residuals)) - middle
         log_value += math.log((weights * values.exp().numpy()).sum())
     return math.exp(log_value)
 
 
-def _points(chains: VonMisesChains, at: int, residuals: torch.Tensor) -> torch.Tensor:
-    """Points of the cube (N, d) at residuals (N, d) in radians of a component."""
+def _points(chain: VonMisesChains, residuals: torch.Tensor) -> torch.Tensor:
+    """Points of the cube (N, d) at residuals (N, d) in radians of the only component."""
     angle = torch.zeros(residuals.shape, dtype=torch.float64)
-    for now in chains.order[at].tolist():
-        angle[:, now] = residuals[:, now] + waves(angle) @ chains.means[at, now]
+    for now in chain.order[0].tolist():
+        angle[:, now] = residuals[:, now] + waves(angle) @ chain.means[0, now]
     return angle / (2 * math.pi)
 
 

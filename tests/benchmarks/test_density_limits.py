@@ -131,7 +131,7 @@ def test_the_integral_is_seen_from_values(module, dim: int, monkeypatch) -> None
     for part, weight in zip(density.components, density.weights.tolist(), strict=True):
         if part.kind == "uniform" or weight < 0.01:
             continue
-        method = "joint" if part.kind == "chains" else "log_density"
+        method = "log_chart" if part.kind == "chains" else "log_density"
         right = getattr(type(part), method)
         with monkeypatch.context() as patched:
             patched.setattr(type(part), method, lambda self, *x, own=right: own(self, *x) + 0.1)
