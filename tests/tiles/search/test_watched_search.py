@@ -63,7 +63,9 @@ def test_all_classes_are_sketched_before_any_is_finished(workers: int) -> None:
         name: tile.score for name, tile in last.items()
     }
     for _, tile in shown:
-        own = last[tile.name]  # of the whole silhouette, where it has been found, whatever its score
+        own = last[
+            tile.name
+        ]  # of the whole silhouette, where it has been found, whatever its score
         assert (own.smoothed, -own.score) <= (tile.smoothed, -tile.score)
     outcomes = [event for event in events if isinstance(event, TileFound | ClassFailed)]
     assert len(outcomes) == len(NAMES)
