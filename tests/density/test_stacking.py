@@ -146,6 +146,15 @@ def test_kernel_estimates_are_normalised(name: str, monkeypatch: pytest.MonkeyPa
     assert "repeated" not in alone
 
 
+@pytest.mark.parametrize(("name", "images"), [("sphere", 1), ("projective-plane", 2)])
+def test_as_many_rows_have_kernels_as_images_allow(
+    name: str, images: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("orbiflow.density.fitting.kernels.MOST_IMAGES", 40)
+    found = kernel_estimates(make_space(name), Rows(clustered(name, 60, 0)))
+    assert {len(part.weights) for part in found.values()} == {40 // images}
+
+
 def test_mixtures_of_chains_are_mixed() -> None:
     space, parts = make_space("torus"), []
     for k in (1.0, 9.0):

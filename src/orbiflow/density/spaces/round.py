@@ -133,6 +133,10 @@ class RoundSpace(Space):
     def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
         return self.unit_vectors(points)[None][which]
 
+    @property
+    def kernel_images(self) -> int:
+        return 1
+
     def step_angle(self, step: float) -> float:
         return math.radians(step) if self.form == "latlon" else step
 
@@ -214,6 +218,10 @@ class ProjectivePlane(RoundSpace):
 
     name = "projective-plane"
     power = 2
+
+    @property
+    def kernel_images(self) -> int:
+        return 2
 
     def features(self, points: Tensor, which: slice = slice(None)) -> Tensor:
         vectors = self.unit_vectors(points)
