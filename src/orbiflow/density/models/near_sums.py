@@ -20,7 +20,7 @@ from orbiflow.typed_torch import applied
 TOLERANCE = 1e-12
 """The share of a sum that may be left out, and that interpolation may miss."""
 
-FEW_POINTS, FEW_PAIRS = 256, 2_500_000
+FEW_POINTS, FEW_PAIRS = 256, 5_000_000
 """Tiles with fewer points, or fewer points times terms, are not divided further."""
 
 FEWEST_PAIRS = 20_000
