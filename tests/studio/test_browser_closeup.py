@@ -93,6 +93,19 @@ def taken_away(studio: RunningStudio, own: str, tile: int, **settings: Any) -> s
     return studio.client.get(f"takeaways/{number}/files/{file['name']}").text
 
 
+def test_a_mode_may_be_chosen_before_the_tile_is_there(
+    page: Any, searched: str, tile: dict[str, Any]
+) -> None:
+    asked: list[Any] = []
+    page.route(f"**/tiles/{tile['id']}", lambda route: asked.append(route))
+    page.goto(f"/#/p/{searched}/t/{tile['id']}")
+    page.get_by_role("radio", name="Pull", exact=True).check()
+    while not asked:
+        page.wait_for_timeout(10)
+    asked[0].continue_()
+    page.wait_for_selector("[data-ready=pull]")
+
+
 def test_pull_certify_undo_redo(closeup, studio: RunningStudio, searched: str, tile) -> None:
     page, first = closeup, tile["id"]
     choose(page, "Pull")

@@ -162,6 +162,7 @@ class Closeup {
   #choose(mode) {
     this.mode = mode;
     this.stage.canvas.style.cursor = "";
+    if (!this.view) return; // the tile opens in this mode when it is there
     if (this.badge.dataset.kind === "refused") this.#proved();
     if (mode !== "look" && this.look.share < 1) this.#change({ share: 1 });
     this.#panels();
