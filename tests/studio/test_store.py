@@ -24,7 +24,7 @@ from orbiflow.studio.hub import Hub
 from orbiflow.studio.store import Missing
 from orbiflow.studio.words import shown_project
 from orbiflow.tiles.silhouette.outlines import sampled
-from studio.served import Bench, ByHand, join_tasks
+from studio.served import Bench, ByHand, InThread, join_tasks
 
 
 @pytest.fixture
@@ -153,6 +153,27 @@ def test_tasks_begin_with_processes_that_are_ready(tmp_path: Path) -> None:
     queue.close()
     join_tasks()
     join_tasks("processes")
+    store.close()
+
+
+def test_a_quick_task_borrows_a_process(tmp_path: Path) -> None:
+    store, made = Store(tmp_path), list[InThread]()
+
+    def spawn() -> Any:
+        made.append(InThread())
+        return made[-1]
+
+    queue = WorkQueue(store, slots={"long": 1, "quick": 1}, spares=2, spawn=spawn)
+    queue.start()
+    while len(queue._spares) < 2:  # pyright: ignore[reportPrivateUsage]
+        pass
+    task = queue.submit(store.create("tile", "a project", 9), "read", {})
+    join_tasks(f"task {task}")
+    assert "no picture" in store.task(task)["error"]
+    assert made[0] in queue._spares  # pyright: ignore[reportPrivateUsage]
+    queue.close()
+    join_tasks("processes")
+    assert len(made) == 2
     store.close()
 
 

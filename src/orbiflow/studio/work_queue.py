@@ -196,7 +196,7 @@ class WorkQueue:
         while not self._closed:
             self._wanted.wait()
             self._wanted.clear()
-            while not self._closed and len(self._spares) < self._spare_count:
+            while not self._closed and self._is_short():
                 try:
                     process = self._spawn()
                 except OSError:  # no memory, or too many processes: again when something ends
@@ -207,6 +207,12 @@ class WorkQueue:
                     if self._closed:
                         process.kill()
                 self._schedule()
+
+    def _is_short(self) -> bool:
+        """Whether more processes should be ready; all but one may be lent to quick tasks."""
+        with self._lock:
+            lent = sum(lane == "quick" for _, lane, _ in self._lanes.values())
+            return len(self._spares) + min(lent, max(0, self._spare_count - 1)) < self._spare_count
 
     def _ready(self) -> CallProcess | None:
         """Return a process that waits for a call, if there is one."""
