@@ -81,15 +81,17 @@ def test_corners_that_become_round_are_blunted_and_limbs_that_turn_are_moved() -
 @st.composite
 def measured(draw: st.DrawFn) -> Fidelity:
     """Any values."""
-    short, long, *others = (draw(st.floats(0, 2)) for _ in range(6))
-    return Fidelity((short, long), *others, 0.2, draw(st.floats(3, 15)))
+    short, long, stretched, thickness, blunted, moved = (draw(st.floats(0, 2)) for _ in range(6))
+    length = draw(st.floats(3, 15))
+    return Fidelity((short, long), stretched, thickness, blunted, moved, 0.2, length)
 
 
 @given(measured(), st.integers(0, 5), st.floats(0.01, 3))
 def test_whatever_is_lost_lowers_the_mark(kept: Fidelity, which: int, more: float) -> None:
     values = [*kept.pieces, kept.stretched, kept.thickness, kept.blunted, kept.moved]
     values[which] += more
-    worse = Fidelity((values[0], values[1]), *values[2:], kept.cost, kept.length)
+    short, long, stretched, thickness, blunted, moved = values
+    worse = Fidelity((short, long), stretched, thickness, blunted, moved, kept.cost, kept.length)
     assert worse.mark < kept.mark
     assert worse.score <= kept.score
     assert worse.losses[which] > kept.losses[which]
