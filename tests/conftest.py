@@ -19,6 +19,9 @@ settings.register_profile("ci", settings.get_profile("local"), derandomize=True,
 settings.load_profile("ci" if os.environ.get("CI") else "local")
 
 
+# what it does when it is imported is for processes alone, and the search for doctests imports all
+collect_ignore = ["runtime/small_process.py"]
+
 gc.disable()  # until all is collected: modules and tests are no litter
 
 
