@@ -118,6 +118,17 @@ def best_similarity(points: Complex, images: Complex) -> Complex:
     return np.conj(own) @ (images - images.mean(axis=0)) / (abs(own) ** 2).sum()
 
 
+def apart(points: Complex, images: Complex) -> float:
+    """Return the mean square distance of points (N,) from their images after the best similarity.
+
+    >>> triangle = np.array([0, 1, 1j])
+    >>> round(apart(triangle, 2j * triangle + 5), 12)
+    0.0
+    """
+    factor = complex(best_similarity(points, images))
+    return float((abs(factor * (points - points.mean()) - (images - images.mean())) ** 2).mean())
+
+
 def ring_length(ring: Array) -> float:
     """Return the length of the closed `ring` (N, 2), including the side that closes it.
 

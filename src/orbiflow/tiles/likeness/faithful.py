@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 from orbiflow.arguments import as_array
 from orbiflow.arrays import Array, Complex
 from orbiflow.tiles.geometry import (
-    best_similarity,
+    apart,
     centroid,
     complex_points,
     orient,
@@ -139,7 +139,7 @@ def fidelity(rest: Complex, bent: Complex, cost: float) -> Fidelity:
         float(np.minimum(stretch**2, LARGEST_STRETCH**2) @ weight),
         float(weight @ thinner**2),
         _blunted(rest, bent),
-        _moved(rest, bent),
+        apart(bent, rest),
         cost,
         float(sides.sum()),
     )
@@ -154,12 +154,6 @@ def _blunted(rest: Complex, bent: Complex) -> float:
         return abs(np.angle(chords * np.conj(np.roll(chords, step))))
 
     return float(np.maximum(turns(rest) - turns(bent), 0).sum() / step)
-
-
-def _moved(rest: Complex, bent: Complex) -> float:
-    """Return the mean square distance of two outlines after the best similarity."""
-    factor = complex(best_similarity(bent, rest))
-    return float((abs(factor * (bent - bent.mean()) - (rest - rest.mean())) ** 2).mean())
 
 
 def _misfits(rest: Complex, bent: Complex, length: float) -> Array:

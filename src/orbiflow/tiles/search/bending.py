@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.errors import CertificationError
 from orbiflow.runtime import NEVER, Cancel
-from orbiflow.tiles.geometry import best_similarity, plane_points, signed_area
+from orbiflow.tiles.geometry import apart, best_similarity, plane_points, signed_area
 from orbiflow.tiles.likeness import (
     Elastic,
     Fidelity,
@@ -96,7 +96,7 @@ def bent_tiles(
 
     def twins(a: Bent, b: Bent) -> bool:
         n = a.hand.fine.size
-        return a.hand is b.hand and _apart(a.points[:n], b.points[:n]) <= TWIN
+        return a.hand is b.hand and apart(a.points[:n], b.points[:n]) <= TWIN
 
     return _unlike(found, len(found), twins), dropped
 
@@ -230,7 +230,7 @@ def _unlike_outlines(outlines: Complex, order: Iterable[int], count: int) -> Int
     """Which outlines (C, n) come first in an order, at most `count`, without twins of earlier ones."""
 
     def twins(a: int, b: int) -> bool:
-        return _apart(outlines[a], outlines[b]) <= TWIN
+        return apart(outlines[a], outlines[b]) <= TWIN
 
     return np.array(_unlike(order, count, twins), dtype=np.int64)
 
@@ -244,12 +244,6 @@ def _unlike(items: Iterable[Item], count: int, twins: Callable[[Item, Item], boo
         if not any(twins(item, other) for other in kept):
             kept.append(item)
     return kept
-
-
-def _apart(a: Complex, b: Complex) -> float:
-    """Mean squared distance of two outlines after the best similarity."""
-    factor = complex(best_similarity(a, b))
-    return float((abs(factor * (a - a.mean()) - (b - b.mean())) ** 2).mean())
 
 
 class PlacedBent(NamedTuple):
