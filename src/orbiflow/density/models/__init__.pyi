@@ -1,7 +1,7 @@
+from .chain_sums import SCALES as SCALES
 from .chain_sums import ChainFits as ChainFits
 from .chain_sums import at_scales as at_scales
 from .chain_sums import seen_angles as seen_angles
-from .chains import SCALES as SCALES
 from .chains import Factor as Factor
 from .chains import VonMisesChains as VonMisesChains
 from .chains import chained as chained

@@ -9,9 +9,11 @@ from torch import Tensor
 
 from orbiflow.density.models.terms import LOG2_E
 
-POWERS = (1, 4, 16)
-"""How much sharper each scale is than the widest: powers are cheaper than exponentials."""
+SCALES = (1.0, 4.0, 16.0)
+"""A component's concentrations are divided by these, each with its own weight: heavy tails.
 
+Each is 4 times the one before: `at_scales` takes powers, which are cheaper than exponentials.
+"""
 
 FAINTEST = {torch.float64: -170.0, torch.float32: -20.0}
 """Logarithm of the least exponential: its 4th power does not underflow, which would be slow."""
@@ -76,7 +78,7 @@ def at_scales(fit: Tensor) -> list[Tensor]:
     Those below `FAINTEST` are raised to it, and those of sharper scales to its 4th power.
     """
     faintest = FAINTEST[fit.dtype]
-    wide = fit.mul(LOG2_E / POWERS[-1]).clamp_min_(faintest * LOG2_E).exp2()
+    wide = fit.mul(LOG2_E / SCALES[-1]).clamp_min_(faintest * LOG2_E).exp2()
     middle = wide.square().square_()
     return [wide, middle, middle.clamp_min(math.exp(faintest)).square_().square_()]
 
@@ -103,7 +105,7 @@ class ChainSum:
         found = total.clamp_min(least).log() + self._top
         faint = (total <= least).nonzero()[:, 0]
         if len(faint):
-            scales = fit.new_tensor(POWERS)[:, None]
+            scales = fit.new_tensor(SCALES)[:, None]
             logs = (fit[faint, None] / scales + self._log_peaks).flatten(1)
             found = found.index_put((faint,), logs.logsumexp(dim=1))
         return found

@@ -12,7 +12,8 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.chains import REACH, SCALES, VonMisesChains, quantiles
+from orbiflow.density.models.chain_sums import SCALES
+from orbiflow.density.models.chains import REACH, VonMisesChains, quantiles
 from orbiflow.density.models.density import Split
 from orbiflow.density.models.lattice import KERNEL_STEP, sharpest_on
 from orbiflow.density.models.terms import FAINT

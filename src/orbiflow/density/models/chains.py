@@ -14,15 +14,12 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_tensor
-from orbiflow.density.models.chain_sums import ChainFits, ChainSum
+from orbiflow.density.models.chain_sums import SCALES, ChainFits, ChainSum
 from orbiflow.density.models.density import Density, Restriction, Split, Weighted, in_blocks
 from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed, special, unique
-
-SCALES = (1.0, 4.0, 16.0)
-"""A component's concentrations are divided by these, each with its own weight: heavy tails."""
 
 REACH = 7.0
 """Deviations from its mean beyond which an angle has no nodes."""

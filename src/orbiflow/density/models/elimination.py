@@ -12,7 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.chains import SCALES, Factor, VonMisesChains, waves
+from orbiflow.density.models.chain_sums import SCALES
+from orbiflow.density.models.chains import Factor, VonMisesChains, waves
 from orbiflow.density.models.density import Split
 from orbiflow.density.models.lattice import KERNEL_STEP, sharpest_on
 from orbiflow.density.models.terms import FAINT, log_sum_exp
