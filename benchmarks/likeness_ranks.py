@@ -147,6 +147,7 @@ def order(_: argparse.Namespace) -> None:
     places = {name: np.array([tile["places"] for tile in own]) for name, own in found.items()}
     agree = np.mean([spearmanr(*own[:, :2].T).statistic for own in places.values()])
     print(f"{len(found)} silhouettes; two judges agree by {agree:.2f} (correlation of ranks)\n")
+    _print_places(found)
     print(f"{'':20}rank correlation  place of our first  preferred to EST and ARAP")
     for label, measure in ORDERS.items():
         values = {
@@ -166,6 +167,27 @@ def order(_: argparse.Namespace) -> None:
             f"{label:20}{np.mean(ranks):16.2f}{np.mean(first):20.2f}"
             f"{2 * np.sum(rows):21.0f} of {2 * len(rows)}"
         )
+
+
+def _print_places(found: dict[str, list[dict[str, Any]]]) -> None:
+    """Print each method's mean place, and what comes of it if one judge chooses ours."""
+    tiles = [tile for own in found.values() for tile in own]
+    for method in dict.fromkeys(tile["method"] for tile in tiles):
+        places = [tile["places"] for tile in tiles if tile["method"] == method]
+        print(f"{method:20}{len(places):4} tiles, mean place {np.mean(places):.1f}")
+    first: list[int] = []
+    rows: list[bool] = []
+    for own in found.values():
+        ours = [tile["places"] for tile in own if tile["method"] in SEARCHED]
+        others = [tile["places"] for tile in own if tile["method"] in ("est", "arap")]
+        for judge in (0, 1):
+            chosen = min(ours, key=lambda places, judge=judge: places[judge])
+            first.append(chosen[1 - judge])
+            rows += [chosen[1 - judge] < other[1 - judge] for other in others]
+    print(
+        f"ours that one judge chooses: place {np.mean(first):.2f} by the other, who prefers it to EST "
+        f"and ARAP in {sum(rows)} of {len(rows)}\n"
+    )
 
 
 def _kept(values: dict[str, Any]) -> Fidelity:
