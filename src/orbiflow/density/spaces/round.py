@@ -123,7 +123,7 @@ class RoundSpace(Space):
 
         The function is differentiable.
         """
-        turned = uniformization.to_sphere(self.project(points), self.power)
+        turned = uniformization.to_sphere(points, self.power)
         return turned @ torch.as_tensor(self.rotation).to(turned)
 
     def vectors(self, points: Tensor) -> Array:

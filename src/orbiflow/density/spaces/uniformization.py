@@ -24,45 +24,45 @@ K = 1.854074677301371918433850347195
 NULL3 = 1.086434811213308014575316121510
 """theta_3(0) = pi^(1/4) / Gamma(3/4)."""
 
-TERMS = 4
-"""Terms of each series; the first one left out is below 1e-16 for |Im z| <= 1."""
+NOME = math.exp(-math.pi)
 
 
 def thetas(z: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """Return theta_1, ..., theta_4 at v = pi z / 2.
+    """Return theta_1, ..., theta_4 at v = pi z / 2, for |Im z| <= 1.
+
+    Of each series all terms above 1e-16, as polynomials in cos 2v.
 
     Reference: DLMF 20.2(i), https://dlmf.nist.gov/20.2.
     """
-    v = z * (math.pi / 2)
-    # powers by multiplication: complex sines are slow
-    up, down = (torch.polar((-t * v.imag).exp(), t * v.real) for t in (1.0, -1.0))
-    rise, fall = up * up, down * down
-    odd, even = (up, down), (rise, fall)
-    one, two = torch.zeros_like(v), torch.zeros_like(v)
-    three, four = torch.ones_like(v), torch.ones_like(v)
-    for n in range(TERMS):
-        sign = -1.0 if n % 2 else 1.0
-        half, whole = (math.exp(-math.pi * m**2) for m in (n + 0.5, n + 1))
-        one = one - sign * half * 1j * (odd[0] - odd[1])
-        two = two + half * (odd[0] + odd[1])
-        three = three + whole * (even[0] + even[1])
-        four = four - sign * whole * (even[0] + even[1])
-        odd, even = (odd[0] * rise, odd[1] * fall), (even[0] * rise, even[1] * fall)
-    return one, two, three, four
+    across, along = z.real * (math.pi / 2), z.imag * (math.pi / 2)
+    # complex sines are slow
+    sin, cos, sinh, cosh = across.sin(), across.cos(), along.sinh(), along.cosh()
+    sine, cosine = torch.complex(sin * cosh, cos * sinh), torch.complex(cos * cosh, -sin * sinh)
+    double = 1 - 2 * sine * sine
+    square, q = double * double, NOME
+    small = q**6 - q**12
+    even, odd = 1 - q**2 - small + 4 * small * square, 2 * (q**2 - q**6 - 2 * q**12)
+    odd = (odd + 8 * q**12 * square) * double
+    whole, part = 1 - 2 * q**4 + 4 * q**4 * square, 2 * q - 6 * q**9 + 8 * q**9 * square
+    part = part * double
+    first = 2 * q**0.25
+    return first * sine * (even - odd), first * cosine * (even + odd), whole + part, whole - part
 
 
-TINY = 1e-30
-"""Least product of theta functions in a logarithm, since cone points have area factor 0."""
+TINY = 1e-36
+"""Least square of a theta function in a logarithm, since cone points have area factor 0."""
 
 
 def to_sphere(points: Tensor, power: int) -> Tensor:
-    """Return the unit vectors (..., 3) of points (..., 2) of the square [0, 1]^2."""
-    one, _, three, _ = thetas(_complex(points))
-    a, b = three**power, one**power
-    size = a.abs() ** 2 + b.abs() ** 2
-    product = 2 * a * b.conj() / size
-    height = (a.abs() ** 2 - b.abs() ** 2) / size
-    return torch.stack([product.real, product.imag, height], dim=-1)
+    """Return the unit vectors (..., 3) of points (..., 2) of the plane."""
+    one, _, three, _ = thetas(_wrapped(points))
+    below, above = (_square(own) ** power for own in (one, three))
+    product = three * one.conj()
+    for _ in range(power // 2):
+        product = product * product
+    size = below + above
+    parts = [2 * product.real, 2 * product.imag, above - below]
+    return torch.stack(parts, dim=-1) / size[..., None]
 
 
 def log_area(points: Tensor, power: int) -> Tensor:
@@ -72,11 +72,10 @@ def log_area(points: Tensor, power: int) -> Tensor:
     (|theta_1|^(2 power) + |theta_3|^(2 power))^2: from the derivative
     (theta_3/theta_1)' = -theta_3(0)^2 theta_2 theta_4 / theta_1^2 (DLMF 20.7(ii), 22.13).
     """
-    wrapped = points - 2 * (points.detach() / 2).round()  # J has the periods 2 and 2i
-    one, two, three, four = (theta.abs().clamp_min(TINY) for theta in thetas(_complex(wrapped)))
+    one, two, three, four = (_square(own).clamp_min(TINY) for own in thetas(_wrapped(points)))
     constant = 2 * math.log(power * math.pi * NULL3**2)
-    product = (2 * power - 2) * (one.log() + three.log()) + 2 * (two.log() + four.log())
-    return constant + product - 2 * (one ** (2 * power) + three ** (2 * power)).log()
+    size = one**power + three**power
+    return constant + (power - 1) * (one * three).log() + (two * four / (size * size)).log()
 
 
 def from_sphere(vectors: Array, power: int) -> Array:
@@ -104,5 +103,11 @@ def from_sphere(vectors: Array, power: int) -> Array:
     return np.stack([found.real, found.imag], axis=-1)
 
 
-def _complex(points: Tensor) -> Tensor:
-    return torch.complex(points[..., 0], points[..., 1])
+def _wrapped(points: Tensor) -> Tensor:
+    """Return complex numbers for points of the plane, moved by periods to |Re z|, |Im z| <= 1."""
+    near = points - 2 * (points.detach() / 2).round()
+    return torch.complex(near[..., 0], near[..., 1])
+
+
+def _square(z: Tensor) -> Tensor:
+    return z.real.square() + z.imag.square()
