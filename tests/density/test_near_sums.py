@@ -19,11 +19,9 @@ shapes, seeds = st.sampled_from(sorted(SHAPES)), st.integers(0, 2**31)
 @pytest.fixture(autouse=True)
 def eager(monkeypatch: pytest.MonkeyPatch) -> None:
     """All that is done for many points and terms is done for few."""
-    few = {"FEWEST_PAIRS": 0, "FEW_POINTS": 16, "FEW_PAIRS": 0, "WORTH_TERMS": 5}
+    few = {"FEWEST_PAIRS": 0, "FEW_POINTS": 16, "FEW_PAIRS": 0, "WORTH": 60, "WORTH_TERMS": 5}
     for name, value in few.items():
         monkeypatch.setattr(near_sums, name, value)
-    for name in ("WORTH_FLAT", "WORTH_ROUND"):
-        monkeypatch.setattr(near_sums, name, 60)
 
 
 def on_spheres(shape: str, places: torch.Tensor) -> torch.Tensor:

@@ -46,8 +46,8 @@ SHIFT = (math.sqrt(5) - 1) / 2
 """How far the grids of a level are shifted from those of the one before, in turns: the change tells
 what the grids miss."""
 
-BLOCK = 256
-"""Points at a time: few enough for the cache."""
+BLOCK, SUMMED = 256, 1024
+"""Points at a time: few enough for the cache, and so many that little is left to do between sums."""
 
 
 class VonMisesChains(Density, kind="chains"):
@@ -111,7 +111,7 @@ class VonMisesChains(Density, kind="chains"):
         scaled = self.concentrations / self.concentrations.new_tensor(SCALES)[:, None, None]
         peaks = self.log_weights.mT - special.i0e(scaled).log().sum(dim=-1)
         own = ChainSum(ChainFits(means, kappa, self.order), peaks.to(points))
-        return in_blocks(own.log, points, BLOCK)
+        return in_blocks(own.log, points, SUMMED)
 
     def residuals(self, points: Tensor) -> Tensor:
         """Return angles less their regressions, in radians (N, K, d), for points (N, d)."""

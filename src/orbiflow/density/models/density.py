@@ -408,15 +408,15 @@ def neighbourhoods(points: Tensor, size: int) -> list[Tensor]:
 
     Sums of kernels are the faster, the smaller the box around the points.
     """
-    table = points.detach().cpu().numpy()
-    parts, found = [np.arange(len(table))], list[Tensor]()
+    table = np.ascontiguousarray(points.detach().cpu().numpy().T)
+    parts, found = [np.arange(len(points))], list[Tensor]()
     while parts:
         at = parts.pop()
         if len(at) <= size:
             found.append(torch.as_tensor(at).to(points.device))
             continue
-        some = table[at]
-        order = np.argpartition(some[:, np.ptp(some, axis=0).argmax()], len(at) // 2)
+        some = table.take(at, axis=1)
+        order = np.argpartition(some[np.ptp(some, axis=1).argmax()], len(at) // 2)
         parts += [at[order[len(at) // 2 :]], at[order[: len(at) // 2]]]
     return found
 

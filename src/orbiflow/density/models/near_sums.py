@@ -6,14 +6,14 @@ Sums of kernels that are smooth across a tile are read off few places.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from orbiflow.density.models.charts import Chart, Tile
-from orbiflow.density.models.smooth_sums import FEW_NODES, NODES, Patch, is_steep
+from orbiflow.density.models.smooth_sums import NODES, Patch, is_steep
 from orbiflow.density.models.terms import LOG2_E, Terms
 from orbiflow.typed_torch import applied
 
@@ -26,8 +26,8 @@ FEW_POINTS, FEW_PAIRS = 256, 5_000_000
 FEWEST_PAIRS = 20_000
 """Fewer points times terms are summed one by one at once: looking for tiles would take longer."""
 
-WORTH_FLAT, WORTH_ROUND = 2_500, 2_500
-"""The fewest points of a tile for which smooth terms are interpolated, flat and round."""
+WORTH = 2_500
+"""The fewest points of a tile for which smooth terms are interpolated."""
 
 WORTH_TERMS = 200
 """The fewest terms for which they are."""
@@ -35,7 +35,7 @@ WORTH_TERMS = 200
 LESS, IDLE = 0.9, 3
 """A tile is divided at most `IDLE` times in a row while more than the share `LESS` of terms stays."""
 
-SMOOTH_AT_MOST = 60.0
+SMOOTH_AT_MOST = 100.0
 """Concentration times squared radius of a tile above which terms are never smooth across it."""
 
 
@@ -81,51 +81,54 @@ class _NearLogSum(torch.autograd.Function):
         return found, None, None, None
 
 
+class _Left(NamedTuple):
+    """What is left to sum in a tile.
+
+    - `terms`: The terms; those beside them sum to exp(`beside`) at least.
+    - `lost`: The logarithm of what has been left out at most, and by how much interpolation is off.
+    - `patch`: The sum of the terms that were smooth across a larger tile.
+    - `idle`: How many times in a row nothing has been left out.
+    """
+
+    terms: Terms
+    beside: float
+    lost: float = -math.inf
+    patch: Patch | None = None
+    idle: int = 0
+
+
 class _Walk:
     """Logarithms (N,) of sums, and their gradients (m, N) in the features if they are wanted."""
 
     def __init__(
         self, features: Tensor, terms: Terms, floor: float, tolerance: float, *, slope: bool = False
     ) -> None:
-        self.tolerance, self.each = math.log(tolerance), math.log(tolerance / terms.size)
+        self.tolerance = math.log(tolerance)
         # the number of points of a tile from which on interpolation may pay
-        self.worth = WORTH_ROUND if len(terms.centers) == 3 else WORTH_FLAT
-        if terms.factors > 2:
-            self.worth = math.inf
+        self.worth = WORTH if terms.factors < 3 else math.inf
         features = features.detach()
         self.log_sum = torch.full_like(features[0], -math.inf)
         self.slope = torch.zeros_like(features) if slope else None
         if len(self.log_sum):
-            self._add_terms(torch.arange(len(self.log_sum)), features, terms, floor, None, 0)
+            self._add(torch.arange(len(self.log_sum)), features, _Left(terms, floor))
 
-    def _add_terms(
-        self,
-        at: Tensor,
-        features: Tensor,
-        terms: Terms,
-        beside: float,
-        patch: Patch | None,
-        idle: int,
-    ) -> None:
-        """Sum terms at points, by their numbers (N,) and features (m, N), or in both halves of them.
-
-        The sum is at least exp(`beside`) without them. Those that are in the `patch` already are added.
-        Nothing has been left out `idle` times in a row.
-        """
-        tile, count, given = Tile(features, terms.factors), len(at), terms.size
-        least, largest = tile.bounds(terms)
-        bottom = log_add(beside, least)
-        near = largest > bottom + self.each
-        if not bool(near.all()):
-            terms, least, largest = terms.only(near), least[near], largest[near]
-        patch, smooth = self._interpolated(features, terms, tile, least, largest, bottom, patch)
-        if smooth is not None:
-            beside, terms = log_add(beside, least[smooth]), terms.only(~smooth)
-        idle = 0 if terms.size < LESS * given or count > self.worth else idle + 1
+    def _add(self, at: Tensor, features: Tensor, left: _Left) -> None:
+        """Sum terms at points, by their numbers (N,) and features (m, N), or in both halves of them."""
+        tile, count, given = Tile(features, left.terms.factors), len(at), left.terms.size
+        least, largest = tile.bounds(left.terms)
+        bottom = log_add(left.beside, least)
+        far, lost = _negligible(largest, left.lost, bottom + self.tolerance)
+        if far is not None:
+            near = ~far
+            left = left._replace(terms=left.terms.only(near), lost=lost)
+            least, largest = least[near], largest[near]
+        left = self._interpolated(features, tile, left, least, largest, bottom)
+        terms, patch = left.terms, left.patch
+        idle = 0 if terms.size < LESS * given or count > self.worth else left.idle + 1
         if count > FEW_POINTS and count * terms.size > FEW_PAIRS and idle <= IDLE:
             for half in _halves(features, tile):
-                part = patch and patch.only(half)
-                self._add_terms(at[half], features[:, half], terms, beside, part, idle)
+                own = left._replace(patch=patch and patch.only(half), idle=idle)
+                self._add(at[half], features[:, half], own)
             return
         parts = [patch.log_sum(features, slope=self.slope is not None)] if patch else []
         if terms.size:
@@ -149,36 +152,62 @@ class _Walk:
     def _interpolated(
         self,
         features: Tensor,
-        terms: Terms,
         tile: Tile,
+        left: _Left,
         least: Tensor,
         largest: Tensor,
         bottom: float,
-        patch: Patch | None,
-    ) -> tuple[Patch | None, Tensor | None]:
-        """Return a patch with the terms that are smooth across the tile, and which (K,) these are."""
+    ) -> _Left:
+        """Return what is left when terms that are smooth across the tile are in the patch.
+
+        Terms are between exp(`least`) and exp(`largest`), (K,); with what is beside they sum to
+        exp(`bottom`) at least.
+        """
+        terms, patch, lost = left.terms, left.patch, left.lost
         if features.shape[1] < self.worth or terms.size < WORTH_TERMS or not tile.has_chart:
-            return patch, None
+            return left
         wide = (terms.kappa * tile.radius[:, None] ** 2).amax(dim=0) < SMOOTH_AT_MOST
         if int(wide.sum()) < WORTH_TERMS:
-            return patch, None
+            return left
         chart = patch.chart if patch else Chart(tile)
         own = Patch(chart, patch.u if patch else chart.coordinates(features))
-        allowed = (self.tolerance + least).clamp_min_(bottom + self.each)[wide]
         some, top = terms.only(wide), largest[wide]
-        few, many = (errors < allowed for errors in own.errors(some, top, tile))
-        many &= ~is_steep(some, tile)
-        few &= many
-        if int(many.sum()) < WORTH_TERMS:
-            return patch, None
+        done, added = is_steep(some, tile), list[tuple[Tensor, int]]()
+        smooth = torch.zeros_like(done)
+        for errors, count in zip(own.errors(some, top, tile), NODES, strict=True):
+            errors = errors.masked_fill_(done, math.inf)
+            fine, lost = _negligible(errors, lost, bottom + self.tolerance)
+            if fine is not None:
+                added.append((fine, count))
+                done, smooth = done | fine, smooth | fine
+        if int(smooth.sum()) < WORTH_TERMS:
+            return left
         if patch:
             own.take(patch)
-        for which, count in ((few, FEW_NODES), (many & ~few, NODES)):
-            if bool(which.any()):
-                own.add(some.only(which), float(top[which].max()), count)
-        smooth = wide.clone()
-        smooth[wide] = many
-        return own, smooth
+        for which, count in added:
+            own.add(some.only(which), float(top[which].max()), count)
+        wide[wide.clone()] = smooth
+        return left._replace(
+            terms=terms.only(~wide), beside=log_add(left.beside, least[wide]), lost=lost, patch=own
+        )
+
+
+def _negligible(logs: Tensor, lost: float, most: float) -> tuple[Tensor | None, float]:
+    """Return which (K,) of the exponentials of logarithms may be lost, if any, and what is lost then.
+
+    With exp(`lost`) they sum to less than exp(`most`): the smallest ones, whose sum is half of what
+    is still allowed, so that something is left for smaller tiles.
+    """
+    if most == -math.inf:
+        return None, lost
+    ordered = np.sort(logs.numpy())
+    before = math.exp(min(lost - most, 0.0))
+    sums = np.exp(np.minimum(ordered - most, 1.0)).cumsum()
+    count = int(np.searchsorted(sums, (1 - before) / 2))
+    if not count:
+        return None, lost
+    lost = most + math.log(sums[count - 1] + before + 1e-300)
+    return logs < (float(ordered[count]) if count < len(ordered) else math.inf), lost
 
 
 def log_add(one: float, logs: Tensor) -> float:

@@ -10,12 +10,12 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.models.charts import ELLIPSES, Chart, Tile
-from orbiflow.density.models.terms import BLOCK_ENTRIES, LOG2_E, Terms
+from orbiflow.density.models.terms import LOG2_E, Terms
 
 LEAST = 1e-290
 """The least interpolated sum, relative to the largest value."""
 
-FEW_NODES, NODES = 14, 28
+NODES = (24, 48)
 """Chebyshev points along a side of a tile, for what is very smooth and for what is smooth."""
 
 BETWEEN = 1.5
@@ -24,8 +24,8 @@ BETWEEN = 1.5
 ROUNDING = math.log(1e-15)
 """Logarithm of the rounding error of interpolation, relative to the largest value in the tile."""
 
-MOST_POWERS = 18
-"""The most products of matrices that are cheaper than exponentials at all nodes."""
+MOST_POINTS = 64
+"""The most points at which exponents are interpolated."""
 
 STEEPEST = 300.0
 """Exponents of factors of a term, which must not overflow."""
@@ -34,15 +34,15 @@ STEEPEST = 300.0
 class Patch:
     """Points u (D, N) of a chart, the box about them, and the sum of terms that are smooth across it.
 
-    Sums of terms that are analytic well beyond the box are polynomials of degree `NODES` - 1 in each
-    coordinate: `_series` are their Chebyshev coefficients (n, n), over exp(`_top`).
+    Sums of terms that are analytic well beyond the box are polynomials of degree `NODES[-1]` - 1 in
+    each coordinate: `_series` are their Chebyshev coefficients (n, n), over exp(`_top`).
     """
 
     def __init__(self, chart: Chart, u: Tensor) -> None:
         self.chart, self.u = chart, u
         low, high = torch.aminmax(u, dim=1)
         self.middle, self.half = (low + high) / 2, ((high - low) / 2).clamp_min(1e-9)
-        self._series, self._top = u.new_zeros(NODES, NODES if len(u) > 1 else 1), -math.inf
+        self._series, self._top = u.new_zeros(NODES[-1], NODES[-1] if len(u) > 1 else 1), -math.inf
 
     def only(self, which: Tensor) -> Patch:
         """Return the same sums in the same box, at some of its points."""
@@ -52,9 +52,9 @@ class Patch:
 
     def take(self, whole: Patch) -> None:
         """Take the sums of a patch that this one is a part of."""
-        nodes = self.middle[:, None] + self.half[:, None] * _nodes(NODES)
+        nodes = self.middle[:, None] + self.half[:, None] * _nodes(NODES[-1])
         sides = (nodes - whole.middle[:, None]) / whole.half[:, None]
-        first, *second = (_transform(NODES) @ _chebyshev(t).mT for t in sides)
+        first, *second = (_transform(NODES[-1]) @ _chebyshev(t).mT for t in sides)
         self._series, self._top = first @ whole._series, whole._top
         if second:
             self._series = self._series @ second[0].mT
@@ -87,7 +87,7 @@ class Patch:
         return sums.log() + self._top, self.chart.in_features(gradient, features)
 
     def errors(self, terms: Terms, largest: Tensor, tile: Tile) -> list[Tensor]:
-        """Return logarithms (K,) of bounds on each term's interpolation error, by few and by all nodes.
+        """Return logarithms (K,) of bounds on each term's interpolation error, for each of `NODES`.
 
         Along an axis by 4 M rho^(1 - n) / (rho - 1), M the largest value on the ellipse of rho
         (Trefethen, Approximation Theory and Approximation Practice, 2013, theorem 8.2), times the
@@ -100,7 +100,7 @@ class Patch:
             # terms are products: the other factor's largest value counts as it is
             shared = (tile.nearest2(terms) / 2).add_(largest - terms.peaks)
         found: list[Tensor] = []
-        for scale in (_scale(FEW_NODES), _scale(NODES)):
+        for scale in map(_scale, NODES):
             worst = ((exponents + scale[:, None]).amin(dim=1) + shared).amax(dim=0) + terms.peaks
             found.append(torch.maximum(worst, largest + ROUNDING))
         return found
@@ -123,8 +123,8 @@ class Patch:
         """Return values (n, n) of terms on a sphere, which are nearly products over the coordinates.
 
         A term is exp(peak - kappa |x0 - c|^2 / 2 + kappa c.(x - x0)) about a place x0 in the box. The
-        height of x - x0 is a sum over the coordinates, but for a small rest, of whose exponential few
-        powers are enough.
+        height of x - x0 is a sum over the coordinates, but for a small rest. Its exponential is
+        interpolated in kappa c: few Chebyshev points between the smallest and the largest are enough.
         """
         (centers,), kappa = self.chart.turned(terms.centers), terms.kappa[0]
         start = torch.cat([(1 - self.middle.square().sum()).sqrt()[None], self.middle])
@@ -133,24 +133,20 @@ class Patch:
         zero = torch.zeros_like(first)
         sides = (self._height(first, zero[:1]), self._height(zero[:1], second))
         rest = self._height(first, second) - sides[0] - sides[1]
-        shift = float(rest.amax() + rest.amin()) / 2
-        rest = rest - shift
         sharp = kappa * centers[0]
-        powers = _powers(float(sharp.abs().max()) * float(rest.abs().max()))
         along, across = (
             torch.stack([own, side.flatten()], dim=1) @ torch.stack([kappa * center, sharp])
             for own, side, center in zip(offset, sides, centers[1:], strict=True)
         )
-        weight = bias.add_(sharp * shift)
-        if powers > MOST_POWERS:
-            return _dense(along, across, weight, sharp, rest)
-        left = along.add_(weight).mul_(LOG2_E).exp2_()
-        right = across.mul_(LOG2_E).exp2_().mT
-        found, factor = left @ right, torch.ones_like(rest)
-        for power in range(1, powers):
-            factor = factor * rest / power
-            found.addcmul_(factor, left.mul_(sharp) @ right)
-        return found
+        left = along.add_(bias).mul_(LOG2_E).exp2_()
+        right = across.mul_(LOG2_E).exp2_()
+        low, high = torch.aminmax(sharp)
+        middle, half = (low + high) / 2, ((high - low) / 2).clamp_min(1e-9)
+        count = _points_of_exponential(float(half * rest.abs().max()))
+        shares = _transform(count).mT @ _chebyshev((sharp - middle) / half, count)
+        products = (left * shares[:, None]).flatten(0, 1) @ right.mT
+        factors = ((middle + half * _nodes(count))[:, None, None] * rest).exp_()
+        return products.reshape(factors.shape).mul_(factors).sum(dim=0)
 
     def _height(self, first: Tensor, second: Tensor) -> Tensor:
         """Return heights (n, n) of the sphere over offsets (n, 1) and (1, n), above its middle's."""
@@ -166,26 +162,16 @@ def is_steep(terms: Terms, tile: Tile) -> Tensor:
     return (reach > STEEPEST).any(dim=0)
 
 
-def _dense(along: Tensor, across: Tensor, weight: Tensor, sharp: Tensor, rest: Tensor) -> Tensor:
-    """Return sums (n, n) of exponentials of sums of tables (n, K), term by term."""
-    found = torch.zeros_like(rest)
-    for at in torch.split(torch.arange(len(weight)), max(1, BLOCK_ENTRIES // rest.numel())):
-        table = along[:, None, at] + across[None, :, at] + weight[at]
-        table.addcmul_(rest[..., None], sharp[at]).mul_(LOG2_E)
-        found += table.exp2_().sum(dim=2)
-    return found
-
-
-def _powers(largest: float) -> int:
-    """Return the number of powers of exponents up to the largest that make an exponential."""
-    count, last = 1, 1.0
-    while last > 1e-17 and count <= MOST_POWERS:
-        last *= largest / count
+def _points_of_exponential(largest: float) -> int:
+    """Return how many Chebyshev points give exponentials of exponents up to +-`largest`."""
+    count, error = 1, largest
+    while error > 1e-16 and count < MOST_POINTS:
         count += 1
+        error *= largest / (2 * count)
     return count
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=MOST_POINTS)
 def _scale(count: int) -> Tensor:
     """Return logarithms (E,) of what bounds on the `ELLIPSES` are times, for so many nodes."""
     lebesgue = 1 + 2 / math.pi * math.log(count)
@@ -194,14 +180,14 @@ def _scale(count: int) -> Tensor:
         return (8 * lebesgue / (rho - 1)).log() - (count - 1) * rho.log() + BETWEEN
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=MOST_POINTS)
 def _nodes(count: int) -> Tensor:
     """Return the Chebyshev points (n,) of [-1, 1]."""
     with torch.inference_mode(False):
         return torch.cos(math.pi * (torch.arange(count, dtype=torch.float64) + 0.5) / count)
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=MOST_POINTS)
 def _transform(count: int) -> Tensor:
     """Return the matrix (n, n) that makes Chebyshev coefficients from values at the nodes."""
     angle = math.pi * (torch.arange(count, dtype=torch.float64) + 0.5) / count
@@ -214,7 +200,7 @@ def _transform(count: int) -> Tensor:
 @lru_cache(maxsize=1)
 def _derivative() -> Tensor:
     """Return the matrix (n, n) that makes the coefficients of a Chebyshev series' derivative."""
-    order = torch.arange(NODES, dtype=torch.float64)
+    order = torch.arange(NODES[-1], dtype=torch.float64)
     with torch.inference_mode(False):
         above = order - order[:, None]
         matrix = torch.where((above > 0) & (above % 2 == 1), 2 * order, 0.0)
@@ -222,17 +208,17 @@ def _derivative() -> Tensor:
         return matrix
 
 
-def _chebyshev(t: Tensor) -> Tensor:
-    """Return the Chebyshev polynomials (n, N) at t (N,), which rounding may put beyond 1."""
-    table = t.new_empty(NODES, len(t))
+def _chebyshev(t: Tensor, count: int = NODES[-1]) -> Tensor:
+    """Return the first Chebyshev polynomials (n, N) at t (N,), which rounding may put beyond 1."""
+    table = t.new_empty(max(2, count), len(t))
     table[0] = 1
     table[1] = t.clamp(-1, 1)
     known = 1
-    while known < NODES - 1:  # T_(k + i) = 2 T_k T_i - T_(k - i)
-        more = min(known, NODES - 1 - known)
+    while known < count - 1:  # T_(k + i) = 2 T_k T_i - T_(k - i)
+        more = min(known, count - 1 - known)
         found = torch.mul(
             table[1 : more + 1], 2 * table[known], out=table[known + 1 : known + 1 + more]
         )
         found.sub_(table[known - more : known].flip(0))
         known += more
-    return table
+    return table[:count]
