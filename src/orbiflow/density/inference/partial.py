@@ -159,7 +159,8 @@ class _Left:
 
     - `found`: Kernels with log weights, of the last level; `before`: Of the level before.
     - `error`: The root mean square error of the whole that is its own, in nats: its change from the
-      level before, undivided, since two levels may be off in the same direction.
+      level before over sqrt(2). Errors of two levels are independent, as their nodes are, and the
+      change has both, of which the last is the smaller one.
     """
 
     log: float
@@ -194,22 +195,20 @@ def _refined(
         if level:
             whole = _mixture([*closed, *(part for one in left for part in one.found)])
             points = whole.sample(CHECKED, torch.Generator().manual_seed(level))
-            now = whole.log_prob(points)
-            total = _log_total(closed, left)
-            for one in wanted:
-                new, old = (_log_sum(parts, points) - total for parts in (one.found, one.before))
+            logs = [_log_sum(one.found, points) for one in left]
+            known = [_log_sum(closed, points)] if closed else []
+            now = torch.stack([*known, *logs]).logsumexp(dim=0)
+            for one, new in zip(left, logs, strict=True):
+                if one.error <= enough:
+                    continue
                 # what the whole would be with the old instead of the new
-                ratio = (old - now).exp() - (new - now).exp()
-                one.error = float(ratio.clamp_min(-1 + 1e-12).log1p().square().mean().sqrt())
+                ratio = (_log_sum(one.before, points) - now).exp() - (new - now).exp()
+                change = ratio.clamp_min(-1 + 1e-12).log1p()
+                one.error = float(change.square().mean().sqrt()) / math.sqrt(2)
         error = math.hypot(*(one.error for one in left))
         if error <= accuracy:
             break
     return _mixture([*closed, *(part for one in left for part in one.found)]), error
-
-
-def _log_total(closed: list[tuple[float, Density]], left: list[_Left]) -> float:
-    logs = [log for log, _ in closed] + [log for one in left for log, _ in one.found]
-    return float(torch.tensor(logs, dtype=torch.float64).logsumexp(0))
 
 
 def _log_sum(parts: list[tuple[float, Density]], points: Tensor) -> Tensor:

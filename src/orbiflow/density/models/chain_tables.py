@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 
 import torch
 from torch import Tensor
@@ -16,7 +17,7 @@ from orbiflow.density.models.chain_sums import SCALES
 from orbiflow.density.models.chains import REACH, VonMisesChains, quantiles
 from orbiflow.density.models.density import Split
 from orbiflow.density.models.lattice import KERNEL_STEP, sharpest_on
-from orbiflow.density.models.terms import FAINT
+from orbiflow.density.models.terms import FAINT, LOG2_E
 from orbiflow.typed_torch import broadcast, listed, special, unique
 
 SIZES = (24, 48, 96, 192, 384, 768, 1536, 3072)
@@ -28,12 +29,13 @@ FINEST = {1: 3072, 2: 768}
 FAINTEST = 25.0
 """Components whose logarithm is further than this below that of the largest are left out."""
 
-ALONE, SEVERAL = 24, (8, 32, 128, 512)
-"""The fewest nodes of an angle that is the only one hidden, and those of several, level by level."""
+ALONE, SEVERAL = 24, (2, 8, 32, 128, 512, 2048)
+"""The fewest nodes of an angle that is the only one hidden, and those of several: for light and wide
+components, for others, and for heavy and narrow ones, each level beginning with the next number."""
 
-LEFT, GENTLE = (0.9, 0.7, 0.3, 0.1), 20.0
-"""Share of hidden noise that is left about quasi-random nodes, level by level, and the concentration
-below which it is less."""
+LEFT, GENTLE = (0.9, 0.7, 0.3, 0.1, 0.05), 20.0
+"""Share of hidden noise that is left about quasi-random nodes, level by level and for more nodes as
+one level later, and the concentration below which it is less."""
 
 SHARPNESS = 1.2 ** torch.arange(-30, 116, dtype=torch.float64)
 """Concentrations by which quasi-random nodes are spread."""
@@ -65,10 +67,26 @@ def chain_tables(
         walks.append(_Walk(order[: last + 1], split, logs[own], means[own], kappa[own]))
     top = max(float(walk.likely.max()) for walk in walks)
     tables: dict[tuple[int, ...], Tensor] = {}
-    for walk in walks:
+    for walk, more in zip(walks, _more_nodes(walks, top), strict=True):
         tick()
-        walk.add_to(tables, top, level, start)
+        for step in (-1, 0, 1):
+            walk.add_to(tables, more == step, top, (level, step), start)
     return top, [*tables.values()]
+
+
+def _more_nodes(walks: list[_Walk], top: float) -> list[Tensor]:
+    """Return which components (C,) of each walk have more nodes, 1, and which fewer, -1.
+
+    For as much work, errors are least where nodes are as the root of weight over work. Others are far
+    too faint to count: 2.
+    """
+    weight = torch.cat([walk.likely for walk in walks]) - top
+    work = torch.cat([walk.widths.prod(dim=1) for walk in walks]).double()
+    counts = weight > -FAINTEST
+    wanted = (weight.exp() / work).sqrt() * counts
+    wanted *= (work * counts).sum() / (wanted * work).sum()
+    steps = (wanted.log2() / 2).round().clamp(-1, 1).masked_fill_(~counts, 2)
+    return [*torch.split(steps, [len(walk.likely) for walk in walks])]
 
 
 class _Walk:
@@ -78,7 +96,7 @@ class _Walk:
 
     - `middle`, `reach`: The angles (C, d) where all noise is 0, and how far they reach from there.
     - `likely`: The logarithm (C,) of weight times the density of what is given, roughly.
-    - `wanted`: Sizes (C, K) of grids that resolve the angles kept.
+    - `wanted`, `widths`: Sizes (C, K) of grids that resolve the angles kept, and of windows in them.
     """
 
     def __init__(
@@ -126,15 +144,22 @@ class _Walk:
         count = 2 * math.pi / KERNEL_STEP * apart.sqrt()
         sizes = torch.tensor([size for size in SIZES if size <= FINEST[len(split.kept)]])
         self.wanted = sizes[torch.searchsorted(sizes, count).clamp_max(len(sizes) - 1)]
+        reach = (self.reach[:, list(split.kept)] / (2 * math.pi) * self.wanted).ceil().long() + 1
+        self.widths = torch.minimum(2 * reach + 1, self.wanted)
 
     def add_to(
-        self, tables: dict[tuple[int, ...], Tensor], top: float, level: int, start: float
+        self,
+        tables: dict[tuple[int, ...], Tensor],
+        some: Tensor,
+        top: float,
+        level: tuple[int, int],
+        start: float,
     ) -> None:
-        """Add the components' densities, relative to exp(top), to tables of their sizes."""
-        likely = torch.nonzero(self.likely > top - FAINTEST)[:, 0]
+        """Add the densities of some components (C,), relative to exp(top), to tables of their sizes."""
+        likely = torch.nonzero(some)[:, 0]
         last = max(self.order.index(axis) for axis in self.split.kept)
         early = all(self.order.index(axis) < last for axis in self.hidden)
-        rule = _Rule(len(self.hidden), level, early)
+        rule = _Rule(len(self.hidden), *level, early=early)
         sizes, number = unique(self.wanted[likely], dim=0, return_inverse=True)
         for k, size in enumerate(listed(sizes)):
             table = tables.setdefault(tuple(size), torch.zeros(*size, dtype=torch.float64))
@@ -142,15 +167,13 @@ class _Walk:
 
     def _add(self, table: Tensor, chosen: Tensor, top: float, rule: _Rule, start: float) -> None:
         kept, sizes = list(self.split.kept), torch.tensor(table.shape)
-        reach = (self.reach[:, kept] / (2 * math.pi) * sizes).ceil().long() + 1
-        widest = torch.minimum(2 * reach + 1, sizes)
         middle = self.middle[:, kept] / (2 * math.pi) - start
         middle = (middle * sizes).round().long()
-        chosen = chosen[widest[chosen].prod(dim=1).argsort()]
+        chosen = chosen[self.widths[chosen].prod(dim=1).argsort()]
         while len(chosen):
-            block = max(1, AT_ONCE // (rule.count * int(widest[chosen[-1]].prod())))
+            block = max(1, AT_ONCE // (rule.count * int(self.widths[chosen[-1]].prod())))
             some, chosen = chosen[-block:], chosen[:-block]
-            at, widths = middle[some], widest[some].amax(dim=0)
+            at, widths = middle[some], self.widths[some].amax(dim=0)
             places = [
                 (at[:, i, None] - width // 2 + torch.arange(width)) % size
                 for i, (width, size) in enumerate(zip(listed(widths), table.shape, strict=True))
@@ -183,9 +206,9 @@ class _Walk:
                 offset, logs = rule.nodes(number, (kappa / (1 - kappa * left))[:, :, 0, 0])
                 at, total = mean + offset[:, :, None, None], total + logs[:, :, None, None]
                 if rule.left:
-                    lean = lean + left.sqrt()[..., None] * torch.eye(len(self.hidden))[number]
+                    lean = lean + left.sqrt() * _unit(len(self.hidden), number)
                     near[axis] = lean, torch.zeros_like(left)
-                mean_sine = (-lean.square().sum(dim=-1) / 2).exp()
+                mean_sine = (-lean.square().sum(dim=0) / 2).exp()
                 seen[axis] = mean_sine * at.sin(), mean_sine * at.cos()
                 continue
             if axis in given:
@@ -196,7 +219,7 @@ class _Walk:
                 at = at.mT
             if axis != self.order[-1]:
                 _observe(near, at - mean, kappa, lean)
-            kappa = kappa / (1 + kappa * lean.square().sum(dim=-1))
+            kappa = kappa / (1 + kappa * lean.square().sum(dim=0))
             if axis in kept:
                 kappa = kappa.clamp_max(sharpest_on(shape[kept.index(axis)]))
             if axis == first_last[-1]:
@@ -208,7 +231,7 @@ class _Walk:
             else:
                 total = total + kappa * ((at - mean).cos() - 1) - special.i0e(kappa).log()
             seen[axis] = at.sin(), at.cos()
-        values = total.clamp_min_(FAINT).exp_().sum(dim=1)
+        values = total.clamp_min_(FAINT).mul_(LOG2_E).exp2_().sum(dim=1)
         if len(kept) == 1:
             return values[:, 0]
         return values if first_last[0] == kept[0] else values.mT
@@ -218,51 +241,50 @@ class _Walk:
     ) -> tuple[Tensor, Tensor]:
         """Return the mean of an angle given those before it, whose sines and cosines are seen.
 
-        And how far it leans (..., H) with what is left about nodes.
+        And how far it leans (H, ...) with what is left about nodes.
         """
         own = self.means[rows, axis][:, :, None, None, None]
-        mean, lean = own[:, 0], own.new_zeros(1, 1, 1, 1, len(self.hidden))
+        mean, lean = own[:, 0], own.new_zeros(len(self.hidden), 1, 1, 1, 1)
         for j, (sin, cos) in seen.items():
             along, across = own[:, 1 + j], own[:, 1 + self.split.dim + j]
             mean = mean + along * sin + across * cos
             if j in near:
                 slope = along * cos - across * sin
-                mean, lean = mean + slope * near[j][1], lean + slope[..., None] * near[j][0]
+                mean, lean = mean + slope * near[j][1], lean + slope * near[j][0]
         return mean, lean
 
 
 _Near = dict[int, tuple[Tensor, Tensor]]
 """What is left of hidden angles' noise about quasi-random nodes, in terms of H normal numbers.
 
-How far (..., H) each angle leans with them, and its shift by what was observed. To first order all
+How far (H, ...) each angle leans with them, and its shift by what was observed. To first order all
 angles after it move in proportion: bumps become wider and aslant, in closed form.
 """
 
 
+def _unit(size: int, number: int) -> Tensor:
+    return torch.eye(size, dtype=torch.float64)[number].reshape(-1, 1, 1, 1, 1)
+
+
 def _observe(near: _Near, off: Tensor, kappa: Tensor, lean: Tensor) -> None:
     """Learn from an angle that is off its mean (Kalman, 1960; of the covariance the square root)."""
-    wider = 1 + kappa * lean.square().sum(dim=-1)
+    wider = 1 + kappa * lean.square().sum(dim=0)
     off = (torch.remainder(off + math.pi, 2 * math.pi) - math.pi) * kappa / wider
     less = kappa / (wider + wider.sqrt())
     for axis, (own, shift) in near.items():
-        told = (own * lean).sum(dim=-1)
-        near[axis] = own - (less * told)[..., None] * lean, shift + told * off
+        told = (own * lean).sum(dim=0)
+        near[axis] = own - less * told * lean, shift + told * off
 
 
 class _Rule:
     """Nodes of hidden angles: even ones of a single angle, quasi-random ones of several."""
 
-    def __init__(self, hidden: int, level: int, early: bool) -> None:
+    def __init__(self, hidden: int, level: int, step: int, *, early: bool) -> None:
+        own = 1 + level + step
         # of angles after those kept, it would have to be known at each point of the grid
-        self.left = LEFT[level] if early and hidden > 1 else 0.0
-        self.count = (1, ALONE * 2**level, SEVERAL[level])[min(hidden, 2)]
-        self.tables: list[Tensor] = []
-        if hidden > 1:
-            even = torch.quasirandom.SobolEngine(hidden, scramble=True, seed=level)
-            nodes = even.draw(self.count, dtype=torch.float64)
-            self.tables = [
-                quantiles(SHARPNESS, own) * SHARPNESS.sqrt()[:, None] for own in nodes.mT
-            ]
+        self.left = LEFT[level + max(step, 0)] if early and hidden > 1 else 0.0
+        self.count = (1, ALONE * 2**level, SEVERAL[own])[min(hidden, 2)]
+        self.tables = _quasi_random(hidden, self.count, level) if hidden > 1 else []
 
     def nodes(self, number: int, kappa: Tensor) -> tuple[Tensor, Tensor]:
         """Return offsets (C, Q) of a hidden angle from its mean, and the logarithms of their weights.
@@ -279,3 +301,12 @@ class _Rule:
         reach = (REACH / kappa.clamp_min(1e-12).sqrt()).clamp_max(math.pi)
         offset = reach * ((2 * torch.arange(self.count) + 1) / self.count - 1)
         return offset, torch.log_softmax(kappa * (offset.cos() - 1), dim=1)
+
+
+@lru_cache(maxsize=16)
+def _quasi_random(hidden: int, count: int, seed: int) -> list[Tensor]:
+    """Return nodes (S, Q) of each hidden angle by `SHARPNESS`, in deviations."""
+    with torch.inference_mode(False):
+        even = torch.quasirandom.SobolEngine(hidden, scramble=True, seed=seed)
+        nodes = even.draw(count, dtype=torch.float64)
+        return [quantiles(SHARPNESS, own) * SHARPNESS.sqrt()[:, None] for own in nodes.mT]
