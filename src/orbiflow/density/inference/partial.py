@@ -159,8 +159,7 @@ class _Left:
 
     - `found`: Kernels with log weights, of the last level; `before`: Of the level before.
     - `error`: The root mean square error of the whole that is its own, in nats: its change from the
-      level before over sqrt(2). Errors of two levels are independent, as their nodes are, and the
-      change has both, of which the last is the smaller one.
+      level before, undivided, since two levels may be off in the same direction.
     """
 
     log: float
@@ -204,7 +203,7 @@ def _refined(
                 # what the whole would be with the old instead of the new
                 ratio = (_log_sum(one.before, points) - now).exp() - (new - now).exp()
                 change = ratio.clamp_min(-1 + 1e-12).log1p()
-                one.error = float(change.square().mean().sqrt()) / math.sqrt(2)
+                one.error = float(change.square().mean().sqrt())
         error = math.hypot(*(one.error for one in left))
         if error <= accuracy:
             break

@@ -44,7 +44,7 @@ def near_log_sum(
 ) -> Tensor:
     """Return the logarithm (N,) of a sum of terms at features (m, N).
 
-    It is exact within twice `tolerance` and rounding.
+    It is exact within `tolerance` and rounding.
 
     Points are divided into tiles. Terms whose largest values in a tile are negligible beside the least
     sum there are left out; those that are smooth across the tile are summed at few places and
