@@ -93,7 +93,7 @@ def likeness_tiles(target: Target, effort: str) -> list[LikenessTile]:
             n = bent.hand.fine.size
             flip = (1.0, -1.0 if bent.hand.mirrored else 1.0)
             ring, source = (plane_points(z[:n]) * flip for z in (bent.points, bent.hand.fine.rest))
-            found.append((-bent.score(wide), LikenessTile(name, orient(ring), orient(source))))
+            found.append((-bent.score, LikenessTile(name, orient(ring), orient(source))))
     found.sort(key=lambda one: one[0])
     return [tile for _, tile in found]
 

@@ -23,7 +23,7 @@ from likeness_methods import silhouette
 
 from orbiflow.runtime import one_blas_thread
 from orbiflow.tiles import CLASSES, LikenessSearch, fidelity
-from orbiflow.tiles.search import bending, co_deformation
+from orbiflow.tiles.search import bending, carving, co_deformation
 from orbiflow.tiles.search.co_deformation import BODIES, TIGHTER, drawn_to_tiles, hands
 from orbiflow.tiles.search.likeness_search import ALL_BODIES
 
@@ -51,6 +51,9 @@ def stiff(**values: Any) -> dict[str, Any]:
 CHANGES: dict[str, Change] = {
     "firm": (PLAIN, {}),
     "corners not moved": (PLAIN, {"co_deformation.MOST_MOVES": 0}),
+    "not carved": (replace(PLAIN, carved=0), {}),
+    "five carved": (replace(PLAIN, carved=5), {}),
+    "wrinkles cost nothing": (PLAIN, {"carving.WRINKLE_COST": 0.0}),
     "all neighbours worked out": (replace(PLAIN, share=1.0), {}),
     "placements chosen rigidly": (replace(PLAIN, placements=32, held=32), {}),
     "springs in one stage": (PLAIN, springs(1)),
@@ -74,7 +77,7 @@ CHANGES: dict[str, Change] = {
 @contextmanager
 def changed(values: dict[str, Any]) -> Iterator[None]:
     """Constants of the search's modules changed for a while."""
-    modules = {"bending": bending, "co_deformation": co_deformation}
+    modules = {"bending": bending, "carving": carving, "co_deformation": co_deformation}
     places = {name: (modules[name.split(".")[0]], name.split(".")[1]) for name in values}
     before = {name: getattr(*place) for name, place in places.items()}
     try:

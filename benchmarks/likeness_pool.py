@@ -156,13 +156,13 @@ class BentCandidate(Candidate):
     placed: PlacedBent
 
     @classmethod
-    def of(cls, method: str, kind: str, bent: Bent, min_neck: float) -> BentCandidate:
+    def of(cls, method: str, kind: str, bent: Bent) -> BentCandidate:
         """Lay a bent silhouette by least squares."""
         points, rest = bent.points, bent.hand.fine.rest
         factor = complex(best_similarity(points, rest))
         placed = PlacedBent(bent, factor, complex(rest.mean() - factor * points.mean()))
         ring = placed.place(points[: bent.hand.fine.size])
-        return cls(method, kind, bent.score(min_neck), ring, placed)
+        return cls(method, kind, bent.score, ring, placed)
 
     def sound(self) -> bool:
         """Whether it is certified."""
@@ -181,7 +181,8 @@ class BentCandidate(Candidate):
         if hand.mirrored:  # read backwards from the same first point
             ring = ring[-np.arange(n) % n]
         away = hand.fine.displacement(bent.points[:, None])[0]
-        row = self.valued(target, ring, bent.fidelity, away, bent.neck)
+        neck = narrowest_neck(ring).share
+        row = self.valued(target, ring, bent.fidelity, away, neck)
         return {**row, "bent": rounded(ring)}
 
 
@@ -197,7 +198,7 @@ def bent_candidates(target: Target) -> tuple[dict[str, list[Candidate]], list[Ca
     """
     usual = LikenessSearch.for_effort("fast")
     both, wide = hands(target, usual), least_neck(target.normal, usual.min_neck)
-    (settings,) = replace(usual, below=0).searches(FINALISTS)
+    (settings,) = replace(usual, below=0, min_neck=wide).searches(FINALISTS)
     found: dict[str, list[Candidate]] = {name: [] for name in BODIES}
     seen: list[Candidate] = []
     for kind in CLASSES.values():
@@ -206,7 +207,7 @@ def bent_candidates(target: Target) -> tuple[dict[str, list[Candidate]], list[Ca
             for name, body in BODIES.items():
                 with one_blas_thread():
                     bents, _ = bending._finalists(hand, body, kind, settings, NEVER)
-                own[name] = [BentCandidate.of(name, kind.name, bent, wide) for bent in bents]
+                own[name] = [BentCandidate.of(name, kind.name, bent) for bent in bents]
                 found[name] += own[name]
             few = 2 * len(own["firm"]) < settings.finalists
             seen += own["firm"] + (own["soft"] if few else [])

@@ -30,7 +30,7 @@ from scipy.optimize import nnls
 from scipy.stats import spearmanr
 
 from orbiflow.tiles import complex_points
-from orbiflow.tiles.likeness.faithful import _clearance
+from orbiflow.tiles.likeness import Measures
 
 Complex = NDArray[np.complex128]
 
@@ -82,7 +82,7 @@ def motions(rest: Complex, bent: Complex, pieces: list[NDArray[np.int64]]) -> Co
 
 def turns(rest: Complex, bent: Complex, found: list[NDArray[np.int64]]) -> tuple[float, float]:
     """Return the mean turns of limbs and of pieces against the body."""
-    n, root = len(rest), np.sqrt(_clearance(rest))
+    n, root = len(rest), np.sqrt(Measures(rest).thick)
     half = round(PIECE * n / 2)
     around = [(np.arange(k - half, k + half + 1)) % n for k in range(n)]
     own = motions(rest, bent, around)

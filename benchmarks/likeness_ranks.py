@@ -60,14 +60,14 @@ SEARCHED = ("soft", "firm", "stiff")  # the bodies of the search at effort norma
 def bent_candidates(target: Target) -> Iterator[Candidate]:
     """Yield what bodies of four stiffnesses are bent into, with the numbers of effort normal."""
     usual = replace(LikenessSearch.for_effort("normal"), below=0)
-    wide = least_neck(target.normal, usual.min_neck)
+    usual = replace(usual, min_neck=least_neck(target.normal, usual.min_neck))
     for kind in CLASSES.values():
         both = hands(target, usual, step=int(np.lcm(6, kind.divisor)))
         for hand in both[:1] if template_symmetries(kind)[1] else both:
             for name, body in BODIES.items():
                 with one_blas_thread():
                     bents, _ = bending._finalists(hand, body, kind, usual, NEVER)
-                yield from (BentCandidate.of(name, kind.name, bent, wide) for bent in bents)
+                yield from (BentCandidate.of(name, kind.name, bent) for bent in bents)
 
 
 def chosen(found: list[Candidate]) -> list[Candidate]:

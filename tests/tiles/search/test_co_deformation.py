@@ -178,7 +178,7 @@ def test_more_effort_never_scores_less(name: str) -> None:
     normal = replace(normal, placements=40, held=12, starts=4, rounds=8)
     both = hands(animal("squirrel.dat"), replace(SMALL, multiples=(2,)))
     found = [bent_tiles(both, CLASSES[name], settings)[0] for settings in (fast, normal)]
-    fast, normal = ([bent.score(LikenessSearch.min_neck) for bent in tiles] for tiles in found)
+    fast, normal = ([bent.score for bent in tiles] for tiles in found)
     assert normal[0] >= fast[0]
     assert normal == sorted(normal, reverse=True)
     assert len(normal) > len(fast)

@@ -4,6 +4,9 @@ from .elastic import Stiffness as Stiffness
 from .faithful import Fidelity as Fidelity
 from .faithful import faithfulness as faithfulness
 from .faithful import fidelity as fidelity
+from .faithful import kept_of as kept_of
+from .faithful import mark_gradient as mark_gradient
+from .measures import Measures as Measures
 from .metrics import Overlap as Overlap
 from .metrics import Region as Region
 from .metrics import Shape as Shape
@@ -23,6 +26,7 @@ from .necks import least_neck as least_neck
 from .necks import narrowest_neck as narrowest_neck
 from .necks import narrowest_slit as narrowest_slit
 from .necks import neck_factor as neck_factor
+from .necks import neck_up_to as neck_up_to
 from .necks import slit_share as slit_share
 from .own_symmetry import NearSymmetry as NearSymmetry
 from .own_symmetry import near_symmetry as near_symmetry

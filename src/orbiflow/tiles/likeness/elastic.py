@@ -23,6 +23,7 @@ import scipy.sparse
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import best_similarity, complex_points, plane_points, signed_area
+from orbiflow.tiles.likeness.measures import Measures
 from orbiflow.tiles.silhouette import Mesh, local_thickness, triangulate
 
 # the bounds of the weights of areas, which are negative for obtuse triangles
@@ -94,6 +95,11 @@ class Elastic:
 
     def __len__(self) -> int:
         return len(self.rest)
+
+    @cached_property
+    def measures(self) -> Measures:
+        """What an outline keeps of this one at rest."""
+        return Measures(self.rest[: self.size])
 
     def rotations(self, z: Complex) -> Complex:
         """Return the rotations (N, C), complex units, that suit shapes (N, C) best."""

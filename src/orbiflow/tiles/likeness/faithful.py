@@ -25,24 +25,13 @@ from numpy.typing import ArrayLike
 
 from orbiflow.arguments import as_array
 from orbiflow.arrays import Array, Complex
-from orbiflow.tiles.geometry import (
-    apart,
-    centroid,
-    complex_points,
-    orient,
-    plane_points,
-    signed_area,
-)
+from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
 from orbiflow.tiles.likeness.bending_onto import bent_onto
 from orbiflow.tiles.likeness.elastic import Elastic
+from orbiflow.tiles.likeness.measures import Measures
 from orbiflow.tiles.likeness.metrics import Overlap, as_region, best_overlay
 from orbiflow.tiles.silhouette import sampled
 
-PIECE_LENGTHS = (0.08, 0.25)  # the lengths of the pieces, as shares of the outline
-# the offset of widths, in square roots of the area, below which differences matter little
-WIDTH_OFFSET = 0.02
-LARGEST_STRETCH = 2.0  # the largest logarithm of a stretch that counts
-CHORDS = 48  # the number of chords into which the outline is cut; their turning is compared
 # Values of two pieces, `stretched`, `thickness`, `blunted` and `moved`: those below which differences
 # matter little, those of a tile of medium likeness, and the marks that a unit of their logarithms costs
 NEGLIGIBLE = (0.05, 0.05, 0.02, 0.02, 2.0, 0.002)
@@ -124,66 +113,24 @@ def fidelity(rest: Complex, bent: Complex, cost: float) -> Fidelity:
     >>> fidelity(square, 3 * square * 1j + 7, 0.0).score > 0.99
     True
     """
-    rest, bent = (z / np.sqrt(abs(signed_area(plane_points(z)))) for z in (rest, bent))
-    sides, now = abs(np.roll(rest, -1) - rest), abs(np.roll(bent, -1) - bent)
-    stretch = np.log(np.maximum(now, 1e-9) / np.maximum(sides, 1e-9))
-    weight = (sides + np.roll(sides, 1)) / (2 * sides.sum())
-    thick = _clearance(rest)
-    thinner = np.log(thick / _clearance(bent))
-    short, long = (
-        float(np.average(np.sqrt(_misfits(rest, bent, length)), weights=np.sqrt(thick)))
-        for length in PIECE_LENGTHS
-    )
-    return Fidelity(
-        (short, long),
-        float(np.minimum(stretch**2, LARGEST_STRETCH**2) @ weight),
-        float(weight @ thinner**2),
-        _blunted(rest, bent),
-        apart(bent, rest),
-        cost,
-        float(sides.sum()),
-    )
+    return kept_of(Measures(rest), bent, cost)
 
 
-def _blunted(rest: Complex, bent: Complex) -> float:
-    """Return by how much less chords of an outline turn than they did, in radians, in all."""
-    step = max(1, round(len(rest) / CHORDS))
-
-    def turns(z: Complex) -> Array:
-        chords = np.roll(z, -step) - z
-        return abs(np.angle(chords * np.conj(np.roll(chords, step))))
-
-    return float(np.maximum(turns(rest) - turns(bent), 0).sum() / step)
+def kept_of(measures: Measures, bent: Complex, cost: float) -> Fidelity:
+    """Return the `fidelity` of an outline (n,) to the one that is measured against."""
+    return _kept(measures, measures.values(bent), cost)
 
 
-def _misfits(rest: Complex, bent: Complex, length: float) -> Array:
-    """Return, for the piece about each point, the misfit (n,) after the best motion, 0 to 1."""
-    n = len(rest)
-    half = min(max(3, round(length * n / 2)), (n - 1) // 2)
-    index = (np.arange(n)[:, None] + np.arange(-half, half + 1)) % n
-    a, b = rest[index], bent[index]
-    a, b = a - a.mean(axis=1, keepdims=True), b - b.mean(axis=1, keepdims=True)
-    sizes = (abs(a) ** 2).sum(axis=1) + (abs(b) ** 2).sum(axis=1)
-    common = abs((np.conj(a) * b).sum(axis=1))
-    return np.maximum(1 - 2 * common / sizes, 0.0)
+def mark_gradient(measures: Measures, bent: Complex) -> tuple[float, Complex]:
+    """Return the mark of an outline (n,), and its gradient in the points, as of `Measures`."""
+    values, along = measures.gradients(bent)
+    steep = [w / (least + x) for w, x, least in zip(WEIGHTS, values, NEGLIGIBLE, strict=True)]
+    return _kept(measures, values, 0.0).mark, -np.array(steep) @ along
 
 
-def _clearance(z: Complex) -> Array:
-    """Return the radius (n,) of the largest disc inside that touches each point, at most 1."""
-    z = z[::-1]
-    n = len(z)
-    along = np.roll(z, -1) - np.roll(z, 1)
-    inward = 1j * along / np.maximum(abs(along), 1e-300)
-    apart = z[None, :] - z[:, None]
-    depth = -(np.conj(inward)[:, None] * apart).real
-    with np.errstate(divide="ignore"):
-        radius = np.where(depth > 1e-9, abs(apart) ** 2 / (2 * np.maximum(depth, 1e-9)), np.inf)
-    own = np.arange(n)
-    for near in range(-2, 3):
-        radius[own, (own + near) % n] = np.inf
-    least = np.minimum(radius.min(axis=1), 1.0)
-    smooth = (np.roll(least, 1) + 2 * least + np.roll(least, -1)) / 4 + WIDTH_OFFSET
-    return smooth[::-1]
+def _kept(measures: Measures, values: Array, cost: float) -> Fidelity:
+    short, long, stretched, thickness, blunted, moved = values.tolist()
+    return Fidelity((short, long), stretched, thickness, blunted, moved, cost, measures.length)
 
 
 TURNS = 24  # number of rotations tried for each orientation; the best `REFINED_TURNS` are refined

@@ -22,14 +22,16 @@ from orbiflow.tiles.likeness import (
     Overlap,
     Stiffness,
     best_overlay,
-    fidelity,
+    kept_of,
     least_neck,
-    narrowest_neck,
     neck_factor,
+    neck_up_to,
 )
 from orbiflow.tiles.search.candidates import Fit, OnProgress, Prototiles, StillTiles, silent
+from orbiflow.tiles.search.carving import carved
 from orbiflow.tiles.search.co_deformation import (
     BODIES,
+    BentTiles,
     Drawn,
     Hand,
     drawn_to_tiles,
@@ -60,11 +62,12 @@ class Bent(NamedTuple):
     placement: Placements  # one, of the fine outline
     relaxed: Complex  # (n,) the outline let go a little: bent as it would like to be near this tile
     fidelity: Fidelity  # what is left of the outline, and what bending costs
-    neck: float  # width of the narrowest neck, in square roots of the area
+    sound: float  # 1, or less where a neck is too thin: `neck_factor`
 
-    def score(self, min_neck: float) -> float:
-        """What finalists are ordered by: their fidelity's, less where a neck is too thin."""
-        return self.fidelity.score * neck_factor(self.neck, min_neck)
+    @property
+    def score(self) -> float:
+        """What finalists are ordered by."""
+        return self.fidelity.score * self.sound
 
 
 def bent_tiles(
@@ -92,13 +95,19 @@ def bent_tiles(
             sound, crossed = sound + more, crossed + also
         found, dropped, done = found + sound, dropped + crossed, done + own.starts
         progress(0.9 * done / work, math.nan)
-    found.sort(key=lambda bent: -bent.score(settings.min_neck))
+    found.sort(key=lambda bent: -bent.score)
 
     def twins(a: Bent, b: Bent) -> bool:
         n = a.hand.fine.size
         return a.hand is b.hand and apart(a.points[:n], b.points[:n]) <= TWIN
 
-    return _unlike(found, len(found), twins), dropped
+    found = _unlike(found, len(found), twins)
+    if settings.carved and both[0].carved:
+        for k, bent in enumerate(found[: max(wanted, settings.carved)]):
+            cancel.check()
+            found[k] = _carved(kind, bent, settings.min_neck)
+    found.sort(key=lambda bent: -bent.score)
+    return found, dropped
 
 
 def _finalists(
@@ -111,7 +120,7 @@ def _finalists(
     for k in range(len(best.costs)):
         cancel.check()
         one = best.take(np.array([k]))
-        bent = _detailed(hand, fine, kind, one, settings.rounds)
+        bent = _detailed(hand, fine, kind, one, settings)
         found += [] if bent is None else [bent]
     return found, len(best.costs) - len(found)
 
@@ -194,10 +203,24 @@ def _finer(
 
 
 def _detailed(
-    hand: Hand, body: Elastic, kind: IsohedralClass, one: Drawn, rounds: int
+    hand: Hand, body: Elastic, kind: IsohedralClass, one: Drawn, settings: LikenessSearch
 ) -> Bent | None:
     """One placement of the fine outline worked out with a body; None if it crosses itself."""
-    tiles = held_on_tiles(body, TileSpace(kind, one.placements), one.points, rounds)
+    space = TileSpace(kind, one.placements)
+    tiles = held_on_tiles(body, space, one.points, settings.rounds)
+    return _bent(hand, body, tiles, settings.min_neck)
+
+
+def _carved(kind: IsohedralClass, bent: Bent, min_neck: float) -> Bent:
+    """The tile carved, or as it is if that is no better."""
+    body = bent.hand.fine
+    tiles = carved(body, TileSpace(kind, bent.placement), bent.points)
+    better = _bent(bent.hand, body, tiles, min_neck)
+    return bent if better is None else max(bent, better, key=lambda own: own.score)
+
+
+def _bent(hand: Hand, body: Elastic, tiles: BentTiles, min_neck: float) -> Bent | None:
+    """The first tile of a bent body; None if it crosses itself."""
     ring = tiles.points[: body.size, 0]
     polygon = plane_points(ring)
     area = float(signed_area(polygon))
@@ -211,8 +234,8 @@ def _detailed(
         tiles.offset[0],
         tiles.placements,
         body.pulled(tiles.points, tiles.points[: body.size], RELAXED, 3)[: body.size, 0],
-        fidelity(body.rest[: body.size], ring, float(hand.fine.cost(tiles.points)[0])),
-        narrowest_neck(polygon).share,
+        kept_of(body.measures, ring, float(hand.fine.cost(tiles.points)[0])),
+        neck_factor(neck_up_to(polygon, min_neck), min_neck),
     )
 
 

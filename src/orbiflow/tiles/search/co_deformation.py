@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles.geometry import plane_points, reverse, signed_area
-from orbiflow.tiles.likeness import Elastic, Pinned, Stiffness, fidelity
+from orbiflow.tiles.likeness import Elastic, Pinned, Stiffness, kept_of
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.tile_space import Placements, TileSpace
 from orbiflow.tiles.silhouette import Emphasis, Pins, Samples, Target, sampled, triangulate
@@ -126,6 +126,7 @@ class Hand:
     outline: Array  # (N, 2) its outline, counter-clockwise
     samples: Samples  # points of its outline, coarse to fine
     made: Callable[[str, Stiffness], Elastic]  # the body of a level of points and a stiffness
+    carved: bool  # whether its tiles may be, as nobody said which parts matter
 
     @cached_property
     def fine(self) -> Elastic:
@@ -169,7 +170,7 @@ def hands(
             parts, angle = pins.parts(own, mesh.triangles), pins.keep_angle
             return Pinned(ring, parts, stiffness, keep_angle=angle, stiff=stiff, mesh=mesh)
 
-        return Hand(mirrored, outline, points, made)
+        return Hand(mirrored, outline, points, made, emphasis is None and pins is None)
 
     return hand(outline, samples, False), hand(reverse(outline) * (1.0, -1.0), mirror, True)
 
@@ -238,7 +239,7 @@ def _drawn(
         points = body.pulled(points, tiles(), SPRINGS, 1)
     rings = plane_points(points[:n].T)
     if judged:
-        costs = np.exp([-fidelity(body.rest[:n], z[:n], 0.0).mark for z in points.T])
+        costs = np.exp([-kept_of(body.measures, z[:n], 0.0).mark for z in points.T])
     else:
         apart = (abs(points[:n] - tiles()) ** 2).mean(axis=0)
         area = np.maximum(signed_area(rings), 0.1)

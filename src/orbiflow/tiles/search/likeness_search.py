@@ -32,6 +32,7 @@ SKETCH = {
     "share": 0.1,
     "finalists": 2,
     "rounds": 10,
+    "carved": 0,
     "bodies": ("soft",),
     "judged": False,
 }
@@ -51,6 +52,7 @@ BEST = {
     "starts": 40,
     "share": 0.4,
     "finalists": 8,
+    "carved": 6,
     "bodies": (*ALL_BODIES, "rigid"),
     "judged": True,
 }
@@ -78,6 +80,8 @@ class LikenessSearch(Settings, SearchMethod):
     - `finalists`: of what comes of it, the best that are worked out with all of the outline's detail,
       a class and hand.
     - `rounds`: steps of the minimisation for finalists.
+    - `carved`: of these, the best of a class that are moved to the highest mark among the tiles of
+      their placements; none where a user says which parts matter.
     - `judged`: whether finalists are chosen, and their corners moved, by the mark that people would
       give rather than by what bending costs; not where hairs need all of the outline's points.
     - `bodies`: how stiff the silhouette is, from soft to rigid; each is searched.
@@ -104,6 +108,7 @@ class LikenessSearch(Settings, SearchMethod):
     share: Annotated[float, Range(above=0, most=1)] = 0.2
     finalists: Count = 4
     rounds: Count = 20
+    carved: Annotated[int, Range(0)] = 2
     judged: bool = False
     bodies: tuple[Body, ...] = ("firm", "stiff")
     below: Annotated[int, Range(0, 2)] = 0

@@ -1,0 +1,243 @@
+"""What an outline keeps of the one that was bent into it: six measures, and their gradients.
+
+Outlines correspond point by point; points are complex numbers x + iy. The gradient of a measure f is
+the complex number g of each point for which f grows by Re(conj(g) dz). `faithful` says what people
+make of the measures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from orbiflow.arrays import Array, Complex, Integers
+from orbiflow.tiles.geometry import plane_points, signed_area
+
+PIECE_LENGTHS = (0.08, 0.25)  # the lengths of the pieces, as shares of the outline
+# the offset of widths, in square roots of the area, below which differences matter little
+WIDTH_OFFSET = 0.02
+LARGEST_WIDTH = 1.0  # the largest radius of a disc inside that counts, in square roots of the area
+LARGEST_STRETCH = 2.0  # the largest logarithm of a stretch that counts
+CHORDS = 48  # the number of chords into which the outline is cut; their turning is compared
+SMALL_MISFIT = 1e-7  # the misfit of a piece below which its root is smooth: it has a gradient at 0
+SHORTEST = 1e-9  # the shortest side whose stretch is known
+WRINKLE_STEPS = (1, 2, 4)  # the numbers of points between those whose directions are compared
+LEAST_KINK = 1e-3  # the angle in radians below which a change of direction counts by its square
+
+Measured = tuple[float, Callable[[], Complex]]  # a value, and what computes the gradient (n,)
+
+
+class Measures:
+    """The measures of outlines (n,) against one at rest, both counter-clockwise and evenly spaced."""
+
+    def __init__(self, rest: Complex) -> None:
+        _, self.rest = _normal(rest)
+        self.sides = abs(_steps(self.rest, 1))
+        self.length = float(self.sides.sum())
+        self._weight = (self.sides + _shifted(self.sides, 1)) / (2 * self.length)
+        self.thick = _clearance(self.rest)[0]
+        share = np.sqrt(self.thick)
+        self._share = share / share.sum()
+        self._step = max(1, round(len(rest) / CHORDS))
+        self._turns = abs(_turns(self.rest, self._step))
+        n = len(rest)
+        halves = (round(length * n / 2) for length in PIECE_LENGTHS)
+        self._pieces = [_Pieces(self.rest, min(max(3, h), (n - 1) // 2)) for h in halves]
+
+    def values(self, bent: Complex) -> Array:
+        """Return the six values of an outline, in the order of `Fidelity`."""
+        _, z = _normal(bent)
+        return np.array([value for value, _ in self._measured(z)])
+
+    def gradients(self, bent: Complex) -> tuple[Array, Complex]:
+        """Return the six values of an outline, and their gradients (6, n)."""
+        size, z = _normal(bent)
+        found = self._measured(z)
+        along = np.array([gradient() for _, gradient in found])
+        # a larger outline is made smaller again
+        grows = (np.conj(along) @ z).real
+        along = (along - grows[:, None] * _area_gradient(z) / 2) / size
+        return np.array([value for value, _ in found]), along
+
+    def wrinkles(self, bent: Complex) -> tuple[float, Complex]:
+        """Return by how many radians the outline turns elsewhere than at rest, and its gradient (n,).
+
+        The sum over its points of the change of the angle between steps, as the mean over steps of
+        one point and more: an outline that bends at few places has fewer wrinkles than a bumpy one.
+        """
+        total, along = 0.0, np.zeros_like(bent)
+        for step in WRINKLE_STEPS:
+            share = 1 / (step * len(WRINKLE_STEPS))
+            change = _turns(bent, step) - _turns(self.rest, step)
+            change = (change + np.pi) % (2 * np.pi) - np.pi
+            size = np.sqrt(change**2 + LEAST_KINK**2)
+            total += share * float(size.sum())
+            along += share * _turned(bent, step, change / size)
+        return total, along
+
+    def _measured(self, z: Complex) -> tuple[Measured, ...]:
+        short, long = (piece.misfit(z, self._share) for piece in self._pieces)
+        return short, long, self._stretched(z), self._thinned(z), self._blunted(z), self._moved(z)
+
+    def _stretched(self, z: Complex) -> Measured:
+        step = _steps(z, 1)
+        now = np.maximum(abs(step), SHORTEST)
+        log = np.log(now / np.maximum(self.sides, SHORTEST))
+        counts = abs(log) < LARGEST_STRETCH
+
+        def gradient() -> Complex:
+            return _stepped(2 * self._weight * log * counts / now**2 * step, 1)
+
+        return float(np.where(counts, log**2, LARGEST_STRETCH**2) @ self._weight), gradient
+
+    def _thinned(self, z: Complex) -> Measured:
+        width, chord = _clearance(z)
+        log = np.log(self.thick / width)
+
+        def gradient() -> Complex:
+            return _clearance_gradient(z, chord, -2 * self._weight * log / width)
+
+        return float(self._weight @ log**2), gradient
+
+    def _blunted(self, z: Complex) -> Measured:
+        turns = _turns(z, self._step)
+        less = self._turns - abs(turns)
+
+        def gradient() -> Complex:
+            return _turned(z, self._step, np.where(less > 0, -np.sign(turns), 0.0) / self._step)
+
+        return float(np.maximum(less, 0).sum() / self._step), gradient
+
+    def _moved(self, z: Complex) -> Measured:
+        own, goal = z - z.mean(), self.rest - self.rest.mean()
+        square, common = float((abs(own) ** 2).sum()), complex(np.conj(own) @ goal)
+        left = float((abs(goal) ** 2).sum()) - abs(common) ** 2 / square
+
+        def gradient() -> Complex:
+            along = abs(common) ** 2 / square**2 * own - np.conj(common) * goal / square
+            return 2 * along / len(z)
+
+        return max(left, 0.0) / len(z), gradient
+
+
+class _Chord(NamedTuple):
+    """How the largest disc inside touches the outline at each point."""
+
+    ends: Integers  # (n,) the other point that it touches
+    inward: Complex  # (n,) the unit vector towards its middle
+    depth: Array  # (n,) how far the other point is, along this vector
+    radius: Array  # (n,) at most `LARGEST_WIDTH`
+
+
+class _Pieces:
+    """The pieces of an outline about each of its points, `half` points to either side."""
+
+    def __init__(self, rest: Complex, half: int) -> None:
+        self.rest, self.half, self.count = rest, half, 2 * half + 1
+        self.sum = self.windows(rest)
+        self.square = self.windows(abs(rest) ** 2) - abs(self.sum) ** 2 / self.count
+
+    def windows(self, values: Array | Complex) -> Any:
+        """Return the sum (n,) of values over the piece about each point."""
+        n, half = len(values), self.half
+        total = np.cumsum(np.concatenate([values[-half - 1 :], values, values[:half]]))
+        return total[self.count :] - total[:n]
+
+    def misfit(self, z: Complex, share: Array) -> Measured:
+        """Return the mean, with weights (n,), of the roots of the misfits after the best motions."""
+        own = self.windows(z)
+        square = self.windows(abs(z) ** 2) - abs(own) ** 2 / self.count
+        common = self.windows(np.conj(self.rest) * z) - np.conj(self.sum) * own / self.count
+        sizes, size = self.square + square, abs(common)
+        misfit = np.maximum(1 - 2 * size / sizes, 0.0)
+        root = np.sqrt(misfit + SMALL_MISFIT)
+
+        def gradient() -> Complex:
+            slope = share * (misfit + 2 * SMALL_MISFIT) / root**3  # of half the misfit
+            turned = -slope / sizes * common / np.maximum(size, 1e-300)
+            larger = slope * size / sizes**2
+            along = self.rest * self.windows(turned) - self.windows(turned * self.sum) / self.count
+            more = z * self.windows(larger) - self.windows(larger * own) / self.count
+            return along + 2 * more
+
+        return float((misfit / root) @ share), gradient
+
+
+def _normal(z: Complex) -> tuple[float, Complex]:
+    """Return the root of the area, and the outline about the origin with area 1."""
+    about = z - z.mean()
+    size = float(np.sqrt(abs(signed_area(plane_points(about)))))
+    return size, about / size
+
+
+def _area_gradient(z: Complex) -> Complex:
+    return -0.5j * (_shifted(z, -1) - _shifted(z, 1))
+
+
+def _shifted(values: Array | Complex, by: int) -> Any:
+    """Return what `numpy.roll` does, in a fifth of its time."""
+    return np.concatenate([values[-by:], values[:-by]])
+
+
+def _steps(z: Complex, step: int) -> Complex:
+    return _shifted(z, -step) - z
+
+
+def _stepped(along: Complex, step: int) -> Complex:
+    """Return the gradient in the points of what has a gradient (n,) in `_steps`."""
+    return _shifted(along, step) - along
+
+
+def _turns(z: Complex, step: int) -> Array:
+    """Return the angles (n,) in radians by which chords of some steps turn, counter-clockwise."""
+    chords = _steps(z, step)
+    return np.angle(chords * np.conj(_shifted(chords, step)))
+
+
+def _turned(z: Complex, step: int, along: Array) -> Complex:
+    """Return the gradient in the points of what has a gradient (n,) in `_turns`."""
+    chords = _steps(z, step)
+    own = (along - _shifted(along, -step)) * 1j * chords / np.maximum(abs(chords) ** 2, 1e-300)
+    return _stepped(own, step)
+
+
+def _clearance(z: Complex) -> tuple[Array, _Chord]:
+    """Return the radius (n,) of the largest disc inside that touches each point, and where it ends.
+
+    Radii are smoothed along the outline, and larger by `WIDTH_OFFSET`.
+    """
+    n = len(z)
+    own = np.arange(n)
+    inward = 1j * (_shifted(z, -1) - _shifted(z, 1))
+    inward /= np.maximum(abs(inward), 1e-300)
+    x, y = z.real, z.imag
+    depth = np.outer(inward.real, x) + np.outer(inward.imag, y)
+    depth -= (inward.real * x + inward.imag * y)[:, None]
+    square = np.subtract.outer(x, x) ** 2
+    square += np.subtract.outer(y, y) ** 2
+    square[own, own] = 1
+    curvature = np.divide(depth, square, out=square)  # of half the disc
+    for near in range(-2, 3):
+        curvature[own, (own + near) % n] = 0
+    ends = curvature.argmax(axis=1)
+    least = 0.5 / np.maximum(curvature[own, ends], 0.5 / LARGEST_WIDTH)
+    return _smooth(least) + WIDTH_OFFSET, _Chord(ends, inward, depth[own, ends], least)
+
+
+def _clearance_gradient(z: Complex, chord: _Chord, along: Array) -> Complex:
+    """Return the gradient (n,) in the points of what has a gradient (n,) in `_clearance`."""
+    ends, inward, depth, radius = chord
+    sides = np.maximum(abs(_shifted(z, -1) - _shifted(z, 1)), 1e-300)
+    share = np.where(radius < LARGEST_WIDTH, _smooth(along), 0.0) / np.maximum(depth, 1e-300)
+    apart = z[ends] - z
+    steep = share * radius * inward  # of the depth
+    pulled = share * apart - steep
+    found = np.bincount(ends, pulled.real, len(z)) + 1j * np.bincount(ends, pulled.imag, len(z))
+    tilt = steep * (np.conj(apart) * -1j * inward).real / sides
+    return found - pulled + _shifted(tilt, 1) - _shifted(tilt, -1)
+
+
+def _smooth(values: Array) -> Array:
+    return (_shifted(values, 1) + 2 * values + _shifted(values, -1)) / 4

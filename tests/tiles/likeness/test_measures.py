@@ -1,0 +1,76 @@
+"""The gradients of what an outline keeps of another."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.arrays import Complex
+from orbiflow.tiles.likeness import Measures, mark_gradient
+from strategies import seeds
+
+COUNT, STEP = 120, 1e-7
+
+
+def outline(rng: np.random.Generator) -> Complex:
+    """A smooth outline without straight sides, whose turning has no kinks."""
+    angle = np.linspace(0, 2 * np.pi, COUNT, endpoint=False)
+    waves = np.arange(2, 9)[:, None]
+    radius = 1 + (rng.normal(0, 0.05, (7, 1)) * np.cos(waves * angle)).sum(axis=0)
+    radius = radius + (rng.normal(0, 0.05, (7, 1)) * np.sin(waves * angle)).sum(axis=0)
+    return np.maximum(radius, 0.3) * np.exp(1j * angle)
+
+
+def bent(rest: Complex, rng: np.random.Generator) -> Complex:
+    angle = np.linspace(0, 2 * np.pi, COUNT, endpoint=False)
+    waves = np.exp(1j * np.arange(-6, 7)[:, None] * angle)
+    bends = rng.normal(0, 0.02, (13, 2)) @ np.array([1, 1j])
+    return 1.7 * (rest + bends @ waves) + complex(*rng.normal(size=2))
+
+
+@given(seeds)
+def test_gradients_are_the_numerical_ones(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rest = outline(rng)
+    measures, z = Measures(rest), bent(rest, rng)
+    values, along = measures.gradients(z)
+    assert values == pytest.approx(measures.values(z), abs=1e-12)
+    way = np.exp(1j * rng.uniform(0, 2 * np.pi, COUNT))
+    more, less = (measures.values(z + step * way) for step in (STEP, -STEP))
+    change = (along.conj() @ way).real
+    size = abs(along).sum(axis=1) + 1e-3  # the largest that the change could be
+    assert (abs((more - less) / (2 * STEP) - change) < 2e-3 * size).all()
+
+
+@given(seeds)
+def test_wrinkles_and_the_mark_have_theirs(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rest = outline(rng)
+    measures, z = Measures(rest), bent(rest, rng)
+    way = np.exp(1j * rng.uniform(0, 2 * np.pi, COUNT))
+    for found in (measures.wrinkles, lambda z: mark_gradient(measures, z)):
+        change = (found(z)[1].conj() @ way).real
+        numerical = (found(z + STEP * way)[0] - found(z - STEP * way)[0]) / (2 * STEP)
+        assert abs(numerical - change) < 2e-3 * (abs(found(z)[1]).sum() + 1e-3)
+
+
+@given(seeds, st.floats(0.1, 10), st.floats(-3.2, 3.2), st.complex_numbers(max_magnitude=10))
+def test_motions_and_scale_change_nothing(
+    seed: int, scale: float, turn: float, shift: complex
+) -> None:
+    rng = np.random.default_rng(seed)
+    rest = outline(rng)
+    measures, z = Measures(rest), bent(rest, rng)
+    moved = scale * np.exp(1j * turn) * z + shift
+    assert measures.values(moved) == pytest.approx(measures.values(z), abs=1e-9)
+    assert measures.wrinkles(moved)[0] == pytest.approx(measures.wrinkles(z)[0], abs=1e-7)
+
+
+def test_an_outline_at_rest_has_no_wrinkles() -> None:
+    rest = outline(np.random.default_rng(1))
+    measures = Measures(rest)
+    assert measures.wrinkles(rest)[0] < 0.001 * COUNT * 2
+    rough = rest + 0.002 * np.random.default_rng(2).normal(size=COUNT)
+    assert measures.wrinkles(rough)[0] > measures.wrinkles(rest)[0] + 1
