@@ -40,8 +40,16 @@ MARKS = ROOT / "benchmarks" / "data" / "likeness_pool.json"
 POINTS = 48  # of each outline: all tiles together stay below 1.5 MB
 ALSO = ("energy", "displacement", "neck", "iou")  # values that the order has no use for
 GOOD = 6.5  # the least mark that is good
-VALUES = ("stretched", "thickness", "blunted", "moved", "cost", "length")  # after `pieces`
-MEASURES = ("short pieces", "long pieces", *VALUES[:4])
+VALUES = (
+    "stretched",
+    "thickness",
+    "blunted",
+    "moved",
+    "merged",
+    "cost",
+    "length",
+)  # after `pieces`
+MEASURES = ("short pieces", "long pieces", *VALUES[:5])
 SEARCHED = ("soft", "firm", "firm-600")  # the bodies of the search for likeness
 
 Reading = dict[str, Ring]  # the marks of each silhouette's tiles, in the order of their file
@@ -204,7 +212,8 @@ class Marked:
     def against(self, values: Ring) -> tuple[float, float, float]:
         """Return the correlation of ranks with the marks, the mark of the first, and what it lacks."""
         first = self.marks[np.argmax(values)]
-        return float(spearmanr(values, self.marks).statistic), first, self.marks.max() - first
+        rank = float(spearmanr(values, self.marks).statistic) if np.ptp(values) else np.nan
+        return rank, first, self.marks.max() - first
 
 
 def order(options: argparse.Namespace) -> None:
@@ -230,7 +239,10 @@ def print_orders(found: list[Marked], *, fitted: bool) -> None:
     print(f"\n{'':36}rank correlation  mark of its first  less than the best")
     for name in orders[0]:
         rows = [one.against(own[name]) for one, own in zip(found, orders, strict=True)]
-        print(f"{name:36}" + "".join(f"{x:16.2f}" for x in np.nanmean(rows, axis=0)))
+        ranks, first, less = np.array(rows).T
+        rank = np.nanmean(ranks) if np.isfinite(ranks).any() else np.nan
+        row = (rank, first.mean(), less.mean())
+        print(f"{name:36}" + "".join(f"{x:16.2f}" for x in row))
     ours = np.mean([one.marks[np.argmax(one.scores * one.searched)] for one in found])
     print(f"{'the order, among tiles of our search':52}{ours:16.2f}")
     shown = np.mean([one.marks[0] for one in found])

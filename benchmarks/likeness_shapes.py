@@ -4,14 +4,16 @@
     python benchmarks/likeness_shapes.py look [--sheet FILE.png]
 
 `make` writes data/likeness_shapes.json from four sources: the icons, the polygons of Nagata and
-Imahori, the PhyloPic silhouettes (docs/benchmarks.md says where they are), and animals of four sets of
-icons, which npm unpacks into FOLDER/node_modules:
+Imahori, the PhyloPic silhouettes (docs/benchmarks.md says where they are), and animals of seven sets
+of icons, which npm unpacks into FOLDER/node_modules:
 
     npm install --prefix FOLDER @iconify-json/noto @iconify-json/twemoji \\
-        @iconify-json/fluent-emoji-flat @iconify-json/fa6-solid
+        @iconify-json/fluent-emoji-flat @iconify-json/fa6-solid @iconify-json/emojione \\
+        @iconify-json/fxemoji @iconify-json/noto-v1
 
 Drawings are filled, gaps are closed by 9 of 480 pixels, and the largest part is kept and sampled at 80
-points. A third of each source is for the test alone, drawn by a fixed seed. `look` draws all of them.
+points. A third of each source is for the test alone, drawn by a fixed seed; of 38 animals (the part
+"ranked") only the best tiles were ranked. `look` draws all of them.
 """
 
 from __future__ import annotations
@@ -45,6 +47,17 @@ ANIMALS = {
 }
 """Animals that a person names at once, by set of icons."""
 
+RANKED = {
+    "emojione": "ant dove horse rooster",
+    "fluent-emoji-flat": "bat dodo eagle giraffe jellyfish mammoth peacock rhinoceros",
+    "fxemoji": "dolphin elephant poodle",
+    "noto": "boar chipmunk cricket goose gorilla guide-dog llama monarch-butterfly parrot pig shark "
+    "spider t-rex turkey",
+    "noto-v1": "camel elephant penguin shark",
+    "twemoji": "ant honeybee rabbit sauropod t-rex",
+}
+"""More of them, whose best tiles were ranked (likeness_ranks.py)."""
+
 UNNAMED = ("Grapsidae", "Hydroscaphidae")
 """PhyloPic silhouettes that nobody could name from 80 points."""
 
@@ -70,10 +83,10 @@ def _disc(radius: int) -> np.ndarray[Any, Any]:
     return x * x + y * y <= radius * radius
 
 
-def animals(packages: Path) -> dict[str, dict[str, Any]]:
+def animals(packages: Path, sets: dict[str, str]) -> dict[str, dict[str, Any]]:
     """Read the animals of the sets of icons, with their licences."""
     found = {}
-    for name, animals in ANIMALS.items():
+    for name, animals in sets.items():
         folder = needed(packages / "node_modules" / "@iconify-json" / name, f"the package {name}")
         drawn = json.loads((folder / "icons.json").read_text())
         about = json.loads((folder / "info.json").read_text())
@@ -135,10 +148,12 @@ def split(names: list[str], rng: np.random.Generator) -> dict[str, str]:
 def make(options: argparse.Namespace) -> None:
     """Write the silhouettes, in their normal form, rounded to four digits."""
     sources = [polygons("icons", ICONS_PLACE, ICONS)]
-    sources += [polygons("nagata", NAGATA_PLACE, NAGATA), phylopic(), animals(options.packages)]
+    sources += [polygons("nagata", NAGATA_PLACE, NAGATA), phylopic()]
+    sources += [animals(options.packages, sets) for sets in (ANIMALS, RANKED)]
     rng, found = np.random.default_rng(SEED), {}
     for source in sources:
-        parts = split(list(source), rng)
+        last = source is sources[-1]
+        parts = dict.fromkeys(source, "ranked") if last else split(list(source), rng)
         for name, shape in source.items():
             normal = np.asarray(Target.from_polygon(shape.pop("outline")).normal)
             found[name] = {"part": parts[name], **shape, "outline": normal.round(4).tolist()}

@@ -260,7 +260,7 @@ def _measurements(entry: dict[str, Any]) -> dict[str, Any]:
     own = ("deformation", "bent_iou", "pinned")
     found = {name: metrics.pop(name, None) for name in own}
     fidelity = metrics.pop("fidelity", None)
-    if fidelity is not None and "moved" in fidelity:  # version 0.1 measured something else
+    if fidelity is not None and "merged" in fidelity:  # version 0.1 measured something else
         found["fidelity"] = Fidelity(**{**fidelity, "pieces": tuple(fidelity["pieces"])})
     if metrics.get("iou") is not None:
         found["metrics"] = ShapeMetrics(**{**metrics, "window": tuple(metrics["window"])})

@@ -217,10 +217,10 @@ def test_scores_and_stars_of_version_0_1_are_read_as_they_were(tmp_path: Path) -
     assert json.loads((tmp_path / "again" / "result.json").read_text())["schema_version"] == 2
     # measures of this version are read; half of them are refused
     kept = {"pieces": [0.1, 0.2], "stretched": 0.2, "thickness": 0.1, "blunted": 3.0}
-    kept |= {"moved": 0.01, "cost": 0.3, "length": 6.0}
+    kept |= {"moved": 0.01, "merged": 0.05, "cost": 0.3, "length": 6.0}
     entry["metrics"] = {"fidelity": kept}
     (run / "result.json").write_text(json.dumps(document))
-    assert read_result(run).fidelity == Fidelity((0.1, 0.2), 0.2, 0.1, 3.0, 0.01, 0.3, 6.0)
+    assert read_result(run).fidelity == Fidelity((0.1, 0.2), 0.2, 0.1, 3.0, 0.01, 0.05, 0.3, 6.0)
     del kept["length"]
     (run / "result.json").write_text(json.dumps(document))
     with pytest.raises(InputFileError, match=r"tile 1 cannot be read: .*length"):

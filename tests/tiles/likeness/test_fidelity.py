@@ -23,7 +23,17 @@ SQUIRREL = complex_points(resampled(animal("squirrel.dat").normal, 240))
 def test_motions_and_scale_cost_nothing(scale: float, turn: float, shift: complex) -> None:
     found = fidelity(SQUIRREL, scale * np.exp(1j * turn) * SQUIRREL + shift, 0.0)
     assert found.score > 0.999
-    assert max(*found.pieces, found.stretched, found.thickness, found.blunted, found.moved) < 1e-5
+    assert (
+        max(
+            *found.pieces,
+            found.stretched,
+            found.thickness,
+            found.blunted,
+            found.moved,
+            found.merged,
+        )
+        < 1e-5
+    )
     assert found.lost == []
 
 
@@ -81,17 +91,17 @@ def test_corners_that_become_round_are_blunted_and_limbs_that_turn_are_moved() -
 @st.composite
 def measured(draw: st.DrawFn) -> Fidelity:
     """Any values."""
-    short, long, stretched, thickness, blunted, moved = (draw(st.floats(0, 2)) for _ in range(6))
+    short, long, one, two, three, four, five = (draw(st.floats(0, 2)) for _ in range(7))
     length = draw(st.floats(3, 15))
-    return Fidelity((short, long), stretched, thickness, blunted, moved, 0.2, length)
+    return Fidelity((short, long), one, two, three, four, five, 0.2, length)
 
 
-@given(measured(), st.integers(0, 5), st.floats(0.01, 3))
+@given(measured(), st.integers(0, 6), st.floats(0.01, 3))
 def test_whatever_is_lost_lowers_the_mark(kept: Fidelity, which: int, more: float) -> None:
-    values = [*kept.pieces, kept.stretched, kept.thickness, kept.blunted, kept.moved]
+    values = [*kept.pieces, kept.stretched, kept.thickness, kept.blunted, kept.moved, kept.merged]
     values[which] += more
-    short, long, stretched, thickness, blunted, moved = values
-    worse = Fidelity((short, long), stretched, thickness, blunted, moved, kept.cost, kept.length)
+    short, long, one, two, three, four, five = values
+    worse = Fidelity((short, long), one, two, three, four, five, kept.cost, kept.length)
     assert worse.mark < kept.mark
     assert worse.score <= kept.score
     assert worse.losses[which] > kept.losses[which]
@@ -119,7 +129,7 @@ def test_a_score_is_a_probability_that_the_stars_know(kept: Fidelity) -> None:
 
 
 def test_what_is_lost_is_named_the_worst_first() -> None:
-    kept = Fidelity((0.4, 0.05), 0.01, 0.9, 5.0, 0.001, 0.2, 6.0)
+    kept = Fidelity((0.4, 0.05), 0.01, 0.9, 5.0, 0.001, 0.01, 0.2, 6.0)
     assert kept.lost == [
         "small parts such as ears and feet have lost their shapes",
         "limbs or body have become thinner or thicker",

@@ -1,6 +1,6 @@
 """How faithful a bent outline is to its silhouette, as people judge it, point by point.
 
-The mark that people would give is foretold from six measures (docs/likeness.md has the evidence):
+The mark that people would give is foretold from seven measures (docs/likeness.md has the evidence):
 
 - `pieces`: how well short and long pieces of the outline are kept, each compared after its own best
   motion (Procrustes; Gower, 1975), by the mean of the roots: a few pieces may be lost, the rest should
@@ -8,10 +8,11 @@ The mark that people would give is foretold from six measures (docs/likeness.md 
   of a piece is the root of the body's thickness there, larger for a head than for a leg.
 - `stretched`: how unevenly the outline is stretched: shrunken limbs, and bodies that have grown.
 - `thickness`: where limbs and bodies have become thin or fat, by the largest disc inside that touches
-  the outline (the medial axis; found as by Ma, Bae and Choi, 3D medial axis point approximation, 2012).
+  the outline (the medial axis).
 - `blunted`: how much of its turning the outline has lost: corners that are round now, and curves that
   are straight.
 - `moved`: how far the outline is from its place, after the best motion of the whole: the pose.
+- `merged`: where gaps have closed, so that parts have come together, by the largest disc outside.
 
 Outlines correspond point by point: this compares a shape with the one that was bent into it.
 """
@@ -32,18 +33,19 @@ from orbiflow.tiles.likeness.measures import Measures
 from orbiflow.tiles.likeness.metrics import Overlap, as_region, best_overlay
 from orbiflow.tiles.silhouette import sampled
 
-# Values of two pieces, `stretched`, `thickness`, `blunted` and `moved`: those below which differences
-# matter little, those of a tile of medium likeness, and the marks that a unit of their logarithms costs
-NEGLIGIBLE = (0.05, 0.05, 0.02, 0.02, 2.0, 0.002)
-USUAL_VALUES = (0.137, 0.12, 0.021, 0.105, 7.5, 0.0048)
-WEIGHTS = (1.3, 1.65, 0.27, 0.45, 0.55, 0.27)
+# Values of two pieces, `stretched`, `thickness`, `blunted`, `moved` and `merged`: those below which
+# differences matter little, those of a tile of medium likeness, and the marks that a unit of their
+# logarithms costs
+NEGLIGIBLE = (0.05, 0.05, 0.02, 0.02, 2.0, 0.002, 0.1)
+USUAL_VALUES = (0.137, 0.12, 0.021, 0.105, 7.5, 0.0048, 0.15)
+WEIGHTS = (1.3, 1.65, 0.27, 0.45, 0.5, 0.27, 0.4)
 # Rough outlines forgive more: marks for the logarithm of the outline's length, and lengths, in square
 # roots of the area: the usual one, and the extremes of those that were marked
 LENGTH_WEIGHT, USUAL_LENGTH, LENGTHS = 2.0, 6.5, (4.2, 10.9)
-USUAL_MARK = 5.9  # of a tile with usual values and of usual length
+USUAL_MARK = 5.3  # of a tile with usual values and of usual length
 # The foretold mark at which half of the people find a tile good, 6.5 or more, and how fast their log
 # odds grow with it
-GOOD_MARK, STEEPNESS = 6.15, 1.8
+GOOD_MARK, STEEPNESS = 6.2, 1.6
 # What has happened where each of the measures costs marks
 LOST = (
     "small parts such as ears and feet have lost their shapes",
@@ -52,6 +54,7 @@ LOST = (
     "limbs or body have become thinner or thicker",
     "corners have become round",
     "limbs, or the whole, have left their pose",
+    "parts have come together, or run into each other",
 )
 
 
@@ -66,6 +69,7 @@ class Fidelity:
       radians.
     - `moved`: The mean square of the distance from the outline at rest, after the best similarity, over
       its area.
+    - `merged`: The mean square of the logarithm by which gaps between parts became narrower.
     - `cost`: The cost of bending (`Elastic.cost`). It has no part in the mark.
     - `length`: The length of the silhouette's outline, in square roots of its area.
     """
@@ -75,13 +79,15 @@ class Fidelity:
     thickness: float
     blunted: float
     moved: float
+    merged: float
     cost: float
     length: float
 
     @property
     def losses(self) -> tuple[float, ...]:
         """The marks lost by each measure, two of them by pieces; below 0, better than usual."""
-        values = (*self.pieces, self.stretched, self.thickness, self.blunted, self.moved)
+        others = self.stretched, self.thickness, self.blunted, self.moved, self.merged
+        values = (*self.pieces, *others)
         parts = zip(WEIGHTS, values, USUAL_VALUES, NEGLIGIBLE, strict=True)
         return tuple(w * math.log((least + x) / (least + usual)) for w, x, usual, least in parts)
 
@@ -129,8 +135,9 @@ def mark_gradient(measures: Measures, bent: Complex) -> tuple[float, Complex]:
 
 
 def _kept(measures: Measures, values: Array, cost: float) -> Fidelity:
-    short, long, stretched, thickness, blunted, moved = values.tolist()
-    return Fidelity((short, long), stretched, thickness, blunted, moved, cost, measures.length)
+    short, long, stretched, thickness, blunted, moved, merged = values.tolist()
+    others = stretched, thickness, blunted, moved, merged
+    return Fidelity((short, long), *others, cost, measures.length)
 
 
 TURNS = 24  # number of rotations tried for each orientation; the best `REFINED_TURNS` are refined

@@ -1,4 +1,4 @@
-"""What an outline keeps of the one that was bent into it: six measures, and their gradients.
+"""What an outline keeps of the one that was bent into it: seven measures, and their gradients.
 
 Outlines correspond point by point; points are complex numbers x + iy. The gradient of a measure f is
 the complex number g of each point for which f grows by Re(conj(g) dz). `faithful` says what people
@@ -37,7 +37,8 @@ class Measures:
         self.sides = abs(_steps(self.rest, 1))
         self.length = float(self.sides.sum())
         self._weight = (self.sides + _shifted(self.sides, 1)) / (2 * self.length)
-        self.thick = _clearance(self.rest)[0]
+        inside, outside = _discs(self.rest)
+        self.thick, self._free = inside.width, outside.width
         share = np.sqrt(self.thick)
         self._share = share / share.sum()
         self._step = max(1, round(len(rest) / CHORDS))
@@ -47,12 +48,12 @@ class Measures:
         self._pieces = [_Pieces(self.rest, min(max(3, h), (n - 1) // 2)) for h in halves]
 
     def values(self, bent: Complex) -> Array:
-        """Return the six values of an outline, in the order of `Fidelity`."""
+        """Return the seven values of an outline, in the order of `Fidelity`."""
         _, z = _normal(bent)
         return np.array([value for value, _ in self._measured(z)])
 
     def gradients(self, bent: Complex) -> tuple[Array, Complex]:
-        """Return the six values of an outline, and their gradients (6, n)."""
+        """Return the seven values of an outline, and their gradients (7, n)."""
         size, z = _normal(bent)
         found = self._measured(z)
         along = np.array([gradient() for _, gradient in found])
@@ -79,7 +80,9 @@ class Measures:
 
     def _measured(self, z: Complex) -> tuple[Measured, ...]:
         short, long = (piece.misfit(z, self._share) for piece in self._pieces)
-        return short, long, self._stretched(z), self._thinned(z), self._blunted(z), self._moved(z)
+        inside, outside = _discs(z)
+        thinned, merged = self._thinned(z, inside), self._merged(z, outside)
+        return short, long, self._stretched(z), thinned, self._blunted(z), self._moved(z), merged
 
     def _stretched(self, z: Complex) -> Measured:
         step = _steps(z, 1)
@@ -92,12 +95,19 @@ class Measures:
 
         return float(np.where(counts, log**2, LARGEST_STRETCH**2) @ self._weight), gradient
 
-    def _thinned(self, z: Complex) -> Measured:
-        width, chord = _clearance(z)
-        log = np.log(self.thick / width)
+    def _thinned(self, z: Complex, discs: _Discs) -> Measured:
+        log = np.log(self.thick / discs.width)
 
         def gradient() -> Complex:
-            return _clearance_gradient(z, chord, -2 * self._weight * log / width)
+            return discs.gradient(z, -2 * self._weight * log / discs.width)
+
+        return float(self._weight @ log**2), gradient
+
+    def _merged(self, z: Complex, discs: _Discs) -> Measured:
+        log = np.maximum(np.log(self._free / discs.width), 0.0)
+
+        def gradient() -> Complex:
+            return discs.gradient(z, -2 * self._weight * log / discs.width)
 
         return float(self._weight @ log**2), gradient
 
@@ -122,13 +132,33 @@ class Measures:
         return max(left, 0.0) / len(z), gradient
 
 
-class _Chord(NamedTuple):
-    """How the largest disc inside touches the outline at each point."""
+class _Discs(NamedTuple):
+    """The largest discs on one side of an outline that touch each of its points."""
 
-    ends: Integers  # (n,) the other point that it touches
-    inward: Complex  # (n,) the unit vector towards its middle
+    ends: Integers  # (n,) the other point that each touches
+    towards: Complex  # (n,) the unit vector towards its middle
     depth: Array  # (n,) how far the other point is, along this vector
     radius: Array  # (n,) at most `LARGEST_WIDTH`
+    side: int  # 1 inside, to the left of the outline, and -1 outside
+
+    @property
+    def width(self) -> Array:
+        """The radii (n,), smoothed along the outline, and larger by `WIDTH_OFFSET`."""
+        return _smooth(self.radius) + WIDTH_OFFSET
+
+    def gradient(self, z: Complex, along: Array) -> Complex:
+        """Return the gradient (n,) in the points of what has a gradient (n,) in `width`."""
+        ends, towards, n = self.ends, self.towards, len(z)
+        sides = np.maximum(abs(_shifted(z, -1) - _shifted(z, 1)), 1e-300)
+        share = np.where(self.radius < LARGEST_WIDTH, _smooth(along), 0.0)
+        share = share / np.maximum(self.depth, 1e-300)
+        apart = z[ends] - z
+        steep = share * self.radius * towards  # of the depth
+        pulled = share * apart - steep
+        found = np.bincount(ends, pulled.real, n) + 1j * np.bincount(ends, pulled.imag, n)
+        # the vectors turn with the outline
+        tilt = steep * (np.conj(apart) * -1j * self.side * towards).real / sides
+        return found - pulled + _shifted(tilt, 1) - _shifted(tilt, -1)
 
 
 class _Pieces:
@@ -203,10 +233,10 @@ def _turned(z: Complex, step: int, along: Array) -> Complex:
     return _stepped(own, step)
 
 
-def _clearance(z: Complex) -> tuple[Array, _Chord]:
-    """Return the radius (n,) of the largest disc inside that touches each point, and where it ends.
+def _discs(z: Complex) -> tuple[_Discs, _Discs]:
+    """Return the largest discs inside and outside of an outline that touch each point.
 
-    Radii are smoothed along the outline, and larger by `WIDTH_OFFSET`.
+    They are found as by Ma, Bae and Choi (3D medial axis point approximation, 2012).
     """
     n = len(z)
     own = np.arange(n)
@@ -217,26 +247,16 @@ def _clearance(z: Complex) -> tuple[Array, _Chord]:
     depth -= (inward.real * x + inward.imag * y)[:, None]
     square = np.subtract.outer(x, x) ** 2
     square += np.subtract.outer(y, y) ** 2
-    square[own, own] = 1
-    curvature = np.divide(depth, square, out=square)  # of half the disc
+    np.maximum(square, 1e-300, out=square)  # points may coincide
+    curvature = np.divide(depth, square, out=square)  # half of that of the disc
     for near in range(-2, 3):
         curvature[own, (own + near) % n] = 0
-    ends = curvature.argmax(axis=1)
-    least = 0.5 / np.maximum(curvature[own, ends], 0.5 / LARGEST_WIDTH)
-    return _smooth(least) + WIDTH_OFFSET, _Chord(ends, inward, depth[own, ends], least)
 
+    def largest(ends: Integers, side: int) -> _Discs:
+        least = np.maximum(side * curvature[own, ends], 0.5 / LARGEST_WIDTH)
+        return _Discs(ends, side * inward, side * depth[own, ends], 0.5 / least, side)
 
-def _clearance_gradient(z: Complex, chord: _Chord, along: Array) -> Complex:
-    """Return the gradient (n,) in the points of what has a gradient (n,) in `_clearance`."""
-    ends, inward, depth, radius = chord
-    sides = np.maximum(abs(_shifted(z, -1) - _shifted(z, 1)), 1e-300)
-    share = np.where(radius < LARGEST_WIDTH, _smooth(along), 0.0) / np.maximum(depth, 1e-300)
-    apart = z[ends] - z
-    steep = share * radius * inward  # of the depth
-    pulled = share * apart - steep
-    found = np.bincount(ends, pulled.real, len(z)) + 1j * np.bincount(ends, pulled.imag, len(z))
-    tilt = steep * (np.conj(apart) * -1j * inward).real / sides
-    return found - pulled + _shifted(tilt, 1) - _shifted(tilt, -1)
+    return largest(curvature.argmax(axis=1), 1), largest(curvature.argmin(axis=1), -1)
 
 
 def _smooth(values: Array) -> Array:

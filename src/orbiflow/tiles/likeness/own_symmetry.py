@@ -19,7 +19,7 @@ from orbiflow.tiles.silhouette import sampled
 PAIRINGS = 12  # mirrors that are tried, by how well the directions of the outline agree
 SPRINGS = tuple(np.geomspace(1.2, 3000.0, 9))  # strengths, stage by stage
 ROUNDS = 3  # steps in each stage
-NEAR = 0.75  # the score from which a silhouette is near to symmetric; docs/likeness.md has examples
+NEAR = 0.65  # the score from which a silhouette is near to symmetric; docs/likeness.md has examples
 
 
 class NearSymmetry(NamedTuple):
@@ -33,7 +33,7 @@ class NearSymmetry(NamedTuple):
         """The symmetry that it nearly has: "D1" for a mirror, "C2" for a half-turn, "C1" for none."""
         if max(self) < NEAR:
             return "C1"
-        return "D1" if self.mirror >= self.half_turn else "C2"
+        return "D1" if self.mirror >= self.half_turn - 1e-9 else "C2"  # equal up to rounding
 
 
 def near_symmetry(outline: Array) -> NearSymmetry:

@@ -54,7 +54,7 @@ class Rating:
         """Return the rating of a tile by its score after a search for likeness.
 
         >>> [str(Rating.of_likeness(score)) for score in (0.9, 0.5, 0.1)]
-        ['★★★★', '★★★½', '★★½']
+        ['★★★★½', '★★★½', '★★½']
         """
         likely = min(max(score, 1e-9), 1 - 1e-9)
         return cls.of_mark(GOOD_MARK + math.log(likely / (1 - likely)) / STEEPNESS)
