@@ -3,7 +3,7 @@
     python benchmarks/likeness_pose.py
 
 Two measures of pose are taken from the published marks and outlines (48 points each), and put beside
-the six measures of the order:
+the seven measures of the order:
 
 - `limbs`: how far limbs are turned against the body: the mean angle, weighted by their lengths. A
   limb is a piece of the outline that is at least 2.2 times as long as the gap between its ends, and at
@@ -14,7 +14,7 @@ the six measures of the order:
 
 Of each, weights fitted to all other silhouettes of the part "learn" order each one's tiles; then those
 fitted to "learn" order the part "test". The last column is twice the standard error of the difference
-of the correlations from that of the six measures alone.
+of the correlations from that of the seven measures alone.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ LIMB, LONGEST, SHORTEST = 2.2, 0.25, 0.05
 
 
 class Case(NamedTuple):
-    """A silhouette's tiles: their measures (T, 8), the order's six and those of pose, and marks."""
+    """A silhouette's tiles: their measures (T, 9), the order's seven and those of pose, and marks."""
 
     measures: Ring
     marks: Ring
@@ -126,8 +126,8 @@ def against(one: Case, columns: list[int], weights: Ring) -> tuple[float, float]
 def main() -> None:
     """Print both parts, with and without each measure of pose."""
     learn, test = cases("learn"), cases("test")
-    six = list(range(6))
-    rows = {"the order's six": six, "and limbs": [*six, 6], "and pieces": [*six, 7]}
+    seven = list(range(7))
+    rows = {"the order's seven": seven, "and limbs": [*seven, 7], "and pieces": [*seven, 8]}
     print(f"{'':24}rank correlation   less than the best   twice the error")
     for part, own in (("learn, held out", learn), ("test", test)):
         usual: Ring | None = None

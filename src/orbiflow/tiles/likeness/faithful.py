@@ -38,7 +38,7 @@ from orbiflow.tiles.silhouette import sampled
 # logarithms costs
 NEGLIGIBLE = (0.05, 0.05, 0.02, 0.02, 2.0, 0.002, 0.1)
 USUAL_VALUES = (0.137, 0.12, 0.021, 0.105, 7.5, 0.0048, 0.15)
-WEIGHTS = (1.3, 1.65, 0.27, 0.45, 0.5, 0.27, 0.4)
+WEIGHTS = (1.3, 1.65, 0.27, 0.45, 0.5, 0.27, 0.25)
 # Rough outlines forgive more: marks for the logarithm of the outline's length, and lengths, in square
 # roots of the area: the usual one, and the extremes of those that were marked
 LENGTH_WEIGHT, USUAL_LENGTH, LENGTHS = 2.0, 6.5, (4.2, 10.9)
