@@ -23,6 +23,7 @@ import scipy.stats
 import torch
 from common import GOALS, Ring
 from likeness_methods import METHODS, cell, common_unit, first_tiles
+from likeness_shapes import silhouettes
 from PIL import Image, ImageDraw, ImageFont
 
 CELL, HEAD, BLUE = 300, 36, "#1f5fbf"  # pixels
@@ -161,7 +162,14 @@ def score(options: argparse.Namespace) -> None:
     for method in methods:
         print(f"{method:14}" + "".join(_share(rows, method, other) for other in methods))
     print()
-    for other, bar in BARS.items() if "likeness" in methods else ():
+    if "likeness" in methods:
+        _print_bars(named)
+
+
+def _print_bars(named: list[tuple[str, dict[str, float]]]) -> None:
+    """Print in how many rows likeness is preferred, and to ARAP, EST or one of them by silhouettes."""
+    rows = [row for _, row in named]
+    for other, bar in BARS.items():
         wins, count = preferred(rows, "likeness", other)
         if count:
             met = "met" if wins >= bar * count - 1e-9 else "not met"
@@ -169,6 +177,16 @@ def score(options: argparse.Namespace) -> None:
                 f"likeness preferred to {other:8}{wins:5g} of {count}"
                 f"  ({wins / count:4.0%}; bar {bar:.0%}: {met})"
             )
+    tested = {name for name, shape in silhouettes().items() if shape["part"] == "test"}
+    groups = {"all": lambda _: True, "the nine goals": GOALS.__contains__}
+    groups |= {"others": lambda name: name not in GOALS, "part test": tested.__contains__}
+    print(f"\n{'likeness preferred to':24}arap   est  one of them  of rows")
+    for label, belongs in groups.items():
+        own = [row for name, row in named if belongs(name) and {"arap", "est"} <= row.keys()]
+        if own:
+            arap, est = (preferred(own, "likeness", other)[0] for other in ("arap", "est"))
+            one = sum(row["likeness"] < max(row["arap"], row["est"]) for row in own)
+            print(f"{label:24}{arap:4g}{est:6g}{one:13}{len(own):9}")
 
 
 def _mean(rows: list[dict[str, float]], method: str) -> str:
