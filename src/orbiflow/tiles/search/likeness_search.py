@@ -108,7 +108,7 @@ class LikenessSearch(Settings, SearchMethod):
     share: Annotated[float, Range(above=0, most=1)] = 0.2
     finalists: Count = 4
     rounds: Count = 20
-    carved: Annotated[int, Range(0)] = 2
+    carved: Annotated[int, Range(0)] = 1
     judged: bool = False
     bodies: tuple[Body, ...] = ("firm", "stiff")
     below: Annotated[int, Range(0, 2)] = 0
