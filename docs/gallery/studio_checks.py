@@ -35,6 +35,11 @@ UNTIDY = """() => {
 }"""
 
 
+SETTLED = """() => document.getAnimations().forEach((own) => {
+    if (own instanceof CSSTransition) own.finish();
+})"""
+
+
 def untidy_parts(page: Any, *widths: int) -> list[str]:
     """Return what is beyond the window, cut off, or over another control.
 
@@ -53,6 +58,7 @@ def serious_issues(page: Any) -> list[str]:
     """Return what axe finds on a page that keeps people out, with the elements."""
     from axe_playwright_python.sync_playwright import Axe
 
+    page.evaluate(SETTLED)  # a colour on its way to another one has a contrast of its own
     found = Axe().run(page).response["violations"]
     return [
         f"{issue['id']}: {node['target']} {node['failureSummary']}"
