@@ -40,15 +40,8 @@ MARKS = ROOT / "benchmarks" / "data" / "likeness_pool.json"
 POINTS = 48  # of each outline: all tiles together stay below 1.5 MB
 ALSO = ("energy", "displacement", "neck", "iou")  # values that the order has no use for
 GOOD = 6.5  # the least mark that is good
-VALUES = (
-    "stretched",
-    "thickness",
-    "blunted",
-    "moved",
-    "merged",
-    "cost",
-    "length",
-)  # after `pieces`
+# after `pieces`
+VALUES = ("stretched", "thickness", "blunted", "moved", "merged", "cost", "length")
 MEASURES = ("short pieces", "long pieces", *VALUES[:5])
 SEARCHED = ("soft", "firm", "firm-600")  # the bodies of the search for likeness
 

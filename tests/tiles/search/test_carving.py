@@ -10,7 +10,7 @@ import pytest
 from orbiflow.tiles import CLASSES, Pins, isohedral_class, plane_points, signed_area
 from orbiflow.tiles.likeness import Elastic, kept_of
 from orbiflow.tiles.search.bending import bent_tiles
-from orbiflow.tiles.search.carving import carved
+from orbiflow.tiles.search.carving import WRINKLE_COST, carved
 from orbiflow.tiles.search.co_deformation import BentTiles, hands, held_on_tiles
 from orbiflow.tiles.search.tile_space import TileSpace, best_placements
 from outlines import SMALL, animal, squirrel_hands
@@ -36,7 +36,7 @@ def test_what_is_carved_is_a_tile_of_its_placement(name: str) -> None:
     assert nearest.linear[0] == pytest.approx(found.linear[0], abs=1e-5)
     marks = [kept_of(body.measures, z, 0.0).mark for z in (before, after)]
     wrinkles = [body.measures.wrinkles(z)[0] for z in (before, after)]
-    gain = marks[1] - marks[0] + 0.12 * (wrinkles[0] - wrinkles[1])
+    gain = marks[1] - marks[0] + WRINKLE_COST * (wrinkles[0] - wrinkles[1])
     assert gain > 0.05
     assert signed_area(plane_points(after)) > 0.2
 

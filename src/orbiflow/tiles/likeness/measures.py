@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from orbiflow.arrays import Array, Complex, Integers
-from orbiflow.tiles.geometry import plane_points, signed_area
+from orbiflow.tiles.geometry import apart, best_similarity, plane_points, signed_area
 
 PIECE_LENGTHS = (0.08, 0.25)  # the lengths of the pieces, as shares of the outline
 # the offset of widths, in square roots of the area, below which differences matter little
@@ -121,15 +121,12 @@ class Measures:
         return float(np.maximum(less, 0).sum() / self._step), gradient
 
     def _moved(self, z: Complex) -> Measured:
-        own, goal = z - z.mean(), self.rest - self.rest.mean()
-        square, common = float((abs(own) ** 2).sum()), complex(np.conj(own) @ goal)
-        left = float((abs(goal) ** 2).sum()) - abs(common) ** 2 / square
-
         def gradient() -> Complex:
-            along = abs(common) ** 2 / square**2 * own - np.conj(common) * goal / square
-            return 2 * along / len(z)
+            own, goal = z - z.mean(), self.rest - self.rest.mean()
+            factor = complex(best_similarity(z, self.rest))
+            return 2 / len(z) * (abs(factor) ** 2 * own - np.conj(factor) * goal)
 
-        return max(left, 0.0) / len(z), gradient
+        return apart(z, self.rest), gradient
 
 
 class _Discs(NamedTuple):

@@ -95,18 +95,20 @@ def bent_tiles(
             sound, crossed = sound + more, crossed + also
         found, dropped, done = found + sound, dropped + crossed, done + own.starts
         progress(0.9 * done / work, math.nan)
-    found.sort(key=lambda bent: -bent.score)
 
     def twins(a: Bent, b: Bent) -> bool:
         n = a.hand.fine.size
         return a.hand is b.hand and apart(a.points[:n], b.points[:n]) <= TWIN
 
-    found = _unlike(found, len(found), twins)
-    if settings.carved and both[0].carved:
-        for k, bent in enumerate(found[: max(wanted, settings.carved)]):
+    def best_first() -> list[Bent]:
+        return _unlike(sorted(found, key=lambda bent: -bent.score), len(found), twins)
+
+    found = best_first()
+    if settings.carved and both[0].plain:
+        for k in range(min(max(wanted, settings.carved), len(found))):
             cancel.check()
-            found[k] = _carved(kind, bent, settings.min_neck)
-    found.sort(key=lambda bent: -bent.score)
+            found[k] = _carved(kind, found[k], settings.min_neck)
+        found = best_first()
     return found, dropped
 
 

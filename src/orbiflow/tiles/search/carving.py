@@ -2,9 +2,9 @@
 
 Bending spreads what must change over the whole outline, as its energy is quadratic. Eyes would rather
 have a few places changed and the rest exact: that is what the mark says (`likeness.faithful`). So the
-best tiles of a class climb from where bending leaves them, by L-BFGS (Liu and Nocedal, On the limited
-memory BFGS method for large scale optimization, 1989) in the linear space of their placement's tiles,
-with the body's stiffness as the metric. The mark does not see wrinkles, so these are charged for.
+best tile of a class climbs from where bending leaves it, by L-BFGS (Liu and Nocedal, On the limited
+memory BFGS method for large scale optimization, 1989) in the linear space of its placement's tiles,
+with the body's stiffness as the metric. The mark does not see wrinkles, so these cost something, too.
 """
 
 from __future__ import annotations

@@ -126,7 +126,7 @@ class Hand:
     outline: Array  # (N, 2) its outline, counter-clockwise
     samples: Samples  # points of its outline, coarse to fine
     made: Callable[[str, Stiffness], Elastic]  # the body of a level of points and a stiffness
-    carved: bool  # whether its tiles may be, as nobody said which parts matter
+    plain: bool  # whether nobody said which parts matter
 
     @cached_property
     def fine(self) -> Elastic:
