@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.models.charts import Chart, Tile
-from orbiflow.density.models.smooth_sums import NODES, Patch, is_steep
+from orbiflow.density.models.smooth_sums import Patch, gathered
 from orbiflow.density.models.terms import LOG2_E, Terms
 from orbiflow.typed_torch import applied
 
@@ -37,6 +37,9 @@ LESS, IDLE = 0.9, 3
 
 SMOOTH_AT_MOST = 100.0
 """Concentration times squared radius of a tile above which terms are never smooth across it."""
+
+STEEPEST = 600.0
+"""Change of a term's logarithm across a tile above which its factors might overflow."""
 
 
 def near_log_sum(
@@ -128,7 +131,7 @@ class _Walk:
         if count > FEW_POINTS and count * terms.size > FEW_PAIRS and idle <= IDLE:
             for half in _halves(features, tile):
                 own = left._replace(patch=patch and patch.only(half), idle=idle)
-                self._add(at[half], features[:, half], own)
+                self._add(at[half], gathered(features, half), own)
             return
         parts = [patch.log_sum(features, slope=self.slope is not None)] if patch else []
         if terms.size:
@@ -167,25 +170,19 @@ class _Walk:
         if features.shape[1] < self.worth or terms.size < WORTH_TERMS or not tile.has_chart:
             return left
         wide = (terms.kappa * tile.radius[:, None] ** 2).amax(dim=0) < SMOOTH_AT_MOST
+        wide &= largest - least < STEEPEST
         if int(wide.sum()) < WORTH_TERMS:
             return left
         chart = patch.chart if patch else Chart(tile)
         own = Patch(chart, patch.u if patch else chart.coordinates(features))
         some, top = terms.only(wide), largest[wide]
-        done, added = is_steep(some, tile), list[tuple[Tensor, int]]()
-        smooth = torch.zeros_like(done)
-        for errors, count in zip(own.errors(some, top, tile), NODES, strict=True):
-            errors = errors.masked_fill_(done, math.inf)
-            fine, lost = _negligible(errors, lost, bottom + self.tolerance)
-            if fine is not None:
-                added.append((fine, count))
-                done, smooth = done | fine, smooth | fine
-        if int(smooth.sum()) < WORTH_TERMS:
+        errors = own.errors(some, top, tile)
+        smooth, lost = _negligible(errors, lost, bottom + self.tolerance)
+        if smooth is None or int(smooth.sum()) < WORTH_TERMS:
             return left
         if patch:
             own.take(patch)
-        for which, count in added:
-            own.add(some.only(which), float(top[which].max()), count)
+        own.add(some.only(smooth), float(top[smooth].max()))
         wide[wide.clone()] = smooth
         return left._replace(
             terms=terms.only(~wide), beside=log_add(left.beside, least[wide]), lost=lost, patch=own

@@ -11,12 +11,13 @@ from torch import Tensor
 
 from orbiflow.density.models.charts import ELLIPSES, Chart, Tile
 from orbiflow.density.models.terms import LOG2_E, Terms
+from orbiflow.typed_torch import linalg
 
 LEAST = 1e-290
 """The least interpolated sum, relative to the largest value."""
 
-NODES = (24, 48)
-"""Chebyshev points along a side of a tile, for what is very smooth and for what is smooth."""
+NODES = 48
+"""Chebyshev points along a side of a tile."""
 
 BETWEEN = 1.5
 """Logarithm of how much larger a term may be between the points at which it is bounded."""
@@ -27,14 +28,14 @@ ROUNDING = math.log(1e-15)
 MOST_POINTS = 64
 """The most points at which exponents are interpolated."""
 
-STEEPEST = 300.0
-"""Exponents of factors of a term, which must not overflow."""
+FELT = 1e-16
+"""Coefficients that are together below this share of the largest are left out, like rounding."""
 
 
 class Patch:
     """Points u (D, N) of a chart, the box about them, and the sum of terms that are smooth across it.
 
-    Sums of terms that are analytic well beyond the box are polynomials of degree `NODES[-1]` - 1 in
+    Sums of terms that are analytic well beyond the box are polynomials of degree `NODES` - 1 in
     each coordinate: `_series` are their Chebyshev coefficients (n, n), over exp(`_top`).
     """
 
@@ -42,68 +43,66 @@ class Patch:
         self.chart, self.u = chart, u
         low, high = torch.aminmax(u, dim=1)
         self.middle, self.half = (low + high) / 2, ((high - low) / 2).clamp_min(1e-9)
-        self._series, self._top = u.new_zeros(NODES[-1], NODES[-1] if len(u) > 1 else 1), -math.inf
+        self._series, self._top = u.new_zeros(NODES, NODES if len(u) > 1 else 1), -math.inf
 
     def only(self, which: Tensor) -> Patch:
         """Return the same sums in the same box, at some of its points."""
         own = copy.copy(self)
-        own.u = self.u[:, which]
+        own.u = gathered(self.u, which)
         return own
 
     def take(self, whole: Patch) -> None:
         """Take the sums of a patch that this one is a part of."""
-        nodes = self.middle[:, None] + self.half[:, None] * _nodes(NODES[-1])
+        nodes = self.middle[:, None] + self.half[:, None] * _nodes(NODES)
         sides = (nodes - whole.middle[:, None]) / whole.half[:, None]
-        first, *second = (_transform(NODES[-1]) @ _chebyshev(t).mT for t in sides)
+        first, *second = (_transform(NODES) @ _chebyshev(t).mT for t in sides)
         self._series, self._top = first @ whole._series, whole._top
         if second:
             self._series = self._series @ second[0].mT
 
-    def add(self, terms: Terms, top: float, count: int) -> None:
-        """Add terms, which are below exp(top) in the box, by so many nodes along a side."""
-        offset = self.half[:, None] * _nodes(count)
+    def add(self, terms: Terms, top: float) -> None:
+        """Add terms, which are below exp(top) in the box."""
+        offset = self.half[:, None] * _nodes(NODES)
         values = self._on_sphere if self.chart.is_round else self._on_circles
         highest = max(top, self._top)
-        found = _transform(count) @ values(terms, top, offset)
+        found = _transform(NODES) @ values(terms, top, offset)
         if len(offset) > 1:
-            found = found @ _transform(count).mT
+            found = found @ _transform(NODES).mT
         self._series = self._series * math.exp(self._top - highest)
-        self._series[: len(found), : found.shape[1]] += found * math.exp(top - highest)
+        self._series += found * math.exp(top - highest)
         self._top = highest
 
     def log_sum(self, features: Tensor, *, slope: bool) -> tuple[Tensor, Tensor | None]:
         """Return the logarithm (N,) of the sum at the points, and its gradient (m, N) if wanted."""
         u = (self.u - self.middle[:, None]) / self.half[:, None]
-        along, *other = (_chebyshev(t) for t in u)
+        series = self._series[tuple(slice(_felt(own)) for own in (self._series, self._series.mT))]
+        along, *other = (_chebyshev(t, n) for t, n in zip(u, series.shape, strict=False))
         across = other[0] if other else torch.ones_like(along[:1])
         # what is negligible beside others may come out below 0
-        sums = (self._series @ across).mul_(along).sum(dim=0).clamp_min_(LEAST)
+        sums = (series @ across).mul_(along).sum(dim=0).clamp_min_(LEAST)
         if not slope:
             return sums.log() + self._top, None
-        rates = [(_derivative() @ self._series @ across).mul_(along).sum(dim=0)]
+        rates = [(_derivative(len(series)) @ series @ across).mul_(along).sum(dim=0)]
         if other:
-            rates.append((self._series @ _derivative().mT @ across).mul_(along).sum(dim=0))
+            bent = series @ _derivative(series.shape[1]).mT
+            rates.append((bent @ across).mul_(along).sum(dim=0))
         gradient = torch.stack(rates) / self.half[:, None] / sums
         return sums.log() + self._top, self.chart.in_features(gradient, features)
 
-    def errors(self, terms: Terms, largest: Tensor, tile: Tile) -> list[Tensor]:
-        """Return logarithms (K,) of bounds on each term's interpolation error, for each of `NODES`.
+    def errors(self, terms: Terms, largest: Tensor, tile: Tile) -> Tensor:
+        """Return logarithms (K,) of bounds on each term's interpolation error.
 
         Along an axis by 4 M rho^(1 - n) / (rho - 1), M the largest value on the ellipse of rho
         (Trefethen, Approximation Theory and Approximation Practice, 2013, theorem 8.2), times the
         Lebesgue constant of the other axis. The terms in the tile are below exp(`largest`), (K,).
         """
         reach = self.chart.reach(self.middle, self.half, self.chart.turned(terms.centers))
-        exponents = reach.sub_(1).mul_(terms.kappa[:, None])
-        shared: Tensor | float = 0.0
+        exponents = reach.sub_(1).mul_(terms.kappa[:, None]).add_(_scale()[:, None])
+        worst = exponents.amin(dim=1)
         if self.chart.factors > 1:
             # terms are products: the other factor's largest value counts as it is
-            shared = (tile.nearest2(terms) / 2).add_(largest - terms.peaks)
-        found: list[Tensor] = []
-        for scale in map(_scale, NODES):
-            worst = ((exponents + scale[:, None]).amin(dim=1) + shared).amax(dim=0) + terms.peaks
-            found.append(torch.maximum(worst, largest + ROUNDING))
-        return found
+            worst += (tile.nearest2(terms) / 2).add_(largest - terms.peaks)
+        return torch.maximum(worst.amax(dim=0) + terms.peaks, largest + ROUNDING)
 
     def _on_circles(self, terms: Terms, top: float, offset: Tensor) -> Tensor:
         """Return values (n, n), or (n, 1) on a circle, of terms: products over the coordinates."""
@@ -129,13 +128,12 @@ class Patch:
         (centers,), kappa = self.chart.turned(terms.centers), terms.kappa[0]
         start = torch.cat([(1 - self.middle.square().sum()).sqrt()[None], self.middle])
         bias = terms.peaks - top - kappa / 2 * ((centers - start[:, None]) ** 2).sum(dim=0)
-        first, second = offset[0][:, None], offset[1][None]
-        zero = torch.zeros_like(first)
-        sides = (self._height(first, zero[:1]), self._height(zero[:1], second))
-        rest = self._height(first, second) - sides[0] - sides[1]
+        height = self._height(offset[0][:, None], offset[1])
+        sides = height.mean(dim=1), height.mean(dim=0) - height.mean()
+        rest = height - sides[0][:, None] - sides[1]
         sharp = kappa * centers[0]
         along, across = (
-            torch.stack([own, side.flatten()], dim=1) @ torch.stack([kappa * center, sharp])
+            torch.stack([own, side], dim=1) @ torch.stack([kappa * center, sharp])
             for own, side, center in zip(offset, sides, centers[1:], strict=True)
         )
         left = along.add_(bias).mul_(LOG2_E).exp2_()
@@ -149,17 +147,23 @@ class Patch:
         return products.reshape(factors.shape).mul_(factors).sum(dim=0)
 
     def _height(self, first: Tensor, second: Tensor) -> Tensor:
-        """Return heights (n, n) of the sphere over offsets (n, 1) and (1, n), above its middle's."""
+        """Return heights (n, n) of the sphere over offsets (n, 1) and (n,), above its middle's."""
         a, b = self.middle
         fall = first * (2 * a + first) + second * (2 * b + second)
         below = 1 - a * a - b * b
         return -fall / ((below - fall).sqrt() + below.sqrt())
 
 
-def is_steep(terms: Terms, tile: Tile) -> Tensor:
-    """Return which terms (K,) have factors that may overflow in `Patch.add`."""
-    reach = (tile.nearest2(terms).sqrt_() + tile.radius[:, None]).mul_(tile.radius[:, None])
-    return (reach > STEEPEST).any(dim=0)
+def gathered(table: Tensor, which: Tensor) -> Tensor:
+    """Return columns of a table (m, N) by their numbers (n,), four times as fast as by an index."""
+    return table.gather(1, which.expand(len(table), -1))
+
+
+def _felt(series: Tensor) -> int:
+    """Return how many rows of coefficients (n, m), from the first, are felt."""
+    size = linalg.vector_norm(series, dim=1)
+    beyond = size.square().flip(0).cumsum(0).flip(0).sqrt()
+    return max(1, int((beyond > FELT * size.max()).sum()))
 
 
 def _points_of_exponential(largest: float) -> int:
@@ -171,13 +175,13 @@ def _points_of_exponential(largest: float) -> int:
     return count
 
 
-@lru_cache(maxsize=MOST_POINTS)
-def _scale(count: int) -> Tensor:
-    """Return logarithms (E,) of what bounds on the `ELLIPSES` are times, for so many nodes."""
-    lebesgue = 1 + 2 / math.pi * math.log(count)
+@lru_cache(maxsize=1)
+def _scale() -> Tensor:
+    """Return logarithms (E,) of what bounds on the `ELLIPSES` are times."""
+    lebesgue = 1 + 2 / math.pi * math.log(NODES)
     with torch.inference_mode(False):
         rho = torch.tensor(ELLIPSES, dtype=torch.float64)
-        return (8 * lebesgue / (rho - 1)).log() - (count - 1) * rho.log() + BETWEEN
+        return (8 * lebesgue / (rho - 1)).log() - (NODES - 1) * rho.log() + BETWEEN
 
 
 @lru_cache(maxsize=MOST_POINTS)
@@ -197,10 +201,10 @@ def _transform(count: int) -> Tensor:
         return matrix * (2 / count)
 
 
-@lru_cache(maxsize=1)
-def _derivative() -> Tensor:
+@lru_cache(maxsize=MOST_POINTS)
+def _derivative(count: int) -> Tensor:
     """Return the matrix (n, n) that makes the coefficients of a Chebyshev series' derivative."""
-    order = torch.arange(NODES[-1], dtype=torch.float64)
+    order = torch.arange(count, dtype=torch.float64)
     with torch.inference_mode(False):
         above = order - order[:, None]
         matrix = torch.where((above > 0) & (above % 2 == 1), 2 * order, 0.0)
@@ -208,7 +212,7 @@ def _derivative() -> Tensor:
         return matrix
 
 
-def _chebyshev(t: Tensor, count: int = NODES[-1]) -> Tensor:
+def _chebyshev(t: Tensor, count: int = NODES) -> Tensor:
     """Return the first Chebyshev polynomials (n, N) at t (N,), which rounding may put beyond 1."""
     table = t.new_empty(max(2, count), len(t))
     table[0] = 1
