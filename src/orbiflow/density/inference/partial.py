@@ -157,7 +157,8 @@ def _inherited(density: Density, split: Split) -> float:
 class _Left:
     """A component without a closed form: its log weight, how its angles are split, and kernels for it.
 
-    - `found`: Kernels with log weights, of the last level; `before`: Of the level before.
+    - `found`: Kernels with log weights, of the last of so many `levels`.
+    - `logs`: The log densities (N,) of these kernels at the samples where levels are compared.
     - `error`: The root mean square error of the whole that is its own, in nats: its change from the
       level before, undivided, since two levels may be off in the same direction.
     """
@@ -165,13 +166,24 @@ class _Left:
     log: float
     density: Density
     split: Split
+    levels: int = 0
     found: list[tuple[float, Density]] = field(default_factory=list[tuple[float, Density]])
-    before: list[tuple[float, Density]] = field(default_factory=list[tuple[float, Density]])
+    logs: Tensor = field(default_factory=lambda: torch.zeros(0))
     error: float = math.inf
 
-    def refine(self, space: Torus, level: int, tick: Callable[[], None]) -> None:
-        more = self.density.approximated(self.split, space, level, tick)
-        self.before, self.found = self.found, [(self.log + log, own) for log, own in more]
+    def refine(self, space: Torus, tick: Callable[[], None]) -> list[tuple[float, Density]]:
+        """Find kernels of the next level, and return those of the level before."""
+        before = self.found
+        more = self.density.approximated(self.split, space, self.levels, tick)
+        self.found, self.levels = [(self.log + log, own) for log, own in more], self.levels + 1
+        return before
+
+    def compare(self, before: Tensor, now: Tensor) -> None:
+        """Measure the error from log densities (N,) of the level before, and of the whole."""
+        # what the whole would be with the old instead of the new
+        ratio = (before - now).exp() - (self.logs - now).exp()
+        change = ratio.clamp_min(-1 + 1e-12).log1p()
+        self.error = float(change.square().mean().sqrt())
 
 
 def _refined(
@@ -183,31 +195,38 @@ def _refined(
 ) -> tuple[Mixture, float]:
     """Return kernels for what has no closed form, level by level until they settle, and their error.
 
-    A component whose error is small is left as it is. Changes are of the whole, at its own samples.
+    After two levels only the component with the largest error is refined again, until the errors are
+    small enough together. Changes are of the whole, at its own samples.
     """
-    enough, error = accuracy / math.sqrt(len(left)), math.inf
-    for level in range(LEVELS):
-        wanted = [one for one in left if one.error > enough]
-        for number, one in enumerate(wanted):
-            share, what = (level + number / len(wanted)) / LEVELS, f"integrating, level {level + 1}"
-            one.refine(space, level, partial(say, share, what))
-        if level:
-            whole = _mixture([*closed, *(part for one in left for part in one.found)])
-            points = whole.sample(CHECKED, torch.Generator().manual_seed(level))
-            logs = [_log_sum(one.found, points) for one in left]
-            known = [_log_sum(closed, points)] if closed else []
-            now = torch.stack([*known, *logs]).logsumexp(dim=0)
-            for one, new in zip(left, logs, strict=True):
-                if one.error <= enough:
-                    continue
-                # what the whole would be with the old instead of the new
-                ratio = (_log_sum(one.before, points) - now).exp() - (new - now).exp()
-                change = ratio.clamp_min(-1 + 1e-12).log1p()
-                one.error = float(change.square().mean().sqrt())
-        error = math.hypot(*(one.error for one in left))
-        if error <= accuracy:
+
+    def refine(one: _Left) -> list[tuple[float, Density]]:
+        share = sum(own.levels for own in left) / (LEVELS * len(left))
+        return one.refine(space, partial(say, share, f"integrating, level {one.levels + 1}"))
+
+    def whole() -> Mixture:
+        return _mixture([*closed, *(part for one in left for part in one.found)])
+
+    def now() -> Tensor:
+        return torch.stack([known, *(one.logs for one in left)]).logsumexp(dim=0)
+
+    for one in left:
+        refine(one)
+    before = [refine(one) for one in left]
+    points = whole().sample(CHECKED, torch.Generator().manual_seed(1))
+    known = _log_sum(closed, points) if closed else points.new_full((CHECKED,), -math.inf)
+    for one in left:
+        one.logs = _log_sum(one.found, points)
+    for one, old in zip(left, before, strict=True):
+        one.compare(_log_sum(old, points), now())
+    while (error := math.hypot(*(one.error for one in left))) > accuracy:
+        coarse = [one for one in left if one.levels < LEVELS]
+        if not coarse:
             break
-    return _mixture([*closed, *(part for one in left for part in one.found)]), error
+        one = max(coarse, key=lambda own: own.error)
+        refine(one)
+        old, one.logs = one.logs, _log_sum(one.found, points)
+        one.compare(old, now())
+    return whole(), error
 
 
 def _log_sum(parts: list[tuple[float, Density]], points: Tensor) -> Tensor:

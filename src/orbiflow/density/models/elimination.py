@@ -16,7 +16,7 @@ from orbiflow.density.models.chain_sums import SCALES
 from orbiflow.density.models.chains import Factor, VonMisesChains, waves
 from orbiflow.density.models.density import Split
 from orbiflow.density.models.lattice import KERNEL_STEP, sharpest_on
-from orbiflow.density.models.terms import FAINT, log_sum_exp
+from orbiflow.density.models.terms import FAINT, LOG2_E, log_sum_exp
 from orbiflow.typed_torch import special
 
 STEP = 0.9
@@ -25,7 +25,7 @@ STEP = 0.9
 SHARPEST = 0.999
 """Share of a factor's weight that is of bumps up to this sharpness; the rest are as sharp as that."""
 
-FINER = (0.85, 1.05, 1.4, 1.8)
+FINER = (0.85, 1.0, 1.15, 1.4)
 """How much finer grids are than factors need, level by level."""
 
 MOST_ENTRIES = 2**24
@@ -172,9 +172,9 @@ def conditional_table(
         row, part = seen.nonzero(as_tuple=True)
         top = logs[row, part] + peaks[part] - log_scale - kappa[part]
         angle, sharp = mean[row, part // len(SCALES)], kappa[part]
-        bumps = torch.stack([sharp * angle.cos(), sharp * angle.sin(), top], dim=1)
+        bumps = torch.stack([sharp * angle.cos(), sharp * angle.sin(), top], dim=1) * LOG2_E
         for some in torch.split(torch.arange(len(row)), max(1, AT_ONCE // len(own))):
-            values = (bumps[some] @ images).clamp_min_(FAINT).exp_()
+            values = (bumps[some] @ images).clamp_min_(FAINT * LOG2_E).exp2_()
             found.index_add_(0, start + row[some], values)
     return log_scale, found
 
