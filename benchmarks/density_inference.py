@@ -80,7 +80,7 @@ def truth(
 
 
 def line(
-    density: Mixture, kept: tuple[int, ...], degrees: dict[int, float], accuracy: float
+    density: Mixture, kept: tuple[int, ...], degrees: dict[int, float], accuracy: float, count: int
 ) -> str:
     """One row of the table."""
     given = {axis: value / 360 for axis, value in degrees.items()}
@@ -90,7 +90,7 @@ def line(
     else:
         found = marginal(density, kept, accuracy=accuracy)
     processor, clock = time.process_time() - processor, time.perf_counter() - clock
-    points = found.sample(POINTS, torch.Generator().manual_seed(0))
+    points = found.sample(count, torch.Generator().manual_seed(0))
     true, spread = truth(density, points, kept, given)
     off = float((found.log_prob(points) - true).square().mean().sqrt())
     asked = ",".join(map(str, kept)) + "".join(f" | {k}={v:g}" for k, v in degrees.items())
@@ -113,7 +113,7 @@ def main() -> None:
         parser.error(f"no such data: {', '.join(sorted(unknown))}")
     needed(DATA / "density" / "torus", "the angles of residues and of RNA")
     for name in names:
-        rows = 400 if options.quick else options.rows
+        rows, count = (400, 4) if options.quick else (options.rows, POINTS)
         density = DensityEstimator("torus", seed=0).fit(angles(name, rows)).density_
         assert isinstance(density, Mixture)
         print(f"{name}: {density}")
@@ -121,7 +121,7 @@ def main() -> None:
         for accuracy in (0.01,) if options.quick else (0.01, 0.001):
             for kept, given in ASKED[name]:
                 with one_blas_thread():
-                    print(line(density, kept, given, accuracy), flush=True)
+                    print(line(density, kept, given, accuracy, count), flush=True)
 
 
 if __name__ == "__main__":
