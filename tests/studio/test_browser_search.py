@@ -243,6 +243,7 @@ def test_what_does_not_apply_cannot_be_set(page, studio: RunningStudio, searched
     page.route("**/tasks", lambda route: route.fulfill(status=422, json={"error": "not now"}))
     with page.expect_request("**/tasks") as caught:
         page.get_by_role("button", name="Make it").click()
+    page.get_by_text("not now").wait_for()
     page.unroute("**/tasks")
     wanted = {"tile": tile, "purpose": "web", "clip": False, "palette": "dusk"}
     assert caught.value.post_data_json["settings"] == wanted
