@@ -50,7 +50,8 @@ def test_a_tile_is_judged_as_by_the_points_that_it_was_bent_by(
     case = bent_squirrel(name, False)
     known = case.bent.fidelity
     found = faithfulness(SQUIRREL, case.tile.polygon)
-    assert known.mark - 0.5 < found.mark < known.mark + 0.5  # points may lie better, or worse
+    # by least bending points lie elsewhere than by the highest mark: at times better, mostly worse
+    assert known.mark - 0.8 < found.mark < known.mark + 0.5
 
 
 def test_a_lost_limb_costs_more_than_a_bent_one() -> None:

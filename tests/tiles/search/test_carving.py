@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
+import shapely
 
+from orbiflow.arrays import Array, Complex
 from orbiflow.tiles import CLASSES, Pins, isohedral_class, plane_points, signed_area
 from orbiflow.tiles.likeness import Elastic, kept_of
-from orbiflow.tiles.search.bending import bent_tiles
-from orbiflow.tiles.search.carving import WRINKLE_COST, carved
+from orbiflow.tiles.search import bending, carving
+from orbiflow.tiles.search.bending import Bent, bent_tiles
+from orbiflow.tiles.search.carving import WRINKLE_COST, Carved, _Laid, carved
 from orbiflow.tiles.search.co_deformation import BentTiles, hands, held_on_tiles
 from orbiflow.tiles.search.tile_space import TileSpace, best_placements
 from outlines import SMALL, animal, squirrel_hands
 
 PLAIN = replace(SMALL, carved=0)
+SPIDER = replace(SMALL, finalists=2)
 NAMES = (*CLASSES, "IH8", "IH12", "IH69")  # with a half-turn and mirrors of their own
 
 
@@ -26,19 +31,87 @@ def bend(name: str) -> tuple[Elastic, TileSpace, BentTiles]:
     return body, space, held_on_tiles(body, space, body.rest[:, None], 8)
 
 
+def carve(name: str, room: float = 0.0) -> tuple[Elastic, TileSpace, Complex, Carved]:
+    body, space, tiles = bend(name)
+    before, own = tiles.points[: body.size, 0], tiles.placements
+    corners = (np.cumsum(own.lengths[0]) - own.lengths[0] + own.starts[0]) % body.size
+    return body, space, before, carved(body, space, before, corners, room=room)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_what_is_carved_is_a_tile_of_its_placement(name: str) -> None:
-    body, space, tiles = bend(name)
-    found, n = carved(body, space, tiles.points[:, 0]), body.size
-    before, after = tiles.points[:n, 0], found.points[:n, 0]
-    nearest = space.nearest(after[None])
-    assert abs(space.in_order(nearest.vertices)[0] - after).max() < 1e-6
-    assert nearest.linear[0] == pytest.approx(found.linear[0], abs=1e-5)
-    marks = [kept_of(body.measures, z, 0.0).mark for z in (before, after)]
-    wrinkles = [body.measures.wrinkles(z)[0] for z in (before, after)]
+    body, space, before, found = carve(name)
+    nearest = space.nearest(found.ring[None])
+    assert abs(space.in_order(nearest.vertices)[0] - found.ring).max() < 1e-6
+    assert nearest.linear[0] == pytest.approx(found.linear, abs=1e-5)
+    outlines = before, found.outline
+    marks = [kept_of(body.measures, z, 0.0).mark for z in outlines]
+    wrinkles = [body.measures.wrinkles(z)[0] for z in outlines]
     gain = marks[1] - marks[0] + WRINKLE_COST * (wrinkles[0] - wrinkles[1])
     assert gain > 0.05
-    assert signed_area(plane_points(after)) > 0.2
+    assert signed_area(plane_points(found.ring)) > 0.2
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_points_slide_in_order_and_meet_the_corners(name: str) -> None:
+    body, space, _, found = carve(name)
+    n, own = body.size, space.placements
+    steps = np.diff(np.append(found.places, found.places[0] + n))
+    assert steps.min() > 0.05
+    assert abs(steps - 1).max() > 0.1
+    corners = (np.cumsum(own.lengths[0]) - own.lengths[0] + own.starts[0]) % n
+    assert abs(found.outline[found.corners] - found.ring[corners]).max() < 1e-12
+    apart = shapely.distance(
+        shapely.points(plane_points(found.outline)), shapely.LinearRing(plane_points(found.ring))
+    )
+    assert apart.max() < 1e-12
+
+
+def test_points_that_slide_have_higher_marks(monkeypatch: pytest.MonkeyPatch) -> None:
+    def marks() -> float:
+        found = [carve(name) for name in CLASSES]
+        return np.mean([kept_of(own[0].measures, own[3].outline, 0.0).mark for own in found])
+
+    slid = marks()
+    monkeypatch.setattr(carving, "SLIDE_UNIT", 1e-9)
+    assert slid > marks() + 0.05
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_gradients_of_laid_points(smooth: bool) -> None:
+    rng = np.random.default_rng(3)
+    ring, along = (rng.normal(size=(2, 12)).T @ [1, 1j] for _ in range(2))
+    places = np.arange(12) + rng.uniform(-0.4, 0.4, 12)
+    lay = _Laid.smoothly if smooth else _Laid.straight
+
+    def value(ring: Complex, places: Array) -> float:
+        return float((np.conj(along) * lay(places).points(ring)).sum().real)
+
+    laid = lay(places)
+    for k, step in product(range(12), (1e-6, 1e-6j)):
+        change = value(ring + step * (np.arange(12) == k), places) - value(ring, places)
+        expected = (np.conj(laid.gradient(along)[k]) * step).real
+        assert change == pytest.approx(expected, abs=1e-11)
+    for k in range(12):
+        change = value(ring, places + 1e-6 * (np.arange(12) == k)) - value(ring, places)
+        assert change / 1e-6 == pytest.approx(laid.slide_gradient(ring, along)[k], abs=1e-4)
+    assert abs(lay(np.arange(12.0)).points(ring) - ring).max() < 1e-14
+
+
+def test_tiles_that_cross_themselves_are_carved_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a spider, most of whose bent tiles do."""
+    both, kind = hands(animal("nagata/spider_120.dat"), SPIDER), CLASSES["IH7"]
+
+    def found() -> tuple[list[Bent], int]:
+        return bent_tiles(both, kind, SPIDER)
+
+    tiles, crossed = found()
+    monkeypatch.setattr(bending, "REPAIRED", 0)
+    before, also = found()
+    assert crossed == also > 0
+    assert tiles[0].score > before[0].score + 0.02
+    for bent in tiles:
+        assert shapely.Polygon(plane_points(bent.ring)).is_valid
 
 
 @pytest.mark.parametrize("name", ["IH1", "IH4", "IH6"])

@@ -6,6 +6,7 @@ from .faithful import faithfulness as faithfulness
 from .faithful import fidelity as fidelity
 from .faithful import kept_of as kept_of
 from .faithful import mark_gradient as mark_gradient
+from .gaps import missing_gaps as missing_gaps
 from .measures import Measures as Measures
 from .metrics import Overlap as Overlap
 from .metrics import Region as Region

@@ -28,10 +28,9 @@ from orbiflow.tiles.likeness import (
     neck_up_to,
 )
 from orbiflow.tiles.search.candidates import Fit, OnProgress, Prototiles, StillTiles, silent
-from orbiflow.tiles.search.carving import carved
+from orbiflow.tiles.search.carving import Carved, carved
 from orbiflow.tiles.search.co_deformation import (
     BODIES,
-    BentTiles,
     Drawn,
     Hand,
     drawn_to_tiles,
@@ -48,6 +47,10 @@ TWIN = 2e-4  # mean squared distance of two bent outlines below which they are t
 FIRST_ROUNDS = 6  # steps of the minimisation for all that are held
 FOLLOWING = 60.0  # strength of the springs by which a finer body follows a coarser one
 RELAXED = 1500.0  # strength of the springs that keep a relaxed outline near its tile
+FOLLOWED = 3  # the number of times that the inside follows a carved outline
+REPAIRED = 1  # the most tiles of a class that cross themselves and are carved apart
+WORSE = 0.25  # how far below the best mark a tile that crosses itself may be to be carved apart
+ROOM = 0.012  # the gaps that carving apart leaves at least, in square roots of the area
 
 Item = TypeVar("Item")
 
@@ -56,13 +59,15 @@ class Bent(NamedTuple):
     """A bent silhouette that is a tile."""
 
     hand: Hand  # what was bent
-    points: Complex  # (N,) of the fine body; its outline is the tile, up to a similarity
-    linear: Array  # with `offset`: the map from the group's own frame, of `points`
+    ring: Complex  # (n,) the vertices of the tile, up to a similarity
+    points: Complex  # (N,) of the fine body; its outline lies on the tile
+    corners: Integers  # (K,) which of these lie at the tile's corners
+    linear: Array  # with `offset`: the map from the group's own frame, of `ring`
     offset: Array
     placement: Placements  # one, of the fine outline
     relaxed: Complex  # (n,) the outline let go a little: bent as it would like to be near this tile
     fidelity: Fidelity  # what is left of the outline, and what bending costs
-    sound: float  # 1, or less where a neck is too thin: `neck_factor`
+    sound: float  # 1, or less where a neck is too thin (`neck_factor`), or 0 if it crosses itself
 
     @property
     def score(self) -> float:
@@ -81,41 +86,61 @@ def bent_tiles(
 ) -> tuple[list[Bent], int]:
     """Return finalists, at best `wanted` of each hand and without twins, and how many crossed."""
     found: list[Bent] = []
-    dropped = done = 0
+    done = 0
     sides = both[:1] if template_symmetries(kind)[1] else both
     searches = settings.searches(wanted, symmetric=len(kind.stabiliser) > 1)
     tasks = [(hand, own, body) for own in searches for body in own.bodies for hand in sides]
     never_soft = all("soft" not in own.bodies for own in searches)
     work = sum(own.starts for _, own, _ in tasks)
     for hand, own, body in tasks:
-        sound, crossed = _finalists(hand, BODIES[body], kind, own, cancel)
-        if never_soft and 2 * len(sound) < own.finalists:
+        finalists = _finalists(hand, BODIES[body], kind, own, cancel)
+        if never_soft and 2 * sum(bent.sound > 0 for bent in finalists) < own.finalists:
             progress(0.9 * (done + 0.5 * own.starts) / work, math.nan)
-            more, also = _finalists(hand, BODIES["soft"], kind, own, cancel)
-            sound, crossed = sound + more, crossed + also
-        found, dropped, done = found + sound, dropped + crossed, done + own.starts
+            finalists += _finalists(hand, BODIES["soft"], kind, own, cancel)
+        found, done = found + finalists, done + own.starts
         progress(0.9 * done / work, math.nan)
-
-    def twins(a: Bent, b: Bent) -> bool:
-        n = a.hand.fine.size
-        return a.hand is b.hand and apart(a.points[:n], b.points[:n]) <= TWIN
-
-    def best_first() -> list[Bent]:
-        return _unlike(sorted(found, key=lambda bent: -bent.score), len(found), twins)
-
-    found = best_first()
+    sound = _best_first([bent for bent in found if bent.sound])
+    crossed = [bent for bent in found if not bent.sound]
     if settings.carved and both[0].plain:
-        for k in range(min(max(wanted, settings.carved), len(found))):
-            cancel.check()
-            found[k] = _carved(kind, found[k], settings.min_neck)
-        found = best_first()
-    return found, dropped
+        sound = _all_carved(kind, sound, crossed, max(wanted, settings.carved), settings, cancel)
+    return sound, len(crossed)
+
+
+def _all_carved(
+    kind: IsohedralClass,
+    sound: list[Bent],
+    crossed: list[Bent],
+    count: int,
+    settings: LikenessSearch,
+    cancel: Cancel,
+) -> list[Bent]:
+    """Carve the first of the sound tiles, and those that cross themselves but are worth it."""
+    least = max((bent.fidelity.mark for bent in sound), default=-math.inf) - WORSE
+    worth = sorted(
+        (bent for bent in crossed if bent.fidelity.mark > least),
+        key=lambda bent: -bent.fidelity.mark,
+    )
+    chosen = sound[:count] + _unlike(worth, REPAIRED, _twins)
+    done: list[Bent] = []
+    for bent in chosen:
+        cancel.check()
+        done.append(_carved(kind, bent, settings.min_neck))
+    return _best_first([bent for bent in done if bent.sound] + sound[count:])
+
+
+def _best_first(found: list[Bent]) -> list[Bent]:
+    """The tiles without twins, by their scores."""
+    return _unlike(sorted(found, key=lambda bent: -bent.score), len(found), _twins)
+
+
+def _twins(a: Bent, b: Bent) -> bool:
+    return a.hand is b.hand and apart(a.ring, b.ring) <= TWIN
 
 
 def _finalists(
     hand: Hand, stiffness: Stiffness, kind: IsohedralClass, settings: LikenessSearch, cancel: Cancel
-) -> tuple[list[Bent], int]:
-    """The best of one hand and stiffness worked out, and how many of them cross themselves."""
+) -> list[Bent]:
+    """The best of one hand and stiffness worked out; some cross themselves."""
     best = _best_placements(hand, stiffness, kind, settings, cancel)
     _, _, fine = hand.bodies(stiffness)
     found: list[Bent] = []
@@ -124,7 +149,7 @@ def _finalists(
         one = best.take(np.array([k]))
         bent = _detailed(hand, fine, kind, one, settings)
         found += [] if bent is None else [bent]
-    return found, len(best.costs) - len(found)
+    return found
 
 
 def _best_placements(
@@ -207,37 +232,54 @@ def _finer(
 def _detailed(
     hand: Hand, body: Elastic, kind: IsohedralClass, one: Drawn, settings: LikenessSearch
 ) -> Bent | None:
-    """One placement of the fine outline worked out with a body; None if it crosses itself."""
+    """One placement of the fine outline worked out with a body; None if nothing is left of it."""
     space = TileSpace(kind, one.placements)
     tiles = held_on_tiles(body, space, one.points, settings.rounds)
-    return _bent(hand, body, tiles, settings.min_neck)
+    ring, own = tiles.points[: body.size, 0], tiles.placements
+    corners = (np.cumsum(own.lengths[0]) - own.lengths[0] + own.starts[0]) % body.size
+    as_bent = Carved(ring, np.arange(body.size), corners, tiles.linear[0], tiles.offset[0])
+    return _bent(hand, body, as_bent, tiles.points, own, settings.min_neck)
 
 
 def _carved(kind: IsohedralClass, bent: Bent, min_neck: float) -> Bent:
-    """The tile carved, or as it is if that is no better."""
-    body = bent.hand.fine
-    tiles = carved(body, TileSpace(kind, bent.placement), bent.points)
-    better = _bent(bent.hand, body, tiles, min_neck)
-    return bent if better is None else max(bent, better, key=lambda own: own.score)
+    """The tile carved, with room between its parts if it needs that, or as it is if no better."""
+    body, space = bent.hand.fine, TileSpace(kind, bent.placement)
+    own = bent.placement._replace(turns=space.turns)
+    found = [bent]
+    for room in (0.0,) * (bent.sound > 0) + (max(ROOM, 1.2 * min_neck),):
+        tile = carved(body, space, bent.ring, bent.corners, room=room)
+        points = bent.points[:, None]
+        for _ in range(FOLLOWED):
+            points = body.condensed.whole(tile.outline[:, None], body.forces(points))
+        better = _bent(bent.hand, body, tile, points, own, min_neck)
+        found += [] if better is None else [better]
+        if better is not None and better.sound == 1:
+            break
+    return max(found, key=lambda own: own.score)
 
 
-def _bent(hand: Hand, body: Elastic, tiles: BentTiles, min_neck: float) -> Bent | None:
-    """The first tile of a bent body; None if it crosses itself."""
-    ring = tiles.points[: body.size, 0]
-    polygon = plane_points(ring)
-    area = float(signed_area(polygon))
-    simple = shapely.is_valid(shapely.Polygon(polygon))
-    if not simple or area < 0.1 or np.linalg.det(tiles.linear[0]) < 1e-6:
+def _bent(
+    hand: Hand, body: Elastic, tile: Carved, points: Complex, placement: Placements, min_neck: float
+) -> Bent | None:
+    """A tile and the shape (N, 1) of the body in it; None if there is no area, lattice or order."""
+    polygon, outline = plane_points(tile.ring), points[: body.size]
+    whole = float(signed_area(polygon)) > 0.1 and np.linalg.det(tile.linear) > 1e-6
+    if not whole or not tile.in_order:
         return None
+    simple = all(
+        shapely.is_valid(shapely.Polygon(own)) for own in (polygon, plane_points(outline[:, 0]))
+    )
     return Bent(
         hand,
-        tiles.points[:, 0],
-        tiles.linear[0],
-        tiles.offset[0],
-        tiles.placements,
-        body.pulled(tiles.points, tiles.points[: body.size], RELAXED, 3)[: body.size, 0],
-        kept_of(body.measures, ring, float(hand.fine.cost(tiles.points)[0])),
-        neck_factor(neck_up_to(polygon, min_neck), min_neck),
+        tile.ring,
+        points[:, 0],
+        tile.corners,
+        tile.linear,
+        tile.offset,
+        placement,
+        body.pulled(points, outline, RELAXED, 3)[: body.size, 0],
+        kept_of(body.measures, outline[:, 0], float(hand.fine.cost(points)[0])),
+        neck_factor(neck_up_to(polygon, min_neck), min_neck) if simple else 0.0,
     )
 
 
@@ -319,7 +361,7 @@ def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:
     """Lay a bent tile over its silhouette by the similarity of largest IoU, found by L-BFGS."""
     rest, points = bent.hand.fine.rest, bent.points
     center = points.mean()
-    ring = bent.points[: bent.hand.fine.size] - center
+    ring = bent.ring - center
     factor, middle, _ = best_overlay(
         ring, overlap, complex(best_similarity(points, rest)), rest.mean()
     )
@@ -333,7 +375,7 @@ def prototile(kind: IsohedralClass, placed: PlacedBent) -> Prototiles:
     order = (np.arange(n) + bent.placement.starts[0]) % n
     turn = np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])
     tiles = NearestTiles(
-        (factor * bent.points[:n] + shift)[order][None],
+        (factor * bent.ring + shift)[order][None],
         (turn @ bent.linear)[None],
         (turn @ bent.offset + [shift.real, shift.imag])[None],
         np.cumsum(bent.placement.lengths, axis=1) - bent.placement.lengths,

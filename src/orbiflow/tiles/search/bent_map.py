@@ -41,8 +41,7 @@ def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bend
     hand = bent.hand
     flip = np.array([1.0, -1.0]) if hand.mirrored else np.ones(2)
     z = factor * bent.points + shift
-    placement, n = bent.placement, hand.fine.size
-    first = np.cumsum(placement.lengths[0]) - placement.lengths[0]
+    n = hand.fine.size
     # how far along the outline each vertex of the mesh lies: all are points of it
     knots = arc_lengths(hand.outline)
     line = shapely.LinearRing(hand.outline)
@@ -53,7 +52,7 @@ def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bend
     own = np.interp(passed, places, np.arange(n + 1))
     mesh, images = divided(hand.fine.mesh, _unknown(hand.fine.mesh, own), plane_points(z))
     mesh, images = onto_polygon(
-        mesh, images, tile.polygon * flip, (first + placement.starts[0]) % n, np.array(tile.corners)
+        mesh, images, tile.polygon * flip, bent.corners, np.array(tile.corners)
     )
     outline = points_along(
         hand.outline, along[0] + np.interp(shares(mesh), np.arange(n + 1), places)

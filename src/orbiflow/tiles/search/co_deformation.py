@@ -34,7 +34,7 @@ from orbiflow.tiles.search.tile_space import Placements, TileSpace
 from orbiflow.tiles.silhouette import Emphasis, Pins, Samples, Target, sampled, triangulate
 from orbiflow.tiles.tilings import IsohedralClass
 
-TIGHTER = tuple(np.geomspace(1.2, 3000.0, 9))  # strengths of the springs, stage by stage
+TIGHTER = tuple(np.geomspace(1.2, 3000.0, 3))  # strengths of the springs, stage by stage
 ROUNDS = 3  # steps of choosing rotations and solving: in each stage, and of each neighbour
 
 

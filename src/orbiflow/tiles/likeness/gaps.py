@@ -1,0 +1,78 @@
+"""Where an outline comes too near to itself or crosses itself, and which way leads out of it.
+
+Two parts of an outline are apart by a signed distance: below 0 where one lies beyond the other, as in
+a limb that has run into its neighbour, or a neck whose sides have changed places. A point of an outline
+is beyond another part exactly if the side on which nothing should be is inside by the rule of even and
+odd crossings.
+"""
+
+import numpy as np
+
+from orbiflow.arrays import Array, Complex
+from orbiflow.tiles.likeness.necks import MIN_OUTLINE
+
+OFFSET = 1e-7  # how far beside the outline its outer side is tried, in square roots of the area
+
+
+def missing_gaps(ring: Complex, width: float) -> tuple[float, Complex]:
+    """Return how much is missing to a width everywhere, and its gradient (n,) in the points.
+
+    This is the sum over the points (n,), counter-clockwise, of h(d), where d is how much nearer than
+    the `width` the nearest other part is, in widths; h(d) is d^2 up to 1, and 2 d - 1 beyond. Other
+    parts are those that are at least `MIN_OUTLINE` away along the outline. The unit is that of a ring
+    of area 1. The gradient of f is the g for which f grows by Re(conj(g) dz).
+    """
+    steps = np.roll(ring, -1) - ring
+    beyond = _is_beyond(ring)
+    own, other, share = _nearest_others(ring, steps, beyond, width)
+    towards = ring[other] + share * steps[other] - ring[own]
+    apart = np.maximum(abs(towards), 1e-12)
+    sign = np.where(beyond[own], -1.0, 1.0)
+    missing = np.maximum(1 - sign * apart / width, 0.0)
+    steep = -2 * np.minimum(missing, 1.0) * sign / width * towards / apart
+    along = np.zeros(len(ring), dtype=complex)
+    for at, part in ((own, -1.0), (other, 1 - share), ((other + 1) % len(ring), share)):
+        np.add.at(along, at, part * steep)
+    total = np.where(missing < 1, missing**2, 2 * missing - 1).sum()
+    return float(total), along
+
+
+def _is_beyond(ring: Complex) -> Array:
+    """Return which points (n,) have the inside on their outer side."""
+    outward = -1j * (np.roll(ring, -1) - np.roll(ring, 1))
+    tried = ring + OFFSET * outward / np.maximum(abs(outward), 1e-300)
+    low, high = ring, np.roll(ring, -1)
+    passed = (low.imag <= tried.imag[:, None]) != (high.imag <= tried.imag[:, None])
+    own, side = np.nonzero(passed)
+    rise = high.imag[side] - low.imag[side]
+    share = (tried.imag[own] - low.imag[side]) / np.where(rise == 0, 1.0, rise)
+    right = low.real[side] + share * (high.real[side] - low.real[side]) > tried.real[own]
+    return np.bincount(own[right], minlength=len(ring)) % 2 == 1
+
+
+def _nearest_others(
+    ring: Complex, steps: Complex, beyond: Array, width: float
+) -> tuple[Array, Array, Array]:
+    """Return points, the sides nearest to them of those far along the outline, and where on these.
+
+    Of points that are not `beyond`, only those with a side within `width` are among them.
+    """
+    n = len(ring)
+    lengths = np.maximum(abs(steps), 1e-12)
+    knots = np.concatenate([[0.0], np.cumsum(lengths)])
+    near = abs(ring[:, None] - ring) < width + lengths
+    own, other = np.nonzero(near | beyond[:, None])
+    way = abs(knots[own] - knots[other])
+    # the side ends one step on: what counts is its nearer end
+    after = abs(knots[own] - knots[other + 1])
+    total = knots[n]
+    way = np.minimum(np.minimum(way, total - way), np.minimum(after, total - after))
+    far = way >= MIN_OUTLINE
+    own, other = own[far], other[far]
+    share = (np.conj(steps[other]) * (ring[own] - ring[other])).real / lengths[other] ** 2
+    share = np.clip(share, 0.0, 1.0)
+    apart = abs(ring[other] + share * steps[other] - ring[own])
+    order = np.lexsort((apart, own))
+    first = np.unique(own[order], return_index=True)[1]
+    best = order[first]
+    return own[best], other[best], share[best]

@@ -1,0 +1,73 @@
+"""What is missing to gaps between the parts of an outline."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.arrays import Complex
+from orbiflow.tiles import complex_points, resampled
+from orbiflow.tiles.likeness import missing_gaps
+from strategies import seeds
+
+
+def fork(gap: float) -> Complex:
+    """A bar with two legs, `gap` apart; below 0 the left leg reaches over the right one."""
+    inner, low = -gap / 2, -0.6
+    ring = [(-0.5, 0.3), (-0.5, 0.0), (inner - 0.3, low), (inner, low), (-0.15, 0.0)]
+    right = [(-x, y) for x, y in reversed(ring)]
+    return complex_points(resampled(np.array([*ring, *right]), 240))
+
+
+def waisted(neck: float) -> Complex:
+    """Two wedges joined by a neck; below 0 its sides have changed places."""
+    half = [(-0.6, -0.4), (0.0, -neck / 2), (0.6, -0.4)]
+    return complex_points(resampled(np.array([*half, *((-x, -y) for x, y in half)]), 240))
+
+
+@pytest.mark.parametrize("wide", [0.02, 0.05])
+def test_nothing_is_missing_where_gaps_and_necks_are_wide(wide: float) -> None:
+    assert missing_gaps(fork(0.06), wide)[0] == 0
+    assert missing_gaps(fork(0.06), 0.08)[0] > 0
+
+
+def test_more_is_missing_the_narrower_a_gap_or_neck_and_most_beyond() -> None:
+    found = [missing_gaps(fork(gap), 0.03)[0] for gap in (0.025, 0.015, 0.005, -0.01, -0.03, -0.08)]
+    assert (np.diff(found) > 0).all()
+    found = [missing_gaps(waisted(neck), 0.03)[0] for neck in (0.025, 0.015, 0.005, -0.005, -0.02)]
+    assert (np.diff(found) > 0).all()
+
+
+def test_a_step_against_the_gradient_parts_what_has_crossed() -> None:
+    ring = fork(-0.02)
+    value = missing_gaps(ring, 0.02)[0]
+    for _ in range(200):
+        value, along = missing_gaps(ring, 0.02)
+        ring = ring - 1e-4 * along
+    assert value < 0.01
+    assert missing_gaps(ring, 0.002)[0] == 0
+
+
+@given(seeds, st.sampled_from([-0.05, -0.01, 0.004, 0.012]))
+def test_gradient(seed: int, gap: float) -> None:
+    rng = np.random.default_rng(seed)
+    ring = fork(gap) + 1e-3 * rng.normal(size=(240, 2)) @ [1, 1j]
+    way = rng.normal(size=(240, 2)) @ [1, 1j]
+    value, along = missing_gaps(ring, 0.03)
+    ahead, behind = (missing_gaps(ring + step * way, 0.03)[0] for step in (1e-7, -1e-7))
+    assert value > 0
+    # the nearest side may change between the two
+    assert (ahead - behind) / 2e-7 == pytest.approx((np.conj(along) @ way).real, rel=1e-3, abs=0.05)
+
+
+@given(seeds)
+def test_motions_change_nothing(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    ring = fork(-0.02) + 1e-3 * rng.normal(size=(240, 2)) @ [1, 1j]
+    turn = np.exp(2j * np.pi * rng.random())
+    value, along = missing_gaps(ring, 0.02)
+    moved, turned = missing_gaps(turn * ring + 1 - 2j, 0.02)
+    assert moved == pytest.approx(value, rel=1e-6)
+    assert abs(turned - turn * along).max() < 1e-4 * abs(along).max()
