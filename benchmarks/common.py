@@ -67,11 +67,13 @@ class LikenessTile(NamedTuple):
 
     - `name`: of its class.
     - `ring`: (M, 2) the tile, counter-clockwise with y up, up to a similarity.
-    - `source`: (M, 2) the points of the target's outline, in its normal form, that became `ring`.
+    - `bent`: (M, 2) the points of the target's outline on it, in the same frame.
+    - `source`: (M, 2) where they are on the target, in its normal form.
     """
 
     name: str
     ring: Ring
+    bent: Ring
     source: Ring
 
 
@@ -92,8 +94,9 @@ def likeness_tiles(target: Target, effort: str) -> list[LikenessTile]:
         for bent in bents:
             n = bent.hand.fine.size
             flip = (1.0, -1.0 if bent.hand.mirrored else 1.0)
-            ring, source = (plane_points(z[:n]) * flip for z in (bent.points, bent.hand.fine.rest))
-            found.append((-bent.score, LikenessTile(name, orient(ring), orient(source))))
+            outlines = bent.ring, bent.points[:n], bent.hand.fine.rest[:n]
+            rings = (orient(plane_points(z) * flip) for z in outlines)
+            found.append((-bent.score, LikenessTile(name, *rings)))
     found.sort(key=lambda one: one[0])
     return [tile for _, tile in found]
 

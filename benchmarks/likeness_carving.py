@@ -48,7 +48,7 @@ def before_and_after(name: str) -> tuple[Ring, Ring, Ring]:
     print(f"{name:20}{kind}{marks}{wrinkles}", flush=True)
     factors = [complex(best_similarity(bent.points, body.rest)) for bent in both]
     before, after = (
-        bending.PlacedBent(bent, factor, 0j).place(bent.points[:n])
+        bending.PlacedBent(bent, factor, 0j).place(bent.ring)
         for bent, factor in zip(both, factors, strict=True)
     )
     return np.asarray(target.normal), before, after

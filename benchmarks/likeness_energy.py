@@ -164,7 +164,7 @@ def energies(name: str, own: list[LikenessTile]) -> dict[str, list[float]]:
     scorer = Scorer(np.asarray(goal(name).normal))
     silhouettes = DATA / "silhouettes"
     document = json.loads((silhouettes / "baseline_tiles" / f"{name}.json").read_text())
-    found = {"ours": [scorer.of_images(tile.ring, tile.source) for tile in own]}
+    found = {"ours": [scorer.of_images(tile.bent, tile.source) for tile in own]}
     for method, key in (("arap", "arap_EIR_top20"), ("est", "est_euclid_top20")):
         found[method] = [scorer.of_vertices(np.array(tile["tile"])) for tile in document[key]]
     trial = silhouettes / "trial_tiles.json"

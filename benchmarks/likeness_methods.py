@@ -25,6 +25,7 @@ BASELINES = {"arap": "arap_EIR_top20", "est": "est_euclid_top20"}
 TRIES = 8
 """Turns from which the best similarity is sought: three have missed it for a spider."""
 
+RINGS = LikenessTile._fields[1:]
 SMOOTH = 3  # pixels drawn for each pixel of a side
 
 
@@ -42,12 +43,12 @@ def kept(
 
     def rows() -> list[dict[str, Any]]:
         return [
-            {"class": tile.name, "ring": tile.ring.tolist(), "source": tile.source.tolist()}
+            {"class": tile.name} | {part: getattr(tile, part).tolist() for part in RINGS}
             for tile in search()
         ]
 
     return [
-        LikenessTile(row["class"], np.array(row["ring"]), np.array(row["source"]))
+        LikenessTile(row["class"], *(np.array(row[part]) for part in RINGS))
         for row in _document(folder, f"{name}-likeness-{effort}", rows)
     ]
 

@@ -161,7 +161,7 @@ class BentCandidate(Candidate):
         points, rest = bent.points, bent.hand.fine.rest
         factor = complex(best_similarity(points, rest))
         placed = PlacedBent(bent, factor, complex(rest.mean() - factor * points.mean()))
-        ring = placed.place(points[: bent.hand.fine.size])
+        ring = placed.place(bent.ring)
         return cls(method, kind, bent.score, ring, placed)
 
     def sound(self) -> bool:
@@ -177,13 +177,15 @@ class BentCandidate(Candidate):
         """Return what is kept, laid by the similarity of largest IoU."""
         bent, hand = self.placed.bent, self.placed.bent.hand
         n, flip = hand.fine.size, (1.0, -1.0 if hand.mirrored else 1.0)
-        ring = placed_best(bent, Overlap(target.normal * flip)).place(bent.points[:n])
+        placed = placed_best(bent, Overlap(target.normal * flip))
+        rings = [placed.place(own) for own in (bent.ring, bent.points[:n])]
         if hand.mirrored:  # read backwards from the same first point
-            ring = ring[-np.arange(n) % n]
+            rings = [ring[-np.arange(n) % n] for ring in rings]
+        ring, points = rings
         away = hand.fine.displacement(bent.points[:, None])[0]
         neck = narrowest_neck(ring).share
         row = self.valued(target, ring, bent.fidelity, away, neck)
-        return {**row, "bent": rounded(ring)}
+        return {**row, "bent": rounded(points), "tile": rounded(ring)}
 
 
 def rounded(ring: Ring) -> list[list[float]]:
@@ -206,8 +208,10 @@ def bent_candidates(target: Target) -> tuple[dict[str, list[Candidate]], list[Ca
             own: dict[str, list[Candidate]] = {}
             for name, body in BODIES.items():
                 with one_blas_thread():
-                    bents, _ = bending._finalists(hand, body, kind, settings, NEVER)
-                own[name] = [BentCandidate.of(name, kind.name, bent) for bent in bents]
+                    bents = bending._finalists(hand, body, kind, settings, NEVER)
+                own[name] = [
+                    BentCandidate.of(name, kind.name, bent) for bent in bents if bent.sound
+                ]
                 found[name] += own[name]
             few = 2 * len(own["firm"]) < settings.finalists
             seen += own["firm"] + (own["soft"] if few else [])
