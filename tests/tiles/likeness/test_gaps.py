@@ -53,8 +53,8 @@ def test_a_step_against_the_gradient_parts_what_has_crossed() -> None:
 @given(seeds, st.sampled_from([-0.05, -0.01, 0.004, 0.012]))
 def test_gradient(seed: int, gap: float) -> None:
     rng = np.random.default_rng(seed)
-    ring = fork(gap) + 1e-3 * rng.normal(size=(240, 2)) @ [1, 1j]
-    way = rng.normal(size=(240, 2)) @ [1, 1j]
+    ring = fork(gap) + 1e-3 * complex_points(rng.normal(size=(240, 2)))
+    way = complex_points(rng.normal(size=(240, 2)))
     value, along = missing_gaps(ring, 0.03)
     ahead, behind = (missing_gaps(ring + step * way, 0.03)[0] for step in (1e-7, -1e-7))
     assert value > 0
@@ -65,7 +65,7 @@ def test_gradient(seed: int, gap: float) -> None:
 @given(seeds)
 def test_motions_change_nothing(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    ring = fork(-0.02) + 1e-3 * rng.normal(size=(240, 2)) @ [1, 1j]
+    ring = fork(-0.02) + 1e-3 * complex_points(rng.normal(size=(240, 2)))
     turn = np.exp(2j * np.pi * rng.random())
     value, along = missing_gaps(ring, 0.02)
     moved, turned = missing_gaps(turn * ring + 1 - 2j, 0.02)

@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 from orbiflow.arrays import Array, Complex
-from orbiflow.tiles import CLASSES, Pins, isohedral_class, plane_points, signed_area
+from orbiflow.tiles import CLASSES, Pins, complex_points, isohedral_class, plane_points, signed_area
 from orbiflow.tiles.likeness import Elastic, kept_of
 from orbiflow.tiles.search import bending, carving
 from orbiflow.tiles.search.bending import Bent, bent_tiles
@@ -70,7 +70,7 @@ def test_points_slide_in_order_and_meet_the_corners(name: str) -> None:
 def test_points_that_slide_have_higher_marks(monkeypatch: pytest.MonkeyPatch) -> None:
     def marks() -> float:
         found = [carve(name) for name in CLASSES]
-        return np.mean([kept_of(own[0].measures, own[3].outline, 0.0).mark for own in found])
+        return float(np.mean([kept_of(own[0].measures, own[3].outline, 0.0).mark for own in found]))
 
     slid = marks()
     monkeypatch.setattr(carving, "SLIDE_UNIT", 1e-9)
@@ -80,7 +80,7 @@ def test_points_that_slide_have_higher_marks(monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.parametrize("smooth", [False, True])
 def test_gradients_of_laid_points(smooth: bool) -> None:
     rng = np.random.default_rng(3)
-    ring, along = (rng.normal(size=(2, 12)).T @ [1, 1j] for _ in range(2))
+    ring, along = (complex_points(rng.normal(size=(12, 2))) for _ in range(2))
     places = np.arange(12) + rng.uniform(-0.4, 0.4, 12)
     lay = _Laid.smoothly if smooth else _Laid.straight
 

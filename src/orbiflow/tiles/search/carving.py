@@ -159,8 +159,9 @@ class _Laid(NamedTuple):
         below = np.floor(places).astype(np.int64)
         powers = np.vander(places - below, polynomials.shape[1], increasing=True)
         at = (below[:, None] + np.arange(first, first + len(polynomials))) % len(places)
-        steeper: Array = polynomials[:, 1:] * np.arange(1, polynomials.shape[1])
-        return cls(at, powers @ polynomials.T, powers[:, :-1] @ steeper.T)
+        degrees: Array = np.arange(1.0, polynomials.shape[1])
+        slopes = (powers[:, :-1] * degrees) @ polynomials[:, 1:].T
+        return cls(at, powers @ polynomials.T, slopes)
 
     def points(self, ring: Complex) -> Complex:
         """Return the points (n,) on a ring."""
