@@ -42,10 +42,10 @@ WEIGHTS = (1.3, 1.65, 0.27, 0.45, 0.5, 0.27, 0.25)
 # Rough outlines forgive more: marks for the logarithm of the outline's length, and lengths, in square
 # roots of the area: the usual one, and the extremes of those that were marked
 LENGTH_WEIGHT, USUAL_LENGTH, LENGTHS = 2.0, 6.5, (4.2, 10.9)
-USUAL_MARK = 5.3  # of a tile with usual values and of usual length
+USUAL_MARK = 5.8  # of a tile with usual values and of usual length
 # The foretold mark at which half of the people find a tile good, 6.5 or more, and how fast their log
 # odds grow with it
-GOOD_MARK, STEEPNESS = 6.2, 1.6
+GOOD_MARK, STEEPNESS = 6.1, 1.6
 # What has happened where each of the measures costs marks
 LOST = (
     "small parts such as ears and feet have lost their shapes",

@@ -19,7 +19,7 @@ from orbiflow.tiles.silhouette import sampled
 PAIRINGS = 12  # mirrors that are tried, by how well the directions of the outline agree
 SPRINGS = tuple(np.geomspace(1.2, 3000.0, 9))  # strengths, stage by stage
 ROUNDS = 3  # steps in each stage
-NEAR = 0.6  # the score from which a silhouette is near to symmetric; docs/likeness.md has examples
+NEAR = 0.77  # the score from which a silhouette is near to symmetric; docs/likeness.md has examples
 
 
 class NearSymmetry(NamedTuple):
