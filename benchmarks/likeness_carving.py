@@ -3,8 +3,8 @@
     python benchmarks/likeness_carving.py [--picture FILE.png] [NAME ...]
 
 For each silhouette of likeness_shapes.json the best tile of the classes IH4, IH5 and IH6 at effort
-fast, as bending leaves it and then carved: the foretold marks, and by how many radians the outlines
-turn elsewhere than the silhouette's. The picture shows the silhouette in blue and both tiles.
+fast, as bending leaves it and then carved: the foretold marks, and by how many radians the silhouette
+and the tiles turn in all. The picture shows the silhouette in blue and both tiles.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from likeness_methods import cell, common_unit
 from likeness_shapes import silhouettes
 from PIL import Image
 
+from orbiflow.arrays import Complex
 from orbiflow.runtime import one_blas_thread
 from orbiflow.tiles import CLASSES, LikenessSearch, Target
 from orbiflow.tiles.geometry import best_similarity
@@ -41,17 +42,23 @@ def before_and_after(name: str) -> tuple[Ring, Ring, Ring]:
             bents, _ = bending.bent_tiles(hands(target, settings), CLASSES[kind], settings)
         found += [(kind, bent) for bent in bents[:1]]
     kind, plain = max(found, key=lambda one: one[1].score)
-    body, n = plain.hand.fine, plain.hand.fine.size
+    body = plain.hand.fine
     both = plain, bending._carved(CLASSES[kind], plain, settings.min_neck)
     marks = "".join(f"{bent.fidelity.mark:8.2f}" for bent in both)
-    wrinkles = "".join(f"{body.measures.wrinkles(bent.points[:n])[0]:9.1f}" for bent in both)
-    print(f"{name:20}{kind}{marks}{wrinkles}", flush=True)
+    rings = body.rest[: body.size], *(bent.ring for bent in both)
+    turning = "".join(f"{_turning(ring):9.1f}" for ring in rings)
+    print(f"{name:20}{kind}{marks}{turning}", flush=True)
     factors = [complex(best_similarity(bent.points, body.rest)) for bent in both]
     before, after = (
         bending.PlacedBent(bent, factor, 0j).place(bent.ring)
         for bent, factor in zip(both, factors, strict=True)
     )
     return np.asarray(target.normal), before, after
+
+
+def _turning(ring: Complex) -> float:
+    steps = np.roll(ring, -1) - ring
+    return float(abs(np.angle(steps * np.conj(np.roll(steps, 1)))).sum())
 
 
 def main() -> None:
@@ -63,7 +70,7 @@ def main() -> None:
     parser.add_argument("--picture", type=Path, default=Path("out/likeness-carving.png"))
     options = parser.parse_args()
     torch.set_num_threads(1)
-    print(f"{'':24}  marks           wrinkles")
+    print(f"{'':24}  marks           turning at rest, bent, carved")
     rows = [before_and_after(name) for name in options.names]
     page = Image.new("RGB", (6 * CELL, -(-len(rows) // 2) * CELL), "white")
     for k, rings in enumerate(rows):

@@ -50,10 +50,14 @@ def test_wrinkles_and_the_mark_have_theirs(seed: int) -> None:
     rest = outline(rng)
     measures, z = Measures(rest), bent(rest, rng)
     way = np.exp(1j * rng.uniform(0, 2 * np.pi, COUNT))
-    for found in (measures.wrinkles, lambda z: mark_gradient(measures, z)):
+    places = np.arange(COUNT) + rng.uniform(0.1, 0.9, COUNT)  # no point at a vertex, where it kinks
+    for found in (lambda z: measures.wrinkles(z, places), lambda z: mark_gradient(measures, z)):
         change = (found(z)[1].conj() @ way).real
         numerical = (found(z + STEP * way)[0] - found(z - STEP * way)[0]) / (2 * STEP)
         assert abs(numerical - change) < 2e-3 * (abs(found(z)[1]).sum() + 1e-3)
+    slide, along = rng.uniform(-1, 1, COUNT), measures.wrinkles(z, places)[2]
+    more, less = (measures.wrinkles(z, places + step * slide)[0] for step in (STEP, -STEP))
+    assert abs((more - less) / (2 * STEP) - along @ slide) < 2e-3 * (abs(along).sum() + 1e-3)
 
 
 @given(seeds, st.floats(0.1, 10), st.floats(-3.2, 3.2), st.complex_numbers(max_magnitude=10))
@@ -65,12 +69,21 @@ def test_motions_and_scale_change_nothing(
     measures, z = Measures(rest), bent(rest, rng)
     moved = scale * np.exp(1j * turn) * z + shift
     assert measures.values(moved) == pytest.approx(measures.values(z), abs=1e-9)
-    assert measures.wrinkles(moved)[0] == pytest.approx(measures.wrinkles(z)[0], abs=1e-7)
+    wrinkles = [measures.wrinkles(own, np.arange(COUNT))[0] for own in (moved, z)]
+    assert wrinkles[0] == pytest.approx(wrinkles[1], abs=1e-7)
 
 
 def test_an_outline_at_rest_has_no_wrinkles() -> None:
     rest = outline(np.random.default_rng(1))
-    measures = Measures(rest)
-    assert measures.wrinkles(rest)[0] < 0.001 * COUNT * 2
+    measures, places = Measures(rest), np.arange(COUNT)
+    assert measures.wrinkles(rest, places)[0] < 1e-9
     rough = rest + 0.002 * np.random.default_rng(2).normal(size=COUNT)
-    assert measures.wrinkles(rough)[0] > measures.wrinkles(rest)[0] + 1
+    assert measures.wrinkles(rough, places)[0] > 1
+
+
+def test_wrinkles_between_the_points_count() -> None:
+    rest = outline(np.random.default_rng(1))
+    ring = np.stack([rest, (rest + np.roll(rest, -1)) / 2], axis=1).ravel()
+    measures, places = Measures(ring), np.repeat(2.0 * np.arange(COUNT), 2)
+    rough = ring * (1 + 0.01 * (np.arange(2 * COUNT) % 2))  # points lie at the other vertices
+    assert measures.wrinkles(rough, places)[0] > measures.wrinkles(ring, places)[0] + 1

@@ -46,7 +46,8 @@ def test_what_is_carved_is_a_tile_of_its_placement(name: str) -> None:
     assert nearest.linear[0] == pytest.approx(found.linear, abs=1e-5)
     outlines = before, found.outline
     marks = [kept_of(body.measures, z, 0.0).mark for z in outlines]
-    wrinkles = [body.measures.wrinkles(z)[0] for z in outlines]
+    laid = (before, np.arange(body.size)), (found.ring, found.places)
+    wrinkles = [body.measures.wrinkles(*own)[0] for own in laid]
     gain = marks[1] - marks[0] + WRINKLE_COST * (wrinkles[0] - wrinkles[1])
     assert gain > 0.05
     assert signed_area(plane_points(found.ring)) > 0.2
@@ -65,6 +66,19 @@ def test_points_slide_in_order_and_meet_the_corners(name: str) -> None:
         shapely.points(plane_points(found.outline)), shapely.LinearRing(plane_points(found.ring))
     )
     assert apart.max() < 1e-12
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_tile_is_no_rougher_than_the_points_on_it(name: str) -> None:
+    _, _, before, found = carve(name)
+    points, ring, bent = (_turning(z) for z in (found.outline, found.ring, before))
+    assert ring < 1.15 * points
+    assert ring < 1.5 * bent
+
+
+def _turning(z: Complex) -> float:
+    steps = np.roll(z, -1) - z
+    return float(abs(np.angle(steps * np.conj(np.roll(steps, 1)))).sum())
 
 
 def test_points_that_slide_have_higher_marks(monkeypatch: pytest.MonkeyPatch) -> None:

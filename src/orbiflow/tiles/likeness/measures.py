@@ -24,7 +24,7 @@ CHORDS = 48  # the number of chords into which the outline is cut; their turning
 SMALL_MISFIT = 1e-7  # the misfit of a piece below which its root is smooth: it has a gradient at 0
 SHORTEST = 1e-9  # the shortest side whose stretch is known
 WRINKLE_STEPS = (1, 2, 4)  # the numbers of points between those whose directions are compared
-LEAST_KINK = 1e-3  # the angle in radians below which a change of direction counts by its square
+LEAST_KINK = 0.02  # the angle in radians below which a change of direction counts by its square
 
 Measured = tuple[float, Callable[[], Complex]]  # a value, and what computes the gradient (n,)
 
@@ -43,6 +43,7 @@ class Measures:
         self._share = share / share.sum()
         self._step = max(1, round(len(rest) / CHORDS))
         self._turns = abs(_turns(self.rest, self._step))
+        self._fine_turns = [_turns(self.rest, step) for step in WRINKLE_STEPS]
         n = len(rest)
         halves = (round(length * n / 2) for length in PIECE_LENGTHS)
         self._pieces = [_Pieces(self.rest, min(max(3, h), (n - 1) // 2)) for h in halves]
@@ -62,21 +63,34 @@ class Measures:
         along = (along - grows[:, None] * _area_gradient(z) / 2) / size
         return np.array([value for value, _ in found]), along
 
-    def wrinkles(self, bent: Complex) -> tuple[float, Complex]:
-        """Return by how many radians the outline turns elsewhere than at rest, and its gradient (n,).
+    def wrinkles(self, ring: Complex, places: Array) -> tuple[float, Complex, Array]:
+        """Return by how many radians a ring turns elsewhere than the outline at rest.
 
-        The sum over its points of the change of the angle between steps, as the mean over steps of
-        one point and more: an outline that bends at few places has fewer wrinkles than a bumpy one.
+        The sum over its vertices of the change of the angle between steps, as the mean over steps of
+        one vertex and more: a ring that bends at few places has fewer wrinkles than a bumpy one. The
+        turning at rest is shared out to the two vertices next to where each point lies.
+
+        Args:
+            ring: The ring (n,), whose vertices need not be points of the outline.
+            places: Where the outline's points (n,) lie on it, in vertices from the first.
+
+        Returns:
+            The wrinkles, and their gradients (n,) in the ring and in the places.
         """
-        total, along = 0.0, np.zeros_like(bent)
-        for step in WRINKLE_STEPS:
-            share = 1 / (step * len(WRINKLE_STEPS))
-            change = _turns(bent, step) - _turns(self.rest, step)
-            change = (change + np.pi) % (2 * np.pi) - np.pi
+        n = len(ring)
+        below = np.floor(places).astype(np.int64)
+        share, low, high = places - below, below % n, (below + 1) % n
+        total, along, sliding = 0.0, np.zeros_like(ring), np.zeros(n)
+        for step, turns in zip(WRINKLE_STEPS, self._fine_turns, strict=True):
+            weight = 1 / (step * len(WRINKLE_STEPS))
+            meant = np.bincount(low, (1 - share) * turns, n) + np.bincount(high, share * turns, n)
+            change = (_turns(ring, step) - meant + np.pi) % (2 * np.pi) - np.pi
             size = np.sqrt(change**2 + LEAST_KINK**2)
-            total += share * float(size.sum())
-            along += share * _turned(bent, step, change / size)
-        return total, along
+            slope = weight * change / size
+            total += weight * float((size - LEAST_KINK).sum())
+            along += _turned(ring, step, slope)
+            sliding += turns * (slope[low] - slope[high])
+        return total, along, sliding
 
     def _measured(self, z: Complex) -> tuple[Measured, ...]:
         short, long = (piece.misfit(z, self._share) for piece in self._pieces)

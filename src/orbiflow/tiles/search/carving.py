@@ -27,7 +27,7 @@ from orbiflow.tiles.likeness import Elastic, mark_gradient, missing_gaps
 from orbiflow.tiles.search.tile_space import TileSpace
 
 STEPS = 60  # the largest number of steps while points slide, and again once they have slid
-WRINKLE_COST = 0.12  # in marks a radian
+WRINKLE_COST = 0.12  # in marks a radian by which the tile turns elsewhere than the silhouette
 GAP_COST = 1.0  # in marks for each point that has no gap at all
 UNEVEN_COST = 0.1  # in marks for a mean square of 1 of how much nearer points lie than vertices
 SLIDES = 36  # the number of pieces of the spline by which points slide
@@ -68,32 +68,31 @@ def carved(
     spline = _spline_basis(body, ring)
     adjoint, count, own = basis.conj().T, basis.shape[1], np.arange(body.size)
 
-    def lost(parameters: Array, still: _Laid | None = None) -> tuple[float, Array]:
+    def lost(parameters: Array, fixed: Array | None = None) -> tuple[float, Array]:
         ring = basis @ parameters[:count]
         slide = spline @ parameters[count:]
-        laid = still or _Laid.smoothly(own + slide)
-        outline = laid.points(ring)
-        mark, rise = mark_gradient(body.measures, outline)
-        wrinkles, bumpy = body.measures.wrinkles(outline)
-        along = WRINKLE_COST * bumpy - rise
-        cost, down = WRINKLE_COST * wrinkles - mark, laid.gradient(along)
+        places = own + slide if fixed is None else fixed
+        laid = _Laid.smoothly(places) if fixed is None else _Laid.straight(places)
+        mark, rise = mark_gradient(body.measures, laid.points(ring))
+        wrinkles, bumpy, shifted = body.measures.wrinkles(ring, places)
+        cost, down = WRINKLE_COST * wrinkles - mark, WRINKLE_COST * bumpy - laid.gradient(rise)
         if room:
             missing, apart = missing_gaps(ring, room)
             cost, down = cost + GAP_COST * missing, down + GAP_COST * apart
         steep = (adjoint @ down).real
-        if still is not None:
+        if fixed is not None:
             return cost, np.append(steep, np.zeros(SLIDES))
         uneven = np.roll(slide, -1) - slide
         cost += UNEVEN_COST * float((uneven**2).mean())
-        sliding = laid.slide_gradient(ring, along)
+        sliding = WRINKLE_COST * shifted - laid.slide_gradient(ring, rise)
         sliding += UNEVEN_COST * 2 / body.size * (np.roll(uneven, 1) - uneven)
         return cost, np.concatenate([steep, spline.T @ sliding])
 
-    def climbed(start: Array, still: _Laid | None = None) -> Array:
+    def climbed(start: Array, fixed: Array | None = None) -> Array:
         return scipy.optimize.minimize(
             lost,
             start,
-            (still,),
+            (fixed,),
             jac=True,
             method="L-BFGS-B",
             options={"maxiter": STEPS, "maxcor": 20},
@@ -103,7 +102,7 @@ def carved(
     start = scipy.linalg.lstsq(whole, np.concatenate([ring.real, ring.imag]))[0]
     best = climbed(np.append(start, np.zeros(SLIDES)))
     places, points = _cornered(own + _calmed(spline @ best[count:]), corners)
-    best = climbed(best, _Laid.straight(places))[:count]
+    best = climbed(best, places)[:count]
     parameters = scipy.linalg.solve_triangular(root, best, lower=True, trans="T")
     return Carved(basis @ best, places, points, *space.group(0, parameters))
 
