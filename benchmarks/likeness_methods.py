@@ -53,6 +53,7 @@ def kept(
     ]
 
 
+RIVALS = ROOT / "benchmarks" / "data" / "likeness_rivals.json"
 SHAPES = ROOT / "benchmarks" / "data" / "likeness_shapes.json"
 
 
@@ -126,7 +127,8 @@ def baseline(name: str) -> dict[str, dict[str, Any]]:
         tiles = json.loads(goals.read_text())
         return {method: tiles[key][0] for method, key in BASELINES.items()}
     known = json.loads(icons.read_text()) if icons.exists() else {}
-    return known.get(name.removesuffix("_80"), {})
+    fresh = json.loads(RIVALS.read_text()) if RIVALS.exists() else {}
+    return known.get(name.removesuffix("_80")) or fresh.get(name, {})
 
 
 def _document(folder: Path | None, name: str, make: Callable[[], Any]) -> Any:

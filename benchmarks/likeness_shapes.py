@@ -4,16 +4,17 @@
     python benchmarks/likeness_shapes.py look [--sheet FILE.png]
 
 `make` writes data/likeness_shapes.json from four sources: the icons, the polygons of Nagata and
-Imahori, the PhyloPic silhouettes (docs/benchmarks.md says where they are), and animals of seven sets
+Imahori, the PhyloPic silhouettes (docs/benchmarks.md says where they are), and animals of eight sets
 of icons, which npm unpacks into FOLDER/node_modules:
 
     npm install --prefix FOLDER @iconify-json/noto @iconify-json/twemoji \\
         @iconify-json/fluent-emoji-flat @iconify-json/fa6-solid @iconify-json/emojione \\
-        @iconify-json/fxemoji @iconify-json/noto-v1
+        @iconify-json/fxemoji @iconify-json/noto-v1 @iconify-json/game-icons
 
 Drawings are filled, gaps are closed by 9 of 480 pixels, and the largest part is kept and sampled at 80
 points. A third of each source is for the test alone, drawn by a fixed seed; of 38 animals (the part
-"ranked") only the best tiles were ranked. `look` draws all of them.
+"ranked") only the best tiles were ranked, and 32 more icons (the part "fresh") came last, for one
+comparison. `look` draws all of them.
 """
 
 from __future__ import annotations
@@ -58,6 +59,13 @@ RANKED = {
 }
 """More of them, whose best tiles were ranked (likeness_ranks.py)."""
 
+FRESH = (
+    "beaver camel cat charging-bull chicken diplodocus dodo dolphin eating-pelican elephant frog gecko "
+    "goat hummingbird kangaroo lion mammoth mouse ostrich polar-bear pterodactylus rooster seagull "
+    "seahorse snail sparrow swan tapir tortoise velociraptor vulture wyvern"
+)
+"""Of game-icons.net, beside the icons: chosen by their outlines, before any tile of them was made."""
+
 UNNAMED = ("Grapsidae", "Hydroscaphidae")
 """PhyloPic silhouettes that nobody could name from 80 points."""
 
@@ -99,7 +107,7 @@ def animals(packages: Path, sets: dict[str, str]) -> dict[str, dict[str, Any]]:
             alpha = np.asarray(Image.open(io.BytesIO(png)).convert("RGBA"))[..., 3]
             found[f"{name}-{animal}"] = {
                 "source": f"@iconify-json/{name} {version}, {animal}",
-                "by": about["author"]["name"],
+                "by": ICONS["by"] if name == "game-icons" else about["author"]["name"],
                 "licence": about["license"]["title"],
                 "outline": outline(alpha > 127),
             }
@@ -149,11 +157,13 @@ def make(options: argparse.Namespace) -> None:
     """Write the silhouettes, in their normal form, rounded to four digits."""
     sources = [polygons("icons", ICONS_PLACE, ICONS)]
     sources += [polygons("nagata", NAGATA_PLACE, NAGATA), phylopic()]
-    sources += [animals(options.packages, sets) for sets in (ANIMALS, RANKED)]
+    sources += [animals(options.packages, ANIMALS)]
     rng, found = np.random.default_rng(SEED), {}
-    for source in sources:
-        last = source is sources[-1]
-        parts = dict.fromkeys(source, "ranked") if last else split(list(source), rng)
+    parted = [(source, split(list(source), rng)) for source in sources]
+    ranked = animals(options.packages, RANKED)
+    fresh = animals(options.packages, {"game-icons": FRESH})
+    parted += [(ranked, dict.fromkeys(ranked, "ranked")), (fresh, dict.fromkeys(fresh, "fresh"))]
+    for source, parts in parted:
         for name, shape in source.items():
             normal = np.asarray(Target.from_polygon(shape.pop("outline")).normal)
             found[name] = {"part": parts[name], **shape, "outline": normal.round(4).tolist()}

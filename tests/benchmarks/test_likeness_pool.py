@@ -41,7 +41,8 @@ def test_each_silhouette_is_one_sound_outline_with_its_licence(load) -> None:
 def test_a_third_is_kept_for_the_test(load) -> None:
     shapes = load("likeness_shapes")
     parts = [shape["part"] for shape in shapes.silhouettes().values()]
-    assert [parts.count(part) for part in ("test", "learn", "ranked")] == [29, 59, 38]
+    names = ("test", "learn", "ranked", "fresh")
+    assert [parts.count(part) for part in names] == [29, 59, 38, 32]
     names = [f"animal {k}" for k in range(25)]
     split = shapes.split(names, np.random.default_rng(3))
     assert list(split) == names
