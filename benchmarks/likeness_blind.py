@@ -22,13 +22,13 @@ import numpy as np
 import scipy.stats
 import torch
 from common import GOALS, Ring
-from likeness_methods import METHODS, cell, common_unit, first_tiles
+from likeness_methods import BEFORE, METHODS, cell, common_unit, first_tiles
 from likeness_shapes import silhouettes
 from PIL import Image, ImageDraw, ImageFont
 
 CELL, HEAD, BLUE = 300, 36, "#1f5fbf"  # pixels
 
-BARS = {"arap": 2 / 3, "trial": 2 / 3, "est": 3 / 4, "overlap": 3 / 4}
+BARS = {"arap": 2 / 3, "trial": 2 / 3, "est": 3 / 4, "overlap": 3 / 4, BEFORE: 3 / 5}
 """Shares of rows in which likeness is meant to be preferred."""
 
 INSTRUCTIONS = """\
@@ -150,7 +150,7 @@ def score(options: argparse.Namespace) -> None:
         except (ValueError, KeyError, TypeError) as error:
             raise SystemExit(f"{path}: {type(error).__name__}: {error}") from error
     rows = [row for _, row in named]
-    methods = [method for method in METHODS if any(method in row for row in rows)]
+    methods = [method for method in (*METHODS, BEFORE) if any(method in row for row in rows)]
     print(f"{len(rows)} rows from {len(options.answers)} files\n\nmean rank\n{'':18}", end="")
     print("".join(f"{method:>10}" for method in methods))
     for name in dict.fromkeys(name for name, _ in named):
@@ -177,9 +177,11 @@ def _print_bars(named: list[tuple[str, dict[str, float]]]) -> None:
                 f"likeness preferred to {other:8}{wins:5g} of {count}"
                 f"  ({wins / count:4.0%}; bar {bar:.0%}: {met})"
             )
-    tested = {name for name, shape in silhouettes().items() if shape["part"] == "test"}
+    parts = {name: shape["part"] for name, shape in silhouettes().items()}
     groups = {"all": lambda _: True, "the nine goals": GOALS.__contains__}
-    groups |= {"others": lambda name: name not in GOALS, "part test": tested.__contains__}
+    groups |= {"others": lambda name: name not in GOALS}
+    for part in ("test", "fresh"):
+        groups[f"part {part}"] = lambda name, part=part: parts.get(name) == part
     print(f"\n{'likeness preferred to':24}arap   est  one of them  of rows")
     for label, belongs in groups.items():
         own = [row for name, row in named if belongs(name) and {"arap", "est"} <= row.keys()]
@@ -211,7 +213,7 @@ def main() -> None:
     maker.add_argument("--seed", type=int, default=0)
     maker.add_argument("--rounds", type=int, default=3)
     maker.add_argument("--effort", choices=("fast", "normal", "best"), default="normal")
-    maker.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS))
+    maker.add_argument("--methods", nargs="+", choices=(*METHODS, BEFORE), default=list(METHODS))
     maker.add_argument(
         "--tiles", type=Path, default=Path("out/likeness"), help="of likeness_sheets.py"
     )

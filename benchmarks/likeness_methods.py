@@ -20,6 +20,9 @@ from orbiflow.tiles import OverlapSearch, Target, centroid, escherize, signed_ar
 METHODS = ("overlap", "likeness", "arap", "est", "trial")
 """Overlap: the flow that maximises IoU; likeness: the silhouette bends; the others' tiles are files."""
 
+BEFORE = "before"
+"""An earlier search for likeness: its first tiles lie in FOLDER/tiles as NAME-first-before.json."""
+
 BASELINES = {"arap": "arap_EIR_top20", "est": "est_euclid_top20"}
 
 TRIES = 8
@@ -111,6 +114,8 @@ def _first(
     if method == "likeness":
         tiles = kept(folder, name, effort, lambda: likeness_tiles(target, effort))
         return aligned(tiles[0].ring, outline, TRIES).tolist() if tiles else []
+    if method == BEFORE:
+        raise SystemExit(f"{name}: there is no {folder}/tiles/{name}-first-{BEFORE}.json")
     if method in BASELINES:
         tile = baseline(name).get(method)
         return aligned(np.array(tile["tile"]), outline, TRIES).tolist() if tile else []
