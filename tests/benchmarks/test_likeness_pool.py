@@ -29,7 +29,7 @@ def load_fixture(tmp_path_factory: pytest.TempPathFactory):
 
 def test_each_silhouette_is_one_sound_outline_with_its_licence(load) -> None:
     found = load("likeness_shapes").silhouettes()
-    assert len(found) == 126
+    assert len(found) == 158
     for name, shape in found.items():
         polygon = shapely.Polygon(shape["outline"])
         assert polygon.is_valid, name
