@@ -102,7 +102,8 @@ def test_reading_can_be_set_and_a_new_picture_begins_anew(client: Client) -> Non
     assert client.put(f"{address}/reading", json={"smooth": 7}).status_code == 422
     done(client, client.put(f"{address}/reading", json={"threshold": None, "smooth": 0.1}))
     found = client.get(address).json()
-    assert found["reading"] == {"threshold": None, "invert": None, "smooth": 0.1}
+    usual = {"threshold": None, "invert": None, "thicken": 0.0}
+    assert found["reading"] == {**usual, "smooth": 0.1}
     assert len(found["silhouette"]["outline"]) > 10
     done(client, client.post(f"{address}/animal", json={"name": "bat"}))
     found = client.get(address).json()

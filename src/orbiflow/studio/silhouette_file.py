@@ -44,9 +44,9 @@ def read_input(home: Path, called: str, reading: ReadingSettings) -> Target:
     content = FileContent(input_file(home).read_bytes(), called)
     target = Target.from_bytes(
         content.data, called, threshold=reading.threshold, invert=reading.invert
-    ).smoothed(reading.smooth)
+    )
     picture = _picture(target, content)
-    mended = _mended(target, home, picture.size)
+    mended = reading.shaped(_mended(target, home, picture.size))
     write_atomic(home / BACKDROP, png_bytes(picture))
     document = {"shown": _shown(mended, picture.size), "target": _stored(mended)}
     write_json(home / SILHOUETTE, document)

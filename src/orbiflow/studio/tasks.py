@@ -96,7 +96,10 @@ def search(
     )
     if rounded := sum(tile.smoothed > 0 for tile in result.tiles):
         on_event(
-            Note(f"The thinnest parts are rounded off in {rounded} of {len(result.tiles)} tiles")
+            Note(
+                f"The thinnest parts are rounded off in {rounded} of {len(result.tiles)} tiles: let "
+                "them grow (Thin parts, where the picture is read) to keep them"
+            )
         )
     if result.interrupted:
         return Outcome({"tiles": len(result.tiles)}, "cancelled")

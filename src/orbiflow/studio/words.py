@@ -25,6 +25,8 @@ LABELS = {
 
 ON_THE_PAGE = {
     "join them to it in the drawing, or by a larger --smooth": "more smoothing may join them",
+    "grow them by --thicken 0.04": "let them grow (Thin parts)",
+    "grow it by --thicken 0.1": "let it grow (Thin parts)",
     "with smooth 0.01": "with a little smoothing",
     "another --threshold or --invert": "another edge (Where it ends) or another side (The animal is)",
     "another --threshold": "another edge (Where it ends)",
@@ -94,9 +96,10 @@ def shown_project(store: Store, project: dict[str, Any], kind: str = "") -> dict
     silhouette = project["silhouette"]
     if silhouette is not None:
         silhouette = {**silhouette, "backdrop": url("backdrop")}
+    usual = {"threshold": None, "invert": None, "smooth": 0.0, "thicken": 0.0}
     part = {
         "input": project["input"],
-        "reading": {"threshold": None, "invert": None, "smooth": 0.0, **project["reading"]},
+        "reading": usual | project["reading"],
         "silhouette": silhouette,
         **{mask: url(mask) for mask in MASKS},
     }

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
 
 from orbiflow.errors import CertificationError
 from orbiflow.runtime import Cancel
@@ -17,12 +20,19 @@ from orbiflow.tiles import (
     Fit,
     LikenessSearch,
     Pins,
+    Rating,
     SearchResult,
     Target,
+    complex_points,
     escherize,
+    fidelity,
+    fit_tile,
     index_page,
+    iou,
 )
-from orbiflow.tiles.search import Goal, SearchMethod, rounded_for
+from orbiflow.tiles.geometry import polygons_in, resampled
+from orbiflow.tiles.likeness import fidelity_to_original
+from orbiflow.tiles.search import Goal, SearchMethod, rounded_for, why_poor
 from orbiflow.tiles.search.candidates import OnProgress, StillTiles
 from orbiflow.tiles.search.likeness_search import ROUNDED_OFF
 from orbiflow.tiles.search.search_method import Sketches
@@ -106,6 +116,44 @@ def test_it_is_said_and_kept(found: SearchResult, tmp_path: Path) -> None:
     )
     found.tiles[0].save(tmp_path / "tile")
     assert EscherTile.load(tmp_path / "tile").smoothed == ROUNDED_OFF[0]
+
+
+def test_a_blob_is_no_good_likeness_of_a_spider() -> None:
+    """Tiles of what is left without legs are rated by how much they are like the whole."""
+    from orbiflow.tiles.search.finished_tiles import best_tiles
+
+    body = shapely.Point(0, 0).buffer(40)
+    turns = 2 * np.pi * (np.arange(8) + 0.3) / 8
+    legs = shapely.MultiLineString([[(0, 0), (150 * np.cos(t), 150 * np.sin(t))] for t in turns])
+    (shape,) = polygons_in(body.union(legs.buffer(2)))
+    whole = shapely.get_coordinates(shape.exterior)[:-1]
+    spider = Target.from_polygon(whole)
+    rounded = spider.smoothed(0.04)
+    assert rounded.area < 1.1 * body.area
+    fit = fit_tile(rounded, "IH4", few)
+    (blind,) = best_tiles(rounded, fit)
+    (rated,) = best_tiles(rounded, fit, original=spider, smoothed=0.04)
+    assert Rating.of_likeness(blind.score).stars > 3
+    assert Rating.of_likeness(rated.score).stars == 1
+    assert rated.metrics.iou == pytest.approx(iou(rated.tile.polygon, spider.outline))
+    assert rated.recognisability.limbs < 0.3 < 0.7 < blind.recognisability.limbs
+    assert why_poor(rated.changed(rating=Rating.of_likeness(rated.score)))
+
+
+few = LikenessSearch(placements=30, held=6, starts=2, finalists=1, rounds=4)
+
+
+@given(st.floats(0, 2 * np.pi), st.floats(0.5, 2.0))
+def test_rounding_that_takes_nothing_away_changes_no_rating(turn: float, size: float) -> None:
+    ring = ANIMAL.without_fur
+    about = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    bent = resampled(ring, 300) @ (size * about).T + (1.0, 0.1) * np.sin(4 * resampled(ring, 300))
+    plain = fidelity(complex_points(resampled(ring, 300)), complex_points(bent), 0.0)
+    same = fidelity_to_original(ring, resampled(ring, 300), bent, 0.02, 0.0)
+    assert same.mark == pytest.approx(plain.mark, abs=0.35)
+
+
+ANIMAL = Target.read(Path(__file__).parents[3] / "examples" / "silhouettes" / "squirrel.dat")
 
 
 def test_what_was_said_to_matter_is_not_rounded_off() -> None:

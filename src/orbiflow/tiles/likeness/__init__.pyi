@@ -4,6 +4,7 @@ from .elastic import Stiffness as Stiffness
 from .faithful import Fidelity as Fidelity
 from .faithful import faithfulness as faithfulness
 from .faithful import fidelity as fidelity
+from .faithful import fidelity_to_original as fidelity_to_original
 from .faithful import kept_of as kept_of
 from .faithful import mark_gradient as mark_gradient
 from .gaps import missing_gaps as missing_gaps

@@ -17,16 +17,29 @@ The mark that people would give is foretold from seven measures (docs/likeness.m
 Outlines correspond point by point: this compares a shape with the one that was bent into it.
 """
 
+# pyright: reportUnknownMemberType=false
+# shapely's stubs leave the keyword arguments of its functions of arrays without types.
+
 import math
+from bisect import bisect_left
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike
 
 from orbiflow.arguments import as_array
 from orbiflow.arrays import Array, Complex
-from orbiflow.tiles.geometry import centroid, complex_points, orient, plane_points, signed_area
+from orbiflow.tiles.geometry import (
+    arc_lengths,
+    centroid,
+    complex_points,
+    orient,
+    plane_points,
+    resampled,
+    signed_area,
+)
 from orbiflow.tiles.likeness.bending_onto import bent_onto
 from orbiflow.tiles.likeness.elastic import Elastic
 from orbiflow.tiles.likeness.measures import Measures
@@ -125,6 +138,56 @@ def fidelity(rest: Complex, bent: Complex, cost: float) -> Fidelity:
 def kept_of(measures: Measures, bent: Complex, cost: float) -> Fidelity:
     """Return the `fidelity` of an outline (n,) to the one that is measured against."""
     return _kept(measures, measures.values(bent), cost)
+
+
+ORIGINAL_POINTS = 480  # on the outline that was there before thin parts were rounded off
+
+
+def fidelity_to_original(
+    original: Array, rest: Array, bent: Array, near: float, cost: float
+) -> Fidelity:
+    """Return what is left of an outline whose thin parts were rounded off before it was bent.
+
+    What lies within a distance `near` of the outline at rest was bent with it. Limbs that are gone are
+    where they began, so they count as shrunken to nothing.
+
+    Args:
+        original: The outline (m, 2) before, a counter-clockwise ring of area 1.
+        rest: The rounded outline (n, 2), which lies over it.
+        bent: The points (n, 2) that its points were bent to.
+        near: A distance.
+        cost: What bending cost.
+    """
+    points = resampled(original, ORIGINAL_POINTS)
+    line, dots = shapely.LinearRing(rest), np.asarray(shapely.points(points))
+    places = np.asarray(shapely.line_locate_point(line, dots))
+    gaps = np.asarray(shapely.distance(line, dots))
+    # from the point that moved least, once around
+    first, length = int(np.argmin(gaps)), float(line.length)
+    found = np.flatnonzero(np.roll(gaps, -first) <= near)
+    along = (np.roll(places, -first)[found] - places[first]) % length
+    kept = _longest_increasing(along)
+    knots, values = np.append(found[kept], len(points)), np.append(along[kept], length)
+    at: Array = np.interp(np.arange(len(points)), knots, values) + places[first]
+    share: Array = np.interp(at % length, arc_lengths(rest), np.arange(len(rest) + 1))
+    closed = complex_points(np.vstack([bent, bent[:1]]))
+    ends: Complex = np.interp(share, np.arange(len(closed)), closed)
+    return fidelity(np.roll(complex_points(points), -first), ends, cost)
+
+
+def _longest_increasing(values: Array) -> list[int]:
+    """Return the indices of the longest part of a sequence that increases (Schensted, 1961)."""
+    tails: list[float] = []
+    last: list[int] = []
+    before = [-1] * len(values)
+    for k, value in enumerate(values.tolist()):
+        place = bisect_left(tails, value)
+        before[k] = last[place - 1] if place else -1
+        tails[place : place + 1], last[place : place + 1] = [value], [k]
+    chain = [last[-1]] if last else []
+    while chain and before[chain[-1]] >= 0:
+        chain.append(before[chain[-1]])
+    return chain[::-1]
 
 
 def mark_gradient(measures: Measures, bent: Complex) -> tuple[float, Complex]:

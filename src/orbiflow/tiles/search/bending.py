@@ -326,12 +326,16 @@ class PlacedBent(NamedTuple):
         return plane_points(np.conj(placed) if self.bent.hand.mirrored else placed)
 
     @property
-    def outlines(self) -> tuple[Array, Array]:
-        """The outline at rest and bent, (n, 2) each, counter-clockwise, in the normal form."""
-        hand = self.bent.hand
+    def outlines(self) -> tuple[Array, Array, Array]:
+        """The outline at rest, bent, and on the tile, in the normal form.
+
+        Each is (n, 2) and counter-clockwise.
+        """
+        hand, bent = self.bent.hand, self.bent
         rest = hand.samples.fine * ((1.0, -1.0) if hand.mirrored else (1.0, 1.0))
-        bent = self.place(self.bent.relaxed)
-        return (rest[::-1], bent[::-1]) if hand.mirrored else (rest, bent)
+        found = rest, self.place(bent.relaxed), self.place(bent.points[: len(rest)])
+        first, second, third = (ring[::-1] if hand.mirrored else ring for ring in found)
+        return first, second, third
 
 
 def fit_bending(

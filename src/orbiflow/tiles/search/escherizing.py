@@ -358,8 +358,15 @@ def _chosen_tiles(
 
     def found(goal: Goal, share: float) -> Sequence[EscherTile]:
         fit = method.fit(goal, kind, count, progress, cancel)
-        tiles = best_tiles(goal.target, fit, force=task.force, min_neck=method.least_neck(goal))
-        chosen = [tiles[k].changed(smoothed=share) for k in without_twins(tiles, count)]
+        tiles = best_tiles(
+            goal.target,
+            fit,
+            force=task.force,
+            min_neck=method.least_neck(goal),
+            original=task.goal.target,
+            smoothed=share,
+        )
+        chosen = [tiles[k] for k in without_twins(tiles, count)]
         cancel.check()
         return task.method.finish(chosen, goal)
 

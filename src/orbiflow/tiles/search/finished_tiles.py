@@ -8,13 +8,22 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+import numpy as np
 import shapely
 
 from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.runtime import one_blas_thread, one_thread
-from orbiflow.tiles.likeness import Pinned, Rating, Recogniser, compare, iou, narrowest_neck
+from orbiflow.tiles.likeness import (
+    Pinned,
+    Rating,
+    Recogniser,
+    compare,
+    fidelity_to_original,
+    iou,
+    narrowest_neck,
+)
 from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
 from orbiflow.tiles.search.candidates import Fit, StillTiles
@@ -37,19 +46,30 @@ class ClassFailure:
 
 
 def best_tiles(
-    target: Target, fit: Fit, *, force: bool = False, min_neck: float = 0.0
+    target: Target,
+    fit: Fit,
+    *,
+    force: bool = False,
+    min_neck: float = 0.0,
+    original: Target | None = None,
+    smoothed: float = 0.0,
 ) -> list[EscherTile]:
-    """Return certified polygons of finalists, best score first, as soon as there are enough."""
+    """Return certified polygons of finalists, best score first, as soon as there are enough.
+
+    They are rated by how much they are like the `original`, if the target is that with what is narrower
+    than the share `smoothed` of its length rounded off.
+    """
+    original = original or target
     found: list[EscherTile] = []
     reasons: list[str] = []
     for index in range(fit.candidates.size):
         try:
-            result = _result(target, fit, index, force=force)
-            result = result.changed(min_neck=min_neck)
+            result = _result(target, fit, index, original, force=force)
+            result = result.changed(min_neck=min_neck, smoothed=smoothed)
             if not force:
                 result.certificate.require()
             if fit.bent:
-                result = _with_bent(target, result, fit.bent[index])
+                result = _with_bent(target, result, fit.bent[index], original)
             found.append(result)
         except CertificationError as error:
             reasons.append(str(error))
@@ -61,18 +81,18 @@ def best_tiles(
     return [result.changed(dropped=fit.crossed + len(reasons)) for result in found]
 
 
-def _result(target: Target, fit: Fit, index: int, *, force: bool) -> EscherTile:
+def _result(target: Target, fit: Fit, index: int, original: Target, *, force: bool) -> EscherTile:
     tile, flow = fit.candidates.finished(index, force=force)
     placed = tile.transformed(target.frame.linear, target.frame.offset)
     region, simple = _region(placed.polygon)
     return EscherTile(
         placed,
         y_down=target.y_down,
-        silhouette=target.report(),
+        silhouette=original.report(),
         map_source=replace(flow, frame=target.frame),
         normal=tile,
-        metrics=compare(region, target.outline),
-        recognisability=recogniser(target)(region),
+        metrics=compare(region, original.outline),
+        recognisability=recogniser(original)(region),
         starts=fit.starts,
         thinnest=narrowest_neck(placed.polygon) if simple else None,
     )
@@ -84,8 +104,15 @@ def _region(ring: Array) -> tuple[shapely.Polygon, bool]:
     return (shape, True) if shape.is_valid else (shapely.make_valid(shape).buffer(0), False)
 
 
-def _with_bent(target: Target, result: EscherTile, placed: PlacedBent) -> EscherTile:
-    rest, outline = (target.frame.to_input(ring) for ring in placed.outlines)
+def _with_bent(
+    target: Target, result: EscherTile, placed: PlacedBent, original: Target
+) -> EscherTile:
+    rest, outline, ends = (target.frame.to_input(ring) for ring in placed.outlines)
+    kept = placed.bent.fidelity
+    if result.smoothed:
+        near = result.smoothed * float(np.ptp(original.normal, axis=0).max())
+        rings = original.without_fur, original.to_normal(rest), original.to_normal(ends)
+        kept = fidelity_to_original(*rings, near, kept.cost)
     tile, simple = _region(result.tile.polygon)
     body, maps, bending = placed.bent.hand.fine, result.map, None
     with contextlib.suppress(OrbiflowError):  # hairs that no triangulation follows
@@ -95,8 +122,8 @@ def _with_bent(target: Target, result: EscherTile, placed: PlacedBent) -> Escher
         rest=rest,
         bent=outline,
         bent_iou=iou(_region(outline)[0], tile) if simple else None,
-        deformation=placed.bent.fidelity.cost,
-        fidelity=placed.bent.fidelity,
+        deformation=kept.cost,
+        fidelity=kept,
         pinned=body.misfit(placed.bent.points[: body.size]) if isinstance(body, Pinned) else None,
         map_source=None if maps is None else replace(maps, bending=bending),
     )
@@ -149,7 +176,8 @@ def rounded_for(tiles: Sequence[EscherTile]) -> str:
             shares.setdefault(tile.smoothed, []).append(tile.isohedral_class)
     return "; ".join(
         f"no tile of {', '.join(dict.fromkeys(names))} has all of the silhouette's thin parts: what is "
-        f"narrower than {100 * share:g} % of its length was rounded off first"
+        f"narrower than {100 * share:g} % of its length was rounded off first; "
+        f"--thicken {max(0.04, 2 * share):g} grows thin parts instead"
         for share, names in sorted(shares.items())
     )
 

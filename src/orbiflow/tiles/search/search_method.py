@@ -101,7 +101,7 @@ class SearchMethod(ABC):
         for share, own in Sketches(self).goals(goal):
             with suppress(CertificationError):
                 fit = self.sketch(own, kind, cancel)._replace(enough=1)
-                return best_tiles(own.target, fit)[0].changed(smoothed=share)
+                return best_tiles(own.target, fit, original=goal.target, smoothed=share)[0]
         return None
 
     def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:  # noqa: ARG002

@@ -15,6 +15,8 @@ SMALL_HOLE, LARGE_HOLE = 0.02, 0.3
 FEWEST_PIXELS = 40
 THIN = 3.0  # pixels
 MOSTLY_THIN = 0.5  # of the outline's length
+LEG_WIDTH = 0.035  # of the silhouette's length: what is thinner is easily lost
+MOSTLY_LEGS = 0.45  # of the outline's length: on thinner parts than this the likeness hangs
 
 
 def parts_left_out(target: Target) -> list[Polygon]:
@@ -71,7 +73,13 @@ def _hopeless(target: Target) -> list[str]:
     if is_hopeless(target):
         found.append(
             f"the silhouette is a line or thread, nowhere wider than {THREAD:.0%} of its length: no "
-            "tile will look like it; draw it wider, or close its outline"
+            "tile will look like it; grow it by --thicken 0.1, draw it wider, or close its outline"
+        )
+    elif (share := _thin_share(shape, LEG_WIDTH * length)) > MOSTLY_LEGS:
+        found.append(
+            f"{share:.0%} of the outline is of parts thinner than {LEG_WIDTH:.1%} of the silhouette's "
+            "length, such as legs, and tiles may lose them: grow them by --thicken 0.04, or draw them "
+            "wider"
         )
     if target.kind != "image":
         return found
@@ -80,10 +88,14 @@ def _hopeless(target: Target) -> list[str]:
             f"the silhouette is only {length:.0f} pixels long, so its outline is of stairs: give a "
             f"larger picture, at least {FEWEST_PIXELS} pixels and better 400"
         )
-    wide = shape.buffer(-THIN / 2).buffer(THIN / 2)
-    if 1 - wide.length / shape.length > MOSTLY_THIN:
+    if _thin_share(shape, THIN) > MOSTLY_THIN:
         found.append(
             f"most of the silhouette is less than {THIN:.0f} pixels wide, which is too thin to be "
             "followed: give a larger picture, or draw it wider"
         )
     return found
+
+
+def _thin_share(shape: Polygon, width: float) -> float:
+    """Return about which share of the outline is of parts thinner than a width."""
+    return 1 - shape.buffer(-width / 2).buffer(width / 2).length / shape.length

@@ -137,10 +137,15 @@ def is_thread(shape: Polygon, length: float) -> bool:
 
 def rounded(geometry: BaseGeometry, width: float) -> Polygon:
     """Return the largest part, filled, without gaps and then without limbs narrower than `width`."""
-    closed = polygons_in(geometry.buffer(width / 2).buffer(-width / 2))
-    solid = filled(max(closed, key=lambda part: filled(part).area, default=Polygon()))
+    solid = closed(geometry, width)
     parts = polygons_in(solid.buffer(-width / 2).buffer(width / 2))
     return simplified(max(parts, key=lambda part: part.area, default=Polygon()), width / 50)
+
+
+def closed(geometry: BaseGeometry, width: float) -> Polygon:
+    """Return the largest part, filled, without gaps narrower than `width` (a morphological closing)."""
+    parts = polygons_in(geometry.buffer(width / 2).buffer(-width / 2))
+    return filled(max(parts, key=lambda part: filled(part).area, default=Polygon()))
 
 
 def outer_ring(polygon: Polygon) -> Array:

@@ -21,6 +21,10 @@ class ReadingSettings(Settings, group="Reading the silhouette"):
     invert: Annotated[bool | None, DefaultText("found automatically")] = None
     """Whether the shape is the light part."""
 
+    thicken: Annotated[float, Range(0, 0.2)] = 0.0
+    """Grow legs and other parts thinner than this share of the silhouette's length, such as 0.04, to
+    this width. Gaps stay open."""
+
     smooth: Annotated[float, Range(0, 0.2)] = 0.0
     """Round off noise and details narrower than this share of the silhouette's length, such as 0.01."""
 
@@ -29,4 +33,8 @@ class ReadingSettings(Settings, group="Reading the silhouette"):
         from orbiflow.tiles.silhouette.target import Target
 
         target = Target.read(image, threshold=self.threshold, invert=self.invert)
-        return replace(target, source=called or target.source).smoothed(self.smooth)
+        return self.shaped(replace(target, source=called or target.source))
+
+    def shaped(self, target: Target) -> Target:
+        """Return a silhouette with thin parts grown, and then details rounded off."""
+        return target.thickened(self.thicken).smoothed(self.smooth)

@@ -17,7 +17,7 @@ from orbiflow.arguments import as_array, described, is_a, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import centroid, orient, signed_area
-from orbiflow.tiles.silhouette.outlines import clean_ring, outer_ring, rounded
+from orbiflow.tiles.silhouette.outlines import clean_ring, closed, outer_ring, percent, rounded
 from orbiflow.tiles.silhouette.readers import (
     MAX_BYTES,
     FileContent,
@@ -25,10 +25,12 @@ from orbiflow.tiles.silhouette.readers import (
     read_mask_array,
     read_outline,
 )
+from orbiflow.tiles.silhouette.thickening import thickened
 
 if TYPE_CHECKING:
     import torch
 
+FUR = 0.015  # of the silhouette's length: gaps narrower than this are not seen in a tile
 SAME_ASPECT = 0.01  # relative difference up to which two aspect ratios count as the same
 
 
@@ -310,6 +312,24 @@ class Target(Reading):
             )
         return replace(self, outline=outer_ring(shape))
 
+    def thickened(self, share: float) -> Self:
+        """Return the silhouette with parts thinner than a share of its length grown to this width.
+
+        Gaps between parts stay open, and a note says by how much the silhouette has grown.
+
+        >>> bar = [[0, 4], [0, 0], [4, 0], [4, 1.9], [9, 1.9], [9, 2.1], [4, 2.1], [4, 4]]
+        >>> target = Target.from_polygon(bar).thickened(0.1)
+        >>> float(target.outline[:, 0].max().round(1)), target.notes
+        (9.3, ('grew parts thinner than 10.0% of the length, by 21.7% of the area',))
+        """
+        if share == 0:
+            return self
+        own = Polygon(self.outline)
+        shape = thickened(own, share * float(np.ptp(self.outline, axis=0).max()))
+        more = percent(shape.area / own.area - 1)
+        note = f"grew parts thinner than {percent(share)} of the length, by {more} of the area"
+        return replace(self, outline=outer_ring(shape), notes=(*self.notes, note))
+
     @property
     def area(self) -> float:
         """The area of the silhouette in square input units."""
@@ -332,6 +352,12 @@ class Target(Reading):
         normal = self.to_normal(self.outline)
         normal.setflags(write=False)
         return normal
+
+    @cached_property
+    def without_fur(self) -> Array:
+        """The outline (N, 2) in the normal form with the gaps between hairs filled: `FUR`."""
+        width = FUR * float(np.ptp(self.normal, axis=0).max())
+        return orient(outer_ring(closed(Polygon(self.normal), width)))
 
     def to_input(self, points: ArrayLike) -> Array:
         """Return `points` (..., 2) of the normal form in the input's units: `frame.to_input`."""

@@ -14,7 +14,7 @@ const MEANINGS = {
   rub: "Rub out what you painted.",
 };
 
-/** Sliders and choices for `reading`, {threshold, invert, smooth}, which they change and tell: {root, reset()}. */
+/** Sliders and choices for `reading`, {threshold, invert, smooth, thicken}, which they change and tell: {root, reset()}. */
 export function readingControls(reading, changed) {
   const change = (part) => { Object.assign(reading, part); changed(); };
   const level = slider("Where it ends", {
@@ -33,15 +33,20 @@ export function readingControls(reading, changed) {
     min: 0, max: 0.06, step: 0.002, value: reading.smooth,
     said: (value) => (value ? `${(100 * value).toFixed(1)} %` : "none"),
   }, (value) => change({ smooth: value }));
+  const growing = slider("Thin parts", {
+    min: 0, max: 0.12, step: 0.01, value: reading.thicken,
+    said: (value) => (value ? `at least ${(100 * value).toFixed(0)} % wide` : "as they are"),
+  }, (value) => change({ thicken: value }));
   const part = choice("The animal is", [[null, "found by itself"], [false, "dark"], [true, "light"]], reading.invert,
     (value) => change({ invert: value }));
   const root = h("section", { class: "panel stack", "aria-label": "How the picture is read" },
-    part, h("label", { class: "check" }, auto, "Find the edge of the animal by itself"), level, smoothing);
+    part, h("label", { class: "check" }, auto, "Find the edge of the animal by itself"), level, smoothing, growing);
   const reset = () => {
     auto.checked = true;
-    change({ threshold: null, invert: null, smooth: 0 });
+    change({ threshold: null, invert: null, smooth: 0, thicken: 0 });
     level.set(0.5);
     smoothing.set(0);
+    growing.set(0);
     part.set(null);
   };
   return { root, reset };

@@ -28,7 +28,7 @@ class PicturePage {
     this.tints = new Map(); // the marks in their colours, painted anew when strokes change
     this.known = 0; // strokes that the outline on the screen knows
     this.sent = 0; // strokes that the server has
-    this.reading = { threshold: null, invert: null, smooth: 0, ...project.reading };
+    this.reading = { threshold: null, invert: null, smooth: 0, thicken: 0, ...project.reading };
     this.read = newest(async () => this.began(await api.put(`${this.place}/reading`, this.reading)));
     this.send = Object.fromEntries(LAYERS.map((layer) => [layer, newest(() => this.upload(layer), 200)]));
   }

@@ -1,0 +1,111 @@
+"""Thin parts of a silhouette grow to a width; bodies and gaps stay; too thin ones are said at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles import Target, polygons_in
+from orbiflow.tiles.silhouette import ReadingSettings, doubts
+
+FOLDER = Path(__file__).parents[3] / "examples" / "silhouettes"
+
+
+def legged(legs: list[list[tuple[float, float]]], width: float) -> shapely.Polygon:
+    """A round body with legs, each a line of a width from its middle."""
+    body = shapely.Point(0, 0).buffer(40)
+    lines = [shapely.LineString([(0, 0), *leg]).buffer(width / 2) for leg in legs]
+    (whole,) = polygons_in(shapely.union_all([body, *lines]))
+    return shapely.Polygon(whole.exterior)
+
+
+def target_of(shape: shapely.Polygon) -> Target:
+    return Target.from_polygon(shapely.get_coordinates(shape.exterior)[:-1])
+
+
+def spider(width: float, count: int = 8) -> Target:
+    turns = 2 * np.pi * (np.arange(count) + 0.3) / count
+    legs = [
+        [(80 * np.cos(t), 80 * np.sin(t)), (160 * np.cos(t + 0.2), 160 * np.sin(t + 0.2))]
+        for t in turns
+    ]
+    return target_of(legged(legs, width))
+
+
+def thinnest_across(target: Target, radius: float) -> float:
+    """The least length of a circle's arcs that lie in a silhouette about the origin."""
+    ring = shapely.Point(0, 0).buffer(radius, quad_segs=200).exterior
+    arcs = shapely.get_parts(shapely.line_merge(ring.intersection(shapely.Polygon(target.outline))))
+    return float(shapely.length(arcs).min())
+
+
+@given(st.floats(1, 9), st.integers(3, 9), st.floats(0.03, 0.05))
+def test_legs_grow_to_the_width_and_none_is_lost(width: float, count: int, share: float) -> None:
+    target = spider(width, count)
+    grown = target.thickened(share)
+    asked = share * float(np.ptp(target.outline, axis=0).max())
+    assert thinnest_across(grown, 130) > 0.95 * max(asked, width)
+    assert thinnest_across(grown, 60) > 0.95 * max(asked, width)
+    own, more = shapely.Polygon(target.outline), shapely.Polygon(grown.outline)
+    assert more.is_valid
+    assert own.difference(more).area < 2e-3 * own.area
+    assert more.difference(own.buffer(0.51 * asked)).area < 1e-3 * own.area
+    circle = shapely.Point(0, 0).buffer(130, quad_segs=200).exterior
+    assert len(shapely.get_parts(shapely.line_merge(circle.intersection(more)))) == count
+
+
+@given(st.floats(0.02, 0.1))
+def test_what_is_wide_enough_stays(share: float) -> None:
+    box = Target.from_polygon([[0, 0], [9, 0], [9, 5], [4, 5], [4, 9], [0, 9]])
+    np.testing.assert_array_equal(box.thickened(share).outline, box.outline)
+    assert box.thickened(0.0) is box
+
+
+@given(st.floats(6, 30))
+def test_gaps_stay_open(gap: float) -> None:
+    """Two legs side by side whose ends nearly meet keep the space that they enclose."""
+    out = 100.0
+    legs = [[(out, 60), (out + 60, gap / 2 + 3)], [(out, -60), (out + 60, -gap / 2 - 3)]]
+    target = target_of(legged(legs, 4))
+    grown = shapely.Polygon(target.thickened(0.08).outline)
+    assert not grown.contains(shapely.Point(out, 0))
+    assert not grown.contains(shapely.Point(out + 55, 0))
+
+
+def test_fur_does_not_grow() -> None:
+    turns = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    radius = 100 + 8 * (np.arange(400) % 2)
+    furry = Target.from_polygon(np.column_stack([radius * np.cos(turns), radius * np.sin(turns)]))
+    grown = shapely.Polygon(furry.thickened(0.04).outline)
+    assert grown.area < 1.01 * furry.area
+
+
+def test_growing_is_said_and_comes_before_smoothing() -> None:
+    target = spider(4)
+    grown = ReadingSettings(thicken=0.04, smooth=0.03).shaped(target)
+    assert grown.notes[-1].startswith("grew parts thinner than 4.0% of the length, by ")
+    assert thinnest_across(grown, 130) > 0.035 * 300
+    with pytest.raises(OrbiflowError, match="thicken"):
+        ReadingSettings(thicken=0.3)
+
+
+def test_legs_that_are_too_thin_are_said_before_a_search() -> None:
+    (said,) = doubts(spider(4))
+    assert "grow them by --thicken 0.04" in said
+    assert not doubts(spider(4).thickened(0.04))
+    assert not doubts(spider(30))
+    for file in FOLDER.rglob("*.*"):
+        if file.suffix in (".dat", ".svg", ".png"):
+            assert "--thicken" not in " ".join(doubts(Target.read(file))), file
+
+
+def test_a_thread_can_be_grown() -> None:
+    thread = Target.from_polygon([[0, 0], [200, 0], [200, 4], [0, 4]])
+    assert "--thicken 0.1" in " ".join(doubts(thread))
+    assert not doubts(thread.thickened(0.1))
