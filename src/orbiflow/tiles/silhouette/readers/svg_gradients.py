@@ -123,7 +123,7 @@ class Gradient:
 
 def gradient_of(drawing: Drawing, element: Element, shape: DrawnShape) -> Gradient | Brush | None:
     """Return the gradient that paints a shape, or the one colour that it has, or None for nothing."""
-    chain = list(_chain(drawing, element))
+    chain = list(references(drawing, element))
     own = ([child for child in one if child.tag == "stop"] for one in chain)
     stops = next(filter(None, own), list[Element]())
     if not stops:
@@ -157,16 +157,17 @@ def gradient_of(drawing: Drawing, element: Element, shape: DrawnShape) -> Gradie
     return Gradient(offsets, brushes, matrix @ own, ends, element.tag[0] == "r", spread)
 
 
+_SERVERS = {"linearGradient", "radialGradient", "pattern"}
 _SHAPED = {*_LINEAR, *_RADIAL, "fx", "fy"}
 
 
-def _chain(drawing: Drawing, element: Element | None) -> Iterator[Element]:
-    """Yield a gradient and those that it takes its stops or attributes from."""
+def references(drawing: Drawing, element: Element | None) -> Iterator[Element]:
+    """Yield a gradient or pattern and those that it takes its stops, content or attributes from."""
     for _ in range(MOST_REFERENCES):
-        if element is None or element.tag not in ("linearGradient", "radialGradient"):
+        if element is None or element.tag not in _SERVERS:
             return
         yield element
-        element = drawing.named(reference(element), "a gradient")
+        element = drawing.named(reference(element), f"a {element.tag}")
 
 
 def _stop(drawing: Drawing, stop: Element) -> Brush:

@@ -24,7 +24,7 @@ from orbiflow.tiles.silhouette.readers.svg_colours import (
     lightness,
     mean_colour,
 )
-from orbiflow.tiles.silhouette.readers.svg_gradients import Gradient, gradient_of
+from orbiflow.tiles.silhouette.readers.svg_gradients import Gradient, gradient_of, references
 from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, TooManyPoints, fill
 from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
 from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, DrawnShape
@@ -81,6 +81,8 @@ def _served(element: Element | None, drawing: Drawing, shape: DrawnShape) -> Pai
     if element is None:
         return None
     if element.tag == "pattern":
+        if not any(len(one) for one in references(drawing, element)):
+            return None
         drawing.notes.add("took a pattern for an even gray")
         return Paint(*PATTERN)
     if element.tag not in ("linearGradient", "radialGradient"):

@@ -198,7 +198,7 @@ class Drawing:
             return self._shape(element, place)
         if tag in _OTHERS and place.style.get("visibility", "visible") == "visible":
             empty = tag in ("text", "flowRoot") and not "".join(element.itertext()).strip()
-            self.others[_OTHERS[tag]] += not empty
+            self.others += Counter([_OTHERS[tag]] * (not empty))
         return []
 
     def _cut(self, shapes: list[DrawnShape], style: Style, place: Place) -> list[DrawnShape]:
