@@ -39,8 +39,8 @@ from orbiflow.tiles.silhouette import (
     SubPath,
     TooManyPoints,
     TooTangled,
-    brushes,
     check_file,
+    paints,
     read_head,
 )
 from orbiflow.tiles.tile import EscherTile
@@ -110,23 +110,21 @@ class _Carry:
 def _parts(shape: DrawnShape, regions: Regions, carry: _Carry) -> list[Part]:
     drawing = regions.drawing
     reach = np.concatenate([path.reach() for path in shape.paths] or [np.zeros((1, 2))])
-    painted = brushes(drawing, shape)
+    painted = paints(drawing, shape)
     if painted and not (np.abs(reach) < FARTHEST * carry.size / carry.scale).all():  # NaN, too
         raise InputFileError(
             f"{drawing.path}: a path reaches much too far beyond the page; delete or shorten it"
         )
     found: list[Part] = []
-    for kind, (colour, opacity) in painted.items():
-        style = Style(colour)
-        if kind == "fill":
-            curves = _area(regions.clipped(shape, regions.fill(shape)), carry)
-        elif regions.has_plain_stroke(shape):
+    for kind, paint in painted.items():
+        if kind == "stroke" and paint.gradient is None and regions.has_plain_stroke(shape):
             width = shape.width * shape.scale * carry.scale
-            style = Style(None, colour, width)
+            style, opacity = Style(None, paint.colour, width), paint.opacity
             lines = regions.lines(shape)
             curves = [_line(carry, points, path) for points, path in lines if len(points) > 1]
         else:
-            curves = _area(regions.clipped(shape, regions.stroke(shape)), carry)
+            region, (colour, opacity) = regions.layer(shape, kind, paint)
+            style, curves = Style(colour), _area(region, carry)
         if curves:
             found.append(Part(tuple(curves), style, opacity))
     return found

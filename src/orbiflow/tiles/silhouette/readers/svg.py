@@ -8,7 +8,7 @@ import shapely
 from shapely.errors import GEOSException
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.arrays import Array
+from orbiflow.arrays import Array, Window
 from orbiflow.drawing import rgb
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.geometry import polygons_in
@@ -22,9 +22,10 @@ from orbiflow.tiles.silhouette.outlines import (
     simplified,
 )
 from orbiflow.tiles.silhouette.readers.reading import Reading, Source
+from orbiflow.tiles.silhouette.readers.svg_colours import Brush
 from orbiflow.tiles.silhouette.readers.svg_paths import MAX_POINTS, TooManyPoints, TooTangled
-from orbiflow.tiles.silhouette.readers.svg_regions import Brush, Layer, Regions, painted
-from orbiflow.tiles.silhouette.readers.svg_shapes import Drawing
+from orbiflow.tiles.silhouette.readers.svg_regions import FAINT, Layer, Regions, painted
+from orbiflow.tiles.silhouette.readers.svg_walk import Drawing
 
 # Flattening error, of the size of each shape, and its floor, of the size of the drawing.
 FLATNESS = 1 / 2000
@@ -35,7 +36,7 @@ OVERLAY_GRID_FLOOR = 1e-12  # of the largest coordinate
 COLLINEAR_TOLERANCE = 1e-6
 PAPER = "#ffffff"  # what a drawing without a background lies on
 SAME_COLOUR = 10  # of 255: colours whose channels differ by no more are one
-FAINT, COVERING = 0.5, 0.9  # opacities: less is not seen, more hides what lies below
+COVERING = 0.9  # opacity: more hides what lies below
 MOSTLY, NOTEWORTHY, OVER = 0.5, 0.001, 0.1  # shares of areas
 PLAIN = Brush("#000000", 1.0)
 
@@ -48,8 +49,7 @@ def read_svg(path: Source) -> Reading:
     are filled. Where nothing is painted, all paths count as filled.
     """
     drawing = Drawing(path)
-    reach = [path.reach() for shape in drawing.shapes for path in shape.paths]
-    size = float(np.ptp(np.concatenate(reach), axis=0).max()) if reach else 0.0
+    size = _size(drawing)
     try:
         seen, notes = _seen(drawing, size)
     except TooManyPoints as exc:
@@ -75,18 +75,36 @@ def read_svg(path: Source) -> Reading:
     return Reading(outline, True, "svg", (box[2] - box[0], box[3] - box[1]), notes, box[:2], seen)
 
 
+def _size(drawing: Drawing) -> float:
+    """Return the longer side of what paths span on the page."""
+    reach = [path.reach() for shape in drawing.shapes for path in shape.paths]
+    if not reach:
+        return 0.0
+    points = np.concatenate(reach)
+    if drawing.window is not None:
+        points = points.clip(drawing.window[:2], drawing.window[2:])
+    return float(np.ptp(points, axis=0).max())
+
+
 def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
     """Return the region that is seen as shape, and notes of what was decided."""
 
     least = size * FLATNESS_FLOOR
-    regions = Regions(
-        drawing, lambda reach: max(float(np.ptp(reach, axis=0).max()) * FLATNESS, least), MAX_POINTS
-    )
+
+    def tolerance(reach: Array) -> float:
+        return max(float(np.ptp(reach, axis=0).max()) * FLATNESS, least)
+
+    regions = Regions(drawing, tolerance, MAX_POINTS, drawing.window)
     layers = [regions.layers(shape) for shape in drawing.shapes]
     notes: list[str] = []
     if not any(layers):
-        layers = [[Layer(regions.fill(shape), PLAIN)] for shape in drawing.shapes]
-        layers = [own for own in layers if own[0].region.area > 0]
+        if regions.beyond > 0:
+            raise InputFileError(
+                f"{drawing.path}: nothing lies on the page {_numbers(drawing.box)} (the viewBox, or "
+                "width and height); fit the page to the drawing"
+            )
+        fills = [regions.shown(shape, regions.fill(shape)) for shape in drawing.shapes]
+        layers = [[Layer(region, PLAIN)] for region in fills if region.area > 0]
         notes = ["nothing is painted: took the closed paths as filled"]
     paper, grounds = _background(layers, drawing)
     shown = [layer for own in layers if own not in grounds for layer in own]
@@ -96,7 +114,14 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
     noun = "a background rectangle" if n == 1 else f"{n} background rectangles"
     notes += [f"left out {noun} that cover{'s' * (n == 1)} the whole drawing"] * (n > 0)
     seen, decided = _overlay(shown, paper)
+    cut = regions.beyond / (regions.beyond + sum(layer.region.area for layer in shown))
+    if cut > NOTEWORTHY:
+        notes.append(f"left out what lies beyond the page: {percent(cut)} of what is painted")
     return seen, notes + decided
+
+
+def _numbers(box: Window | None) -> str:
+    return " ".join(f"{value:g}" for value in box or ())
 
 
 def _background(

@@ -1,53 +1,40 @@
-"""The shapes that an SVG drawing shows, with their transforms, found by a walk of its elements."""
+"""The shapes that a drawing shows: their geometry, where they stand, and how they are painted."""
 
 import re
-from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element
 
 import numpy as np
 import svgelements
 
 from orbiflow.arrays import Array, Window
-from orbiflow.errors import InputFileError
-from orbiflow.tiles.silhouette.readers.reading import Source, read_bytes
-from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, corners, sub_paths
-from orbiflow.tiles.silhouette.readers.svg_xml import MAX_DEPTH, StyleSheet, parse_xml
+from orbiflow.tiles.silhouette.outlines import MAX_COORDINATE
+from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, sub_paths
+from orbiflow.tiles.silhouette.readers.svg_style import Style
+from orbiflow.tiles.silhouette.readers.svg_units import (
+    FONT_SIZE,
+    as_number,
+    length,
+    without_font_units,
+)
 
-MAX_BYTES = 16 * 2**20
-PIXELS_PER_INCH = 96
-MAX_DRAWN = 10_000  # elements, those drawn again by <use>, clips, masks and markers counted again
-MAX_TRANSFORM = 2000  # characters
 MOST_DASHES = 1000  # lengths in one pattern
-MAX_NUMBER = 1e9  # the largest width or opacity that is believed
-MAX_TOKENS = 400_000  # commands and numbers in all path data; one with a fraction counts twice
-_GROUPS = {"svg", "g", "a", "switch"}
-_SHAPES = {
-    "path": (svgelements.Path, ("d",)),
-    "line": (svgelements.SimpleLine, ()),
-    "rect": (svgelements.Rect, ("width", "height")),
-    "circle": (svgelements.Circle, ("r",)),
-    "ellipse": (svgelements.Ellipse, ("rx", "ry")),
-    "polygon": (svgelements.Polygon, ("points",)),
-    "polyline": (svgelements.Polyline, ("points",)),
-}
-_MARKED = {"path", "line", "polygon", "polyline"}
-_GEOMETRY = {
-    *("d", "points", "x", "y", "width", "height", "r", "rx", "ry", "cx", "cy"),
-    *("x1", "y1", "x2", "y2"),
-}
+BOX_FLATNESS = 1e-4  # of the size of a shape: how exact its bounding box is
+SHAPES = {"path", "line", "rect", "circle", "ellipse", "polygon", "polyline"}
+MARKED = {"path", "line", "polygon", "polyline"}
 _BAD_VALUE = (ValueError, TypeError, IndexError, AttributeError, ZeroDivisionError, OverflowError)
 _TOKEN = re.compile(r"[A-Za-z]|\.?\d+")
-_LENGTH = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?(px|pt|pc|mm|cm|in|%)?", re.IGNORECASE)
-_REFERENCE = re.compile(r"""\s*url\(\s*["']?#([^"')]+)""")
-# properties of paint that elements have from those around them
-PAINT = (
-    *("fill", "fill-rule", "fill-opacity", "clip-rule", "color", "visibility", "paint-order"),
-    *("stroke", "stroke-width", "stroke-opacity", "stroke-linecap", "stroke-linejoin"),
-    *("stroke-miterlimit", "stroke-dasharray", "stroke-dashoffset"),
-    *("marker", "marker-start", "marker-mid", "marker-end"),
-)
+Number = Callable[..., float]  # the length that an attribute is, or the usual one
+
+
+class BadElement(Exception):
+    """An element cannot be read, for a reason."""
+
+    def __init__(self, element: Element, reason: str) -> None:
+        super().__init__(reason)
+        name = f" id={element.get('id', '')[:40]!a}" if element.get("id") else ""
+        self.message = f"<{element.tag}{name}>: {reason}"
 
 
 @dataclass(frozen=True)
@@ -55,10 +42,13 @@ class DrawnShape:
     """One element's sub-paths in the drawing's user units, and how they are painted."""
 
     paths: list[SubPath]
-    paint: Mapping[str, str]  # the properties of paint that apply to it, as they are written
+    paint: Style  # the properties that apply to it
     opacity: float  # its own times that of the groups around it
     matrix: Array  # the map (3, 3) from the units of its pen to the drawing's
     diagonal: float  # what percentages of the pen refer to, in units of the pen
+    place: "Place"
+    path_length: float | None = None  # what its author takes for the length of its paths
+    decorates: bool = False  # as a marker does, which is not part of the shape's box
     clips: tuple["Clip", ...] = ()  # what cuts it: it shows where all of these are
 
     @property
@@ -93,289 +83,132 @@ class Clip:
 
 
 @dataclass(frozen=True)
-class _Place:
+class Place:
     """Where in the drawing an element stands: what it inherits."""
 
     matrix: Array  # (3, 3), to the drawing's user units
     viewport: tuple[float, float]  # what percentages refer to
+    style: Style
+    rem: float = FONT_SIZE
     depth: int = 0
-    paint: Mapping[str, str] = field(default_factory=dict[str, str])
     opacity: float = 1.0
+    context: tuple[str, str] = ("none", "none")  # the fill and stroke around a marker or <use>
+    decorates: bool = False
 
-    def moved(self, matrix: Array) -> "_Place":
+    def moved(self, matrix: Array) -> "Place":
         return replace(self, matrix=self.matrix @ matrix)
 
-    def painted(self, properties: Mapping[str, str]) -> "_Place":
-        own = {key: properties[key] for key in PAINT if properties.get(key, "inherit") != "inherit"}
-        share = min(max(as_number(properties.get("opacity"), 1.0), 0.0), 1.0)
-        return replace(
-            self, depth=self.depth + 1, paint={**self.paint, **own}, opacity=self.opacity * share
-        )
-
-
-class Drawing:
-    """The shapes of the SVG drawing in a file, and how many things of other kinds were met."""
-
-    def __init__(self, path: Source) -> None:
-        self.path, self.root = path, parse_xml(path, read_bytes(path, MAX_BYTES))
-        self.shapes: list[DrawnShape] = []
-        self.others = Counter[str]()
-        self.visited = self.tokens = 0
-        self.styles = StyleSheet(path, self.root)
-        self.by_id = {key: item for item in self.root.iter() if (key := item.get("id"))}
-        self.box = self._box()
-        self._clips: dict[tuple[int, bytes], Clip] = {}
-        xmin, ymin, xmax, ymax = self.box or (0.0, 0.0, 100.0, 100.0)
-        properties = self.styles.properties(self.root)
-        place = _Place(np.eye(3), (xmax - xmin, ymax - ymin), depth=-1).painted(properties)
-        for child in self.root:
-            self._visit(child, place)
-
-    def left_out(self) -> list[str]:
-        """Return a note of what was met and is not drawn."""
-        left = [f"{count} {name}{'s' * (count > 1)}" for name, count in self.others.items()]
-        return [f"left out {' and '.join(left)} of the drawing"] * bool(left)
-
-    def referred(self, text: str | None) -> Element | None:
-        """Return the element that the property `url(#id)` names."""
-        found = _REFERENCE.match(text or "")
-        return self.by_id.get(found[1].strip()) if found else None
-
-    def _box(self) -> Window | None:
-        """Return the visible part (xmin, ymin, xmax, ymax) in user units: the viewBox, or the size."""
-        box = self._view_box(self.root)
-        if box is not None:
-            return box[0], box[1], box[0] + box[2], box[1] + box[3]
-        width, height = (self._length(self.root, key) for key in ("width", "height"))
-        if width is None or height is None or not (width > 0 and height > 0):
-            return None
-        return 0.0, 0.0, width, height
-
-    def _view_box(self, element: Element) -> Window | None:
-        """Return the viewBox (x, y, width, height) of `element`."""
-        text = element.get("viewBox")
-        if text is None:
-            return None
-        try:
-            x, y, width, height = map(float, text.replace(",", " ").split())
-        except ValueError as exc:
-            raise self._refuse(element, f"viewBox {text[:60]!a} is not four numbers") from exc
-        if not (np.isfinite([x, y, width, height]).all() and width > 0 and height > 0):
-            raise self._refuse(element, f"viewBox {text[:60]!a} has no area")
-        return x, y, width, height
-
-    def _visit(self, element: Element, place: _Place) -> None:
-        self.visited += 1
-        if self.visited > MAX_DRAWN:
-            raise InputFileError(
-                f"{self.path}: draws more than {MAX_DRAWN} elements; keep only the silhouette"
-            )
-        if place.depth > MAX_DEPTH:
-            raise InputFileError(
-                f"{self.path}: <use> elements refer to each other in a circle or nest too deeply"
-            )
-        properties = self.styles.properties(element)
-        if properties.get("display", "").lower() == "none":
-            return
-        place = place.moved(self._transform(element, properties, place)).painted(properties)
-        first = len(self.shapes)
-        if np.linalg.det(place.matrix) == 0:  # flat
-            return
-        if element.tag == "svg":
-            self._visit_viewport(element, self._window(element, place), place)
-        elif element.tag in _GROUPS:
-            for child in element:
-                self._visit(child, place)
-        elif element.tag == "use":
-            self._visit_use(element, place)
-        elif element.tag in _SHAPES:
-            self._add_shape(element, properties, place)
-        elif element.tag in ("image", "text"):
-            self.others[element.tag] += 1
-        if properties.get("filter", "none") != "none":
-            self.others["filter"] += 1
-        for key in ("clip-path", "mask"):
-            self._clip(self.referred(properties.get(key)), place, first)
-
-    def _visit_use(self, use: Element, place: _Place) -> None:
-        target = self.by_id.get(use.get("href", "").strip().removeprefix("#"))
-        if target is None:
-            return
-        if target.tag in ("symbol", "svg"):
-            self._visit_viewport(target, self._window(use, place), place)
-            return
-        shift = np.eye(3)
-        shift[:2, 2] = [self._length(use, key, place) or 0.0 for key in ("x", "y")]
-        self._visit(target, place.moved(shift))
-
-    def _window(self, element: Element, place: _Place) -> Window:
-        """Return x, y, width and height of a viewport: those of an inner <svg>, or of a <use>."""
-        x, y = (self._length(element, key, place) or 0.0 for key in ("x", "y"))
-        width = self._length(element, "width", place) or place.viewport[0]
-        return x, y, width, self._length(element, "height", place) or place.viewport[1]
-
-    def _visit_viewport(self, element: Element, window: Window, place: _Place) -> None:
-        """Draw what an inner <svg>, a <symbol> or a <marker> holds in a window, cut at its edges."""
-        matrix, viewport = self._view(element, window)
-        inner, first = replace(place.moved(matrix), viewport=viewport), len(self.shapes)
-        for child in element:
-            self._visit(child, inner)
-        if self.styles.properties(element).get("overflow") not in ("visible", "auto"):
-            own = self.shapes[first:]
-            x, y, width, height = map(str, window)
-            edge = {"x": x, "y": y, "width": width, "height": height}
-            del self.shapes[first:]
-            self._add_shape(Element("rect"), edge, place)
-            self._cut(own, first, Clip(self.shapes[first:]))
-
-    def _view(self, element: Element, window: Window) -> tuple[Array, tuple[float, float]]:
-        """Return the map (3, 3) of a viewBox into a window, and what percentages refer to."""
-        box = self._view_box(element)
-        if box is None:
-            return np.array([[1, 0, window[0]], [0, 1, window[1]], [0, 0, 1.0]]), window[2:]
-        text = svgelements.Viewbox.viewbox_transform(
-            *window, *box, element.get("preserveAspectRatio")
-        )
-        return _as_array(svgelements.Matrix(text)), box[2:]
-
-    def _cut(self, own: list[DrawnShape], first: int, clip: Clip) -> None:
-        self.shapes[first:] = [replace(shape, clips=(*shape.clips, clip)) for shape in own]
-
-    def _clip(self, source: Element | None, place: _Place, first: int) -> None:
-        """Cut the shapes from the `first` on by the content of a <clipPath> or <mask>."""
-        own = self.shapes[first:]
-        if source is None or source.tag not in ("clipPath", "mask") or not own:
-            return
-        properties = self.styles.properties(source)
-        inner = place.moved(self._transform(source, properties, place))
-        if "objectBoundingBox" in (source.get("clipPathUnits"), source.get("maskContentUnits")):
-            points = np.concatenate([path.reach() for shape in own for path in shape.paths])
-            points = _mapped(np.linalg.inv(place.matrix), points)
-            low, high = points.min(axis=0), points.max(axis=0)
-            inner = inner.moved(np.array([*np.c_[np.diag(high - low), low], [0, 0, 1.0]]))
-        key = id(source), inner.matrix.tobytes()
-        if key not in self._clips:
-            del self.shapes[first:]
-            inner = replace(inner, paint={}, opacity=1.0).painted(properties)
-            for child in source:
-                self._visit(child, inner)
-            kind = "clip" if source.tag == "clipPath" else properties.get("mask-type", "luminance")
-            self._clips[key] = Clip(self.shapes[first:], kind)
-        self._cut(own, first, self._clips[key])
-
-    def _add_shape(self, element: Element, properties: dict[str, str], place: _Place) -> None:
-        kind, needed = _SHAPES[element.tag]
-        if any(key not in properties for key in needed):
-            return
-        for key in ("d", "points"):
-            self.tokens += sum(1 for _ in _TOKEN.finditer(properties.get(key, "")))
-        if self.tokens > MAX_TOKENS:
-            raise self._refuse(element, "the paths hold too much data; simplify the drawing")
-        geometry = {key: properties[key] for key in _GEOMETRY & properties.keys()}
-        for key in geometry.keys() - {"d", "points"}:
-            self._check_length(element, key, geometry[key])
-        try:
-            shape = kind(geometry)
-            width, height = place.viewport
-            shape.render(ppi=PIXELS_PER_INCH, width=width, height=height)
-            paths = sub_paths(svgelements.Path(shape), place.matrix[:2])
-        except _BAD_VALUE as exc:
-            raise self._refuse(element, "its geometry cannot be read; redraw or delete it") from exc
-        matrix = place.matrix
-        if properties.get("vector-effect") == "non-scaling-stroke":
-            x, y, *end = self.box or (0.0, 0.0, 1.0, 1.0)
-            sizes = zip(("width", "height"), (end[0] - x, end[1] - y), strict=True)
-            pixel = max(own / (self._length(self.root, key) or own) for key, own in sizes)
-            matrix = np.diag([pixel, pixel, 1.0])
-        diagonal = float(np.hypot(*place.viewport)) / 2**0.5
-        drawn = DrawnShape(paths, place.paint, place.opacity, matrix, diagonal)
-        self.shapes.append(drawn)
-        if element.tag in _MARKED:
-            self._add_markers(drawn, place)
-
-    def _add_markers(self, shape: DrawnShape, place: _Place) -> None:
-        named = {key: shape.paint.get(f"marker-{key}") for key in ("start", "mid", "end")}
-        named = {
-            key: self.referred(text or shape.paint.get("marker")) for key, text in named.items()
+    def styled(self, style: Style) -> "Place":
+        """Return the place inside an element of a style."""
+        share = min(max(as_number(style.get("opacity"), 1.0), 0.0), 1.0)
+        known = {"context-fill": self.context[0], "context-stroke": self.context[1]}
+        own = {
+            key: known[text] for key in ("fill", "stroke") if (text := style.get(key, "")) in known
         }
-        if all(marker is None for marker in named.values()):
-            return
-        for key, point, angle in corners(shape.paths, np.linalg.inv(place.matrix)[:2]):
-            marker = named[key]
-            if marker is None or marker.tag != "marker":
-                continue
-            turn, scale = marker.get("orient", "0"), shape.width
-            if not turn.startswith("auto"):
-                angle = np.radians(as_number(turn.removesuffix("deg"), 0.0))
-            elif turn == "auto-start-reverse" and key == "start":
-                angle += np.pi
-            if marker.get("markerUnits") == "userSpaceOnUse":
-                scale = 1.0
-            x, y = scale * np.cos(angle), scale * np.sin(angle)
-            inner = place.moved(np.array([[x, -y, point[0]], [y, x, point[1]], [0, 0, 1.0]]))
-            inner = replace(inner, paint={}).painted(self.styles.properties(marker))
-            self._visit_marker(marker, inner)
+        style = {**style, **own} if own else style
+        return replace(self, depth=self.depth + 1, style=style, opacity=self.opacity * share)
 
-    def _visit_marker(self, marker: Element, place: _Place) -> None:
-        """Draw a marker with its reference point at the origin of a place."""
-        width, height = (as_number(marker.get(f"marker{key}"), 3.0) for key in ("Width", "Height"))
-        matrix, _ = self._view(marker, (0.0, 0.0, width, height))
-        at = np.array([[as_number(marker.get(f"ref{key}"), 0.0) for key in "XY"]])
-        x, y = -_mapped(matrix, at)[0]
-        self._visit_viewport(marker, (x, y, width, height), place)
-
-    def _transform(self, element: Element, properties: dict[str, str], place: _Place) -> Array:
-        text = properties.get("transform")
-        if not text or text == "none":
-            return np.eye(3)
-        if len(text) > MAX_TRANSFORM:
-            raise self._refuse(element, f"transform of {len(text)} characters; flatten it")
-        try:
-            matrix = svgelements.Matrix(text)
-            width, height = place.viewport
-            matrix.render(ppi=PIXELS_PER_INCH, width=width, height=height)
-            return _as_array(matrix)
-        except _BAD_VALUE as exc:
-            raise self._refuse(element, f"transform {text[:60]!a} cannot be read") from exc
-
-    def _length(self, element: Element, key: str, place: _Place | None = None) -> float | None:
-        """Return a length attribute in user units, or None if it is absent or cannot be resolved."""
-        text = element.get(key)
-        if text is None:
-            return None
-        self._check_length(element, key, text)
-        if place is None and text.strip().endswith("%"):
-            return None
-        relative = 0.0 if place is None else place.viewport[key in ("y", "height")]
-        length = svgelements.Length(text.strip())
-        return float(length.value(ppi=PIXELS_PER_INCH, relative_length=relative))
-
-    def _check_length(self, element: Element, key: str, text: str) -> None:
-        if len(text) > 100 or not _LENGTH.fullmatch(text.strip()):
-            reason = f"{key} {text[:40]!a} is not a length in px, mm, in, pt or %"
-            raise self._refuse(element, reason)
-
-    def _refuse(self, element: Element, reason: str) -> InputFileError:
-        name = f" id={element.get('id', '')[:40]!a}" if element.get("id") else ""
-        return InputFileError(f"{self.path}: <{element.tag}{name}>: {reason}")
+    def length(self, element: Element, key: str, text: str | None, usual: float = 0.0) -> float:
+        """Return a length of an element in user units. Raises `BadElement` for what is none."""
+        if text is None or text.strip().lower() == "auto":
+            return usual
+        text = without_font_units(text, float(self.style.get("font-size", FONT_SIZE)), self.rem)
+        width, height = self.viewport
+        along_x = key in {"x", "width", "cx", "rx", "x1", "x2", "refX", "markerWidth"}
+        along_y = key in {"y", "height", "cy", "ry", "y1", "y2", "refY", "markerHeight"}
+        across = float(np.hypot(width, height)) / 2**0.5
+        found = length(text, width if along_x else height if along_y else across)
+        if found is None:
+            reason = f"{key} {text[:40]!a} is not a length in px, mm, in, pt, em or %"
+            raise BadElement(element, reason)
+        return found
 
 
-def as_number(text: str | None, usual: float, relative: float = 1.0) -> float:
-    """Read a length in user units or a share; return the usual one if it cannot be read."""
-    if not text:
-        return usual
+def path_tokens(element: Element, style: Style) -> int:
+    """Return the number of commands and numbers in the path data of an element."""
+    texts = (style.get("d", ""), element.get("points", ""))
+    return sum(1 for text in texts for _ in _TOKEN.finditer(text))
+
+
+def shape_paths(element: Element, place: Place) -> list[SubPath]:
+    """Return the sub-paths of an element in the drawing's user units; none of what has no size."""
     try:
-        length = svgelements.Length(text.strip()[:40])
-        value = float(length.value(ppi=PIXELS_PER_INCH, relative_length=relative))
-    except _BAD_VALUE:
-        return usual
-    return value if abs(value) < MAX_NUMBER else usual  # neither is NaN
+        shape = _shape(element, place)
+        return [] if shape is None else sub_paths(svgelements.Path(shape), place.matrix[:2])
+    except _BAD_VALUE as exc:
+        raise BadElement(element, "its geometry cannot be read; redraw or delete it") from exc
 
 
-def _mapped(matrix: Array, points: Array) -> Array:
+def _shape(element: Element, place: Place) -> svgelements.Shape | None:
+    tag, style = element.tag, place.style
+    if tag == "path":
+        return svgelements.Path({"d": style["d"]}) if style.get("d") else None
+    if tag in ("polygon", "polyline"):
+        kind = svgelements.Polygon if tag == "polygon" else svgelements.Polyline
+        return kind({"points": element.get("points", "")}) if element.get("points") else None
+
+    def number(key: str, usual: float = 0.0) -> float:
+        text = element.get(key) if tag == "line" else style.get(key)
+        return place.length(element, key, text, usual)
+
+    if tag == "line":
+        ends = {key: number(key) for key in ("x1", "y1", "x2", "y2")}
+        return svgelements.SimpleLine(_written(ends))
+    if tag == "rect":
+        return _rectangle({key: number(key) for key in ("x", "y", "width", "height")}, number)
+    middle = {key: number(key) for key in ("cx", "cy")}
+    if tag == "circle":
+        radius = number("r")
+        return svgelements.Circle(_written({**middle, "r": radius})) if radius > 0 else None
+    rx, ry = _radii(number)
+    size = {"rx": rx, "ry": ry}
+    return svgelements.Ellipse(_written({**middle, **size})) if rx > 0 and ry > 0 else None
+
+
+def _rectangle(box: dict[str, float], number: Number) -> svgelements.Shape | None:
+    if not (box["width"] > 0 and box["height"] > 0):
+        return None
+    rx, ry = _radii(number)
+    rounded = {"rx": min(rx, box["width"] / 2), "ry": min(ry, box["height"] / 2)}
+    return svgelements.Rect(_written({**box, **(rounded if rx > 0 and ry > 0 else {})}))
+
+
+def _radii(number: Number) -> tuple[float, float]:
+    """Return rx and ry, each of which is the other where it is not given."""
+    rx, ry = number("rx", -1.0), number("ry", -1.0)
+    return (rx if rx >= 0 else max(ry, 0.0)), (ry if ry >= 0 else max(rx, 0.0))
+
+
+def _written(values: dict[str, float]) -> dict[str, str]:
+    return {key: f"{value!r}" for key, value in values.items()}
+
+
+def bounds_of(shapes: Iterable[DrawnShape], matrix: Array) -> Window | None:
+    """Return the box (xmin, ymin, xmax, ymax) of shapes without their pens.
+
+    It is in the units that `matrix` maps to the drawing's, and exact but for `BOX_FLATNESS`.
+    """
+    back = np.linalg.inv(matrix)
+    found: list[Array] = []
+    for shape in shapes:
+        for path in () if shape.decorates else shape.paths:
+            reach = path.reach()
+            size = float(np.ptp(reach, axis=0).max())
+            exact = 0 < size < MAX_COORDINATE  # not NaN, either
+            found.append(mapped(back, path.flatten(BOX_FLATNESS * size) if exact else reach))
+    if not found:
+        return None
+    points = np.concatenate(found)
+    (xmin, ymin), (xmax, ymax) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return xmin, ymin, xmax, ymax
+
+
+def unit_box_matrix(box: Window) -> Array:
+    """Return the map (3, 3) from the unit square to a box: that of `objectBoundingBox`."""
+    xmin, ymin, xmax, ymax = box
+    return np.array([[xmax - xmin, 0, xmin], [0, ymax - ymin, ymin], [0, 0, 1.0]])
+
+
+def mapped(matrix: Array, points: Array) -> Array:
+    """Return points (N, 2) mapped by a matrix (3, 3)."""
     return points @ matrix[:2, :2].T + matrix[:2, 2]
-
-
-def _as_array(matrix: svgelements.Matrix) -> Array:
-    rows = [[matrix.a, matrix.c, matrix.e], [matrix.b, matrix.d, matrix.f], [0, 0, 1]]
-    return np.array(rows, dtype=np.float64)

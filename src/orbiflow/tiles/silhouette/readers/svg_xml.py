@@ -1,31 +1,39 @@
-"""The elements of an SVG document, read within bounds, and the style sheet that applies to them."""
+"""The elements of an SVG document, read within bounds, with what is SVG's own told from the rest."""
 
-import re
+from collections import Counter
+from collections.abc import Iterator
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.reading import Source
 
+SVG = "http://www.w3.org/2000/svg"
+XLINK = "http://www.w3.org/1999/xlink"
+HREF = f"{{{XLINK}}}href"
 MAX_ELEMENTS = 20_000
 MAX_DEPTH = 100
-MAX_STYLE = 200_000  # characters
-_COMMENT = re.compile(r"/\*.*?(?:\*/|$)", re.DOTALL)
-_SELECTOR = re.compile(r"\*|[\w-]*(?:[.#][\w-]+)?")
+MAX_ENTITIES = 100
+MAX_EXPANDED = 16 * 2**20  # characters that all references to entities can come to
+# of prefixes that are used without being declared, as where a drawing was cut out of a web page
+_KNOWN = {"xlink": XLINK, "xml": "http://www.w3.org/XML/1998/namespace"}
 
 
 def parse_xml(path: Source, data: bytes) -> Element:
-    """Return the root element of the SVG document `data`, all names without their namespaces.
+    """Return the root element of the SVG document `data`.
 
-    Refused are entities, which can blow up to any size, deep nesting and too many elements.
+    SVG's own elements and attributes have their plain names; all others have "{namespace}name". A
+    document whose root has no namespace is read as if it had SVG's. Refused are entities that hold
+    more than plain text, which can blow up to any size, deep nesting and too many elements.
     """
-    parser = expat.ParserCreate(namespace_separator="}")
+    parser = expat.ParserCreate()
     parser.buffer_text = True
-    tree = _BoundedTree(path, parser)
+    tree = _BoundedTree(path, parser, data.count(b"&"))
     parser.StartElementHandler = tree.start
     parser.EndElementHandler = tree.end
     parser.CharacterDataHandler = tree.builder.data
-    parser.EntityDeclHandler = tree.refuse_entity
+    parser.EntityDeclHandler = tree.declare_entity
+    parser.ProcessingInstructionHandler = tree.instruct
     try:
         parser.Parse(data, True)
     except expat.ExpatError as exc:
@@ -39,80 +47,114 @@ def parse_xml(path: Source, data: bytes) -> Element:
         raise InputFileError(
             f"{path}: its text encoding cannot be read ({exc}); use UTF-8"
         ) from exc
-    root = tree.builder.close()
-    if root.tag != "svg":
-        raise InputFileError(f"{path}: the XML is a <{root.tag[:40]}>, not an <svg> drawing")
-    return root
+    return tree.builder.close()
+
+
+def reference(element: Element) -> str | None:
+    """Return what an element's `href`, or else its `xlink:href`, refers to."""
+    text = element.get("href", element.get(HREF))
+    return None if text is None else text.strip()
+
+
+def is_own(element: Element) -> bool:
+    """Return whether an element is one of SVG's own."""
+    return not element.tag.startswith("{")
+
+
+class Notes:
+    """What a reader tells the user about a drawing, each thing once."""
+
+    MOST = 12
+
+    def __init__(self) -> None:
+        self.texts = Counter[str]()
+
+    def add(self, text: str) -> None:
+        self.texts[text] += 1
+
+    def said(self) -> list[str]:
+        """Return the notes, with how often each was met, and how many more there are."""
+        every = [f"{text} ({n} times)" if n > 1 else text for text, n in self.texts.items()]
+        more = len(every) - self.MOST
+        return every[: self.MOST] + [f"and {more} more notes of this kind"] * (more > 0)
 
 
 class _BoundedTree:
-    def __init__(self, path: Source, parser: expat.XMLParserType) -> None:
+    def __init__(self, path: Source, parser: expat.XMLParserType, references: int) -> None:
         self.path, self.parser, self.builder = path, parser, TreeBuilder()
-        self.count = self.depth = 0
+        self.references, self.entities = references, 0
+        self.count = 0
+        self.scopes = [dict[str, str](_KNOWN)]  # the namespace of each prefix, by depth
+        self.own = SVG  # the namespace whose names are plain
+        self.names: list[str] = []
+        self.sheets = ""  # instructions that refer to style sheets
 
-    def start(self, name: str, attributes: dict[str, str]) -> None:
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
         self.count += 1
-        self.depth += 1
         if self.count > MAX_ELEMENTS:
             self._refuse(f"more than {MAX_ELEMENTS} elements; keep only the silhouette")
-        if self.depth > MAX_DEPTH:
+        if len(self.scopes) > MAX_DEPTH + 1:
             self._refuse(f"elements nested more than {MAX_DEPTH} deep; ungroup the drawing")
-        self.builder.start(_local(name), {_local(key): value for key, value in attributes.items()})
+        declared = dict(_declared(attributes))
+        self.scopes.append({**self.scopes[-1], **declared} if declared else self.scopes[-1])
+        if self.count == 1:
+            self._check_root(tag)
+        own = {
+            self._named(key): value
+            for key, value in attributes.items()
+            if not key.startswith("xmlns:") and key != "xmlns"
+        }
+        if self.count == 1 and self.sheets:
+            own["{}xml-stylesheet"] = self.sheets
+        self.names.append(self._element(tag))
+        self.builder.start(self.names[-1], own)
 
-    def end(self, name: str) -> None:
-        self.depth -= 1
-        self.builder.end(_local(name))
+    def end(self, _: str) -> None:
+        self.scopes.pop()
+        self.builder.end(self.names.pop())
 
-    def refuse_entity(self, name: str, *_: object) -> None:
-        self._refuse(
-            f"declares the XML entity {name[:40]!a}; entities are not read, save the drawing "
-            "as plain SVG"
-        )
-
-    def _refuse(self, reason: str) -> None:
-        raise InputFileError(f"{self.path}: line {self.parser.CurrentLineNumber}: {reason}")
-
-
-def _local(name: str) -> str:
-    return name.rpartition("}")[2]
-
-
-class StyleSheet:
-    """The rules of a drawing's `<style>` elements with selectors `tag`, `.class`, `#id`, `tag.class`.
-
-    Enough for what drawing programs write; rules with other selectors are passed over.
-    """
-
-    def __init__(self, path: Source, root: Element) -> None:
-        self.rules: dict[str, dict[str, str]] = {}
-        text = "\n".join(style.text or "" for style in root.iter("style"))
-        if len(text) > MAX_STYLE:
-            raise InputFileError(
-                f"{path}: <style> of {len(text)} characters; save the drawing as plain SVG"
+    def declare_entity(self, name: str, parameter: bool, value: str | None, *_: object) -> None:
+        """Take an entity of plain text, such as Illustrator's for its namespaces; refuse others."""
+        self.entities += 1
+        plain = value is not None and not parameter and not set("&<%") & set(value)
+        fits = plain and len(value or "") * self.references <= MAX_EXPANDED
+        if not fits or self.entities > MAX_ENTITIES:
+            self._refuse(
+                f"declares the XML entity {name[:40]!a}; only entities of a short plain text are "
+                "read, save the drawing as plain SVG"
             )
-        for rule in _COMMENT.sub(" ", text).split("}"):
-            selectors, _, body = rule.partition("{")
-            declarations = _declarations(body)
-            for selector in map(str.strip, selectors.split(",")):
-                if _SELECTOR.fullmatch(selector):
-                    self.rules.setdefault(selector, {}).update(declarations)
 
-    def properties(self, element: Element) -> dict[str, str]:
-        """Return attributes of `element` overridden by the rules that match it and by its own style."""
-        properties = dict(element.attrib)
-        properties.pop("marker", None)  # a property of styles alone
-        tag, names = element.tag, element.get("class", "").split()
-        classes = [f"{before}.{name}" for before in ("", tag) for name in names]
-        for selector in ("*", tag, *classes, f"#{element.get('id', '')}"):
-            properties.update(self.rules.get(selector, {}))
-        properties.update(_declarations(element.get("style", "")))
-        return properties
+    def instruct(self, target: str, data: str) -> None:
+        if target == "xml-stylesheet" and not self.count:
+            self.sheets = data
+
+    def _check_root(self, tag: str) -> None:
+        prefix, _, name = tag.rpartition(":")
+        namespace = self.scopes[-1].get(prefix, prefix)
+        if name != "svg":
+            self._refuse(f"the XML is a <{name[:40]}>, not an <svg> drawing", line=False)
+        if namespace not in ("", SVG):
+            reason = f"the namespace of <svg> is {namespace[:60]!a}; it should be {SVG!a}"
+            self._refuse(reason)
+        self.own = namespace
+
+    def _element(self, tag: str) -> str:
+        prefix, _, name = tag.rpartition(":")
+        namespace = self.scopes[-1].get(prefix, prefix)
+        return name if namespace == self.own else f"{{{namespace}}}{name}"
+
+    def _named(self, key: str) -> str:
+        """Return the name of an attribute; one without a prefix has no namespace."""
+        prefix, colon, name = key.rpartition(":")
+        return f"{{{self.scopes[-1].get(prefix, prefix)}}}{name}" if colon else name
+
+    def _refuse(self, reason: str, *, line: bool = True) -> None:
+        where = f"line {self.parser.CurrentLineNumber}: " if line else ""
+        raise InputFileError(f"{self.path}: {where}{reason}")
 
 
-def _declarations(text: str) -> dict[str, str]:
-    pairs = (item.partition(":") for item in text.split(";"))
-    return {
-        key.strip().lower(): value.replace("!important", "").strip()
-        for key, colon, value in pairs
-        if colon
-    }
+def _declared(attributes: dict[str, str]) -> Iterator[tuple[str, str]]:
+    """Yield the prefix and namespace that each attribute `xmlns` or `xmlns:prefix` declares."""
+    for key, value in attributes.items():
+        if key == "xmlns" or key.startswith("xmlns:"):
+            yield key[6:], value.strip()

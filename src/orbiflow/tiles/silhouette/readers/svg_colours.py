@@ -1,0 +1,88 @@
+"""The colours that CSS can write."""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+import tinycss2.color4
+
+from orbiflow.arrays import Array
+from orbiflow.drawing import rgb
+
+CURRENT = "currentColor"
+"""The colour of what is drawn in `currentColor` where no colour is set."""
+
+MAX_COLOUR = 100  # characters
+# from CIE XYZ to linear sRGB, for the whites D65 and D50 (B. Lindbloom's tables)
+_FROM_D65 = np.array(
+    [
+        [3.2404542, -1.5371385, -0.4985314],
+        [-0.969266, 1.8760108, 0.041556],
+        [0.0556434, -0.2040259, 1.0572252],
+    ]
+)
+_FROM_D50 = np.array(
+    [
+        [3.1338561, -1.6168667, -0.4906146],
+        [-0.9787684, 1.9161415, 0.033454],
+        [0.0719453, -0.2289914, 1.4052427],
+    ]
+)
+
+
+class Brush(NamedTuple):
+    """A colour, #rrggbb or `CURRENT`, and its opacity, 0 to 1."""
+
+    colour: str
+    opacity: float
+
+
+@lru_cache(4096)
+def colour_of(text: str) -> Brush | None:
+    """Return the colour and opacity that a text such as "hsl(20 50% 40%)" writes, or None."""
+    text = text.strip()
+    if len(text) > MAX_COLOUR or text.count("(") > 1:
+        return None
+    try:
+        colour = tinycss2.color4.parse_color(text)
+    except (ValueError, IndexError, AttributeError):  # of what is no colour at all
+        return None
+    if colour is None:
+        return None
+    if isinstance(colour, str):
+        return Brush(CURRENT, 1.0)
+    return Brush(_hexadecimal(_srgb(colour)), colour.alpha)
+
+
+def lightness(colour: str) -> float:
+    """Return how light a colour is, from 0 to 1."""
+    return float(np.dot(rgb(colour), [0.2126, 0.7152, 0.0722])) / 255 if colour[0] == "#" else 0.0
+
+
+def mean_colour(brushes: list[Brush]) -> Brush:
+    """Return the mean of colours, each as much as it is opaque, and their mean opacity."""
+    opacities = np.array([brush.opacity for brush in brushes])
+    solid = [brush.colour if brush.colour[0] == "#" else "#000000" for brush in brushes]
+    shares = opacities if opacities.any() else np.ones(len(brushes))
+    mean = np.average([rgb(colour) for colour in solid], axis=0, weights=shares)
+    return Brush(_hexadecimal(mean / 255), float(opacities.mean()))
+
+
+def _srgb(colour: tinycss2.color4.Color) -> Array:
+    """Return red, green and blue, 0 to 1; those of wider spaces are taken for sRGB's own."""
+    if colour.space in ("hsl", "hwb"):
+        return np.array(colour.to("srgb").coordinates)
+    wanted = {"lab": "xyz-d50", "lch": "xyz-d50", "oklab": "xyz-d65", "oklch": "xyz-d65"}
+    space = wanted.get(colour.space, colour.space)
+    values = np.array([value or 0.0 for value in colour.to(space).coordinates])
+    if space.startswith("xyz"):
+        values = (_FROM_D50 if space == "xyz-d50" else _FROM_D65) @ values
+    if space.startswith("xyz") or space == "srgb-linear":
+        low, high = 12.92 * values, 1.055 * np.maximum(values, 0.0) ** (1 / 2.4) - 0.055
+        values = np.where(values <= 0.0031308, low, high)
+    return values
+
+
+def _hexadecimal(channels: Array) -> str:
+    red, green, blue = (channels.clip(0, 1) * 255).round().astype(int)
+    return f"#{red:02x}{green:02x}{blue:02x}"

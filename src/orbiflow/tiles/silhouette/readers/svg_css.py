@@ -1,0 +1,304 @@
+"""The style sheets of a drawing, and what they and its attributes declare for each element."""
+
+import re
+from collections.abc import Iterator
+from functools import lru_cache
+from xml.etree.ElementTree import Element
+
+import tinycss2
+from cssselect2 import ElementWrapper, Matcher, SelectorError, compile_selector_list
+from tinycss2.ast import AtRule, Declaration, Node, QualifiedRule
+
+from orbiflow.errors import InputFileError
+from orbiflow.tiles.silhouette.readers.reading import Source
+from orbiflow.tiles.silhouette.readers.svg_properties import ATTRIBUTES, checked, longhands
+from orbiflow.tiles.silhouette.readers.svg_xml import SVG, Notes
+
+MAX_STYLE = 200_000  # characters of all style sheets
+MAX_STYLES = 4_000_000  # characters of all attributes `style`
+MAX_BRACKETS = 50  # how deep brackets may nest
+MAX_SELECTORS = 5_000
+MAX_SELECTOR = 1_000  # characters
+MAX_STEPS = 5_000_000  # comparisons of elements with selectors, and steps from element to element
+# at-rules that paint nothing
+_SILENT = {
+    *(
+        "charset",
+        "font-face",
+        "page",
+        "keyframes",
+        "-webkit-keyframes",
+        "counter-style",
+        "property",
+    ),
+    *("color-profile", "font-feature-values", "font-palette-values", "view-transition"),
+}
+_PREFERENCE = re.compile(r"(?:(?:all|screen) and )?\(prefers-[a-z-]+\s*:?\s*([a-z-]*)\)")
+_USUAL = {"light", "no-preference"}  # what readers prefer who have said nothing
+_ABSENT = {"", "null", "undefined"}  # as SVG-edit and scripts write what is not set
+
+# what the library raises for selectors that it does not know, or that nest too deeply for Python
+_NO_SELECTOR = (
+    *(SelectorError, NotImplementedError, TypeError, AttributeError),
+    *(SyntaxError, RecursionError, MemoryError),
+)
+
+Declared = tuple[str, str, bool]  # a property, its value, and whether it is important
+
+
+class StyleSheets:
+    """What the style sheets and attributes of a drawing declare for its elements."""
+
+    def __init__(self, path: Source, root: Element, notes: Notes) -> None:
+        self.path, self.notes, self.matcher = path, notes, Matcher()
+        self.selectors = self.characters = 0
+        sheets = [item for item in root.iter("style") if _is_css(item)]
+        self._read(sheets)
+        self.nodes: dict[Element, _Node] = {}
+        if self.selectors:
+            top = _Node(root, None, 0, None, False)
+            self.nodes = {node.etree_element: node for node in top.iter_subtree()}
+            top.budget.left = MAX_STEPS
+
+    def declared(self, element: Element) -> dict[str, str]:
+        """Return the properties that are declared for an element, by CSS's order of precedence.
+
+        Attributes come first, then rules by their specificity and order, then the attribute `style`;
+        what is important comes over all that is not.
+        """
+        found: dict[str, str] = {}
+        for key, text in element.attrib.items():
+            if key in ATTRIBUTES and (value := checked(key, text, css=False)) is not None:
+                found[key] = value
+            elif key in ATTRIBUTES:
+                self._misread(key, text)
+        ruled = [*self._matched(element), *self._own(element)]
+        for late in (False, True):
+            found.update((key, value) for key, value, important in ruled if important == late)
+        return found
+
+    def _matched(self, element: Element) -> Iterator[Declared]:
+        node = self.nodes.get(element)
+        if node is None:
+            return
+        try:
+            node.charge(self._candidates(node))
+            matches = self.matcher.match(node)
+        except _TooManySteps as exc:
+            raise InputFileError(
+                f"{self.path}: the style sheet takes too long to apply; save the drawing as plain SVG"
+            ) from exc
+        for _, _, pseudo, declarations in matches:
+            if pseudo is None:
+                yield from declarations
+
+    def _candidates(self, node: "_Node") -> int:
+        """Return an upper bound of how many selectors are compared with an element."""
+        matcher = self.matcher
+        by_class = sum(len(matcher.class_selectors.get(name, ())) for name in node.classes)
+        by_name = len(matcher.lower_local_name_selectors.get(node.local_name.lower(), ()))
+        others = len(matcher.other_selectors) + len(matcher.id_selectors.get(node.id or "", ()))
+        text = sum(map(len, node.etree_element.attrib.values()))  # which attributes are compared
+        return (by_class + by_name + others) * (1 + text // 2_000)
+
+    def _own(self, element: Element) -> tuple[Declared, ...]:
+        """Return the declarations of the attribute `style`."""
+        text = element.get("style")
+        if not text:
+            return ()
+        self.characters += len(text)
+        if self.characters > MAX_STYLES:
+            reason = f"more than {MAX_STYLES} characters of style; save the drawing as plain SVG"
+            raise InputFileError(f"{self.path}: {reason}")
+        found, wrong = _style(text)
+        for key, value in wrong:
+            self._misread(key, value)
+        return found
+
+    def _misread(self, key: str, value: str) -> None:
+        if value.strip().lower() not in _ABSENT:
+            self.notes.add(f"{key} {value.strip()[:40]!a} is not understood and left out")
+
+    def _read(self, sheets: list[Element]) -> None:
+        texts = ["".join(sheet.itertext()) for sheet in sheets]
+        if sum(map(len, texts)) > MAX_STYLE:
+            raise InputFileError(
+                f"{self.path}: <style> of {sum(map(len, texts))} characters; save the drawing as "
+                "plain SVG"
+            )
+        for sheet, text in zip(sheets, texts, strict=True):
+            if text.strip() and self._applies(sheet.get("media", "")):
+                if _too_nested(text):
+                    reason = "brackets nest too deeply in <style>; save the drawing as plain SVG"
+                    raise InputFileError(f"{self.path}: {reason}")
+                rules = tinycss2.parse_stylesheet(text, skip_comments=True, skip_whitespace=True)
+                self._add(rules, {})
+
+    def _add(self, rules: list[Node], namespaces: dict[str | None, str]) -> None:
+        for rule in rules:
+            if isinstance(rule, QualifiedRule):
+                self._add_rule(rule, namespaces)
+            elif isinstance(rule, AtRule):
+                self._add_at_rule(rule, namespaces)
+            else:
+                self.notes.add("part of the style sheet is not CSS and left out")
+
+    def _add_rule(self, rule: QualifiedRule, namespaces: dict[str | None, str]) -> None:
+        text = tinycss2.serialize(rule.prelude).strip()
+        found, wrong = _declarations(rule.content)
+        for key, value in wrong:
+            self._misread(key, value)
+        if not found:
+            return
+        try:
+            if max(map(len, text.split(","))) > MAX_SELECTOR:
+                raise SelectorError
+            compiled = compile_selector_list(rule.prelude, namespaces)
+        except _NO_SELECTOR:
+            self.notes.add(f"the selector {text[:40]!a} of the style sheet is not understood")
+            return
+        self.selectors += len(compiled)
+        if self.selectors > MAX_SELECTORS:
+            reason = f"more than {MAX_SELECTORS} selectors in <style>; save it as plain SVG"
+            raise InputFileError(f"{self.path}: {reason}")
+        for selector in compiled:
+            self.matcher.add_selector(selector, found)
+
+    def _add_at_rule(self, rule: AtRule, namespaces: dict[str | None, str]) -> None:
+        name, prelude = rule.lower_at_keyword, tinycss2.serialize(rule.prelude).strip()
+        if name == "namespace":
+            *prefix, last = [token for token in rule.prelude if token.type != "whitespace"]
+            if last.type in ("string", "url") and len(prefix) < 2:
+                namespaces[prefix[0].value if prefix else None] = last.value
+        elif name == "media" and self._applies(prelude):
+            content = rule.content or []
+            inner = tinycss2.parse_rule_list(content, skip_comments=True, skip_whitespace=True)
+            self._add(inner, namespaces)
+        elif name != "media" and name not in _SILENT:
+            self.notes.add(f"@{name} {prelude[:40]} of the style sheet is left out")
+
+    def _applies(self, query: str) -> bool:
+        """Return whether a media query is of a screen; what cannot be told is noted, and is not."""
+        found = [_screen(part) for part in query.lower().split(",")]
+        if not any(found) and None in found:
+            self.notes.add(f"@media {query.strip()[:40]} of the style sheet is left out")
+        return any(found)
+
+
+def _screen(query: str) -> bool | None:
+    """Return whether one media query is true of a screen, or None if that cannot be told."""
+    words = query.split()
+    refused = words[:1] == ["not"]
+    words = words[refused or words[:1] == ["only"] :]
+    preference = _PREFERENCE.fullmatch(" ".join(words))
+    if preference:
+        return (preference[1] in _USUAL) != refused
+    if not words or words in (["all"], ["screen"]):
+        return not refused
+    if words[0].startswith("(") or words[0] in ("all", "screen"):
+        return None
+    return refused  # print, speech and others
+
+
+def _is_css(sheet: Element) -> bool:
+    return sheet.get("type", "text/css").partition(";")[0].strip().lower() in ("", "text/css")
+
+
+@lru_cache(2_000)
+def _style(text: str) -> tuple[tuple[Declared, ...], tuple[tuple[str, str], ...]]:
+    if _too_nested(text):
+        return (), (("style", text[:40]),)
+    return _declarations(text)
+
+
+def _declarations(
+    source: str | list[Node],
+) -> tuple[tuple[Declared, ...], tuple[tuple[str, str], ...]]:
+    """Return the valid declarations in a block, and those that are not understood."""
+    found: list[Declared] = []
+    wrong: list[tuple[str, str]] = []
+    for item in tinycss2.parse_blocks_contents(source, skip_comments=True, skip_whitespace=True):
+        if not isinstance(item, Declaration):
+            nested = item.serialize() if isinstance(item, QualifiedRule) else ""
+            wrong += [("the nested rule", nested)] * bool(nested)
+            continue
+        value = "".join(" " if t.type == "comment" else t.serialize() for t in item.value)
+        for name, text in longhands(item.name, value.strip()):
+            valid = text if name.startswith("--") else checked(name, text)
+            if valid is None:
+                wrong.append((name, text))
+            else:
+                found.append((name, valid, item.important))
+    return tuple(found), tuple(wrong)
+
+
+def _too_nested(text: str) -> bool:
+    depth = 0
+    for character in text:
+        depth += (character in "([{") - (character in ")]}" and depth > 0)
+        if depth > MAX_BRACKETS:
+            return True
+    return False
+
+
+class _TooManySteps(Exception):
+    """Matching would take longer than any drawing is worth."""
+
+
+class _Budget:
+    left = MAX_STEPS
+
+
+class _Node(ElementWrapper):
+    """An element as selectors see it, with a bound on the steps that all of them take together."""
+
+    def __init__(
+        self,
+        etree_element: Element,
+        parent: "_Node | None",
+        index: int,
+        previous: "_Node | None",
+        in_html_document: bool,
+        content_language: str | None = None,
+    ) -> None:
+        self.budget: _Budget = _Budget() if parent is None else parent.budget
+        args = (etree_element, parent, index, previous, in_html_document, content_language)
+        super().__init__(*args)
+        namespace, brace, name = etree_element.tag[1:].rpartition("}")
+        self.local_name = name if brace else etree_element.tag
+        self.namespace_url = namespace if brace else SVG
+
+    def charge(self, steps: int) -> None:
+        self.budget.left -= steps
+        if self.budget.left < 0:
+            raise _TooManySteps
+
+    @property
+    def ancestors(self) -> Iterator["_Node"]:
+        node = self.parent
+        while node is not None:
+            self.charge(1)
+            yield node
+            node = node.parent
+
+    @property
+    def previous_siblings(self) -> Iterator["_Node"]:
+        node = self.previous
+        while node is not None:
+            self.charge(1)
+            yield node
+            node = node.previous
+
+    @property
+    def etree_siblings(self) -> list[Element]:
+        self.charge(1 + len(self._siblings))
+        return self._siblings
+
+    @etree_siblings.setter
+    def etree_siblings(self, siblings: list[Element]) -> None:
+        self._siblings = siblings
+
+    def iter_children(self) -> Iterator["_Node"]:
+        for child in super().iter_children():
+            self.charge(1)
+            yield child

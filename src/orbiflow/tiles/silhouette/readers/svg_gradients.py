@@ -1,0 +1,201 @@
+"""Gradients: their colours, and where they are opaque or light enough to count."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import shapely
+from shapely.geometry import Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from orbiflow.arrays import Array
+from orbiflow.tiles.silhouette.readers.svg_colours import CURRENT, Brush, colour_of
+from orbiflow.tiles.silhouette.readers.svg_shapes import (
+    DrawnShape,
+    bounds_of,
+    mapped,
+    unit_box_matrix,
+)
+from orbiflow.tiles.silhouette.readers.svg_transforms import NotATransform, transform_matrix
+from orbiflow.tiles.silhouette.readers.svg_units import as_number, length
+from orbiflow.tiles.silhouette.readers.svg_xml import reference
+
+if TYPE_CHECKING:
+    from orbiflow.tiles.silhouette.readers.svg_walk import Drawing
+
+MOST_REFERENCES = 10  # from gradient to gradient
+MOST_PERIODS = 500  # of a gradient that repeats
+_ROUND = 64  # segments of a quarter of a circle
+_EMPTY = 1e-9  # of a vector or radius: a gradient of less has its last colour everywhere
+_LINEAR = {"x1": "0%", "y1": "0%", "x2": "100%", "y2": "0%"}
+_RADIAL = {"cx": "50%", "cy": "50%", "r": "50%", "fr": "0%"}
+
+
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """Colours along a line, or from circle to circle."""
+
+    offsets: Array  # (N,), 0 to 1, in order
+    brushes: list[Brush]  # (N)
+    matrix: Array  # (3, 3), from its own units to the drawing's
+    ends: Array  # (2, 3): x, y and radius where it begins and ends
+    radial: bool
+    spread: str  # "pad", "reflect" or "repeat"
+
+    def part(self, values: Array, least: float, region: BaseGeometry) -> BaseGeometry:
+        """Return the part of a region where values (N,), given at the offsets, are at least `least`."""
+        if (values >= least).all():
+            return region
+        if (values < least).all() or region.is_empty:
+            return Polygon()
+        xmin, ymin, xmax, ymax = region.bounds
+        corners = np.array([[xmin, ymin], [xmax, ymin], [xmax, ymax], [xmin, ymax]])
+        corners = mapped(np.linalg.inv(self.matrix), corners)
+        spans = list(self._spans(values, least))
+        bands = self._rings(spans, corners) if self.radial else self._strips(spans, corners)
+        there = shapely.transform(shapely.union_all(bands), lambda xy: mapped(self.matrix, xy))
+        return shapely.intersection(region, there)
+
+    def _spans(self, values: Array, least: float) -> Iterator[tuple[float, float]]:
+        """Yield the intervals of offsets with enough of a value, beyond 0 to 1 where it pads."""
+        pads = self.spread == "pad"
+        first, last = float(self.offsets[0]), float(self.offsets[-1])
+        if values[0] >= least and (first > 0 or pads):
+            yield (-np.inf if pads else 0.0), first
+        for (a, b), (u, v) in zip(pairwise(self.offsets), pairwise(values), strict=True):
+            if max(u, v) >= least and b > a:
+                crossing = a + (least - u) / (v - u) * (b - a) if (u < least) != (v < least) else a
+                yield (crossing if u < least else a), (crossing if v < least else b)
+        if values[-1] >= least and (last < 1 or pads):
+            yield last, (np.inf if pads else 1.0)
+
+    def _repeated(
+        self, spans: list[tuple[float, float]], low: float, high: float
+    ) -> list[tuple[float, float]]:
+        """Return the intervals between `low` and `high`, repeated there as the gradient is."""
+        if self.spread == "pad":
+            every = spans
+        else:
+            turns = range(int(np.floor(max(low, -MOST_PERIODS))), int(min(high, MOST_PERIODS)) + 1)
+            back = self.spread == "reflect"
+            every = [
+                (k + 1 - b, k + 1 - a) if back and k % 2 else (k + a, k + b)
+                for k in turns
+                for a, b in spans
+            ]
+        cut = [(max(a, low), min(b, high)) for a, b in every]
+        return [(a, b) for a, b in cut if b > a]
+
+    def _strips(self, spans: list[tuple[float, float]], corners: Array) -> list[BaseGeometry]:
+        start, along = self.ends[0, :2], self.ends[1, :2] - self.ends[0, :2]
+        across = np.array([-along[1], along[0]])
+        square = float(along @ along)
+        t, s = ((corners - start) @ side / square for side in (along, across))
+        wide = np.array([s.min() - 1, s.max() + 1])
+        return [
+            shapely.Polygon(
+                start + np.outer([a, b, b, a], along) + np.outer(wide[[0, 0, 1, 1]], across)
+            )
+            for a, b in self._repeated(spans, float(t.min()) - 1, float(t.max()) + 1)
+        ]
+
+    def _rings(self, spans: list[tuple[float, float]], corners: Array) -> list[BaseGeometry]:
+        """Return the rings of a gradient whose circles lie in each other, the first one within."""
+        (x, y, radius), step = self.ends[0], self.ends[1] - self.ends[0]
+        growth = step[2] - float(np.hypot(*step[:2]))
+        reach = float(np.hypot(*(corners - [x, y]).T).max())
+        high = 1 + max(reach - radius, 0.0) / growth
+
+        def disc(t: float) -> BaseGeometry:
+            centre = Point(x + t * step[0], y + t * step[1])
+            return centre.buffer(max(radius + t * step[2], 0.0), quad_segs=_ROUND)
+
+        return [
+            shapely.difference(disc(b), disc(a)) if a > 0 else disc(b)
+            for a, b in self._repeated([(a, b) for a, b in spans if b > 0], 0.0, high)
+        ]
+
+
+def gradient_of(drawing: Drawing, element: Element, shape: DrawnShape) -> Gradient | Brush | None:
+    """Return the gradient that paints a shape, or the one colour that it has, or None for nothing."""
+    chain = list(references(drawing, element))
+    own = ([child for child in one if child.tag == "stop"] for one in chain)
+    stops = next(filter(None, own), list[Element]())
+    if not stops:
+        return None
+    brushes = [_stop(drawing, stop) for stop in stops]
+    given = [min(max(as_number(stop.get("offset"), 0.0), 0.0), 1.0) for stop in stops]
+    offsets = np.maximum.accumulate(np.array(given))
+
+    def attribute(key: str, usual: str) -> str:
+        same = (one.get(key) for one in chain if one.tag == element.tag or key not in _SHAPED)
+        return next((text for text in same if text is not None), usual)
+
+    boxed = attribute("gradientUnits", "objectBoundingBox") != "userSpaceOnUse"
+    box = bounds_of([shape], shape.place.matrix) if boxed else None
+    matrix = shape.place.matrix
+    if boxed:
+        if box is None or not (box[2] > box[0] and box[3] > box[1]):
+            return None
+        matrix = matrix @ unit_box_matrix(box)
+    try:
+        own = transform_matrix(attribute("gradientTransform", ""), (1.0, 1.0))
+    except NotATransform:
+        drawing.notes.add("a gradientTransform is not understood and left out")
+        own = np.eye(3)
+    size = (1.0, 1.0) if boxed else shape.place.viewport
+    ends = _ends(element.tag, attribute, size)
+    flat = abs(np.linalg.det(matrix @ own)) == 0 or not np.ptp(ends, axis=0).max() > _EMPTY
+    if len(stops) == 1 or flat:
+        return brushes[-1]
+    spread = attribute("spreadMethod", "pad")
+    return Gradient(offsets, brushes, matrix @ own, ends, element.tag[0] == "r", spread)
+
+
+_SERVERS = {"linearGradient", "radialGradient", "pattern"}
+_SHAPED = {*_LINEAR, *_RADIAL, "fx", "fy"}
+
+
+def references(drawing: Drawing, element: Element | None) -> Iterator[Element]:
+    """Yield a gradient or pattern and those that it takes its stops, content or attributes from."""
+    for _ in range(MOST_REFERENCES):
+        if element is None or element.tag not in _SERVERS:
+            return
+        yield element
+        element = drawing.named(reference(element), f"a {element.tag}")
+
+
+def _stop(drawing: Drawing, stop: Element) -> Brush:
+    style = drawing.styles.standing(stop)
+    brush = colour_of(style.get("stop-color", "#000000")) or Brush("#000000", 1.0)
+    if brush.colour == CURRENT:
+        brush = colour_of(style.get("color", "#000000")) or brush
+    opacity = min(max(as_number(style.get("stop-opacity"), 1.0), 0.0), 1.0)
+    return Brush(brush.colour, brush.opacity * opacity)
+
+
+def _ends(tag: str, attribute: Callable[[str, str], str], size: tuple[float, float]) -> Array:
+    """Return x, y and radius of where a gradient begins and ends."""
+    across = float(np.hypot(*size)) / 2**0.5
+
+    def number(key: str, usual: str) -> float:
+        relative = size[0] if "x" in key else size[1] if "y" in key else across
+        value = length(attribute(key, usual), relative)
+        return length(usual, relative) or 0.0 if value is None else value
+
+    if tag == "linearGradient":
+        x1, y1, x2, y2 = (number(key, usual) for key, usual in _LINEAR.items())
+        return np.array([[x1, y1, 0.0], [x2, y2, 0.0]])
+    cx, cy, r, fr = (number(key, usual) for key, usual in _RADIAL.items())
+    centre = np.array([cx, cy])
+    focus = np.array([number("fx", repr(cx)), number("fy", repr(cy))])
+    away = float(np.hypot(*(focus - centre)))
+    most = 0.99 * max(r - fr, 0.0)  # a focus outside its circle is moved into it
+    if away > most:
+        focus = centre + (focus - centre) * (most / away)
+    return np.array([[*focus, fr], [cx, cy, r]])

@@ -1,0 +1,314 @@
+"""The shapes that an SVG drawing shows, with their transforms, found by a walk of its elements."""
+
+from collections import Counter
+from dataclasses import replace
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from orbiflow.arrays import Array, Window
+from orbiflow.errors import InputFileError
+from orbiflow.tiles.silhouette.readers.reading import Source, read_bytes
+from orbiflow.tiles.silhouette.readers.svg_cuts import Cuts, window_clip
+from orbiflow.tiles.silhouette.readers.svg_markers import Markers
+from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
+from orbiflow.tiles.silhouette.readers.svg_shapes import (
+    SHAPES,
+    BadElement,
+    DrawnShape,
+    Place,
+    bounds_of,
+    path_tokens,
+    shape_paths,
+)
+from orbiflow.tiles.silhouette.readers.svg_style import Style, Styles
+from orbiflow.tiles.silhouette.readers.svg_transforms import (
+    NotATransform,
+    origin_of,
+    shift,
+    single_transforms,
+    transform_matrix,
+)
+from orbiflow.tiles.silhouette.readers.svg_units import as_number
+from orbiflow.tiles.silhouette.readers.svg_views import view_box, view_matrix
+from orbiflow.tiles.silhouette.readers.svg_xml import MAX_DEPTH, Notes, is_own, parse_xml, reference
+
+MAX_BYTES = 16 * 2**20
+MAX_DRAWN = 10_000  # elements, those drawn again by <use>, clips, masks and markers counted again
+MAX_TOKENS = 400_000  # commands and numbers in all path data; one with a fraction counts twice
+ROUNDING = 1e-9  # of the page: what reaches beyond it by less does not
+LANGUAGE = "en"  # what drawings in several languages are read in
+_GROUPS = {"svg", "g", "a", "switch"}
+_OTHERS = {
+    **{"image": "image", "text": "text", "flowRoot": "text", "foreignObject": "piece of HTML"},
+    **dict.fromkeys(("video", "audio", "canvas", "iframe"), "piece of HTML"),
+}
+_ANIMATIONS = {"animate", "animateTransform", "animateMotion", "animateColor", "set"}
+_MOVES = ("transform", "translate", "rotate", "scale")
+# what changes how a drawing is seen and is not drawn, with the values that change nothing
+_EFFECTS = {
+    "mix-blend-mode": ("blends (mix-blend-mode) are left out", {"normal"}),
+    "offset-path": ("the property offset-path is left out", {"none"}),
+    "mask-image": ("the property mask-image is left out", {"none"}),
+    "animation": ("read as it stands, without its animations", {"none"}),
+    "animation-name": ("read as it stands, without its animations", {"none"}),
+}
+
+
+class Drawing:
+    """The shapes of the SVG drawing in a file, and what was met that is not drawn.
+
+    - `box`: The page (xmin, ymin, xmax, ymax) in user units: the viewBox, or the size; None without.
+    - `window`: What of the plane is seen, which is wider than the page where its sides' ratio is not
+      that of the size; None without a page.
+    """
+
+    def __init__(self, path: Source) -> None:
+        self.path, self.root = path, parse_xml(path, read_bytes(path, MAX_BYTES))
+        self.others, self.notes = Counter[str](), Notes()
+        self.visited = self.tokens = 0
+        self.styles = Styles(path, self.root, self.notes)
+        self.by_id: dict[str, Element] = {}
+        for item in self.root.iter():
+            if is_own(item) and (key := item.get("id")):
+                self.by_id.setdefault(key, item)
+        self.cuts, self.markers = Cuts(self), Markers(self)
+        try:
+            self._read()
+        except BadElement as exc:
+            raise InputFileError(f"{path}: {exc.message}") from exc
+
+    def left_out(self) -> list[str]:
+        """Return notes of what was met and is not drawn, or not as it is written."""
+        left = [
+            f"{count} {name.replace('piece', 'piece' + 's' * (count > 1)) if ' ' in name else name}"
+            + "s" * (count > 1 and " " not in name)
+            for name, count in self.others.items()
+        ]
+        return [f"left out {' and '.join(left)} of the drawing"] * bool(left) + self.notes.said()
+
+    def referred(self, text: str | None, what: str) -> Element | None:
+        """Return the element that `url(#id)` names; say so if there is none."""
+        found = REFERENCE.match(text or "")
+        return self.named(next(filter(None, found.groups()), ""), what) if found else None
+
+    def named(self, target: str | None, what: str) -> Element | None:
+        """Return the element that "#id" names; say so if there is none."""
+        target = (target or "").strip()
+        if not target:
+            return None
+        element = self.by_id.get(target[1:]) if target.startswith("#") else None
+        if element is None:
+            where = "is not there" if target.startswith("#") else "is outside the file"
+            self.notes.add(f"{what} refers to {target[:40]!a}, which {where}")
+        return element
+
+    def _read(self) -> None:
+        style = self.styles.standing(self.root)
+        self.box = self._box(style)
+        if any(item.tag in _ANIMATIONS for item in self.root.iter()):
+            self.notes.add(_EFFECTS["animation"][0])
+        if self.root.get("{}xml-stylesheet"):
+            self.notes.add("style sheets in other files are not read")
+        xmin, ymin, xmax, ymax = self.box or (0.0, 0.0, 100.0, 100.0)
+        size = xmax - xmin, ymax - ymin
+        place = Place(np.eye(3), size, {}, self.styles.rem, depth=-1).styled(style)
+        self.window, view = self._window(style)
+        about = np.linalg.inv(view) @ self.own_transform(self.root, style, place, "50% 50%") @ view
+        inner = place.moved(about)
+        found = [] if style.get("display") == "none" else self.children(self.root, inner)
+        self.shapes = self._cut(found, style, inner)
+
+    def _box(self, style: Style) -> Window | None:
+        """Return the page in user units: the viewBox, or the size."""
+        box = view_box(self.root)
+        if box is not None:
+            return box[0], box[1], box[0] + box[2], box[1] + box[3]
+        width, height = (self._pixels(style, key) for key in ("width", "height"))
+        if width is None or height is None or not (width > 0 and height > 0):
+            return None
+        return 0.0, 0.0, width, height
+
+    def _window(self, style: Style) -> tuple[Window | None, Array]:
+        """Return the part of the plane that shows, and the map (3, 3) from it to pixels."""
+        box, size = view_box(self.root), [self._pixels(style, key) for key in ("width", "height")]
+        width, height = (own if own and own > 0 else None for own in size)
+        if box is None or width is None or height is None:
+            return self.box, np.eye(3)
+        view = view_matrix(self.root, (0.0, 0.0, width, height))[0]
+        if not np.isfinite(np.linalg.inv(view)).all():
+            return self.box, np.eye(3)
+        corners = np.array([[0.0, 0.0], [width, height]]) - view[:2, 2]
+        (xmin, ymin), (xmax, ymax) = (corners / np.diag(view)[:2]).tolist()
+        margin = ROUNDING * max(xmax - xmin, ymax - ymin)  # the page's own edge is not cut
+        return (xmin - margin, ymin - margin, xmax + margin, ymax + margin), view
+
+    def _pixels(self, style: Style, key: str) -> float | None:
+        """Return the width or height of the root in pixels, or None if it is a share or not given."""
+        text = style.get(key, "").strip()
+        if not text or text.endswith("%") or text == "auto":
+            return None
+        return Place(np.eye(3), (0.0, 0.0), style).length(self.root, key, text)
+
+    def pixel(self) -> float:
+        """Return the size of a pixel in user units."""
+        style, (xmin, ymin, xmax, ymax) = (
+            self.styles.standing(self.root),
+            self.box or (0.0, 0.0, 1.0, 1.0),
+        )
+        sizes = (("width", xmax - xmin), ("height", ymax - ymin))
+        return max(own / (self._pixels(style, key) or own) for key, own in sizes)
+
+    def children(self, element: Element, place: Place) -> list[DrawnShape]:
+        """Return the shapes that the elements inside one show."""
+        return [shape for child in element if is_own(child) for shape in self.visit(child, place)]
+
+    def visit(self, element: Element, place: Place) -> list[DrawnShape]:
+        """Return the shapes that an element shows in a place, from bottom to top."""
+        self.visited += 1
+        if self.visited > MAX_DRAWN:
+            raise InputFileError(
+                f"{self.path}: draws more than {MAX_DRAWN} elements; keep only the silhouette"
+            )
+        if place.depth > MAX_DEPTH:
+            raise InputFileError(
+                f"{self.path}: <use> elements refer to each other in a circle or nest too deeply"
+            )
+        style = self.styles.computed(element, place.style)
+        if style.get("display") == "none" or not self._meant(element):
+            return []
+        place = place.styled(style)
+        place = place.moved(self.own_transform(element, style, place))
+        if np.linalg.det(place.matrix) == 0:  # flat
+            return []
+        return self._cut(self._content(element, place), style, place)
+
+    def _content(self, element: Element, place: Place) -> list[DrawnShape]:
+        tag = element.tag
+        if tag == "svg":
+            return self.viewport(element, self._frame(element, place.style, place), place)
+        if tag == "switch":
+            chosen = [child for child in element if is_own(child) and self._chosen(child)][:1]
+            return self.visit(chosen[0], place) if chosen else []
+        if tag in _GROUPS:
+            return self.children(element, place)
+        if tag == "use":
+            return self._use(element, place)
+        if tag in SHAPES:
+            return self._shape(element, place)
+        if tag in _OTHERS and place.style.get("visibility", "visible") == "visible":
+            empty = tag in ("text", "flowRoot") and not "".join(element.itertext()).strip()
+            self.others += Counter([_OTHERS[tag]] * (not empty))
+        return []
+
+    def _cut(self, shapes: list[DrawnShape], style: Style, place: Place) -> list[DrawnShape]:
+        """Return shapes cut by the clip and mask of their element, and note its other effects."""
+        if style.get("filter", "none") != "none":
+            self.others["filter"] += 1
+        for key, (note, harmless) in _EFFECTS.items():
+            if style.get(key, "none").lower() not in {"none", *harmless}:
+                self.notes.add(note)
+        for key in ("clip-path", "mask"):
+            if shapes and style.get(key, "none") != "none":
+                shapes = self.cuts.cut(shapes, key, style[key], place)
+        return shapes
+
+    def _chosen(self, child: Element) -> bool:
+        drawn = child.tag in _GROUPS | SHAPES | {"use", "text", "image"}
+        return drawn and self._meant(child)
+
+    def _meant(self, element: Element) -> bool:
+        """Return whether an element is meant for a program like this one and its language."""
+        if element.get("requiredExtensions") is not None:
+            return False
+        languages = element.get("systemLanguage")
+        if languages is None:
+            return True
+        tags = [tag.strip().lower() for tag in languages.split(",")]
+        meant = any(tag == LANGUAGE or tag.startswith(f"{LANGUAGE}-") for tag in tags)
+        if not meant:
+            self.notes.add(f"left out what is for other languages than {LANGUAGE!a}")
+        return meant
+
+    def _use(self, use: Element, place: Place) -> list[DrawnShape]:
+        target = self.named(reference(use), "<use>")
+        if target is None:
+            return []
+        x, y = (place.length(use, key, place.style.get(key)) for key in ("x", "y"))
+        fill, stroke = place.style.get("fill", "#000000"), place.style.get("stroke", "none")
+        place = replace(place.moved(shift(x, y)), context=(fill, stroke))
+        if target.tag not in ("symbol", "svg"):
+            return self.visit(target, place)
+        if place.depth > MAX_DEPTH:
+            return self.visit(target, place)  # which refuses it
+        style = self.styles.computed(target, place.style)
+        if style.get("display") == "none" and target.tag == "svg":
+            return []
+        sizes = ((key, place.style.get(key, "auto")) for key in ("width", "height"))
+        own = {key: text for key, text in sizes if text != "auto"}
+        inner = place.styled(style)
+        inner = inner.moved(self.own_transform(target, style, inner))
+        frame = self._frame(target, {**style, **own}, inner)
+        return self._cut(self.viewport(target, frame, inner), style, inner)
+
+    def _frame(self, element: Element, style: Style, place: Place) -> Window:
+        """Return x, y, width and height of an inner <svg> or a <symbol>."""
+        usual = {"x": 0.0, "y": 0.0, "width": place.viewport[0], "height": place.viewport[1]}
+        x, y, width, height = (
+            place.length(element, key, style.get(key), own) for key, own in usual.items()
+        )
+        return x, y, width, height
+
+    def viewport(self, element: Element, frame: Window, place: Place) -> list[DrawnShape]:
+        """Return what an inner <svg>, a <symbol> or a <marker> shows in a frame, cut at its edges."""
+        if not (frame[2] > 0 and frame[3] > 0):
+            return []
+        matrix, size = view_matrix(element, frame)
+        own = self.children(element, replace(place.moved(matrix), viewport=size))
+        if place.style.get("overflow") in ("visible", "auto") or not own:
+            return own
+        clip = window_clip(frame, place)
+        return [replace(shape, clips=(*shape.clips, clip)) for shape in own]
+
+    def _shape(self, element: Element, place: Place) -> list[DrawnShape]:
+        self.tokens += path_tokens(element, place.style)
+        if self.tokens > MAX_TOKENS:
+            raise BadElement(element, "the paths hold too much data; simplify the drawing")
+        paths = shape_paths(element, place)
+        matrix = place.matrix
+        if place.style.get("vector-effect") == "non-scaling-stroke":
+            matrix = np.diag([self.pixel()] * 2 + [1.0])
+        diagonal = float(np.hypot(*place.viewport)) / 2**0.5
+        own = as_number(element.get("pathLength"), -1.0)
+        drawn = DrawnShape(
+            *(paths, place.style, place.opacity, matrix, diagonal, place),
+            path_length=own if own >= 0 else None,
+            decorates=place.decorates,
+        )
+        return self.markers.around(element, drawn, place)
+
+    def own_transform(
+        self, element: Element, style: Style, place: Place, origin: str = "0 0"
+    ) -> Array:
+        """Return the matrix of an element's transforms, about their origin."""
+        texts = [style.get(key, "none") for key in _MOVES]
+        if all(text in ("none", "") for text in texts):
+            return np.eye(3)
+        size, corner = place.viewport, (0.0, 0.0)
+        if style.get("transform-box", "view-box") != "view-box" and element is not self.root:
+            box = bounds_of(self._content(element, place), place.matrix)
+            xmin, ymin, xmax, ymax = box or (0.0, 0.0, 0.0, 0.0)
+            size, corner = (xmax - xmin, ymax - ymin), (xmin, ymin)
+        try:
+            text = "" if texts[0] == "none" else texts[0]
+            matrix = single_transforms(texts[1], texts[2], texts[3], size)
+            matrix = matrix @ transform_matrix(text, size)
+        except NotATransform as exc:
+            text = " ".join(text for text in texts if text != "none")
+            raise BadElement(element, f"transform {text[:60]!a} cannot be read") from exc
+        try:
+            x, y = origin_of(style.get("transform-origin", origin), size)
+        except NotATransform:
+            self.notes.add(f"transform-origin {style['transform-origin'][:40]!a} is not understood")
+            x, y = 0.0, 0.0
+        return shift(x + corner[0], y + corner[1]) @ matrix @ shift(-x - corner[0], -y - corner[1])
