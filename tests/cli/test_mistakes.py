@@ -73,7 +73,7 @@ BAD_INPUTS: dict[str, tuple[Callable[[Path], Path], str]] = {
     "empty": (text("empty.png", ""), "the file is empty"),
     "blank": (picture(40, 30), "blank"),
     "one pixel": (picture(1, 1), "1 x 1 pixels cannot hold a silhouette"),
-    "100 megapixels": (header_of(10_000, 10_000), "10000 x 10000 pixels (100 megapixels)"),
+    "130 megapixels": (header_of(13_000, 10_000), "13000 x 10000 pixels (130 megapixels)"),
     "a bomb": (header_of(100_000, 100_000), "megapixels"),
     "cut short": (header_of(50, 40), "damaged or cut short"),
     "no closed path": (

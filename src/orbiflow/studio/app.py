@@ -31,7 +31,7 @@ from orbiflow.studio.work_queue import WorkQueue
 
 STATIC = Path(__file__).parent / "static"
 SETTLED_EVERY = 20.0  # seconds
-MAX_PIXELS = 40_000_000  # of a picture that is read
+MAX_PIXELS = 128_000_000  # of a picture that is read
 log = logging.getLogger("orbiflow.studio")
 
 

@@ -85,10 +85,7 @@ def _picture(target: Target, content: FileContent) -> Image.Image:
     """Return the picture that the user is shown below the silhouette."""
     if target.kind == "image":
         picture, _ = open_image(content, enough=SIDE)
-        if picture.mode.startswith(("I", "F")):
-            levels = np.asarray(picture, dtype=np.float64)
-            picture = Image.fromarray((levels / max(1.0, levels.max()) * 255).astype(np.uint8))
-        picture = picture.convert("RGBA" if picture.has_transparency_data else "RGB")
+        picture = picture.convert("RGBA" if picture.mode == "RGBA" else "RGB")
         picture.thumbnail((SIDE, SIDE))
         return picture
     extent = target.covered.high - target.covered.low

@@ -133,7 +133,7 @@ from .silhouette.emphasis import Emphasis as Emphasis
 from .silhouette.mesh import triangulate as triangulate
 from .silhouette.pins import Pins as Pins
 from .silhouette.readers.files import read_outline as read_outline
-from .silhouette.readers.pictures import open_image as open_image
+from .silhouette.readers.image_files import open_image as open_image
 from .silhouette.readers.pictures import read_mask_array as read_mask_array
 from .silhouette.readers.reading import FileContent as FileContent
 from .silhouette.readers.reading import Reading as Reading

@@ -212,7 +212,7 @@ def test_exif_orientation(tmp_path: Path) -> None:
 def test_first_frame_of_an_animation(tmp_path: Path) -> None:
     path = save(tmp_path, draw(), "a.gif", save_all=True, append_images=[draw("L", 255, 0)])
     reading = read_outline(path)
-    assert reading.notes[0] == "took the first frame of several"
+    assert reading.notes[0] == "took the first frame of 2"
 
 
 def test_outline_is_simple_where_pixels_meet_at_corners(tmp_path: Path) -> None:
@@ -231,7 +231,6 @@ def test_outline_is_simple_where_pixels_meet_at_corners(tmp_path: Path) -> None:
         (lambda: Image.new("RGBA", (50, 50)), "wholly transparent"),
         (lambda: draw("L", 250, 255), "all but blank"),
         (lambda: draw().resize((8, 8)), "covers only .* pixels"),
-        (lambda: Image.new("L", (6400, 6400)), r"6400 x 6400 pixels \(41 megapixels\)"),
     ],
 )
 def test_images_without_a_shape(
@@ -249,11 +248,11 @@ def test_a_bomb_is_refused_by_its_header(tmp_path: Path) -> None:
             struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
         )
 
-    for side, said in ((10_000, "10000 x 10000 pixels"), (60_000, "3600 megapixels")):
+    for side, said in ((12_000, "12000 x 12000 pixels"), (60_000, "3600 megapixels")):
         path = tmp_path / "bomb.png"
         header = chunk(b"IHDR", struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0))
         path.write_bytes(b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", b"") + chunk(b"IEND", b""))
-        with pytest.raises(InputFileError, match=f"{said}.*40 megapixels are read"):
+        with pytest.raises(InputFileError, match=f"{said}.*128 megapixels are read"):
             read_outline(path)
 
 

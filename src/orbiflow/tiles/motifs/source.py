@@ -16,7 +16,7 @@ from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import triangle_sides
 from orbiflow.tiles.motifs.raster import Grid, polygon_sides, region_sides, runs
 from orbiflow.tiles.search import matched
-from orbiflow.tiles.silhouette import Covered, Frame, Target, deep_channel, open_image
+from orbiflow.tiles.silhouette import Covered, Frame, Target, open_image
 from orbiflow.tiles.tile import EscherTile, TileMap, TileSource
 
 
@@ -104,9 +104,6 @@ class Picture:
 def read_picture(path: Path, tile: EscherTile) -> Picture:
     """Read a picture of a tile's silhouette from a file; it must have the silhouette's aspect."""
     image, notes = open_image(path)
-    if image.mode.startswith(("I", "F")):  # more than 8 bits
-        levels = np.asarray(deep_channel(path, image))
-        image = Image.fromarray((levels * 255 + 0.5).astype(np.uint8))
     image, covered = image.convert("RGBA"), tile.covered
     covered.require_aspect(path, "picture", image.size)
     wide, high = covered.high - covered.low

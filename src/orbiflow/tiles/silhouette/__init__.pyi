@@ -13,8 +13,7 @@ from .outlines import Samples as Samples
 from .outlines import sampled as sampled
 from .pins import Pins as Pins
 from .readers.files import read_outline as read_outline
-from .readers.pictures import deep_channel as deep_channel
-from .readers.pictures import open_image as open_image
+from .readers.image_files import open_image as open_image
 from .readers.pictures import read_mask_array as read_mask_array
 from .readers.reading import FileContent as FileContent
 from .readers.reading import Reading as Reading

@@ -78,7 +78,7 @@ class Emphasis:
         aspect within 1%. Its edges are smoothed by 1/50 of the square root of the silhouette's
         area.
 
-        Raises `InputFileError` for a file over 64 MB or 40 megapixels, one that is damaged or not
+        Raises `InputFileError` for a file over 64 MB or 128 megapixels, one that is damaged or not
         an image, a mask of another aspect, a uniform mask, and one that emphasises no part of the
         silhouette; `OrbiflowError` for a strength that is not above 1 and at most 100.
         """

@@ -1,5 +1,5 @@
 from .files import read_outline as read_outline
-from .pictures import MAX_BYTES as MAX_BYTES
+from .image_files import MAX_BYTES as MAX_BYTES
 from .pictures import Picture as Picture
 from .pictures import read_mask as read_mask
 from .pictures import read_mask_array as read_mask_array

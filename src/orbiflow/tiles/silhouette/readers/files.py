@@ -1,36 +1,24 @@
-"""The reader of all silhouette files, which finds out a file's kind from its content or name.
+"""The reader of all silhouette files, which finds out a file's kind from its content or name."""
 
-Polygons written out as numbers are read here: the `.dat` files of Nagata and Imahori, JSON and GeoJSON.
-"""
-
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from shapely import Polygon
 
 from orbiflow.arguments import as_path
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.runtime import is_list, is_object
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette.outlines import (
-    MAX_VERTICES,
-    clean_ring,
-    is_thread,
-    outer_outline,
-    outer_ring,
-    simplified,
-)
+from orbiflow.tiles.silhouette.outlines import is_thread, outer_outline, outer_ring, simplified
 from orbiflow.tiles.silhouette.readers.pictures import read_image
+from orbiflow.tiles.silhouette.readers.point_lists import read_points
+from orbiflow.tiles.silhouette.readers.polygon_json import read_json, read_wkt
 from orbiflow.tiles.silhouette.readers.reading import (
     FileContent,
     Reading,
     Source,
     check_file,
-    read_bytes,
     read_head,
 )
 from orbiflow.tiles.silhouette.readers.svg import read_svg
@@ -65,9 +53,16 @@ _BY_ENDING = {
     },
 }
 _SVG = re.compile(r"<(\w+:)?svg[\s>]")
+_WKT = re.compile(
+    r"(SRID=\d+;)?\s*(MULTI)?(POLYGON|LINESTRING|POINT)|GEOMETRYCOLLECTION", re.IGNORECASE
+)
 _COUNT_LINE = re.compile(r"\s*\d+\s*[\r\n]")
-_BY_NAME = {".svg": "svg", ".json": "json", ".geojson": "json", ".dat": "dat"}
-_READABLE = "a PNG, JPEG or WebP image, an SVG drawing, a .json polygon or a .dat polygon"
+_BY_NAME = {
+    **{".svg": "svg", ".json": "json", ".geojson": "json", ".wkt": "wkt"},
+    **dict.fromkeys((".dat", ".csv", ".tsv", ".txt", ".xy"), "points"),
+}
+_READERS = {"svg": read_svg, "json": read_json, "wkt": read_wkt, "points": read_points}
+_READABLE = "a PNG, JPEG or WebP image, an SVG drawing, or a polygon (.json, .geojson, .dat, .csv)"
 
 
 def read_outline(
@@ -90,7 +85,7 @@ def read_outline(
             raise OrbiflowError(f"{name} applies to {where}; leave it out")
     # extreme coordinates overflow in the geometry, whose result is then refused
     with np.errstate(all="ignore"):
-        return _bridged({"svg": read_svg, "json": read_json, "dat": read_dat}[kind](path))
+        return _bridged(_READERS[kind](path))
 
 
 def _bridged(reading: Reading) -> Reading:
@@ -125,8 +120,10 @@ def _kind(path: Source, head: bytes) -> str:
             return "svg"
         if text.startswith(("[", "{")):
             return "json"
+        if _WKT.match(text):
+            return "wkt"
         if _COUNT_LINE.match(text):
-            return "dat"
+            return "points"
         # the reader that fits the name of a text file gives the best message
         if path.suffix.lower() in _BY_NAME:
             return _BY_NAME[path.suffix.lower()]
@@ -151,150 +148,3 @@ def _what(path: Source, head: bytes, text: str | None) -> str:
     suffix = f" although its name ends in {path.suffix}" if path.suffix else ""
     kind = "text" if text is not None else "data"
     return f"holds {kind} of an unknown kind{suffix}; give {_READABLE}"
-
-
-MAX_BYTES = 16 * 2**20
-POLYGON_KEYS = ("polygon", "tile", "outline")
-
-
-def read_dat(path: Source) -> Reading:
-    """Read a goal polygon of Nagata and Imahori: a line `n`, then n lines `x y`, with y down.
-
-    Blank lines are passed over; lines after those n are left unread, with a note. Source of the
-    format: https://github.com/nagata-yuichi/EscherTiling.
-    """
-    try:
-        text = read_bytes(path, MAX_BYTES).decode("utf-8-sig")
-    except UnicodeDecodeError as exc:
-        raise InputFileError(
-            f"{path}: not a text file (byte {exc.start} is not UTF-8); a .dat polygon is plain text"
-        ) from exc
-    lines = [(i, line) for i, line in enumerate(text.splitlines(), start=1) if line.strip()]
-    n = _vertex_count(path, lines)
-    if len(lines) - 1 < n:
-        raise InputFileError(
-            f"{path}: line {lines[0][0]} promises {n} vertices and {len(lines) - 1} follow; "
-            "the file is cut short or its first line is wrong"
-        )
-    points = [_vertex(path, *line) for line in lines[1 : n + 1]]
-    outline, notes = clean_ring(points, str(path), InputFileError)
-    extra = len(lines) - 1 - n
-    if extra:
-        what = f"left {extra} line{'s' * (extra > 1)} after the vertices unread"
-        notes.append(f"{what} (line {lines[n + 1][0]} on)")
-    return Reading(outline, True, "dat", None, tuple(notes))
-
-
-def _vertex_count(path: Source, lines: list[tuple[int, str]]) -> int:
-    if not lines:
-        raise InputFileError(f"{path}: the file holds only blank lines; export it again")
-    number, first = lines[0]
-    try:
-        n = int(first)
-    except ValueError as exc:
-        raise InputFileError(
-            f"{path}: line {number}: {_quote(first)} is not a number of vertices; "
-            "a .dat polygon begins with a line that holds just that"
-        ) from exc
-    if not 3 <= n <= MAX_VERTICES:
-        raise InputFileError(
-            f"{path}: line {number}: {n} vertices; from 3 to {MAX_VERTICES} can be read"
-        )
-    return n
-
-
-def _vertex(path: Source, number: int, line: str) -> tuple[float, float]:
-    try:
-        x, y = (float(word) for word in line.split())
-    except ValueError as exc:
-        raise InputFileError(
-            f"{path}: line {number}: {_quote(line)} is not a vertex; write two numbers, `x y`"
-        ) from exc
-    if not np.isfinite([x, y]).all():
-        raise InputFileError(
-            f"{path}: line {number}: {_quote(line)}: every coordinate must be a finite number"
-        )
-    return x, y
-
-
-def read_json(path: Source) -> Reading:
-    """Read a polygon from JSON, with y up unless the file says otherwise.
-
-    Taken are: a list of [x, y] pairs; an object with such a list under "polygon", "tile" or
-    "outline", and optionally `"y_down": true`; the outer ring of a GeoJSON Polygon or of a Feature
-    that holds one.
-    """
-    data = read_bytes(path, MAX_BYTES)
-    try:
-        content = json.loads(data)
-    except json.JSONDecodeError as exc:
-        where = f"line {exc.lineno}, column {exc.colno}"
-        raise InputFileError(f"{path}: {where}: not valid JSON ({exc.msg})") from exc
-    except RecursionError as exc:
-        raise InputFileError(f"{path}: nested too deeply to be a polygon") from exc
-    except ValueError as exc:
-        raise InputFileError(f"{path}: not valid JSON ({exc})") from exc
-    points, y_down, notes = _find_polygon(path, content)
-    _check_pairs(path, points)
-    outline, dropped = clean_ring(points, str(path), InputFileError)
-    return Reading(outline, y_down, "json", None, (*notes, *dropped))
-
-
-def _find_polygon(path: Source, content: object) -> tuple[list[Any], bool, list[str]]:
-    """Return the list of vertices in `content`, whether y points down, and notes."""
-    if is_list(content):
-        return content, False, []
-    if not is_object(content):
-        raise InputFileError(f"{path}: holds a single value, not a polygon; write [[x, y], ...]")
-    if "type" in content and not any(key in content for key in POLYGON_KEYS):
-        points, notes = _geojson_ring(path, content)
-        return points, False, notes
-    keys = [key for key in POLYGON_KEYS if key in content]
-    if not keys:
-        found = ", ".join(_quote(str(key)) for key in list(content)[:8]) or "nothing"
-        raise InputFileError(
-            f'{path}: none of "polygon", "tile", "outline" is in it (it has {found}); '
-            "put the list of vertices under one of them"
-        )
-    points, y_down = content[keys[0]], content.get("y_down", False)
-    if not isinstance(y_down, bool):
-        raise InputFileError(f'{path}: "y_down" must be true or false')
-    if not is_list(points):
-        raise InputFileError(f'{path}: "{keys[0]}" must be a list of [x, y] pairs')
-    notes = [f'took "{keys[0]}", left {", ".join(keys[1:])} unread'] if len(keys) > 1 else []
-    return points, y_down, notes
-
-
-def _geojson_ring(path: Source, content: dict[str, Any]) -> tuple[list[Any], list[str]]:
-    geometry = content.get("geometry") if content["type"] == "Feature" else content
-    if not is_object(geometry) or geometry.get("type") != "Polygon":
-        kind = geometry.get("type") if is_object(geometry) else content["type"]
-        raise InputFileError(
-            f"{path}: GeoJSON of type {_quote(str(kind))}; save one Polygon, or a Feature with one"
-        )
-    rings = geometry.get("coordinates")
-    if not is_list(rings) or not rings or not is_list(rings[0]):
-        raise InputFileError(f'{path}: the GeoJSON Polygon has no ring under "coordinates"')
-    notes: list[str] = []
-    if len(rings) > 1:
-        notes.append(f"filled {len(rings) - 1} hole{'s' * (len(rings) > 2)}")
-    # A GeoJSON position may carry an altitude.
-    if any(is_list(position) and len(position) == 3 for position in rings[0]):
-        notes.append("left the altitudes unread")
-        return [p[:2] if is_list(p) else p for p in rings[0]], notes
-    return rings[0], notes
-
-
-def _check_pairs(path: Source, points: list[Any]) -> None:
-    for i, pair in enumerate(points):
-        if not is_list(pair) or len(pair) != 2 or not all(type(n) in (int, float) for n in pair):
-            raise InputFileError(
-                f"{path}: vertex {i} (counted from 0) is {_quote(json.dumps(pair))}, not a pair of "
-                "numbers [x, y]"
-            )
-
-
-def _quote(text: str) -> str:
-    """Return `text` for a message: short, and on one line."""
-    text = text.strip()
-    return ascii(text if len(text) <= 40 else text[:37] + "...")

@@ -1,50 +1,36 @@
-"""Images: decoding within bounds, and the choice of which part of the picture is the shape.
+"""Images: the choice of which part of the picture is the shape.
 
 Masks are pictures whose light or opaque part is selected.
 """
 
-import re
-import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageOps, UnidentifiedImageError
+from PIL import Image
 from skimage.filters import threshold_otsu
 
 from orbiflow.arguments import described, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.tiles.silhouette.readers.image_files import MAX_PIXELS, check_size, decoded_image
+from orbiflow.tiles.silhouette.readers.label_masks import label_mask
+from orbiflow.tiles.silhouette.readers.outline_drawings import outline_drawing
 from orbiflow.tiles.silhouette.readers.photographs import is_photograph, shape_in
-from orbiflow.tiles.silhouette.readers.reading import (
-    FileContent,
-    Reading,
-    Source,
-    check_file,
-    opened,
-    read_head,
-)
+from orbiflow.tiles.silhouette.readers.reading import FileContent, Reading, Source
 from orbiflow.tiles.silhouette.readers.tracing import Level, trace
 
-MAX_BYTES = 64 * 2**20
-MAX_PIXELS = 40_000_000
 MAX_SIDE = 1500  # pixels; beyond this an image is averaged down before it is traced
 MAX_SIDE_OF_PHOTOGRAPH = 1000  # pixels, in the same way
 MIN_SIDE_OF_PHOTOGRAPH = 16
 MIN_TRANSPARENT = 0.005  # of the picture: less, such as rounded corners, cuts nothing out
 MIN_CONTRAST = 0.04  # of full scale, between the shape's and the background's usual level
-_STARTS = {"PNG": b"\x89PNG", "JPEG": b"\xff\xd8", "WebP": b"RIFF", "GIF": b"GIF", "BMP": b"BM"}
-_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
-# What Pillow raises on a damaged file depends on the format.
-_DAMAGED = (
-    *(OSError, SyntaxError, ValueError, EOFError, KeyError, IndexError, TypeError),
-    *(OverflowError, MemoryError, ArithmeticError, Image.DecompressionBombError),
-)
 # channels that say by themselves where the shape is: their high part and their low part
 _PARTS = {"alpha": ("opaque", "transparent"), "mask": ("marked", "unmarked")}
+_WHOLLY_TRANSPARENT = "the image is wholly transparent; there is no shape in it"
 _PLAIN = "cut it out, photograph it on a plain ground of another colour, or set a threshold"
 
 
@@ -70,15 +56,21 @@ def read_image(
     parts them; with `invert` the shape is the light (or transparent) part; with either, a photograph
     is read like a drawing. Coordinates are those of the image turned as its EXIF orientation asks.
     """
-    image, notes = open_image(path)
+    found = decoded_image(path)
+    image, notes = found.image, [*found.notes]
     if _is_hardly_cut_out(image):
         image, notes = _on_white(image), [*notes, "took the few transparent pixels for white"]
     band, name, band_notes = _channel(path, image)
     picture = None
-    if threshold is None and invert is None and name == "luminance":
-        colours = band if band_notes or band.mode == "F" else image.convert("RGB")
-        picture = _photograph(path, colours, (*notes, *band_notes))
+    if threshold is None and name == "luminance":
+        if found.numbers is not None and (labels := label_mask(found.numbers)):
+            mask, note = labels
+            picture = _drawing(Image.fromarray(mask), "mask", notes, [note])
+        elif invert is None:
+            colours = band if band_notes or band.mode == "F" else image.convert("RGB")
+            picture = _photograph(path, colours, (*notes, *band_notes))
     picture = picture or _drawing(band, name, notes, band_notes)
+    picture = replace(picture, size=found.size, reduced=picture.reduced * found.shrunk)
     return _traced(path, picture, threshold, invert)
 
 
@@ -88,73 +80,15 @@ def _traced(
     if threshold is not None and not (isinstance(threshold, Real) and 0 < threshold < 1):
         raise OrbiflowError(f"threshold must lie between 0 and 1, got {threshold}")
     level, notes = choose_shape(path, picture, threshold, invert)
+    is_given = threshold is not None or picture.name == "photograph"
+    if (drawn := outline_drawing(level, is_given=is_given)) is not None:
+        level, width = drawn.level, drawn.width * picture.reduced
+        notes.append(
+            f"an outline drawing: took the middle of its line, which is {width:.2g} pixels wide"
+        )
     outline, seen, traced = trace(path, level, scale=picture.reduced, size=picture.size)
     notes = (*picture.notes, *notes, *traced)
     return Reading(outline, True, "image", picture.size, notes, seen=seen)
-
-
-def open_image(path: Source, *, enough: int | None = None) -> tuple[Image.Image, list[str]]:
-    """Return the first frame of an image, turned as its EXIF orientation asks, with notes.
-
-    With `enough` pixels a side, a JPEG may be decoded to fewer than it has, which is faster.
-    Raises `InputFileError` for one that is too large, before a pixel of it is decoded, or damaged.
-    """
-    n_bytes = check_file(path)
-    if n_bytes > MAX_BYTES:
-        raise InputFileError(
-            f"{path}: {n_bytes / 2**20:.0f} MB, images over {MAX_BYTES / 2**20:.0f} MB are not "
-            "read; downscale it"
-        )
-    try:
-        with warnings.catch_warnings():
-            # Pillow warns of damaged metadata and of sizes that are refused here anyway.
-            warnings.simplefilter("ignore")
-            with Image.open(opened(path), formats=_FORMATS) as image:
-                check_size(path, image.size)
-                if enough is not None:
-                    image.draft("RGB", (enough, enough))
-                notes = ["took the first frame of several"] * (getattr(image, "n_frames", 1) > 1)
-                if image.getexif().get(0x0112, 1) not in (0, 1):
-                    notes.append("turned the image as its EXIF orientation asks")
-                return ImageOps.exif_transpose(image), notes
-    except InputFileError:
-        raise
-    except Image.DecompressionBombError as exc:
-        n_pixels = max(map(int, re.findall(r"\d+", str(exc))), default=0)
-        raise InputFileError(_too_large(path, f"{n_pixels / 1e6:.0f} megapixels")) from exc
-    except PermissionError as exc:
-        raise InputFileError(f"{path}: cannot be read; check its permissions") from exc
-    except UnidentifiedImageError as exc:
-        raise InputFileError(
-            f"{path}: the {_named(path)} is damaged or cut short, or it is none; give a PNG, JPEG or "
-            "WebP image"
-        ) from exc
-    except _DAMAGED as exc:
-        raise InputFileError(
-            f"{path}: the {_named(path)} is damaged or cut short ({exc}); export or download it again"
-        ) from exc
-
-
-def _named(path: Source) -> str:
-    """Return the kind of an image by its first bytes, such as "PNG image"."""
-    head = read_head(path, 12)
-    kinds = (k for k, starts in _STARTS.items() if head.startswith(starts))
-    return f"{next(kinds, '')} image".strip()
-
-
-def check_size(path: Source, size: tuple[int, int]) -> None:
-    """Raise InputFileError for a picture of `size` (width, height) that is too large or too small."""
-    width, height = size
-    if width * height > MAX_PIXELS:
-        raise InputFileError(
-            _too_large(path, f"{width} x {height} pixels ({width * height / 1e6:.0f} megapixels)")
-        )
-    if width * height < 2:
-        raise InputFileError(f"{path}: {width} x {height} pixels cannot hold a silhouette")
-
-
-def _too_large(path: Source, size: str) -> str:
-    return f"{path}: {size}, at most {MAX_PIXELS // 10**6} megapixels are read; downscale the image"
 
 
 def _reduced(band: Image.Image, most: int = MAX_SIDE) -> tuple[Array, int, list[str]]:
@@ -185,55 +119,40 @@ def _photograph(path: Source, image: Image.Image, notes: Sequence[str]) -> Pictu
     return Picture(channel, "photograph", image.size, reduced, (*notes, *averaging))
 
 
-def _bands(path: Source, image: Image.Image) -> tuple[Image.Image, Image.Image | None]:
-    """Return the luminance, mode "L" (0 to 255) or "F" (0 to 1), and the opacity, if there is one."""
-    if image.mode.startswith(("I", "F")):
-        return deep_channel(path, image), None
-    if not image.has_transparency_data:
-        return image.convert("L"), None
-    rgba = image.convert("RGBA")
-    return rgba.convert("RGB").convert("L"), rgba.getchannel("A")
-
-
 def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, str, list[str]]:
     """Return the channel that shows the shape."""
-    luminance, alpha = _bands(path, image)
-    low, high = (255, 255) if alpha is None else np.asarray(alpha.getextrema()).tolist()
+    if image.mode != "RGBA":
+        return (image if image.mode == "F" else image.convert("L")), "luminance", []
+    alpha = image.getchannel("A")
+    low, high = np.asarray(alpha.getextrema()).tolist()
     if high == 0:
-        raise InputFileError(f"{path}: the image is wholly transparent; there is no shape in it")
-    if alpha is None or low == 255:
-        return luminance, "luminance", []
+        raise InputFileError(f"{path}: {_WHOLLY_TRANSPARENT}{_hidden(image)}")
+    if low == 255:
+        return image.convert("RGB").convert("L"), "luminance", []
     if low < 128 <= high:
         return alpha, "alpha", []
     return _on_white(image).convert("L"), "luminance", ["laid the half-transparent image on white"]
 
 
+def _hidden(image: Image.Image) -> str:
+    """Return a hint where a transparent image has colours all the same."""
+    extrema: Any = image.convert("RGB").getextrema()
+    shows = any(high - low > MIN_CONTRAST * 255 for low, high in extrema)
+    return "; its colours have one: save it without transparency (without an alpha channel)" * shows
+
+
 def _on_white(image: Image.Image) -> Image.Image:
     white = Image.new("RGBA", image.size, "white")
-    return Image.alpha_composite(white, image.convert("RGBA")).convert("RGB")
+    return Image.alpha_composite(white, image).convert("RGB")
 
 
 def _is_hardly_cut_out(image: Image.Image) -> bool:
     """Whether some pixels are transparent, but too few for a background, and the rest has a shape."""
-    if image.mode.startswith(("I", "F")) or not image.has_transparency_data:
+    if image.mode != "RGBA":
         return False
-    rgba = np.asarray(image.convert("RGBA"))
+    rgba = np.asarray(image)
     opaque = rgba[..., 3] >= 128
     return 1 - MIN_TRANSPARENT < opaque.mean() < 1 and np.ptp(rgba[opaque][:, :3], axis=0).any()
-
-
-def deep_channel(path: Source, image: Image.Image) -> Image.Image:
-    """Return a channel of more than 8 bits as mode "F", 0 to 1."""
-    values = np.asarray(image, dtype=np.float32)
-    if not np.isfinite(values).all():
-        raise InputFileError(f"{path}: holds pixels that are not finite numbers; export it as PNG")
-    low, high = float(values.min()), float(values.max())
-    if image.mode == "F" or low < 0 or high > 65535:
-        # No full scale is known: the image's own range stands in for it.
-        values, full_scale = values - low, max(high - low, np.finfo(np.float32).tiny)
-    else:
-        full_scale = 65535.0
-    return Image.fromarray(values / np.float32(full_scale))
 
 
 def choose_shape(
@@ -310,8 +229,9 @@ def read_mask_array(
     """Return the outline of the shape in an array (H, W), in pixels with y down.
 
     Booleans, and integers that are 0 and 1 alone, say where the shape is; with `invert`, where it
-    is not. Other integers of 8 or 16 bits are gray levels of that full scale, floats of full scale
-    1: `threshold` and `invert` mean what they do for images (see `read_image`).
+    is not. So do labels, of which the largest is the shape (see `label_mask`). Other integers of 8 or
+    16 bits are gray levels of that full scale, floats of full scale 1: `threshold` and `invert` mean
+    what they do for images (see `read_image`).
 
     Raises:
         OrbiflowError: for another shape or type, levels out of range, or a setting that does not fit.
@@ -319,8 +239,9 @@ def read_mask_array(
     """
     source = FileContent(b"", name)
     array = _array(values, name)
-    check_size(source, array.shape[::-1])
-    levels, is_mask = _levels(array, name)
+    check_size(source, array.shape[::-1], MAX_PIXELS)
+    labels = label_mask(array) if array.dtype.kind in "iu" and array.max(initial=0) > 1 else None
+    levels, is_mask = _levels(array if labels is None else labels[0] > 0, name)
     if is_mask and threshold is not None:
         raise OrbiflowError(
             f"{name}: threshold parts gray levels, and this is a mask; leave it out"
@@ -328,7 +249,8 @@ def read_mask_array(
     band = Image.fromarray(levels)
     by_colour = not is_mask and threshold is None and invert is None
     picture = _photograph(source, band, ()) if by_colour else None
-    picture = picture or _drawing(band, "mask" if is_mask else "luminance")
+    more = () if labels is None else (labels[1],)
+    picture = picture or _drawing(band, "mask" if is_mask else "luminance", more=more)
     return _traced(source, picture, threshold, invert)
 
 
@@ -372,9 +294,11 @@ _PAINT = "paint what must survive white and the rest black"
 
 def read_mask(path: Source) -> Picture:
     """Read a mask from an image: its opacity where some is more transparent, else its luminance."""
-    image, notes = open_image(path)
-    band, alpha = _bands(path, image)
-    if alpha is not None:
+    found = decoded_image(path)
+    image, notes = found.image, [*found.notes]
+    band = image if image.mode == "F" else image.convert("RGB").convert("L")
+    if image.mode == "RGBA":
+        alpha = image.getchannel("A")
         least, most = np.asarray(alpha.getextrema()).tolist()
         if most < MIN_CONTRAST * 255:
             raise InputFileError(
@@ -393,4 +317,4 @@ def read_mask(path: Source) -> Picture:
             f"{path}: the mask is uniform, its levels are {low:.2f} to {high:.2f} of white, and "
             f"emphasises nothing above the rest; {_PAINT}"
         )
-    return Picture(levels, "mask", image.size, reduced, tuple(notes))
+    return Picture(levels, "mask", found.size, reduced * found.shrunk, tuple(notes))

@@ -42,8 +42,8 @@ class Reading:
     - `outline`: A simple ring (N, 2) without a repeated last vertex, in the file's own units. In an
       image the unit is the pixel and (0, 0) the top left corner, so that pixel (row 0, column 0) spans
       [0, 1] x [0, 1].
-    - `y_down`: Whether the file's y axis points down (images, SVG and `.dat` files).
-    - `kind`: "image", "svg", "dat", "json" or "polygon".
+    - `y_down`: Whether the file's y axis points down (images, SVG and goal polygons).
+    - `kind`: "image", "svg", "dat" (a list of points), "json" (WKT as well) or "polygon".
     - `size`, `corner`: The width and height of the picture or drawing, if there is one, and its corner
       of least coordinates.
     - `notes`: What was decided for the user, in plain words.
@@ -100,3 +100,9 @@ def read_head(path: Source, n: int) -> bytes:
     except OSError as exc:
         reason = f"cannot be read ({exc.strerror})"
         raise InputFileError(f"{path}: {reason}; check its permissions") from exc
+
+
+def quoted(text: str) -> str:
+    """Return `text` for a message: short, and on one line."""
+    text = text.strip()
+    return ascii(text if len(text) <= 40 else text[:37] + "...")

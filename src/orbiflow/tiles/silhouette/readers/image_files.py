@@ -1,0 +1,341 @@
+"""Image files, decoded within bounds to what each pixel shows, whatever its depth and transparency."""
+
+import re
+import warnings
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
+
+from orbiflow.errors import InputFileError
+from orbiflow.tiles.silhouette.readers.label_masks import DARKEST
+from orbiflow.tiles.silhouette.readers.reading import Source, check_file, opened, read_head
+
+MAX_BYTES = 64 * 2**20
+MAX_PIXELS = 40_000_000  # that are kept: of a larger image, several become one
+MAX_PIXELS_READ = 128_000_000  # before they are shrunk: telephones have 48 or 108 million
+MAX_FRAMES = 100  # of an animation, in which one that shows anything is sought
+FULL_SCALES = (255.0, 1023.0, 4095.0, 16383.0, 65535.0)  # of 8, 10, 12, 14 and 16 bits
+STRIP = 256  # rows of the shrunk image that are made at once
+MIN_COLOURS = 10  # of 255: a palette whose colours differ less shows nothing
+_STARTS = {
+    **{"PNG": b"\x89PNG", "JPEG": b"\xff\xd8", "WebP": b"RIFF", "GIF": b"GIF", "BMP": b"BM"},
+    **{"TIFF": b"II*\0", "big-endian TIFF": b"MM\0*"},
+}
+_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
+# What Pillow raises on a damaged file depends on the format.
+_DAMAGED = (
+    *(OSError, SyntaxError, ValueError, EOFError, KeyError, IndexError, TypeError),
+    *(OverflowError, MemoryError, ArithmeticError, Image.DecompressionBombError),
+)
+_PNG_SCALES = {
+    "L;2": 85,
+    "L;4": 17,
+}  # Pillow scales these levels to 255, but not the transparent one
+Numbers = NDArray[np.integer[Any]]
+
+
+@dataclass(frozen=True)
+class DecodedImage:
+    """The first frame of an image file that shows anything, turned as its EXIF orientation asks.
+
+    - `image`: Of mode "L", "RGB", "RGBA" (not premultiplied), or "F" (0 to 1, of more than 8 bits).
+    - `size`: The width and height of the image in the file, turned, in pixels.
+    - `shrunk`: How many of those pixels are one of `image`'s wide.
+    - `numbers`: The whole number (H, W) that stands in the file for each pixel, if that may be a label:
+      of grey images, and of palettes without colours. Not of shrunk images.
+    - `notes`: What was decided for the user.
+    """
+
+    image: Image.Image
+    size: tuple[int, int]
+    shrunk: int
+    numbers: Numbers | None
+    notes: tuple[str, ...]
+
+
+def open_image(path: Source, *, enough: int | None = None) -> tuple[Image.Image, list[str]]:
+    """Return the picture of `decoded_image`, 8 bits deep, and its notes."""
+    found = decoded_image(path, enough=enough)
+    return eight_bits(found.image), list(found.notes)
+
+
+def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
+    """Decode an image file.
+
+    With `enough` pixels a side, a JPEG may be decoded to fewer than it has, which is faster.
+    Raises `InputFileError` for one that is too large, before a pixel of it is decoded, or damaged.
+    """
+    n_bytes = check_file(path)
+    if n_bytes > MAX_BYTES:
+        raise InputFileError(
+            f"{path}: {n_bytes / 2**20:.0f} MB, images over {MAX_BYTES / 2**20:.0f} MB are not "
+            "read; downscale it"
+        )
+    try:
+        with warnings.catch_warnings():
+            # Pillow warns of damaged metadata and of sizes that are refused here anyway.
+            warnings.simplefilter("ignore")
+            with Image.open(opened(path), formats=_FORMATS) as file:
+                return _first_shown(path, file, enough)
+    except InputFileError:
+        raise
+    except Image.DecompressionBombError as exc:
+        n_pixels = max(map(int, re.findall(r"\d+", str(exc))), default=0)
+        raise InputFileError(_too_large(path, f"{n_pixels / 1e6:.0f} megapixels")) from exc
+    except PermissionError as exc:
+        raise InputFileError(f"{path}: cannot be read; check its permissions") from exc
+    except UnidentifiedImageError as exc:
+        raise InputFileError(f"{path}: {_unidentified(path)}") from exc
+    except _DAMAGED as exc:
+        raise InputFileError(
+            f"{path}: the {_named(path)} is damaged or cut short ({exc}); export or download it again"
+        ) from exc
+
+
+def _named(path: Source) -> str:
+    """Return the kind of an image by its first bytes, such as "PNG image"."""
+    head = read_head(path, 12)
+    kinds = (k for k, starts in _STARTS.items() if head.startswith(starts))
+    return f"{next(kinds, '')} image".strip()
+
+
+def _unidentified(path: Source) -> str:
+    if "TIFF" in _named(path):
+        return (
+            "this kind of TIFF image (such as colours of floating-point numbers) is not read, or it is "
+            "damaged; save it as PNG"
+        )
+    return (
+        f"the {_named(path)} is damaged or cut short, or it is none; give a PNG, JPEG or WebP image"
+    )
+
+
+def check_size(path: Source, size: tuple[int, int], most: int = MAX_PIXELS_READ) -> None:
+    """Raise InputFileError for a picture of `size` (width, height) that is too large or too small."""
+    width, height = size
+    if width * height > most:
+        pixels = f"{width} x {height} pixels ({width * height / 1e6:.0f} megapixels)"
+        raise InputFileError(_too_large(path, pixels, most))
+    if width * height < 2:
+        raise InputFileError(f"{path}: {width} x {height} pixels cannot hold a silhouette")
+
+
+def _too_large(path: Source, size: str, most: int = MAX_PIXELS_READ) -> str:
+    return f"{path}: {size}, at most {most // 10**6} megapixels are read; downscale the image"
+
+
+def _first_shown(path: Source, file: Any, enough: int | None) -> DecodedImage:
+    """Return the first frame that shows anything, or the first of all."""
+    n_frames = getattr(file, "n_frames", 1)
+    first: DecodedImage | None = None
+    pixels = 0
+    for number in range(min(n_frames, MAX_FRAMES)):
+        file.seek(number)
+        pixels += file.width * file.height
+        if first is not None and pixels > MAX_PIXELS_READ:
+            break
+        which = (
+            "the first frame"
+            if number == 0
+            else f"frame {number + 1}, the first that shows anything,"
+        )
+        notes = [f"took {which} of {n_frames}"] * (n_frames > 1)
+        found = _frame(path, file, enough, notes)
+        if n_frames == 1 or _shows_anything(found.image):
+            return found
+        first = first or found
+    assert first is not None
+    return first
+
+
+def _shows_anything(image: Image.Image) -> bool:
+    extrema: Any = image.getextrema()
+    bands = [extrema] if len(image.getbands()) == 1 else extrema
+    transparent = image.mode == "RGBA" and bands[3][1] == 0
+    return not transparent and any(low != high for low, high in bands)
+
+
+def _frame(path: Source, file: Any, enough: int | None, notes: list[str]) -> DecodedImage:
+    is_jpeg = file.format in ("JPEG", "MPO")
+    check_size(path, file.size)
+    width, height = size = file.size
+    stored = str(file.tile[0][3]) if file.format == "PNG" and file.tile else ""
+    shrunk = _shrinking(width, height, is_jpeg)
+    if shrunk > 1:
+        megapixels = f"{width * height / 1e6:.0f} megapixels"
+        notes.append(f"shrank the image of {megapixels}: {shrunk} x {shrunk} pixels became one")
+    if is_jpeg and (shrunk > 1 or enough is not None):
+        least = enough if enough is not None and shrunk == 1 else min(size) // shrunk
+        file.draft("RGB", (least, least))
+    orientation = file.getexif().get(0x0112, 1)
+    is_turned = orientation not in (0, 1)
+    if is_turned:
+        notes.append("turned the image as its EXIF orientation asks")
+        # Pillow itself turns TIFFs, their size included
+        size = (height, width) if orientation >= 5 and file.format != "TIFF" else size
+    raw = _Raw.of(path, file, stored)
+    turn = None if file.format == "TIFF" else _TURNS.get(orientation)
+    if shrunk > 1:
+        image = _shrunk(path, raw, max(1, round(shrunk * file.width / width)), notes)
+        image = image if turn is None else image.transpose(turn)
+        return DecodedImage(image, size, shrunk, None, tuple(notes))
+    raw = raw if turn is None else raw.turned(turn)
+    image = raw.normal(_scale(path, raw, notes))
+    return DecodedImage(image, size, 1, _numbers(raw, image), tuple(notes))
+
+
+def _shrinking(width: int, height: int, is_jpeg: bool) -> int:
+    """Return how many pixels become one each way; JPEGs are decoded to halves, quarters or eighths."""
+    shrunk = 1
+    while -(-width // shrunk) * -(-height // shrunk) > MAX_PIXELS:
+        shrunk += shrunk if is_jpeg else 1
+    return shrunk
+
+
+@dataclass(frozen=True)
+class _Raw:
+    """What Pillow decodes, of any mode, and what it leaves to be done.
+
+    - `low`: Of colours of 16 bits, their lower bytes, where they decide what is transparent.
+    - `key`: The level or the colour, as in the pixels, that is transparent; None if none or many are.
+    """
+
+    image: Image.Image
+    low: Image.Image | None = None
+    key: int | tuple[int, ...] | None = None
+
+    @classmethod
+    def of(cls, path: Source, file: Any, stored: str) -> "_Raw":
+        """Load the frame that an open file stands at; a PNG has pixels as `stored`, such as "L;2"."""
+        file.load()
+        key: Any = file.info.get("transparency")
+        if file.mode == "RGB" and isinstance(key, tuple):
+            if stored != "RGB;16B":
+                return cls(file, None, tuple(int(level) & 255 for level in cast(Any, key)))
+            with Image.open(opened(path), formats=_FORMATS) as again:
+                again.tile = [again.tile[0]._replace(args="RGB;16L")]  # the other byte of each
+                again.load()
+            return cls(file, again, tuple(map(int, cast(Any, key))))
+        if file.mode in ("L", "I;16", "I;16B") and isinstance(key, int):
+            bits = 16 if file.mode != "L" else int(stored.partition(";")[2] or 8)
+            return cls(file, None, (key & (2**bits - 1)) * _PNG_SCALES.get(stored, 1))
+        return cls(file)
+
+    def turned(self, turn: Image.Transpose) -> "_Raw":
+        """Return it turned or mirrored."""
+        low = None if self.low is None else self.low.transpose(turn)
+        return _Raw(self.image.transpose(turn), low, self.key)
+
+    def rows(self, top: int, bottom: int) -> "_Raw":
+        """Return some of the rows."""
+        box = (0, top, self.image.width, bottom)
+        low = None if self.low is None else self.low.crop(box)
+        return _Raw(self.image.crop(box), low, self.key)
+
+    def normal(self, full_scale: "FullScale | None") -> Image.Image:
+        """Return the image as `DecodedImage` has it."""
+        image = self.image
+        if full_scale is not None:
+            found = full_scale.applied(image)
+            if self.key is None:
+                return found
+            image = eight_bits(found)
+        elif self.key is None:
+            if image.has_transparency_data:
+                return image.convert("RGBA")
+            return image.convert("L" if image.mode in ("1", "L") else "RGB")
+        values = np.asarray(self.image)
+        if self.low is not None:
+            values = values.astype(np.uint16) * 256 + np.asarray(self.low)
+        differs = values != np.asarray(self.key)
+        opaque = differs if differs.ndim == 2 else differs.any(axis=2)
+        image = image.convert("RGB")
+        image.putalpha(Image.fromarray(np.where(opaque, 255, 0).astype(np.uint8)))
+        return image
+
+
+# by EXIF orientation
+_TURNS = {
+    2: Image.Transpose.FLIP_LEFT_RIGHT,
+    3: Image.Transpose.ROTATE_180,
+    4: Image.Transpose.FLIP_TOP_BOTTOM,
+    5: Image.Transpose.TRANSPOSE,
+    6: Image.Transpose.ROTATE_270,
+    7: Image.Transpose.TRANSVERSE,
+    8: Image.Transpose.ROTATE_90,
+}
+
+
+@dataclass(frozen=True)
+class FullScale:
+    """The levels of black and white in an image of more than 8 bits."""
+
+    black: float
+    white: float
+
+    @classmethod
+    def of(cls, path: Source, image: Image.Image) -> tuple["FullScale", list[str]]:
+        """Return the least of `FULL_SCALES` for whole numbers, with a note if it is not of 16 bits.
+
+        Of other numbers none is known: the image's own range stands in for it.
+        """
+        values = np.asarray(image)
+        low, high = float(values.min()), float(values.max())
+        if not np.isfinite([low, high]).all():
+            raise InputFileError(
+                f"{path}: holds pixels that are not finite numbers; export it as PNG"
+            )
+        if image.mode == "F" or low < 0 or high > FULL_SCALES[-1]:
+            return cls(low, max(high, low + float(np.finfo(np.float32).tiny))), []
+        white = next(scale for scale in FULL_SCALES if high <= scale)
+        note = f"took {white:.0f} for white: the levels, of 16 bits or more, go up to {high:.0f}"
+        return cls(0.0, white), [note] * (DARKEST < high <= FULL_SCALES[-2])
+
+    def applied(self, image: Image.Image) -> Image.Image:
+        """Return the image as mode "F", 0 to 1."""
+        values = np.asarray(image, dtype=np.float32) - np.float32(self.black)
+        return Image.fromarray(values / np.float32(self.white - self.black))
+
+
+def eight_bits(image: Image.Image) -> Image.Image:
+    """Return an image of mode "F", 0 to 1, as "L", and any other as it is."""
+    if image.mode != "F":
+        return image
+    return Image.fromarray((np.asarray(image) * 255 + 0.5).astype(np.uint8))
+
+
+def _scale(path: Source, raw: _Raw, notes: list[str]) -> FullScale | None:
+    if not raw.image.mode.startswith(("I", "F")):
+        return None
+    found, more = FullScale.of(path, raw.image)
+    notes += more
+    return found
+
+
+def _shrunk(path: Source, raw: _Raw, factor: int, notes: list[str]) -> Image.Image:
+    """Return the image with `factor` x `factor` pixels averaged into one, by strips: it is large."""
+    scale = _scale(path, raw, notes)
+    if factor == 1:
+        return raw.normal(scale)
+    width, height = raw.image.size
+    strips: list[tuple[int, Image.Image]] = []
+    for top in range(0, height, STRIP * factor):
+        strip = raw.rows(top, min(top + STRIP * factor, height)).normal(scale)
+        strips.append((top // factor, strip.reduce(factor)))
+    whole = Image.new(strips[0][1].mode, (-(-width // factor), -(-height // factor)))
+    for top, strip in strips:
+        whole.paste(strip, (0, top))
+    return whole
+
+
+def _numbers(raw: _Raw, normal: Image.Image) -> Numbers | None:
+    """Return the numbers of the pixels that may be labels: see `DecodedImage`."""
+    mode = raw.image.mode
+    is_grey = mode == "L" or mode.startswith("I")
+    if mode == "P" and normal.mode == "RGB":
+        extrema: Any = normal.getextrema()
+        is_grey = all(high - low < MIN_COLOURS for low, high in extrema)
+    return np.asarray(raw.image) if is_grey and raw.key is None else None

@@ -1,0 +1,55 @@
+"""Label masks: pictures whose numbers are names of regions, and not levels of grey."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from orbiflow.arrays import Array
+
+DARKEST = 10  # of 255: numbers no larger cannot be told apart as levels
+FEW = 40  # three numbers or more, and none larger, are labels if their regions are even
+MOST_LABELS = 256
+MAX_STRAY = (
+    0.1  # of the pixels on borders between regions: those of labels that fill no 3 x 3 pixels
+)
+
+_Mask = NDArray[np.bool_]
+
+
+def label_mask(numbers: Array | NDArray[np.integer[Any]]) -> tuple[NDArray[np.uint8], str] | None:
+    """Return where the largest label is, 255 and 0 (H, W), and a note; None if these are no labels.
+
+    Labels are small whole numbers, or 0, 1, 2 and so on, each of which fills regions. Levels of grey
+    are not: between two levels of an anti-aliased or noisy picture there are others, which fill none.
+    The label that most of the border has is the background.
+    """
+    low, high = int(numbers.min()), int(numbers.max())
+    if low < 0 or high > 65535 or low == high:
+        return None
+    counts = np.bincount(numbers.ravel())
+    values = np.flatnonzero(counts)
+    n = len(values)
+    are_few = high <= (DARKEST if n == 2 else FEW)
+    if n > MOST_LABELS or not (are_few or (n > 2 and low <= 1 and high - low == n - 1)):
+        return None
+    even = ndimage.maximum_filter(numbers, 3) == ndimage.minimum_filter(numbers, 3)
+    filling = np.bincount(numbers[even], minlength=len(counts)) > 0
+    if counts[~filling].sum() > MAX_STRAY * (~even).sum():
+        return None
+    border = np.concatenate([numbers[0], numbers[-1], numbers[1:-1, 0], numbers[1:-1, -1]])
+    background = int(np.bincount(border).argmax())
+    counts[background] = 0
+    label, labelled = int(counts.argmax()), int(counts.sum())
+    mask = np.where(numbers == label, 255, 0).astype(np.uint8)
+    if n == 2:
+        return (
+            mask,
+            f"label mask: took the pixels of {label} for the shape, of {background} for background",
+        )
+    share = f"{counts[label] / labelled:.0%} of what is labelled"
+    return mask, (
+        f"label mask: took label {label}, the largest of {n - 1} ({share}), background {background}; "
+        "to take several, give them one label"
+    )

@@ -1,0 +1,244 @@
+"""Polygons as lines of text, two numbers for each vertex: goal polygons, aerofoils, tables of points.
+
+- A goal polygon of Nagata and Imahori (`.dat`): a line `n`, then n lines `x y`, with y down. Source of
+  the format: https://github.com/nagata-yuichi/EscherTiling.
+- An aerofoil (`.dat`), with y up: a title, then the points from the trailing edge around the nose and
+  back (Selig), or the numbers of points of both sides and then these, each from the nose (Lednicer).
+- Points in two columns or under a header that names them, with y up.
+"""
+
+import re
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from orbiflow.arrays import Array
+from orbiflow.errors import InputFileError
+from orbiflow.tiles.silhouette.outlines import MAX_VERTICES, clean_ring
+from orbiflow.tiles.silhouette.readers.reading import Reading, Source, quoted, read_bytes
+
+MAX_BYTES = 16 * 2**20
+HIGHEST = 0.6  # of an aerofoil's length: its height
+NEAR = 0.05  # of an aerofoil's length: its ends, and its nose, are so near those of its box
+COLUMNS = {
+    "x": ("x", "lon", "lng", "long", "longitude", "easting", "east"),
+    "y": ("y", "lat", "latitude", "northing", "north"),
+}
+_AXES = {name: axis for axis, names in COLUMNS.items() for name in names}
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")  # of "pickup_longitude" and "decimalLatitude"
+_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?")
+
+
+class _Line(NamedTuple):
+    number: int  # in the file, from 1
+    text: str
+    run: int  # how many times blank lines came before it
+
+
+def read_points(path: Source) -> Reading:
+    """Read a polygon from lines of text: see above.
+
+    Raises `InputFileError` for anything else, with the line that does not fit.
+    """
+    lines = _lines(path)
+    first = lines[0]
+    pairs = [_pair(line.text) for line in lines]
+    if pairs[0] is not None:
+        known = np.array([pair for pair in pairs if pair is not None])
+        is_title = _is_aerofoil(known[1:]) and abs(known[0]).max() > 2 * abs(known[1:]).max()
+        return _plain(path, lines[int(is_title) :], first.text if is_title else "")
+    if re.fullmatch(r"\s*\d+\s*", first.text):
+        return _counted(path, lines, pairs[1:])
+    header = [_axis(cell) for cell in _cells(first.text)]
+    if {"x", "y"} <= {*header} and len(header) == len(_cells(lines[min(1, len(lines) - 1)].text)):
+        return _table(path, lines, header)
+    if len(lines) > 3 and pairs[1] is not None:
+        return _plain(path, lines[1:], first.text)
+    raise InputFileError(
+        f"{path}: line {first.number}: {quoted(first.text)} is not a number of vertices, a vertex (two "
+        "numbers, `x y`) or a title of lines that are; save the polygon as one of these"
+    )
+
+
+def _lines(path: Source) -> list[_Line]:
+    """Return lines that are neither blank nor comments."""
+    try:
+        text = read_bytes(path, MAX_BYTES).decode("utf-8-sig")
+    except UnicodeDecodeError as exc:
+        raise InputFileError(
+            f"{path}: not a text file (byte {exc.start} is not UTF-8); a list of points is one"
+        ) from exc
+    lines: list[_Line] = []
+    run = after_blank = 0
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip():
+            after_blank = 1
+        elif not line.lstrip().startswith("#"):
+            run += after_blank if lines else 0
+            after_blank = 0
+            lines.append(_Line(number, line, run))
+    if not lines:
+        raise InputFileError(f"{path}: the file holds only blank lines; export it again")
+    return lines
+
+
+def _cells(text: str) -> list[str]:
+    """Return the cells of a line: parted by semicolons, tabs, commas or blanks, the first that it has.
+
+    Where blanks part them, every number may have a decimal comma.
+    """
+    text = text.strip()
+    for separator in (";", "\t"):
+        if separator in text:
+            return [cell.strip() for cell in text.rstrip(separator).split(separator)]
+    words = text.split()
+    if len(words) > 1 and all(re.fullmatch(r"[+-]?\d+,\d+", word) for word in words):
+        return words
+    if "," in text:
+        return [cell.strip() for cell in text.rstrip(",").split(",")]
+    return words
+
+
+def _value(cell: str) -> float | None:
+    cell = cell.strip().strip('"').replace("\u2212", "-")
+    if not _NUMBER.fullmatch(cell):
+        return None
+    return float(cell.replace(",", "."))
+
+
+def _pair(text: str) -> tuple[float, float] | None:
+    values = [_value(cell) for cell in _cells(text)]
+    if len(values) != 2 or values[0] is None or values[1] is None:
+        return None
+    return values[0], values[1]
+
+
+def _axis(cell: str) -> str:
+    """Return the axis that a column's name says, or ""."""
+    axes = {_AXES.get(word.lower(), "") for word in _WORD.findall(cell)} - {""}
+    return axes.pop() if len(axes) == 1 else ""
+
+
+def _vertex(path: Source, line: _Line) -> tuple[float, float]:
+    pair = _pair(line.text)
+    if pair is not None and np.isfinite(pair).all():
+        return pair
+    where = f"{path}: line {line.number}: {quoted(line.text)}"
+    if pair is not None or re.search(r"nan|inf", line.text, re.IGNORECASE):
+        raise InputFileError(f"{where}: every coordinate must be a finite number")
+    more = len(_cells(line.text)) > 2
+    cure = "; of more columns, name two in a header, x and y" if more else ""
+    raise InputFileError(f"{where} is not a vertex; write two numbers, `x y`{cure}")
+
+
+def _counted(path: Source, lines: list[_Line], pairs: list[tuple[float, float] | None]) -> Reading:
+    """Read a goal polygon, or an aerofoil whose title is a number."""
+    first, rest = lines[0], lines[1:]
+    title = first.text.strip()
+    n = int(title) if len(title) < 10 else MAX_VERTICES + 1
+    known = np.array([pair for pair in pairs if pair is not None], dtype=float).reshape(-1, 2)
+    is_title = n != len(rest) or title.startswith("0")
+    runs = [line.run for line in rest]
+    if is_title and None not in pairs and (_is_aerofoil(known) or _sides(known, runs) is not None):
+        return _plain(path, rest, title)
+    if not 3 <= n <= MAX_VERTICES:
+        raise InputFileError(
+            f"{path}: line {first.number}: {title[:20]} vertices; from 3 to {MAX_VERTICES} can be read"
+        )
+    if len(rest) < n:
+        raise InputFileError(
+            f"{path}: line {first.number} promises {n} vertices and {len(rest)} follow; "
+            "the file is cut short or its first line is wrong"
+        )
+    extra = rest[n:]
+    points = [_vertex(path, line) for line in rest[:n]]
+    also = [line for line in extra if _pair(line.text) is not None]
+    if [_pair(line.text) for line in also] == [points[0]]:  # the ring is closed
+        extra, also = [line for line in extra if line not in also], []
+    if also:
+        raise InputFileError(
+            f"{path}: line {first.number} promises {n} vertices and {n + len(also)} follow; correct "
+            "it, or remove it if it is a title"
+        )
+    outline, notes = clean_ring(points, str(path), InputFileError)
+    if extra:
+        what = f"left {len(extra)} line{'s' * (len(extra) > 1)} after the vertices unread"
+        notes.append(f"{what} (line {extra[0].number} on)")
+    return Reading(outline, True, "dat", None, tuple(notes))
+
+
+def _plain(path: Source, lines: list[_Line], title: str) -> Reading:
+    """Read lines of two numbers, below a title or none: an aerofoil of one run or two, or a ring."""
+    notes = [f"took line {lines[0].number - 1} for a title: {quoted(title)}"] if title else []
+    points = np.array([_vertex(path, line) for line in lines])
+    sides = _sides(points, [line.run for line in lines])
+    if sides is not None:
+        upper, lower = sides
+        points = np.concatenate([upper[::-1], lower[1:] if (upper[0] == lower[0]).all() else lower])
+        notes.append("joined the two sides of an aerofoil at its nose")
+    elif lines[0].run != lines[-1].run:
+        later = next(b for a, b in pairwise(lines) if a.run != b.run)
+        raise InputFileError(
+            f"{path}: line {later.number} begins another run of points, after a blank line; save one "
+            "outline alone"
+        )
+    outline, dropped = clean_ring(points, str(path), InputFileError)
+    return Reading(outline, False, "dat", None, (*notes, *dropped, "took y to point up"))
+
+
+def _sides(points: Array, runs: list[int]) -> tuple[Array, Array] | None:
+    """Return the sides of an aerofoil in Lednicer's format, each from the nose; None if it is none."""
+    if len(points) < 2:
+        return None
+    counts, rest = points[0], points[1:]
+    if (counts > 1).all() and (counts % 1 == 0).all() and counts.sum() == len(rest):
+        sides = rest[: int(counts[0])], rest[int(counts[0]) :]
+    elif len({*runs}) == 2:
+        n = runs.index(runs[-1])
+        sides = points[:n], points[n:]
+    else:
+        return None
+    is_one = len(sides[0]) > 1 < len(sides[1]) and _is_aerofoil(
+        np.vstack([sides[0][::-1], sides[1]])
+    )
+    return sides if is_one else None
+
+
+def _is_aerofoil(points: Array) -> bool:
+    """Whether points run from the end of least or greatest x around the nose and back to it."""
+    if len(points) < 5:
+        return False
+    low, high = points.min(axis=0), points.max(axis=0)
+    length = high[0] - low[0]
+    ends = (points[[0, -1], 0] > high[0] - NEAR * length).all()
+    nose = int(np.argmin(points[:, 0]))
+    steps = np.sign(np.diff(points[:, 0]))
+    is_monotonic = (steps[:nose] <= 0).all() and (steps[nose:] >= 0).all()
+    return bool(ends and is_monotonic and high[1] - low[1] < HIGHEST * length)
+
+
+def _table(path: Source, lines: list[_Line], header: list[str]) -> Reading:
+    """Read the columns x and y, or longitude and latitude, that a header names."""
+    if header.count("x") > 1 or header.count("y") > 1:
+        raise InputFileError(
+            f"{path}: line {lines[0].number}: {quoted(lines[0].text)} names several columns of x or "
+            "of y; keep one of each"
+        )
+    names = _cells(lines[0].text)
+    at = [header.index("x"), header.index("y")]
+    points: list[tuple[float, float]] = []
+    for line in lines[1:]:
+        cells = _cells(line.text)
+        values = [_value(cells[i]) if i < len(cells) == len(names) else None for i in at]
+        if values[0] is None or values[1] is None or not np.isfinite(np.array(values, float)).all():
+            raise InputFileError(
+                f"{path}: line {line.number}: {quoted(line.text)} has no two numbers under "
+                f"{quoted(names[at[0]])} and {quoted(names[at[1]])}, of {len(names)} columns"
+            )
+        points.append((values[0], values[1]))
+    if not points:
+        raise InputFileError(f"{path}: there is no line below the header; export it again")
+    outline, dropped = clean_ring(points, str(path), InputFileError)
+    took = f"took {quoted(names[at[0]])} for x and {quoted(names[at[1]])} for y, which points up"
+    return Reading(outline, False, "dat", None, (took, *dropped))

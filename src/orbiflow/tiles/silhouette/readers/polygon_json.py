@@ -1,0 +1,245 @@
+"""Polygons in JSON, GeoJSON and WKT, with y up unless the file says otherwise."""
+
+import json
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from orbiflow.arrays import Array
+from orbiflow.errors import InputFileError
+from orbiflow.runtime import is_list, is_object
+from orbiflow.tiles.geometry import polygons_in
+from orbiflow.tiles.silhouette.outlines import clean_ring, outer_outline, outer_ring
+from orbiflow.tiles.silhouette.readers.reading import Reading, Source, quoted, read_bytes
+
+MAX_BYTES = 16 * 2**20
+MAX_POLYGONS = 10_000
+POLYGON_KEYS = ("polygon", "tile", "outline")
+MAX_STEP = 90.0  # degrees of longitude: what crosses the date line has no longer step across it
+STRETCHED = 1.1  # more than so much wider than on the ground, longitudes are said to be as they are
+_MERIDIAN = "joined the shape where its longitudes jump by 360 degrees"
+_OTHERS = {
+    "Topology": "is TopoJSON, which is not read; convert it to GeoJSON (mapshaper.org does)",
+    "esri": 'is JSON of Esri ("rings"), which is not read; export GeoJSON',
+}
+
+
+def read_json(path: Source) -> Reading:
+    """Read a polygon from JSON, with y up unless the file says otherwise.
+
+    Taken are: a list of [x, y] pairs; an object with such a list under "polygon", "tile" or
+    "outline", and optionally `"y_down": true`; GeoJSON, of which the largest polygon is kept.
+    """
+    content = _content(path)
+    if is_object(content) and "type" in content and not any(key in content for key in POLYGON_KEYS):
+        return _geojson(path, content)
+    points, y_down, notes = _find_polygon(path, content)
+    _check_pairs(path, points)
+    outline, dropped = clean_ring(points, str(path), InputFileError)
+    return Reading(outline, y_down, "json", None, (*notes, *dropped))
+
+
+def read_wkt(path: Source) -> Reading:
+    """Read the largest polygon of a text such as POLYGON ((0 0, 1 0, 0 1)), with y up."""
+    text = read_bytes(path, MAX_BYTES).decode("utf-8-sig", errors="replace").strip()
+    try:
+        found = shapely.from_wkt(
+            text.partition(";")[2] if text.upper().startswith("SRID") else text
+        )
+    except shapely.errors.GEOSException as exc:
+        raise InputFileError(f"{path}: not valid WKT ({exc})") from exc
+    parts = shapely.get_parts([found])
+    if polygons := [part for part in parts if isinstance(part, Polygon) and not part.is_empty]:
+        rings = [[shapely.get_coordinates(ring).tolist() for ring in _rings(p)] for p in polygons]
+        return _reading(path, rings, [])
+    raise InputFileError(f"{path}: WKT of type {found.geom_type}; save a POLYGON or MULTIPOLYGON")
+
+
+def _rings(polygon: Polygon) -> list[BaseGeometry]:
+    return [polygon.exterior, *polygon.interiors]
+
+
+def _content(path: Source) -> object:
+    data = read_bytes(path, MAX_BYTES)
+    try:
+        return json.loads(data)
+    except json.JSONDecodeError as exc:
+        where = f"line {exc.lineno}, column {exc.colno}"
+        raise InputFileError(f"{path}: {where}: not valid JSON ({exc.msg})") from exc
+    except RecursionError as exc:
+        raise InputFileError(f"{path}: nested too deeply to be a polygon") from exc
+    except ValueError as exc:
+        raise InputFileError(f"{path}: not valid JSON ({exc})") from exc
+
+
+def _find_polygon(path: Source, content: object) -> tuple[list[Any], bool, list[str]]:
+    """Return the list of vertices in `content`, whether y points down, and notes."""
+    if is_list(content):
+        return content, False, []
+    if not is_object(content):
+        raise InputFileError(f"{path}: holds a single value, not a polygon; write [[x, y], ...]")
+    keys = [key for key in POLYGON_KEYS if key in content]
+    if not keys:
+        if "rings" in content or is_object(content.get("geometry")):
+            raise InputFileError(f"{path}: {_OTHERS['esri']}")
+        found = ", ".join(quoted(str(key)) for key in list(content)[:8]) or "nothing"
+        raise InputFileError(
+            f'{path}: none of "polygon", "tile", "outline" is in it (it has {found}); '
+            "put the list of vertices under one of them"
+        )
+    points, y_down = content[keys[0]], content.get("y_down", False)
+    if not isinstance(y_down, bool):
+        raise InputFileError(f'{path}: "y_down" must be true or false')
+    if not is_list(points):
+        raise InputFileError(f'{path}: "{keys[0]}" must be a list of [x, y] pairs')
+    notes = [f'took "{keys[0]}", left {", ".join(keys[1:])} unread'] if len(keys) > 1 else []
+    return points, y_down, notes
+
+
+def _check_pairs(path: Source, points: list[Any]) -> None:
+    for i, pair in enumerate(points):
+        if not is_list(pair) or len(pair) != 2 or not all(type(n) in (int, float) for n in pair):
+            raise InputFileError(
+                f"{path}: vertex {i} (counted from 0) is {quoted(json.dumps(pair))}, not a pair of "
+                "numbers [x, y]"
+            )
+
+
+def _geojson(path: Source, content: dict[str, Any]) -> Reading:
+    if content["type"] in _OTHERS:
+        raise InputFileError(f"{path}: {_OTHERS[content['type']]}")
+    polygons, others = _polygons(path, content)
+    if not polygons:
+        kinds = ", ".join(quoted(kind) for kind in dict.fromkeys(others)) or "nothing"
+        raise InputFileError(
+            f"{path}: GeoJSON of type {quoted(str(content['type']))} with no polygon (it has {kinds}); "
+            "save a Polygon or MultiPolygon, or a Feature with one"
+        )
+    notes = [f"left {', '.join(sorted({*others}))} unread"] if others else []
+    rings: list[list[list[Any]]] = []
+    for polygon in polygons:
+        if not is_list(polygon) or not polygon or not all(is_list(ring) for ring in polygon):
+            raise InputFileError(f'{path}: the GeoJSON Polygon has no ring under "coordinates"')
+        if any(is_list(at) and len(at) > 2 for ring in polygon for at in ring):
+            notes = [note for note in notes if "altitudes" not in note] + [
+                "left the altitudes unread"
+            ]
+        rings.append([[at[:2] if is_list(at) else at for at in ring] for ring in polygon])
+    return _reading(path, rings, notes, on_globe=True)
+
+
+def _polygons(path: Source, content: dict[str, Any]) -> tuple[list[Any], list[str]]:
+    """Return the rings of all polygons in GeoJSON, and the types of what else is in it."""
+    polygons: list[Any] = []
+    others: list[str] = []
+    waiting: list[object] = [content]
+    while waiting:
+        found = waiting.pop(0)
+        kind = found.get("type") if is_object(found) else None
+        if not is_object(found) or not isinstance(kind, str):
+            others.append("nothing" if found is None else "what is no geometry")
+            continue
+        below = {"FeatureCollection": "features", "GeometryCollection": "geometries"}.get(kind)
+        coordinates = found.get("coordinates")
+        if kind == "Feature":
+            waiting.append(found.get("geometry"))
+        elif below is not None:
+            inner = found.get(below)
+            waiting += inner if is_list(inner) else [None]
+        elif kind == "Polygon":
+            polygons.append(coordinates)
+        elif kind == "MultiPolygon":
+            polygons += coordinates if is_list(coordinates) else [None]
+        elif kind == "LineString" and is_list(coordinates) and coordinates[:1] == coordinates[-1:]:
+            polygons.append([coordinates])
+        else:
+            others.append(kind)
+        if len(polygons) + len(others) > MAX_POLYGONS:
+            raise InputFileError(
+                f"{path}: over {MAX_POLYGONS} geometries; save the one that you mean"
+            )
+    return polygons, others
+
+
+def _reading(
+    path: Source, polygons: list[list[list[Any]]], notes: list[str], *, on_globe: bool = False
+) -> Reading:
+    """Return the largest of polygons, given by their rings, of which the first is the outer one."""
+    rings: list[Array] = []
+    for outer, *holes in polygons:
+        _check_pairs(path, outer)
+        if holes and len(polygons) == 1:
+            notes = [f"filled {len(holes)} hole{'s' * (len(holes) > 1)}", *notes]
+        points = np.array(outer, dtype=float) if _is_finite(outer) else outer
+        if on_globe and isinstance(points, np.ndarray):
+            points, joined = _unwrapped(path, points)
+            notes += [note for note in joined if note not in notes]
+        ring, dropped = clean_ring(points, str(path), InputFileError)
+        rings.append(ring)
+        notes += dropped
+    if len(rings) > 1:
+        ring, more = _largest(rings, on_globe)
+        notes += more
+    else:
+        ring = rings[0]
+    return Reading(ring, False, "json", None, (*notes, *(_stretched(ring) if on_globe else ())))
+
+
+def _is_finite(points: list[Any]) -> bool:
+    return all(abs(n) < 1e300 for pair in points for n in pair)
+
+
+def _is_on_globe(points: Array) -> bool:
+    return bool((abs(points[:, 0]) <= 360).all() and (abs(points[:, 1]) <= 90).all())
+
+
+def _unwrapped(path: Source, points: Array) -> tuple[Array, list[str]]:
+    """Return a ring with longitudes that do not jump at the date line, and a note if they did."""
+    steps = np.diff(np.append(points[:, 0], points[0, 0]))
+    jumps = abs(steps) > 180
+    if not jumps.any() or not _is_on_globe(points):
+        return points, []
+    is_short = bool((360 - abs(steps[jumps]) < MAX_STEP).all())
+    if not is_short and Polygon(points).is_valid:
+        return points, []  # a large shape whose sides are that long
+    if np.sum(np.round(steps / 360)):
+        raise InputFileError(
+            f"{path}: the ring goes around a pole or all around the globe: project it to a map first"
+        )
+    unwrapped = points.copy()
+    unwrapped[:, 0] = np.unwrap(points[:, 0], period=360.0)
+    return unwrapped, [_MERIDIAN]
+
+
+def _largest(rings: list[Array], on_globe: bool) -> tuple[Array, list[str]]:
+    """Return the largest ring of what touching ones make together, and notes."""
+    notes: list[str] = []
+    if on_globe and all(_is_on_globe(ring) for ring in rings):
+        east = any(np.isclose(ring[:, 0].max(), 180, atol=1e-6) for ring in rings)
+        west = [np.isclose(ring[:, 0].min(), -180, atol=1e-6) for ring in rings]
+        if east and any(west):  # cut along the date line, as GeoJSON wants it
+            rings = [
+                ring + np.array([360.0 * is_west, 0.0])
+                for ring, is_west in zip(rings, west, strict=True)
+            ]
+            notes.append(_MERIDIAN)
+    whole = shapely.union_all([Polygon(ring) for ring in rings])
+    shape, more = outer_outline(shapely.MultiPolygon(polygons_in(whole)))
+    return outer_ring(shape), [*notes, *more]
+
+
+def _stretched(ring: Array) -> tuple[str, ...]:
+    """Return a note where degrees of longitude are much shorter than those of latitude."""
+    if not _is_on_globe(ring) or np.ptp(ring[:, 0]) > 180:
+        return ()
+    latitude = float(ring[:, 1].min() + ring[:, 1].max()) / 2
+    wide = 1 / max(np.cos(np.radians(latitude)), 1e-3)
+    if wide < STRETCHED:
+        return ()
+    return (
+        f"took longitudes and latitudes for x and y as they are: at latitude {latitude:.0f} the shape "
+        f"is {wide:.2g} times as wide as on the ground; project it first if that matters",
+    )

@@ -1,0 +1,132 @@
+"""Drawings of an outline are read on the middle of their line, however thin or broad it is."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image, ImageDraw, ImageOps
+
+from orbiflow.tiles import FileContent, Reading, iou, read_outline
+from png_files import saved
+
+TURNS = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+FINER = 8
+
+
+def blob(size: int, waves: int = 3, depth: float = 0.25) -> Any:
+    radius = 0.3 * size * (1 + depth * np.cos(waves * TURNS) + 0.1 * np.sin(7 * TURNS))
+    return size / 2 + np.stack([radius * np.cos(TURNS), radius * np.sin(TURNS)], axis=1)
+
+
+def drawn(ring: Any, size: int, width: float, ink: int = 0, ground: int = 255) -> Image.Image:
+    """An anti-aliased closed line."""
+    image = Image.new("L", (size * FINER, size * FINER), ground)
+    ends = [tuple(xy) for xy in np.vstack([ring, ring[:2]]) * FINER]
+    ImageDraw.Draw(image).line(ends, fill=ink, width=round(width * FINER), joint="curve")
+    return image.reduce(FINER)
+
+
+def read(image: Image.Image, kind: str = "PNG", **options: Any) -> Reading:
+    return read_outline(FileContent(saved(image, kind), "a.png"), **options)
+
+
+def offset(reading: Reading, ring: Any) -> float:
+    """How far outside the ring the outline lies on average, in pixels."""
+    shape = shapely.Polygon(ring)
+    return (shapely.Polygon(reading.outline).area - shape.area) / shape.length
+
+
+@given(
+    st.integers(2, 5),
+    st.floats(0.05, 0.3),
+    st.floats(0.9, 7),
+    st.sampled_from([(0, 255), (255, 0), (150, 235)]),
+)
+def test_the_outline_is_the_middle_of_the_line(
+    waves: int, depth: float, width: float, colours: tuple[int, int]
+) -> None:
+    ring = blob(220, waves, depth)
+    reading = read(drawn(ring, 220, width, *colours))
+    assert reading.notes[-1].startswith(
+        "an outline drawing: took the middle of its line, which is "
+    )
+    assert abs(offset(reading, ring)) < 0.15
+    assert iou(reading.outline, ring) > 0.99
+
+
+RING = blob(400)
+LINE = drawn(RING, 400, 2)
+
+
+def transparent(line: Image.Image) -> Image.Image:
+    image = Image.new("RGBA", line.size)
+    image.putalpha(ImageOps.invert(line))
+    return image
+
+
+def with_details(line: Image.Image) -> Image.Image:
+    image = line.copy()
+    pen = ImageDraw.Draw(image)
+    pen.ellipse((180, 180, 195, 195), fill=0)
+    pen.line((200, 200, 230, 240), fill=0, width=2)
+    pen.line((*RING[50], 200, 200), fill=0, width=3)  # it begins on the outline
+    return image
+
+
+KINDS: dict[str, tuple[Image.Image, str]] = {
+    "JPEG": (LINE, "JPEG"),
+    "colour": (ImageOps.colorize(LINE, "red", "ivory"), "PNG"),
+    "transparent": (transparent(LINE), "PNG"),
+    "two levels": (LINE.convert("1", dither=Image.Dither.NONE), "PNG"),
+    "details inside": (with_details(LINE), "PNG"),
+    "16 bits": (Image.fromarray(np.asarray(LINE).astype(np.uint16) * 257), "PNG"),
+}
+
+
+@pytest.mark.parametrize("case", KINDS)
+def test_outlines_in_pictures_of_all_kinds(case: str) -> None:
+    reading = read(*KINDS[case])
+    assert abs(offset(reading, RING)) < 0.2
+    assert "an outline drawing" in " ".join(reading.notes)
+
+
+def test_a_faint_thin_line_in_a_large_picture_holds_together() -> None:
+    ring = blob(2000)
+    image = Image.new("L", (4000, 4000), 255)
+    ImageDraw.Draw(image).line(
+        [tuple(xy) for xy in np.vstack([ring, ring[:2]]) * 2], fill=0, width=2
+    )
+    reading = read(image.reduce(2))  # a pixel wide, and then averaged
+    assert iou(reading.outline, ring) > 0.999
+
+
+def test_limbs_that_are_single_lines_are_kept() -> None:
+    image = LINE.copy()
+    ImageDraw.Draw(image).line((*RING[0], 395, 200), fill=0, width=3)
+    assert read(image).outline[:, 0].max() > 390
+
+
+def test_another_drawing_beside_it_is_said() -> None:
+    image = LINE.copy()
+    ImageDraw.Draw(image).ellipse((5, 5, 45, 45), fill=0)
+    reading = read(image)
+    assert "kept the largest of 2 components" in reading.notes[-1]
+    assert abs(offset(reading, RING)) < 0.2
+
+
+def test_a_threshold_says_where_the_line_is() -> None:
+    assert abs(offset(read(LINE, threshold=0.5), RING)) < 0.2
+
+
+@pytest.mark.parametrize("hole", [0, 30, 60])
+def test_rings_and_filled_shapes_keep_their_outer_edge(hole: int) -> None:
+    image = Image.new("L", (220, 220), 255)
+    pen = ImageDraw.Draw(image)
+    pen.ellipse((20, 20, 199, 199), fill=0)
+    pen.ellipse((110 - hole, 110 - hole, 110 + hole, 110 + hole), fill=255 if hole else 0)
+    reading = read(image)
+    assert np.hypot(*(reading.outline - 110).T).max() == pytest.approx(90, abs=0.7)
+    assert "outline drawing" not in " ".join(reading.notes)

@@ -1,0 +1,234 @@
+"""Pictures of every depth and way of transparency, label masks, animations and large pictures."""
+
+import io
+import struct
+from typing import Any
+
+import numpy as np
+import pytest
+import tifffile
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image, ImageDraw
+
+from orbiflow.errors import InputFileError
+from orbiflow.tiles import FileContent, Reading, Target, iou, read_outline
+from png_files import COLOUR, PALETTE, png, saved
+
+# An L whose long arm points down and whose foot points right, in pixels.
+SHAPE = np.array([[20, 10], [40, 10], [40, 70], [80, 70], [80, 90], [20, 90]], dtype=float)
+INSIDE = np.zeros((100, 100), bool)
+INSIDE[10:90, 20:40] = INSIDE[70:90, 20:80] = True
+OPAQUE = "shape taken: the opaque part (alpha threshold 0.50)"
+
+
+def read(data: bytes, name: str = "a.png") -> Reading:
+    return read_outline(FileContent(data, name))
+
+
+def tiff(pixels: Any, **options: Any) -> bytes:
+    stream = io.BytesIO()
+    tifffile.imwrite(stream, np.asarray(pixels), **options)
+    return stream.getvalue()
+
+
+def of_inside(shape: Any, ground: Any) -> Any:
+    return np.where(INSIDE if np.ndim(shape) == 0 else INSIDE[..., None], shape, ground)
+
+
+@st.composite
+def depths_and_levels(draw: st.DrawFn) -> tuple[int, int, int]:
+    depth = draw(st.sampled_from([1, 2, 4, 8, 16]))
+    level = st.integers(0, 2**depth - 1)
+    shape, ground = draw(st.lists(level, min_size=2, max_size=2, unique=True))
+    return depth, shape, ground
+
+
+@given(depths_and_levels())
+def test_a_transparent_level_of_grey_cuts_out_at_every_depth(case: tuple[int, int, int]) -> None:
+    depth, shape, ground = case
+    reading = read(png(of_inside(shape, ground), depth, transparent=struct.pack(">H", ground)))
+    assert reading.notes[-1] == OPAQUE
+    assert iou(reading.outline, SHAPE) > 0.995
+
+
+@given(
+    st.sampled_from([8, 16]),
+    st.lists(st.tuples(*[st.integers(0, 255)] * 3), min_size=2, max_size=2, unique=True),
+    st.booleans(),
+)
+def test_a_transparent_colour_cuts_out_at_every_depth(
+    depth: int, colours: list[tuple[int, int, int]], is_near: bool
+) -> None:
+    shape, ground = (np.array(c) * (257 if depth == 16 else 1) for c in colours)
+    if is_near:  # the least difference, which 8 bits of 16 do not show
+        shape = ground.copy()
+        shape[0] ^= 1
+    key = struct.pack(">HHH", *ground)
+    reading = read(png(of_inside(shape, ground), depth, COLOUR, transparent=key))
+    assert reading.notes == (OPAQUE,)
+    assert iou(reading.outline, SHAPE) > 0.995
+
+
+@given(st.sampled_from([1, 2, 4, 8]), st.data())
+def test_palettes_cut_out_by_any_of_their_entries(depth: int, data: st.DataObject) -> None:
+    entries = st.integers(0, 2**depth - 1)
+    shape, ground = data.draw(st.lists(entries, min_size=2, max_size=2, unique=True))
+    opacity = bytearray([255] * 2**depth)
+    opacity[ground] = data.draw(st.integers(0, 20))
+    colours = data.draw(st.binary(min_size=3 * 2**depth, max_size=3 * 2**depth))
+    reading = read(
+        png(of_inside(shape, ground), depth, PALETTE, transparent=bytes(opacity), palette=colours)
+    )
+    assert reading.notes == (OPAQUE,)
+    assert iou(reading.outline, SHAPE) > 0.99
+
+
+DEEP = {
+    "16 bits": of_inside(9000, 60_000).astype("u2"),
+    "16 bits, big-endian": of_inside(9000, 60_000).astype(">u2"),
+    "12 bits in 16": of_inside(4000, 100).astype("u2"),
+    "10 bits in 16": of_inside(0, 1000).astype("u2"),
+    "32 bits": of_inside(200, 0).astype("i4"),
+    "with a sign": of_inside(-3000, 9000).astype("i2"),
+    "floats to 1": of_inside(0.0, 1.0).astype("f4"),
+    "floats to a million": of_inside(1e6, -1e6).astype("f4"),
+    "small floats": of_inside(1e-7, 0.0).astype(">f4"),
+    "colours of 16 bits": of_inside((60_000, 9000, 0), (65_535,) * 3).astype("u2"),
+    "with opacity": of_inside((0, 0, 0, 65_535), (65_535,) * 4).astype("u2"),
+}
+
+
+@pytest.mark.parametrize("pixels", DEEP.values(), ids=DEEP)
+def test_deep_tiffs_are_neither_clipped_nor_wrapped(pixels: Any) -> None:
+    colour = {"photometric": "rgb"} if pixels.ndim == 3 else {}
+    assert iou(read(tiff(pixels, **colour), "a.tif").outline, SHAPE) > 0.995
+
+
+def test_ramps_of_16_bits_keep_their_order() -> None:
+    ramp = np.linspace(0, 65_535, 100).astype(int)[None].repeat(100, axis=0)
+    reading = read(png(np.where(INSIDE, 65_535, ramp // 2), 16))
+    assert iou(reading.outline, SHAPE) > 0.97
+
+
+def test_tiffs_that_are_not_read_say_what_to_save() -> None:
+    pixels = of_inside((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)).astype("f4")
+    with pytest.raises(InputFileError, match=r"kind of TIFF .* save it as PNG"):
+        read(tiff(pixels, photometric="rgb"), "a.tif")
+
+
+@pytest.mark.parametrize(("shape", "ground"), [(1, 0), (0, 1), (2, 0), (1, 2), (9, 3)])
+@pytest.mark.parametrize("dtype", ["u1", "u2", ">u2", "i4"])
+def test_masks_of_two_small_numbers_are_labels(shape: int, ground: int, dtype: str) -> None:
+    pixels = of_inside(shape, ground).astype(dtype)
+    label = f"label mask: took the pixels of {shape} for the shape, of {ground} for background"
+    reading = read(tiff(pixels), "a.tif")
+    assert reading.notes[0] == label
+    assert iou(reading.outline, SHAPE) > 0.995
+    if (shape, ground) == (0, 1):  # an array of 0 and 1 says where the shape is
+        return
+    found = Target.from_mask(pixels)
+    assert iou(found.outline, reading.outline) > 0.999
+
+
+@pytest.mark.parametrize("depth", [1, 2, 4, 8])
+@pytest.mark.parametrize("shape", [0, 1])
+def test_palettes_without_colours_hold_labels(depth: int, shape: int) -> None:
+    reading = read(png(of_inside(shape, 1 - shape), depth, PALETTE, palette=b"\0" * 6))
+    assert reading.notes[0].startswith(f"label mask: took the pixels of {shape}")
+    assert iou(reading.outline, SHAPE) > 0.995
+
+
+@pytest.mark.parametrize("labels", [(1, 2, 3), (3, 1, 2), (40, 10, 7)])
+def test_of_several_labels_the_largest_is_taken_and_said(labels: tuple[int, int, int]) -> None:
+    numbers = np.where(INSIDE, labels[0], 0).astype(np.uint8)
+    numbers[10:20, 50:90], numbers[30:40, 50:60] = labels[1:]
+    reading = read(saved(Image.fromarray(numbers)))
+    assert f"took label {labels[0]}, the largest of 3" in reading.notes[0]
+    assert "give them one label" in reading.notes[0]
+    assert iou(reading.outline, SHAPE) > 0.995
+
+
+def test_many_labels_in_a_row_are_labels() -> None:
+    numbers = np.where(INSIDE, 90, 0).astype(np.uint8)
+    numbers[10:58, 45:99] = np.kron(np.arange(1, 28).reshape(3, 9), np.ones((16, 6), np.uint8))
+    numbers[:9, :93] = np.kron(np.arange(28, 59), np.ones((9, 3), np.uint8))
+    numbers[91:, :93] = np.kron(np.arange(59, 90), np.ones((9, 3), np.uint8))
+    reading = read(saved(Image.fromarray(numbers)))
+    assert "took label 90, the largest of 90" in reading.notes[0]
+    assert iou(reading.outline, SHAPE) > 0.995
+
+
+def test_dark_pictures_are_no_labels() -> None:
+    disc = Image.new("L", (800, 800), 4)
+    ImageDraw.Draw(disc).ellipse((100, 100, 700, 700), fill=36)
+    dark = read(saved(disc.reduce(8)))  # anti-aliased
+    assert not any("label" in note for note in dark.notes)
+    noise = np.random.default_rng(0).integers(0, 4, (60, 60), dtype=np.uint8)
+    with pytest.raises(InputFileError, match="all but blank"):
+        read(saved(Image.fromarray(noise)))
+
+
+SHOWN = Image.fromarray(of_inside((0, 0, 0, 255), (0, 0, 0, 0)).astype(np.uint8))
+NOTHING = Image.new("RGBA", (100, 100))
+FILM = {"save_all": True, "duration": 100}
+ANIMATIONS = {
+    "APNG": (NOTHING, [SHOWN], "PNG", 2),
+    "APNG, third": (NOTHING, [NOTHING, SHOWN], "PNG", 2),
+    "GIF": (NOTHING, [SHOWN, NOTHING], "GIF", 2),
+    "WebP": (NOTHING, [SHOWN], "WEBP", 2),
+    "pages": (Image.new("L", (100, 100), 255), [SHOWN.getchannel("A")], "TIFF", 2),
+    "white first": (Image.new("L", (100, 100), 255), [SHOWN.getchannel("A")], "GIF", 2),
+}
+
+
+@pytest.mark.parametrize("case", ANIMATIONS)
+def test_the_first_frame_that_shows_anything_is_taken(case: str) -> None:
+    first, others, kind, _ = ANIMATIONS[case]
+    lossless = {"lossless": True} if kind == "WEBP" else {}
+    own = FILM if kind != "TIFF" else {"save_all": True}
+    reading = read(saved(first, kind, append_images=others, **own, **lossless))
+    assert ", the first that shows anything, of " in reading.notes[0]
+    assert iou(reading.outline, SHAPE) > 0.99
+
+
+def test_an_animation_of_nothing_is_refused() -> None:
+    with pytest.raises(InputFileError, match="wholly transparent"):
+        read(saved(NOTHING, append_images=[Image.new("RGBA", (100, 100), (9, 0, 0, 0))], **FILM))
+
+
+def test_colours_behind_full_transparency_are_hinted_at() -> None:
+    pixels = of_inside((0, 0, 0, 0), (255, 255, 255, 0)).astype(np.uint8)
+    with pytest.raises(InputFileError, match="its colours have one: save it without transparency"):
+        read(saved(Image.fromarray(pixels)))
+
+
+@pytest.mark.parametrize(
+    ("mode", "kind", "size", "orientation"),
+    [
+        ("L", "JPEG", (8000, 6000), 1),
+        ("L", "JPEG", (8000, 6000), 6),
+        ("1", "PNG", (8000, 6000), 1),
+        ("P", "GIF", (6500, 6500), 1),
+        ("L", "PNG", (6600, 6600), 8),
+    ],
+)
+def test_pictures_of_telephones_are_shrunk_and_said(
+    mode: str, kind: str, size: tuple[int, int], orientation: int
+) -> None:
+    image = Image.new("L", (size[0], size[1]), 255)
+    scale = np.array(size) / 100
+    ImageDraw.Draw(image).polygon([tuple(xy) for xy in SHAPE * scale], fill=0)
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    options = {"exif": exif} if kind != "GIF" else {}
+    reading = read(saved(image.convert(mode), kind, **options))
+    shape = SHAPE * scale
+    turned = {
+        1: shape,
+        6: np.stack([size[1] - shape[:, 1], shape[:, 0]], axis=1),
+        8: np.stack([shape[:, 1], size[0] - shape[:, 0]], axis=1),
+    }[orientation]
+    assert reading.size == (size if orientation == 1 else size[::-1])
+    assert "megapixels: 2 x 2 pixels became one" in reading.notes[0]
+    assert iou(reading.outline, turned) > 0.995
