@@ -60,6 +60,22 @@ def test_a_busy_picture_is_led_to_the_lasso(page, drawing) -> None:
     assert "lasso" in page.locator(".said").inner_text()
 
 
+def test_thin_legs_are_said_and_grown_by_a_button(page, studio: RunningStudio) -> None:
+    ends = [(40, 60), (20, 160), (380, 60), (380, 160)]
+    legs = "".join(f"M200 200L{x} {y}" for x, y in ends)
+    body = '<circle cx="200" cy="200" r="50"/>'
+    drawing = f'<path d="{legs}" stroke="black" stroke-width="4"/>{body}'
+    head = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 400 400">'
+    own = studio.with_picture(f"{head}{drawing}</svg>".encode(), "spider.svg")
+    page.goto(f"/#/p/{own}/picture")
+    before = studio.project(own)["silhouette"]
+    assert "let them grow (Thin parts)" in before["doubts"][0]
+    page.get_by_role("button", name="Make thin parts thicker").click()
+    studio.until(lambda: studio.project(own)["reading"].get("thicken") == 0.04)
+    studio.until(lambda: not (studio.project(own)["silhouette"] or before)["doubts"])
+    page.get_by_text("at least 4 % wide").wait_for()
+
+
 def test_sliders_read_anew(page, drawing, studio: RunningStudio) -> None:
     own = begun(page, drawing)
     before = studio.project(own)["silhouette"]["outline"]

@@ -77,9 +77,9 @@ def _hopeless(target: Target) -> list[str]:
         )
     elif (share := _thin_share(shape, LEG_WIDTH * length)) > MOSTLY_LEGS:
         found.append(
-            f"{share:.0%} of the outline is of parts thinner than {LEG_WIDTH:.1%} of the silhouette's "
-            "length, such as legs, and tiles may lose them: grow them by --thicken 0.04, or draw them "
-            "wider"
+            f"legs or other parts thinner than {LEG_WIDTH:.1%} of the silhouette's length have "
+            f"{share:.0%} of its outline, and tiles may lose them: grow them by --thicken 0.04, or draw "
+            "them wider"
         )
     if target.kind != "image":
         return found

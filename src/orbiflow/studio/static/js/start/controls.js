@@ -14,7 +14,7 @@ const MEANINGS = {
   rub: "Rub out what you painted.",
 };
 
-/** Sliders and choices for `reading`, {threshold, invert, smooth, thicken}, which they change and tell: {root, reset()}. */
+/** Sliders and choices for `reading`, {threshold, invert, smooth, thicken}, which they change and tell: {root, reset(), grow(share)}. */
 export function readingControls(reading, changed) {
   const change = (part) => { Object.assign(reading, part); changed(); };
   const level = slider("Where it ends", {
@@ -49,7 +49,11 @@ export function readingControls(reading, changed) {
     growing.set(0);
     part.set(null);
   };
-  return { root, reset };
+  const grow = (share) => {
+    change({ thicken: share });
+    growing.set(share);
+  };
+  return { root, reset, grow };
 }
 
 /** The choice of `pen`, {tool, shape, size}, which it changes and tells; `buttons` stand below. */

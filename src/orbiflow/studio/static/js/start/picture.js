@@ -207,7 +207,7 @@ class PicturePage {
     if (told === this.told) return; // what is open stays open
     this.told = told;
     const error = !busy && task?.state === "failed" && h("p", { class: "error" }, sentence(task.error));
-    if (silhouette) put(this.said, busy && h("p", { class: "soft" }, "Reading it again …"), error, notes(silhouette));
+    if (silhouette) put(this.said, busy && h("p", { class: "soft" }, "Reading it again …"), error, notes(silhouette, this.controls.grow));
     else put(this.unread, ...(this.project.tasks.some(alive) ? [h("p", { class: "soft" }, "Reading the picture …")] : this.nothing(error)));
   }
 
@@ -242,11 +242,12 @@ class PicturePage {
   }
 }
 
-/** What there is to say of a silhouette. */
-function notes({ doubts, notes: said, left_out: others = [] }) {
+/** What there is to say of a silhouette; `grow` makes thin parts thicker. */
+function notes({ doubts, notes: said, left_out: others = [] }, grow) {
   const out = others.length;
   return h("ul", { class: "notes stack" },
-    doubts.map((text) => h("li", { class: "notice" }, sentence(text))),
+    doubts.map((text) => h("li", { class: "notice stack" }, sentence(text),
+      text.includes("(Thin parts)") && button("Make thin parts thicker", () => grow(text.includes("thread") ? 0.1 : 0.04), { kind: "quiet" }))),
     out > 0 && h("li", {}, h("span", { class: "swatch" }), `${number(out, "part is", "parts are")} left out: a tile is one piece. `, out < MANY
       ? `Paint a bridge with “Add” to keep ${out === 1 ? "it" : "them"}.`
       : "A busy photograph? Draw round the head first: choose “Add” and the lasso. Then “Remove” what is too much."),
