@@ -78,8 +78,8 @@ def _hopeless(target: Target) -> list[str]:
     elif (share := _thin_share(shape, LEG_WIDTH * length)) > MOSTLY_LEGS:
         found.append(
             f"legs or other parts thinner than {LEG_WIDTH:.1%} of the silhouette's length have "
-            f"{share:.0%} of its outline, and tiles may lose them: grow them by --thicken 0.04, or draw "
-            "them wider"
+            f"{share:.0%} of its outline, and tiles may lose them: grow them by --thicken 0.04, or "
+            "draw them wider"
         )
     if target.kind != "image":
         return found
