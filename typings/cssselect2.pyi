@@ -33,6 +33,7 @@ class ElementWrapper:
     namespace_url: str
     id: str | None
     classes: set[str]
+    etree_children: list[Element]
     def __init__(
         self,
         etree_element: Element,

@@ -142,9 +142,9 @@ def _background(
     shown = [own for own in layers if own]
     grounds = [own for own in shown if covers(own)]
     if len(grounds) == len(shown) and not drawing.others.keys() & {"image", "text"}:
-        return None, []
+        return drawing.ground, []
     full = [own[0] for own in grounds if own[0].region.area >= 0.999 * page.area]  # no frames
-    return full[-1].brush.colour if full else None, grounds
+    return full[-1].brush.colour if full else drawing.ground, grounds
 
 
 def _overlay(layers: list[Layer], ground: str | None) -> tuple[BaseGeometry, list[str]]:

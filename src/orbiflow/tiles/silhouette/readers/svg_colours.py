@@ -12,6 +12,8 @@ from orbiflow.drawing import rgb
 CURRENT = "currentColor"
 """The colour of what is drawn in `currentColor` where no colour is set."""
 
+# what the library raises for what is no colour at all
+_NO_COLOUR = (ValueError, TypeError, IndexError, AttributeError, ArithmeticError)
 MAX_COLOUR = 100  # characters
 # from CIE XYZ to linear sRGB, for the whites D65 and D50 (B. Lindbloom's tables)
 _FROM_D65 = np.array(
@@ -45,13 +47,11 @@ def colour_of(text: str) -> Brush | None:
         return None
     try:
         colour = tinycss2.color4.parse_color(text)
-    except (ValueError, IndexError, AttributeError):  # of what is no colour at all
+        if colour is None or isinstance(colour, str):
+            return Brush(CURRENT, 1.0) if colour else None
+        return Brush(_hexadecimal(_srgb(colour)), colour.alpha)
+    except _NO_COLOUR:
         return None
-    if colour is None:
-        return None
-    if isinstance(colour, str):
-        return Brush(CURRENT, 1.0)
-    return Brush(_hexadecimal(_srgb(colour)), colour.alpha)
 
 
 def lightness(colour: str) -> float:
@@ -84,5 +84,7 @@ def _srgb(colour: tinycss2.color4.Color) -> Array:
 
 
 def _hexadecimal(channels: Array) -> str:
+    if not np.isfinite(channels).all():
+        raise ValueError
     red, green, blue = (channels.clip(0, 1) * 255).round().astype(int)
     return f"#{red:02x}{green:02x}{blue:02x}"

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from functools import lru_cache
+from typing import Any
 from xml.etree.ElementTree import Element
 
 import tinycss2
@@ -82,7 +83,7 @@ class StyleSheets:
         if node is None:
             return
         try:
-            node.charge(self._candidates(node))
+            node.budget.charge(self._candidates(node))
             matches = self.matcher.match(node)
         except _TooManySteps as exc:
             raise InputFileError(
@@ -150,6 +151,10 @@ class StyleSheets:
             self._misread(key, value)
         if not found:
             return
+        self.selectors += text.count(",") + 1
+        if self.selectors > MAX_SELECTORS:
+            reason = f"more than {MAX_SELECTORS} selectors in <style>; save it as plain SVG"
+            raise InputFileError(f"{self.path}: {reason}")
         try:
             if max(map(len, text.split(","))) > MAX_SELECTOR:
                 raise SelectorError
@@ -157,19 +162,15 @@ class StyleSheets:
         except _NO_SELECTOR:
             self.notes.add(f"the selector {text[:40]!a} of the style sheet is not understood")
             return
-        self.selectors += len(compiled)
-        if self.selectors > MAX_SELECTORS:
-            reason = f"more than {MAX_SELECTORS} selectors in <style>; save it as plain SVG"
-            raise InputFileError(f"{self.path}: {reason}")
         for selector in compiled:
             self.matcher.add_selector(selector, found)
 
     def _add_at_rule(self, rule: AtRule, namespaces: dict[str | None, str]) -> None:
         name, prelude = rule.lower_at_keyword, tinycss2.serialize(rule.prelude).strip()
         if name == "namespace":
-            *prefix, last = [token for token in rule.prelude if token.type != "whitespace"]
-            if last.type in ("string", "url") and len(prefix) < 2:
-                namespaces[prefix[0].value if prefix else None] = last.value
+            words = [token for token in rule.prelude if token.type != "whitespace"]
+            if len(words) in (1, 2) and words[-1].type in ("string", "url"):
+                namespaces[words[0].value if len(words) == 2 else None] = words[-1].value
         elif name == "media" and self._applies(prelude):
             content = rule.content or []
             inner = tinycss2.parse_rule_list(content, skip_comments=True, skip_whitespace=True)
@@ -246,7 +247,29 @@ class _TooManySteps(Exception):
 
 
 class _Budget:
-    left = MAX_STEPS
+    """The steps that all selectors may take together."""
+
+    def __init__(self) -> None:
+        self.left = MAX_STEPS
+
+    def charge(self, steps: int) -> None:
+        self.left -= steps
+        if self.left < 0:
+            raise _TooManySteps
+
+
+class _Siblings(list[Element]):
+    """Elements with one parent, of which it costs steps to go through them, not to count them."""
+
+    budget = _Budget()
+
+    def __getitem__(self, key: Any) -> Any:
+        self.budget.charge(len(self) if isinstance(key, slice) else 1)
+        return super().__getitem__(key)
+
+    def __iter__(self) -> Iterator[Element]:
+        self.budget.charge(len(self))
+        return super().__iter__()
 
 
 class _Node(ElementWrapper):
@@ -264,41 +287,31 @@ class _Node(ElementWrapper):
         self.budget: _Budget = _Budget() if parent is None else parent.budget
         args = (etree_element, parent, index, previous, in_html_document, content_language)
         super().__init__(*args)
+        self.children: list[_Node] | None = None
         namespace, brace, name = etree_element.tag[1:].rpartition("}")
         self.local_name = name if brace else etree_element.tag
         self.namespace_url = namespace if brace else SVG
-
-    def charge(self, steps: int) -> None:
-        self.budget.left -= steps
-        if self.budget.left < 0:
-            raise _TooManySteps
+        self.etree_children = _Siblings(etree_element)
+        self.etree_children.budget = self.budget
 
     @property
     def ancestors(self) -> Iterator["_Node"]:
-        node = self.parent
-        while node is not None:
-            self.charge(1)
-            yield node
-            node = node.parent
+        return self._following("parent")
 
     @property
     def previous_siblings(self) -> Iterator["_Node"]:
-        node = self.previous
+        return self._following("previous")
+
+    def _following(self, name: str) -> Iterator["_Node"]:
+        node = getattr(self, name)
         while node is not None:
-            self.charge(1)
+            self.budget.charge(1)
             yield node
-            node = node.previous
-
-    @property
-    def etree_siblings(self) -> list[Element]:
-        self.charge(1 + len(self._siblings))
-        return self._siblings
-
-    @etree_siblings.setter
-    def etree_siblings(self, siblings: list[Element]) -> None:
-        self._siblings = siblings
+            node = getattr(node, name)
 
     def iter_children(self) -> Iterator["_Node"]:
-        for child in super().iter_children():
-            self.charge(1)
+        if self.children is None:
+            self.children = list(super().iter_children())
+        for child in self.children:
+            self.budget.charge(1)
             yield child

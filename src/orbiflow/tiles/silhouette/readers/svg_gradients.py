@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from orbiflow.tiles.silhouette.readers.svg_walk import Drawing
 
 MOST_REFERENCES = 10  # from gradient to gradient
-MOST_PERIODS = 500  # of a gradient that repeats
+MOST_STOPS = 500
+MOST_PERIODS = 100  # of a gradient that repeats, to either side
 _ROUND = 64  # segments of a quarter of a circle
 _EMPTY = 1e-9  # of a vector or radius: a gradient of less has its last colour everywhere
 _LINEAR = {"x1": "0%", "y1": "0%", "x2": "100%", "y2": "0%"}
@@ -56,6 +57,8 @@ class Gradient:
         xmin, ymin, xmax, ymax = region.bounds
         corners = np.array([[xmin, ymin], [xmax, ymin], [xmax, ymax], [xmin, ymax]])
         corners = mapped(np.linalg.inv(self.matrix), corners)
+        if not np.isfinite(corners).all():
+            return region
         spans = list(self._spans(values, least))
         bands = self._rings(spans, corners) if self.radial else self._strips(spans, corners)
         there = shapely.transform(shapely.union_all(bands), lambda xy: mapped(self.matrix, xy))
@@ -81,7 +84,8 @@ class Gradient:
         if self.spread == "pad":
             every = spans
         else:
-            turns = range(int(np.floor(max(low, -MOST_PERIODS))), int(min(high, MOST_PERIODS)) + 1)
+            low, high = max(low, -MOST_PERIODS), min(high, MOST_PERIODS)
+            turns = range(int(np.floor(low)), int(high) + 1)
             back = self.spread == "reflect"
             every = [
                 (k + 1 - b, k + 1 - a) if back and k % 2 else (k + a, k + b)
@@ -151,7 +155,7 @@ def gradient_of(drawing: Drawing, element: Element, shape: DrawnShape) -> Gradie
     size = (1.0, 1.0) if boxed else shape.place.viewport
     ends = _ends(element.tag, attribute, size)
     flat = abs(np.linalg.det(matrix @ own)) == 0 or not np.ptp(ends, axis=0).max() > _EMPTY
-    if len(stops) == 1 or flat:
+    if len(stops) == 1 or len(stops) > MOST_STOPS or flat:
         return brushes[-1]
     spread = attribute("spreadMethod", "pad")
     return Gradient(offsets, brushes, matrix @ own, ends, element.tag[0] == "r", spread)

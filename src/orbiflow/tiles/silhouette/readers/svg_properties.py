@@ -127,6 +127,7 @@ _CHECKS: dict[str, Check] = {
     **dict.fromkeys(("transform-origin", "translate", "rotate", "scale"), _any),
     **dict.fromkeys(("offset-path", "animation", "animation-name", "mask-image"), _any),
     "font-size": _any,
+    "background-color": _colour,
 }
 INHERITED = frozenset(
     {
@@ -139,9 +140,9 @@ INHERITED = frozenset(
 # properties of CSS alone: an attribute of such a name says nothing
 _NO_ATTRIBUTES = {
     *("translate", "rotate", "scale", "mix-blend-mode", "offset-path", "animation", "mask-image"),
-    *("animation-name", "transform-box"),
+    *("animation-name", "background-color"),
 }
-ATTRIBUTES = frozenset(_CHECKS) - _NO_ATTRIBUTES | {"transform-box"}
+ATTRIBUTES = frozenset(_CHECKS) - _NO_ATTRIBUTES
 # properties whose lengths may be in sizes of the font
 WITH_LENGTHS = frozenset(
     {
@@ -171,6 +172,8 @@ def longhands(name: str, text: str) -> list[tuple[str, str]]:
         name = name.removeprefix("-webkit-")
     if name == "marker":
         return [(f"marker-{where}", text) for where in ("start", "mid", "end")]
+    if name == "background":
+        return [("background-color", word) for word in text.split()[:1] if colour_of(word)]
     if name == "font":
         sizes = [word for word in text.partition("/")[0].split() if quantity(word)]
         sizes = [word for word in sizes if quantity(word)[1]]  # type: ignore[index]  # no weights

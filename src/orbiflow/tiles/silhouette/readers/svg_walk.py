@@ -9,6 +9,7 @@ import numpy as np
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.reading import Source, read_bytes
+from orbiflow.tiles.silhouette.readers.svg_colours import colour_of
 from orbiflow.tiles.silhouette.readers.svg_cuts import Cuts, window_clip
 from orbiflow.tiles.silhouette.readers.svg_markers import Markers
 from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
@@ -59,6 +60,7 @@ class Drawing:
     """The shapes of the SVG drawing in a file, and what was met that is not drawn.
 
     - `box`: The page (xmin, ymin, xmax, ymax) in user units: the viewBox, or the size; None without.
+    - `ground`: The colour that CSS gives the page, if it gives one.
     - `window`: What of the plane is seen, which is wider than the page where its sides' ratio is not
       that of the size; None without a page.
     """
@@ -114,6 +116,8 @@ class Drawing:
         size = xmax - xmin, ymax - ymin
         place = Place(np.eye(3), size, {}, self.styles.rem, depth=-1).styled(style)
         self.window, view = self._window(style)
+        ground = colour_of(style.get("background-color", "transparent"))
+        self.ground = ground.colour if ground and ground.opacity == 1 else None
         about = np.linalg.inv(view) @ self.own_transform(self.root, style, place, "50% 50%") @ view
         inner = place.moved(about)
         found = [] if style.get("display") == "none" else self.children(self.root, inner)
@@ -181,7 +185,21 @@ class Drawing:
         place = place.moved(self.own_transform(element, style, place))
         if np.linalg.det(place.matrix) == 0:  # flat
             return []
-        return self._cut(self._content(element, place), style, place)
+        return self._cut(self._content(element, place), style, self._inside(element, place))
+
+    def _inside(self, element: Element, place: Place) -> Place:
+        """Return the place in whose units an element's clips are: after its own shift or view."""
+        if element.tag == "use":
+            return self._shifted(element, place)
+        if element.tag == "svg":
+            frame = self._frame(element, place.style, place)
+            matrix, size = view_matrix(element, frame)
+            return replace(place.moved(matrix), viewport=size)
+        return place
+
+    def _shifted(self, use: Element, place: Place) -> Place:
+        x, y = (place.length(use, key, place.style.get(key)) for key in ("x", "y"))
+        return place.moved(shift(x, y))
 
     def _content(self, element: Element, place: Place) -> list[DrawnShape]:
         tag = element.tag
@@ -234,9 +252,8 @@ class Drawing:
         target = self.named(reference(use), "<use>")
         if target is None:
             return []
-        x, y = (place.length(use, key, place.style.get(key)) for key in ("x", "y"))
         fill, stroke = place.style.get("fill", "#000000"), place.style.get("stroke", "none")
-        place = replace(place.moved(shift(x, y)), context=(fill, stroke))
+        place = replace(self._shifted(use, place), context=(fill, stroke))
         if target.tag not in ("symbol", "svg"):
             return self.visit(target, place)
         if place.depth > MAX_DEPTH:
@@ -261,6 +278,8 @@ class Drawing:
 
     def viewport(self, element: Element, frame: Window, place: Place) -> list[DrawnShape]:
         """Return what an inner <svg>, a <symbol> or a <marker> shows in a frame, cut at its edges."""
+        if not np.isfinite(frame).all():
+            raise BadElement(element, "its size cannot be read")
         if not (frame[2] > 0 and frame[3] > 0):
             return []
         matrix, size = view_matrix(element, frame)
