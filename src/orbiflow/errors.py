@@ -99,3 +99,7 @@ class CertificationError(OrbiflowError):
 
 class CoarseStepsWarning(UserWarning):
     """A flow whose integration steps are too coarse for its fields: its results are not accurate."""
+
+
+class RoundedOperatorsWarning(UserWarning):
+    """Operators of a group with rounded shifts, such as 0.3333: they are read as simple fractions."""

@@ -16,6 +16,7 @@ from orbiflow.errors import (
     InputFileError,
     LatticeMismatchError,
     OrbiflowError,
+    RoundedOperatorsWarning,
     SettingError,
 )
 from orbiflow.symmetry import (
@@ -212,6 +213,20 @@ def test_a_cif_in_the_conventional_cell_names_the_group_to_other_programs():
         (CORE.replace("4.9134(2)", "-4") + "_space_group_IT_number 1", "lengths above 0"),
         (CORE.replace("120", "180") + "_space_group_IT_number 1", "it would be flat"),
         (CORE + "_space_group_IT_number 1\0", "string"),
+        (
+            CORE + "_space_group_name_H-M_alt 'P 32 2 1'\n_space_group_IT_number 152",
+            r"contradicts itself: .*h-m_alt P 32 2 1 is of number 154, .*number 152 is of number 152",
+        ),
+        (
+            CORE + f"_symmetry_space_group_name_H-M 'P3_121'\n{OPERATORS}",
+            "P3_121 is of number 152, its 6 operators is of number 154",
+        ),
+        (
+            CORE + "_space_group_name_Hall 'P 3'\n_symmetry_space_group_name_H-M P31",
+            "hall P 3 is of number 143, .* P31 is of number 144",
+        ),
+        (CORE + f"_symmetry_Int_Tables_number 14\n{OPERATORS}", "its 6 operators is of number 154"),
+        (CORE + "_space_group_name_H-M_alt 'P 21/q'\n_space_group_IT_number 14", "'P 21/q'"),
     ],
 )
 def test_files_that_are_no_cifs_of_a_group_are_refused(tmp_path, text, reason):
@@ -220,6 +235,54 @@ def test_files_that_are_no_cifs_of_a_group_are_refused(tmp_path, text, reason):
     with pytest.raises(InputFileError, match=reason) as caught:
         group_from_cif(path)
     assert str(path) in str(caught.value)
+
+
+ROUNDED = [("0.3333", "0.6667"), ("0.33", "0.67"), ("0.333333", "0.666666"), ("0.333", "0.667")]
+
+
+@pytest.mark.parametrize(("third", "two"), ROUNDED)
+def test_rounded_operators_are_read_as_fractions_and_said(tmp_path, third, two):
+    listed = OPERATORS.replace("1/3", third).replace("2/3", two)
+    path = tmp_path / "rounded.cif"
+    path.write_text(f"{CORE}{listed}\n", "utf-8")
+    with pytest.warns(RoundedOperatorsWarning, match=f"{third} as 1/3, {two} as 2/3"):
+        group = group_from_cif(path)
+    assert group == space_group(154, (4.9134, 4.9134, 5.4052, 90, 90, 120))
+
+
+SHIFTS = {
+    "0.1667": "1/6",
+    "0.833": "5/6",
+    "0.0833": "1/12",
+    "0.041667": "1/24",
+    "0.16": "1/6",
+    ".66": "2/3",
+}
+
+
+@pytest.mark.parametrize(("shift", "exact"), SHIFTS.items())
+def test_other_rounded_shifts(shift, exact):
+    with pytest.warns(RoundedOperatorsWarning):
+        group = group_from_operators([f"-x,y+1/2,-z+{shift}"], np.eye(3))
+    assert group == group_from_operators([f"-x,y+1/2,-z+{exact}"], np.eye(3))
+
+
+def test_exact_decimals_are_left_as_they_are():
+    for shift in ("0.25", "0.5", "0.125", "0.3", "0.3333333333333333", "0.70710678"):
+        assert operators(group_from_operators([f"-x+{shift},-y"], np.eye(2)))
+
+
+def test_a_cif_may_write_its_name_as_it_is_typeset(tmp_path):
+    path = tmp_path / "p21.cif"
+    cell = CORE.replace("120", "90")
+    path.write_text(f"{cell}_symmetry_space_group_name_H-M P2_1\n_symmetry_Int_Tables_number 4")
+    assert group_from_cif(path).name == "P 1 21 1"
+
+
+def test_a_cif_with_operators_may_have_a_name_that_nobody_knows(tmp_path):
+    path = tmp_path / "own.cif"
+    path.write_text(f"{CORE}_space_group_name_H-M_alt 'P 32 (own axes)'\n{OPERATORS}\n")
+    assert group_from_cif(path).order == 6
 
 
 def test_files_that_are_none_or_too_large_are_refused(tmp_path, monkeypatch):

@@ -12,6 +12,7 @@ from orbiflow.arguments import as_path, described
 from orbiflow.errors import GroupError, InputFileError, OrbiflowError, system_errors
 from orbiflow.symmetry.cells import cell_lattice, cell_parameters, fitting_cell
 from orbiflow.symmetry.group import CrystallographicGroup, checked_lattice
+from orbiflow.symmetry.group_symbols import find_hall, find_setting
 from orbiflow.symmetry.triplets import group_from_operators, operators, parse_operator
 
 MAX_CIF_BYTES = 64 * 2**20
@@ -19,11 +20,14 @@ _TYPICAL = (1.0, 1.1, 1.3, 80.0, 100.0, 95.0)  # without symmetry; all default c
 _LENGTHS, _ANGLES = ("a", "b", "c"), ("alpha", "beta", "gamma")
 _CELL = [*(f"_cell_length_{x}" for x in _LENGTHS), *(f"_cell_angle_{x}" for x in _ANGLES)]
 _OPERATORS = ("_space_group_symop_operation_xyz", "_symmetry_equiv_pos_as_xyz")
-_SYMBOLS = (
-    *("_space_group_name_hall", "_symmetry_space_group_name_hall"),
+_HALL = ("_space_group_name_hall", "_symmetry_space_group_name_hall")
+_NAMES = (
     *("_space_group_name_h-m_alt", "_symmetry_space_group_name_h-m"),
-    *("_space_group_it_number", "_symmetry_int_tables_number"),
+    *("_space_group_name_h-m_full", "_space_group_name_h-m_ref"),
 )
+_SAID = "Hall: "  # before a symbol of Hall
+_NUMBERS = ("_space_group_it_number", "_symmetry_int_tables_number")
+_SYMBOLS = (*_HALL, *_NAMES, *_NUMBERS)
 
 
 def space_group(name: int | str, cell: ArrayLike | None = None) -> CrystallographicGroup:
@@ -32,9 +36,10 @@ def space_group(name: int | str, cell: ArrayLike | None = None) -> Crystallograp
     Needs the package gemmi, whose tables have 564 settings: `pip install "orbiflow[crystals]"`.
 
     Args:
-        name: A number from 1 to 230, a Hermann-Mauguin symbol, short or full ("P21/c", "F d -3 m:2",
-            "R -3 m:R"), or a Hall symbol ("-P 2ybc"; "Hall: P 2" where it could be both). Without more
-            it means origin 1, hexagonal axes and the unique axis b.
+        name: A number from 1 to 230, a Hermann-Mauguin symbol as it is typeset or typed ("P2_1/c",
+            "P 21/c", "P2(1)/c", "P 1 21/c 1", "Fd-3m:2", "R -3 m:R"), or a Hall symbol: "Hall: P 2", or
+            without that word where nothing else is written so ("-P 2ybc"). Without more it means
+            origin 1, hexagonal axes and the unique axis b.
         cell: The conventional cell, as for `cell_lattice`. Default: one of its system with a = 1.
 
     Raises `GroupError` for an unknown name, or a cell that the group does not fit.
@@ -55,20 +60,23 @@ def space_group(name: int | str, cell: ArrayLike | None = None) -> Crystallograp
 
 def _named(name: int | str) -> tuple[str, list[str]]:
     """Return the name that a group goes by, and all its operators in the conventional cell."""
-    gemmi = _gemmi()
-    # printable, and no number that gemmi would read modulo 2^32
-    given = re.fullmatch(r"0*((?!0|\d{4})[ -~]{1,80})", str(name).strip())
-    text = given[1] if given else ""
-    try:
-        if known := gemmi.find_spacegroup_by_name(text):
-            return known.xhm(), [op.triplet() for op in known.operations()]
-        hall = text.removeprefix("Hall:").strip()
-        return hall, [op.triplet() for op in gemmi.symops_from_hall(hall)]
-    except (RuntimeError, ValueError) as error:
-        raise GroupError(
-            f"unknown space group {described(name)}: give a number from 1 to 230, a Hermann-Mauguin "
-            'symbol such as "P 21 21 21" or "R -3 m:H", or a Hall symbol such as "-P 2ybc"'
-        ) from error
+    gemmi, text = _gemmi(), str(name).strip()
+    if known := _setting(gemmi, text):
+        return known.xhm(), [op.triplet() for op in known.operations()]
+    if found := find_hall(gemmi, text):
+        known = gemmi.find_spacegroup_by_ops(gemmi.GroupOps(found))
+        return known.xhm() if known else text, [op.triplet() for op in found]
+    raise GroupError(
+        f"unknown space group {described(name)}: give a number from 1 to 230, a Hermann-Mauguin "
+        'symbol such as "P 21 21 21" or "R -3 m:H", or a Hall symbol such as "Hall: -P 2ybc"'
+    )
+
+
+def _setting(gemmi: Any, text: str) -> Any | None:
+    """Return gemmi's row of a number or a Hermann-Mauguin symbol, or None."""
+    if number := re.fullmatch(r"0*([1-9]\d{0,2})", text):
+        return gemmi.find_spacegroup_by_number(int(number[1]))
+    return find_setting(gemmi, text)
 
 
 def group_from_cif(path: str | Path, cell: ArrayLike | None = None) -> CrystallographicGroup:
@@ -77,7 +85,8 @@ def group_from_cif(path: str | Path, cell: ArrayLike | None = None) -> Crystallo
     It is that of the operators, or else of the Hall symbol, the Hermann-Mauguin symbol or the number.
     `cell`, as for `space_group`, is used in the place of the file's. Needs gemmi.
 
-    Raises `InputFileError` for a file that cannot be read or describes no group.
+    Raises `InputFileError` for a file that cannot be read, describes no group, or contradicts itself:
+    operators, symbols and number must be of one type of group.
     """
     path = as_path(path, "path")
     with system_errors(InputFileError, f"{path}: cannot be read"):
@@ -92,15 +101,55 @@ def group_from_cif(path: str | Path, cell: ArrayLike | None = None) -> Crystallo
             cell = [cif.as_number(values.get(tag, "?")[0]) for tag in _CELL]
         if not np.isfinite(cell).all():
             raise GroupError("its cell is not complete: give one as the argument cell")
-        symbols = [values[tag][0] for tag in _SYMBOLS if tag in values]
+        names, numbers = _names(values)
         listed = next((values[tag] for tag in _OPERATORS if tag in values), None)
         if listed is None:
-            return space_group(symbols[0], cell)
-        return group_from_operators(listed, cell_lattice(cell), name="".join(symbols[:1]))
+            group = space_group(names[0], cell)
+        else:
+            basis = cell_lattice(cell)
+            group = group_from_operators(listed, basis, name="".join(names[:1]).removeprefix(_SAID))
+            number = _number_of(operators(group, basis))
+            numbers |= {f"its {len(listed)} operators": number} if number else {}
+        if len({*numbers.values()}) > 1:
+            said = ", ".join(f"{what} is of number {number}" for what, number in numbers.items())
+            raise GroupError(f"it contradicts itself: {said}; correct it, or remove what is wrong")
+        return group
     except StopIteration:
         raise InputFileError(f"{path}: it has neither operators nor a symbol of a group") from None
     except (RuntimeError, ValueError) as error:
         raise InputFileError(f"{path}: {error}") from error
+
+
+def _names(values: dict[str, list[str]]) -> tuple[list[str], dict[str, int]]:
+    """Return the names that a CIF gives its group, the most exact first, and the number of each.
+
+    A Hall symbol that is none is passed over.
+    """
+    gemmi = _gemmi()
+    names: list[str] = []
+    numbers: dict[str, int] = {}
+    for tag, text in ((tag, values[tag][0]) for tag in _SYMBOLS if tag in values):
+        is_hall = tag in _HALL
+        hall = find_hall(gemmi, _SAID + text) if is_hall else None
+        if hall is None and is_hall:
+            continue
+        names.append(_SAID + text if is_hall else text)
+        number = _number_of([op.triplet() for op in hall]) if hall else None
+        if not is_hall and (row := _setting(gemmi, text)):
+            number = row.number
+        if number is not None:
+            numbers[f"{tag} {text}"] = number
+    return names, numbers
+
+
+def _number_of(triplets: list[str]) -> int | None:
+    """Return the number of the group of these operators, if its setting is in gemmi's tables."""
+    gemmi = _gemmi()
+    try:
+        found = gemmi.find_spacegroup_by_ops(gemmi.GroupOps([gemmi.Op(t) for t in triplets]))
+    except (RuntimeError, ValueError):  # a shift that is no 24th
+        return None
+    return None if found is None else found.number
 
 
 def _values_by_tag(block: Any, cif: Any) -> dict[str, list[str]]:

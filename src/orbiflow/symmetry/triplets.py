@@ -2,6 +2,7 @@
 
 import itertools
 import re
+import warnings
 from collections.abc import Iterable
 from fractions import Fraction
 
@@ -9,7 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orbiflow.arrays import Array
-from orbiflow.errors import GroupError, LatticeMismatchError, NotAnIsometryError
+from orbiflow.errors import (
+    GroupError,
+    LatticeMismatchError,
+    NotAnIsometryError,
+    RoundedOperatorsWarning,
+)
 from orbiflow.symmetry.cells import cell_parameters, fitting_cell
 from orbiflow.symmetry.group import MAX_ORDER, CrystallographicGroup, checked_lattice, generated
 from orbiflow.symmetry.isometry import Isometry, translation
@@ -28,7 +34,8 @@ def group_from_operators(
 
     The operators are texts such as "-x,y+1/2,-z" with d parts, 1 to 3: all of the group's modulo the
     lattice, or generators. `lattice` has the basis vectors of their cell as columns (d, d); if pure
-    translations make it finer, the group is on the primitive one.
+    translations make it finer, the group is on the primitive one. Rounded thirds, sixths and the like,
+    such as 0.3333, are read as the fractions they stand for, with a `RoundedOperatorsWarning`.
 
     Raises `GroupError` for a text that is no operator, or one that does not map the lattice to itself.
 
@@ -41,6 +48,7 @@ def group_from_operators(
         raise GroupError(f"more than {MAX_ORDER} operators were given; generators are enough")
     d, inverse = len(basis), np.linalg.inv(basis)
     tables = [parse_operator(text, d) for text in texts]
+    _warn_of_rounding(texts)
     try:
         isometries = [Isometry(basis @ t[:, :d] @ inverse, basis @ t[:, d]) for t in tables]
     except NotAnIsometryError as error:
@@ -69,8 +77,32 @@ def parse_operator(text: str, dim: int) -> Array:
     for row, part in zip(table, parts, strict=True):
         for sign, number, axis in _TERM.findall(part):
             place = AXES.index(axis) if axis else dim
-            row[place] += float(Fraction(f"{sign}{number or 1}")) if number or axis else 0.0
+            exact = Fraction(f"{sign}{number or 1}") if number or axis else Fraction(0)
+            row[place] += float(exact if axis else _unrounded(number, exact))
     return table
+
+
+def _unrounded(text: str, value: Fraction) -> Fraction:
+    """Return the 24th, or of two decimals the 6th, that a shift is, rounded or cut; or the value."""
+    decimals = len(text.partition(".")[2])
+    if decimals < 2:
+        return value
+    parts = 6 if decimals == 2 else 24
+    nearest = Fraction(round(value * parts), parts)
+    return nearest if abs(value - nearest) < Fraction(1, 10**decimals) else value
+
+
+def _warn_of_rounding(texts: Iterable[str]) -> None:
+    """Warn where a shift is not what is written."""
+    numbers = {number for text in texts for number in re.findall(r"\d*\.\d+", text)}
+    pairs = ((number, _unrounded(number, Fraction(number))) for number in sorted(numbers))
+    changed = [f"{text} as {value}" for text, value in pairs if abs(value - Fraction(text)) > 1e-9]
+    if changed:
+        warnings.warn(
+            f"the operators are rounded: read {', '.join(changed[:8])}",
+            RoundedOperatorsWarning,
+            stacklevel=3,
+        )
 
 
 def operators(group: CrystallographicGroup, lattice: ArrayLike | None = None) -> list[str]:

@@ -1,0 +1,172 @@
+"""Names of space groups as people typeset them, found among the settings that gemmi lists."""
+
+import html
+import re
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+MAX_LENGTH = 200
+USUAL = 530  # so many of gemmi's settings, its first, are in International Tables
+HALL = re.compile(
+    r"-?[PABCIRSTF](?: ?-?[1-6](?:[xyz'\"*=]|[abcnuvwd1-5])*)+(?: ?\( ?-?\d+ -?\d+ -?\d+ ?\))?"
+)
+"""Symbols of Hall: a lattice, then rotations with their axes and shifts, and a change of origin."""
+
+_AXES_OF_HALL = re.compile(r"[xyz'\"*=]")  # letters of no other symbol
+_MINUS = "\u2010\u2011\u2012\u2013\u2014\u2212\ufe63\uff0d"
+_SUBSCRIPTS = {0x2080 + n: f"_{n}" for n in range(10)}
+_PLAIN = str.maketrans({**dict.fromkeys(_MINUS, "-"), "\u2044": "/", "\u2215": "/", "\u00a0": " "})
+_TYPESETTING: tuple[tuple[str, str], ...] = (
+    (r"<sub>\s*(\d)\s*</sub>", r"_\1"),
+    (r"<(\w+)[^<>]*overline[^<>]*>\s*(\d)\s*</\1>", r"-\2"),
+    (r"</?[A-Za-z][^<>]*>", ""),
+    (r"\\(?:bar|overline)\s*(?:\{\s*(\d)\s*\}|(\d))", r"-\1\2"),
+    (r"\\(?:mathrm|mathit|mathbf|mathsf|text|textit|textrm|rm|it)\b\s*", ""),
+    (r"\\[,;:! ]|~", " "),
+    (r"_\s*\{\s*(\d)\s*\}", r"_\1"),
+    (r"[{}$]", ""),
+    (r"(\d)[\u0304\u0305]", r"-\1"),
+    (r"[\u00af\u203e]\s*(?=\d)", "-"),
+    (r"(\d)[\u00af\u203e]", r"-\1"),
+    (r"(?<=\d)\s*[(\[](\d)[)\]]", r"_\1"),
+)
+_EXTENSION = re.compile(r"\s*:\s*([12HRSZ]|-?[abc][a-c1-6-]*)$|\s+([HRSZ])$", re.IGNORECASE)
+_ORIGINS = {"S": "1", "Z": "2"}  # as the ICSD writes them
+_AFTER_2002 = {
+    **{"A e m 2": "A b m 2", "A e a 2": "A b a 2"},
+    **{"C m c e": "C m c a", "C m m e": "C m m a", "C c c e": "C c c a"},
+}
+
+
+class _Symbol(NamedTuple):
+    """The parts of a way to write a setting, in small letters, and whether tables of groups have it."""
+
+    parts: tuple[str, ...]
+    is_usual: bool
+    setting: Any
+
+
+def plain(name: str) -> str:
+    """Return a typeset name in plain letters: subscripts after "_", a bar as a minus before its digit.
+
+    >>> plain(r"$P2_{1}/c$"), plain("P2(1)/c"), plain("P2\u2081/c"), plain("P1\u0305")
+    ('P2_1/c', 'P2_1/c', 'P2_1/c', 'P-1')
+    """
+    text = html.unescape(name[:MAX_LENGTH]).translate(_SUBSCRIPTS).translate(_PLAIN)
+    for pattern, meant in _TYPESETTING:
+        text = re.sub(pattern, meant, text)
+    return " ".join(text.split())
+
+
+def find_setting(gemmi: Any, name: str) -> Any | None:
+    """Return the row of gemmi's table that a Hermann-Mauguin symbol names, or None.
+
+    Blanks may be left out, or stand between the symbol's parts; letters may be large or small.
+    """
+    table = _symbols(gemmi)
+    text = plain(name)
+    exact = next((row for row in gemmi.spacegroup_table() if row.xhm() == text), None)
+    if exact is not None:
+        return exact
+    text, extension = _without_extension(text)
+    written = [part.lower() for part in re.findall(r"^[A-Za-z]|[^ ]+", text)]
+    if not text or not re.fullmatch(r"[A-Za-z][-_/ A-Za-z0-9]*", text):
+        return None
+    found = [
+        symbol
+        for symbol in table.get("".join(written).replace("_", ""), ())
+        if _is_written(written, symbol.parts) and _has_extension(symbol.setting, extension)
+    ]
+    usual = [symbol.setting for symbol in found if symbol.is_usual]
+    settings = usual or [symbol.setting for symbol in found]
+    # the first listed of several: unique axis b before c and a, origin 1, hexagonal axes
+    return settings[0] if len({setting.number for setting in settings}) == 1 else None
+
+
+def find_hall(gemmi: Any, name: str) -> list[Any] | None:
+    """Return the operators of a symbol of Hall, said by "Hall:" or by letters of no other; or None."""
+    text = " ".join(name.split())
+    said = re.fullmatch(r"hall\s*[:=]\s*(.*)", text, re.IGNORECASE)
+    text = said[1] if said else text
+    if not HALL.fullmatch(text):
+        return None
+    known = {row.hall for row in gemmi.spacegroup_table()}
+    if not said and not (_AXES_OF_HALL.search(text) and text in known):
+        return None
+    try:
+        return list(gemmi.symops_from_hall(text))
+    except (RuntimeError, ValueError):
+        return None
+
+
+def _without_extension(text: str) -> tuple[str, str]:
+    """Return a symbol and the setting after it: an origin, axes, or the cell of a monoclinic group."""
+    found = _EXTENSION.search(text)
+    if found is None and re.fullmatch(r"R.+[HR]", text, re.IGNORECASE):
+        return text[:-1].strip(), text[-1].upper()
+    if found is None:
+        return text, ""
+    given: str = found[1] or found[2]
+    extension = given.upper() if len(given) == 1 and given.upper() in "12HRSZ" else given.lower()
+    return text[: found.start()], _ORIGINS.get(extension, extension)
+
+
+def _has_extension(setting: Any, extension: str) -> bool:
+    own = setting.ext.strip("\0")
+    cell = re.sub(r"^-?([abc])\d?$", r"\1", setting.qualifier)  # of monoclinic settings, the axis
+    return extension in ("", own, setting.qualifier, cell)
+
+
+def _is_written(written: Sequence[str], parts: Sequence[str]) -> bool:
+    """Whether a symbol of these parts is written so: blanks between them, "_" in screw axes."""
+    spans, own = _spans(parts), _spans([part.replace("_", "") for part in written])
+    letters = "".join(written)
+    marks = [at for at, letter in enumerate(letters) if letter == "_"]
+    subscripts = {at - count for count, at in enumerate(marks)}
+    screws = {start + 1 for (start, _), part in spans.items() if re.match(r"[2346][1-5]", part)}
+    # numbers apart are apart in the symbol: "P 2 1" is not P 21, and "P 32 1" not P 3 2 1
+    numbers = {span for span, part in own.items() if part.isdigit() and len(own) > 2}
+    if subscripts:  # a screw axis without one stands alone
+        screws_left = screws - subscripts - {start + 1 for start, _ in own}
+    else:
+        screws_left = set[int]()
+    return (
+        {end for _, end in own} <= {end for _, end in spans}
+        and subscripts <= screws
+        and numbers <= spans.keys()
+        and not screws_left
+    )
+
+
+def _spans(parts: Sequence[str]) -> dict[tuple[int, int], str]:
+    """Return parts by where they begin and end when they are put together."""
+    ends = [sum(map(len, parts[: k + 1])) for k in range(len(parts))]
+    return {(end - len(part), end): part for part, end in zip(parts, ends, strict=True)}
+
+
+@lru_cache(maxsize=1)
+def _symbols(gemmi: Any) -> dict[str, list[_Symbol]]:
+    """Return all symbols by their letters without blanks, in small letters."""
+    table: dict[str, list[_Symbol]] = {}
+    for number, row in enumerate(gemmi.spacegroup_table()):
+        for parts in _ways(row.hm, row.ext == "H"):
+            lower = tuple(part.lower() for part in parts)
+            table.setdefault("".join(lower), []).append(_Symbol(lower, number < USUAL, row))
+    return table
+
+
+def _ways(symbol: str, is_hexagonal: bool) -> list[list[str]]:
+    """Return the parts of a symbol as it is listed, and of other ways to write it."""
+    parts = symbol.split()
+    if not all(re.fullmatch(r"[A-Z]|-?[1-6]{1,2}(/[a-enm])?|[a-enm]", part) for part in parts):
+        return []  # a few of gemmi's own, such as "P 21212(a)"
+    ways = [parts]
+    if len(parts) == 4 and parts[1:].count("1") == 2:  # monoclinic
+        ways.append([parts[0], *(part for part in parts[1:] if part != "1")])
+    ways += [new.split() for new, old in _AFTER_2002.items() if old == symbol]
+    if len(parts) > 2 and parts[2] == "-3":  # cubic, before the bar was written
+        ways.append([*parts[:2], "3", *parts[3:]])
+    if is_hexagonal:  # as the PDB writes them
+        ways.append(["H", *parts[1:]])
+    return ways
