@@ -39,7 +39,7 @@ from orbiflow.density.fitting.flow_trial import (
     try_flow,
 )
 from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, Repeats, folds_of, repeats_of
-from orbiflow.density.fitting.kernels import NARROWEST
+from orbiflow.density.fitting.kernels import narrowest_for
 from orbiflow.density.fitting.likelihood import Budget, training
 from orbiflow.density.fitting.report import (
     ComponentEvidence,
@@ -116,7 +116,8 @@ def fit_automatic(
     say = progress or silent
     budget = Budget(seconds=settings.seconds)
     rows, settings, notes = _rows(space, points, weights, groups, settings, check_missing(missing))
-    found = repeats_of(space, rows[is_whole(rows)].points)
+    known = rows[is_whole(rows)].points
+    found = repeats_of(space, known)
     whole = " that lack no angle" if found.places + found.rows < len(rows) else ""
     if found.places < LEAST_PLACES:
         raise OrbiflowError(
@@ -125,7 +126,7 @@ def fit_automatic(
         )
     generator = torch.Generator().manual_seed(settings.seed)
     folds = folds_of(rows, together=settings.repeats == "rounding", generator=generator)
-    families = _families(space, folds, settings, found)
+    families = _families(space, folds, settings, found, narrowest_for(space, known))
     flows = _wants_flow(space, folds, settings)
     total = work_of(len(families), folds.used) + FLOW_WORK * flows
     course = Course(lambda done, what: say(BEFORE_END * done, what), total)
@@ -215,10 +216,11 @@ def _rows(
 
 
 def _families(
-    space: Space, folds: Folds, settings: DensitySettings, found: Repeats
+    space: Space, folds: Folds, settings: DensitySettings, found: Repeats, narrowest: float
 ) -> list[Family]:
     rounding = settings.repeats == "rounding"
-    narrowest = _narrowest(space, found.step) if rounding else NARROWEST
+    if rounding and found.step is not None:  # a deviation of one step
+        narrowest = min(narrowest, 1 / space.step_angle(found.step) ** 2)
     starts = max(1, round(MEMBERS / folds.used)) if space.dim > MOST_DIM else 1
     families: list[Family] = [
         KernelFamily(space, narrowest, repeats=not rounding),
@@ -240,11 +242,6 @@ def _families(
             f"network for more than {MOST_DIM}, a flow for {MOST_DIM} at most"
         )
     return chosen
-
-
-def _narrowest(space: Space, step: float | None) -> float:
-    """Concentration of kernels of a deviation of one step of rounding."""
-    return NARROWEST if step is None else min(NARROWEST, 1 / space.step_angle(step) ** 2)
 
 
 def _wants_flow(space: Space, folds: Folds, settings: DensitySettings) -> bool:

@@ -103,11 +103,15 @@ def lightest_folds(sizes: NDArray[np.int64], folds: int) -> NDArray[np.int64]:
     return found
 
 
+SAME = 1e-13
+"""Difference of chart coordinates within which points are the same: far below what kernels resolve."""
+
+
 def places(points: Tensor) -> tuple[Tensor, Tensor]:
     """Return the number of points (N, d) at each different place (M,), and the place (N,) of each."""
-    # rounding keeps together what differs by the projection's last digit
+    # rounding keeps together what differs by the projection's last digits
     _, place, counts = unique(
-        (points * 1e9).round(), dim=0, return_inverse=True, return_counts=True
+        (points / SAME).round(), dim=0, return_inverse=True, return_counts=True
     )
     return counts, place
 

@@ -21,6 +21,7 @@ from .flow import FlowDensity as FlowDensity
 from .flow import UniformDensity as UniformDensity
 from .flow import VonMisesDensity as VonMisesDensity
 from .flow import flow_obstacle as flow_obstacle
+from .kernels import SHARPEST as SHARPEST
 from .kernels import AdaptiveKernels as AdaptiveKernels
 from .kernels import kernel_rows as kernel_rows
 from .mixture import Mixture as Mixture
