@@ -31,7 +31,7 @@ MIN_ROWS = 25
 MAX_CONCENTRATION = 1e9
 
 CLOSE, SAME = 1e-6, 1e-30
-"""The shortfall of a resultant from 1 below which it is taken from differences, and that of equal rows."""
+"""How far a resultant is below 1, where that is taken from differences, and of equal rows."""
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from scipy.special import ive
 from torch import Tensor
 
 from orbiflow.density.fitting.chains import PRIOR, PRIOR_RESULTANT, concentration, far_apart
-from orbiflow.density.fitting.folds import places
 from orbiflow.density.fitting.likelihood import training
+from orbiflow.density.fitting.repeats import places
 from orbiflow.density.fitting.rows import Rows, is_whole
 from orbiflow.density.models import FAINT, SHARPEST, AdaptiveKernels, kernel_rows
 from orbiflow.density.spaces import Space
@@ -36,11 +36,11 @@ MOST_LOOKED_AT = 2_000
 """The most rows whose neighbours are looked at."""
 
 
-def narrowest_for(space: Space, points: Tensor) -> float:
+def narrowest_for(space: Space, points: Tensor) -> tuple[float, bool]:
     """Return the concentration of the narrowest kernels that points (N, d) ask for.
 
     It is `NARROWEST`, which blurs 2 km on earth, or more where many rows have neighbours that such
-    kernels could not tell apart; `SHARPEST` at most.
+    kernels could not tell apart; `SHARPEST` at most. Second comes whether most rows ask for more.
     """
     counts, place = places(points)
     first = torch.empty_like(counts).scatter_(0, place, torch.arange(len(points)))
@@ -48,14 +48,15 @@ def narrowest_for(space: Space, points: Tensor) -> float:
     some = some[:MOST_CENTERS]
     near = min(NEIGHBOURS[1], len(some) - 1)
     if near < 1:
-        return NARROWEST
+        return NARROWEST, False
     away2 = spreads(space, some, [near], MOST_LOOKED_AT)[0].mean(dim=1).sort().values
     crowded = float(away2[int(CROWDED * (len(away2) - 1))])
     # the mean side of a cell that has one of the rows
     even = 2 * math.pi * len(some) ** (-1 / space.dim)
     if crowded * SCALES[0] * NARROWEST > 1 or crowded > (EVEN * even) ** 2:
-        return NARROWEST
-    return min(SHARPEST, 1 / (SCALES[0] * float(away2[int(CROWDED**2 * (len(away2) - 1))])))
+        return NARROWEST, False
+    nearest, median = (float(away2[int(p * (len(away2) - 1))]) for p in (CROWDED**2, 0.5))
+    return min(SHARPEST, 1 / (SCALES[0] * nearest)), 1 / (SCALES[1] * median) > SHARPEST
 
 
 def _near_concentrations(
@@ -69,6 +70,17 @@ def _near_concentrations(
         for scale, share in itertools.product(SCALES, shrinkage):
             kappa = 1 / (scale * ((1 - share) * spread + share * mean))
             yield f"near {number}, {scale:g}, {share:g}", kappa.clamp(WIDEST, narrowest)
+
+
+def limit_notes(space: Space, crowded: bool) -> list[str]:
+    """Return what to say where most rows are closer together than kernels can be narrow."""
+    if not crowded:
+        return []
+    least = SHARPEST**-0.5
+    return [
+        f"most rows lie closer together than {least:.0e} radians ({least / space.step_angle(1.0):.1g} "
+        "in the unit of the data), and the density cannot tell them apart"
+    ]
 
 
 def spreads(
