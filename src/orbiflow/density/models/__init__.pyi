@@ -9,6 +9,7 @@ from .chains import waves as waves
 from .density import LEVELS as LEVELS
 from .density import Density as Density
 from .density import Split as Split
+from .density import Weighted as Weighted
 from .evaluation import CHECKED as CHECKED
 from .evaluation import TabulatedDensity as TabulatedDensity
 from .evaluation import kl_by_quadrature as kl_by_quadrature
