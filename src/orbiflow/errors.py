@@ -97,6 +97,10 @@ class CertificationError(OrbiflowError):
     """A tile that does not tile the plane within the stated tolerance."""
 
 
+class DataWarning(UserWarning):
+    """Something about the data that was decided for the user, who may decide otherwise."""
+
+
 class CoarseStepsWarning(UserWarning):
     """A flow whose integration steps are too coarse for its fields: its results are not accurate."""
 

@@ -26,8 +26,9 @@ from orbiflow.density.fitting.evidence import (
     stacking_weights,
     supported_weights,
 )
-from orbiflow.density.fitting.folds import FOLDS, folds_of, repeats_of
+from orbiflow.density.fitting.folds import FOLDS, folds_of
 from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
+from orbiflow.density.fitting.repeats import repeats_of
 from orbiflow.density.fitting.rows import Rows, gain_of
 from orbiflow.errors import OrbiflowError
 

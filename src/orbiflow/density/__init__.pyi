@@ -19,8 +19,8 @@ from .estimator import DensityEstimator as DensityEstimator
 from .fitting.automatic import fit_automatic as fit_automatic
 from .fitting.flow import fit_density as fit_density
 from .fitting.folds import LEAST_PLACES as LEAST_PLACES
-from .fitting.folds import places as places
 from .fitting.likelihood import Refinement as Refinement
+from .fitting.repeats import places as places
 from .fitting.report import FitReport as FitReport
 from .fitting.report import Progress as Progress
 from .fitting.report import report_from_json as report_from_json

@@ -30,6 +30,9 @@ MIN_ROWS = 25
 
 MAX_CONCENTRATION = 1e9
 
+CLOSE, SAME = 1e-6, 1e-30
+"""How far a resultant is below 1, where that is taken from differences, and of equal rows."""
+
 
 @dataclass(frozen=True)
 class AngleSummary:
@@ -219,19 +222,20 @@ def _angle_summary(name: str, turns: Array, turn: float, rows: _Rows) -> AngleSu
     angles = 2 * np.pi * turns
     vectors = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     mean, resultant, spread = _mean_direction(vectors, rows)
+    below = _shortfall(vectors, mean, resultant, rows)
     per_radian = turn / (2 * np.pi)
     middle = deviation = None
     if mean is not None:
         least = -0.5 * turn if (turns < 0).any() else 0.0
         middle = (math.atan2(mean[1], mean[0]) * per_radian - least) % turn + least
-        deviation = math.sqrt(max(0.0, -2 * math.log(resultant))) * per_radian
+        deviation = math.sqrt(-2 * math.log1p(-below)) * per_radian
     return AngleSummary(
         name=name,
         rows=len(turns),
         mean=middle,
         half_width=None if spread is None else spread * per_radian,
         resultant=resultant,
-        concentration=concentration(resultant, 2),
+        concentration=concentration(resultant, 2, below),
         deviation=deviation,
         rayleigh_p=rayleigh_p(vectors, rows),
         kuiper_p=kuiper_p(turns) if rows.alike else None,
@@ -248,6 +252,15 @@ def _mean_direction(vectors: Array, rows: _Rows) -> tuple[Array | None, float, f
     mean = total / resultant
     across = vectors - (vectors @ mean)[:, None] * mean
     return mean, resultant, _half_angle(across / resultant, rows)
+
+
+def _shortfall(vectors: Array, mean: Array | None, resultant: float, rows: _Rows) -> float:
+    """Return 1 less the resultant of unit vectors (n, p), to all digits where they are close."""
+    if mean is None:
+        return 1.0
+    # 1 - cos is half the square of the chord
+    near = float(rows.mean(((vectors - mean) ** 2).sum(axis=1))) / 2
+    return near if near < CLOSE else max(0.0, 1 - resultant)
 
 
 def _tail(of: Any, *arguments: float) -> float:
@@ -275,8 +288,10 @@ def _half_angle(errors: Array, rows: _Rows) -> float | None:
     return math.asin(sine) if sine < 1 else None
 
 
-def concentration(resultant: float, dimension: int) -> float | None:
+def concentration(resultant: float, dimension: int, below: float | None = None) -> float | None:
     """Return the likeliest concentration of a von Mises-Fisher distribution, None if it is infinite.
+
+    `below` is 1 less the resultant, if it is known to more digits.
 
     >>> round(concentration(0.5, 2), 3), round(concentration(0.5, 3), 3)
     (1.159, 1.797)
@@ -288,6 +303,8 @@ def concentration(resultant: float, dimension: int) -> float | None:
 
     if resultant <= 1e-12:
         return 0.0
+    if below is not None and below < 1 / MAX_CONCENTRATION:
+        return None if below < SAME else (dimension - 1) / (2 * below)
     if excess(MAX_CONCENTRATION) <= 0:
         return None
     return float(optimize.brentq(excess, 1e-12, MAX_CONCENTRATION, xtol=1e-12, rtol=1e-12))
@@ -406,14 +423,14 @@ def summarize_directions(
     vectors, rows = _chosen(to_vectors(table), weights, groups, level)
     mean, resultant, cone = _mean_direction(vectors, rows)
     count, k, fisher_cone = len(vectors), None, None
-    away = count * (1 - resultant)
-    if rows.alike and count > 1 and away > 1e-12:
-        k = (count - 1) / away
-        cosine = 1 - away / max(count * resultant, 1e-300) * ((1 - level) ** (-1 / (count - 1)) - 1)
-        fisher_cone = math.degrees(math.acos(cosine)) if cosine > -1 else None
+    below = _shortfall(vectors, mean, resultant, rows)
+    if rows.alike and count > 1 and below > SAME:
+        k = (count - 1) / (count * below)
+        fall = below / max(resultant, 1e-300) * ((1 - level) ** (-1 / (count - 1)) - 1)
+        fisher_cone = math.degrees(2 * math.asin(math.sqrt(fall / 2))) if fall < 2 else None
     return DirectionSummary(
         count, None if mean is None else _written(mean, table), _degrees(cone), resultant,
-        concentration(resultant, 3), k, fisher_cone, rayleigh_p(vectors, rows),
+        concentration(resultant, 3, below), k, fisher_cone, rayleigh_p(vectors, rows),
     )  # fmt: skip
 
 

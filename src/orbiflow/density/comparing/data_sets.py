@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, TypeVar
@@ -19,7 +20,7 @@ from orbiflow.density.comparing.resampling import Groups, TestResult, mmd_test, 
 from orbiflow.density.comparing.settings import ComparisonSettings
 from orbiflow.density.fitting import DensitySettings, Progress, fit_automatic
 from orbiflow.density.spaces import Space, space_for
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import DataWarning, OrbiflowError
 
 T = TypeVar("T")
 
@@ -294,7 +295,9 @@ def _held_out_ratio(
             try:
                 # kernels are fitted in a second or so
                 settings = DensitySettings(components=("kernels",), seed=seed)
-                density, _ = fit_automatic(space, train, settings)
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", DataWarning)  # of halves that nobody asked for
+                    density, _ = fit_automatic(space, train, settings)
             except OrbiflowError as error:
                 raise OrbiflowError(f"half of a data set is too small to fit: {error}") from error
             with torch.no_grad():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -38,9 +39,10 @@ from orbiflow.density.fitting.flow_trial import (
     flow_settings,
     try_flow,
 )
-from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, Repeats, folds_of, repeats_of
-from orbiflow.density.fitting.kernels import NARROWEST
+from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, folds_of
+from orbiflow.density.fitting.kernels import limit_notes, narrowest_for
 from orbiflow.density.fitting.likelihood import Budget, training
+from orbiflow.density.fitting.repeats import Repeats, repeats_of, spread_evenly
 from orbiflow.density.fitting.report import (
     ComponentEvidence,
     FitReport,
@@ -68,7 +70,7 @@ from orbiflow.density.fitting.rows import (
 from orbiflow.density.fitting.settings import COMPONENTS, DensitySettings
 from orbiflow.density.models import MOST_DIM, Mixture, flow_obstacle
 from orbiflow.density.spaces import Space, Torus
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import DataWarning, OrbiflowError
 from orbiflow.runtime import SideBySide
 
 LEAST_FLOW_ROWS = 300
@@ -110,6 +112,10 @@ def fit_automatic(
     `groups` (N,) are held out together, so that parts are chosen for rows of new groups. `missing` says
     to "refuse" points that lack angles (NaN), or to "marginalise": on tori a row counts by the density
     of the angles that it has, and the components are kernels and mixtures. The density is float64.
+
+    Warns:
+        DataWarning: If repeated values are taken for an accident of rounding without being told so, or
+            rows are closer together than kernels can be narrow.
     """
     settings = DensitySettings() if settings is None else settings
     as_instance(settings, DensitySettings, "settings")
@@ -123,9 +129,15 @@ def fit_automatic(
             f"a density needs at least {LEAST_PLACES} different points{whole}, got {found.places} "
             f"among {len(rows)}"
         )
+    taken_for = found.taken_for(settings.repeats)
+    rows, together = _without_rounding(space, rows, found, taken_for, settings.seed)
     generator = torch.Generator().manual_seed(settings.seed)
-    folds = folds_of(rows, together=settings.repeats == "rounding", generator=generator)
-    families = _families(space, folds, settings, found)
+    folds = folds_of(rows, together=together, generator=generator)
+    narrowest, crowded = narrowest_for(space, rows[is_whole(rows)].points)
+    limited = limit_notes(space, crowded)
+    if together and found.step is not None:  # a deviation of one step
+        narrowest = min(narrowest, 1 / space.step_angle(found.step) ** 2)
+    families = _families(space, folds, settings, together, narrowest)
     flows = _wants_flow(space, folds, settings)
     total = work_of(len(families), folds.used) + FLOW_WORK * flows
     course = Course(lambda done, what: say(BEFORE_END * done, what), total)
@@ -145,16 +157,30 @@ def fit_automatic(
     rest = 1 - tried.share
     parts = (*tried.evidence, *(replace(one, share=one.share * rest) for one in others))
     report = _report(density, folds, candidates, weights, tried, parts, found)
+    for note in (*found.warnings(settings.repeats), *limited):
+        warnings.warn(note, DataWarning, stacklevel=4)
     after = (
         *weights_note(folds.rows),
         *lone_groups_note(folds.rows.groups),
         *report.notes,
         *_untried_note(folds, settings, flows),
-        *found.notes(settings.repeats),
+        *found.notes(taken_for),
+        *limited,
         *budget.notes(),
         *steps_note(report.steps, report.integration_error),
     )
     return density, replace(report, notes=(*notes, *after))
+
+
+def _without_rounding(
+    space: Space, rows: Rows, found: Repeats, taken_for: str, seed: int
+) -> tuple[Rows, bool]:
+    """Return rows as they may have been before they were rounded, and if equal ones stay together."""
+    if taken_for != "rounding" or not any(found.spread):
+        return rows, taken_for == "rounding"
+    generator = torch.Generator().manual_seed(seed)
+    points = spread_evenly(space, rows.points, found.spread, generator)
+    return replace(rows, points=points), False
 
 
 def _flow_fits(
@@ -215,13 +241,11 @@ def _rows(
 
 
 def _families(
-    space: Space, folds: Folds, settings: DensitySettings, found: Repeats
+    space: Space, folds: Folds, settings: DensitySettings, together: bool, narrowest: float
 ) -> list[Family]:
-    rounding = settings.repeats == "rounding"
-    narrowest = _narrowest(space, found.step) if rounding else NARROWEST
     starts = max(1, round(MEMBERS / folds.used)) if space.dim > MOST_DIM else 1
     families: list[Family] = [
-        KernelFamily(space, narrowest, repeats=not rounding),
+        KernelFamily(space, narrowest, repeats=not together),
         MixtureFamily(space, settings.seed, narrowest),
     ]
     if space.is_torus and space.dim > 1:
@@ -240,11 +264,6 @@ def _families(
             f"network for more than {MOST_DIM}, a flow for {MOST_DIM} at most"
         )
     return chosen
-
-
-def _narrowest(space: Space, step: float | None) -> float:
-    """Concentration of kernels of a deviation of one step of rounding."""
-    return NARROWEST if step is None else min(NARROWEST, 1 / space.step_angle(step) ** 2)
 
 
 def _wants_flow(space: Space, folds: Folds, settings: DensitySettings) -> bool:

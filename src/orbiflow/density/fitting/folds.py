@@ -1,4 +1,4 @@
-"""Folds of rows that are held out, and rows that repeat another."""
+"""Folds of rows that are held out."""
 
 from __future__ import annotations
 
@@ -11,11 +11,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from orbiflow.arrays import Array
+from orbiflow.density.fitting.repeats import places
 from orbiflow.density.fitting.rows import Rows, group_numbers
-from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
-from orbiflow.typed_torch import unique
 
 FOLDS = 10
 """Number of folds: each holds out a tenth of the rows."""
@@ -101,99 +99,3 @@ def lightest_folds(sizes: NDArray[np.int64], folds: int) -> NDArray[np.int64]:
         rows, found[place] = heap[0]
         heapq.heapreplace(heap, (rows + size, int(found[place])))
     return found
-
-
-def places(points: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the number of points (N, d) at each different place (M,), and the place (N,) of each."""
-    # rounding keeps together what differs by the projection's last digit
-    _, place, counts = unique(
-        (points * 1e9).round(), dim=0, return_inverse=True, return_counts=True
-    )
-    return counts, place
-
-
-STEPS = tuple(m * 10.0**e for e in range(2, -7, -1) for m in (5, 2, 1))
-"""Steps of rounding that are looked for."""
-
-MANY = 2.0
-"""If there are more than so many times the repeats that rounding explains, they are real."""
-
-
-@dataclass(frozen=True)
-class Repeats:
-    """Rows that repeat another, and how far rounding explains them.
-
-    - `rows`: The number of rows that repeat an earlier one.
-    - `places`: The number of different ones.
-    - `step`: The step to which all values are rounded, in the data's unit; None if there is none.
-    - `explained`: The share of pairs of equal rows that rounding explains; None if values are not
-      rounded or nothing repeats.
-    """
-
-    rows: int
-    places: int
-    step: float | None
-    explained: float | None
-
-    @property
-    def is_rounding(self) -> bool:
-        """Whether rounding explains the repeats."""
-        return self.explained is not None and self.explained * MANY >= 1
-
-    def notes(self, taken_for: str) -> list[str]:
-        """Return what was found and assumed, in words; `taken_for` is "places" or "rounding"."""
-        if not self.rows:
-            return []
-        total = self.rows + self.places
-        found = f"{self.rows} of {total} rows repeat an earlier one"
-        if self.is_rounding:
-            found += f", as many as rounding to {self.step:g} brings about"
-        elif self.step is not None:
-            found += f", far more than rounding to {self.step:g} brings about"
-        else:
-            found += ", and the values are not rounded: they are places of their own"
-        if taken_for == "places":
-            assumed = "new rows are taken to repeat them as often (--repeats rounding: not to)"
-        else:
-            assumed = "they are taken for an accident: equal rows were held out together"
-        return [f"{found}; {assumed}"]
-
-
-def repeats_of(space: Space, points: Tensor) -> Repeats:
-    """Return what repeats among points (N, d).
-
-    Where values are rounded and the density is even over a few steps, as many pairs of rows are equal
-    as are exactly one step apart in one direction.
-    """
-    counts, _ = places(points)
-    rows = len(points) - len(counts)
-    data = space.from_chart(points)
-    step = _step(data) if rows else None
-    explained = None if step is None else _explained(data, step, counts)
-    return Repeats(rows, len(counts), step, explained)
-
-
-def _step(data: Array) -> float | None:
-    """Return the largest of `STEPS` of which all values are multiples, within rounding errors."""
-    scale = max(1.0, float(abs(data).max()))
-    for step in STEPS:
-        tolerance = 1e-9 * scale / step
-        if tolerance > 1e-3:
-            break
-        multiples = data / step
-        if bool((abs(multiples - np.round(multiples)) < tolerance).all()):
-            return step
-    return None
-
-
-def _explained(data: Array, step: float, counts: Tensor) -> float | None:
-    """Return the ratio of pairs that are one step apart to pairs that are equal."""
-    equal = float((counts.double() * (counts - 1) / 2).sum())
-    cells, number = np.unique(np.round(data / step).astype(np.int64), axis=0, return_counts=True)
-    of = {tuple(cell): int(n) for cell, n in zip(cells.tolist(), number, strict=True)}
-    apart = 0.0
-    for shift in np.eye(data.shape[1], dtype=np.int64):
-        beside = (cells + shift).tolist()
-        apart += sum(n * of.get(tuple(m), 0) for n, m in zip(of.values(), beside, strict=True))
-    # of n rows in a cell n (n - 1) / 2 pairs are equal, and n m with the m of a cell beside it
-    return apart / data.shape[1] / 2 / equal if equal else None

@@ -14,10 +14,10 @@ from scipy.special import ive
 from torch import Tensor
 
 from orbiflow.density.fitting.chains import PRIOR, PRIOR_RESULTANT, concentration, far_apart
-from orbiflow.density.fitting.folds import places
 from orbiflow.density.fitting.likelihood import training
+from orbiflow.density.fitting.repeats import places
 from orbiflow.density.fitting.rows import Rows, is_whole
-from orbiflow.density.models import FAINT, AdaptiveKernels, kernel_rows
+from orbiflow.density.models import FAINT, SHARPEST, AdaptiveKernels, kernel_rows
 from orbiflow.density.spaces import Space
 from orbiflow.typed_torch import linalg, special
 
@@ -25,7 +25,38 @@ NEIGHBOURS = (2, 4, 8, 16)
 SCALES = (0.1, 0.2, 0.4, 0.8, 1.6)
 ISOTROPY = (0.05, 0.3)
 NARROWEST, WIDEST = 1e7, 0.5
-"""The largest and the least concentration: a deviation of 0.02 degrees, or nearly uniform."""
+"""The largest and the least concentration: a deviation of 0.02 degrees, or nearly uniform. Rows that
+crowd more ask for narrower kernels, see `narrowest_for`."""
+
+CROWDED, EVEN = 0.1, 0.1
+"""The share of the rows that ask for narrower kernels, and how much nearer than in an even spread of
+all rows their neighbours must be."""
+
+MOST_LOOKED_AT = 2_000
+"""The most rows whose neighbours are looked at."""
+
+
+def narrowest_for(space: Space, points: Tensor) -> tuple[float, bool]:
+    """Return the concentration of the narrowest kernels that points (N, d) ask for.
+
+    It is `NARROWEST`, which blurs 2 km on earth, or more where many rows have neighbours that such
+    kernels could not tell apart; `SHARPEST` at most. Second comes whether most rows ask for more.
+    """
+    counts, place = places(points)
+    first = torch.empty_like(counts).scatter_(0, place, torch.arange(len(points)))
+    some = points[first][torch.randperm(len(first), generator=torch.Generator().manual_seed(0))]
+    some = some[:MOST_CENTERS]
+    near = min(NEIGHBOURS[1], len(some) - 1)
+    if near < 1:
+        return NARROWEST, False
+    away2 = spreads(space, some, [near], MOST_LOOKED_AT)[0].mean(dim=1).sort().values
+    crowded = float(away2[int(CROWDED * (len(away2) - 1))])
+    # the mean side of a cell that has one of the rows
+    even = 2 * math.pi * len(some) ** (-1 / space.dim)
+    if crowded * SCALES[0] * NARROWEST > 1 or crowded > (EVEN * even) ** 2:
+        return NARROWEST, False
+    nearest, median = (float(away2[int(p * (len(away2) - 1))]) for p in (CROWDED**2, 0.5))
+    return min(SHARPEST, 1 / (SCALES[0] * nearest)), 1 / (SCALES[1] * median) > SHARPEST
 
 
 def _near_concentrations(
@@ -41,18 +72,35 @@ def _near_concentrations(
             yield f"near {number}, {scale:g}, {share:g}", kappa.clamp(WIDEST, narrowest)
 
 
-def spreads(space: Space, centers: Tensor, neighbours: list[int]) -> list[Tensor]:
-    """Return mean square distances to the nearest neighbours, per axis: (N, 1) or (N, d) each."""
+def limit_notes(space: Space, crowded: bool) -> list[str]:
+    """Return what to say where most rows are closer together than kernels can be narrow."""
+    if not crowded:
+        return []
+    least = SHARPEST**-0.5
+    return [
+        f"most rows lie closer together than {least:.0e} radians ({least / space.step_angle(1.0):.1g} "
+        "in the unit of the data), and the density cannot tell them apart"
+    ]
+
+
+def spreads(
+    space: Space, centers: Tensor, neighbours: list[int], most: int | None = None
+) -> list[Tensor]:
+    """Return mean square distances to the nearest neighbours, per axis: (N, 1) or (N, d) each.
+
+    They are of all centers, or of the first `most`.
+    """
     images = space.features(centers)
+    own = images[0, :most]
     tree = KDTree(images.reshape(-1, images.shape[-1]).numpy())
-    _, nearest = tree.query(images[0].numpy(), k=neighbours[-1] + 1)
+    _, nearest = tree.query(own.numpy(), k=neighbours[-1] + 1)
     near = images.reshape(-1, images.shape[-1])[torch.as_tensor(np.asarray(nearest)[:, 1:])]
-    square = (near - images[0][:, None]) ** 2
+    square = (near - own[:, None]) ** 2
     if space.is_round:
         square = square.sum(dim=-1, keepdim=True) / space.dim
     else:  # a chord's square is nearly the angle's
         square = square[..., : space.dim] + square[..., space.dim :]
-    return [square[:, :m].mean(dim=1) + 1e-12 for m in neighbours]
+    return [square[:, :m].mean(dim=1) + 1 / SHARPEST for m in neighbours]
 
 
 MOST_CENTERS, MOST_IMAGES = 20_000, 40_000
@@ -60,6 +108,15 @@ MOST_CENTERS, MOST_IMAGES = 20_000, 40_000
 
 LADDER = 27
 """Number of widths from `WIDEST` to `NARROWEST`; neighbours differ by a factor of 1.4."""
+
+
+def ladder(narrowest: float) -> list[float]:
+    """Return concentrations from `WIDEST` to `narrowest`; beyond `NARROWEST` there are more of them."""
+    rungs: list[float] = np.geomspace(WIDEST, min(NARROWEST, narrowest), LADDER).tolist()
+    if narrowest > NARROWEST:
+        more = math.ceil((LADDER - 1) * math.log(narrowest / NARROWEST, NARROWEST / WIDEST))
+        rungs += np.geomspace(NARROWEST, narrowest, more + 1)[1:].tolist()
+    return rungs
 
 
 def kernel_estimates(
@@ -82,7 +139,7 @@ def kernel_estimates(
         own = rows.weights / rows.weights.sum()
     found: dict[str, AdaptiveKernels] = {}
     start = even_kernels(space, train, WIDEST, own)
-    for kappa in np.geomspace(WIDEST, narrowest, LADDER).tolist():
+    for kappa in ladder(narrowest):
         name = f"width {kappa**-0.5:.2g}"
         if only is None or name in only:
             found[name] = start.with_concentrations(torch.full_like(start.concentrations, kappa))

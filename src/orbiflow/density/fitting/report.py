@@ -11,8 +11,9 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance, as_points
-from orbiflow.density.fitting.folds import LEAST_PLACES, Repeats, places
+from orbiflow.density.fitting.folds import LEAST_PLACES
 from orbiflow.density.fitting.likelihood import Refinement
+from orbiflow.density.fitting.repeats import Repeats, places
 from orbiflow.density.fitting.rows import mean_of
 from orbiflow.density.inference import at_observed
 from orbiflow.density.models import Density, FlowDensity
@@ -127,11 +128,16 @@ def report_from_json(document: Mapping[str, Any]) -> FitReport:
         return FitReport(
             stages=stages,
             components=components,
-            repeats=None if repeats is None else Repeats(**repeats),
+            repeats=None if repeats is None else _repeats_from(repeats),
             **values,
         )
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise OrbiflowError(f"not the report of a fit: {error}") from error
+
+
+def _repeats_from(document: Mapping[str, Any]) -> Repeats:
+    spread, columns = (tuple(document.get(name, ())) for name in ("spread", "columns"))
+    return Repeats(**{**document, "spread": spread, "columns": columns})
 
 
 def _figures(values: list[float | None]) -> tuple[float, ...]:

@@ -43,9 +43,9 @@ class ComponentSettings(Settings, group="Density"):
     """Components that may be used, such as kernels,mixture; held-out data choose among them. Chains are
     for tori of two or more angles, a flow for three dimensions at most, a network for more."""
 
-    repeats: Literal["places", "rounding"] = "places"
+    repeats: Literal["auto", "places", "rounding"] = "auto"
     """What rows that repeat another are. Places: new rows repeat them as often. Rounding: an accident,
-    and the density has no peaks there."""
+    and the density has no peaks there. Auto: rounding where it explains the repeats, else places."""
 
     seed: Seed = 0
     """Seed of the random numbers: the same seed on the same machine gives the same density."""

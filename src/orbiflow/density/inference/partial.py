@@ -6,13 +6,22 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance, as_number
 from orbiflow.density.inference.angles import check_torus, given_axes, kept_axes
-from orbiflow.density.models import LEVELS, Density, Mixture, PartialDensity, Split, mixture_of
+from orbiflow.density.models import (
+    LEVELS,
+    Density,
+    Mixture,
+    PartialDensity,
+    Split,
+    Weighted,
+    mixture_of,
+)
 from orbiflow.density.spaces import Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import one_thread
@@ -29,6 +38,12 @@ MOST_TABULATED = 2
 
 CHECKED, CHECKED_TWICE = 512, 16
 """Points at which two levels of accuracy are compared, and two sets of quasi-random nodes."""
+
+FEWEST_CHECKED, COMPARED = 32, 10_000_000
+"""The fewest points at which a density is compared with the exact one, and the most terms of these."""
+
+SEARCHED, NEAR = (0.03, 0.01, 0.003), 8
+"""How far, in turns, the largest error is looked for about the worst points, and a share of these."""
 
 LEAST_WEIGHT = 1e-9
 """The least weight of a component."""
@@ -48,8 +63,10 @@ def marginal(
 
     Kernels and the uniform component have a closed form, and so have chains that end in the other
     angles. The rest, of one or two angles, is integrated and becomes kernels on a grid: what comes out
-    is exactly normalised, and its `error` says by how many nats (root mean square) it is off the true
-    density. The rest of three angles and more is a `PartialDensity`, which asks the whole.
+    is exactly normalised. Its `error` says by how many nats (root mean square) it is off the true
+    density where it is dense, and its `largest_error` by how many it is off anywhere, as far as was
+    found, in the faintest tails too. The rest of three angles and more is a `PartialDensity`, which
+    asks the whole.
 
     Args:
         density: A density of two angles or more.
@@ -116,22 +133,28 @@ def _restricted(
         raise OrbiflowError(f"accuracy must be above 0 and at most {MOST_OFF}, got {accuracy}")
     say = progress or _silent
     closed, left = density.restricted(split, space)
-    error = 0.0
+    error = Error(0.0, 0.0)
     if left and space.dim > MOST_TABULATED:
         parts = [(log, PartialDensity(own, how)) for log, own, how in left]
         whole = _mixture([*closed, *((log + own.log_given, own) for log, own in parts)])
         say(0.5, "comparing")
         error = _spread(whole)
     elif left:
-        whole, error = _refined(closed, [_Left(*one) for one in left], space, accuracy, say)
+        parts = [_Left(*one) for one in left]
+        whole, error = _refined(closed, parts, space, accuracy, say)
+        say(1.0, "comparing")
+        error = _compared(whole, closed, parts) or error
     else:
         whole = _mixture(closed)
-    if error > MOST_OFF:
+    if error.usual > MOST_OFF:
         raise OrbiflowError(
-            f"the density of these angles cannot be approximated to better than {error:.1f} nats (root "
+            "the density of these angles cannot be approximated to better than "
+            f"{error.usual:.1f} nats (root "
             'mean square): keep one angle, or fit with components="kernels,mixture"'
         )
-    whole.error = error + _inherited(density, split)
+    whole.error = error.usual + _inherited(density, split)
+    # of a ratio of the joint density and that of what is given, both may be off
+    whole.largest_error = error.largest + density.largest_error * (2 if split.given else 1)
     return whole
 
 
@@ -153,14 +176,25 @@ def _inherited(density: Density, split: Split) -> float:
     return density.error * math.exp(-rare / 2)
 
 
+class Error(NamedTuple):
+    """Differences of log densities in nats: root mean square at samples, and the largest anywhere."""
+
+    usual: float
+    largest: float
+
+
+EXACT = Error(1e-6, 1e-5)
+"""What densities that are integrated point by point may be off themselves."""
+
+
 @dataclass
 class _Left:
     """A component without a closed form: its log weight, how its angles are split, and kernels for it.
 
     - `found`: Kernels with log weights, of the last of so many `levels`.
-    - `logs`: The log densities (N,) of these kernels at the samples where levels are compared.
-    - `error`: The root mean square error of the whole that is its own, in nats: its change from the
-      level before, undivided, since two levels may be off in the same direction.
+    - `logs`: The log densities (N,) of these kernels at the points where levels are compared.
+    - `error`: The error of the whole that is its own: its change from the level before, undivided,
+      since two levels may be off in the same direction.
     """
 
     log: float
@@ -169,7 +203,17 @@ class _Left:
     levels: int = 0
     found: list[tuple[float, Density]] = field(default_factory=list[tuple[float, Density]])
     logs: Tensor = field(default_factory=lambda: torch.zeros(0))
-    error: float = math.inf
+    error: Error = field(default_factory=lambda: Error(math.inf, math.inf))
+
+    def terms(self) -> int | None:
+        """Return how many terms its exact density takes at a point, None if it cannot be had."""
+        return self.density.terms_at(list(self.split.observed))
+
+    def exact(self, points: Tensor) -> Tensor:
+        """Return its exact log density (N,) at points (N, r), with its weight."""
+        given = points.new_tensor(self.split.values).expand(len(points), -1)
+        whole = torch.cat([points, given], dim=1)
+        return self.log + self.density.log_marginal(whole, list(self.split.observed))
 
     def refine(self, space: Torus, tick: Callable[[], None]) -> list[tuple[float, Density]]:
         """Find kernels of the next level, and return those of the level before."""
@@ -183,7 +227,7 @@ class _Left:
         # what the whole would be with the old instead of the new
         ratio = (before - now).exp() - (self.logs - now).exp()
         change = ratio.clamp_min(-1 + 1e-12).log1p()
-        self.error = float(change.square().mean().sqrt())
+        self.error = _error_of(change)
 
 
 def _refined(
@@ -212,21 +256,69 @@ def _refined(
     for one in left:
         refine(one)
     before = [refine(one) for one in left]
-    points = whole().sample(CHECKED, torch.Generator().manual_seed(1))
-    known = _log_sum(closed, points) if closed else points.new_full((CHECKED,), -math.inf)
+    points = _checked_points(whole(), CHECKED)
+    known = _log_sum(closed, points) if closed else points.new_full((len(points),), -math.inf)
     for one in left:
         one.logs = _log_sum(one.found, points)
     for one, old in zip(left, before, strict=True):
         one.compare(_log_sum(old, points), now())
-    while (error := math.hypot(*(one.error for one in left))) > accuracy:
+    while math.hypot(*(one.error.usual for one in left)) > accuracy:
         coarse = [one for one in left if one.levels < LEVELS]
         if not coarse:
             break
-        one = max(coarse, key=lambda own: own.error)
+        one = max(coarse, key=lambda own: own.error.usual)
         refine(one)
         old, one.logs = one.logs, _log_sum(one.found, points)
         one.compare(old, now())
-    return whole(), error
+    usual = math.hypot(*(one.error.usual for one in left))
+    return whole(), Error(usual, sum(one.error.largest for one in left))
+
+
+def _compared(whole: Mixture, closed: list[Weighted], left: list[_Left]) -> Error | None:
+    """Return the error by exact densities, None where these cannot be had or would take too long.
+
+    The largest is looked for about the worst points.
+    """
+    terms = [one.terms() for one in left]
+    known = [one for one in terms if one is not None]
+    count = min(CHECKED, COMPARED // max(1, sum(known)))
+    if len(known) < len(left) or count < FEWEST_CHECKED:
+        return None
+
+    def off(points: Tensor) -> Tensor:
+        exact = [one.exact(points) for one in left]
+        if closed:
+            exact.append(_log_sum(closed, points))
+        return torch.stack(exact).logsumexp(dim=0) - whole.log_prob(points)
+
+    points = _checked_points(whole, count)
+    found = off(points)
+    shift = found.new_zeros(())
+    if left[0].split.given:  # the density of what is given, of which the samples tell
+        shift = found[:count].logsumexp(dim=0) - math.log(count)
+    found = found - shift
+    generator = torch.Generator().manual_seed(2)
+    for reach in SEARCHED:
+        worst = points[found.abs().topk(max(1, count // NEAR)).indices].repeat(NEAR, 1)
+        noise = torch.randn(worst.shape, dtype=torch.float64, generator=generator)
+        near = (worst + reach * noise) % 1
+        points, found = torch.cat([points, near]), torch.cat([found, off(near) - shift])
+    usual, largest = found[:count].square().mean().sqrt(), found.abs().max()
+    return Error(float(usual) + EXACT.usual, float(largest) + EXACT.largest)
+
+
+def _checked_points(density: Density, count: int) -> Tensor:
+    """Return as many samples of a density as points drawn evenly: (2 count, r)."""
+    generator = torch.Generator().manual_seed(1)
+    drawn = density.sample(count, generator)
+    even = torch.rand(count, drawn.shape[1], dtype=torch.float64, generator=generator)
+    return torch.cat([drawn, even])
+
+
+def _error_of(off: Tensor) -> Error:
+    """Return the error of differences (2 N,) at points as of `_checked_points`."""
+    usual = off[: len(off) // 2].square().mean().sqrt()
+    return Error(float(usual), float(off.abs().max()))
 
 
 def _log_sum(parts: list[tuple[float, Density]], points: Tensor) -> Tensor:
@@ -242,9 +334,9 @@ def _mixture(parts: list[tuple[float, Density]]) -> Mixture:
     return mixture_of(list(zip(weights, own, strict=True)))
 
 
-def _spread(density: Density) -> float:
-    """Return how far log densities by other quasi-random nodes are, at samples."""
-    points = density.sample(CHECKED_TWICE, torch.Generator().manual_seed(0))
+def _spread(density: Density) -> Error:
+    """Return how far log densities by other quasi-random nodes are."""
+    points = _checked_points(density, CHECKED_TWICE)
     axes = list(range(density.space.dim))
     first, second = (density.log_marginal(points, axes, seed) for seed in (0, 1))
-    return float((first - second).square().mean().sqrt())
+    return _error_of(first - second)

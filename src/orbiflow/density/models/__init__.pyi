@@ -9,6 +9,7 @@ from .chains import waves as waves
 from .density import LEVELS as LEVELS
 from .density import Density as Density
 from .density import Split as Split
+from .density import Weighted as Weighted
 from .evaluation import CHECKED as CHECKED
 from .evaluation import TabulatedDensity as TabulatedDensity
 from .evaluation import kl_by_quadrature as kl_by_quadrature
@@ -21,6 +22,7 @@ from .flow import FlowDensity as FlowDensity
 from .flow import UniformDensity as UniformDensity
 from .flow import VonMisesDensity as VonMisesDensity
 from .flow import flow_obstacle as flow_obstacle
+from .kernels import SHARPEST as SHARPEST
 from .kernels import AdaptiveKernels as AdaptiveKernels
 from .kernels import kernel_rows as kernel_rows
 from .mixture import Mixture as Mixture

@@ -175,6 +175,20 @@ class VonMisesChains(Density, kind="chains"):
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
         return _chains_at(self, points, axes, seed)
 
+    def terms_at(self, axes: list[int]) -> int | None:
+        count = 0
+        for which, order in _by_order(self, axes):
+            hidden, seen = ([i for i in order if (i in axes) == known] for known in (False, True))
+            means, kappa = _at_scales(self, which)
+            if not hidden:
+                count += len(kappa)
+                continue
+            sizes = _sizes(means, kappa, hidden, seen)[1].prod(dim=1)
+            if float(sizes.max()) > (MOST_ALONE if len(hidden) == 1 else MOST):
+                return None
+            count += int(sizes.sum())
+        return count
+
     def restricted(self, split: Split, space: Torus) -> Restriction:
         """Keep the chains in which all that is given comes first and all that is hidden last."""
         place = self.order.argsort(dim=1)
@@ -286,14 +300,29 @@ def _chains_at(chains: VonMisesChains, points: Tensor, observed: list[int], seed
     """
     angle = torch.zeros(len(points), chains.order.shape[1], dtype=torch.float64)
     angle[:, observed] = 2 * math.pi * points.double()
+    logs = [
+        _ordered_at(chains, which, order, angle, observed, seed)
+        for which, order in _by_order(chains, observed)
+    ]
+    return log_sum_exp(torch.cat(logs, dim=1))
+
+
+def _by_order(chains: VonMisesChains, observed: list[int]) -> Iterator[tuple[Tensor, list[int]]]:
+    """Yield masks (K,) of chains of one order, and their angles up to the last that is observed.
+
+    Angles after that integrate to 1.
+    """
     orders, number = unique(chains.order, dim=0, return_inverse=True)
     rows: list[list[int]] = listed(orders)
-    logs: list[Tensor] = []
     for k, order in enumerate(rows):
-        # angles after the last that is observed integrate to 1
-        last = max(order.index(axis) for axis in observed)
-        logs.append(_ordered_at(chains, number == k, order[: last + 1], angle, observed, seed))
-    return log_sum_exp(torch.cat(logs, dim=1))
+        yield number == k, order[: 1 + max(order.index(axis) for axis in observed)]
+
+
+def _at_scales(chains: VonMisesChains, which: Tensor) -> tuple[Tensor, Tensor]:
+    """Return means (C, d, 1 + 2 d) and concentrations (C, d) of some chains (K,) at each scale."""
+    scale = torch.tensor(SCALES, dtype=torch.float64)
+    means = chains.means[which].repeat_interleave(len(SCALES), dim=0)
+    return means, (chains.concentrations[which][:, None] / scale[:, None]).flatten(0, 1)
 
 
 def _ordered_at(
@@ -307,9 +336,7 @@ def _ordered_at(
     """Return log weight plus log density (N, C) of components (K,) of one order, at each scale."""
     seen = [axis for axis in order if axis in observed]
     hidden = [axis for axis in order if axis not in observed]
-    scale = torch.tensor(SCALES, dtype=torch.float64)
-    means = chains.means[which].repeat_interleave(len(SCALES), dim=0)
-    kappa = (chains.concentrations[which][:, None] / scale[:, None]).flatten(0, 1)
+    means, kappa = _at_scales(chains, which)
     constant = chains.log_weights[which].flatten()
     constant = constant - special.i0e(kappa[:, seen]).log().sum(dim=1)
     found = angle.new_empty(len(angle), len(means))
@@ -374,18 +401,11 @@ def _nodes(
     analytic functions it converges exponentially (Trefethen and Weideman, 2014). For means
     (C, d, 1 + 2 d) and concentrations (C, d); observed axes before a hidden one have slopes of 0 there.
     """
-    count, d = kappa.shape
+    count = len(kappa)
     if not hidden:
         yield torch.arange(count), kappa.new_zeros(count, 1), {}
         return
-    # concentrations (C, H) of the integrand in each hidden angle, which bends others
-    after = hidden + observed
-    slope = means[:, after][:, :, [1 + axis for axis in hidden]].square()
-    slope += means[:, after][:, :, [1 + d + axis for axis in hidden]].square()
-    sharp = kappa[:, hidden] + (kappa[:, after, None] * slope).sum(dim=1)
-    reach = (REACH / kappa[:, hidden].clamp_min(1e-12).sqrt()).clamp_max(math.pi)
-    sizes = (2 * reach * sharp.sqrt() / STEP).ceil().clamp_min(FEWEST)
-    sizes = FEWEST * torch.exp2((sizes / FEWEST).log2().ceil())  # few different ones
+    reach, sizes = _sizes(means, kappa, hidden, observed)
     wanted, number = unique(sizes, dim=0, return_inverse=True)
     for k, size in enumerate(listed(wanted)):
         chosen = torch.nonzero(number == k)[:, 0]
@@ -394,6 +414,20 @@ def _nodes(
         own = kappa[chosen][:, hidden]
         rule = _trapezoidal(own, reach[chosen], size) if fits else _sobol(own, seed)
         yield chosen, rule[0], dict(zip(hidden, rule[1], strict=True))
+
+
+def _sizes(
+    means: Tensor, kappa: Tensor, hidden: list[int], observed: list[int]
+) -> tuple[Tensor, Tensor]:
+    """Return how far nodes reach from the mean of each hidden angle, and how many there are (C, H)."""
+    # concentrations (C, H) of the integrand in each hidden angle, which bends others
+    after, d = hidden + observed, kappa.shape[1]
+    slope = means[:, after][:, :, [1 + axis for axis in hidden]].square()
+    slope += means[:, after][:, :, [1 + d + axis for axis in hidden]].square()
+    sharp = kappa[:, hidden] + (kappa[:, after, None] * slope).sum(dim=1)
+    reach = (REACH / kappa[:, hidden].clamp_min(1e-12).sqrt()).clamp_max(math.pi)
+    sizes = (2 * reach * sharp.sqrt() / STEP).ceil().clamp_min(FEWEST)
+    return reach, FEWEST * torch.exp2((sizes / FEWEST).log2().ceil())  # few different ones
 
 
 def _trapezoidal(kappa: Tensor, reach: Tensor, sizes: list[int]) -> tuple[Tensor, list[Tensor]]:

@@ -17,6 +17,9 @@ ELLIPSES = (3.0, 5.0, 9.0, 17.0)
 TURNS = 9
 """Points of half an ellipse at which terms are bounded."""
 
+ROUNDING = 1e-15
+"""Rounding error of squared distances between unit vectors, which bounds allow for."""
+
 POLE = 0.75
 """The largest coordinate, complex ones included: coordinates have poles, or branches, at size 1."""
 
@@ -38,9 +41,9 @@ class Tile:
 
         They are bounds by the triangle inequality.
         """
-        away, radius = self._away(terms), self.radius[:, None]
-        nearest = (away - radius).clamp_min_(0).square_()
-        farthest = away.add_(radius).square_()
+        square, radius = self._away2(terms), self.radius[:, None]
+        nearest = (square - ROUNDING).clamp_min_(0).sqrt_().sub_(radius).clamp_min_(0).square_()
+        farthest = square.clamp_min_(0).add_(ROUNDING).sqrt_().add_(radius).square_()
         least = largest = terms.peaks
         for kappa, near, far in zip(terms.kappa, nearest, farthest, strict=True):
             least = torch.addcmul(least, kappa, far, value=-0.5)
@@ -49,18 +52,18 @@ class Tile:
 
     def nearest2(self, terms: Terms) -> Tensor:
         """Return kappa times the squared distance (F, K) of centers to the tile in each factor."""
-        away = self._away(terms).sub_(self.radius[:, None])
-        return away.clamp_min_(0).square_().mul_(terms.kappa)
+        away = self._away2(terms).sub_(ROUNDING).clamp_min_(0).sqrt_()
+        return away.sub_(self.radius[:, None]).clamp_min_(0).square_().mul_(terms.kappa)
 
-    def _away(self, terms: Terms) -> Tensor:
-        """Return distances (F, K) of centers from the middle."""
+    def _away2(self, terms: Terms) -> Tensor:
+        """Return squared distances (F, K) of centers from the middle, within `ROUNDING`."""
         rows = torch.zeros(self.factors, len(self.middle), dtype=self.middle.dtype)
         rows[torch.arange(len(self.middle)) % self.factors, torch.arange(len(self.middle))] = (
             -2 * self.middle
         )
         # centers are unit vectors
         square = 1 + lengths2(self.middle[:, None], self.factors)
-        return torch.addmm(square, rows, terms.centers).clamp_min_(0).sqrt_()
+        return torch.addmm(square, rows, terms.centers)
 
     @property
     def has_chart(self) -> bool:

@@ -70,8 +70,11 @@ class Density(Distribution):
     """Whether the density may hold detail that a coarse picture would miss."""
 
     error: float = 0.0
-    """Root mean square difference, in nats, from the density that a tabulated one stands for; see
-    `orbiflow.density.marginal`."""
+    """Root mean square difference, in nats, from the density that a tabulated one stands for, where it
+    is dense; see `orbiflow.density.marginal`."""
+
+    largest_error: float = 0.0
+    """The largest difference, in nats, that was found anywhere, also where hardly any mass is."""
 
     _dtype: torch.dtype = torch.float64
 
@@ -153,6 +156,14 @@ class Density(Distribution):
         """
         del points, axes, seed
         raise OrbiflowError(f"a {type(self).__name__} cannot be integrated over some of its angles")
+
+    def terms_at(self, axes: list[int]) -> int | None:
+        """Return how many terms `log_marginal` of some angles takes at a point.
+
+        None if it is not exact, which is to more digits than `approximated`.
+        """
+        del axes
+        return None
 
     def restricted(self, split: Split, space: Torus) -> Restriction:
         """Return the density of the angles kept, given others, as far as there is a closed form."""

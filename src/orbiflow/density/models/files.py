@@ -157,7 +157,8 @@ def density_parts(
             f"the {name} is on {own!r}, the density on {space!r}: make both on one space"
         )
     tensors = {prefix + key: tensor for key, tensor in density.tensors().items()}
-    error = {"error": density.error} if density.error else {}
+    names = ("error", "largest_error")
+    error = {name: getattr(density, name) for name in names if getattr(density, name)}
     return {"kind": kind, **error, **density.header()}, tensors
 
 
@@ -170,6 +171,7 @@ def density_from(space: Space, header: Mapping[str, Any], tensors: Mapping[str, 
         )
     made = KINDS[kind].from_header(space, header, tensors)
     made.error = as_number(header.get("error", 0.0), "error")
+    made.largest_error = as_number(header.get("largest_error", 0.0), "largest_error")
     return made
 
 

@@ -27,6 +27,13 @@ MOST_KERNELS = 1_000_000
 BLOCK_ENTRIES = 250_000
 """Entries of the table of points against kernels worked on at a time."""
 
+SHARPEST = 1e16
+"""The largest concentration whose kernels keep seven digits: a deviation of 1e-8 radians, 6 cm on the
+earth."""
+
+ASYMPTOTIC = 1e8
+"""Concentration from which Bessel functions are their asymptotic series."""
+
 
 class AdaptiveKernels(Density, kind="kernels"):
     """A mixture of kernels made invariant under the space's group.
@@ -172,10 +179,13 @@ class AdaptiveKernels(Density, kind="kernels"):
     def log_each(self, points: Tensor, axes: list[int]) -> Tensor:
         """Return the log density (N, K) of each kernel of some angles, at points (N, len(axes))."""
         kappa = self.concentrations[:, axes]
-        angle, center = 2 * math.pi * points.double(), 2 * math.pi * self.centers[:, axes]
-        images = torch.cat([angle.cos(), angle.sin()], dim=1)
-        rows = torch.cat([kappa * center.cos(), kappa * center.sin()], dim=1)
-        return images @ rows.mT - (special.i0e(kappa).log() + kappa).sum(dim=1)
+        angle, center = math.pi * points.double(), math.pi * self.centers[:, axes]
+        found = -special.i0e(kappa).log().sum(dim=1).expand(len(points), -1)
+        for own, middle, sharp in zip(angle.mT, center.mT, kappa.mT, strict=True):
+            # 1 - cos would lose all digits of narrow kernels
+            sine = (own[:, None] - middle).sin_()
+            found = torch.addcmul(found, sine * sharp, sine, value=-2)
+        return found
 
     def header(self) -> dict[str, Any]:
         if len(self.centers) > MOST_KERNELS:
@@ -205,9 +215,17 @@ def _round_peaks(kappa: Tensor, dim: int) -> Tensor:
     """Return logarithms of the largest values of von Mises-Fisher kernels on S^dim, per its area."""
     if dim != 2:
         order = (dim - 1) / 2
-        scaled = as_tensor(ive(order, kappa.cpu().numpy()), "ive").to(kappa)
-        return order * kappa.log() - (order + 1) * math.log(2 * math.pi) - scaled.log()
+        return order * kappa.log() - (order + 1) * math.log(2 * math.pi) - _log_ive(order, kappa)
     return (kappa / (2 * math.pi)).log() - (-torch.expm1(-2 * kappa)).log()
+
+
+def _log_ive(order: float, kappa: Tensor) -> Tensor:
+    """Return log I(kappa) - kappa of a modified Bessel function, which SciPy has up to 1e9 only."""
+    first = (1 - 4 * order**2) / (8 * kappa)  # DLMF 10.40.1
+    large = torch.log1p(first * (1 + (9 - 4 * order**2) / (16 * kappa)))
+    large -= (2 * math.pi * kappa).log() / 2
+    small = as_tensor(ive(order, kappa.clamp_max(ASYMPTOTIC).cpu().numpy()), "ive").to(kappa).log()
+    return torch.where(kappa < ASYMPTOTIC, small, large)
 
 
 def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, Tensor]:
@@ -227,26 +245,29 @@ def _von_mises_fisher(centers: Array, kappa: Array, rng: np.random.Generator) ->
     distribution, 1994; closed form on the sphere)."""
     if centers.shape[1] == 3:
         u = rng.uniform(size=len(centers))
-        height = 1 + np.log(u + (1 - u) * np.exp(-2 * kappa)) / kappa
+        below = -np.log(u + (1 - u) * np.exp(-2 * kappa)) / kappa
     else:
-        height = 1 - _wood(kappa, centers.shape[1] - 1, rng)
+        below = _wood(kappa, centers.shape[1] - 1, rng)
     across = rng.normal(size=centers.shape)
     across -= (across * centers).sum(axis=1, keepdims=True) * centers
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    vectors = height[:, None] * centers + np.sqrt(np.clip(1 - height**2, 0, 1))[:, None] * across
+    aside = np.sqrt(np.clip(below * (2 - below), 0, 1))
+    vectors = (1 - below)[:, None] * centers + aside[:, None] * across
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
 def _wood(kappa: Array, dim: int, rng: np.random.Generator) -> Array:
     """Return 1 - cos (N,) of the angle between draws on S^dim and their centers, by rejection."""
     slope = dim / (2 * kappa + np.sqrt(4 * kappa**2 + dim**2))
-    best = (1 - slope) / (1 + slope)
-    most = kappa * best + dim * np.log1p(-(best**2))
+    # how far the best cosine is below 1, without which all digits would be lost
+    gap = 2 * slope / (1 + slope)
+    best, most = 1 - gap, dim * np.log(gap * (2 - gap))
     found, left = np.zeros_like(kappa), np.arange(len(kappa))
     while len(left):
         z, b = rng.beta(dim / 2, dim / 2, size=len(left)), slope[left]
         below = 2 * b * z / (1 - (1 - b) * z)
-        odds = kappa[left] * (1 - below) + dim * np.log1p(-best[left] * (1 - below)) - most[left]
+        odds = kappa[left] * (gap[left] - below)
+        odds += dim * np.log(gap[left] + best[left] * below) - most[left]
         found[left] = below
         left = left[odds < np.log(rng.uniform(size=len(left)))]
     return found

@@ -6,6 +6,7 @@ Sums of kernels that are smooth across a tile are read off few places.
 from __future__ import annotations
 
 import math
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -133,11 +134,15 @@ class _Walk:
                 own = left._replace(patch=patch and patch.only(half), idle=idle)
                 self._add(at[half], gathered(features, half), own)
             return
-        parts = [patch.log_sum(features, slope=self.slope is not None)] if patch else []
+        slope = self.slope is not None
+        parts = [patch.log_sum(features, slope=slope)] if patch else []
+        sharp = terms.sharp(tile.radius)
+        if bool(sharp.any()):
+            parts.append(terms.only(sharp).sharp_log_sum(features, slope=slope))
+            terms = terms.only(~sharp)
         if terms.size:
             spread = float(terms.peaks.max()) - bottom
-            found = terms.log_sum(features, tile.middle, spread, slope=self.slope is not None)
-            parts.append(found)
+            parts.append(terms.log_sum(features, tile.middle, spread, slope=slope))
         self._put(at, parts)
 
     def _put(self, at: Tensor, parts: list[tuple[Tensor, Tensor | None]]) -> None:
@@ -145,7 +150,7 @@ class _Walk:
         if not parts:
             return
         logs = [log for log, _ in parts]
-        total = logs[0] if len(logs) == 1 else torch.logaddexp(*logs)
+        total = reduce(torch.logaddexp, logs)
         self.log_sum[at] = total
         if self.slope is not None:
             for log, slope in parts:

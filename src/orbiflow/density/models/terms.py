@@ -61,6 +61,10 @@ PLAIN_ENTRIES = 2**24
 BLOCK_ENTRIES = 250_000
 """Entries of the table of points against terms worked on at a time: few enough for the cache."""
 
+SHARP = 1e8
+"""Concentration times squared distance from the middle above which exponents are taken term by term: a
+sum about the middle would lose more than 8 digits of 16."""
+
 
 class Terms(NamedTuple):
     """Terms exp(peak - sum_f kappa_f / 2 |x_f - center_f|^2) of a sum over K of them.
@@ -97,8 +101,9 @@ class Terms(NamedTuple):
         """Return the logarithm (N,) of the sum at features (m, N), and its gradient (m, N) if wanted.
 
         Exponents are taken about features `middle` (m,) near them, where little cancels: at a
-        concentration of 1e7 the cosine of the whole angle would lose half of all digits. `spread` is
-        the logarithm of the ratio of the largest peak to the least sum.
+        concentration of 1e7 the cosine of the whole angle would lose half of all digits. For terms as
+        in `sharp`, even that loses too much: see `sharp_log_sum`. `spread` is the logarithm of the
+        ratio of the largest peak to the least sum.
         """
         rows, bias, offset, parts = self._about(features, middle)
         top = self.peaks.max()
@@ -123,6 +128,30 @@ class Terms(NamedTuple):
         linear, square = torch.split(torch.cat(slopes, dim=1), [len(middle), self.factors])
         repeated = square.repeat(len(middle) // self.factors, 1)
         return found, linear + 2 * repeated * offset
+
+    def sharp(self, radius: Tensor) -> Tensor:
+        """Return which terms (K,) are too sharp for `log_sum` at this distance (F,) from its middle."""
+        return (self.kappa * radius[:, None].square()).amax(dim=0) > SHARP
+
+    def sharp_log_sum(self, features: Tensor, *, slope: bool) -> tuple[Tensor, Tensor | None]:
+        """Return what `log_sum` does, from the differences of features: nothing cancels."""
+        values: list[Tensor] = []
+        slopes: list[Tensor] = []
+        half = self.kappa / 2
+        pulls = self.kappa.repeat(len(features) // self.factors, 1)
+        for part in torch.split(features, max(1, BLOCK_ENTRIES // self.size), dim=1):
+            table = self.peaks.expand(part.shape[1], -1).clone()
+            for k, (x, center) in enumerate(zip(part, self.centers, strict=True)):
+                off = x[:, None] - center
+                table.addcmul_(off * half[k % self.factors], off, value=-1)
+            high = table.amax(dim=1, keepdim=True)
+            table.sub_(high).clamp_min_(FAINT).mul_(LOG2_E).exp2_()
+            total = table.sum(dim=1)
+            values.append(total.log() + high[:, 0])
+            if slope:
+                shares = table / total[:, None]
+                slopes.append((pulls * self.centers) @ shares.mT - part * (pulls @ shares.mT))
+        return torch.cat(values), torch.cat(slopes, dim=1) if slope else None
 
     def plain_log_sum(self, features: Tensor) -> Tensor:
         """Return the logarithm (N,) of the sum at features (m, N), term by term; differentiable.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,6 +16,7 @@ from orbiflow.density import comparing, models, pictures, spaces, tables
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
 from orbiflow.density.run_folder import write_files, written_files
 from orbiflow.density.tables import GroupedRowSettings, RowSettings, SpaceSettings
+from orbiflow.errors import DataWarning
 from orbiflow.settings import Hidden, Option, SettingError
 
 if TYPE_CHECKING:
@@ -101,7 +103,9 @@ def fit_rows(
     given = {name: getattr(settings, name) for name in settings.fields_given}
     estimator = DensityEstimator(space_of(where), unit=unit, missing=reading.kept_missing, **given)
     progress = runtime.progress_events(tell, cancel)
-    return estimator.fit(values, sample_weight=rows.weights, groups=labels, progress=progress)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DataWarning)  # the report's notes say the same
+        return estimator.fit(values, sample_weight=rows.weights, groups=labels, progress=progress)
 
 
 def _check(where: SpaceSettings, settings: DensitySettings, reading: GroupedRowSettings) -> None:

@@ -192,7 +192,8 @@ def write_derived(
     """Write the folder of a density of fewer angles; `origin` says in the report where it is from."""
     space = density.space
     named = {"space": {"name": space.name, **space.settings()}, "columns": names}
-    document = {**named, "report": {"error": density.error}, **origin}
+    errors = {"error": density.error, "largest_error": density.largest_error}
+    document = {**named, "report": errors, **origin}
     if settings.sample is not None:
         document["samples"] = settings.sample
     files: dict[str, str | bytes] = {
@@ -216,7 +217,7 @@ def write_derived(
         tell(Note(f"WARNING: an error of {settings.accuracy:g} nats cannot be had here"))
     tell(Note(_words(density, names, folder.path)))
     summary = {"folder": str(folder.path), "files": list(files), "columns": names}
-    return Outcome({**summary, "error": density.error})
+    return Outcome({**summary, **errors})
 
 
 def _sample_notes(density: Mixture) -> list[str]:
@@ -235,7 +236,10 @@ def _sample_notes(density: Mixture) -> list[str]:
 def _words(density: Density, names: list[str], out: Path) -> str:
     exact = "in closed form"
     if density.error:
-        exact = f"its logarithm right within {density.error:.1e} nats (root mean square)"
+        exact = (
+            f"its logarithm right within {density.error:.1e} nats (root mean square) where it is dense, "
+            f"and {density.largest_error:.1e} anywhere"
+        )
     per = f"per {str(density.space.unit).removesuffix('s')}"
     power = "" if len(names) == 1 else f"^{len(names)}"
     return f"the density of {', '.join(names)}, {per}{power}, {exact}; written to {out}"

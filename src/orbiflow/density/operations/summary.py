@@ -184,7 +184,7 @@ def _notes(found: dict[str, Any], rows: TableRows) -> list[str]:
     if units < MIN_ROWS:
         notes.append(f"intervals are rough with fewer than {MIN_ROWS} {what}, there are {units}")
     peaks = [one for one in entries if "name" in one and one["rows"] > 1]
-    if constant := [one["name"] for one in peaks if one["resultant"] > 1 - 1e-12]:
+    if constant := [one["name"] for one in peaks if one["concentration"] is None]:
         notes.append(f"all rows have the same value of {', '.join(constant)}")
     undetermined = [entry["name"] for entry in entries if entry.get("half_width", 0) is None]
     if undetermined:

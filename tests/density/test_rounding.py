@@ -1,0 +1,124 @@
+"""Rounded values are no spikes: the fit finds the rounding, undoes it, and says so."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+
+from orbiflow.density import DensityEstimator, make_space
+from orbiflow.density.fitting.repeats import repeats_of, spread_evenly
+from orbiflow.errors import DataWarning
+
+Rows = NDArray[np.float64]
+
+
+def weather(rng: np.random.Generator, rows: int) -> Rows:
+    """Directions of the wind and temperatures (N, 2), the latter as degrees of an angle."""
+    west = rng.random(rows) < 0.6
+    wind = np.degrees(np.where(west, rng.vonmises(-1.5, 4, rows), rng.vonmises(1, 2, rows)))
+    return np.stack([wind % 360, np.where(west, 12, 5) + 8 * rng.normal(size=rows)], axis=1)
+
+
+def rounded(values: Rows, step: float) -> Rows:
+    return np.round(values / step) * step
+
+
+@pytest.mark.parametrize("step", [1.0, 5.0, 10.0])
+def test_rounded_weather_has_no_spikes(step: float) -> None:
+    rng = np.random.default_rng(0)
+    rows, new = weather(rng, 1200), weather(rng, 1000)
+    how = {"unit": "degrees", "components": ("kernels", "chains"), "seed": 0}
+    plain = DensityEstimator("torus", **how).fit(rows)
+    with pytest.warns(DataWarning, match=f"rounding to {step:g} brings about"):
+        found = DensityEstimator("torus", **how).fit(rounded(rows, step))
+    # what rounding loses, and not 3 nats of spikes
+    assert float((plain.score_samples(new) - found.score_samples(new)).mean()) < 0.01 * step
+    on, off = found.marginal(1).score_samples([[10.0], [10.0 + step / 2]])
+    assert abs(on - off) < 0.1 + 0.02 * step
+    given = found.conditional({1: 10.0}).score_samples([[270.0], [270.0 + step / 2]])
+    assert abs(float(np.diff(given)[0])) < 0.1 + 0.02 * step
+
+
+def test_what_is_asked_for_is_done_without_a_warning() -> None:
+    rows = rounded(weather(np.random.default_rng(1), 600), 5.0)
+    how = {"unit": "degrees", "components": ("kernels",)}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        places = DensityEstimator("torus", repeats="places", **how).fit(rows)
+        smooth = DensityEstimator("torus", repeats="rounding", **how).fit(rows)
+    assert float(places.score_samples(rows).mean()) > float(smooth.score_samples(rows).mean()) + 2
+    assert "new rows are taken to be rounded as well" in places.report_.notes[-1]
+    assert "spread evenly over its step" in smooth.report_.notes[-1]
+
+
+STEPS = {
+    "torus": (1.0, 5.0, 10.0, 22.5, 1 / 4),
+    "sphere": (1.0, 5.0, 10.0, 22.5, 1 / 60),
+    "klein-bottle": (1.0, 10.0, 22.5),
+    "projective-plane": (1.0, 10.0),
+}
+
+
+@pytest.mark.parametrize(("name", "step"), [(n, s) for n, steps in STEPS.items() for s in steps])
+def test_steps_are_found(name: str, step: float) -> None:
+    space = make_space(name, **({} if name[0] == "s" or "j" in name else {"unit": "degrees"}))
+    reach = min(60.0, 60 * step)  # so that many rows repeat
+    rows = rounded(np.random.default_rng(2).uniform(-reach, reach, (2000, 2)), step)
+    found = repeats_of(space, space.to_chart(rows))
+    assert found.is_rounding
+    assert found.spread == pytest.approx((step, step))
+
+
+def test_steps_that_do_not_divide_the_circle() -> None:
+    angles = np.random.default_rng(3).vonmises(1.0, 1.0, (3000, 1))
+    for turned in (angles, angles % (2 * np.pi)):
+        space = make_space("torus", dim=1)
+        assert repeats_of(space, space.to_chart(turned.round(1))).spread == pytest.approx((0.1,))
+    space = make_space("torus", dim=1, unit="degrees")
+    middles = np.floor(np.degrees(angles) / 5) * 5 + 2.5
+    assert repeats_of(space, space.to_chart(middles)).spread == pytest.approx((5.0,))
+
+
+def test_columns_are_rounded_by_themselves() -> None:
+    rng = np.random.default_rng(4)
+    rows = weather(rng, 3000)
+    space = make_space("torus", unit="degrees")
+    rows[:, 0] = rounded(rows[:, 0], 10)
+    assert repeats_of(space, space.to_chart(rows)).spread == (10.0, 0.0)
+    rows[:, 1] = rounded(rows[:, 1], 0.5)
+    assert repeats_of(space, space.to_chart(rows)).spread == (10.0, 0.5)
+
+
+def test_true_repeats_are_left() -> None:
+    """Stations, states and rows that stand there twice are no rounding, whatever their digits."""
+    rng = np.random.default_rng(5)
+    sphere, torus = make_space("sphere"), make_space("torus", unit="degrees")
+    stations = np.stack([rng.uniform(30, 60, 40), rng.uniform(0, 40, 40)], axis=1)
+    for digits in (0, 2, 8):
+        rows = stations.round(digits)[rng.integers(0, 40, 2000)]
+        assert not any(repeats_of(sphere, sphere.to_chart(rows)).spread)
+    states = np.stack([rng.choice([0.0, 90, 180, 270], 2000), rng.normal(0, 20, 2000)], axis=1)
+    assert not any(repeats_of(torus, torus.to_chart(states)).spread)
+    twice = np.repeat(rng.normal(0, 20, (500, 2)), 2, axis=0)
+    assert not any(repeats_of(torus, torus.to_chart(twice)).spread)
+    fit = DensityEstimator("torus", unit="degrees", components=("kernels",)).fit(twice)
+    asked = DensityEstimator(
+        "torus", unit="degrees", components=("kernels",), repeats="places"
+    ).fit(twice)
+    assert np.array_equal(fit.score_samples(twice), asked.score_samples(twice))
+
+
+@pytest.mark.parametrize("name", ["torus", "sphere", "klein-bottle", "projective-plane"])
+def test_rows_are_moved_by_half_a_step_at_most(name: str) -> None:
+    space = make_space(name)
+    data = space.from_chart(space.uniform(200, torch.Generator().manual_seed(0)))
+    points = space.to_chart(data)
+    moved = spread_evenly(space, points, (0.1, 0.1), torch.Generator().manual_seed(1))
+    still = spread_evenly(space, points, (0.0, 0.0), torch.Generator().manual_seed(1))
+    assert float(space.distance(points, still).max()) < 1e-7
+    off = (space.features(points)[0] - space.features(moved)).norm(dim=-1).amin(dim=0)
+    assert 0 < float(off.max()) <= 0.05 * 2**0.5 * (np.pi / 180 if space.is_round else 1.0) * 1.01
