@@ -99,3 +99,7 @@ class CertificationError(OrbiflowError):
 
 class CoarseStepsWarning(UserWarning):
     """A flow whose integration steps are too coarse for its fields: its results are not accurate."""
+
+
+class DataWarning(UserWarning):
+    """Data that may not be what they were taken for: another unit, fractions, or no angles at all."""

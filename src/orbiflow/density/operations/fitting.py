@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,9 +13,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from orbiflow import runtime
 from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
 from orbiflow.density import comparing, models, pictures, spaces, tables
+from orbiflow.density.data import is_angular
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
 from orbiflow.density.run_folder import write_files, written_files
-from orbiflow.density.tables import GroupedRowSettings, RowSettings, SpaceSettings
+from orbiflow.density.tables import CountedRowSettings, RowSettings, SpaceSettings
+from orbiflow.errors import DataWarning
 from orbiflow.settings import Hidden, Option, SettingError
 
 if TYPE_CHECKING:
@@ -37,7 +40,7 @@ def fit(
     data: Path,
     where: SpaceSettings,
     settings: DensitySettings = DensitySettings(),
-    reading: GroupedRowSettings = GroupedRowSettings(),
+    reading: CountedRowSettings = CountedRowSettings(),
     *,
     out: Annotated[Path, Option("--out", "-o")] = Path("density"),
     picture: Annotated[bool, Hidden()] = False,
@@ -56,7 +59,9 @@ def fit(
     begin = time.perf_counter()
     _check(where, settings, reading)
     with runtime.one_thread():
-        rows = tables.read_rows(data, reading, on_event, width=where.width, group=reading.group)
+        rows = tables.read_rows(
+            data, reading, on_event, space=where.space, width=where.width, group=reading.group
+        )
         values = rows.table.values
         folder = runtime.ResultFolder(out, written_files)
         runtime.check_output_folder(out, data)
@@ -82,7 +87,9 @@ def fit(
 
 def space_of(where: SpaceSettings) -> str | Space:
     """Return the space if its cell is known, otherwise its name: data tell the rest."""
-    return spaces.make_space(where.space, cell=where.cell) if where.cell else where.space
+    if not where.cell:
+        return where.space
+    return spaces.make_space(where.space, cell=where.cell, fractional=where.fractional)
 
 
 def fit_rows(
@@ -98,13 +105,16 @@ def fit_rows(
 
     values, labels = rows.table.values, rows.labels
     unit = tables.angle_unit(where, rows.table, tell)
+    unit = unit if is_angular(where.space, values.shape[1]) else where.unit
     given = {name: getattr(settings, name) for name in settings.fields_given}
     estimator = DensityEstimator(space_of(where), unit=unit, missing=reading.kept_missing, **given)
     progress = runtime.progress_events(tell, cancel)
-    return estimator.fit(values, sample_weight=rows.weights, groups=labels, progress=progress)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DataWarning)  # told already, with the names of columns
+        return estimator.fit(values, sample_weight=rows.weights, groups=labels, progress=progress)
 
 
-def _check(where: SpaceSettings, settings: DensitySettings, reading: GroupedRowSettings) -> None:
+def _check(where: SpaceSettings, settings: DensitySettings, reading: CountedRowSettings) -> None:
     """Refuse rows that such a density cannot be fitted to, before they are read."""
     settings.check_rows("refuse", None if reading.group is None else "group")
     if reading.missing == "marginalise":
@@ -166,7 +176,7 @@ def batch(
     folder: Path,
     where: SpaceSettings,
     settings: DensitySettings = DensitySettings(),
-    reading: GroupedRowSettings = GroupedRowSettings(),
+    reading: CountedRowSettings = CountedRowSettings(),
     out: Annotated[Path, Option("-o")] = Path("batch"),
     work: WorkSettings = WorkSettings(),
     *,
