@@ -29,8 +29,8 @@ def table_view(path: Path) -> dict[str, Any]:
     except TableError as error:
         cause = str(error).removeprefix(f"{path}: ").partition(";")[0]
         raise OrbiflowError(
-            f"this table cannot be read: {cause}; save it again as CSV, with a row for each thing and plain "
-            "numbers in its columns: decimal points, and nothing between thousands"
+            f"this table cannot be read: {cause}; save it again as CSV, with a row for each thing and "
+            "plain numbers in its columns: decimal points, and nothing between thousands"
         ) from None
     shown = table.columns[:MAX_SHOWN]
     if max(map(len, shown)) > MAX_NAME:

@@ -130,7 +130,7 @@ def _quaternions(names: Sequence[str]) -> list[Arrangement]:
         for ends in ("xyz", "ijk", "123"):
             if len(scalars) == 1 and set(ends) <= columns.keys():
                 order = (*(columns[end] for end in ends), scalars[0])
-                found.append(Arrangement(order, "a quaternion x, y, z and its scalar w"))
+                found.append(Arrangement(order, "a quaternion with its scalar last"))
     return found
 
 
@@ -150,7 +150,7 @@ def _matrices(names: Sequence[str]) -> list[Arrangement]:
 
 def _euler(names: Sequence[str]) -> list[Arrangement]:
     """Return Bunge's Euler angles: phi1, Phi, phi2, or three numbered ones."""
-    words = "Bunge's Euler angles phi1, Phi, phi2"
+    words = "Bunge's Euler angles"
     found = _named_so(names, ("phi1", "phi", "phi2"), words)
     return found or _named_so(names, ("euler1", "euler2", "euler3"), words)
 
@@ -230,6 +230,9 @@ def _check_forms(space: str, names: Sequence[str]) -> None:
             "hexagonal-orientations for crystals"
         )
         wrong.append((", ".join(names), how))
+    if space in DIRECTIONS and len(names) > 2 and (pairs := pairs_of(names)):
+        pair = f"{names[pairs[0].north]},{names[pairs[0].east]}"
+        wrong.append((", ".join(names), f"are too many columns: give '{pair}' alone"))
     for name, how in wrong:
         raise SettingError(literal(f"{name} {how}"))
 

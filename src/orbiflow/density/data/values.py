@@ -10,7 +10,14 @@ from typing import Literal, NamedTuple, cast, get_args
 import numpy as np
 
 from orbiflow.arrays import Array
-from orbiflow.density.data.columns import ANGULAR, DIRECTIONS, ROTATIONS, VECTORS, check_columns
+from orbiflow.density.data.columns import (
+    ANGULAR,
+    DIRECTIONS,
+    ROTATIONS,
+    VECTORS,
+    Arrangement,
+    check_columns,
+)
 from orbiflow.density.data.names import is_count_named, is_other_quantity, unit_named, words_of
 from orbiflow.errors import DataWarning, SettingError, literal
 
@@ -79,15 +86,37 @@ def check_values(
             space's, codes for missing values among angles, and radians in the place of degrees.
     """
     check_unit(space, unit)
-    called = list(names) if names else [f"column {k}" for k in range(1, values.shape[1] + 1)]
+    called = list(names) if names else [f"column{k}" for k in range(1, values.shape[1] + 1)]
     found = check_columns(space, names) if names else None
     doubts = [Doubt(found.note, False)] if found and found.note else []
+    doubts += _doubts_of_names(space, called, found, is_named=bool(names))
     if is_angular(space, values.shape[1]):
         own, more = _angles(values, called, unit, cure)
         return own, doubts + more
     if space in DIRECTIONS and values.shape[1] == 2:
         doubts += _places(space, values, called, unit)
     return "radians", doubts
+
+
+def _doubts_of_names(
+    space: str, names: Sequence[str], found: Arrangement | None, *, is_named: bool
+) -> list[Doubt]:
+    """Return what columns were taken for, if their names do not say it."""
+    listed = ", ".join(names)
+    if space in ROTATIONS and len(names) == 4 and found is None:
+        return [Doubt(f"took {listed} as x, y, z, w: the quaternion's scalar is the last", False)]
+    if space not in DIRECTIONS or len(names) != 2 or not is_named:
+        return []
+    if found is None:
+        return [
+            Doubt(f"took {names[0]} as latitude and {names[1]} as longitude, in degrees", False)
+        ]
+    if found.columns != (0, 1):  # x, y
+        text = (
+            f"took {names[0]} as latitude and {names[1]} as longitude: on maps it is the other way"
+        )
+        return [Doubt(text, True)]
+    return []
 
 
 CURE = "replace them by NaN, which `missing` treats, or leave their rows out"
@@ -257,7 +286,8 @@ def _are_whole(values: Array) -> bool:
 
 def _counted(codes: Sequence[float], column: Array) -> str:
     """Return codes and how often each is there, in words."""
-    words = [f"{code:.10g} in {int((column == code).sum())} rows" for code in codes]
+    often = [int((column == code).sum()) for code in codes]
+    words = [f"{code:.10g} in {n} row{'s' * (n > 1)}" for code, n in zip(codes, often, strict=True)]
     listed = words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
     return f"{listed}, which seem{'s' * (len(words) == 1)} to stand for missing values"
 
