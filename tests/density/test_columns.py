@@ -14,10 +14,10 @@ PLACES = [
     "lon,lat", "LON_deg,LAT_deg", "decimalLongitude,decimalLatitude",
     "pickup_longitude,pickup_latitude", "GPSLongitude,GPSLatitude", "lng,lat", "Long.,Lat.",
     "longitude_deg,latitude_deg", "X,Y", "plon,plat", "longitud,latitud", "Länge,Breite",
-    "Längengrad,Breitengrad", "ra,dec", "RAJ2000,DEJ2000", "RAdeg,DEdeg", "Right
-    Ascension,Declination", "RA_ICRS,DE_ICRS", "dec,inc", "Declination,Inclination",
-    "dir_dec,dir_inc", "az,alt", "azimuth,elevation", "trend,plunge", "dipdir,dip", "dip
-    direction,dip", "strike,dip", "glon,glat", "l,b", "azimut,plunge",
+    "Längengrad,Breitengrad", "ra,dec", "RAJ2000,DEJ2000", "RAdeg,DEdeg",
+    "Right Ascension,Declination", "RA_ICRS,DE_ICRS", "dec,inc", "Declination,Inclination",
+    "dir_dec,dir_inc", "az,alt", "azimuth,elevation", "trend,plunge", "dipdir,dip",
+    "dip direction,dip", "strike,dip", "glon,glat", "l,b", "azimut,plunge",
 ]  # fmt: skip
 
 
