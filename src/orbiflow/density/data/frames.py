@@ -147,7 +147,12 @@ def _of_objects(array: NDArray[Any], what: str) -> Array:
 
 
 def require_values(values: Array, names: Sequence[str] | None) -> None:
-    """Refuse columns (N, k) of which no row has a value."""
+    """Refuse columns (N, k) of which no row has a value, and values that are infinite."""
+    rows = np.flatnonzero(np.isinf(values).any(axis=1))
+    if len(rows):
+        raise OrbiflowError(
+            f"row {rows[0] + 1} has an infinite value ({len(rows)} such rows): correct or remove it"
+        )
     empty = np.flatnonzero(np.isnan(values).all(axis=0)) if len(values) else ()
     if len(empty):
         own = [repr(names[k]) if names else str(k + 1) for k in empty]

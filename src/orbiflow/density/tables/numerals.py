@@ -84,18 +84,18 @@ def marks_of(rows: Sequence[Sequence[str]], delimiter: str, asked: Mark | None) 
         return Marks(asked, parted[asked])
     if decimals[","] and not decimals["."]:
         return Marks(",", parted[","])
-    if decimals["."]:
-        return Marks(".", None if decimals[","] else parted["."])
+    if decimals["."] and not decimals[","]:
+        return Marks(".", parted["."])
     if not comma.either:
         return Marks(".")
-    if delimiter == ";" and not point.either:
+    if delimiter == ";" and not point.either and not decimals["."]:
         return Marks(",")  # it parts cells because commas are in them
-    doubtful = [
-        (k, cell)
-        for k, column in enumerate(zip(*rows, strict=False))
-        if (cell := _evidence([c.strip() for c in column], ",").either)
-        and not _leaves_whole([c.strip() for c in column])
-    ]
+    doubtful: list[tuple[int, str]] = []
+    for k, column in enumerate(zip(*rows, strict=False)):
+        own = [cell.strip() for cell in column]
+        cell = _evidence(own, ",").either
+        if cell is not None and (decimals["."] or not _leaves_whole(own)):
+            doubtful.append((k, cell))
     return Marks(".", comma.either, tuple(doubtful))
 
 

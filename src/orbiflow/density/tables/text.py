@@ -127,7 +127,9 @@ def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
                     )
                 text = line.strip()
                 if text:
-                    is_comment = text[0] == "#" or (number == 1 and _SEPARATOR.fullmatch(text))
+                    is_comment = text[0] == "#" or (
+                        number == 1 and _SEPARATOR.fullmatch(line.rstrip("\r\n"))
+                    )
                     yield number, line.rstrip("\n"), bool(is_comment)
     except OSError as exc:
         raise InputFileError(f"{path}: cannot be read ({exc.strerror}); check it") from exc
@@ -142,7 +144,7 @@ def layout_of(
     """Find the layout of a text file from its first rows."""
     lines = (line[:2] for line in text_lines(path) if not line[2])
     sample = list(islice(lines, SAMPLE))
-    said = next((_SEPARATOR.fullmatch(line.strip()) for _, line, _ in text_lines(path)), None)
+    said = next((_SEPARATOR.fullmatch(line) for _, line, _ in text_lines(path)), None)
     if not sample:
         raise InputFileError(f"{path}: only comments and blank lines; export it again")
     first = sample[0][0]
