@@ -235,6 +235,9 @@ HUGE = 1e15
 CODE_GAP = 1 / 36
 """Share of a turn that lies between a code and all other values."""
 
+FEW_VALUES = 5
+"""Different values below which a code within a turn may be one of the angles."""
+
 MOST_CODES = 3
 """More different values beyond a turn are no codes, unless they are among `CODES`."""
 
@@ -273,7 +276,7 @@ def _is_code(value: float, rest: Array, turn: float) -> bool:
     """Return whether one of `CODES` is far from all other values, beyond a turn or of another kind."""
     if abs(value) > turn * (1 + TURN_TOLERANCE):
         return not len(rest) or float(np.abs(rest - value).min()) > CODE_GAP * turn
-    if turn < 100 or len(rest) < FEW_ROWS:
+    if turn < 100 or len(rest) < FEW_VALUES:
         return False
     if value < 0:  # the only negative value of a compass
         return float(rest.min()) >= 0 and float(rest.max()) > turn / 2
