@@ -168,7 +168,7 @@ def test_missing_values_are_named() -> None:
     assert np.isfinite(estimator.fit(holes).score_samples(holes)).all()
     with pytest.raises(OrbiflowError, match="column 'psi' has no value in any row; leave it out"):
         estimator.fit(frame(ANGLES, "phi,psi").assign(psi=None))
-    with pytest.raises(OrbiflowError, match="numpy.angle gives their angles"):
+    with pytest.raises(OrbiflowError, match=r"numpy\.angle gives their angles"):
         made("torus").fit(np.exp(1j * ANGLES))
 
 

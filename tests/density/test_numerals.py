@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -113,7 +114,7 @@ def test_any_two_decimals_come_back(tmp_path: Path, numbers: list, marks: tuple)
 
 def test_codes_for_missing_values_are_missing(tmp_path: Path) -> None:
     path = write(tmp_path, "a,b\n1,999\n-99,3\n4,5\n")
-    how = {"columns": ["a", "b"], "width": None, "missing_codes": (999, -99)}
+    how: dict[str, Any] = {"columns": ["a", "b"], "width": None, "missing_codes": (999, -99)}
     with pytest.raises(InputFileError, match="2 cells empty"):
         read_table(path, **how)
     table = read_table(path, **how, drop_missing=True)
@@ -126,7 +127,8 @@ def test_codes_for_missing_values_are_missing(tmp_path: Path) -> None:
 def test_a_column_without_a_value_is_named(tmp_path: Path) -> None:
     path = write(tmp_path, "phi,chi,psi\n1,NULL,3\n4,NULL,6\n")
     assert read_table(path, columns=None, width=None).columns == ("phi", "psi")
-    for how in ({}, {"drop_missing": True}, {"keep_missing": True}):
+    ways: list[dict[str, Any]] = [{}, {"drop_missing": True}, {"keep_missing": True}]
+    for how in ways:
         with pytest.raises(
             InputFileError, match="column chi has no value in any row; choose others"
         ):

@@ -326,7 +326,7 @@ class DensityEstimator:
             raise OrbiflowError(f"expected data of shape (N, k), got {data.shape}")
         require_values(data, names)
         own = self.space if isinstance(self.space, Space) else None
-        space, unit = self.space if own is None else own.name, self.unit
+        space, unit = str(self.space) if own is None else own.name, self.unit
         if own is not None and is_angular(own.name, data.shape[1]):
             unit = str(getattr(own, "angle_unit", own.unit))
             if self.unit not in (None, unit):

@@ -66,28 +66,25 @@ def _columns_of(data: Any, what: str) -> list[tuple[Any, Any]] | None:
         return [(n, _plain(data.column(k))) for k, n in enumerate(data.column_names)]
     if isinstance(data, np.ndarray) and data.dtype.names:
         return [(name, data[name]) for name in data.dtype.names]
-    names = getattr(data, "columns", None)
+    frame: Any = data
+    names = getattr(frame, "columns", None)
     if names is None or callable(names):
         return None
-    if hasattr(data, "iloc"):  # pandas
-        return [(n, _plain(data.iloc[:, k])) for k, n in enumerate(names)]
-    if hasattr(data, "get_columns"):  # polars
-        return [(n, _plain(c)) for n, c in zip(names, data.get_columns(), strict=True)]
-    return list(zip(names, np.asarray(data).T, strict=True))
+    if hasattr(frame, "iloc"):  # pandas
+        return [(n, _plain(frame.iloc[:, k])) for k, n in enumerate(names)]
+    if hasattr(frame, "get_columns"):  # polars
+        return [(n, _plain(c)) for n, c in zip(names, frame.get_columns(), strict=True)]
+    return list(zip(names, np.asarray(frame).T, strict=True))
 
 
 def _plain(column: Any) -> Any:
-    """Return a frame's column as an array, of objects where something is missing in it."""
-    if hasattr(column, "isna") or hasattr(column, "is_null"):
-        lists = (
-            getattr(column, "tolist", None) or getattr(column, "to_pylist", None) or column.to_list
-        )
-        kind = str(getattr(column, "type", getattr(column, "dtype", "")))
-        if not kind.casefold().startswith(("float", "double", "int", "uint")):
-            return np.array([*lists(), None], dtype=object)[:-1]
-        if kind[:1].isupper() or hasattr(column, "to_pylist"):  # may hold NA or null
-            return np.array([*lists(), None], dtype=object)[:-1]
-    return column.to_numpy()
+    """Return a frame's column as an array, of objects where its kind has a mark for missing values."""
+    if hasattr(column, "to_pylist"):  # pyarrow
+        return np.array([*column.to_pylist(), None], dtype=object)[:-1]
+    kind = str(column.dtype)
+    if kind.startswith(("float", "int", "uint")) and "[" not in kind:
+        return column.to_numpy()
+    return np.fromiter(column, dtype=object, count=len(column))
 
 
 def as_numbers(data: Any, what: str) -> Array:
@@ -153,8 +150,8 @@ def require_values(values: Array, names: Sequence[str] | None) -> None:
         raise OrbiflowError(
             f"row {rows[0] + 1} has an infinite value ({len(rows)} such rows): correct or remove it"
         )
-    empty = np.flatnonzero(np.isnan(values).all(axis=0)) if len(values) else ()
-    if len(empty):
+    empty = np.flatnonzero(np.isnan(values).all(axis=0)).tolist() if len(values) else []
+    if empty:
         own = [repr(names[k]) if names else str(k + 1) for k in empty]
         several = len(own) > 1
         have, them = ("have", "them") if several else ("has", "it")
