@@ -16,7 +16,7 @@ HOME = Path(__file__).parents[1] / "src" / "orbiflow"
 TILES = ["geometry", "tilings", "silhouette", "likeness", "tile", "result_file"]
 TILES += ["search", "pictures", "scene", "motifs", "exporting", "solids"]
 TILES += ["art", "motion", "pages"]
-DENSITY = ["spaces", "models", "inference", "fitting"]
+DENSITY = ["data", "spaces", "models", "inference", "fitting"]
 DENSITY += [
     "estimator",
     "comparing",

@@ -107,3 +107,7 @@ class CoarseStepsWarning(UserWarning):
 
 class RoundedOperatorsWarning(UserWarning):
     """Operators of a group with rounded shifts, such as 0.3333: they are read as simple fractions."""
+
+
+class DataWarning(UserWarning):
+    """Data that may not be what they were taken for: another unit, fractions, or no angles at all."""

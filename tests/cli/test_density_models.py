@@ -16,7 +16,7 @@ def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, space, unit, data, columns in (
         ("torus", "torus", "radians", angles, ["phi", "psi"]),
         ("degrees", "torus", "degrees", np.degrees(angles), ["phi", "psi"]),
-        ("sphere", "sphere", "radians", np.degrees(angles).clip(-80, 80), ["lat", "lon"]),
+        ("sphere", "sphere", None, np.degrees(angles).clip(-80, 80), ["lat", "lon"]),
     ):
         write(folder / f"{name}.csv", columns, data)
         fitted = DensityEstimator(space, unit=unit, components="mixture").fit(data)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -18,26 +19,32 @@ def places(path: Path, header: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("header", "space", "asked"),
+    ("header", "space"),
     [
-        ("longitude,latitude", "sphere", ()),
-        ("LON_deg,lat_deg", "sphere", ()),
-        ("trend,plunge", "projective-plane", ()),
-        ("lat,lon", "sphere", ("--columns", "lon,lat")),
+        ("longitude,latitude", "sphere"),
+        ("LON_deg,lat_deg", "sphere"),
+        ("trend,plunge", "projective-plane"),
     ],
 )
-def test_longitude_first_is_refused(
-    header: str, space: str, asked: tuple[str, ...], tmp_path: Path, orbiflow
+def test_longitude_first_is_put_right_and_said(
+    header: str, space: str, tmp_path: Path, orbiflow
 ) -> None:
-    data = places(tmp_path / "places.csv", header)
-    found = orbiflow(*FIT, data, "--space", space, *asked, "--out", tmp_path / "m")
-    assert found.status == 2
-    names = asked[1] if asked else header
-    assert f"--columns '{','.join(reversed(names.split(',')))}'" in found.err
-    assert not (tmp_path / "m").exists()
-    right = ",".join(reversed(names.split(",")))
-    found = orbiflow(*FIT, data, "--space", space, "--columns", right, "--out", tmp_path / "m")
+    data, right = places(tmp_path / "places.csv", header), ", ".join(reversed(header.split(",")))
+    found = orbiflow(*FIT, data, "--space", space, "--out", tmp_path / "m")
     assert found.status == 0, found.err
+    assert f"took {right} as " in found.out
+    report = json.loads((tmp_path / "m" / "report.json").read_text())
+    assert report["columns"] == right.split(", ")
+
+
+def test_longitude_first_is_refused_where_it_was_asked_for(tmp_path: Path, orbiflow) -> None:
+    data = places(tmp_path / "places.csv", "lat,lon")
+    fit = (*FIT, data, "--space", "sphere", "--out", tmp_path / "m")
+    found = orbiflow(*fit, "--columns", "lon,lat")
+    assert found.status == 2
+    assert "give --columns 'lat,lon'" in found.err
+    assert not (tmp_path / "m").exists()
+    assert orbiflow(*fit, "--columns", "lat,lon").status == 0
 
 
 def test_units_of_places_are_refused(tmp_path: Path, orbiflow) -> None:

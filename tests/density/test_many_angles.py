@@ -52,4 +52,4 @@ def test_settings_without_a_meaning_are_refused(settings: dict, named: str) -> N
     with pytest.raises(OrbiflowError, match=f"{named} have no effect on a torus of 5 angles"):
         DensityEstimator("torus", unit="degrees", **settings).fit(data(20))
     with pytest.raises(OrbiflowError, match=named):
-        DensityEstimator(Torus(5), **settings).fit(data(20))
+        DensityEstimator(Torus(5, unit="degrees"), **settings).fit(data(20))

@@ -229,7 +229,7 @@ def test_models_are_compared_in_one_measure() -> None:
     degrees = DensityEstimator(unit="degrees", components="mixture").fit(np.degrees(angles[:80]))
     with pytest.raises(OrbiflowError, match="radians, deg in degrees"):
         compare_models({"rad": good, "deg": degrees}, angles)
-    globe = DensityEstimator("sphere", components="mixture").fit(angles[:80])
+    globe = DensityEstimator("sphere", unit="degrees", components="mixture").fit(angles[:80])
     with pytest.raises(OrbiflowError, match="torus of 2 angles, globe on the sphere"):
         compare_models({"flat": good, "globe": globe}, angles)
     assert make_space("torus").dim == 2

@@ -69,7 +69,7 @@ def test_missing_values_of_arrays(tmp_path: Path) -> None:
     table = read_table(path, columns=None, width=2, drop_missing=True)
     assert table.values.tolist() == [[1, 2]]
     np.save(path, np.full((3, 2), np.nan))
-    with pytest.raises(InputFileError, match="every row lacks a value"):
+    with pytest.raises(InputFileError, match="columns column1, column2 have no value in any row"):
         read_table(path, columns=None, width=2, drop_missing=True)
 
 

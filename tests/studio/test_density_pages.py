@@ -17,11 +17,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from density.blends import random_kernels
-from orbiflow.density import Mixture, Torus, density_to_bytes, read_density
+from orbiflow.density import Mixture, Torus, density_to_bytes, guess, read_density, seen_column
 from orbiflow.density.tables import Table
 from orbiflow.studio import density_table, density_tasks
 from orbiflow.studio.density_routes import EXAMPLES, TABLES
-from orbiflow.studio.density_table import guess, seen_column, table_view
+from orbiflow.studio.density_table import table_view
 from studio.served import Client, done, new_project, studio
 
 ROWS = 40

@@ -126,6 +126,10 @@ from .tables.files import is_identifier as is_identifier
 from .tables.files import read_labels as read_labels
 from .tables.files import read_table as read_table
 from .tables.files import to_csv as to_csv
+from .tables.guesses import code_notes as code_notes
+from .tables.guesses import guess as guess
+from .tables.guesses import seen_column as seen_column
+from .tables.guesses import seen_columns as seen_columns
 from .tables.table import MissingCellsError as MissingCellsError
 from .tables.table import Table as Table
 from .tables.table import TableError as TableError

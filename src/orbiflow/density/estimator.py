@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from orbiflow.arguments import as_instance, as_whole, refusal
 from orbiflow.arrays import Array
+from orbiflow.density.data import as_data, check_columns, is_angular, require_values, unit_of
 from orbiflow.density.fitting import (
     DensitySettings,
     FitReport,
@@ -32,7 +33,7 @@ from orbiflow.density.inference import (
     marginal,
 )
 from orbiflow.density.models import Density, flow_obstacle, log_density_gradient
-from orbiflow.density.spaces import Space, check_measure, space_for
+from orbiflow.density.spaces import QuotientSpace, Space, check_measure, space_for
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import check_names, fields_of
 
@@ -56,7 +57,7 @@ def seed_of(random_state: RandomState) -> int:
 
 def _signature() -> inspect.Signature:
     """The constructor's parameters, which include all settings by name."""
-    own = {"unit": "radians", "missing": "refuse"}
+    own = {"unit": None, "missing": "refuse"}
     others = own | {entry.name: entry.default for entry in fields_of(DensitySettings)}
     kinds = inspect.Parameter
     return inspect.Signature(
@@ -74,6 +75,7 @@ class DensityEstimator:
         space: "torus", "sphere" and other names that `make_space` takes; the name of a group, such as
             "p4m", "hantzsche-wendt" or "P 21 21 21"; or a `Space`, such as `QuotientSpace(group)`.
         unit: The unit of angles, and of rotations in three columns: "radians", "degrees" or "turns".
+            Default: radians, if no value is beyond 2 pi.
         missing: "refuse" rows that lack an angle (NaN), or, on tori, "marginalise": fit kernels and
             mixtures to them, and score them, by the density of the angles that they have.
         settings: Those of `DensitySettings`, by name: `components`, `repeats`, `max_frequency`,
@@ -99,7 +101,7 @@ class DensityEstimator:
         self,
         space: str | Space = "torus",
         *,
-        unit: str = "radians",
+        unit: str | None = None,
         missing: str = "refuse",
         **settings: Any,
     ) -> None:
@@ -125,6 +127,10 @@ class DensityEstimator:
     ) -> DensityEstimator:
         """Fit to data (N, k) in the space's own units; `y` is ignored.
 
+        Data are an array or a data frame (pandas, polars, pyarrow, xarray) with as many columns as the
+        space takes. Of a frame whose columns have names, later frames are read by these names. What
+        one may doubt is a `DataWarning`.
+
         Args:
             sample_weight: of the rows (N,), at least 0: how much each counts in everything that is
                 fitted and judged. Only ratios count, equal ones are none.
@@ -132,13 +138,14 @@ class DensityEstimator:
                 densities of new groups (proteins, stations, fires).
 
         Raises:
-            OrbiflowError: for data that are not of the space, too few points, weights that are none, a
-                setting out of range, or one that has no meaning on a torus of so many angles.
+            OrbiflowError: for data that are not of the space, in another order than its columns, or of
+                an unknown unit; too few points, weights that are none, a setting out of range, or one
+                that has no meaning on a torus of so many angles.
         """
         del y
         settings = self.settings()
-        data = np.asarray(X)
-        self.space_ = self._space_for(data)
+        data, names = as_data(X)
+        self.space_ = self._space_for(data, names)
         points = self._chart(data)
         self.density_: Density
         self.report_: FitReport
@@ -161,9 +168,8 @@ class DensityEstimator:
             )
         self.density_, self.report_ = found
         self.n_features_in_ = int(data.shape[1])
-        names = getattr(X, "columns", None)
-        if names is not None and all(isinstance(name, str) for name in names):
-            self.feature_names_in_ = np.array(list(names), dtype=object)
+        if names is not None:
+            self.feature_names_in_ = np.array(names, dtype=object)
         elif hasattr(self, "feature_names_in_"):
             del self.feature_names_in_  # of an earlier fit
         return self
@@ -233,12 +239,13 @@ class DensityEstimator:
     def score_samples(self, X: ArrayLike, *, measure: str = "natural") -> Array:
         """Log densities (N,) in nats at data (N, k), with respect to `measure` (see `MEASURES`).
 
-        Of rows that lack angles (NaN), with `missing="marginalise"`, of the angles that they have.
+        Of rows that lack angles (NaN), with `missing="marginalise"`, of the angles that they have. The
+        columns of a data frame are found by the names that `fit` has seen.
         """
         density = self._fitted()
         check_measure(measure, density.space)
         with torch.no_grad():
-            points = self._chart(np.asarray(X))
+            points = self._chart(self._in_order(X))
             return at_observed(density, points, measure=measure).numpy()
 
     def score_gradient(self, X: ArrayLike) -> Array:
@@ -247,7 +254,7 @@ class DensityEstimator:
         In nats per unit of each angle; per degree of latitude and longitude; of unit vectors the
         tangent vector that points uphill, per radian. See `log_density_gradient`.
         """
-        return log_density_gradient(self._fitted(), np.asarray(X))[1]
+        return log_density_gradient(self._fitted(), self._in_order(X))[1]
 
     def score(
         self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None
@@ -313,12 +320,40 @@ class DensityEstimator:
         given = {name: getattr(self, name) for name in names}
         return {name: v for name, v in given.items() if v != defaults[name].default}
 
-    def _space_for(self, data: np.ndarray) -> Space:
-        if isinstance(self.space, Space):
-            return self.space
+    def _space_for(self, data: Array, names: tuple[str, ...] | None) -> Space:
+        """Return the space of data, once they are known to be of it, and warn of what is doubtful."""
         if data.ndim != 2:
             raise OrbiflowError(f"expected data of shape (N, k), got {data.shape}")
-        return space_for(self.space, data, unit=self.unit, seed=self.settings().seed)
+        require_values(data, names)
+        own = self.space if isinstance(self.space, Space) else None
+        space, unit = str(self.space) if own is None else own.name, self.unit
+        if own is not None and is_angular(own.name, data.shape[1]):
+            unit = str(getattr(own, "angle_unit", own.unit))
+            if self.unit not in (None, unit):
+                raise SettingError(f"{{unit}} {self.unit} is not the space's, {unit}: leave it out")
+        found = unit_of(space, data, names, unit, stacklevel=4)
+        if isinstance(self.space, QuotientSpace):
+            self.space.warn_of_fractions(data, stacklevel=4)
+        if isinstance(self.space, Space):
+            return self.space
+        return space_for(self.space, data, unit=found, seed=self.settings().seed)
+
+    def _in_order(self, X: ArrayLike) -> Array:
+        """Return data with the columns of a frame in the order in which `fit` has seen them."""
+        data, names = as_data(X)
+        fitted = [str(name) for name in getattr(self, "feature_names_in_", ())]
+        if names is None or not fitted or list(names) == fitted:
+            if names is not None and not fitted:
+                check_columns(self.space_.name, names)
+            return data
+        if sorted(names) != sorted(fitted) or len(set(fitted)) < len(fitted):
+            missing = [name for name in fitted if name not in names]
+            raise OrbiflowError(
+                f"the columns are {', '.join(names)}, and the fit has seen {', '.join(fitted)}"
+                + f": there is no {', '.join(missing)}" * bool(missing)
+                + "; choose those of the fit"
+            )
+        return data[:, [names.index(name) for name in fitted]]
 
     def _chart(self, data: np.ndarray) -> torch.Tensor:
         """Points of data (N, k); with missing angles where they may be."""

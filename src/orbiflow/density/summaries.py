@@ -22,6 +22,7 @@ from scipy import optimize, special
 
 from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array
+from orbiflow.density.data import as_data, unit_of
 from orbiflow.density.spaces import to_vectors, whole_turn
 from orbiflow.errors import OrbiflowError
 
@@ -179,11 +180,12 @@ def summarize_angles(
     >>> round(one[0].mean), round(one[0].resultant, 3)  # Mardia and Jupp, example 1.1
     (51, 0.711)
     """
-    values = as_array(data, "data", (...,), finite=False)
+    found = as_data(data)
+    values = as_array(found.values, "data", (...,), finite=False)
     values = as_array(
         values[:, None] if values.ndim == 1 else values, "data", ("n", "d"), finite=False
     )
-    names = names or tuple(f"column{k}" for k in range(1, values.shape[1] + 1))
+    names = names or found.names or tuple(f"column{k}" for k in range(1, values.shape[1] + 1))
     turn = whole_turn(unit)
     columns: list[AngleSummary] = []
     for name, column in zip(names, values.T, strict=True):
@@ -411,15 +413,18 @@ def _fisher_lee(a: Array, b: Array, rows: _Rows) -> float | None:
 def summarize_directions(
     data: ArrayLike,
     *,
+    unit: str | None = None,
     weights: ArrayLike | None = None,
     groups: ArrayLike | None = None,
     level: float = 0.95,
 ) -> DirectionSummary:
     """Summarise directions, (n, 2) of latitude and longitude in degrees or (n, 3) of unit vectors.
 
+    `unit` is "degrees" for those that could be taken for radians, which are refused otherwise.
     `weights`, `groups` and `level` are those of `summarize_angles`.
     """
-    table = np.asarray(data, dtype=np.float64)
+    table, names = as_data(data)
+    unit_of("sphere", table, names, unit)
     vectors, rows = _chosen(to_vectors(table), weights, groups, level)
     mean, resultant, cone = _mean_direction(vectors, rows)
     count, k, fisher_cone = len(vectors), None, None
@@ -437,12 +442,14 @@ def summarize_directions(
 def summarize_axes(
     data: ArrayLike,
     *,
+    unit: str | None = None,
     weights: ArrayLike | None = None,
     groups: ArrayLike | None = None,
     level: float = 0.95,
 ) -> AxisSummary:
     """Summarise axes, either end of each as in `summarize_directions`."""
-    table = np.asarray(data, dtype=np.float64)
+    table, names = as_data(data)
+    unit_of("projective-plane", table, names, unit)
     vectors, rows = _chosen(to_vectors(table), weights, groups, level)
     products = vectors[:, :, None] * vectors[:, None, :]
     tensor = np.tensordot(rows.weights, products, axes=1)

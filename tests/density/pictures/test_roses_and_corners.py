@@ -12,7 +12,7 @@ from matplotlib.projections.polar import PolarAxes
 
 from known_densities import kernels_about
 from orbiflow.density import PlotSettings, Torus, plot_density
-from orbiflow.density.pictures import Rose, corner_picture, rose_picture, roses_picture
+from orbiflow.density.pictures import Rose, corner_picture, rose_picture, roses_picture, sectors_of
 from orbiflow.density.pictures.frames import symbol
 from orbiflow.drawing import Sheet
 
@@ -97,3 +97,44 @@ def test_a_rose_has_the_curve_of_its_density(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_greek(name: str, shown: str) -> None:
     assert symbol(name) == shown
+
+
+@pytest.mark.parametrize("directions", [8, 16, 24, 36, 72, 360])
+@pytest.mark.parametrize("rows", [40, 84, 300, 1000])
+def test_sectors_of_rounded_angles_hold_as_many_directions_each(directions: int, rows: int) -> None:
+    rng = np.random.default_rng(directions)
+    turns = rng.integers(0, directions + 1, rows) / directions  # 0 and 1 are one direction
+    count, first = sectors_of(turns, 18)
+    if count > directions:
+        return
+    held = np.histogram((np.arange(directions) / directions - first) % 1, count, (0, 1))[0]
+    assert len(set(held)) == 1
+    assert (len({*np.round(turns % 1, 9)}) < directions) or directions % count == 0
+    if directions // count % 2:  # the middle of a sector is a direction, north among them
+        middles = (first + (np.arange(count) + 0.5) / count) * directions
+        assert np.allclose(middles, np.round(middles))
+        assert (
+            np.isclose(middles % directions, 0).any()
+            or np.isclose(middles % directions, directions).any()
+        )
+
+
+def test_sectors_of_other_angles_are_as_before() -> None:
+    rng = np.random.default_rng(0)
+    assert sectors_of(rng.uniform(0, 1, 50), 18) == (18, 0.0)
+    assert sectors_of(np.zeros(20), 12) == (12, 0.0)
+
+
+def test_a_rose_of_whole_tens_is_centred_on_north() -> None:
+    turns = (
+        np.array([*[0] * 12, *[10] * 22, *[20] * 9, *[340] * 14, *[350] * 15, *[360] * 12]) / 360
+    )
+    roses = [Rose("wind", turns)]
+    (axes,) = roses_picture(roses, "degrees", "One", SHEETS["screen"]).figure.axes
+    heights = {
+        round(np.degrees(bar.get_x() + bar.get_width() / 2) % 360): bar.get_height()
+        for bar in axes.patches
+    }
+    shares = {angle: height**2 for angle, height in heights.items() if height > 0}
+    assert shares[0] / sum(shares.values()) == pytest.approx((12 + 22 + 15 + 12) / 84)
+    assert set(shares) == {0, 30, 330}

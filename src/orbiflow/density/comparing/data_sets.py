@@ -18,6 +18,7 @@ from orbiflow.arguments import as_array, is_a
 from orbiflow.arrays import Array
 from orbiflow.density.comparing.resampling import Groups, TestResult, mmd_test, resampled_sums
 from orbiflow.density.comparing.settings import ComparisonSettings
+from orbiflow.density.data import as_data, unit_of
 from orbiflow.density.fitting import DensitySettings, Progress, fit_automatic
 from orbiflow.density.spaces import Space, space_for
 from orbiflow.errors import DataWarning, OrbiflowError
@@ -116,7 +117,7 @@ def compare_samples(
     space: str | Space = "torus",
     settings: ComparisonSettings | None = None,
     *,
-    unit: str = "radians",
+    unit: str | None = None,
     groups: Mapping[str, ArrayLike] | None = None,
     progress: Progress = lambda _share, _what: None,
 ) -> DataComparison:
@@ -142,10 +143,14 @@ def compare_samples(
     >>> compare_samples({"a": one, "b": other}).differ
     True
     """
-    names, tables = _two(samples)
+    names, tables, columns = _two(samples)
     settings = settings or ComparisonSettings()
     seed = settings.seed
-    own = space if isinstance(space, Space) else _space_of(space, names, tables, unit, seed)
+    if isinstance(space, Space):
+        own = space
+    else:
+        found = unit_of(space, np.concatenate(tables), columns, unit)
+        own = _space_of(space, names, tables, found, seed)
     points = torch.cat(
         [_named(name, own.to_chart, table) for name, table in zip(names, tables, strict=True)]
     )
@@ -172,10 +177,20 @@ def compare_samples(
     return DataComparison((names[0], names[1]), *found, tuple(notes))
 
 
-def _two(samples: Mapping[str, ArrayLike]) -> tuple[list[str], list[np.ndarray]]:
+def _two(
+    samples: Mapping[str, ArrayLike],
+) -> tuple[list[str], list[np.ndarray], tuple[str, ...] | None]:
+    """Return the names of two data sets, their values in one order, and the names of the columns."""
     if not is_a(samples, Mapping) or len(samples) != 2:
         raise OrbiflowError("give two data sets by their names, such as {'before': a, 'after': b}")
-    tables = [as_array(table, f"data set {name}", ("N", "k")) for name, table in samples.items()]
+    read = [as_data(table, f"data set {name}") for name, table in samples.items()]
+    (first, columns), (second, others) = read
+    if columns and others and columns != others and sorted(columns) == sorted(others):
+        second = second[:, [others.index(name) for name in columns]]
+    tables = [
+        as_array(table, f"data set {name}", ("N", "k"))
+        for name, table in zip(samples, (first, second), strict=True)
+    ]
     widths = [table.shape[1] for table in tables]
     if widths[0] != widths[1]:
         raise OrbiflowError(
@@ -183,7 +198,7 @@ def _two(samples: Mapping[str, ArrayLike]) -> tuple[list[str], list[np.ndarray]]
         )
     if not all(len(table) for table in tables):
         raise OrbiflowError("a data set has no rows")
-    return list(samples), tables
+    return list(samples), tables, columns
 
 
 def _space_of(

@@ -27,8 +27,9 @@ from orbiflow.density.cross_validation.splits import (
     held_out,
     splits_of,
 )
+from orbiflow.density.data import is_angular
 from orbiflow.density.pictures import space_title
-from orbiflow.density.tables import append_columns, is_angular
+from orbiflow.density.tables import append_columns
 from orbiflow.drawing import rendered
 from orbiflow.errors import InputFileError
 

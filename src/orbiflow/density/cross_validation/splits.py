@@ -17,10 +17,11 @@ from orbiflow.arrays import Array
 from orbiflow.batch import Entry
 from orbiflow.density import comparing
 from orbiflow.density.cross_validation.operations import SCORES, UNIFORM, CrossValidation
+from orbiflow.density.data import Unit
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
 from orbiflow.density.inference import chart_of_observed
 from orbiflow.density.spaces import Space, space_for
-from orbiflow.density.tables import TableRows, Unit, angle_unit, read_rows, read_table
+from orbiflow.density.tables import TableRows, angle_unit, read_rows, read_table
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import Note, Sink, one_blas_thread
 
@@ -96,15 +97,18 @@ class Fit:
 
 def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
     """Return the rows of the table that count."""
-    width = asked.where.width
-    rows = read_rows(asked.data, asked.rows, tell, width=width, group=asked.rows.group)
+    where, group = asked.where, asked.rows.group
+    rows = read_rows(
+        asked.data, asked.rows, tell, space=where.space, width=where.width, group=group
+    )
     if rows.weights is not None:
         weighed(torch.zeros(len(rows.weights), 1), rows.weights)  # refuses what is no weight
         rows = rows.only(rows.weights > 0)  # others count for nothing
     table = rows.table
     unit = angle_unit(asked.where, table, tell)
-    where, seed = asked.where, asked.density.seed
-    space = space_for(where.space, table.values, unit=unit, seed=seed, cell=where.cell)
+    seed = asked.density.seed
+    of_group = {"cell": where.cell, "fractional": where.fractional}
+    space = space_for(where.space, table.values, unit=unit, seed=seed, **of_group)
     marginalise = asked.rows.missing == "marginalise"
     points = chart_of_observed(space, table.values) if marginalise else space.to_chart(table.values)
     counts, place = places(points)

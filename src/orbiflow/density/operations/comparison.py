@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,11 +13,12 @@ from orbiflow import runtime
 from orbiflow.batch import csv_bytes
 from orbiflow.density import comparing, tables
 from orbiflow.density.comparing import ComparisonSettings
+from orbiflow.density.data import DIRECTIONS, Unit, arrangements, is_angular
 from orbiflow.density.operations.drawing import require_ending
 from orbiflow.density.operations.fitting import space_of
 from orbiflow.density.run_folder import write_file
-from orbiflow.density.tables import SpaceSettings, TableSettings, Unit
-from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.density.tables import SpaceSettings, TableSettings
+from orbiflow.errors import DataWarning, OrbiflowError, SettingError
 from orbiflow.settings import DefaultText, Option, Repeated
 
 if TYPE_CHECKING:
@@ -119,10 +121,13 @@ class _Reader(NamedTuple):
     tell: runtime.Sink
     progress: Callable[[float, str], None]
 
-    def rows(self, data: Path, columns: Columns, tell: runtime.Sink) -> TableRows:
+    def rows(
+        self, data: Path, columns: Columns, tell: runtime.Sink, where: SpaceSettings | None = None
+    ) -> TableRows:
         """Return rows, without the column of groups if columns are not named."""
         settings = self.settings.replace(columns=columns)
-        return tables.read_rows(data, settings, tell, group=self.group)
+        space = {} if where is None else {"space": where.space, "width": where.width}
+        return tables.read_rows(data, settings, tell, **space, group=self.group)
 
 
 def _compare_models(
@@ -160,9 +165,9 @@ def _compare_data(
 ) -> DataComparison:
     import numpy as np
 
-    columns = read.settings.columns or _common_columns(data, read)
+    columns = read.settings.columns or _common_columns(data, where.space, read)
     found = {
-        name: read.rows(path, columns, read.tell)
+        name: read.rows(path, columns, read.tell, where)
         for name, path in zip(_names(data), data, strict=True)
     }
     groups = None
@@ -173,9 +178,13 @@ def _compare_data(
     if len({own.shape[1] for own in values.values()}) == 1:
         both = replace(both, values=np.concatenate(list(values.values())))
     unit = tables.angle_unit(where, both, read.tell)
-    return comparing.compare_samples(
-        values, space_of(where), settings, unit=unit, groups=groups, progress=read.progress
-    )
+    if not is_angular(where.space, both.values.shape[1]):
+        unit = where.unit or ("degrees" if where.space in DIRECTIONS else None)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DataWarning)  # told already
+        return comparing.compare_samples(
+            values, space_of(where), settings, unit=unit, groups=groups, progress=read.progress
+        )
 
 
 def _columns_of_models(
@@ -215,11 +224,16 @@ def _columns_of_models(
     return dict.fromkeys(own)
 
 
-def _common_columns(data: Sequence[Path], read: _Reader) -> Columns:
-    """Return the first table's columns if the second has them in another order, else None."""
+def _common_columns(data: Sequence[Path], space: str, read: _Reader) -> Columns:
+    """Return the first table's columns if the second has them in another order, else None.
+
+    Where names say which columns the space takes, and in which order, each table is asked.
+    """
     header = read.settings.header
     one, other = (tables.column_names(path, has_header=header) for path in data)
     if one is None or other is None or one == other:
+        return None
+    if all(len(arrangements(space, names)) == 1 for names in (one, other)):
         return None
     if sorted(n.casefold() for n in one) != sorted(n.casefold() for n in other):
         raise OrbiflowError(

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from orbiflow import runtime
 from orbiflow.density import pictures, regions, spaces, tables
+from orbiflow.density.data import Unit
 from orbiflow.density.pictures import PlotSettings
 from orbiflow.density.regions import RegionSettings
 from orbiflow.density.run_folder import write_file
-from orbiflow.density.tables import TableSettings, Unit, check_table_name
+from orbiflow.density.tables import TableSettings, check_table_name
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.settings import DefaultText, Option, Range
 

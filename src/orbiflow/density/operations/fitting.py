@@ -13,9 +13,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 from orbiflow import runtime
 from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
 from orbiflow.density import comparing, models, pictures, spaces, tables
+from orbiflow.density.data import is_angular
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
 from orbiflow.density.run_folder import write_files, written_files
+<<<<<<< HEAD
 from orbiflow.density.tables import GroupedRowSettings, RowSettings, SpaceSettings
+=======
+from orbiflow.density.tables import CountedRowSettings, RowSettings, SpaceSettings
+>>>>>>> tables
 from orbiflow.errors import DataWarning
 from orbiflow.settings import Hidden, Option, SettingError
 
@@ -39,7 +44,7 @@ def fit(
     data: Path,
     where: SpaceSettings,
     settings: DensitySettings = DensitySettings(),
-    reading: GroupedRowSettings = GroupedRowSettings(),
+    reading: CountedRowSettings = CountedRowSettings(),
     *,
     out: Annotated[Path, Option("--out", "-o")] = Path("density"),
     picture: Annotated[bool, Hidden()] = False,
@@ -58,7 +63,9 @@ def fit(
     begin = time.perf_counter()
     _check(where, settings, reading)
     with runtime.one_thread():
-        rows = tables.read_rows(data, reading, on_event, width=where.width, group=reading.group)
+        rows = tables.read_rows(
+            data, reading, on_event, space=where.space, width=where.width, group=reading.group
+        )
         values = rows.table.values
         folder = runtime.ResultFolder(out, written_files)
         runtime.check_output_folder(out, data)
@@ -84,7 +91,9 @@ def fit(
 
 def space_of(where: SpaceSettings) -> str | Space:
     """Return the space if its cell is known, otherwise its name: data tell the rest."""
-    return spaces.make_space(where.space, cell=where.cell) if where.cell else where.space
+    if not where.cell:
+        return where.space
+    return spaces.make_space(where.space, cell=where.cell, fractional=where.fractional)
 
 
 def fit_rows(
@@ -100,15 +109,20 @@ def fit_rows(
 
     values, labels = rows.table.values, rows.labels
     unit = tables.angle_unit(where, rows.table, tell)
+    unit = unit if is_angular(where.space, values.shape[1]) else where.unit
     given = {name: getattr(settings, name) for name in settings.fields_given}
     estimator = DensityEstimator(space_of(where), unit=unit, missing=reading.kept_missing, **given)
     progress = runtime.progress_events(tell, cancel)
     with warnings.catch_warnings():
+<<<<<<< HEAD
         warnings.simplefilter("ignore", DataWarning)  # the report's notes say the same
+=======
+        warnings.simplefilter("ignore", DataWarning)  # told already, with the names of columns
+>>>>>>> tables
         return estimator.fit(values, sample_weight=rows.weights, groups=labels, progress=progress)
 
 
-def _check(where: SpaceSettings, settings: DensitySettings, reading: GroupedRowSettings) -> None:
+def _check(where: SpaceSettings, settings: DensitySettings, reading: CountedRowSettings) -> None:
     """Refuse rows that such a density cannot be fitted to, before they are read."""
     settings.check_rows("refuse", None if reading.group is None else "group")
     if reading.missing == "marginalise":
@@ -170,7 +184,7 @@ def batch(
     folder: Path,
     where: SpaceSettings,
     settings: DensitySettings = DensitySettings(),
-    reading: GroupedRowSettings = GroupedRowSettings(),
+    reading: CountedRowSettings = CountedRowSettings(),
     out: Annotated[Path, Option("-o")] = Path("batch"),
     work: WorkSettings = WorkSettings(),
     *,

@@ -16,7 +16,8 @@ import numpy as np
 import torch
 
 from orbiflow.arrays import Array
-from orbiflow.density import inference, pictures
+from orbiflow.density import inference, pictures, tables
+from orbiflow.density.data import TURN_TOLERANCE, check_columns, is_angular, refuse_codes
 from orbiflow.density.fitting import Progress as InProgress
 from orbiflow.density.models import Density, Mixture, density_to_bytes, read_density
 from orbiflow.density.run_folder import SAMPLES, write_files
@@ -91,6 +92,18 @@ def check_fits(data: Path, table: Table, space: Space, extra: dict[str, Any], te
             )
             + ": say with {columns} which they are, in this order"
         )
+    if list(table.columns) != wanted:
+        if sorted(table.columns) == sorted(wanted):
+            raise TableError(
+                literal(
+                    f"{data}: the model was fitted to {', '.join(wanted)}, in this order; give "
+                )
+                + "{columns} "
+                + literal(f"'{','.join(wanted)}'")
+            )
+        check_columns(space.name, table.columns)
+    if space.unit is not None and is_angular(space.name, len(table.columns)):
+        refuse_codes(table.values, table.columns, space.unit, tables.CURE)
     warning = unit_warning(space, table.values, table.columns)
     if warning:
         tell(Note(f"WARNING: {data}: {warning}"))
@@ -99,7 +112,7 @@ def check_fits(data: Path, table: Table, space: Space, extra: dict[str, Any], te
 def unit_warning(space: Space, values: Array, columns: Sequence[str]) -> str | None:
     """Return what makes one doubt that angles (N, k) are in the model's unit, or None."""
     most = np.nanmax(np.abs(values), axis=0, initial=0.0)
-    beyond = float(most.max()) > 2 * math.pi + 1e-9
+    beyond = float(most.max()) > 2 * math.pi * (1 + TURN_TOLERANCE)
     if space.unit == "radians" and beyond:
         return (
             f"column {columns[int(most.argmax())]!r} has {most.max():g}, beyond 2 pi, and the model's "
@@ -126,13 +139,18 @@ DRAWN = 20_000
 
 
 def axes_of(wanted: Sequence[str], names: Sequence[str]) -> list[int]:
-    """Return the numbers, from 0, of angles given by name, or else by number from 1, as in tables.
+    """Return the numbers, from 0, of angles given by name, or else by number from 1.
 
-    >>> axes_of(["psi", "1"], ["phi", "psi"])
-    [1, 0]
+    Columns without a name have the numbers of their table, of which the model may have some alone.
+
+    >>> axes_of(["psi", "1"], ["phi", "psi"]), axes_of(["3"], ["column2", "column3"])
+    ([1, 0], [1])
     """
     lower = {name.casefold() for name in names}
     numbers = {str(number): number - 1 for number in range(1, len(names) + 1)}
+    unnamed = [re.fullmatch(r"column(\d+)", name) for name in names]
+    if all(unnamed):
+        numbers = {found[1]: axis for axis, found in enumerate(unnamed) if found}
     asked = [one if one.casefold() in lower else numbers.get(one, one) for one in wanted]
     return inference.axes_named(asked, names)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -12,8 +13,8 @@ from orbiflow import runtime
 from orbiflow.batch import csv_bytes
 from orbiflow.density import tables
 from orbiflow.density.run_folder import write_file
-from orbiflow.density.tables import GroupedRowSettings, SpaceSettings
-from orbiflow.errors import SettingError, literal
+from orbiflow.density.tables import CountedRowSettings, SpaceSettings
+from orbiflow.errors import DataWarning, SettingError, literal
 from orbiflow.settings import DefaultText, Ending, Option, Range, Settings
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def summary(
     data: Path,
     where: SpaceSettings,
     settings: SummarySettings = SummarySettings(),
-    reading: GroupedRowSettings = GroupedRowSettings(),
+    reading: CountedRowSettings = CountedRowSettings(),
     *,
     out: Annotated[File, Option("-o"), Ending(".json", ".csv")] = None,
     picture: Annotated[File, Ending(".png", ".pdf", ".svg")] = None,
@@ -53,7 +54,9 @@ def summary(
     _check(where, reading, picture)
     for file in filter(None, (out, picture)):
         runtime.check_output_file(file, data)
-    rows = tables.read_rows(data, reading, on_event, width=where.width, group=reading.group)
+    rows = tables.read_rows(
+        data, reading, on_event, space=where.space, width=where.width, group=reading.group
+    )
     unit = tables.angle_unit(where, rows.table, on_event)
     found = _summarised(rows, where.space, unit, settings.level)
     cancel.check()
@@ -62,7 +65,8 @@ def summary(
     for note in _notes(found, rows):
         on_event(runtime.Note(note))
     document = {"kind": "summary", "space": where.space, "unit": unit, "level": settings.level}
-    document |= {"weights": reading.weights, "group": reading.group, **found}
+    document |= {"weights": reading.weights, "counts": reading.counts, "group": reading.group}
+    document |= found
     if out is not None:
         as_csv = out.suffix.lower() == ".csv"
         text = _csv(found) if as_csv else json.dumps(document, allow_nan=False, indent=1)
@@ -84,7 +88,7 @@ def _csv(found: dict[str, Any]) -> bytes:
     return csv_bytes(list(rows[0]), [list(row.values()) for row in rows])
 
 
-def _check(where: SpaceSettings, reading: GroupedRowSettings, picture: Path | None) -> None:
+def _check(where: SpaceSettings, reading: CountedRowSettings, picture: Path | None) -> None:
     """Refuse what has no summary before the table is read."""
     if where.space not in ("torus", "sphere", "projective-plane"):
         raise SettingError(
@@ -114,7 +118,9 @@ def _summarised(rows: TableRows, space: str, unit: str, level: float) -> dict[st
         "sphere": ("directions", summaries.summarize_directions),
         "projective-plane": ("axes", summaries.summarize_axes),
     }[space]
-    return {name: [asdict(summarise(values, **how))]}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DataWarning)  # told already
+        return {name: [asdict(summarise(values, unit="degrees", **how))]}
 
 
 TABLES = {

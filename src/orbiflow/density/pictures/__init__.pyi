@@ -21,6 +21,7 @@ from .plots import plot_density as plot_density
 from .roses import Rose as Rose
 from .roses import rose_picture as rose_picture
 from .roses import roses_picture as roses_picture
+from .roses import sectors_of as sectors_of
 from .settings import PlotSettings as PlotSettings
 from .square import edge_pairs as edge_pairs
 from .surfaces import density_page as density_page

@@ -40,6 +40,9 @@ COMPASS = frozenset(
 SECTORS = {0: 12, 60: 18, 150: 24, 400: 36}
 """Number of sectors from so many values on."""
 
+ROUNDED = (4, 8, 12, 16, 18, 24, 32, 36, 64, 72, 120, 180, 360, 720)
+"""Numbers of directions on a turn to which angles are rounded; finer ones need no own sectors."""
+
 MAX_ROW = 4
 """Number of roses side by side."""
 
@@ -96,6 +99,37 @@ def roses_picture(roses: Sequence[Rose], unit: str, words: str, sheet: Sheet) ->
     return Picture(figure, sheet, "Rose diagram" + "s" * (len(roses) > 1), caption)
 
 
+def sectors_of(turns: Array, count: int) -> tuple[int, float]:
+    """Return about so many sectors that suit angles (N,) in turns, and where the first one begins.
+
+    If angles were rounded to a part of the turn, each sector holds as many of the directions that are
+    left, and is centred on one of them wherever their number allows.
+
+    >>> count, first = sectors_of(np.array([0, 10, 350, 340, 20, 360]) / 360, 18)
+    >>> count, round(360 * first, 9)
+    (12, -15.0)
+    """
+    step = _rounding(turns)
+    if step is None:
+        return count, 0.0
+    divisors = [k for k in range(1, step + 1) if step % k == 0 and count / 2 <= k <= 2 * count]
+    if not divisors:
+        return count, 0.0
+    # an odd number of directions has one in the middle
+    best = min(divisors, key=lambda k: (step // k % 2 == 0, abs(math.log(k / count))))
+    each = step // best
+    return best, -(each // 2 + 0.5) / step if each % 2 else -0.5 / step
+
+
+def _rounding(turns: Array) -> int | None:
+    """Return how many directions there are on the turn to which all angles (N,) were rounded."""
+    for directions in ROUNDED:
+        away = turns * directions
+        if bool((np.abs(away - np.round(away)) < 1e-6 * directions).all()):
+            return directions
+    return None
+
+
 def _polar(figure: Figure, left: float, below: float, cell: float, sheet: Sheet) -> PolarAxes:
     margin = 2.6 * sheet.em
     wide, high = figure.get_size_inches()
@@ -106,9 +140,11 @@ def _polar(figure: Figure, left: float, below: float, cell: float, sheet: Sheet)
 
 def _draw(axes: PolarAxes, rose: Rose, unit: str, sheet: Sheet) -> None:
     count = max(sectors for least, sectors in SECTORS.items() if len(rose.turns) >= least)
+    count, first = sectors_of(rose.turns, count)
     shares, edges = np.histogram(
-        rose.turns % 1.0, count, (0.0, 1.0), density=True, weights=rose.weights
+        (rose.turns - first) % 1.0, count, (0.0, 1.0), density=True, weights=rose.weights
     )
+    edges = edges + first
     around = 2 * np.pi
     axes.bar(
         around * edges[:-1], np.sqrt(shares), around / count, align="edge", color=_DATA, alpha=0.45,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import Any, Self, cast
 
@@ -10,12 +11,15 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
+from orbiflow.arguments import as_array
 from orbiflow.arrays import Array
+from orbiflow.density.data import fraction_doubts
 from orbiflow.density.spaces.frame import frame_of
 from orbiflow.density.spaces.space import Space, checked_table
-from orbiflow.errors import OrbiflowError
+from orbiflow.errors import DataWarning, OrbiflowError
 from orbiflow.symmetry import (
     CrystallographicGroup,
+    cell_lattice,
     checked_group,
     group_by_name,
     group_from_header,
@@ -44,7 +48,11 @@ class QuotientSpace(Space):
         cell: The lengths and angles of the cell of a group given by its name. Default: that of
             `group_by_name`.
 
-    Raises `OrbiflowError` if there is no such group, or the cell does not suit it.
+        fractional: Whether data are fractions of the cell's vectors, as in CIF, and not Cartesian; or
+            these vectors, as columns (d, d). Densities are per volume in the unit of the cell all the
+            same.
+
+    Raises `OrbiflowError` if there is no such group, the cell does not suit it, or fractions have none.
 
     >>> space = QuotientSpace("p4", cell=(2.0, 2.0))
     >>> space.volume
@@ -62,7 +70,12 @@ class QuotientSpace(Space):
         group: CrystallographicGroup | str | Mapping[str, Any],
         *,
         cell: ArrayLike | None = None,
+        fractional: bool | ArrayLike = False,
     ) -> None:
+        if fractional is True and not (isinstance(group, str) and cell is not None):
+            raise OrbiflowError(
+                "fractions are of a cell: give cell as well, or its vectors as columns"
+            )
         if isinstance(group, str):
             group = group_by_name(group, cell)
         elif cell is not None:
@@ -83,9 +96,23 @@ class QuotientSpace(Space):
         # on a rectangle whose axes the group keeps, fields can be splines
         keeps_axes = frame.own == frame.group.order
         self.group = (frame.group if keeps_axes else self._given).conjugate(self._to_chart)
+        self._vectors = self._checked_vectors(cell, fractional)
+        if self._vectors is not None:
+            self._to_chart = self._to_chart @ self._vectors
         self.columns = (
             COLUMNS[: self.dim] if self.dim <= 3 else tuple(f"x{k + 1}" for k in range(self.dim))
         )
+
+    def _checked_vectors(
+        self, cell: ArrayLike | None, fractional: bool | ArrayLike
+    ) -> Array | None:
+        """Return vectors (d, d), as columns, whose fractions the data are; None for Cartesian data."""
+        if isinstance(fractional, bool):
+            return _cell_vectors(self._given, cell) if fractional else None
+        vectors = as_array(fractional, "fractional", (self.dim, self.dim))
+        if abs(np.linalg.det(vectors)) < 1e-12:
+            raise OrbiflowError("fractional must be vectors that span a cell, as columns")
+        return vectors
 
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:
@@ -118,7 +145,32 @@ class QuotientSpace(Space):
         return gradient.numpy() @ self._to_chart
 
     def settings(self) -> dict[str, Any]:
-        return {"group": {**group_header(self._given), "name": self._given.name}}
+        found: dict[str, Any] = {"group": {**group_header(self._given), "name": self._given.name}}
+        return found if self._vectors is None else {**found, "fractional": self._vectors.tolist()}
+
+    def warn_of_fractions(self, data: Array, *, stacklevel: int = 2) -> None:
+        """Warn if points (N, d) seem to be fractions of the cell and the space takes lengths."""
+        sides = np.linalg.norm(self._given.lattice, axis=0)
+        for doubt in fraction_doubts(data, sides.tolist()) if self._vectors is None else ():
+            warnings.warn(doubt.text, DataWarning, stacklevel=stacklevel)
+
+    def step_angle(self, step: float) -> float:
+        longest = (
+            1.0 if self._vectors is None else float(np.linalg.norm(self._vectors, axis=0).max())
+        )
+        return super().step_angle(step * longest)
 
     def __repr__(self) -> str:
-        return f"QuotientSpace({self._given!r})"
+        fractions = "" if self._vectors is None else f", fractional={self._vectors.tolist()}"
+        return f"QuotientSpace({self._given!r}{fractions})"
+
+
+def _cell_vectors(group: CrystallographicGroup, cell: ArrayLike | None) -> Array:
+    """Return the vectors (d, d), as columns, of the conventional cell of a group given by its name."""
+    if np.ndim(cast(Any, cell)) == 2 or group.dim != 2:
+        own = np.asarray(cell, dtype=np.float64)
+        return own if own.ndim == 2 else cell_lattice(own)
+    a, b, *angle = np.asarray(cell, dtype=np.float64)
+    if not angle and np.allclose(group.lattice[:, 0], [a, 0.0]):
+        return group.lattice  # of a hexagonal plane: its angle may be left out
+    return cell_lattice((a, b, a, 90.0, 90.0, angle[0] if angle else 90.0))[:2, :2]

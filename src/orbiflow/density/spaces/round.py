@@ -13,6 +13,7 @@ from torch import Tensor
 
 from orbiflow.arguments import as_choice, as_instance
 from orbiflow.arrays import Array
+from orbiflow.density.data import CODES
 from orbiflow.density.spaces import uniformization
 from orbiflow.density.spaces.space import Space, checked_table, named_group, row_count
 from orbiflow.errors import OrbiflowError
@@ -20,6 +21,9 @@ from orbiflow.typed_torch import linalg
 
 UNIT_TOLERANCE = 1e-3
 """Difference from 1 that the length of a unit vector may have."""
+
+ROUNDING = 1e-4
+"""Degrees by which numbers of single precision may be beyond 90 or 360."""
 
 FORMS: dict[str, tuple[str, ...]] = {"latlon": ("lat", "lon"), "vector": ("x", "y", "z")}
 """Columns of directions in each form: degrees north and east, or unit vectors."""
@@ -39,14 +43,27 @@ def to_vectors(data: ArrayLike) -> Array:
     if table.shape[1] == 3:
         return to_unit(table)
     refuse_rows(
-        abs(table[:, 0]) > 90,
-        lambda row: f"latitude {table[row, 0]:g} is beyond 90 degrees: are the columns lat, lon?",
+        abs(table[:, 0]) > 90 + ROUNDING,
+        lambda row: (
+            f"latitude {table[row, 0]:g} is beyond 90 degrees: "
+            + _cause(table[row, 0], "are the columns lat, lon?")
+        ),
     )
     refuse_rows(
-        abs(table[:, 1]) > 360, lambda row: f"longitude {table[row, 1]:g} is beyond 360 degrees"
+        abs(table[:, 1]) > 360 + ROUNDING,
+        lambda row: (
+            f"longitude {table[row, 1]:g} is beyond 360 degrees"
+            + _cause(table[row, 1], "").replace("is it", ": is it")
+        ),
     )
-    lat, lon = np.radians(table.T)
+    lat, lon = np.radians([table[:, 0].clip(-90, 90), table[:, 1]])
     return np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], axis=-1)
+
+
+def _cause(value: float, otherwise: str) -> str:
+    """Return what may have made a value that no angle has."""
+    code = "is it a code for a missing value? Then leave such rows out"
+    return code if abs(value) in CODES else otherwise
 
 
 def to_latlon(vectors: Array) -> Array:

@@ -17,6 +17,7 @@ from torch import Tensor
 
 from orbiflow.arguments import as_choice, as_tensor, as_whole, is_a
 from orbiflow.arrays import Array
+from orbiflow.density.data import as_data
 from orbiflow.density.spaces.frame import Frame, frame_of
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.symmetry import (
@@ -366,12 +367,18 @@ def make_space(name: str, **options: Any) -> Space:
 
 
 def space_for(
-    name: str, data: Array, *, unit: str = "radians", seed: int = 0, cell: Any = None
+    name: str,
+    data: Array,
+    *,
+    unit: str = "radians",
+    seed: int = 0,
+    cell: Any = None,
+    fractional: bool = False,
 ) -> Space:
-    """Return the space of a name that suits data (N, k); `cell` is that of a group."""
+    """Return the space of a name that suits data (N, k); `cell` and `fractional` are of a group."""
     if name in SPACE_CLASSES or not is_group_name(name):
         return space_class(name).for_data(data, unit=unit, seed=seed)
-    return make_space(name, cell=cell)
+    return make_space(name, cell=cell, fractional=fractional)
 
 
 def check_measure(measure: str, space: Space | None = None) -> None:
@@ -400,10 +407,7 @@ def row_count(count: int) -> str:
 
 def checked_table(data: ArrayLike, widths: tuple[int, ...], what: str) -> Array:
     """Return data as a finite float64 array (N, k)."""
-    try:
-        table = np.asarray(data, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise OrbiflowError(f"{what}: expected numbers, got {error}") from error
+    table = as_data(data, what).values
     if table.ndim != 2 or table.shape[1] not in widths:
         expected = " or ".join(f"(N, {k})" for k in widths)
         raise OrbiflowError(f"{what}: expected an array {expected}, got shape {table.shape}")

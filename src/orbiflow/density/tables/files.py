@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import io
 import math
+import re
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain, count
@@ -14,7 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from orbiflow.density.data import is_angle_named
 from orbiflow.density.tables import text
+from orbiflow.density.tables.numerals import Mark
 from orbiflow.density.tables.table import (
     BLOCK,
     MAX_COLUMNS,
@@ -42,22 +45,26 @@ def read_table(
     has_header: bool | None = None,
     drop_missing: bool = False,
     keep_missing: bool = False,
+    missing_codes: Sequence[float] = (),
+    decimal: Mark | None = None,
 ) -> Table:
     """Read columns of finite numbers from a text, `.npy` or Parquet file.
 
     In text, cells are separated by tabs, semicolons, commas or whitespace, and a quoted cell may not
     run over a line's end. Blank lines and lines that begin with # are skipped; the first other line is
-    a header if a cell in it is neither a number nor a missing value. Decimal commas are read if they
-    cannot be taken for anything else. `.npy` files hold a 2-dimensional array of numbers or a
-    1-dimensional structured one.
+    a header if a cell in it is neither a number nor a missing value. Decimal commas and parted
+    thousands are read where the numbers of the file tell which is which; `decimal` says so otherwise.
+    `.npy` files hold a 2-dimensional array of numbers or a 1-dimensional structured one.
 
     Columns are wanted in their order: each by its name (exactly, or else without regard to case), or by
     its number from 1 as text ("3"). None takes all columns of numbers; `width` says how many there must
-    be. Rows that lack a value are refused, left out or kept with NaN.
+    be. Rows that lack a value are refused, left out or kept with NaN; `missing_codes` are numbers that
+    stand for a missing value.
     """
     path = Path(path)
     read = {"text": text.read_text, "npy": read_npy, "parquet": read_parquet}[kind_of_file(path)]
-    return read(path, Reading(columns, width, max_rows, has_header, drop_missing, keep_missing))
+    how = (columns, width, max_rows, has_header, drop_missing, keep_missing, missing_codes, decimal)
+    return read(path, Reading(*how))
 
 
 def append_columns(
@@ -207,23 +214,30 @@ def read_labels(
     return np.array([found[line] for line in table.lines.tolist()])
 
 
-IDENTIFIER_NAMES = frozenset(
-    {"", "#", "id", "idx", "index", "key", "no", "no.", "nr", "number", "row"}
-)
+IDENTIFIER_NAMES = frozenset({"#", "id", "idx", "index", "key", "no", "no.", "nr", "number", "row"})
 """Names of columns that number the rows with any different whole numbers."""
+
+INDEX_NAMES = re.compile(r"|unnamed: \d+|__index_level_\d+__|level_\d+")
+"""Names that pandas gives to an index when it writes it: any whole numbers there are no data."""
 
 
 def is_identifier(name: str, values: NDArray[np.float64]) -> bool:
     """Return whether a column (N,) numbers the rows, one by one or by its name.
 
-    >>> is_identifier("phi", np.arange(5.0)), is_identifier("phi", np.array([1.0, 1.0, 2.0]))
+    One that is called after an angle does not.
+
+    >>> is_identifier("item", np.arange(5.0)), is_identifier("item", np.array([1.0, 1.0, 2.0]))
     (True, False)
+    >>> is_identifier("phi", np.arange(5.0))
+    False
     """
-    if len(values) < 3 or not bool((values == np.round(values)).all()):
+    if len(values) < 3 or not bool((values == np.round(values)).all()) or is_angle_named(name):
         return False
     if bool((np.diff(values) == 1).all()):
         return True
     word = name.strip().casefold()
+    if INDEX_NAMES.fullmatch(word):
+        return True
     named = word in IDENTIFIER_NAMES or word.endswith(("_id", " id"))
     return named and len(np.unique(values)) == len(values)
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -14,22 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
-from orbiflow.density.tables.files import column_names, is_identifier, read_labels, read_table
-from orbiflow.density.tables.settings import (
-    SPACES,
-    RowSettings,
-    SpaceSettings,
-    TableSettings,
+from orbiflow.density.data import (
+    DIRECTIONS,
     Unit,
-    is_angular,
+    check_values,
+    chosen_arrangement,
+    fraction_doubts,
+    is_angle_named,
+    is_count_named,
+    is_other_quantity,
 )
-from orbiflow.density.tables.table import MissingCellsError, Table, TableError, find, quote
+from orbiflow.density.tables.files import column_names, is_identifier, read_labels, read_table
+from orbiflow.density.tables.settings import SPACES, RowSettings, SpaceSettings, TableSettings
+from orbiflow.density.tables.table import MissingCellsError, Table, TableError, find, listing, quote
 from orbiflow.errors import SettingError, literal
 from orbiflow.runtime import Note, Sink
 
-NORTH = frozenset({"lat", "latitude", "plunge", "inclination"})
-EAST = frozenset({"lon", "long", "lng", "longitude", "trend", "azimuth"})
-"""First words of names of the angle towards the pole, and of that around it."""
+MAX_ROWS = 20_000_000
+"""The most rows that counts may make."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +52,23 @@ class TableRows:
         weights = None if self.weights is None else self.weights[kept]
         return TableRows(self.path, self.table.only(kept), weights, self.group, self.header)
 
+    def repeated(self, counts: Array) -> TableRows:
+        """Return each row as often as it was seen, counts (N,)."""
+        wrong = np.flatnonzero((counts < 0) | (counts != np.round(counts)))
+        if len(wrong) or not 0 < counts.sum() <= MAX_ROWS:
+            what = f"{counts[wrong[0]]:g}" if len(wrong) else f"{counts.sum():g} in all"
+            raise TableError(
+                f"{{counts}} must be whole numbers from 0 on, {MAX_ROWS} in all at most, got {what}"
+            )
+        each = counts.astype(np.int64)
+        table = replace(
+            self.table,
+            values=self.table.values.repeat(each, axis=0),
+            lines=self.table.lines.repeat(each),
+        )
+        weights = None if self.weights is None else self.weights.repeat(each)
+        return TableRows(self.path, table, weights, self.group, self.header)
+
     @property
     def whole(self) -> NDArray[np.bool_]:
         """Which rows (N,) lack no value, or all, if none is whole: others have another unit."""
@@ -70,25 +88,34 @@ def read_rows(
     settings: TableSettings,
     tell: Sink,
     *,
+    space: str | None = None,
     width: int | None = None,
     group: str | None = None,
 ) -> TableRows:
     """Return the rows of a table of `width` columns, and tell what was decided for the user.
 
-    Without `columns` in the settings, all columns of numbers are taken but those that count the rows,
-    and those of weights and groups.
+    Without `columns` in the settings, those are taken whose names say that they are what the `space`
+    takes, in its order. If no name says so, all columns of numbers are taken but those that number
+    the rows, those of weights, counts and groups and, on a torus, those that are no angles by name.
     """
     rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
     dropped = rows.drop_missing or rows.missing == "drop"
     how: dict[str, Any] = {"has_header": rows.header, "drop_missing": dropped}
+    how |= {"missing_codes": rows.missing_codes, "decimal": rows.decimal}
     name = None if group is None or rows.columns is not None else _name(path, group, rows.header)
-    weighing = None
-    if rows.weights is not None:
-        weighing = read_table(path, columns=[rows.weights], width=1, **how)
-    others = [*(weighing.columns if weighing else ()), *([name] if name else [])]
+    weighing, counting = (
+        None if column is None else read_table(path, columns=[column], width=1, **how)
+        for column in (rows.weights, getattr(rows, "counts", None))
+    )
+    beside = [own for one in (weighing, counting) if one is not None for own in one.columns]
+    others = [*beside, *([name] if name else [])]
+    how["keep_missing"] = rows.missing == "marginalise"
+    columns = rows.columns
+    if columns is None and space is not None:
+        columns = _columns_by_name(path, space, width, others, rows.header, tell)
+    by_name = columns is not None
     try:
-        how["keep_missing"] = rows.missing == "marginalise"
-        table = _read(path, rows.columns, None if others else width, tell, how)
+        table = _read(path, columns, None if others else width, tell, how)
     except MissingCellsError as error:
         if rows is not settings:  # the command has no way to keep them
             raise
@@ -97,13 +124,97 @@ def read_rows(
         ) from error
     for note in table.notes:
         tell(Note(note))
-    for other in others if rows.columns is None else ():
+    for other in () if by_name else others:
         if other in table.columns and len(table.columns) > 1:
             table = table.without(table.columns.index(other))
-    weights = None
+    if space == "torus" and not by_name:
+        table = _angles_alone(table, tell)
+    _check_width(path, table, space, width, others)
+    weights = counts = None
     if weighing is not None:
-        table, weights = _weighed(path, table, weighing)
-    if others and width not in (None, len(table.columns)):
+        _tell_of_weights(weighing, tell)
+        table, weights = _beside(path, table, weighing)
+    elif counting is None and space == "torus" and hasattr(rows, "counts"):
+        _tell_of_counts(path, table, rows.header, tell)
+    if counting is not None:
+        before = table.lines
+        table, counts = _beside(path, table, counting)
+        weights = None if weights is None else weights[np.isin(before, table.lines)]
+    found = TableRows(path, table, weights, group, rows.header)
+    return found if counts is None else found.repeated(counts)
+
+
+def _columns_by_name(
+    path: Path,
+    space: str,
+    width: int | None,
+    others: Sequence[str],
+    header: bool | None,
+    tell: Sink,
+) -> tuple[str, ...] | None:
+    """Return the columns that a space takes, in its order, if the table's names say which they are."""
+    names = [name for name in column_names(path, has_header=header) or () if name not in others]
+    try:
+        found = chosen_arrangement(space, names, width)
+    except SettingError as error:
+        raise TableError(literal(f"{path}: ") + error.template) from error
+    if found is None:
+        return None
+    chosen = tuple(names[k] for k in found.columns)
+    if list(chosen) != names:
+        tell(Note(f"took {', '.join(chosen)} as {found.words}"))
+    return chosen
+
+
+def _angles_alone(table: Table, tell: Sink) -> Table:
+    """Return a table without the columns that are no angles by their names."""
+    named = table.header is not None or table.delimiter is None
+    for name in table.columns if named else ():
+        is_count = is_count_named(name)
+        if (is_count or is_other_quantity(name)) and len(table.columns) > 1:
+            table = table.without(table.columns.index(name))
+            why = "which says how much or how often each row counts; --weights or --counts uses it"
+            other = "which is no angle, by its name; name all columns to keep it"
+            tell(Note(f"left out the column {name!r}, {why if is_count else other}"))
+    unknown = [name for name in table.columns if not is_angle_named(name)]
+    if named and unknown and not all(re.fullmatch(r"column\d+", name) for name in unknown):
+        tell(Note(f"took {listing(unknown)} as angle{'s' * (len(unknown) > 1)}"))
+    return table
+
+
+def _tell_of_counts(path: Path, table: Table, header: bool | None, tell: Sink) -> None:
+    """Tell that a column beside evenly spaced, different angles may count them."""
+    names = column_names(path, has_header=header) or ()
+    beside = [name for name in names if is_count_named(name) and name not in table.columns]
+    if not beside or len(table.columns) != 1:
+        return
+    steps = np.diff(np.sort(table.values[:, 0]))
+    if len(steps) > 1 and steps.min() > 0 and bool(np.isclose(steps, steps.min(), rtol=0.01).all()):
+        text = (
+            f"the values of {table.columns[0]!r} are evenly spaced, as the middles of bins are: if "
+            f"{beside[0]!r} says how many rows are in each, give --counts {beside[0]}"
+        )
+        tell(Note(text))
+
+
+def _tell_of_weights(weighing: Table, tell: Sink) -> None:
+    """Tell that weights may be counts: only their ratios matter, and tests would find fewer rows."""
+    (name,), values = weighing.columns, weighing.values[:, 0]
+    whole = bool((values == np.round(values)).all()) and float(np.ptp(values)) > 0
+    if whole and is_count_named(name) and "weight" not in name.casefold():
+        text = (
+            f"of weights only the ratios matter: if {name!r} says how many rows are alike, give "
+            f"--counts {name}, for intervals and tests that know of all of them"
+        )
+        tell(Note(text))
+
+
+def _check_width(
+    path: Path, table: Table, space: str | None, width: int | None, others: Sequence[str]
+) -> None:
+    """Refuse a table that has other columns than the space takes."""
+    count = len(table.columns)
+    if others and width not in (None, count):
         raise TableError(
             literal(
                 f"{path}: {width} columns must be taken beside {' and '.join(map(quote, others))}, "
@@ -111,7 +222,14 @@ def read_rows(
             )
             + "; choose with {columns}"
         )
-    return TableRows(path, table, weights, group, rows.header)
+    if space in DIRECTIONS and count not in (2, 3):
+        raise TableError(
+            literal(
+                f"{path}: the {space} takes a latitude and a longitude, or unit vectors x,y,z, and the "
+                f"columns of numbers are {listing(table.columns)}"
+            )
+            + "; choose with {columns}"
+        )
 
 
 def _read(
@@ -135,22 +253,24 @@ def _read(
 def _without_identifiers(table: Table, tell: Sink) -> Table:
     for column in reversed(range(len(table.columns))):
         name = table.columns[column]
-        if len(table.columns) > 1 and is_identifier(name, table.values[:, column]):
+        # what the header leaves empty is called "column1" by now
+        given = name if table.header is None or name in table.header else ""
+        if len(table.columns) > 1 and is_identifier(given, table.values[:, column]):
             table = table.without(column)
             tell(Note(f"left out the column {name!r}, which numbers the rows; name all to keep it"))
     return table
 
 
-def _weighed(path: Path, table: Table, weighing: Table) -> tuple[Table, Array]:
-    """Return the rows that have a weight, and their weights."""
-    name = weighing.columns[0]
+def _beside(path: Path, table: Table, own: Table) -> tuple[Table, Array]:
+    """Return the rows that have a weight or count, and these (N,)."""
+    name = own.columns[0]
     if name in table.columns:
         raise TableError(
             literal(f"{path}: {name!r} holds the rows' weights and cannot be a column of the data")
             + " as well; leave it out of {columns}"
         )
-    table = table.only(np.isin(table.lines, weighing.lines))
-    return table, weighing.values[np.isin(weighing.lines, table.lines), 0]
+    table = table.only(np.isin(table.lines, own.lines))
+    return table, own.values[np.isin(own.lines, table.lines), 0]
 
 
 def _name(path: Path, column: str, header: bool | None) -> str:
@@ -163,49 +283,28 @@ def _name(path: Path, column: str, header: bool | None) -> str:
 
 
 def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
-    """Return the unit of angles: the given one, or else radians if all values are within 2 pi.
+    """Return the unit of angles, and tell what one may doubt of a space's data.
 
     A cell that was not given is told, too: data of another size would be folded into it.
     """
-    space, unit = where.space, where.unit
+    space = where.space
     if space not in SPACES and where.cell is None:
         tell(
             Note("no cell was given: its lengths are taken to be about 1, in the unit of the data")
         )
-    if not is_angular(space, len(table.columns)):
-        check_order(table.columns, space)
-        return "radians"
-    if unit is not None:
-        return unit
-    beyond = np.nanmax(abs(table.values), axis=0, initial=0) > 2 * math.pi + 1e-9
-    if beyond.any():
-        column = int(beyond.argmax())
-        most = table.values[np.nanargmax(abs(table.values[:, column])), column]
-        raise SettingError(
-            literal(f"column {table.columns[column]!r} has {most:g}, beyond 2 pi")
-            + "; give {unit} degrees, radians or turns"
-        )
-    tell(Note("no unit was given and all values are within 2 pi: they were read as radians"))
-    return "radians"
-
-
-def check_order(columns: Sequence[str], space: str) -> None:
-    """Refuse a longitude before its latitude: it would be taken for another place.
-
-    >>> check_order(["lat", "lon"], "sphere")
-    >>> check_order(["Longitude (deg)", "Latitude (deg)"], "sphere")
-    Traceback (most recent call last):
-    ...
-    orbiflow.errors.SettingError: the columns are 'Longitude (deg)', 'Latitude (deg)', and the sphere \
-takes latitude before longitude; give columns 'Latitude (deg),Longitude (deg)'
-    """
-    words = [re.search(r"[^\W\d_]+", name) for name in columns]
-    east, *rest = [found[0].casefold() if found else "" for found in words]
-    if east not in EAST or len(rest) != 1 or rest[0] not in NORTH:
-        return
-    first, second = columns
-    raise SettingError(
-        literal(f"the columns are {first!r}, {second!r}, and the {space} takes latitude before ")
-        + "longitude; give {columns} "
-        + literal(f"'{second},{first}'")
+    named = (
+        None if all(re.fullmatch(r"column\d+", name) for name in table.columns) else table.columns
     )
+    unit, doubts = check_values(space, table.values, named, where.unit, CURE)
+    if where.cell is not None and not where.fractional:
+        doubts += fraction_doubts(table.values, where.cell[: len(table.columns)])
+    for doubt in doubts:
+        tell(Note(f"WARNING: {doubt.text}" if doubt.is_serious else doubt.text))
+    return unit
+
+
+CURE = (
+    "say so with {missing_codes}, and leave their rows out with {drop_missing}; or make these cells "
+    "empty"
+)
+"""What to do with codes for missing values."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
+from orbiflow.density.data import Unit, check_unit
 from orbiflow.errors import literal
-from orbiflow.settings import DefaultText, SettingError, Settings
+from orbiflow.settings import DefaultText, Needs, SettingError, Settings
 
 if TYPE_CHECKING:
     from orbiflow.symmetry import CrystallographicGroup
@@ -28,7 +29,6 @@ SpaceName = Literal[
     "rotation-space", "cubic-orientations", "hexagonal-orientations",
 ]  # fmt: skip
 SPACES: tuple[str, ...] = get_args(SpaceName)
-Unit = Literal["radians", "degrees", "turns"]
 
 
 class SpaceSettings(Settings, group="Density"):
@@ -45,6 +45,11 @@ class SpaceSettings(Settings, group="Density"):
     ] = None
     """Lengths and angles in degrees of the group's cell: a,b,c,alpha,beta,gamma, in the plane
     a,b,gamma. Right angles may be left out."""
+
+    fractional: Annotated[bool, Needs("cell", because="fractions are of the lengths of a cell")] = (
+        False
+    )
+    """The data are fractions of the cell's vectors, as in CIF, and not lengths along x, y and z."""
 
     unit: Annotated[Unit | None, DefaultText("radians, if no value is beyond 2 pi")] = None
     """Unit of angles on the torus and the Klein bottle, and of rotations in three columns."""
@@ -76,27 +81,6 @@ def group_of(space: str, cell: tuple[float, ...] | None) -> CrystallographicGrou
     return group_by_name(space, cell)
 
 
-def is_angular(space: str, columns: int) -> bool:
-    """Return whether data of so many columns are angles, which have a unit."""
-    rotations = ("rotation-space", "cubic-orientations", "hexagonal-orientations")
-    return space in ("torus", "klein-bottle") or (space in rotations and columns == 3)
-
-
-def check_unit(space: str, unit: Unit | None) -> None:
-    """Refuse a unit of data that are not angles."""
-    if unit is not None and space not in SPACES:
-        raise SettingError(
-            "{unit} applies only to angles: points of a quotient are in the unit of its cell; leave it "
-            "out"
-        )
-    vectors = ("sphere", "projective-plane", "hypersphere", "projective-space")
-    if space in vectors and unit in ("radians", "turns"):
-        raise SettingError(
-            f"{{unit}} {unit} applies only to angles on the torus and the Klein bottle: latitude and "
-            "longitude are degrees; convert them, or give unit vectors x,y,z"
-        )
-
-
 class TableSettings(Settings, group="Reading the table"):
     """Which columns and rows of a table are read."""
 
@@ -108,6 +92,12 @@ class TableSettings(Settings, group="Reading the table"):
 
     drop_missing: bool = False
     """Leave out rows that lack a value."""
+
+    missing_codes: Annotated[tuple[float, ...], DefaultText("none")] = ()
+    """Numbers that stand for missing values, such as 999,-99."""
+
+    decimal: Annotated[Literal[".", ","] | None, DefaultText("found automatically")] = None
+    """Mark before the decimals of a text file; the other one then parts thousands."""
 
 
 class RowSettings(TableSettings, group="Reading the table"):
@@ -139,6 +129,14 @@ class GroupedRowSettings(RowSettings, group="Reading the table"):
     group: str | None = None
     """Column that names what rows belong to (a protein, a station, an event): those of one are not
     independent."""
+
+
+class CountedRowSettings(GroupedRowSettings, group="Reading the table"):
+    """Which columns and rows of a table are read, how often each was seen, and how much each counts."""
+
+    counts: str | None = None
+    """Column, by name or number, that says how many rows were seen that are alike, as in a table of
+    bins. Each row is taken so often."""
 
 
 def check_table_name(out: Path) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orbiflow.density.tables.numerals import Mark
 from orbiflow.errors import InputFileError, SettingError, literal
 
 MAX_COLUMNS = 10_000
@@ -27,6 +28,8 @@ class Reading:
     has_header: bool | None = None
     drop_missing: bool = False
     keep_missing: bool = False
+    missing_codes: Sequence[float] = ()
+    decimal: Mark | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +168,10 @@ def finished(
     unit = "row" if lines is None else "line"
     lines = np.arange(1, len(values) + 1, dtype=np.int64) if lines is None else lines
     dropped, notes = frozenset[int](), list(notes)
+    if reading.missing_codes:
+        values = np.where(np.isin(values, list(reading.missing_codes)), np.nan, values)
+    values, columns, left_out = _with_values(path, values, columns, reading)
+    notes += left_out
     if reading.drop_missing and len(values):
         whole = ~np.isnan(values).any(axis=1)
         if not whole.any():
@@ -190,6 +197,24 @@ def finished(
         )
     named: dict[str, Any] = {"header": None, "delimiter": None, **(layout or {})}
     return Table(values, columns, lines, tuple(notes), dropped=dropped, **named)
+
+
+def _with_values(
+    path: Path, values: NDArray[np.float64], columns: tuple[str, ...], reading: Reading
+) -> tuple[NDArray[np.float64], tuple[str, ...], list[str]]:
+    """Return the columns that have a value in some row, and notes; refuse others that are wanted."""
+    bare = np.isnan(values).all(axis=0)
+    if not len(values) or not bare.any():
+        return values, columns, []
+    empty = [columns[k] for k in np.flatnonzero(bare)]
+    several = len(empty) > 1
+    fault = f"{listing(empty)} {'have' if several else 'has'} no value in any row"
+    if reading.columns is None and reading.width is None and not bare.all():
+        kept = tuple(columns[k] for k in np.flatnonzero(~bare))
+        return values[:, ~bare], kept, [f"left out the column{'s' * several}: {fault}"]
+    raise MissingCellsError(
+        literal(f"{path}: column{'s' * several} {fault}") + "; choose others with {columns}"
+    )
 
 
 def listing(names: Sequence[str]) -> str:

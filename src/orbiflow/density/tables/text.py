@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from orbiflow.density.tables import table as tables
+from orbiflow.density.tables.numerals import Mark, Marks, kind_of, marks_of, plain, with_minus
 from orbiflow.density.tables.table import (
     BLOCK,
     Reading,
@@ -38,9 +39,11 @@ SAMPLE = 100
 """Rows looked at to find the layout."""
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
+_LONE_COMMA = re.compile(r"[+-]?\d+(\.\d{3})*(,\d+)?")
 _WHOLE = re.compile(r"[+-]?\d+")
 _UNDECODED = re.compile("[\udc80-\udcff]")
-_MISSING = frozenset({"", "na", "n/a", "nan", "null", "none"})
+_SEPARATOR = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
+"""Excel's first line, which says what separates cells."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,7 @@ class Layout:
     - `header`: The names in the header line, None if there is none.
     - `names`: The columns' names. `numeric`: Which columns hold numbers.
     - `first`: The number of the first line that is no comment.
-    - `decimal`: The mark before decimals.
+    - `marks`: How numbers are written.
     """
 
     delimiter: str
@@ -59,13 +62,19 @@ class Layout:
     names: tuple[str, ...]
     numeric: tuple[bool, ...]
     first: int
-    decimal: str
+    marks: Marks
+
+    @property
+    def decimal(self) -> Mark:
+        """The mark before decimals."""
+        return self.marks.decimal
 
 
 def read_text(path: Path, reading: Reading) -> Table:
     """Read a table from a text file."""
-    layout = layout_of(path, reading.columns, reading.has_header)
+    layout = layout_of(path, reading.columns, reading.has_header, reading.decimal)
     picked, notes = tables.choose(path, layout.names, layout.numeric, reading)
+    _refuse_doubtful(path, layout, picked)
     names = tuple(layout.names[i] for i in picked)
     values, lines, comments = array("d"), array("q"), 0
     cells: list[str] = []
@@ -89,6 +98,9 @@ def read_text(path: Path, reading: Reading) -> Table:
     notes = list(table.notes)
     if layout.decimal == ",":
         notes.append("read decimal commas")
+    if layout.marks.parted:
+        value = float(plain(layout.marks.parted, layout.decimal))
+        notes.append(f"read thousands: {layout.marks.parted} as {value:.10g}")
     if layout.header is not None:
         notes.append(f"took line {layout.first} as the header: {listing(layout.header)}")
     if comments:
@@ -97,7 +109,10 @@ def read_text(path: Path, reading: Reading) -> Table:
 
 
 def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
-    """Yield the number and text of every line that is not blank, and whether it is a comment."""
+    """Yield the number and text of every line that is not blank, and whether it is a comment.
+
+    Excel's first line "sep=;" counts as one.
+    """
     try:
         with path.open(encoding="utf-8-sig", errors="surrogateescape") as file:
             for number, line in enumerate(iter(partial(file.readline, MAX_LINE), ""), start=1):
@@ -112,26 +127,35 @@ def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
                     )
                 text = line.strip()
                 if text:
-                    yield number, line.rstrip("\n"), text[0] == "#"
+                    is_comment = text[0] == "#" or (
+                        number == 1 and _SEPARATOR.fullmatch(line.rstrip("\r\n"))
+                    )
+                    yield number, line.rstrip("\n"), bool(is_comment)
     except OSError as exc:
         raise InputFileError(f"{path}: cannot be read ({exc.strerror}); check it") from exc
 
 
-def layout_of(path: Path, columns: Sequence[str] | None, has_header: bool | None = None) -> Layout:
+def layout_of(
+    path: Path,
+    columns: Sequence[str] | None,
+    has_header: bool | None = None,
+    decimal: Mark | None = None,
+) -> Layout:
     """Find the layout of a text file from its first rows."""
     lines = (line[:2] for line in text_lines(path) if not line[2])
     sample = list(islice(lines, SAMPLE))
+    said = next((_SEPARATOR.fullmatch(line) for _, line, _ in text_lines(path)), None)
     if not sample:
         raise InputFileError(f"{path}: only comments and blank lines; export it again")
     first = sample[0][0]
-    delimiter = _delimiter([line for _, line in sample])
+    delimiter = said[1] if said else _delimiter([with_minus(line) for _, line in sample])
     rows = [split_line(path, number, line, delimiter) for number, line in sample]
     check_count(path, len(rows[0]), tables.MAX_COLUMNS, "columns")
     for (number, _), row in zip(sample, rows, strict=True):
         _check_length(path, number, row, first, len(rows[0]), delimiter)
-    decimal = _decimal(rows)
+    marks = marks_of(rows, delimiter, decimal)
     classes = [
-        tuple(_class(cell.replace(decimal, ".")) for cell in column)
+        tuple(kind_of(plain(cell, marks.decimal)) for cell in column)
         for column in zip(*rows, strict=True)
     ]
     header = None
@@ -144,25 +168,37 @@ def layout_of(path: Path, columns: Sequence[str] | None, has_header: bool | None
         classes = [column[1:] for column in classes]
     names = tuple(name or f"column{i}" for i, name in enumerate(header or [""] * len(classes), 1))
     numeric = tuple(c.count("number") >= max(1, c.count("word")) for c in classes)
-    return Layout(delimiter, header, names, numeric, first, decimal)
+    return Layout(delimiter, header, names, numeric, first, marks)
 
 
-def _decimal(rows: list[list[str]]) -> str:
-    """Return the mark before decimals, a comma if numbers have one and none has a point."""
-    cells = [cell.strip() for row in rows for cell in row]
-    commas = any(DECIMAL_COMMA.fullmatch(cell) for cell in cells)
-    points = any("." in cell and _class(cell) == "number" for cell in cells)
-    return "," if commas and not points else "."
+def _refuse_doubtful(path: Path, layout: Layout, picked: Sequence[int]) -> None:
+    """Refuse columns whose commas may be before decimals or thousands."""
+    for column, cell in layout.marks.doubtful:
+        if column in picked:
+            right, other = cell.replace(",", ""), cell.replace(",", ".")
+            raise TableError(
+                literal(
+                    f"{path}: column {quote(layout.names[column])}: {cell!r} may be {right} or {other}"
+                )
+                + "; say with {decimal} which mark is before decimals, . or ,"
+            )
 
 
 def _delimiter(lines: list[str]) -> str:
     r"""Return the mark that splits all lines into as many cells, or else splits most of them.
 
-    The semicolon is tried before the comma, which may be a decimal one.
+    The semicolon is tried before the comma, which may be a decimal one. It also stands for none, where
+    a single column has decimal commas.
 
     >>> _delimiter(["lat;lon", "1,5;2"]), _delimiter(["1, 2", "3, 4"]), _delimiter(["1 2", "3\t4"])
     (';', ',', ' ')
+    >>> _delimiter(["angle", "1.025,2", "998,7"])
+    ';'
     """
+    first, *rest = lines
+    lone = all(_LONE_COMMA.fullmatch(line.strip()) for line in rest)
+    if "," not in first and lone and any("," in line for line in rest):
+        return ";"
     if _is_spaced(lines[len(lines) > 1 :]):
         return " "
     counts = {mark: [line.count(mark) for line in lines] for mark in "\t;,"}
@@ -189,7 +225,8 @@ def _is_spaced(lines: list[str]) -> bool:
 
 
 def split_line(path: Path, number: int, line: str, delimiter: str) -> list[str]:
-    """Return the cells of a line."""
+    """Return the cells of a line, with plain minus signs before numbers."""
+    line = with_minus(line)
     if delimiter == " ":
         return line.split()
     if '"' not in line:
@@ -201,17 +238,6 @@ def split_line(path: Path, number: int, line: str, delimiter: str) -> list[str]:
             f"{path}: line {number}: {quote(line)} has a quotation mark without its pair ({exc}); "
             "a quoted cell must end on its line"
         ) from exc
-
-
-def _class(cell: str) -> str:
-    cell = cell.strip()
-    if cell.casefold() in _MISSING:
-        return "missing"
-    try:
-        float(cell)
-    except ValueError:
-        return "word"
-    return "word" if "_" in cell else "number"
 
 
 def _has_header(
@@ -247,29 +273,33 @@ def _numbers(
     path: Path, cells: list[str], lines: array[int], names: tuple[str, ...], decimal: str
 ) -> list[float]:
     """Return the cells of the last of `lines`, row after row, as floats; NaN for missing ones."""
-    if decimal != ".":
-        cells = [cell.replace(decimal, ".") for cell in cells]
     try:
-        if "_" not in "".join(cells):  # float takes 1_000
+        # float takes 1_000 and other digits than ASCII's
+        if decimal == "." and "_" not in (text := "".join(cells)) and text.isascii():
             return list(map(float, cells))
     except ValueError:
         pass
     k, start = len(names), len(lines) - len(cells) // len(names)
     return [
-        _number(path, lines[start + i // k], names[i % k], cell) for i, cell in enumerate(cells)
+        _number(path, lines[start + i // k], names[i % k], cell, decimal)
+        for i, cell in enumerate(cells)
     ]
 
 
-def _number(path: Path, line: int, name: str, cell: str) -> float:
-    kind = _class(cell)
+def _number(path: Path, line: int, name: str, cell: str, decimal: str) -> float:
+    number = plain(cell, decimal)
+    kind = kind_of(number)
     if kind == "missing":
         return math.nan
     if kind == "number":
-        return float(cell.strip())  # float does not strip all that `strip` does, such as \x1c
-    comma = _class(cell.replace(",", ".")) == "number"
-    raise InputFileError(
-        f"{path}: line {line}: column {quote(name)}: {quote(cell)} is not a number; "
-        + ("write decimal points, not commas" if comma else "correct it or drop the line")
+        return float(number)
+    other = "," if decimal == "." else "."
+    comma = kind_of(plain(cell, other)) == "number"
+    right, wrong = ("points", "commas") if decimal == "." else ("commas", "points")
+    hint = f"write decimal {right}, not {wrong}, or say with {{decimal}} that they are {wrong}"
+    raise TableError(
+        literal(f"{path}: line {line}: column {quote(name)}: {quote(cell)} is not a number; ")
+        + (hint if comma else "correct it or drop the line")
     )
 
 

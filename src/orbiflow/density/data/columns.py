@@ -1,0 +1,241 @@
+"""Which columns, in which order, a space takes by their names: one answer for all doors."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from orbiflow.density.data.names import (
+    FROM_POLE,
+    HOURS,
+    LATITUDES,
+    LONGITUDES,
+    UNITS,
+    Pair,
+    pairs_of,
+    unit_named,
+    words_of,
+)
+from orbiflow.errors import SettingError, literal
+
+DIRECTIONS = ("sphere", "projective-plane")
+CRYSTALS = ("cubic-orientations", "hexagonal-orientations")
+ROTATIONS = ("rotation-space", *CRYSTALS)
+ANGULAR = ("torus", "klein-bottle")
+VECTORS = (*DIRECTIONS, "hypersphere", "projective-space")
+
+
+class Arrangement(NamedTuple):
+    """Columns, from 0, in the order that a space takes, and what they are.
+
+    - `words`: What they are, as in "latitude and longitude".
+    - `is_sure`: Whether the names can hardly mean anything else.
+    - `note`: What to keep in mind of such data.
+    """
+
+    columns: tuple[int, ...]
+    words: str
+    is_sure: bool = True
+    note: str = ""
+
+
+def arrangements(space: str, names: Sequence[str], width: int | None = None) -> list[Arrangement]:
+    """Return every way in which some of the names say what a space's columns are.
+
+    Args:
+        space: The name of the space, or of a group.
+        names: Names of columns.
+        width: The number of columns that a group's space takes.
+
+    >>> [found.columns for found in arrangements("sphere", ["lon", "lat", "mag"])]
+    [(1, 0)]
+    >>> [found.columns for found in arrangements("rotation-space", ["w", "x", "y", "z"])]
+    [(1, 2, 3, 0)]
+    """
+    if space in DIRECTIONS:
+        return _directions(names)
+    if space in ROTATIONS:
+        euler = _euler(names) if space in CRYSTALS else []
+        vector = _lettered(names, ("xyz",), "a rotation vector")
+        return euler or _quaternions(names) or _matrices(names) or vector
+    if space == "klein-bottle":
+        return _named_so(names, ("theta", "phi"), "theta and phi")
+    if space == "torus" or space in VECTORS:
+        return []
+    letters = [own for own in ("xyz", "xy") if width in (None, len(own))]
+    return _lettered(names, letters, "coordinates")  # of a quotient
+
+
+def _directions(names: Sequence[str]) -> list[Arrangement]:
+    pairs = pairs_of(names)
+    if pairs:
+        return [_of_pair(pair) for pair in pairs]
+    if found := _lettered(names, ("xyz",), "unit vectors"):
+        return found
+    single = {name.strip().casefold(): k for k, name in enumerate(names)}
+    for north, east in (("b", "l"), ("y", "x")):
+        if north in single and east in single:
+            pair = (single[north], single[east])
+            return [Arrangement(pair, "latitude and longitude", is_sure=False)]
+    return _half_known(names)
+
+
+def _of_pair(pair: Pair) -> Arrangement:
+    return Arrangement((pair.north, pair.east), "latitude and longitude", note=pair.family.note)
+
+
+def _half_known(names: Sequence[str]) -> list[Arrangement]:
+    """Return two columns of which one name is known: the other is what is left."""
+    if len(names) != 2:
+        return []
+    norths, easts = (
+        [bool(side.intersection(words_of(name))) for name in names]
+        for side in (LATITUDES, LONGITUDES)
+    )
+    if sum(norths) + sum(easts) != 1:
+        return []
+    first = norths[0] or easts[1]
+    return [Arrangement((0, 1) if first else (1, 0), "latitude and longitude")]
+
+
+def _stemmed(names: Sequence[str]) -> dict[str, dict[str, int]]:
+    """Return by the beginnings of names the columns (from 0) of each last letter, digit or word."""
+    found: dict[str, dict[str, int]] = {}
+    for column, name in enumerate(names):
+        *first, last = [word for word in words_of(name) if word not in UNITS] or [""]
+        if not first and len(last) > 1 and last not in _SCALARS:
+            first, last = [last[:-1]], last[-1]
+        found.setdefault("".join(first), {})[last] = column
+    return found
+
+
+_SCALARS = frozenset({"w", "s", "0", "r", "real", "scalar", "re"})
+
+
+def _lettered(names: Sequence[str], letters: Sequence[str], words: str) -> list[Arrangement]:
+    """Return columns that differ in their last letter alone, such as nx, ny, nz."""
+    for own in letters:
+        ends = [columns for columns in _stemmed(names).values() if set(own) <= columns.keys()]
+        if ends:
+            return [Arrangement(tuple(columns[c] for c in own), words) for columns in ends]
+    return []
+
+
+def _quaternions(names: Sequence[str]) -> list[Arrangement]:
+    """Return quaternions: w,x,y,z, q0..q3, qw.., scalar,i,j,k, in any order of the columns."""
+    found: list[Arrangement] = []
+    for columns in _stemmed(names).values():
+        scalars = [columns[end] for end in columns if end in _SCALARS]
+        for ends in ("xyz", "ijk", "123"):
+            if len(scalars) == 1 and set(ends) <= columns.keys():
+                order = (*(columns[end] for end in ends), scalars[0])
+                found.append(Arrangement(order, "a quaternion with its scalar last"))
+    return found
+
+
+def _matrices(names: Sequence[str]) -> list[Arrangement]:
+    """Return rotation matrices r11 to r33, or m00 to m22, row by row."""
+    stems: dict[str, dict[str, int]] = {}
+    for column, name in enumerate(names):
+        if found := re.fullmatch(r"(.*?)([0-3])[ _,]?([0-3])", name.strip().casefold()):
+            stems.setdefault(found[1], {})[found[2] + found[3]] = column
+    return [
+        Arrangement(tuple(columns[place] for place in places), "a rotation matrix, row by row")
+        for columns in stems.values()
+        for places in ([i + j for i in own for j in own] for own in ("123", "012"))
+        if set(places) == columns.keys()
+    ]
+
+
+def _euler(names: Sequence[str]) -> list[Arrangement]:
+    """Return Bunge's Euler angles: phi1, Phi, phi2, or three numbered ones."""
+    words = "Bunge's Euler angles"
+    found = _named_so(names, ("phi1", "phi", "phi2"), words)
+    return found or _named_so(names, ("euler1", "euler2", "euler3"), words)
+
+
+def _named_so(names: Sequence[str], wanted: Sequence[str], words: str) -> list[Arrangement]:
+    """Return the columns that have these names, whatever their case, marks and units."""
+    own = ["".join(word for word in words_of(name) if word not in UNITS) for name in names]
+    own = [name.replace("φ", "phi").replace("ϕ", "phi").replace("θ", "theta") for name in own]
+    if any(own.count(name) != 1 for name in wanted):
+        return []
+    return [Arrangement(tuple(own.index(name) for name in wanted), words)]
+
+
+def chosen_arrangement(
+    space: str, names: Sequence[str], width: int | None = None
+) -> Arrangement | None:
+    """Return the columns that a space takes of a table, or None if names do not say.
+
+    Raises:
+        SettingError: If several columns may be meant.
+    """
+    found = arrangements(space, names, width)
+    if len(found) > 1:
+        ways = " or ".join(",".join(names[k] for k in one.columns) for one in found[:4])
+        raise SettingError(
+            literal(f"several columns may be {found[0].words}: {ways}") + "; choose with {columns}"
+        )
+    return found[0] if found else None
+
+
+def check_columns(space: str, names: Sequence[str]) -> Arrangement | None:
+    """Check that the names of a space's columns do not contradict their order, and say what they are.
+
+    >>> check_columns("sphere", ["lat", "lon"]).words
+    'latitude and longitude'
+    >>> check_columns("sphere", ["Longitude (deg)", "Latitude (deg)"])
+    Traceback (most recent call last):
+    ...
+    orbiflow.errors.SettingError: the columns are Longitude (deg), Latitude (deg), and the sphere \
+takes latitude and longitude in the order Latitude (deg), Longitude (deg); give columns \
+'Latitude (deg),Longitude (deg)'
+    """
+    _check_forms(space, names)
+    found = [one for one in arrangements(space, names) if len(one.columns) == len(names)]
+    if not found:
+        return None
+    best = found[0]
+    right = [names[k] for k in best.columns]
+    if right != list(names) and best.is_sure:
+        raise SettingError(
+            literal(
+                f"the columns are {', '.join(names)}, and the {space} takes {best.words} in the order "
+                f"{', '.join(right)}; give "
+            )
+            + "{columns} "
+            + literal(f"'{','.join(right)}'")
+        )
+    return best
+
+
+def _check_forms(space: str, names: Sequence[str]) -> None:
+    """Refuse columns whose names say that they must be converted first."""
+    split = [set(words_of(name)) for name in names]
+    wrong: list[tuple[str, str]] = []
+    if space in DIRECTIONS and len(names) == 2:
+        for name, words in zip(names, split, strict=True):
+            if words & FROM_POLE:
+                wrong.append((name, "is the angle from the pole: give the latitude, 90 less it"))
+            if unit_named(name) not in (None, "degrees"):
+                wrong.append((name, f"is in {unit_named(name)}: convert it to degrees"))
+            if words & HOURS:
+                wrong.append((name, "is in hours: convert it to degrees (15 for each hour)"))
+    if space == "rotation-space" and len(names) == 3 and (_euler(names) or _is_airborne(split)):
+        how = (
+            "are Euler angles, and three columns on the rotation-space are a rotation vector: convert "
+            "them (scipy.spatial.transform.Rotation.from_euler), or take cubic-orientations or "
+            "hexagonal-orientations for crystals"
+        )
+        wrong.append((", ".join(names), how))
+    if space in DIRECTIONS and len(names) > 2 and (pairs := pairs_of(names)):
+        pair = f"{names[pairs[0].north]},{names[pairs[0].east]}"
+        wrong.append((", ".join(names), f"are too many columns: give '{pair}' alone"))
+    for name, how in wrong:
+        raise SettingError(literal(f"{name} {how}"))
+
+
+def _is_airborne(split: Sequence[set[str]]) -> bool:
+    return all(words & {"roll", "pitch", "yaw", "heading"} for words in split)

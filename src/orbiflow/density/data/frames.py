@@ -1,0 +1,160 @@
+"""Arrays and data frames of any library as plain numbers, with NaN for whatever is missing."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Mapping, Sequence
+from decimal import Decimal
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbiflow.arguments import described, is_a, is_tensor
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+
+
+class Data(NamedTuple):
+    """Numbers, NaN where they are missing, and the names of their columns if they have names."""
+
+    values: Array
+    names: tuple[str, ...] | None
+
+
+def as_data(data: Any, what: str = "data") -> Data:
+    """Return data as float64, missing values as NaN, and the names of their columns.
+
+    Args:
+        data: An array or nested lists, masked or structured ones too, a tensor, or a data frame: of
+            pandas or polars, a table of pyarrow, or an xarray.Dataset of columns along one dimension.
+        what: What they are, for messages.
+
+    Raises:
+        OrbiflowError: For complex numbers, text, dates, Booleans, ragged lists and other containers,
+            and for columns without any value.
+
+    >>> as_data(np.ma.masked_greater([[1.0, 999.0]], 900)).values.tolist()
+    [[1.0, nan]]
+    """
+    columns = _columns_of(data, what)
+    if columns is None:
+        return Data(as_numbers(data, what), None)
+    parts = [as_numbers(part, f"{what}: column {name!r}") for name, part in columns]
+    sizes = {part.shape for part in parts}
+    if len(sizes) > 1 or any(len(size) != 1 for size in sizes):
+        raise OrbiflowError(f"{what}: the columns must be of one length, got {sorted(sizes)}")
+    values = np.stack(parts, axis=1) if parts else np.empty((0, 0))
+    names = [name for name, _ in columns]
+    named = all(is_a(name, str) for name in names)
+    return Data(values, tuple(cast("list[str]", names)) if named else None)
+
+
+def _columns_of(data: Any, what: str) -> list[tuple[Any, Any]] | None:
+    """Return the names and columns of a frame, or None for what is not one."""
+    if hasattr(data, "collect_schema") and hasattr(data, "collect"):
+        raise OrbiflowError(f"{what}: a lazy frame holds no numbers yet; call its collect() first")
+    if hasattr(data, "data_vars"):  # xarray
+        if len(data.dims) != 1:
+            raise OrbiflowError(
+                f"{what}: a Dataset of the dimensions {', '.join(map(str, data.dims))}; give columns "
+                "along one, such as dataset.to_dataframe().reset_index()[['lat', 'lon']]"
+            )
+        return [(name, data[name].values) for name in data.data_vars]
+    if hasattr(data, "column_names"):  # pyarrow
+        return [(n, _plain(data.column(k))) for k, n in enumerate(data.column_names)]
+    if isinstance(data, np.ndarray) and data.dtype.names:
+        return [(name, data[name]) for name in data.dtype.names]
+    frame: Any = data
+    names = getattr(frame, "columns", None)
+    if names is None or callable(names):
+        return None
+    if hasattr(frame, "iloc"):  # pandas
+        return [(n, _plain(frame.iloc[:, k])) for k, n in enumerate(names)]
+    if hasattr(frame, "get_columns"):  # polars
+        return [(n, _plain(c)) for n, c in zip(names, frame.get_columns(), strict=True)]
+    return list(zip(names, np.asarray(frame).T, strict=True))
+
+
+def _plain(column: Any) -> Any:
+    """Return a frame's column as an array, of objects where its kind has a mark for missing values."""
+    if hasattr(column, "to_pylist"):  # pyarrow
+        return np.array([*column.to_pylist(), None], dtype=object)[:-1]
+    kind = str(column.dtype)
+    if kind.startswith(("float", "int", "uint")) and "[" not in kind:
+        return column.to_numpy()
+    return np.fromiter(column, dtype=object, count=len(column))
+
+
+def as_numbers(data: Any, what: str) -> Array:
+    """Return an array of any shape as float64, missing values as NaN.
+
+    >>> as_numbers([[1, None]], "angles").tolist()
+    [[1.0, nan]]
+    """
+    if is_tensor(data):
+        data = data.detach().cpu()
+        data = (data.double() if data.is_floating_point() else data).numpy()
+    is_container = is_a(data, Sequence | numbers.Number) or hasattr(data, "__array__")
+    if is_a(data, Mapping | str | bytes) or not is_container:
+        raise OrbiflowError(
+            f"{what}: expected an array or a data frame of numbers, got {described(data)}"
+        )
+    mask = np.ma.getmaskarray(data) if isinstance(data, np.ma.MaskedArray) else None
+    try:
+        array: NDArray[Any] = np.asarray(data)
+    except (TypeError, ValueError) as error:  # ragged
+        raise OrbiflowError(f"{what}: expected numbers in rows of one length: {error}") from error
+    if array.dtype.kind == "c":
+        raise OrbiflowError(
+            f"{what}: expected real numbers, got complex ones; numpy.angle gives their angles"
+        )
+    if array.dtype.kind == "O":
+        array = _of_objects(array, what)
+    elif array.dtype.kind not in "fiu":
+        raise OrbiflowError(f"{what}: expected numbers, got {_kind(array)}")
+    values = array.astype(np.float64)
+    if mask is not None:
+        values[mask] = np.nan
+    return values
+
+
+def _kind(array: NDArray[Any]) -> str:
+    words = {"b": "Booleans", "U": "text", "S": "text", "M": "dates", "m": "durations"}
+    sample = f", such as {array.flat[0].item()!r:.40}" if array.size else ""
+    return words.get(array.dtype.kind, str(array.dtype)) + sample
+
+
+def _of_objects(array: NDArray[Any], what: str) -> Array:
+    values = np.empty(array.shape)
+    flat = values.reshape(-1)
+    for k, item in enumerate(array.reshape(-1)):
+        if isinstance(item, float | int | Decimal | numbers.Real) and not is_a(item, bool):
+            flat[k] = float(item)
+        elif item is None or type(item).__name__ in ("NAType", "NaTType", "MaskedConstant"):
+            flat[k] = math.nan
+        else:
+            row = np.unravel_index(k, array.shape)[0] + 1 if array.ndim else 1
+            cure = "; numpy.angle gives the angles of complex numbers" * is_a(item, complex)
+            raise OrbiflowError(
+                f"{what}: expected numbers, got {described(item)} in row {row}{cure}"
+            )
+    return values
+
+
+def require_values(values: Array, names: Sequence[str] | None) -> None:
+    """Refuse columns (N, k) of which no row has a value, and values that are infinite."""
+    rows = np.flatnonzero(np.isinf(values).any(axis=1))
+    if len(rows):
+        raise OrbiflowError(
+            f"row {rows[0] + 1} has an infinite value ({len(rows)} such rows): correct or remove it"
+        )
+    empty = np.flatnonzero(np.isnan(values).all(axis=0)).tolist() if len(values) else []
+    if empty:
+        own = [repr(names[k]) if names else str(k + 1) for k in empty]
+        several = len(own) > 1
+        have, them = ("have", "them") if several else ("has", "it")
+        raise OrbiflowError(
+            f"column{'s' * several} {', '.join(own)} {have} no value in any row; leave {them} out"
+        )

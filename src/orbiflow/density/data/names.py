@@ -1,0 +1,203 @@
+"""What the name of a column says: a latitude, an angle, a unit, a count, or no angle at all."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+UNITS = {
+    "deg": "degrees", "degs": "degrees", "degree": "degrees", "degrees": "degrees", "°": "degrees",
+    "rad": "radians", "rads": "radians", "radian": "radians", "radians": "radians",
+    "turn": "turns", "turns": "turns",
+}  # fmt: skip
+"""Words for units of angles."""
+
+_FORMATS = frozenset({"decimal", "dd", "wgs", "wgs84", "gps", "j2000", "2000", "icrs", "epoch"})
+"""Words that say in which form a place is written, and not which place it is."""
+
+LATITUDES = frozenset(
+    {"lat", "lats", "latitude", "latitudes", "latitud", "latitudine", "breite", "breitengrad"}
+)
+LONGITUDES = frozenset(
+    {"lon", "lons", "long", "lng", "longitude", "longitudes", "longitud", "longitudine"}
+) | {"länge", "laenge", "längengrad", "laengengrad"}
+_DECLINATIONS = frozenset(
+    {"dec", "decl", "declination", "déclinaison", "declinaison", "deklination"}
+)
+_AZIMUTHS = frozenset({"az", "azi", "azim", "azimuth", "azimut"})
+
+
+class Family(NamedTuple):
+    """Words for the angle towards the pole, and for that around it, which belong together.
+
+    - `is_axial`: Whether they say a line without an arrow.
+    - `note`: What to keep in mind of such data.
+    """
+
+    north: frozenset[str]
+    east: frozenset[str]
+    is_axial: bool = False
+    note: str = ""
+
+
+FAMILIES = (
+    Family(LATITUDES, LONGITUDES),
+    Family(_DECLINATIONS | {"de", "dej"}, frozenset({"ra", "raj", "rektaszension"})),
+    Family(frozenset({"inc", "incl", "inclination", "inclinaison", "inklination"}), _DECLINATIONS),
+    Family(frozenset({"alt", "altitude", "el", "elev", "elevation"}), _AZIMUTHS),
+    Family(frozenset({"plunge", "plg"}), _AZIMUTHS | {"trend", "trd", "bearing"}, is_axial=True),
+    Family(
+        frozenset({"dip"}),
+        _AZIMUTHS | {"dipdir", "strike"},
+        is_axial=True,
+        note="these are the lines of dip; for the poles of the planes, give latitude 90 - dip and "
+        "longitude dip direction + 180, or strike - 90",
+    ),
+)
+"""A declination is a latitude in astronomy and a longitude in palaeomagnetism: its partner decides."""
+
+_NOT_PLACES = frozenset(
+    {"err", "error", "errors", "std", "sd", "sigma", "se", "unc", "uncertainty", "var", "pm", "res"}
+    | {"residual", "bin", "count"}
+)
+"""Words of columns that say how well a place is known, or else about it."""
+
+FROM_POLE = frozenset({"colat", "colatitude", "zenith", "kolatitude", "polardistance"})
+"""Words for the angle from the pole, which is 90 degrees less the latitude."""
+
+HOURS = frozenset({"h", "hr", "hrs", "hour", "hours", "hms"})
+
+# fmt: off
+ANGLES = frozenset((
+    "phi", "psi", "chi", "omega", "theta", "alpha", "beta", "gamma", "delta", "epsilon", "zeta",
+    "angle", "angles", "winkel", "dihedral", "torsion", "phase", "argument", "tilt", "roll",
+    "pitch", "yaw", "direction", "dir", "wdir", "wd", "heading", "bearing", "course", "cog",
+    "aspect", "strike", "trend", "rotation", "twist", "richtung", "windrichtung",
+)) | _AZIMUTHS
+# fmt: on
+"""Words for angles in general."""
+
+# fmt: off
+OTHERS = frozenset((
+    "temp", "temperature", "temperatur", "length", "len", "distance", "dist", "radius", "mass",
+    "speed", "velocity", "wspd", "ws", "gust", "pressure", "humidity", "rain", "precipitation",
+    "depth", "height", "width", "size", "area", "volume", "resolution", "occupancy", "bfactor",
+    "score", "energy", "charge", "magnitude", "mag", "price", "year", "month", "date", "time",
+    "timestamp", "age", "probability", "pvalue", "density", "log_prob", "hdr",
+))
+# fmt: on
+"""Words for quantities that do not come back to themselves after a turn."""
+
+# fmt: off
+COUNTS = frozenset((
+    "count", "counts", "n", "num", "nobs", "freq", "frequency", "frequencies", "weight", "weights",
+    "anzahl", "häufigkeit", "haeufigkeit", "gewicht", "effectif", "hits", "events",
+))
+# fmt: on
+"""Words for how often a row was seen, or how much it counts."""
+
+_TOKEN = re.compile(r"°|[A-Z]+(?![a-zß-ÿ])|[A-Z]?[^\W\d_A-Z]+|\d+")
+_RUN_TOGETHER = re.compile(r"(?<=[A-Z])(?=(?:deg|rad|hms|dms)$)")
+
+
+def words_of(name: str) -> list[str]:
+    """Return the words of a name in lower case, apart where it is underscored or in camel case.
+
+    >>> words_of("decimalLatitude"), words_of("pole_lat"), words_of("RAdeg"), words_of("wind dir (°)")
+    (['decimal', 'latitude'], ['pole', 'lat'], ['ra', 'deg'], ['wind', 'dir', '°'])
+    >>> words_of("Right Ascension"), words_of("dipDirection")
+    (['ra'], ['dipdir'])
+    """
+    text = " ".join(_TOKEN.findall(_RUN_TOGETHER.sub(" ", name))).casefold()
+    text = re.sub(r"\bright ascension\b", "ra", text)
+    return re.sub(r"\bdip (dir|direction|azimuth|azi|az)\b", "dipdir", text).split()
+
+
+def unit_named(name: str) -> str | None:
+    """Return the unit of angles that a name says, or None.
+
+    >>> unit_named("phi (deg)"), unit_named("lat_rad"), unit_named("radius")
+    ('degrees', 'radians', None)
+    """
+    return next((UNITS[word] for word in words_of(name) if word in UNITS), None)
+
+
+def is_angle_named(name: str) -> bool:
+    """Return whether a name says that a column holds angles.
+
+    >>> is_angle_named("chi1"), is_angle_named("bond length"), is_angle_named("a")
+    (True, False, False)
+    """
+    words = set(words_of(name))
+    known = ANGLES | LATITUDES | LONGITUDES | set(UNITS)
+    return bool(words & known) or any(word.endswith(("angle", "winkel")) for word in words)
+
+
+def is_other_quantity(name: str) -> bool:
+    """Return whether a name says that a column holds no angles but another quantity.
+
+    >>> is_other_quantity("bond length"), is_other_quantity("bond angle"), is_other_quantity("x")
+    (True, False, False)
+    """
+    return bool(OTHERS.intersection(words_of(name))) and not is_angle_named(name)
+
+
+def is_count_named(name: str) -> bool:
+    """Return whether a name says how often a row was seen, or how much it counts.
+
+    >>> is_count_named("count"), is_count_named("n"), is_count_named("county")
+    (True, True, False)
+    """
+    return bool(COUNTS.intersection(words_of(name))) and not is_angle_named(name)
+
+
+class Pair(NamedTuple):
+    """The columns, from 0, of an angle towards the pole and of that around it."""
+
+    north: int
+    east: int
+    family: Family
+
+
+def pairs_of(names: Sequence[str]) -> list[Pair]:
+    """Return the columns that are a latitude and a longitude by their names, each pair once.
+
+    >>> [pair[:2] for pair in pairs_of(["pickup_longitude", "pickup_latitude", "fare"])]
+    [(1, 0)]
+    >>> [pair[:2] for pair in pairs_of(["ra", "dec"]) + pairs_of(["dec", "inc"])]
+    [(1, 0), (1, 0)]
+    """
+    split = [words_of(name) for name in names]
+    found: list[Pair] = []
+    for family in FAMILIES:
+        norths, easts = _rest(split, family.north), _rest(split, family.east)
+        same = [(i, j) for i, a in norths.items() for j, b in easts.items() if a == b and i != j]
+        if not same and len(norths) == 1 == len(easts) and norths.keys() != easts.keys():
+            same = [(*norths, *easts)]
+        taken = {frozenset(pair[:2]) for pair in found}
+        found += [Pair(i, j, family) for i, j in same if frozenset((i, j)) not in taken]
+    known = {column for pair in found for column in pair[:2]}
+    return found + [pair for pair in _run_together(names) if not known & set(pair[:2])]
+
+
+def _rest(split: Sequence[list[str]], words: frozenset[str]) -> dict[int, tuple[str, ...]]:
+    """Return by column, of those with one of the words, what else their names say."""
+    found: dict[int, tuple[str, ...]] = {}
+    for column, own in enumerate(split):
+        if words.intersection(own) and not _NOT_PLACES.intersection(own):
+            skipped = words | _FORMATS | set(UNITS) | HOURS
+            found[column] = tuple(word for word in own if word not in skipped)
+    return found
+
+
+def _run_together(names: Sequence[str]) -> list[Pair]:
+    """Return pairs such as plat and plon, glat and glon."""
+    lower = ["".join(words_of(name)) for name in names]
+    ends = {name: k for k, name in enumerate(lower)}
+    return [
+        Pair(ends[name], ends[name[:-3] + east], FAMILIES[0])
+        for name in ends
+        for east in ("lon", "lng", "long")
+        if len(name) > 3 and name.endswith("lat") and name[:-3] + east in ends
+    ]

@@ -1,0 +1,131 @@
+"""Names of columns say which they are and in which order, for all doors alike."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orbiflow.density.data import arrangements, check_columns, chosen_arrangement, pairs_of
+from orbiflow.errors import SettingError
+
+PLACES = [
+    "lon,lat", "LON_deg,LAT_deg", "decimalLongitude,decimalLatitude",
+    "pickup_longitude,pickup_latitude", "GPSLongitude,GPSLatitude", "lng,lat", "Long.,Lat.",
+    "longitude_deg,latitude_deg", "X,Y", "plon,plat", "longitud,latitud", "Länge,Breite",
+    "Längengrad,Breitengrad", "ra,dec", "RAJ2000,DEJ2000", "RAdeg,DEdeg",
+    "Right Ascension,Declination", "RA_ICRS,DE_ICRS", "dec,inc", "Declination,Inclination",
+    "dir_dec,dir_inc", "az,alt", "azimuth,elevation", "trend,plunge", "dipdir,dip",
+    "dip direction,dip", "strike,dip", "glon,glat", "l,b", "azimut,plunge",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("names", PLACES)
+@pytest.mark.parametrize("space", ["sphere", "projective-plane"])
+def test_latitude_is_first_whatever_the_order(names: str, space: str) -> None:
+    east, north = names.split(",")
+    for order in ([east, north], [north, east], ["depth", east, "mag", north]):
+        found = chosen_arrangement(space, order)
+        assert found is not None
+        assert [order[k] for k in found.columns] == [north, east]
+
+
+@pytest.mark.parametrize("names", [n for n in PLACES if n not in ("X,Y", "l,b")])
+def test_columns_that_were_chosen_in_another_order_are_refused(names: str) -> None:
+    east, north = names.split(",")
+    with pytest.raises(SettingError, match="in the order") as caught:
+        check_columns("sphere", [east, north])
+    assert str(caught.value).endswith(f"'{north},{east}'")
+    check_columns("sphere", [north, east])
+
+
+ROTATIONS = {
+    "w,x,y,z": "x,y,z,w", "q0,q1,q2,q3": "q1,q2,q3,q0", "qw,qx,qy,qz": "qx,qy,qz,qw",
+    "scalar,i,j,k": "i,j,k,scalar", "q_w,q_x,q_y,q_z": "q_x,q_y,q_z,q_w", "qr,qi,qj,qk": "qi,qj,qk,qr",
+    "orientation.w,orientation.x,orientation.y,orientation.z":
+        "orientation.x,orientation.y,orientation.z,orientation.w",
+    "real,i,j,k": "i,j,k,real", "z,y,x,w": "x,y,z,w", "rz,ry,rx": "rx,ry,rz",
+    "r11,r21,r31,r12,r22,r32,r13,r23,r33": "r11,r12,r13,r21,r22,r23,r31,r32,r33",
+    "t,w,x,y,z": "x,y,z,w",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("names", "right"), ROTATIONS.items(), ids=list(ROTATIONS))
+def test_rotations_are_read_by_the_names_of_their_numbers(names: str, right: str) -> None:
+    columns = names.split(",")
+    found = chosen_arrangement("rotation-space", columns)
+    assert found is not None
+    assert [columns[k] for k in found.columns] == right.split(",")
+    assert check_columns("rotation-space", right.split(",")) is not None
+
+
+@pytest.mark.parametrize(
+    "names", ["phi2,Phi,phi1", "PHI,phi1,phi2", "φ2,Φ,φ1", "euler3,euler1,euler2"]
+)
+def test_euler_angles_are_read_by_name(names: str) -> None:
+    columns = names.split(",")
+    found = chosen_arrangement("cubic-orientations", columns)
+    assert found is not None
+    ends = [columns[k][-1] for k in found.columns]
+    assert (ends[0], ends[2]) in (("1", "2"), ("1", "3"))
+    with pytest.raises(SettingError, match="Bunge's Euler angles in the order"):
+        check_columns("cubic-orientations", columns)
+
+
+MUST_BE_CONVERTED = {
+    ("sphere", "colatitude,longitude"): "90 less it",
+    ("sphere", "zenith,azimuth"): "90 less it",
+    ("sphere", "lat_rad,lon_rad"): "is in radians: convert it to degrees",
+    ("sphere", "dec,ra_hours"): "15 for each hour",
+    ("sphere", "lat,lon,mag"): "'lat,lon' alone",
+    ("rotation-space", "phi1,Phi,phi2"): "are Euler angles",
+    ("rotation-space", "roll,pitch,yaw"): "are Euler angles",
+}
+
+
+@pytest.mark.parametrize(("space", "names"), MUST_BE_CONVERTED)
+def test_what_must_be_converted_is_refused(space: str, names: str) -> None:
+    with pytest.raises(SettingError, match=MUST_BE_CONVERTED[space, names]):
+        check_columns(space, names.split(","))
+
+
+def test_several_pairs_are_asked_about() -> None:
+    names = ["lat", "lon", "vgp_lat", "vgp_lon"]
+    assert len(pairs_of(names)) == 2
+    with pytest.raises(SettingError, match=r"lat,lon or vgp_lat,vgp_lon; choose with columns"):
+        chosen_arrangement("sphere", names)
+    assert pairs_of(["lat", "lon", "lat_err", "lon_err", "ra_pm"]) == pairs_of(["lat", "lon"])
+
+
+@pytest.mark.parametrize(
+    ("space", "names"),
+    [
+        ("sphere", "x,y,z"), ("sphere", "a,b"), ("sphere", "column1,column2"), ("torus", "lon,lat"),
+        ("sphere", "lat,lon"), ("rotation-space", "a,b,c,d"), ("rotation-space", "q1,q2,q3,q4"),
+        ("klein-bottle", "theta,phi"), ("p4m", "x,y"), ("hypersphere", "x2,x1,x3"),
+        ("cubic-orientations", "phi1,Phi,phi2"), ("sphere", "late,lone"), ("sphere", "dec,temperature"),
+    ],
+)  # fmt: skip
+def test_good_orders_pass(space: str, names: str) -> None:
+    check_columns(space, names.split(","))
+
+
+@given(st.permutations(["lon", "lat", "x", "id", "w", "y", "z", "theta", "phi", "temp"]))
+def test_the_order_of_other_columns_does_not_matter(names: list[str]) -> None:
+    for space, right in (
+        ("sphere", ["lat", "lon"]),
+        ("klein-bottle", ["theta", "phi"]),
+        ("rotation-space", ["x", "y", "z", "w"]),
+        ("P 21 21 21", ["x", "y", "z"]),
+    ):
+        (found,) = arrangements(space, names)
+        assert [names[k] for k in found.columns] == right
+
+
+@given(st.lists(st.text(max_size=12), max_size=6), st.sampled_from(["sphere", "torus", "p4"]))
+def test_any_names_are_arranged_or_refused(names: list[str], space: str) -> None:
+    for found in arrangements(space, names):
+        assert len(set(found.columns)) == len(found.columns)
+        assert max(found.columns) < len(names)
+    assert np.all([pair.north != pair.east for pair in pairs_of(names)])

@@ -1,0 +1,207 @@
+"""What an estimator takes: frames by the names of their columns, units, and what may be doubted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orbiflow.density import (
+    DensityEstimator,
+    QuotientSpace,
+    Torus,
+    compare_samples,
+    summarize_axes,
+    summarize_directions,
+)
+from orbiflow.errors import DataWarning, OrbiflowError, SettingError
+
+pandas = pytest.importorskip("pandas")
+RNG = np.random.default_rng(0)
+PLACES = np.stack([RNG.normal(48, 3, 40), RNG.normal(10, 3, 40)], axis=1)
+ANGLES = np.degrees(RNG.vonmises([0.0, 1.0], [2.0, 9.0], (40, 2)))
+
+
+def made(space: Any, **settings: Any) -> DensityEstimator:
+    return DensityEstimator(space, components="mixture", **settings)
+
+
+def frame(values: np.ndarray, names: str) -> Any:
+    return pandas.DataFrame(values, columns=names.split(","))
+
+
+def frames_of(values: np.ndarray, names: str) -> list[Any]:
+    """The same table in several libraries."""
+    found = [frame(values, names)]
+    columns = {name: values[:, k] for k, name in enumerate(names.split(","))}
+    for library, call in (("polars", "DataFrame"), ("pyarrow", "table")):
+        try:
+            module = pytest.importorskip(library)
+        except pytest.skip.Exception:
+            continue
+        found.append(getattr(module, call)(columns))
+    return found
+
+
+@pytest.fixture(scope="module")
+def fitted() -> DensityEstimator:
+    return made("torus", unit="degrees").fit(frame(ANGLES, "phi,psi"))
+
+
+def test_frames_are_scored_by_name(fitted: DensityEstimator) -> None:
+    right = fitted.score_samples(ANGLES)
+    slope = fitted.score_gradient(ANGLES)
+    for table in [*frames_of(ANGLES, "phi,psi"), *frames_of(ANGLES[:, ::-1], "psi,phi")]:
+        assert np.array_equal(fitted.score_samples(table), right)
+        assert np.array_equal(fitted.score_gradient(table), slope)
+        assert fitted.score(table) == pytest.approx(right.mean())
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        ("phi,chi", "the columns are phi, chi, and the fit has seen phi, psi: there is no psi"),
+        ("a,b", "there is no phi, psi; choose those of the fit"),
+        ("phi,phi", "there is no psi"),
+    ],
+)
+def test_frames_of_other_columns_are_refused(
+    names: str, words: str, fitted: DensityEstimator
+) -> None:
+    with pytest.raises(OrbiflowError, match=words):
+        fitted.score_samples(frame(ANGLES, names))
+
+
+def test_more_columns_than_those_of_the_fit_are_refused(fitted: DensityEstimator) -> None:
+    with pytest.raises(OrbiflowError, match="choose those of the fit"):
+        fitted.score_samples(frame(np.hstack([ANGLES, ANGLES[:, :1]]), "phi,psi,chi"))
+
+
+def test_names_are_of_the_last_fit(fitted: DensityEstimator) -> None:
+    estimator = made("torus", unit="degrees").fit(frame(ANGLES, "phi,psi"))
+    assert list(estimator.feature_names_in_) == ["phi", "psi"]
+    assert not hasattr(estimator.fit(ANGLES), "feature_names_in_")
+    assert not hasattr(estimator.fit(pandas.DataFrame(ANGLES)), "feature_names_in_")
+    assert fitted.marginal("psi").feature_names_in_.tolist() == ["psi"]
+
+
+WRONG = {
+    ("sphere", "lon,lat"): "in the order lat, lon; give columns 'lat,lon'",
+    ("sphere", "ra,dec"): "in the order dec, ra",
+    ("sphere", "dec,inc"): "in the order inc, dec",
+    ("projective-plane", "trend,plunge"): "in the order plunge, trend",
+    ("sphere", "lat,lon,mag"): "lat, lon, mag are too many columns: give 'lat,lon' alone",
+    ("rotation-space", "w,x,y,z"): "in the order x, y, z, w",
+    ("rotation-space", "q0,q1,q2,q3"): "in the order q1, q2, q3, q0",
+    ("cubic-orientations", "phi2,Phi,phi1"): "in the order phi1, Phi, phi2",
+    ("klein-bottle", "phi,theta"): "in the order theta, phi",
+}
+
+
+@pytest.mark.parametrize(("space", "names"), WRONG)
+def test_frames_in_another_order_are_refused(space: str, names: str) -> None:
+    values = RNG.normal(size=(40, names.count(",") + 1))
+    values /= np.linalg.norm(values, axis=1, keepdims=True)
+    with pytest.raises(SettingError, match=WRONG[space, names]):
+        made(space).fit(frame(values, names))
+
+
+def test_units_are_known_or_refused() -> None:
+    with pytest.raises(SettingError, match="beyond 2 pi; give unit degrees, radians or turns"):
+        made("torus").fit(ANGLES)
+    assert made("torus").fit(np.radians(ANGLES)).space_ == Torus(2, unit="radians")
+    assert made("torus").fit(frame(ANGLES, "phi_deg,psi_deg")).space_ == Torus(2, unit="degrees")
+    with pytest.raises(SettingError, match="unit radians applies only to angles on the torus"):
+        made("sphere", unit="radians").fit(np.radians(PLACES))
+    with pytest.raises(
+        SettingError, match="unit degrees is not the space's, radians: leave it out"
+    ):
+        made(Torus(2), unit="degrees").fit(ANGLES)
+    with pytest.warns(DataWarning, match="if they are degrees, give that unit"):
+        made("torus", unit="radians").fit(RNG.uniform(-180, 180, (40, 2)))
+    with pytest.warns(DataWarning, match="if they are radians, give the unit radians"):
+        made("torus", unit="degrees").fit(RNG.uniform(-3.1, 3.1, (40, 2)))
+    turning = np.degrees(RNG.uniform(-3, 3, (40, 2)).cumsum(axis=0)) + 2000
+    assert made("torus", unit="degrees").fit(turning).space_.unit == "degrees"
+
+
+def test_radians_on_the_sphere_are_refused_or_doubted() -> None:
+    vectors = RNG.normal(size=(80, 3))
+    even = np.stack([np.arcsin(vectors[:, 2] / np.linalg.norm(vectors, axis=1)), vectors[:, 1]], 1)
+    even[:, 1] = np.arctan2(vectors[:, 1], vectors[:, 0])
+    for call in (made("sphere").fit, summarize_directions, summarize_axes):
+        with pytest.raises(SettingError, match="they are radians, it seems"):
+            call(even)
+    with pytest.warns(DataWarning, match="if they are radians, convert them"):
+        summarize_directions(np.radians(PLACES))
+    assert summarize_directions(even, unit="degrees").resultant > 0.99
+    with pytest.raises(SettingError, match="they are radians, it seems"):
+        compare_samples({"a": even, "b": even + 0.01}, "sphere")
+
+
+@pytest.mark.parametrize("code", [999, -999, 9999.0, 32767])
+def test_codes_for_missing_values_are_refused(code: float) -> None:
+    values = np.vstack([ANGLES, [[code, 20.0]] * 3])
+    with pytest.raises(
+        SettingError, match=r"column 'column1' has .* in 3 rows, .* replace them by NaN"
+    ):
+        made("torus", unit="degrees").fit(values)
+    names = frame(values, "phi,psi")
+    with pytest.raises(SettingError, match=r"column 'phi' has"):
+        made("torus", unit="degrees").fit(names)
+    kept = names.replace(code, np.nan)
+    estimator = made("torus", unit="degrees", missing="marginalise").fit(kept)
+    assert np.isfinite(estimator.score_samples(kept)).all()
+
+
+def test_missing_values_are_named() -> None:
+    holes = frame(ANGLES, "phi,psi").astype(object)
+    holes.iloc[2, 0] = pandas.NA
+    with pytest.raises(OrbiflowError, match="row 3 has a missing or infinite value"):
+        made("torus", unit="degrees").fit(holes)
+    masked = np.ma.masked_array(ANGLES, mask=ANGLES > 100)
+    masked[4, 1] = np.ma.masked
+    with pytest.raises(OrbiflowError, match="a missing or infinite value"):
+        made("torus", unit="degrees").fit(masked)
+    estimator = made("torus", unit="degrees", missing="marginalise")
+    assert np.isfinite(estimator.fit(holes).score_samples(holes)).all()
+    with pytest.raises(OrbiflowError, match="column 'psi' has no value in any row; leave it out"):
+        estimator.fit(frame(ANGLES, "phi,psi").assign(psi=None))
+    with pytest.raises(OrbiflowError, match=r"numpy\.angle gives their angles"):
+        made("torus").fit(np.exp(1j * ANGLES))
+
+
+def test_other_quantities_are_doubted() -> None:
+    for name in ("temperature", "bond_length", "count"):
+        with pytest.warns(DataWarning, match=f"'{name}' seems to be no angle, by its name"):
+            made("torus", unit="degrees").fit(frame(ANGLES, f"phi,{name}"))
+
+
+def test_fractions_are_doubted_or_read() -> None:
+    inside = RNG.uniform(0, 1, (40, 2))
+    with pytest.warns(DataWarning, match="if they are fractions of the cell"):
+        made(QuotientSpace("p4g", cell=(10.0, 10.0))).fit(inside)
+    estimator = made(QuotientSpace("p4g", cell=(10.0, 10.0), fractional=True)).fit(inside)
+    drawn = estimator.sample(200, random_state=0)
+    assert np.ptp(drawn, axis=0).max() < 2
+    with pytest.raises(OrbiflowError, match="give cell as well"):
+        QuotientSpace("p4g", fractional=True)
+
+
+@pytest.mark.parametrize("number", [2, -1, 7])
+def test_numbers_of_columns_that_there_are_not(number: int, fitted: DensityEstimator) -> None:
+    words = rf"no column {number}: columns are numbered from 0 to 1 \(phi, psi\)"
+    with pytest.raises(OrbiflowError, match=words):
+        fitted.conditional({number: 1.0})
+    with pytest.raises(OrbiflowError, match=words):
+        fitted.marginal(number)
+
+
+def test_frames_are_compared_by_name() -> None:
+    one, other = frame(PLACES, "lat,lon"), frame(PLACES[:, ::-1] + 0.01, "lon,lat")
+    assert not compare_samples({"a": one, "b": other}, "sphere").differ
+    with pytest.raises(SettingError, match="in the order lat, lon"):
+        compare_samples({"a": other, "b": one}, "sphere")
+    with pytest.raises(SettingError, match="in the order lat, lon"):
+        summarize_directions(other)
