@@ -98,7 +98,7 @@ class CertificationError(OrbiflowError):
 
 
 class DataWarning(UserWarning):
-    """Something about the data that was decided for the user, who may decide otherwise."""
+    """Data that may not be what they were taken for, or of which something was decided for the user."""
 
 
 class CoarseStepsWarning(UserWarning):
@@ -107,7 +107,3 @@ class CoarseStepsWarning(UserWarning):
 
 class RoundedOperatorsWarning(UserWarning):
     """Operators of a group with rounded shifts, such as 0.3333: they are read as simple fractions."""
-
-
-class DataWarning(UserWarning):
-    """Data that may not be what they were taken for: another unit, fractions, or no angles at all."""

@@ -16,11 +16,7 @@ from orbiflow.density import comparing, models, pictures, spaces, tables
 from orbiflow.density.data import is_angular
 from orbiflow.density.fitting import ComponentSettings, DensitySettings
 from orbiflow.density.run_folder import write_files, written_files
-<<<<<<< HEAD
-from orbiflow.density.tables import GroupedRowSettings, RowSettings, SpaceSettings
-=======
 from orbiflow.density.tables import CountedRowSettings, RowSettings, SpaceSettings
->>>>>>> tables
 from orbiflow.errors import DataWarning
 from orbiflow.settings import Hidden, Option, SettingError
 
@@ -114,11 +110,7 @@ def fit_rows(
     estimator = DensityEstimator(space_of(where), unit=unit, missing=reading.kept_missing, **given)
     progress = runtime.progress_events(tell, cancel)
     with warnings.catch_warnings():
-<<<<<<< HEAD
-        warnings.simplefilter("ignore", DataWarning)  # the report's notes say the same
-=======
-        warnings.simplefilter("ignore", DataWarning)  # told already, with the names of columns
->>>>>>> tables
+        warnings.simplefilter("ignore", DataWarning)  # notes say the same, with names of columns
         return estimator.fit(values, sample_weight=rows.weights, groups=labels, progress=progress)
 
 
