@@ -26,7 +26,7 @@ from orbiflow.tiles.silhouette.readers.svg_units import as_number, length
 from orbiflow.tiles.silhouette.readers.svg_xml import reference
 
 if TYPE_CHECKING:
-    from orbiflow.tiles.silhouette.readers.svg_walk import Drawing
+    from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
 
 MOST_REFERENCES = 10  # from gradient to gradient
 MOST_STOPS = 500
