@@ -233,6 +233,45 @@ def test_strokes_that_are_no_plain_lines_are_carried_as_regions(body: str, tmp_p
 
 
 @pytest.mark.parametrize(
+    ("body", "plain"),
+    [
+        (
+            "<style>#guides > rect{display:none} .a circle{fill:#123456!important}</style>"
+            '<g class="a"><circle cx="500" cy="300" r="90" style="fill:none"/></g>'
+            '<g id="guides"><rect width="900" height="400"/></g>',
+            '<circle cx="500" cy="300" r="90" fill="#123456"/>',
+        ),
+        (
+            '<linearGradient id="g"><stop stop-color="#123456"/><stop offset="1" '
+            'stop-color="#123456" stop-opacity="0"/></linearGradient>'
+            '<rect x="400" y="250" width="200" height="90" fill="url(#g)"/>',
+            '<rect x="400" y="250" width="100" height="90" fill="#123456"/>',
+        ),
+        (
+            '<mask id="m" x="0" y="0" width=".5" height="1"><rect width="999" height="999" '
+            'fill="#fff"/></mask><rect x="400" y="250" width="200" height="90" mask="url(#m)"/>',
+            '<rect x="400" y="250" width="100" height="90"/>',
+        ),
+        # what bleeds beyond the page is kept: the tile's own edge cuts it
+        (
+            '<rect x="-100" y="250" width="700" height="90"/>',
+            '<g><rect x="-100" y="250" width="700" height="90"/></g>',
+        ),
+    ],
+)
+def test_artwork_is_carried_as_it_is_seen(body: str, plain: str, tmp_path: Path) -> None:
+    tile = squirrel("IH4")
+    parts: list[Part] = []
+    for text in (body, plain):
+        over = read_over(svg_of("IH4", text, tmp_path), tile)
+        assert over.drawing is not None
+        parts += over.drawing.parts
+    one, two = parts
+    assert one.style == two.style
+    assert region(one).symmetric_difference(region(two)).area < 1e-3 * region(two).area
+
+
+@pytest.mark.parametrize(
     ("text", "message"),
     [
         ('<svg viewBox="0 0 10 99"><rect width="3" height="3"/></svg>', "must have its aspect"),

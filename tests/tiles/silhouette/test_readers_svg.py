@@ -213,7 +213,7 @@ def test_entities_are_refused(tmp_path: Path, encoding: str) -> None:
 
 
 def test_uses_that_multiply_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("orbiflow.tiles.silhouette.readers.svg_walk.MAX_DRAWN", 1000)
+    monkeypatch.setattr("orbiflow.tiles.silhouette.readers.svg_drawing.MAX_DRAWN", 1000)
     levels = "".join(f'<g id="l{i + 1}">' + f'<use href="#l{i}"/>' * 10 + "</g>" for i in range(12))
     start = time.perf_counter()
     with pytest.raises(InputFileError, match="draws more than 1000 elements"):

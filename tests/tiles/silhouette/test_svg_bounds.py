@@ -6,7 +6,7 @@ import shapely
 from orbiflow.errors import InputFileError
 from orbiflow.tiles import Reading, read_outline
 from orbiflow.tiles.silhouette import FileContent
-from orbiflow.tiles.silhouette.readers import svg_css, svg_walk
+from orbiflow.tiles.silhouette.readers import svg_css, svg_drawing
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100">'
 SQUARE = '<path d="M10 10h50v50h-50z"/>'
@@ -74,7 +74,7 @@ def test_what_would_take_too_long_is_refused(
     text: str, message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(svg_css, "MAX_STEPS", 100_000)
-    monkeypatch.setattr(svg_walk, "MAX_DRAWN", 1000)
+    monkeypatch.setattr(svg_drawing, "MAX_DRAWN", 1000)
     closed = text + "</g>" * (text.count("<g>") + text.count("<g style") - text.count("</g>"))
     with pytest.raises(InputFileError, match=message):
         body(closed)
@@ -160,3 +160,12 @@ def test_what_reaches_hardly_beyond_the_page_is_kept_whole() -> None:
     reading = body('<rect x="-.05" width="60" height="50"/>')
     assert shapely.Polygon(reading.outline).area == pytest.approx(3000)
     assert reading.notes == ()
+
+
+def test_what_is_left_out_is_counted_once() -> None:
+    group = '<g style="transform:scale(.5);transform-box:fill-box"><text>Hm</text>{}</g>'
+    reading = body(group.format(SQUARE + '<use href="#nothing"/>'))
+    assert reading.notes == (
+        "left out 1 text of the drawing",
+        "<use> refers to '#nothing', which is not there",
+    )

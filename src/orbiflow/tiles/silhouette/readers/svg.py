@@ -23,9 +23,9 @@ from orbiflow.tiles.silhouette.outlines import (
 )
 from orbiflow.tiles.silhouette.readers.reading import Reading, Source
 from orbiflow.tiles.silhouette.readers.svg_colours import Brush
+from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
 from orbiflow.tiles.silhouette.readers.svg_paths import MAX_POINTS, TooManyPoints, TooTangled
 from orbiflow.tiles.silhouette.readers.svg_regions import FAINT, Layer, Regions, painted
-from orbiflow.tiles.silhouette.readers.svg_walk import Drawing
 
 # Flattening error, of the size of each shape, and its floor, of the size of the drawing.
 FLATNESS = 1 / 2000

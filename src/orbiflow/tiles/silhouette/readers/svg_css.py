@@ -263,8 +263,8 @@ class _Siblings(list[Element]):
 
     budget = _Budget()
 
-    def __getitem__(self, key: Any) -> Any:
-        self.budget.charge(len(self) if isinstance(key, slice) else 1)
+    def __getitem__(self, key: "slice[Any, Any, Any]") -> list[Element]:  # type: ignore[override]
+        self.budget.charge(len(self))
         return super().__getitem__(key)
 
     def __iter__(self) -> Iterator[Element]:

@@ -14,7 +14,7 @@ from shapely.geometry import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arrays import Array
-from orbiflow.tiles.silhouette.readers.svg_colours import CURRENT, Brush, colour_of
+from orbiflow.tiles.silhouette.readers.svg_colours import CURRENT, Brush, colour_of, mean_colour
 from orbiflow.tiles.silhouette.readers.svg_shapes import (
     DrawnShape,
     bounds_of,
@@ -26,7 +26,7 @@ from orbiflow.tiles.silhouette.readers.svg_units import as_number, length
 from orbiflow.tiles.silhouette.readers.svg_xml import reference
 
 if TYPE_CHECKING:
-    from orbiflow.tiles.silhouette.readers.svg_walk import Drawing
+    from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
 
 MOST_REFERENCES = 10  # from gradient to gradient
 MOST_STOPS = 500
@@ -125,40 +125,55 @@ class Gradient:
         ]
 
 
+_Attribute = Callable[[str, str], str]  # the attribute of a gradient, or its usual value
+
+
 def gradient_of(drawing: Drawing, element: Element, shape: DrawnShape) -> Gradient | Brush | None:
     """Return the gradient that paints a shape, or the one colour that it has, or None for nothing."""
     chain = list(references(drawing, element))
     own = ([child for child in one if child.tag == "stop"] for one in chain)
     stops = next(filter(None, own), list[Element]())
-    if not stops:
-        return None
-    brushes = [_stop(drawing, stop) for stop in stops]
-    given = [min(max(as_number(stop.get("offset"), 0.0), 0.0), 1.0) for stop in stops]
-    offsets = np.maximum.accumulate(np.array(given))
 
     def attribute(key: str, usual: str) -> str:
         same = (one.get(key) for one in chain if one.tag == element.tag or key not in _SHAPED)
         return next((text for text in same if text is not None), usual)
 
-    boxed = attribute("gradientUnits", "objectBoundingBox") != "userSpaceOnUse"
-    box = bounds_of([shape], shape.place.matrix) if boxed else None
-    matrix = shape.place.matrix
-    if boxed:
-        if box is None or not (box[2] > box[0] and box[3] > box[1]):
-            return None
-        matrix = matrix @ unit_box_matrix(box)
-    try:
-        own = transform_matrix(attribute("gradientTransform", ""), (1.0, 1.0))
-    except NotATransform:
-        drawing.notes.add("a gradientTransform is not understood and left out")
-        own = np.eye(3)
-    size = (1.0, 1.0) if boxed else shape.place.viewport
-    ends = _ends(element.tag, attribute, size)
-    flat = abs(np.linalg.det(matrix @ own)) == 0 or not np.ptp(ends, axis=0).max() > _EMPTY
+    placed = _placed(drawing, attribute, shape)
+    if not stops or placed is None:
+        return None
+    matrix, size = placed
+    brushes = [_stop(drawing, stop) for stop in stops]
+    given = [min(max(as_number(stop.get("offset"), 0.0), 0.0), 1.0) for stop in stops]
+    radial, ends = element.tag == "radialGradient", _ends(element.tag, attribute, size)
+    flat = np.linalg.det(matrix) == 0 or not np.ptp(ends, axis=0).max() > _EMPTY
     if len(stops) == 1 or len(stops) > MOST_STOPS or flat:
         return brushes[-1]
-    spread = attribute("spreadMethod", "pad")
-    return Gradient(offsets, brushes, matrix @ own, ends, element.tag[0] == "r", spread)
+    along = ends[1] - ends[0]
+    if radial and float(np.hypot(*along[:2])) >= along[2]:
+        drawing.notes.add("a gradient that begins outside its circle is taken for one colour")
+        return mean_colour(brushes)
+    offsets = np.maximum.accumulate(np.array(given))
+    return Gradient(offsets, brushes, matrix, ends, radial, attribute("spreadMethod", "pad"))
+
+
+def _placed(
+    drawing: Drawing, attribute: _Attribute, shape: DrawnShape
+) -> tuple[Array, tuple[float, float]] | None:
+    """Return the map of a gradient's units to the drawing's, and what its percentages refer to.
+
+    None is of a gradient in units of a box that has no area.
+    """
+    matrix, size = shape.place.matrix, shape.place.viewport
+    if attribute("gradientUnits", "objectBoundingBox") != "userSpaceOnUse":
+        box = bounds_of([shape], matrix)
+        if box is None or not (box[2] > box[0] and box[3] > box[1]):
+            return None
+        matrix, size = matrix @ unit_box_matrix(box), (1.0, 1.0)
+    try:
+        return matrix @ transform_matrix(attribute("gradientTransform", ""), (1.0, 1.0)), size
+    except NotATransform:
+        drawing.notes.add("a gradientTransform is not understood and left out")
+        return matrix, size
 
 
 _SERVERS = {"linearGradient", "radialGradient", "pattern"}
@@ -183,7 +198,7 @@ def _stop(drawing: Drawing, stop: Element) -> Brush:
     return Brush(brush.colour, brush.opacity * opacity)
 
 
-def _ends(tag: str, attribute: Callable[[str, str], str], size: tuple[float, float]) -> Array:
+def _ends(tag: str, attribute: _Attribute, size: tuple[float, float]) -> Array:
     """Return x, y and radius of where a gradient begins and ends."""
     across = float(np.hypot(*size)) / 2**0.5
 
@@ -198,8 +213,7 @@ def _ends(tag: str, attribute: Callable[[str, str], str], size: tuple[float, flo
     cx, cy, r, fr = (number(key, usual) for key, usual in _RADIAL.items())
     centre = np.array([cx, cy])
     focus = np.array([number("fx", repr(cx)), number("fy", repr(cy))])
-    away = float(np.hypot(*(focus - centre)))
-    most = 0.99 * max(r - fr, 0.0)  # a focus outside its circle is moved into it
-    if away > most:
-        focus = centre + (focus - centre) * (most / away)
+    away, most = float(np.hypot(*(focus - centre))), max(r - fr, 0.0)
+    if 0.99 * most < away < 1.01 * most:  # on the circle, but for rounding
+        focus = centre + (focus - centre) * (0.99 * most / away)
     return np.array([[*focus, fr], [cx, cy, r]])

@@ -15,7 +15,7 @@ from orbiflow.tiles.silhouette.readers.svg_units import angle, quantity
 from orbiflow.tiles.silhouette.readers.svg_views import view_box, view_matrix
 
 if TYPE_CHECKING:
-    from orbiflow.tiles.silhouette.readers.svg_walk import Drawing
+    from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
 
 # shares of the marker's viewBox
 _KEYWORDS = {"left": 0.0, "top": 0.0, "center": 0.5, "right": 1.0, "bottom": 1.0}

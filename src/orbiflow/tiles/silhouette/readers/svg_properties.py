@@ -116,6 +116,7 @@ _CHECKS: dict[str, Check] = {
     "display": _words,
     "paint-order": _words,
     "vector-effect": _words,
+    "color-interpolation": _words,
     "mask-type": _keyword("luminance", "alpha"),
     "mix-blend-mode": _words,
     "transform-box": _keyword("view-box", "fill-box", "stroke-box", "content-box", "border-box"),
@@ -135,6 +136,7 @@ INHERITED = frozenset(
         *("stroke", "stroke-width", "stroke-opacity", "stroke-linecap", "stroke-linejoin"),
         *("stroke-miterlimit", "stroke-dasharray", "stroke-dashoffset"),
         *("marker-start", "marker-mid", "marker-end", "font-size"),
+        "color-interpolation",
     }
 )
 # properties of CSS alone: an attribute of such a name says nothing

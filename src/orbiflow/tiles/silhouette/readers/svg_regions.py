@@ -24,17 +24,18 @@ from orbiflow.tiles.silhouette.readers.svg_colours import (
     lightness,
     mean_colour,
 )
+from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
 from orbiflow.tiles.silhouette.readers.svg_gradients import Gradient, gradient_of, references
 from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, TooManyPoints, fill
 from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
 from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, DrawnShape
 from orbiflow.tiles.silhouette.readers.svg_strokes import Line, stroked
 from orbiflow.tiles.silhouette.readers.svg_units import as_number
-from orbiflow.tiles.silhouette.readers.svg_walk import Drawing
 
 FINER = 8  # the paths of strokes are flattened as much finer, as a wide pen magnifies what is left
 EDGE = 1e-3  # of the page's longer side: shapes that reach no farther beyond it are kept whole
 FAINT = 0.5  # opacity: less is not seen
+NEARLY = 1e-3  # share of a region: it is kept whole where no more of it is faint
 PATTERN = Brush("#808080", 1.0)
 _SAMPLES = np.linspace(0, 1, 257)
 
@@ -195,10 +196,12 @@ class Regions:
         values = paint.opacity * np.array([brush.opacity for brush in paint.gradient.brushes])
         along = np.interp(_SAMPLES, paint.gradient.offsets, values)
         part = paint.gradient.part(values, FAINT, region)
-        if part is region or not part.area > 0:
-            return Layer(region, Brush(paint.colour, float(along.mean())))
+        counts = along >= FAINT if part.area > 0 else along < FAINT
+        brush = Brush(paint.colour, float(along[counts].mean()))
+        if not 0 < part.area < (1 - NEARLY) * region.area:
+            return Layer(region, brush)
         self.drawing.notes.add("left out what of a gradient is less than half visible")
-        return Layer(part, Brush(paint.colour, float(along[along >= FAINT].mean())))
+        return Layer(part, brush)
 
     def layers(self, shape: DrawnShape) -> list[Layer]:
         """Return what a shape paints, from bottom to top."""

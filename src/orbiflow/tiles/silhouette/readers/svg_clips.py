@@ -26,7 +26,7 @@ from orbiflow.tiles.silhouette.readers.svg_units import as_number, length
 from orbiflow.tiles.silhouette.readers.svg_xml import is_own
 
 if TYPE_CHECKING:
-    from orbiflow.tiles.silhouette.readers.svg_walk import Drawing
+    from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
 
 _MASK_FRAME = {"x": "-10%", "y": "-10%", "width": "120%", "height": "120%"}
 _BASIC = re.compile(r"(?:^|\s)(circle|ellipse|inset|polygon|path)\((.*)\)", re.DOTALL)
@@ -34,7 +34,7 @@ _RULE = re.compile(r"\s*(nonzero|evenodd)\s*,\s*")
 _TEXT = re.compile(r"""["'](.*)["']""", re.DOTALL)
 
 
-class Cuts:
+class Clips:
     """The clip paths and masks of a drawing, each read once for each place where it stands."""
 
     def __init__(self, drawing: Drawing) -> None:
@@ -56,7 +56,17 @@ class Cuts:
         if source.tag != wanted:
             drawing.notes.add(f"{key} refers to a <{source.tag[:40]}>, which is no <{wanted}>")
             return shapes
+        self._note_mode(text, key, source)
         return _with(shapes, self._clips(source, shapes, place))
+
+    def _note_mode(self, text: str, key: str, source: Element) -> None:
+        """Note what else is said of a clip or mask than which it is."""
+        notes, rest = self.drawing.notes, REFERENCE.sub("", text, count=1).strip()
+        if rest:
+            notes.add(f"of {key} {text[:40]!a} only the first reference is read")
+        style = self.drawing.styles.standing(source)
+        if key == "mask" and style.get("color-interpolation") == "linearrgb":
+            notes.add("a mask in linearRGB is read as one in sRGB")
 
     def _clips(self, source: Element, shapes: list[DrawnShape], place: Place) -> list[Clip]:
         """Return what a <clipPath> or <mask> cuts shapes by."""

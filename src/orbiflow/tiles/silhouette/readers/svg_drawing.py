@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import replace
+from urllib.parse import unquote
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -9,8 +10,8 @@ import numpy as np
 from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.reading import Source, read_bytes
+from orbiflow.tiles.silhouette.readers.svg_clips import Clips, window_clip
 from orbiflow.tiles.silhouette.readers.svg_colours import colour_of
-from orbiflow.tiles.silhouette.readers.svg_cuts import Cuts, window_clip
 from orbiflow.tiles.silhouette.readers.svg_markers import Markers
 from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
 from orbiflow.tiles.silhouette.readers.svg_shapes import (
@@ -44,10 +45,12 @@ _OTHERS = {
     **{"image": "image", "text": "text", "flowRoot": "text", "foreignObject": "piece of HTML"},
     **dict.fromkeys(("video", "audio", "canvas", "iframe"), "piece of HTML"),
 }
+_PLURALS = {"piece of HTML": "pieces of HTML"}
 _ANIMATIONS = {"animate", "animateTransform", "animateMotion", "animateColor", "set"}
 _MOVES = ("transform", "translate", "rotate", "scale")
 # what changes how a drawing is seen and is not drawn, with the values that change nothing
 _EFFECTS = {
+    "stroke-linejoin": ("a stroke-linejoin is drawn as miter", {"miter", "round", "bevel"}),
     "mix-blend-mode": ("blends (mix-blend-mode) are left out", {"normal"}),
     "offset-path": ("the property offset-path is left out", {"none"}),
     "mask-image": ("the property mask-image is left out", {"none"}),
@@ -74,7 +77,7 @@ class Drawing:
         for item in self.root.iter():
             if is_own(item) and (key := item.get("id")):
                 self.by_id.setdefault(key, item)
-        self.cuts, self.markers = Cuts(self), Markers(self)
+        self.clips, self.markers = Clips(self), Markers(self)
         try:
             self._read()
         except BadElement as exc:
@@ -83,8 +86,7 @@ class Drawing:
     def left_out(self) -> list[str]:
         """Return notes of what was met and is not drawn, or not as it is written."""
         left = [
-            f"{count} {name.replace('piece', 'piece' + 's' * (count > 1)) if ' ' in name else name}"
-            + "s" * (count > 1 and " " not in name)
+            f"{count} {name if count == 1 else _PLURALS.get(name, f'{name}s')}"
             for name, count in self.others.items()
         ]
         return [f"left out {' and '.join(left)} of the drawing"] * bool(left) + self.notes.said()
@@ -99,7 +101,8 @@ class Drawing:
         target = (target or "").strip()
         if not target:
             return None
-        element = self.by_id.get(target[1:]) if target.startswith("#") else None
+        name = target[1:] if target.startswith("#") else ""
+        element = self.by_id.get(name, self.by_id.get(unquote(name)))
         if element is None:
             where = "is not there" if target.startswith("#") else "is outside the file"
             self.notes.add(f"{what} refers to {target[:40]!a}, which {where}")
@@ -156,12 +159,12 @@ class Drawing:
 
     def pixel(self) -> float:
         """Return the size of a pixel in user units."""
-        style, (xmin, ymin, xmax, ymax) = (
+        xmin, ymin, xmax, ymax = self.box or (0.0, 0.0, 1.0, 1.0)
+        style, sizes = (
             self.styles.standing(self.root),
-            self.box or (0.0, 0.0, 1.0, 1.0),
+            {"width": xmax - xmin, "height": ymax - ymin},
         )
-        sizes = (("width", xmax - xmin), ("height", ymax - ymin))
-        return max(own / (self._pixels(style, key) or own) for key, own in sizes)
+        return max(own / (self._pixels(style, key) or own) for key, own in sizes.items())
 
     def children(self, element: Element, place: Place) -> list[DrawnShape]:
         """Return the shapes that the elements inside one show."""
@@ -182,9 +185,10 @@ class Drawing:
         if style.get("display") == "none" or not self._meant(element):
             return []
         place = place.styled(style)
-        place = place.moved(self.own_transform(element, style, place))
-        if np.linalg.det(place.matrix) == 0:  # flat
-            return []
+        if not style.keys().isdisjoint(_MOVES):
+            place = place.moved(self.own_transform(element, style, place))
+            if np.linalg.det(place.matrix) == 0:  # flat
+                return []
         return self._cut(self._content(element, place), style, self._inside(element, place))
 
     def _inside(self, element: Element, place: Place) -> Place:
@@ -228,7 +232,7 @@ class Drawing:
                 self.notes.add(note)
         for key in ("clip-path", "mask"):
             if shapes and style.get(key, "none") != "none":
-                shapes = self.cuts.cut(shapes, key, style[key], place)
+                shapes = self.clips.cut(shapes, key, style[key], place)
         return shapes
 
     def _chosen(self, child: Element) -> bool:
@@ -306,6 +310,13 @@ class Drawing:
         )
         return self.markers.around(element, drawn, place)
 
+    def _own_box(self, element: Element, place: Place) -> Window:
+        """Return the box of what an element holds, in the units of a place, without counting it."""
+        others, texts = self.others.copy(), self.notes.texts.copy()
+        box = bounds_of(self._content(element, place), place.matrix)
+        self.others, self.notes.texts = others, texts
+        return box or (0.0, 0.0, 0.0, 0.0)
+
     def own_transform(
         self, element: Element, style: Style, place: Place, origin: str = "0 0"
     ) -> Array:
@@ -315,8 +326,7 @@ class Drawing:
             return np.eye(3)
         size, corner = place.viewport, (0.0, 0.0)
         if style.get("transform-box", "view-box") != "view-box" and element is not self.root:
-            box = bounds_of(self._content(element, place), place.matrix)
-            xmin, ymin, xmax, ymax = box or (0.0, 0.0, 0.0, 0.0)
+            xmin, ymin, xmax, ymax = self._own_box(element, place)
             size, corner = (xmax - xmin, ymax - ymin), (xmin, ymin)
         try:
             text = "" if texts[0] == "none" else texts[0]
