@@ -15,11 +15,13 @@ from orbiflow.density import DensityEstimator
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, OutputError
 from orbiflow.loading import LoadedRun
 from orbiflow.runtime import find
+from orbiflow.symmetry import wallpaper_group
 from orbiflow.tiles import (
     AnimationSettings,
     ArtSettings,
     EscherTile,
     ExportSettings,
+    Tile,
     TileMap,
     export,
     read_document,
@@ -62,6 +64,37 @@ def test_a_density(folders: Path) -> None:
     assert again.score(data) == pytest.approx(found.score(data), abs=1e-9)
     alone = orbiflow.load(folders / "density" / "density.safetensors")
     assert isinstance(alone, DensityEstimator)
+
+
+def test_flipped_bits_of_a_result_never_give_another_tile(tmp_path: Path) -> None:
+    """What decides, polygon and group, is certified anew: a result.json may be edited by hand."""
+    ring = [
+        [0, 0],
+        [0.6, 0.13],
+        [1.37, 0],
+        [1.5, 0.7],
+        [1.37, 1.21],
+        [0.6, 1.34],
+        [0, 1.21],
+        [0.13, 0.7],
+    ]
+    tile = Tile(np.array(ring), wallpaper_group("p1", np.diag([1.37, 1.21])))
+    folder = orbiflow.save(EscherTile(tile), tmp_path / "saved")
+    whole = (folder / "result.json").read_bytes()
+    loaded = 0
+    for bit in np.random.default_rng(0).integers(0, 8 * len(whole), 300).tolist():
+        data = bytearray(whole)
+        data[bit // 8] ^= 1 << bit % 8
+        (folder / "result.json").write_bytes(data)
+        try:
+            found = orbiflow.load(folder)
+        except OrbiflowError:
+            continue
+        loaded += 1
+        assert isinstance(found, LoadedRun)
+        assert np.abs(found.best.tile.polygon - ring).max() < 1e-6
+        assert np.allclose(found.best.tile.group.lattice, tile.group.lattice)
+    assert 0 < loaded < 200
 
 
 class Frame:
