@@ -74,14 +74,11 @@ def differences(cases: list[Case], options: argparse.Namespace, scratch: Path) -
     cache = (options.cache or scratch / "cache").resolve()
     out = emptied((options.keep or scratch / "present").resolve())
     spent_before = run_before(
-        with_needs(cases, old=True),
-        cache,
-        lambda: checkout(options.before, scratch / "before"),
-        options.jobs,
+        with_needs(cases), cache, lambda: checkout(options.before, scratch / "before"), options.jobs
     )
     shutil.copytree(cache / "inputs", out / "inputs")
     (out / "old").symlink_to(cache)
-    needed = with_needs(cases, old=False)
+    needed = with_needs(cases)
     spent = run_cases(needed, out, options.present.resolve(), PRESENT, options.jobs)
     print(
         f"processor time: before {spent_before:.0f} s (what the cache lacked), present {spent:.0f} s"
@@ -138,7 +135,7 @@ def chosen(only: str, *, slow: bool) -> list[Case]:
     return fit
 
 
-def with_needs(cases: Iterable[Case], *, old: bool) -> list[Case]:
+def with_needs(cases: Iterable[Case]) -> list[Case]:
     """Return the cases and those whose folders they read, in the corpus' order."""
     by_name = {case.name: case for case in corpus()}
     wanted: set[str] = set()
@@ -146,8 +143,7 @@ def with_needs(cases: Iterable[Case], *, old: bool) -> list[Case]:
     while ahead:
         case = by_name[ahead.pop()]
         wanted.add(case.name)
-        needs = case.needs | (case.needs_before if old else set())
-        ahead += needs & by_name.keys() - wanted
+        ahead += case.needs & by_name.keys() - wanted
     return [case for case in corpus() if case.name in wanted]
 
 
@@ -176,8 +172,6 @@ def run_before(cases: list[Case], cache: Path, tree: Callable[[], Path], jobs: i
     if not missing:
         return 0.0
     folder = tree()
-    if not (cache / "old").exists():
-        (cache / "old").symlink_to(".")
     spent = run_cases(missing, cache, folder, BEFORE, jobs)
     if failed := [case.name for case in missing if not is_cached(case, cache)]:
         raise SystemExit("not run as they should with the version before: " + ", ".join(failed))
@@ -225,11 +219,7 @@ def run_cases(cases: list[Case], root: Path, tree: Path, renamed: Renamed, jobs:
     names = {case.name for case in cases}
     done: set[str] = set()
     while waiting or running:
-        ready = (
-            case
-            for case in waiting
-            if not (case.needs | (case.needs_before if renamed is BEFORE else set())) & names - done
-        )
+        ready = (case for case in waiting if not case.needs & names - done)
         while len(running) < jobs and (case := next(ready, None)):
             waiting = [other for other in waiting if other is not case]
             running[fork(lambda case=case: run_case(case, root, tree, renamed))] = case

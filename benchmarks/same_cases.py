@@ -1,7 +1,7 @@
 """The corpus of `same.py`: its inputs, its commands, and what has been renamed since version 0.1.
 
 Commands are written as version 0.1 wants them. What they read is in `../inputs` or in the folder of an
-earlier case, `../CASE`; `../old/CASE` is a folder that version 0.1 wrote, whichever version reads it.
+earlier case, `../CASE`.
 """
 
 from __future__ import annotations
@@ -94,13 +94,7 @@ class Case:
     @property
     def needs(self) -> set[str]:
         """Return the cases whose folders it reads."""
-        found = re.findall(r"\.\./(old/)?([\w-]+)", " ".join(self.commands))
-        return {name for old, name in found if name != "inputs" and not old}
-
-    @property
-    def needs_before(self) -> set[str]:
-        """Return the cases of the version before whose folders it reads."""
-        return set(re.findall(r"\.\./old/([\w-]+)", " ".join(self.commands)))
+        return set(re.findall(r"\.\./([\w-]+)", " ".join(self.commands))) - {"inputs"}
 
 
 IN = "../inputs"
@@ -149,35 +143,16 @@ def corpus() -> list[Case]:
 
 
 def searches() -> list[Case]:
-    """Return the searches, and for some of them what the present tree makes of the files before."""
-    made = [
+    """Return the searches."""
+    return [
         Case(f"search-{name}", (f"escherize {line} --out run",), slow=name.startswith("best"))
         for name, line in SEARCHES.items()
     ]
-    again = [
-        Case(
-            f"old-search-{name}",
-            (
-                f"export ../old/search-{name}/run --format json --out tile.json",
-                f"art ../old/search-{name}/run --picture {IN}/{drawing} --size 200x150 "
-                "--tile-size 90 --out art.png",
-                f"animate ../old/search-{name}/run --kind {kind} --seconds 1 --fps 3 --size 160 "
-                f"--out {kind}.gif",
-            ),
-        )
-        for name, drawing, kind in (
-            ("likeness", "squirrel.svg", "bend"),
-            ("overlap", "squirrel.svg", "morph"),
-            ("occupancy", "squirrel.svg", "grow"),
-            ("pins", "drawing.svg", "bend"),
-        )
-    ]
-    return [*made, *again]
 
 
 def fits() -> list[Case]:
-    """Return the fits, each with scores and samples, and those again with the models of before."""
-    made = [
+    """Return the fits, each with scores and samples."""
+    return [
         Case(
             f"fit-{name}",
             (
@@ -188,8 +163,6 @@ def fits() -> list[Case]:
         )
         for name, line in FITS.items()
     ]
-    again = [Case(f"old-fit-{name}", used(name, f"../old/fit-{name}/model")) for name in FITS]
-    return [*made, *again]
 
 
 def used(name: str, model: str) -> tuple[str, ...]:

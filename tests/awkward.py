@@ -24,6 +24,7 @@ STRANGE: dict[str, Any] = {
     "tiny": 1e-6 * SQUARE,
     "huge": 1e9 * SQUARE,
     "far away": SQUARE + 1e8,
+    "thin": SQUARE * [50.0, 0.005],
     "vertex on a side": np.insert(SQUARE, 1, [1.0, 0.0], axis=0),
     "thin spike": np.insert(SQUARE, 1, [[1.0, 0.0], [1.001, -9.0], [1.002, 0.0]], axis=0),
 }

@@ -15,11 +15,13 @@ from orbiflow.density import DensityEstimator
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, OutputError
 from orbiflow.loading import LoadedRun
 from orbiflow.runtime import find
+from orbiflow.symmetry import wallpaper_group
 from orbiflow.tiles import (
     AnimationSettings,
     ArtSettings,
     EscherTile,
     ExportSettings,
+    Tile,
     TileMap,
     export,
     read_document,
@@ -62,6 +64,84 @@ def test_a_density(folders: Path) -> None:
     assert again.score(data) == pytest.approx(found.score(data), abs=1e-9)
     alone = orbiflow.load(folders / "density" / "density.safetensors")
     assert isinstance(alone, DensityEstimator)
+
+
+def test_flipped_bits_of_a_result_never_give_another_tile(tmp_path: Path) -> None:
+    """What decides, polygon and group, is certified anew: a result.json may be edited by hand."""
+    ring = [
+        [0, 0],
+        [0.6, 0.13],
+        [1.37, 0],
+        [1.5, 0.7],
+        [1.37, 1.21],
+        [0.6, 1.34],
+        [0, 1.21],
+        [0.13, 0.7],
+    ]
+    tile = Tile(np.array(ring), wallpaper_group("p1", np.diag([1.37, 1.21])))
+    folder = orbiflow.save(EscherTile(tile), tmp_path / "saved")
+    whole = (folder / "result.json").read_bytes()
+    loaded = 0
+    for bit in np.random.default_rng(0).integers(0, 8 * len(whole), 300).tolist():
+        data = bytearray(whole)
+        data[bit // 8] ^= 1 << bit % 8
+        (folder / "result.json").write_bytes(data)
+        try:
+            found = orbiflow.load(folder)
+        except OrbiflowError:
+            continue
+        loaded += 1
+        assert isinstance(found, LoadedRun)
+        assert np.abs(found.best.tile.polygon - ring).max() < 1e-6
+        assert np.allclose(found.best.tile.group.lattice, tile.group.lattice)
+    assert 0 < loaded < 200
+
+
+class Frame:
+    """What an estimator takes for a data frame."""
+
+    def __init__(self, values: Any, columns: list[str]) -> None:
+        self.values, self.columns = np.asarray(values), columns
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
+        return self.values if dtype is None else self.values.astype(dtype)
+
+
+@pytest.mark.parametrize("name", ["fit", "fit.safetensors"])
+@pytest.mark.parametrize("columns", [["phi", "psi"], None])
+def test_an_estimator_is_saved_with_its_names(
+    tmp_path: Path, name: str, columns: list[str] | None
+) -> None:
+    angles = np.degrees(np.random.default_rng(0).vonmises([0.5, -1.0], 6.0, (60, 2)))
+    data = angles if columns is None else Frame(angles, columns)
+    fit = DensityEstimator("torus", unit="degrees", components="kernels", seed=4).fit(data)
+    path = orbiflow.save(fit, tmp_path / name)
+    assert path == tmp_path / name
+    found = orbiflow.load(path)
+    assert isinstance(found, DensityEstimator)
+    assert np.array_equal(found.score_samples(angles), fit.score_samples(angles))
+    assert list(getattr(found, "feature_names_in_", [])) == (columns or [])
+    assert found.unit == "degrees"
+    if path.is_dir():
+        assert (found.components, found.seed) == ("kernels", 4)
+        assert found.report_.validation_nll == fit.report_.validation_nll
+        orbiflow.save(found, path)  # in its own place
+    again = orbiflow.load(orbiflow.save(found, tmp_path / "again"))
+    assert isinstance(again, DensityEstimator)
+    assert np.array_equal(again.score_samples(angles), fit.score_samples(angles))
+    if columns:
+        part = orbiflow.load(orbiflow.save(fit.marginal("psi"), tmp_path / "part"))
+        assert isinstance(part, DensityEstimator)
+        assert part.feature_names_in_.tolist() == ["psi"]
+
+
+def test_estimators_that_cannot_be_saved(tmp_path: Path) -> None:
+    with pytest.raises(OrbiflowError, match="was not fitted"):
+        orbiflow.save(DensityEstimator(), tmp_path / "none")
+    (tmp_path / "letter.txt").write_text("mine")
+    fit = DensityEstimator(components="kernels").fit(np.random.default_rng(0).normal(size=(40, 2)))
+    with pytest.raises(OutputError, match=r"holds letter\.txt"):
+        orbiflow.save(fit, tmp_path)
 
 
 def test_a_run_and_its_tiles(folders: Path, tmp_path: Path) -> None:

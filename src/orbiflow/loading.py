@@ -8,9 +8,17 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from orbiflow.arguments import as_path
-from orbiflow.density import MODEL, REPORT, DensityEstimator, read_density, report_from_json
+from orbiflow.density import (
+    MODEL,
+    REPORT,
+    DensityEstimator,
+    density_to_bytes,
+    read_density,
+    report_from_json,
+    written_files,
+)
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
-from orbiflow.runtime import is_list, read_json
+from orbiflow.runtime import ResultFolder, is_list, read_json, write_atomic, write_json
 from orbiflow.tiles import (
     RESULT,
     TILE_MODEL,
@@ -100,17 +108,46 @@ def load(path: str | Path, *, uncertified: bool = False) -> Loaded:
     return _tile_folder(path if path.is_dir() else path.parent, uncertified)
 
 
-def save(what: EscherTile | Sequence[EscherTile] | LoadedRun, path: str | Path) -> Path:
-    """Save tiles so that `load` returns them again.
+def save(
+    what: EscherTile | Sequence[EscherTile] | LoadedRun | DensityEstimator, path: str | Path
+) -> Path:
+    """Save tiles or a fitted density so that `load` returns them again.
 
     Args:
-        what: A tile, or tiles of one search, best first.
-        path: The folder to write.
+        what: A tile, tiles of one search, best first, or a fitted `DensityEstimator`, of which its
+            density, unit, columns' names, settings and the report of its fit are kept.
+        path: The folder to write; for an estimator also a file that ends in .safetensors, which holds
+            all but settings and report.
 
     Raises:
+        OrbiflowError: for an estimator that was not fitted, or a density that files do not hold.
         OutputError: if the folder holds anything else, or cannot be written.
     """
+    if isinstance(what, DensityEstimator):
+        return _save_estimator(what, as_path(path, "the folder to write into"))
     return save_tiles([what] if isinstance(what, EscherTile) else list(what), path)
+
+
+def _save_estimator(estimator: DensityEstimator, path: Path) -> Path:
+    if not hasattr(estimator, "density_"):
+        raise OrbiflowError("the estimator was not fitted, so there is nothing to save: call fit")
+    columns = [str(name) for name in getattr(estimator, "feature_names_in_", ())]
+    content = density_to_bytes(estimator.density_, columns=columns)
+    if path.suffix == ".safetensors":
+        return write_atomic(path, content)
+    space, report = estimator.space_, getattr(estimator, "report_", None)
+    document: dict[str, Any] = {
+        "space": {"name": space.name, **space.settings()},
+        "columns": columns,
+        "report": {"error": estimator.density_.error} if report is None else report.to_json(),
+    }
+    if report is not None:
+        document["settings"] = {name: getattr(estimator, name) for name in _SETTINGS}
+    folder = ResultFolder(path, written_files)
+    with folder.replaced() as staged:
+        write_atomic(staged / MODEL, content)
+        write_json(staged / REPORT, document)
+    return folder.path
 
 
 def _estimator(path: Path) -> DensityEstimator:
@@ -122,19 +159,17 @@ def _estimator(path: Path) -> DensityEstimator:
     try:
         if "settings" in document:  # a marginal or a conditional was not fitted
             report = report_from_json(document["report"])
-            settings = _settings(dict(document["settings"]))
+            given = dict(document["settings"])
+            settings = {name: given[name] for name in _SETTINGS if name in given}
+        if unit := density.space.settings().get("unit"):
+            settings["unit"] = unit
         return DensityEstimator.fitted(density, report, extra.get("columns"), **settings)
     except (KeyError, TypeError, ValueError) as error:
         raise InputFileError(f"{beside}: not the report of a density: {error}") from error
 
 
-def _settings(settings: dict[str, Any]) -> dict[str, Any]:
-    """The settings of a fit as the estimator has them; version 0.1 had other names for two."""
-    settings = {
-        {"parts": "components", "detail": "max_frequency"}.get(k, k): v for k, v in settings.items()
-    }
-    own = ("components", "repeats", "missing", "max_frequency", "segments", "seed")
-    return {name: settings[name] for name in own if name in settings}
+_SETTINGS = ("components", "repeats", "missing", "max_frequency", "segments", "seed")
+"""Those of a fit that the estimator has as well."""
 
 
 def _run(path: Path, uncertified: bool) -> LoadedRun:

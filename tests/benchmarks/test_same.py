@@ -119,7 +119,7 @@ def test_a_case_comes_after_those_that_it_reads(module) -> None:
     seen: set[str] = set()
     for case in cases:
         assert case.name not in seen
-        assert case.needs | case.needs_before <= seen | {"nowhere"}
+        assert case.needs <= seen | {"nowhere"}
         seen.add(case.name)
 
 

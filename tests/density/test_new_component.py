@@ -31,6 +31,7 @@ from orbiflow.density import (
     read_density,
 )
 from orbiflow.errors import InputFileError, OrbiflowError
+from sealed import sealed
 
 
 # The walk: from here ...
@@ -143,7 +144,7 @@ def test_what_is_missing_is_said(tmp_path: Path) -> None:
     with pytest.raises(OrbiflowError, match=r"Bare.* a kind"):
         density_to_bytes(Mixture([Bare(TORUS, 0.1)], [1.0]))
     path = tmp_path / "density.safetensors"
-    path.write_bytes(density_to_bytes(Wave(TORUS, 0.1)).replace(b"wave", b"wove"))
+    path.write_bytes(sealed(density_to_bytes(Wave(TORUS, 0.1)).replace(b"wave", b"wove")))
     with pytest.raises(InputFileError, match="wove"):
         read_density(path)
     with pytest.raises(OrbiflowError, match="taken"):

@@ -70,6 +70,36 @@ def test_tolerances_scale_with_the_values(cells):
     assert_equivariant(lambda p: field(p) + 1e-6, p2, cells=cells, atol=1e-5)
 
 
+@pytest.mark.parametrize("metres", [4e-10, 1e-6, 1.0, 3e8])
+@pytest.mark.parametrize("name", ["p2", "pg", "p4g", "p6m"])
+def test_maps_are_measured_in_cells_whatever_the_unit(name, metres):
+    group = wallpaper_group(name)
+    group = group.conjugate(metres * torch.eye(2).numpy(), [0.0, 0.0])
+    shift = torch.tensor([0.28 * metres, 0.0], dtype=torch.float64)
+    assert_equivariant(lambda p: p, group, kind="map")
+    assert_equivariant(lambda p: p * (1 + 1e-12), group, kind="map")
+    with pytest.raises(EquivarianceError):  # it commutes with translations alone
+        assert_equivariant(lambda p: p + shift * torch.tensor([1.0, 0.5]).to(p), group, kind="map")
+    with pytest.raises(EquivarianceError):
+        assert_equivariant(lambda p: p * (1 + 1e-7), group, kind="map")
+
+
+@pytest.mark.parametrize("unit", [1e-12, 1.0, 1e20])
+def test_fields_and_invariants_are_measured_by_their_own_size(unit):
+    group = wallpaper_group("p4")
+    group = group.conjugate(1e-9 * torch.eye(2).numpy(), [0.0, 0.0])
+    field = random_field(group, 2, 0)
+    scale = unit / float(field(torch.zeros(1, 2, dtype=torch.float64) + 1e-10).detach().abs().max())
+    assert_equivariant(lambda p: scale * field(p), group)
+    wrong = torch.tensor([1e-6 * unit, 0.0], dtype=torch.float64)
+    with pytest.raises(EquivarianceError):
+        assert_equivariant(lambda p: scale * field(p) + wrong, group)
+    wave = torch.tensor([2e9 * torch.pi, 0.0], dtype=torch.float64)
+    with pytest.raises(EquivarianceError):
+        assert_equivariant(lambda p: unit * torch.cos(p @ wave), group, kind="invariant")
+    assert_equivariant(lambda p: 0.0 * p[:, 0], group, kind="invariant")
+
+
 def test_mistakes_are_refused():
     p2 = wallpaper_group("p2")
     with pytest.raises(OrbiflowError, match="kind must be"):

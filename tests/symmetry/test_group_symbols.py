@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.errors import GroupError
-from orbiflow.symmetry import group_by_name, space_group
+from orbiflow.symmetry import WALLPAPER_GROUPS, group_by_name, space_group, wallpaper_group
 from orbiflow.symmetry.group_symbols import USUAL, find_hall, find_setting, plain
 
 TABLE = list(gemmi.spacegroup_table())
@@ -130,20 +130,7 @@ def test_names_that_people_write(name: str, setting: str) -> None:
             "P2/_c",
             "P21/c/c",
         ),
-        *(
-            "P21_/c",
-            "P2__1",
-            "P 21c",
-            "P21-c",
-            "P2_1/",
-            "/P21",
-            "P",
-            "P-",
-            "_",
-            ":",
-            "P:1",
-            "P 21:1",
-        ),
+        *("P21_/c", "P 21c", "P21-c", "P2_1/", "/P21", "P", "P-", "_", ":", "P:1", "P 21:1"),
         *(
             "Pnma:2",
             "Fd-3m:3",
@@ -215,3 +202,13 @@ def test_groups_of_spaces_by_typeset_names() -> None:
     assert group_by_name("P2_1/c").name == "P 1 21/c 1"
     with pytest.raises(GroupError):
         group_by_name("C2_1")
+
+
+@pytest.mark.parametrize("name", WALLPAPER_GROUPS)
+def test_plane_groups_are_read_with_blanks_or_refused(name: str) -> None:
+    for written in (" ".join(name), f" {name} ", f"${name}$"):
+        assert wallpaper_group(written).name == name
+        assert group_by_name(written).name == name
+    for wrong in (f"{name}x", f"{name[0]}_{name[1:]}", name.upper()):
+        with pytest.raises(GroupError, match="unknown wallpaper group"):
+            wallpaper_group(wrong)

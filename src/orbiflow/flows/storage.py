@@ -99,9 +99,6 @@ class Reader:
             inner = self.field(header["field"], f"{place}.field", nesting + 1)
             group, periodic = self._group(header), bool(header["periodic"])
             return Symmetrized(inner, group, periodic=periodic, along=header.get("along"))
-        if kind == "torus-network":
-            what = f"{place} is a NeuralTorusField"
-            raise OrbiflowError(f"{what}, which orbiflow no longer has: use orbiflow 0.1")
         if kind == "perceptron":
             return self._perceptron(header, place)
         if kind == "own":

@@ -1,7 +1,11 @@
-"""Files of named tensors with a JSON header beside them: safetensors, never pickle."""
+"""Files of named tensors with a JSON header and a checksum: safetensors, never pickle.
+
+A checksum is the SHA-256 of the whole file with zeros in its own place: no bit can change unnoticed.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -22,6 +26,9 @@ Values = TypeVar("Values")
 MAX_BYTES, MAX_HEADER = 256 * 2**20, 2**20
 KEY = "orbiflow"
 """Under which the header stands among the file's metadata."""
+CHECKSUM = "checksum"
+"""Under which the checksum stands in the header, its first entry."""
+_ZEROS = "0" * hashlib.sha256().digest_size * 2
 
 
 def tensor_bytes(
@@ -30,18 +37,54 @@ def tensor_bytes(
     """The content of a file that `read_tensors` reads again; `what` it holds is for messages."""
     from safetensors.torch import save
 
+    alone = {name: t.detach().cpu().contiguous().clone() for name, t in tensors.items()}
+    return _sealed(header, what, KEY, lambda metadata: save(alone, metadata=metadata))
+
+
+def array_bytes(
+    header: Mapping[str, Any], arrays: Mapping[str, Array], what: str, *, key: str = KEY
+) -> bytes:
+    """The content of a file that `read_arrays` reads again, as `tensor_bytes`."""
+    from safetensors.numpy import save
+
+    own = dict(arrays)
+    return _sealed(header, what, key, lambda metadata: save(own, metadata=metadata))
+
+
+def _sealed(
+    header: Mapping[str, Any], what: str, key: str, save: Callable[[dict[str, str]], bytes]
+) -> bytes:
+    """Return a file with its checksum; it has one entry of metadata, as several are in random order."""
     try:
-        text = json.dumps(header, allow_nan=False)
+        text = json.dumps({CHECKSUM: _ZEROS, **header}, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise OrbiflowError(f"what is saved beside {what} must be JSON: {error}") from error
-    alone = {name: t.detach().cpu().contiguous().clone() for name, t in tensors.items()}
-    data = save(alone, metadata={KEY: text})
+    data = save({key: text})
     if int.from_bytes(data[:8], "little") > MAX_HEADER or len(data) > MAX_BYTES:
         raise OrbiflowError(
             f"the file would have {len(data) / 2**20:.1f} MB, {len(text) / 2**20:.1f} MB of them "
             f"header; at most {MAX_BYTES / 2**20:g} and {MAX_HEADER / 2**20:g} are read again"
         )
-    return data
+    return data.replace(_entry(_ZEROS), _entry(hashlib.sha256(data).hexdigest()), 1)
+
+
+def _entry(digest: str) -> bytes:
+    """Return the checksum as it stands in a file: JSON within a text of JSON."""
+    return json.dumps(json.dumps({CHECKSUM: digest})[1:-1])[1:-1].encode()
+
+
+def _check_sum(data: bytes, digest: object) -> str:
+    """Return what is wrong with a file by its checksum, "" if nothing is."""
+    if not isinstance(digest, str) or len(digest) != len(_ZEROS):
+        return (
+            "it has no checksum, so whether it is damaged cannot be told; it is of an earlier orbiflow "
+            "or was changed: save it again with this one"
+        )
+    if hashlib.sha256(data.replace(_entry(digest), _entry(_ZEROS), 1)).hexdigest() != digest:
+        return (
+            "it was damaged or changed after it was saved: its checksum does not match; use a copy"
+        )
+    return ""
 
 
 def read_tensors(path: str | Path, what: str) -> tuple[dict[str, Any], dict[str, Tensor]]:
@@ -76,7 +119,12 @@ def _read(
             )
         data = path.read_bytes()
     try:
-        return _header(data, key), load(data)
+        header = _header(data, key)
+        if wrong := _check_sum(data, header.pop(CHECKSUM, None)):
+            raise InputFileError(f"{path}: {wrong}")
+        return header, load(data)
+    except InputFileError:
+        raise
     except (SafetensorError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputFileError(
             f"{path}: not {what} saved by orbiflow, or damaged ({error})"

@@ -71,13 +71,15 @@ _OTHER_SYMBOLS = {
 
 def short_symbol(name: str) -> str:
     """Return the short symbol of a wallpaper group, and any other name as it is."""
-    return _OTHER_SYMBOLS.get(str(name).replace("×", "x"), name)
+    plain = str(name).replace("×", "x").replace(" ", "").strip("$")
+    return plain if plain in WALLPAPER_GROUPS else _OTHER_SYMBOLS.get(plain, name)
 
 
 def wallpaper_group(name: str, lattice: ArrayLike | None = None) -> CrystallographicGroup:
     """Return the wallpaper group `name`, one of `WALLPAPER_GROUPS`.
 
-    The full symbol of the IUC ("p2mg") and the orbifold's ("22*") name the same group as the short one.
+    The full symbol of the IUC ("p2mg" or "p 2 m g") and the orbifold's ("22*") name the same group as
+    the short one.
     The lattice has basis vectors as columns, (2, 2); by default it is one of the group's system.
     Raises `GroupError` for an unknown name, or a lattice that is not of the group's system.
 

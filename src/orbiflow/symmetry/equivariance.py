@@ -15,6 +15,7 @@ from orbiflow.symmetry.isometry import Isometry, translation
 from orbiflow.typed_torch import listed
 
 Kind = Literal["field", "map", "invariant"]
+ROUNDING = 1e-13  # of values that come out as zero: of fields in cells, of invariants as they are
 _LAWS = {"field": "V(g p) = R_g V(p)", "map": "D(g p) = g D(p)", "invariant": "f(g p) = f(p)"}
 
 
@@ -38,7 +39,7 @@ def assert_equivariant(
     kind: Kind = "field",
     along: str | None = None,
     points: Tensor | None = None,
-    atol: float = 1e-9,
+    atol: float | None = None,
     rtol: float = 1e-9,
     cells: int = 1,
     seed: int = 0,
@@ -58,7 +59,10 @@ def assert_equivariant(
         kind: "field", "map" or "invariant".
         along: The axes that the group is periodic along, as for `symmetrize`. Default: all.
         points: Points (N, d). Default: 32 random float64 points in a cell.
-        atol, rtol: Deviations up to atol + rtol times the largest value are accepted.
+        atol: The deviation that is accepted whatever the values, in their unit. Default: of maps 1e-9
+            of the cell's size, which is the d-th root of its volume; of fields and invariants, whose
+            own values say how large they are, rounding alone.
+        rtol: The deviation that is accepted beside it, relative to the largest value.
         cells: The number of cells to move by.
         seed: The seed of the default points.
 
@@ -93,7 +97,8 @@ def assert_equivariant(
         if worst is None or not largest <= worst[0]:
             at = points[int(errors.reshape(len(points), -1).amax(dim=1).argmax())]
             worst = (largest, number, element, at)
-    allowed = atol + rtol * float(values.abs().max())
+    allowed = _least(group, kind) if atol is None else atol
+    allowed += rtol * float(values.abs().max())
     if worst is not None and not worst[0] <= allowed:
         error, number, element, at = worst
         raise EquivarianceError(
@@ -102,6 +107,12 @@ def assert_equivariant(
             element,
             error,
         )
+
+
+def _least(group: CrystallographicGroup, kind: Kind) -> float:
+    """Return the deviation that is accepted where values vanish."""
+    size = group.cell_volume ** (1 / group.dim)
+    return {"map": 1e-9 * size, "field": ROUNDING * size, "invariant": ROUNDING}[kind]
 
 
 def _elements(

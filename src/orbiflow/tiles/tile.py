@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 from collections.abc import Generator
 from dataclasses import KW_ONLY, dataclass, field, replace
@@ -16,7 +15,7 @@ import numpy as np
 from orbiflow.arguments import as_instance, as_path
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
-from orbiflow.runtime import read_arrays
+from orbiflow.runtime import array_bytes, read_arrays
 from orbiflow.tiles.geometry import border
 from orbiflow.tiles.likeness import (
     Fidelity,
@@ -40,9 +39,9 @@ if TYPE_CHECKING:
 
 FORMAT = "orbiflow-tile/1"
 MAX_BYTES = 64 * 2**20
-# Arrays of the map from the silhouette. Earlier files have none, and earlier readers skip them.
+# Arrays of the map from the silhouette, which files may lack.
 BENDING = ("bending.rest", "bending.images", "bending.triangles")
-# Entry of the settings in a file. Files of version 0.1 lack it, and their readers skip it.
+# Entry of the settings in a file, which files may lack.
 FRAME = "frame"
 SAME = 1e-6  # largest distance of the map's outline from the tile's, in square roots of its area
 
@@ -65,26 +64,23 @@ class TileMap:
 
     def to_bytes(self) -> bytes:
         """Return the contents of a `model.safetensors` file."""
-        from safetensors.numpy import save
-
-        # one entry: the library writes several in random order, and the same seed gives one file
         frame = {} if self.frame is None else {FRAME: self.frame.as_dict()}
-        metadata = {FORMAT: json.dumps({**self.settings, **frame}, sort_keys=True)}
+        header = dict(sorted({**self.settings, **frame}.items()))
         own = self.bending
         parts = () if own is None else (own.rest, own.images, own.triangles)
         stored = {**self.arrays, **dict(zip(BENDING, parts, strict=False))}
         arrays = {name: np.array(a, order="C") for name, a in stored.items()}  # keeps 0-d
-        return save(arrays, metadata=metadata)
+        return array_bytes(header, arrays, "a tile model", key=FORMAT)
 
     @classmethod
     def read(cls, path: str | Path) -> TileMap:
         """Read a `model.safetensors` that `orbiflow escherize` wrote.
 
-        Files of version 0.1 may lack the frame and the bending. The flow's parameters are checked
-        when a model is made of them, by `load_model`.
+        It may lack the frame and the bending. The flow's parameters are checked when a model is made of
+        them, by `load_model`.
 
         Raises:
-            InputFileError: if the file is missing, too large or of another kind.
+            InputFileError: if the file is missing, too large, damaged or of another kind.
         """
         path = as_path(path, "the model's file")
         settings, arrays = read_arrays(path, "a tile model", key=FORMAT, max_bytes=MAX_BYTES)

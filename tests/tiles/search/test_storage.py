@@ -1,6 +1,5 @@
 """Fitted tiles on disk."""
 
-import json
 import pickle
 from collections.abc import Callable
 from pathlib import Path
@@ -14,19 +13,10 @@ from hypothesis import strategies as st
 from safetensors.numpy import save
 
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.tiles import (
-    CLASSES,
-    Bending,
-    Frame,
-    TileMap,
-    TileModel,
-    as_map,
-    as_model,
-    certify,
-    load_model,
-)
+from orbiflow.tiles import CLASSES, Bending, Frame, TileMap, TileModel, as_map, as_model, load_model
 from orbiflow.tiles.search.tile_model import extract_tile
 from orbiflow.tiles.tile import BENDING, FORMAT, MAX_BYTES
+from sealed import sealed
 from strategies import seeds
 
 
@@ -85,22 +75,6 @@ def test_a_restored_model_gives_the_same_polygon(tmp_path: Path) -> None:
     assert np.array_equal(tile.group.lattice, again.group.lattice)
 
 
-OLD = Path(__file__).parent / "data" / "tile-1"
-
-
-def test_a_file_of_version_0_1_is_read_as_it_was() -> None:
-    path = OLD.with_suffix(".safetensors")
-    expected = json.loads(OLD.with_suffix(".json").read_text())
-    assert TileMap.read(path).frame is None
-    model = load_model(path)
-    with torch.no_grad():
-        images = model(torch.tensor(expected["points"], dtype=torch.float64)[None])[0].numpy()
-    assert np.abs(images - expected["images"]).max() < 1e-12
-    tile, _ = extract_tile(model)
-    assert np.abs(tile.polygon[list(tile.corners)] - expected["corners"]).max() < 1e-9
-    assert certify(tile).valid
-
-
 def test_the_frame_is_kept_bit_for_bit(tmp_path: Path) -> None:
     frame = Frame(np.diag([0.1, -0.1]), np.array([1 / 3, 1e7]), "image", (640, 480))
     path = tmp_path / "model.safetensors"
@@ -136,7 +110,6 @@ def test_files_without_a_bending_have_none(tmp_path: Path) -> None:
     path = tmp_path / "model.safetensors"
     path.write_bytes(good())
     assert TileMap.read(path).bending is None
-    assert TileMap.read(OLD.with_suffix(".safetensors")).bending is None
 
 
 def with_bending(name: str, array: np.ndarray | None) -> Callable[[], bytes]:
@@ -241,15 +214,16 @@ BAD_FILES: dict[str, tuple[Callable[[], bytes], str]] = {
     "pickle": (lambda: pickle.dumps({"angle": 0.0}), "not a tile model saved by orbiflow"),
     "text": (lambda: b"hello, world, this is no model\n" * 9, "not a tile model saved by orbiflow"),
     "cut in the header": (lambda: good()[:100], "not a tile model saved by orbiflow"),
-    "cut in the data": (lambda: good()[:-8], "not a tile model saved by orbiflow"),
-    "one byte more": (lambda: good() + b"\0", "not a tile model saved by orbiflow"),
+    "cut in the data": (lambda: good()[:-8], "damaged"),
+    "one byte more": (lambda: good() + b"\0", "damaged"),
     "header length": (lambda: b"\xff" * 8 + good()[8:], "not a tile model saved by orbiflow"),
     "no metadata": (with_metadata(None), "no 'orbiflow-tile/1'"),
     "other format": (with_metadata({"format": "pt"}), "no 'orbiflow-tile/1'"),
     "no settings": (with_metadata({FORMAT: "null"}), "not a tile model saved"),
     "settings no JSON": (with_metadata({FORMAT: "{"}), "not a tile model saved"),
     "settings a list": (with_metadata({FORMAT: "[1, 2]"}), "not a tile model saved by orbiflow"),
-    "settings empty": (with_metadata({FORMAT: "{}"}), "settings"),
+    "no checksum": (with_metadata({FORMAT: "{}"}), "has no checksum"),
+    "settings empty": (lambda: sealed(with_metadata({FORMAT: "{}"})()), "settings"),
     "settings nested": (with_metadata({FORMAT: NESTED}), "not a tile model saved"),
     "unknown class": (with_settings(**{"class": "IH94"}), "unknown isohedral class 'IH94'"),
     "class a number": (with_settings(**{"class": 1e300}), "unknown isohedral class"),
@@ -265,7 +239,7 @@ BAD_FILES: dict[str, tuple[Callable[[], bytes], str]] = {
     "steps true": (with_settings(steps=True), "whole number from 1 to 1000000, got True"),
     "method": (with_settings(method="rk99"), "rk99"),
     "smoothness NaN": (
-        with_settings(smoothness=float("nan")),
+        lambda: sealed(with_settings(smoothness=77.5)().replace(b"77.5", b" NaN")),
         "smoothness must be .*from 0 to 100",
     ),
     "smoothness huge": (with_settings(smoothness=1e308), "smoothness must be .*from 0 to 100"),
@@ -319,18 +293,9 @@ def test_a_damaged_file_never_gives_anything_but_an_error(
 ) -> None:
     content = bytearray(good())
     header = 8 + int.from_bytes(content[:8], "little")
-    position = data.draw(st.integers(0, header - 1))
+    position = data.draw(st.integers(0, len(content) - 1) | st.integers(0, header - 1))
     content[position] ^= data.draw(st.integers(1, 255))
     path = tmp_path_factory.mktemp("damaged") / "model.safetensors"
     path.write_bytes(content)
-    try:
-        model = load_model(path)
-    except InputFileError:
-        return
-    assert all(torch.isfinite(p).all() for p in model.parameters())
-
-
-def test_settings_are_plain_json() -> None:
-    saved = as_map(candidate("IH2", 5))
-    assert json.loads(json.dumps(saved.settings)) == saved.settings
-    assert all(array.dtype == np.float64 for array in saved.arrays.values())
+    with pytest.raises(InputFileError):
+        load_model(path)

@@ -236,3 +236,28 @@ def test_needles_finer_than_rounding_are_refused_in_words() -> None:
         assert certificate.valid == (not certificate.reasons)
         found.extend(certificate.reasons)
     assert any("thinner than 1e-12" in reason for reason in found)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, np.pi / 2])
+@pytest.mark.parametrize(
+    ("lattice", "turns"),
+    [
+        ([[100.0, 0.0], [0.0, 0.01]], False),
+        ([[100.0, 0.0], [0.0, 0.02]], True),  # half turns make the other row
+        ([[100.0, 50.0], [0.0, 0.01]], False),  # bricks
+        ([[100.0, 100.0], [0.01, 0.0]], False),
+    ],
+)
+def test_thin_rectangles_tile(turn: float, lattice: Any, turns: bool) -> None:
+    rectangle = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 0.01], [0.0, 0.01]])
+    elements = [rotation((50.0, 0.01), 2)] * turns
+    group = CrystallographicGroup.generate(np.array(lattice), elements)
+    turned = group.conjugate(rotation_matrix(turn), np.zeros(2))
+    assert certify(Tile(rectangle @ rotation_matrix(turn).T, turned)).valid
+    for wrong in ((1.001, 1.0), (1.0, 1.1), (1.0, 0.5)):
+        assert not certify(Tile((rectangle * wrong) @ rotation_matrix(turn).T, turned)).valid
+
+
+def test_a_tile_in_other_units_than_its_group_is_refused_at_once() -> None:
+    certificate = certify(square(1000.0))
+    assert "have the same units" in certificate.reasons[0]

@@ -22,10 +22,6 @@ from orbiflow.symmetry import CrystallographicGroup, group_header
 
 FORMAT = "orbiflow-density/5"
 
-FORMATS_BEFORE = tuple(f"orbiflow-density/{number}" for number in (1, 2, 3, 4))
-"""Formats of version 0.1, which are read: the first has one smoothness for all segments, and no group;
-the second no chains beside a flow; the third no network."""
-
 
 def density_to_bytes(density: Density, **extra: Any) -> bytes:
     """Return a density as bytes that `read_density` makes the same again.
@@ -66,15 +62,16 @@ def _checked_space(space: Space) -> Space:
 
 
 def read_density(path: str | Path) -> tuple[Density, dict[str, Any]]:
-    """Return a saved density, float64, and what was saved with it; files of version 0.1 as well."""
+    """Return a saved density, float64, and what was saved with it.
+
+    Raises `InputFileError` for a file that is missing, no density, or damaged: no bit may have changed.
+    """
     header, tensors = read_tensors(path, "a density")
     try:
-        if header["format"] not in (FORMAT, *FORMATS_BEFORE):
+        if header["format"] != FORMAT:
             raise ValueError(f"format {header['format']!r}")
         with torch.inference_mode(False):  # what is made in it could never be differentiated
             return _restored(header, tensors), header["extra"]
-    except _NeuralFlowError as error:
-        raise InputFileError(f"{path}: {error}") from error
     except (OrbiflowError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputFileError(
             f"{path}: not a density saved by orbiflow, or damaged ({error})"
@@ -86,55 +83,9 @@ def _restored(header: dict[str, Any], tensors: dict[str, Tensor]) -> Density:
         import_module(f"orbiflow.density.models.{module}")
     options = dict(header["space"])
     space = make_space(str(options.pop("name")), **options)
-    if header["format"] != FORMATS_BEFORE[0] and space.has_chart:
+    if space.has_chart:
         check_group(header["group"], space.group)
-    if header["format"] == FORMAT:
-        return density_from(space, header["density"], tensors)
-    return _of_version_0_1(space, header, tensors)
-
-
-class _NeuralFlowError(OrbiflowError):
-    """A file of version 0.1 holds a neural flow."""
-
-
-def _of_version_0_1(space: Space, header: dict[str, Any], tensors: dict[str, Tensor]) -> Density:
-    """Make a density of a file with a flow and a base and, if it has weights, other components.
-
-    A density without a flow had one of weight 0, which is left out.
-    """
-    weights = tensors.get("shares")
-    if weights is None:
-        return _flow_of_version_0_1(space, header, tensors)
-    components = [_flow_of_version_0_1(space, header, tensors)] if weights[0] > 0 else []
-    names = ("centers", "concentrations", "weights")
-    kernels = {name: tensors[f"kernel_{name}"] for name in names}
-    count = {"kind": "kernels", "kernels": len(kernels["centers"])}
-    components += [
-        density_from(space, count, kernels),
-        density_from(space, {"kind": "uniform"}, {}),
-    ]
-    for kind in ("chains", "network"):
-        if header.get(kind) is not None:
-            own = {**header[kind], "kind": kind}
-            components.append(density_from(space, own, within(tensors, f"{kind}.")))
-    return cast(Any, KINDS["mixture"])(components, weights[weights > 0])
-
-
-def _flow_of_version_0_1(
-    space: Space, header: dict[str, Any], tensors: dict[str, Tensor]
-) -> Density:
-    base = dict(header["base"])
-    if base["kind"] == "mixture":
-        base["kind"] = "chains"
-    if header["flow"]["kind"] == "neural":
-        if any(bool(t.any()) for name, t in tensors.items() if name.startswith("flow.last.")):
-            raise _NeuralFlowError(
-                f"it holds a neural flow on a torus of {space.dim} angles, which orbiflow has no "
-                "longer: fit the data again without one, or use this file with orbiflow 0.1"
-            )
-        # the field is zero, and the density that of its base
-        return density_from(space, base, within(tensors, "base."))
-    return density_from(space, {"kind": "flow", "flow": header["flow"], "base": base}, tensors)
+    return density_from(space, header["density"], tensors)
 
 
 def density_parts(
@@ -282,11 +233,11 @@ def _segment(number: int, field: Any, space: Space) -> dict[str, Any]:
 def series_from_header(
     header: Mapping[str, Any], tensors: Mapping[str, Tensor], space: Space
 ) -> Flow:
-    """Make the flow of `series_parts` again; headers of the first files of version 0.1 work as well."""
+    """Make the flow of `series_parts` again."""
     if space.dim > MAX_DIM:
         raise ValueError(f"a flow of Fourier or spline fields has {MAX_DIM} dimensions at most")
     if header["kind"] != "series":
-        header, tensors = _of_version_1(header, tensors["parameters"])
+        raise ValueError(f"a flow of kind {header['kind']!r}")
     segments = header["segments"]
     if not is_list(segments) or not 1 <= len(segments) <= MAX_SEGMENTS:
         raise ValueError("no segments, or too many")
@@ -297,17 +248,6 @@ def series_from_header(
         duration=as_number(header["duration"], "duration"),
         warn=False,  # the fit has settled them and said if it could not
     )
-
-
-def _of_version_1(
-    header: Mapping[str, Any], stack: Tensor
-) -> tuple[Mapping[str, Any], Mapping[str, Tensor]]:
-    """Translate a header whose segments had one kind, and their parameters one tensor."""
-    if stack.dim() != 2 or not 1 <= len(stack) <= MAX_SEGMENTS:
-        raise ValueError(f"parameters of shape {tuple(stack.shape)}")
-    shared = {name: header[name] for name in ("kind", "max_frequency", "smoothness")}
-    tensors = {f"flow.{k}": row for k, row in enumerate(stack)}
-    return {**header, "segments": [shared] * len(stack)}, tensors
 
 
 def _field(header: Mapping[str, Any], row: Tensor, space: Space) -> InvariantField:

@@ -22,12 +22,12 @@ from orbiflow.tiles.tilings.tile_copies import (
     Placed,
     copies_meeting,
     copies_near,
+    expected_near,
     prototile_of,
 )
 from orbiflow.tiles.tilings.tiling import Tiles, Tiling, as_tiling
 
-# the largest radius, in square roots of the expected area, of a tile whose images are listed
-MAX_SPAN = 12.0
+MAX_AROUND = 40_000  # the most tiles whose boxes meet that of a tile, for these to be listed
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +81,14 @@ class Surroundings:
 def surroundings(tiling: Tiling, prototile: int, margin: float) -> Surroundings:
     """Return the tiles whose box is within `margin`, in tile sizes, of a prototile's, nearest first."""
     scale = math.sqrt(tiling.tile_area)
-    if tiling.radius > MAX_SPAN * scale:
-        raise OrbiflowError(
-            f"the tile's radius is {tiling.radius / scale:.0f} times the size that its group allows "
-            "for: check that polygon and group belong together and have the same units"
-        )
     own = tiling.prototiles[prototile]
+    count = expected_near(tiling, *(own.box[1] - own.box[0] + 2 * margin * scale))
+    if count > MAX_AROUND:
+        raise OrbiflowError(
+            f"the tile's radius is {own.radius / scale:.0f} times the size that its group allows for, "
+            f"and about {count:.0f} tiles would lie around it: check that polygon and group belong "
+            "together and have the same units"
+        )
     if any(len(p.ring) < 3 for p in tiling.prototiles):
         raise OrbiflowError("the tile's polygon has fewer than three distinct vertices")
     (left, bottom), (right, top) = own.box + margin * scale * np.array([[-1.0], [1.0]])

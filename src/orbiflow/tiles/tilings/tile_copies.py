@@ -220,6 +220,12 @@ def copies_near(tiling: Tiling, window: Window, *, whole: bool) -> Copies:
     return Copies(tiling, aspects, cells)
 
 
+def expected_near(tiling: Tiling, width: float, height: float) -> float:
+    """Return about how many tiles have a bounding box that meets a window of this size."""
+    low, high = aspect_boxes(tiling)
+    return float(((high - low) + (width, height)).prod(axis=1).sum() / tiling.group.cell_volume)
+
+
 def aspect_boxes(tiling: Tiling) -> tuple[Array, Array]:
     """Return the lower left and upper right corners (A, 2) of the boxes of the tiles of a cell."""
     table, group = tiling.aspects, tiling.group
@@ -268,9 +274,8 @@ def _by_rows(copies: Copies) -> Copies:
 
 def _refuse_too_many(tiling: Tiling, window: Window) -> None:
     width, height = window[2] - window[0], window[3] - window[1]
-    size, reach = tiling.tile_area, 2 * tiling.radius
-    count = width * height / size
-    if (width + reach) * (height + reach) / size > 2 * MAX_TILES or count > MAX_TILES:
+    count = width * height / tiling.tile_area
+    if expected_near(tiling, width, height) > 2 * MAX_TILES or count > MAX_TILES:
         raise OrbiflowError(
             f"the window of {width:.4g} by {height:.4g} would hold about {count:.0f} "
             f"tiles; the most is {MAX_TILES}: choose larger tiles "

@@ -213,6 +213,8 @@ class _Raw:
         file.load()
         key: Any = file.info.get("transparency")
         if file.mode == "RGB" and isinstance(key, tuple):
+            if stored == "RGB;16B" and getattr(file, "n_frames", 1) > 1:
+                return cls(file, None, tuple(int(level) >> 8 for level in cast(Any, key)))
             if stored != "RGB;16B":
                 return cls(file, None, tuple(int(level) & 255 for level in cast(Any, key)))
             with Image.open(opened(path), formats=_FORMATS) as again:

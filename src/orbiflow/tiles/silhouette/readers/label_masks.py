@@ -11,6 +11,7 @@ from orbiflow.arrays import Array
 DARKEST = 10  # of 255: numbers no larger cannot be told apart as levels
 FEW = 40  # three numbers or more, and none larger, are labels if their regions are even
 MOST_LABELS = 256
+STRIP = 4_000_000  # pixels
 MAX_STRAY = (
     0.1  # of the pixels on borders between regions: those of labels that fill no 3 x 3 pixels
 )
@@ -28,7 +29,9 @@ def label_mask(numbers: Array | NDArray[np.integer[Any]]) -> tuple[NDArray[np.ui
     low, high = int(numbers.min()), int(numbers.max())
     if low < 0 or high > 65535 or low == high:
         return None
-    counts = np.bincount(numbers.ravel())
+    # by strips: counting takes eight bytes for each pixel
+    strips = np.array_split(numbers, 1 + numbers.size // STRIP)
+    counts = np.sum([np.bincount(strip.ravel(), minlength=high + 1) for strip in strips], axis=0)
     values = np.flatnonzero(counts)
     n = len(values)
     are_few = high <= (DARKEST if n == 2 else FEW)
