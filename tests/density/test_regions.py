@@ -25,7 +25,7 @@ from orbiflow.density import (
 )
 from orbiflow.density.regions import boundaries
 from orbiflow.density.regions import levels as region_levels
-from orbiflow.density.regions.grid import LevelGrid, filled
+from orbiflow.density.regions.grid import Block, LevelGrid, filled
 from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
@@ -42,7 +42,7 @@ def test_a_disc_on_the_grid_is_a_disc(x: float, y: float, radius: float, level: 
     low, high = np.zeros(2), np.ones(2)
     grid = LevelGrid(function, low, high, (16, 16), levels, NO_SEEDS, 4, 10**6)
     assert grid.evaluations < 6000  # of 66,049 nodes
-    shape, off = filled(grid.values, grid.low, grid.step, level, function)
+    shape, off = filled(Block(grid.values, grid.low, grid.step), level, function)
     assert off < 2e-3
     assert shapely.area(shape) == pytest.approx(math.pi * radius**2, rel=2e-3)
     vertices = shapely.get_coordinates(shape)

@@ -237,8 +237,8 @@ def _words(density: Density, names: list[str], out: Path) -> str:
     exact = "in closed form"
     if density.error:
         exact = (
-            f"its logarithm right within {density.error:.1e} nats (root mean square) where it is dense, "
-            f"and {density.largest_error:.1e} anywhere"
+            f"its logarithm right within {density.error:.1e} nats (root mean square) where it is "
+            f"dense, and {density.largest_error:.1e} anywhere"
         )
     per = f"per {str(density.space.unit).removesuffix('s')}"
     power = "" if len(names) == 1 else f"^{len(names)}"
