@@ -55,18 +55,20 @@ def test_a_region_is_cut_at_the_border_and_may_have_holes() -> None:
 
     low, high = np.zeros(2), np.ones(2)
     grid = LevelGrid(function, low, high, (8, 8), np.zeros(1), NO_SEEDS, 3, 10**6)
-    shape, _ = filled(grid.values, low, grid.step, 0.0, function)
+    shape, _ = filled(Block(grid.values, low, grid.step), 0.0, function)
     assert shapely.area(shape) == pytest.approx(0.5, abs=1e-9)
     assert shapely.bounds(shape) == pytest.approx((0, 0, 0.5, 1), abs=1e-9)
-    everything, _ = filled(np.ones((4, 4)), low, np.full(2, 1 / 3), 0.0, function)
+    everything, _ = filled(Block(np.ones((4, 4)), low, np.full(2, 1 / 3)), 0.0, function)
     assert shapely.area(everything) == pytest.approx(1.0)
-    assert shapely.is_empty(filled(-np.ones((4, 4)), low, np.full(2, 1 / 3), 0.0, function)[0])
+    assert shapely.is_empty(
+        filled(Block(-np.ones((4, 4)), low, np.full(2, 1 / 3)), 0.0, function)[0]
+    )
 
     def ring(points: np.ndarray) -> np.ndarray:
         return 0.1 - abs(np.hypot(*(points - 0.5).T) - 0.3)
 
     grid = LevelGrid(ring, low, high, (16, 16), np.zeros(1), NO_SEEDS, 3, 10**6)
-    shape, _ = filled(grid.values, low, grid.step, 0.0, ring)
+    shape, _ = filled(Block(grid.values, low, grid.step), 0.0, ring)
     assert isinstance(shape, shapely.Polygon)
     assert len(shape.interiors) == 1
     assert shape.area == pytest.approx(math.pi * (0.4**2 - 0.2**2), rel=1e-3)
