@@ -220,7 +220,7 @@ def _are_multiples(values: Array, step: float, turn: float, off: float) -> bool:
 
 def _cells(column: Array, step: float | None) -> NDArray[np.int64]:
     """Return values (N,) of a column in steps, from the least one."""
-    return np.round((column - column.min()) / (step or 1.0)).astype(np.int64)
+    return np.rint((column - column.min()) / (step or 1.0)).astype(np.int64)
 
 
 def _known(step: float | None, turn: float) -> float:

@@ -56,6 +56,14 @@ class LevelGrid:
                 break
             self._double()
 
+    @classmethod
+    def of(cls, block: Block, function: Function, seeds: tuple[Array, Array]) -> LevelGrid:
+        """Return a grid of values that are known, whose cells are not halved."""
+        new = cls.__new__(cls)
+        new.function, new.seeds, new.values, new.low = function, seeds, block.values, block.low
+        new.high = block.low + block.step * (np.array(block.values.shape) - 1)
+        return new
+
     @property
     def step(self) -> Array:
         """The sides of a cell."""
@@ -128,6 +136,10 @@ def _doubled(values: Array) -> Array:
     return found
 
 
+CROWDED, DEPTH = 0.005, 4
+"""The share of the seeds that must be on the wrong side in a cell for it to be divided again, and how
+often: to a metre on the globe."""
+
 PARTS = 12
 """Parts into which each side of a cell is cut."""
 
@@ -142,17 +154,26 @@ BLOCK = 500
 
 
 def with_islands(
-    shape: shapely.Geometry, grid: LevelGrid, level: float, budget: int
+    shape: shapely.Geometry,
+    grid: LevelGrid,
+    level: float,
+    budget: int,
+    depth: int = DEPTH,
+    least: float | None = None,
 ) -> tuple[shapely.Geometry, int, int]:
     """Draw a shape again in those of a grid's cells that have seeds on its wrong side.
 
     Cells with the most seeds are first; those beyond the budget of evaluations are left as they are.
-    The numbers of evaluations and of cells left come after the shape.
+    Where `least` seeds, by default the share `CROWDED` of all, are on the wrong side of what is drawn
+    in a cell, it is divided again, up to `depth` times. The numbers of evaluations and of cells left
+    come after the shape.
     """
+    least = CROWDED * len(grid.seeds[0]) if least is None else least
     most = max(1, budget // (PARTS + 1) ** 2)
     cells = _wrong(shape, grid, level)
     left = max(0, len(cells) - most)
     done = np.zeros(np.array(grid.values.shape) - 1, dtype=bool)
+    finer = 0
     drawn: list[shapely.Geometry] = []
     for _ in range(ISLAND_ROUNDS):
         cells = cells[: most - len(drawn)]
@@ -164,7 +185,14 @@ def with_islands(
             Block(block, grid.low + cell * grid.step, fine)
             for cell, block in zip(cells, blocks, strict=True)
         ]
-        drawn += all_filled(own, level, grid.function)[0]
+        shapes, _ = all_filled(own, level, grid.function)
+        for cell, block, piece in zip(cells, own, shapes, strict=True):
+            inner = _crowded(grid, cell, block, piece, level, least) if depth else None
+            if inner is not None:
+                room = budget - finer - len(drawn) * (PARTS + 1) ** 2
+                piece, more, lost = with_islands(piece, inner, level, room, depth - 1, least)
+                finer, left = finer + more, left + lost
+            drawn.append(piece)
         cells = _beside(cells, blocks, level, done)
     if not drawn:
         return shape, 0, left
@@ -172,17 +200,41 @@ def with_islands(
     corners = np.concatenate([lows, lows + grid.step], axis=1).tolist()
     boxes: list[shapely.Geometry] = [shapely.box(*corner) for corner in corners]
     merged = shapely.union_all([shapely.difference(shape, shapely.union_all(boxes)), *drawn])
-    return merged, len(drawn) * (PARTS + 1) ** 2, left
+    return merged, len(drawn) * (PARTS + 1) ** 2 + finer, left
+
+
+def _crowded(
+    grid: LevelGrid,
+    cell: NDArray[np.int64],
+    block: Block,
+    shape: shapely.Geometry,
+    level: float,
+    least: float,
+) -> LevelGrid | None:
+    """Return the grid of a cell's block if `least` seeds are on the wrong side of what it draws."""
+    points, values = grid.seeds
+    own = (grid.cells_of(points) == cell).all(axis=1)
+    if own.sum() < least:
+        return None
+    seeds = points[own], values[own]
+    if _on_wrong_side(shape, seeds, level).sum() < least:
+        return None
+    return LevelGrid.of(block, grid.function, seeds)
 
 
 def _wrong(shape: shapely.Geometry, grid: LevelGrid, level: float) -> NDArray[np.int64]:
     """Return cells (C, 2) with seeds on the wrong side, those with most first."""
-    shapely.prepare(shape)
-    points, values = grid.seeds
-    inside = np.asarray(shapely.intersects_xy(shape, points[:, 0], points[:, 1]))
-    wrong = inside != (values >= level)
-    cells, counts = np.unique(grid.cells_of(points[wrong]), axis=0, return_counts=True)
+    wrong = grid.seeds[0][_on_wrong_side(shape, grid.seeds, level)]
+    cells, counts = np.unique(grid.cells_of(wrong), axis=0, return_counts=True)
     return cells[np.argsort(-counts, kind="stable")]
+
+
+def _on_wrong_side(shape: shapely.Geometry, seeds: tuple[Array, Array], level: float) -> Flags:
+    """Return which seeds (S,) are inside a shape and below a level, or outside and above."""
+    points, values = seeds
+    shapely.prepare(shape)
+    inside = np.asarray(shapely.intersects_xy(shape, points[:, 0], points[:, 1]))
+    return inside != (values >= level)
 
 
 def _evaluated(grid: LevelGrid, cells: NDArray[np.int64]) -> Array:
