@@ -19,14 +19,7 @@ from orbiflow.density import (
 )
 from orbiflow.density.fitting import COMPONENTS
 from orbiflow.density.fitting.automatic import BEFORE_END
-from orbiflow.density.fitting.evidence import (
-    Candidates,
-    Course,
-    candidates_of,
-    judged,
-    stacked,
-    supported_weights,
-)
+from orbiflow.density.fitting.evidence import Candidates, Course, candidates_of, judged
 from orbiflow.density.fitting.families import KernelFamily
 from orbiflow.density.fitting.flow_trial import FIRST, Rivals, TriedFlow, flow_beside, try_flow
 from orbiflow.density.fitting.folds import Folds, folds_of
@@ -34,6 +27,7 @@ from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence
 from orbiflow.density.fitting.rows import Gain
 from orbiflow.density.fitting.settings import Component
+from orbiflow.density.fitting.stacking import stacked, supported_weights
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow

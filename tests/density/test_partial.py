@@ -14,6 +14,7 @@ from scipy import stats
 from density.blends import even_grid, identity_flow, kernels_of, random_blend
 from orbiflow.density import (
     Density,
+    DensityEstimator,
     FlowDensity,
     Mixture,
     Torus,
@@ -194,6 +195,16 @@ def test_other_spaces_are_refused(name: str) -> None:
             call()
     with pytest.raises(OrbiflowError, match="torus"):
         log_prob_observed(density, torch.zeros(1, 2))
+
+
+def test_columns_that_are_not_there() -> None:
+    fit = DensityEstimator("torus", components=("kernels",))
+    fit.fit(np.random.default_rng(0).vonmises(0.0, 4.0, (40, 2)))
+    for number in (2, -1, 10**9):
+        with pytest.raises(OrbiflowError, match="number of a column, of angle1, angle2, must be"):
+            fit.conditional({number: 1.0})
+        with pytest.raises(OrbiflowError, match="number of a column"):
+            fit.marginal(number)
 
 
 def test_mistakes_are_named() -> None:

@@ -25,7 +25,7 @@ from orbiflow.density import (
 )
 from orbiflow.density.regions import boundaries
 from orbiflow.density.regions import levels as region_levels
-from orbiflow.density.regions.grid import LevelGrid, filled
+from orbiflow.density.regions.grid import Block, LevelGrid, filled
 from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
@@ -42,7 +42,7 @@ def test_a_disc_on_the_grid_is_a_disc(x: float, y: float, radius: float, level: 
     low, high = np.zeros(2), np.ones(2)
     grid = LevelGrid(function, low, high, (16, 16), levels, NO_SEEDS, 4, 10**6)
     assert grid.evaluations < 6000  # of 66,049 nodes
-    shape, off = filled(grid.values, grid.low, grid.step, level, function)
+    shape, off = filled(Block(grid.values, grid.low, grid.step), level, function)
     assert off < 2e-3
     assert shapely.area(shape) == pytest.approx(math.pi * radius**2, rel=2e-3)
     vertices = shapely.get_coordinates(shape)
@@ -55,18 +55,20 @@ def test_a_region_is_cut_at_the_border_and_may_have_holes() -> None:
 
     low, high = np.zeros(2), np.ones(2)
     grid = LevelGrid(function, low, high, (8, 8), np.zeros(1), NO_SEEDS, 3, 10**6)
-    shape, _ = filled(grid.values, low, grid.step, 0.0, function)
+    shape, _ = filled(Block(grid.values, low, grid.step), 0.0, function)
     assert shapely.area(shape) == pytest.approx(0.5, abs=1e-9)
     assert shapely.bounds(shape) == pytest.approx((0, 0, 0.5, 1), abs=1e-9)
-    everything, _ = filled(np.ones((4, 4)), low, np.full(2, 1 / 3), 0.0, function)
+    everything, _ = filled(Block(np.ones((4, 4)), low, np.full(2, 1 / 3)), 0.0, function)
     assert shapely.area(everything) == pytest.approx(1.0)
-    assert shapely.is_empty(filled(-np.ones((4, 4)), low, np.full(2, 1 / 3), 0.0, function)[0])
+    assert shapely.is_empty(
+        filled(Block(-np.ones((4, 4)), low, np.full(2, 1 / 3)), 0.0, function)[0]
+    )
 
     def ring(points: np.ndarray) -> np.ndarray:
         return 0.1 - abs(np.hypot(*(points - 0.5).T) - 0.3)
 
     grid = LevelGrid(ring, low, high, (16, 16), np.zeros(1), NO_SEEDS, 3, 10**6)
-    shape, _ = filled(grid.values, low, grid.step, 0.0, ring)
+    shape, _ = filled(Block(grid.values, low, grid.step), 0.0, ring)
     assert isinstance(shape, shapely.Polygon)
     assert len(shape.interiors) == 1
     assert shape.area == pytest.approx(math.pi * (0.4**2 - 0.2**2), rel=1e-3)

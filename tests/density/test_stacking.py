@@ -19,17 +19,17 @@ from orbiflow.density import (
     midpoints,
 )
 from orbiflow.density.fitting import group_numbers
-from orbiflow.density.fitting.evidence import (
+from orbiflow.density.fitting.folds import FOLDS, folds_of
+from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
+from orbiflow.density.fitting.repeats import repeats_of
+from orbiflow.density.fitting.rows import Rows, gain_of
+from orbiflow.density.fitting.stacking import (
     TOLERANCE,
     sparse_weights,
     stacked,
     stacking_weights,
     supported_weights,
 )
-from orbiflow.density.fitting.folds import FOLDS, folds_of
-from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
-from orbiflow.density.fitting.repeats import repeats_of
-from orbiflow.density.fitting.rows import Rows, gain_of
 from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")

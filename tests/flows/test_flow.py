@@ -3,6 +3,7 @@
 import copy
 import io
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from torch import nn
+from torch import Tensor, nn
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField, symmetrize
@@ -314,7 +315,7 @@ def test_shapes_of_points_are_kept(shape):
 
 @pytest.mark.parametrize("bad", [0, -3, 2.5, True])
 def test_steps_that_are_no_count_are_refused(bad):
-    with pytest.raises(OrbiflowError, match="steps must be an integer of at least 1"):
+    with pytest.raises(OrbiflowError, match="steps must be"):
         Flow(torch.sin, steps=bad)
 
 
@@ -326,3 +327,45 @@ def test_an_unknown_method_is_refused():
 def test_a_flow_of_no_field_is_refused():
     with pytest.raises(OrbiflowError, match="at least one vector field"):
         Flow([])
+
+
+def _in_place(points: Tensor) -> Tensor:
+    return points.mul_(-1.0)
+
+
+class _InPlace(torch.nn.Module):
+    def forward(self, points: Tensor) -> Tensor:
+        points[..., 0] += 0.3
+        return points.sin_()
+
+
+class _WithDivergence(_InPlace):
+    def divergence(self, points: Tensor) -> Tensor:
+        points[..., 0] += 0.3
+        return points.cos_().sum(dim=-1)
+
+
+@pytest.mark.parametrize("field", [_in_place, _InPlace(), _WithDivergence()])
+def test_fields_may_write_into_their_points(field: Any) -> None:
+    """The caller's tensor is left as it is, and the result is that of a field that does not write."""
+    points = torch.rand(7, 2, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
+    before = points.clone()
+    plain = (
+        (lambda p: -p) if field is _in_place else (lambda p: (p + p.new_tensor([0.3, 0.0])).sin())
+    )
+    written, pure = Flow(field, warn=False), Flow(plain, warn=False)
+    assert torch.equal(written(points), pure(points))
+    assert torch.equal(written.inverse(points), pure.inverse(points))
+    for found, expected in zip(
+        written.forward_and_log_det(points), pure.forward_and_log_det(points), strict=True
+    ):
+        assert torch.allclose(found, expected, atol=1e-12)
+    assert torch.equal(points, before)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, "1", True])
+def test_numbers_are_finite(value: Any) -> None:
+    with pytest.raises(OrbiflowError, match="duration must be"):
+        Flow(lambda p: p, duration=value)
+    with pytest.raises(OrbiflowError, match="steps must be"):
+        Flow(lambda p: p, steps=value)

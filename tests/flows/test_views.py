@@ -71,7 +71,7 @@ def test_another_thread_sees_its_own_steps():
 
 def test_views_are_checked_like_flows():
     flow = Flow(torch.sin)
-    with pytest.raises(OrbiflowError, match="steps must be an integer of at least 1, got 0"):
+    with pytest.raises(OrbiflowError, match="steps must be at least 1, got 0"):
         flow.with_steps(0)
     with pytest.raises(OrbiflowError, match="unknown integrator"):
         flow.with_steps(4, method="heun")

@@ -19,6 +19,7 @@ autograd function is silently wrong in torch 2.13, even if the function has its 
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import torch
@@ -46,7 +47,7 @@ def divergence(field: VectorField, points: Tensor) -> Tensor:
 def prepared(field: VectorField) -> VectorField:
     """Return the field as a function for many evaluations at fixed parameters."""
     own: Any = getattr(field, "bound", None)
-    return own() if own else field
+    return own() if own else partial(_values, field)
 
 
 def prepared_with_divergence(field: VectorField) -> Callable[[Tensor], tuple[Tensor, Tensor]]:
@@ -58,7 +59,7 @@ def prepared_with_divergence(field: VectorField) -> Callable[[Tensor], tuple[Ten
 
     def both(points: Tensor) -> tuple[Tensor, Tensor]:
         if in_closed_form:
-            return field(points), divergence(field, points)
+            return _values(field, points), divergence(field, points.clone())
         values, slopes = _by_autograd(field, points)
         return values, _trace(slopes)
 
@@ -71,7 +72,7 @@ def prepared_with_jacobian(field: VectorField) -> Callable[[Tensor], tuple[Tenso
     if own:
         return own()
     if hasattr(field, "jacobian"):
-        return lambda points: (field(points), jacobian(field, points))
+        return lambda points: (_values(field, points), jacobian(field, points.clone()))
     return lambda points: _by_autograd(field, points)
 
 
@@ -79,6 +80,11 @@ def lipschitz_bound(field: object) -> float | None:
     """Return the field's own bound of its Jacobian's spectral norm, or None if it has none."""
     own: Any = getattr(field, "lipschitz_bound", None)
     return float(own().max()) if own else None
+
+
+def _values(field: VectorField, points: Tensor) -> Tensor:
+    """Return a field of the user's at points, of which it gets a copy: it may write into it."""
+    return field(points.clone())
 
 
 def _trace(slopes: Tensor) -> Tensor:
@@ -94,7 +100,7 @@ def _by_autograd(field: VectorField, points: Tensor) -> tuple[Tensor, Tensor]:
     with torch.inference_mode(False), torch.enable_grad():
         inputs = points.clone() if points.is_inference() else points
         inputs = inputs if inputs.requires_grad else inputs.detach().requires_grad_()
-        values = field(inputs)
+        values = _values(field, inputs)
         if not values.requires_grad:  # a constant field
             return values, points.new_zeros(*points.shape, points.shape[-1])
         options: Any = {"create_graph": keep, "retain_graph": True, "materialize_grads": True}
@@ -105,7 +111,7 @@ def _by_autograd(field: VectorField, points: Tensor) -> tuple[Tensor, Tensor]:
 
 def _functionally(field: VectorField, points: Tensor) -> tuple[Tensor, Tensor]:
     """Return V and its Jacobian under `torch.func`, where requires_grad cannot be set."""
-    values, pull, *_ = torch.func.vjp(field, points)
+    values, pull, *_ = torch.func.vjp(partial(_values, field), points)
     units = torch.eye(points.shape[-1], dtype=points.dtype, device=points.device)
     rows = [pull(unit.expand(points.shape))[0] for unit in units]
     return values, torch.stack(rows, dim=-2)
@@ -117,7 +123,7 @@ def _is_differentiable(field: VectorField, points: Tensor) -> bool:
     if isinstance(field, nn.Module) and any(p.requires_grad for p in field.parameters()):
         return True
     # a plain function may use parameters that show only in its values
-    return field(points).requires_grad
+    return _values(field, points).requires_grad
 
 
 # torch uses these itself, but has neither public names nor types for them

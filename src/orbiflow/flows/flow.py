@@ -9,7 +9,7 @@ from typing import Any, Self
 import torch
 from torch import Tensor, nn
 
-from orbiflow.arguments import is_a
+from orbiflow.arguments import as_number, as_whole, is_a
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import (
     VectorField,
@@ -108,7 +108,7 @@ class Flow(nn.Module):
         self.segments = nn.ModuleList(
             f if isinstance(f, nn.Module) else _FunctionSegment(f) for f in listed
         )
-        self._duration = float(duration)
+        self._duration = as_number(duration, "duration")
         self._steps = _checked_steps(steps)
         self.integrator: RungeKutta = runge_kutta(method)
         self._step_check = StepCheck() if warn and not bijective else None
@@ -273,9 +273,7 @@ class Flow(nn.Module):
 
 
 def _checked_steps(value: int) -> int:
-    if isinstance(value, bool) or int(value) != value or value < 1:
-        raise OrbiflowError(f"steps must be an integer of at least 1, got {value!r}")
-    return int(value)
+    return as_whole(value, "steps", 1)
 
 
 def _check_points(points: Tensor) -> None:

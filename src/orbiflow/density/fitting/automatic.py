@@ -19,8 +19,6 @@ from orbiflow.density.fitting.evidence import (
     assembled,
     candidates_of,
     judged,
-    stacked,
-    supported_weights,
     without_idle,
     work_of,
 )
@@ -68,6 +66,7 @@ from orbiflow.density.fitting.rows import (
     weights_of,
 )
 from orbiflow.density.fitting.settings import COMPONENTS, DensitySettings
+from orbiflow.density.fitting.stacking import stacked, supported_weights
 from orbiflow.density.models import MOST_DIM, Mixture, flow_obstacle
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import DataWarning, OrbiflowError

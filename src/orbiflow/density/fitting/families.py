@@ -20,8 +20,9 @@ from orbiflow.density.fitting.chains import (
 )
 from orbiflow.density.fitting.kernels import NARROWEST, fit_mixture, kernel_estimates
 from orbiflow.density.fitting.rows import Rows, gain_of, is_whole, with_incomplete
+from orbiflow.density.fitting.stacking import stacking_weights
 from orbiflow.density.inference import at_observed
-from orbiflow.density.models import MOST_DIM, Density, averaged_networks
+from orbiflow.density.models import MOST_DIM, Density, UniformDensity, averaged_networks
 from orbiflow.density.spaces import Space, Torus
 
 SIZES = (1, 2, 4, 8, 16, 32, 64)
@@ -39,6 +40,9 @@ MOST_MIXED, MOST_CHAINED = 20_000, 12_000
 TELLING = 500
 """Rows held out by which kernels without a weight, and without a neighbour of any, are left out; in
 more than `MOST_DIM` dimensions all are of use."""
+
+DEAR, PROMISING = 20_000, 1e-4
+"""Rows from which kernels are judged by all rows held out only if some of these give them a weight."""
 
 CLEARLY = 2.0
 """Standard errors by which a larger mixture must be worse to be the last that is tried."""
@@ -91,7 +95,20 @@ class KernelFamily(Family):
         found = self._estimates(train, self._names)
         if number == 0 and len(held) >= TELLING and self.space.dim <= MOST_DIM:
             self._names = list(found)
+            if len(train) >= DEAR and len(held) >= 2 * TELLING:
+                self.keep(self._promising(found, held[:TELLING]))
+                found = {name: found[name] for name in self._names}
         return found
+
+    def _promising(self, found: dict[str, Density], held: Rows) -> set[str]:
+        """Return what has any weight by some of the rows held out, and the best alone."""
+        names = [*found, ""]
+        own = {name: at_observed(part, held.points) for name, part in found.items()}
+        own[""] = at_observed(UniformDensity(self.space), held.points)
+        weights = stacking_weights(torch.stack([own[name] for name in names]), held.weights)
+        best = max(found, key=lambda name: held.mean(own[name]))
+        kept = zip(names, weights, strict=True)
+        return {best, *(name for name, weight in kept if name and weight >= PROMISING)}
 
     def final(self, rows: Rows, folds: list[dict[str, Density]], names: list[str]) -> list[Density]:
         del folds

@@ -11,7 +11,6 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.spaces import Space, Torus, whole_turn
-from orbiflow.typed_torch import unique
 
 SAME = 1e-13
 """Difference of chart coordinates within which points are the same: far below what kernels resolve."""
@@ -20,10 +19,15 @@ SAME = 1e-13
 def places(points: Tensor) -> tuple[Tensor, Tensor]:
     """Return the number of points (N, d) at each different place (M,), and the place (N,) of each."""
     # rounding keeps together what differs by the projection's last digits
-    _, place, counts = unique(
-        (points / SAME).round(), dim=0, return_inverse=True, return_counts=True
-    )
-    return counts, place
+    table = (points.detach().cpu() / SAME).round().numpy()
+    order = np.lexsort(table.T[::-1])
+    ordered = table[order]
+    begins = np.ones(len(table), dtype=bool)
+    begins[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    number = begins.cumsum() - 1
+    place = np.empty_like(number)
+    place[order] = number
+    return torch.as_tensor(np.bincount(number)), torch.as_tensor(place)
 
 
 STEPS = tuple(m * 10.0**e for e in range(2, -9, -1) for m in (5, 2, 1))
@@ -216,7 +220,7 @@ def _are_multiples(values: Array, step: float, turn: float, off: float) -> bool:
 
 def _cells(column: Array, step: float | None) -> NDArray[np.int64]:
     """Return values (N,) of a column in steps, from the least one."""
-    return np.round((column - column.min()) / (step or 1.0)).astype(np.int64)
+    return np.rint((column - column.min()) / (step or 1.0)).astype(np.int64)
 
 
 def _known(step: float | None, turn: float) -> float:

@@ -136,8 +136,10 @@ def report_from_json(document: Mapping[str, Any]) -> FitReport:
 
 
 def _repeats_from(document: Mapping[str, Any]) -> Repeats:
-    spread, columns = (tuple(document.get(name, ())) for name in ("spread", "columns"))
-    return Repeats(**{**document, "spread": spread, "columns": columns})
+    values: dict[str, Any] = dict(document)
+    for name in ("spread", "columns"):  # which version 0.1 did not write
+        values[name] = tuple(values.get(name, ()))
+    return Repeats(**values)
 
 
 def _figures(values: list[float | None]) -> tuple[float, ...]:

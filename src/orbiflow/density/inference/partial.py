@@ -236,7 +236,7 @@ def _refined(
     space: Torus,
     accuracy: float,
     say: Progress,
-) -> tuple[Mixture, float]:
+) -> tuple[Mixture, Error]:
     """Return kernels for what has no closed form, level by level until they settle, and their error.
 
     After two levels only the component with the largest error is refined again, until the errors are

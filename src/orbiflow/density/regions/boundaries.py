@@ -16,7 +16,7 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.batch import csv_bytes
 from orbiflow.density.models import Density
-from orbiflow.density.regions.grid import LevelGrid, filled, with_islands
+from orbiflow.density.regions.grid import Block, LevelGrid, filled, with_islands
 from orbiflow.density.regions.levels import DensityLevels, DensityRegion
 from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors, whole_turn
 from orbiflow.errors import OrbiflowError
@@ -135,7 +135,7 @@ def outlines(
     found: list[Outline] = []
     for number, region in enumerate(regions):
         told(min(0.9, spent / budget), "drawing outlines")
-        shape, off = filled(grid.values, grid.low, grid.step, region.log_prob, function)
+        shape, off = filled(Block(grid.values, grid.low, grid.step), region.log_prob, function)
         left = (budget - spent) // (len(regions) - number)
         shape, more, missed = with_islands(shape, grid, region.log_prob, left)
         spent += more

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -54,6 +55,14 @@ class LevelGrid:
             if self.evaluations >= budget:
                 break
             self._double()
+
+    @classmethod
+    def of(cls, block: Block, function: Function, seeds: tuple[Array, Array]) -> LevelGrid:
+        """Return a grid of values that are known, whose cells are not halved."""
+        new = cls.__new__(cls)
+        new.function, new.seeds, new.values, new.low = function, seeds, block.values, block.low
+        new.high = block.low + block.step * (np.array(block.values.shape) - 1)
+        return new
 
     @property
     def step(self) -> Array:
@@ -127,6 +136,10 @@ def _doubled(values: Array) -> Array:
     return found
 
 
+CROWDED, DEPTH = 0.005, 4
+"""The share of the seeds that must be on the wrong side in a cell for it to be divided again, and how
+often: to a metre on the globe."""
+
 PARTS = 12
 """Parts into which each side of a cell is cut."""
 
@@ -141,17 +154,26 @@ BLOCK = 500
 
 
 def with_islands(
-    shape: shapely.Geometry, grid: LevelGrid, level: float, budget: int
+    shape: shapely.Geometry,
+    grid: LevelGrid,
+    level: float,
+    budget: int,
+    depth: int = DEPTH,
+    least: float | None = None,
 ) -> tuple[shapely.Geometry, int, int]:
     """Draw a shape again in those of a grid's cells that have seeds on its wrong side.
 
     Cells with the most seeds are first; those beyond the budget of evaluations are left as they are.
-    The numbers of evaluations and of cells left come after the shape.
+    Where `least` seeds, by default the share `CROWDED` of all, are on the wrong side of what is drawn
+    in a cell, it is divided again, up to `depth` times. The numbers of evaluations and of cells left
+    come after the shape.
     """
+    least = CROWDED * len(grid.seeds[0]) if least is None else least
     most = max(1, budget // (PARTS + 1) ** 2)
     cells = _wrong(shape, grid, level)
     left = max(0, len(cells) - most)
     done = np.zeros(np.array(grid.values.shape) - 1, dtype=bool)
+    finer = 0
     drawn: list[shapely.Geometry] = []
     for _ in range(ISLAND_ROUNDS):
         cells = cells[: most - len(drawn)]
@@ -159,10 +181,18 @@ def with_islands(
             break
         done[tuple(cells.T)] = True
         blocks, fine = _evaluated(grid, cells), grid.step / PARTS
-        drawn += [
-            filled(block, grid.low + cell * grid.step, fine, level, grid.function)[0]
+        own = [
+            Block(block, grid.low + cell * grid.step, fine)
             for cell, block in zip(cells, blocks, strict=True)
         ]
+        shapes, _ = all_filled(own, level, grid.function)
+        for cell, block, piece in zip(cells, own, shapes, strict=True):
+            inner = _crowded(grid, cell, block, piece, level, least) if depth else None
+            if inner is not None:
+                room = budget - finer - len(drawn) * (PARTS + 1) ** 2
+                piece, more, lost = with_islands(piece, inner, level, room, depth - 1, least)
+                finer, left = finer + more, left + lost
+            drawn.append(piece)
         cells = _beside(cells, blocks, level, done)
     if not drawn:
         return shape, 0, left
@@ -170,17 +200,41 @@ def with_islands(
     corners = np.concatenate([lows, lows + grid.step], axis=1).tolist()
     boxes: list[shapely.Geometry] = [shapely.box(*corner) for corner in corners]
     merged = shapely.union_all([shapely.difference(shape, shapely.union_all(boxes)), *drawn])
-    return merged, len(drawn) * (PARTS + 1) ** 2, left
+    return merged, len(drawn) * (PARTS + 1) ** 2 + finer, left
+
+
+def _crowded(
+    grid: LevelGrid,
+    cell: NDArray[np.int64],
+    block: Block,
+    shape: shapely.Geometry,
+    level: float,
+    least: float,
+) -> LevelGrid | None:
+    """Return the grid of a cell's block if `least` seeds are on the wrong side of what it draws."""
+    points, values = grid.seeds
+    own = (grid.cells_of(points) == cell).all(axis=1)
+    if own.sum() < least:
+        return None
+    seeds = points[own], values[own]
+    if _on_wrong_side(shape, seeds, level).sum() < least:
+        return None
+    return LevelGrid.of(block, grid.function, seeds)
 
 
 def _wrong(shape: shapely.Geometry, grid: LevelGrid, level: float) -> NDArray[np.int64]:
     """Return cells (C, 2) with seeds on the wrong side, those with most first."""
-    shapely.prepare(shape)
-    points, values = grid.seeds
-    inside = np.asarray(shapely.intersects_xy(shape, points[:, 0], points[:, 1]))
-    wrong = inside != (values >= level)
-    cells, counts = np.unique(grid.cells_of(points[wrong]), axis=0, return_counts=True)
+    wrong = grid.seeds[0][_on_wrong_side(shape, grid.seeds, level)]
+    cells, counts = np.unique(grid.cells_of(wrong), axis=0, return_counts=True)
     return cells[np.argsort(-counts, kind="stable")]
+
+
+def _on_wrong_side(shape: shapely.Geometry, seeds: tuple[Array, Array], level: float) -> Flags:
+    """Return which seeds (S,) are inside a shape and below a level, or outside and above."""
+    points, values = seeds
+    shapely.prepare(shape)
+    inside = np.asarray(shapely.intersects_xy(shape, points[:, 0], points[:, 1]))
+    return inside != (values >= level)
 
 
 def _evaluated(grid: LevelGrid, cells: NDArray[np.int64]) -> Array:
@@ -221,49 +275,93 @@ MAX_STEPS = 8
 FAR_BELOW = 1e12
 
 
-def filled(
-    values: Array, low: Array, step: Array, level: float, function: Function
-) -> tuple[shapely.Geometry, float]:
-    """Return the area in which values (n + 1, m + 1) at the nodes of a grid are at least `level`.
+class Block(NamedTuple):
+    """Values (n + 1, m + 1) at the nodes of even cells, their lowest corner and their sides (2,)."""
 
-    It is cut at the grid's border. Vertices lie on sides of cells, moved along them to where `function`
-    is at the level; second comes the root mean square of the difference that is left inside.
+    values: Array
+    low: Array
+    step: Array
+
+
+def filled(block: Block, level: float, function: Function) -> tuple[shapely.Geometry, float]:
+    """Return the area in which a block's values are at least `level`; see `all_filled`."""
+    shapes, off = all_filled([block], level, function)
+    return shapes[0], off
+
+
+def all_filled(
+    blocks: Sequence[Block], level: float, function: Function
+) -> tuple[list[shapely.Geometry], float]:
+    """Return for each block the area in which its values are at least `level`.
+
+    It is cut at the block's border. Vertices lie on sides of cells, moved along them to where
+    `function` is at the level; second comes the root mean square of the difference that is left inside.
+    The vertices of all blocks move together, as a call of the function costs more than a point of it.
     """
+    rings = [_rings(block.values, level) for block in blocks]
+    pairs = zip(rings, blocks, strict=True)
+    sides = [_Sides.of(np.concatenate(own), block) for own, block in pairs if own]
+    moved, off = _on_level(sides, level, function)
+    found = iter(moved)
+    shapes = [_area(own, next(found)) if own else shapely.MultiPolygon() for own in rings]
+    return shapes, off
+
+
+def _rings(values: Array, level: float) -> list[Array]:
+    """Return closed lines (n, 2), in cells, at a level of values at nodes; they end at the border."""
     padded = np.pad(values, 1, constant_values=level - FAR_BELOW)
-    rings = [ring - 1 for ring in find_contours(padded, level)]
-    if not rings:
-        return shapely.MultiPolygon(), 0.0
+    return [ring - 1 for ring in find_contours(padded, level)]
+
+
+def _area(rings: list[Array], vertices: Array) -> shapely.Geometry:
+    """Return the area of rings, whose vertices (V, 2) are one after the other."""
     sizes = np.cumsum([len(ring) for ring in rings])[:-1]
-    at, off = _on_level(np.concatenate(rings), values, low, step, level, function)
-    lines = [np.concatenate([ring[:-1], ring[:1]]) for ring in np.split(low + at * step, sizes)]
+    lines = [np.concatenate([ring[:-1], ring[:1]]) for ring in np.split(vertices, sizes)]
     closed = [shapely.LinearRing(line) for line in lines if len(np.unique(line, axis=0)) > 2]
     if not closed:
-        return shapely.MultiPolygon(), off
-    return shapely.make_valid(shapely.build_area(shapely.GeometryCollection(closed))), off
+        return shapely.MultiPolygon()
+    return shapely.make_valid(shapely.build_area(shapely.GeometryCollection(closed)))
+
+
+class _Sides(NamedTuple):
+    """Vertices (V, 2), and of those inside, (R,), the ends (R, 2) of their sides and values there."""
+
+    vertices: Array
+    inside: NDArray[np.int64]
+    ends: tuple[Array, Array]
+    values: tuple[Array, Array]
+
+    @classmethod
+    def of(cls, at: Array, block: Block) -> _Sides:
+        """Return the sides on which vertices (V, 2) of a block lie, in cells."""
+        most = np.array(block.values.shape) - 1
+        inside = ((at >= 0) & (at <= most)).all(axis=1)
+        at = np.clip(at, 0, most)
+        start, end = np.floor(at), np.ceil(at)
+        inside &= (start != end).any(axis=1)  # else it lies on a node
+        rows = np.flatnonzero(inside)
+        nodes = start[rows], end[rows]
+        a, b = (block.low + node * block.step for node in nodes)
+        fa, fb = (block.values[tuple(node.T.astype(int))] for node in nodes)
+        return cls(block.low + at * block.step, rows, (a, b), (fa, fb))
 
 
 def _on_level(
-    at: Array, values: Array, low: Array, step: Array, level: float, function: Function
-) -> tuple[Array, float]:
-    """Return vertices (V, 2), in cells, by false position between nodes (the Illinois algorithm)."""
-    most = np.array(values.shape) - 1
-    inside = ((at >= 0) & (at <= most)).all(axis=1)
-    at = np.clip(at, 0, most)
-    start, end = np.floor(at), np.ceil(at)
-    inside &= (start != end).any(axis=1)  # else it lies on a node
-    rows = np.flatnonzero(inside)
-    if not len(rows):
-        return at, 0.0
-    a, b = start[rows], end[rows]
-    fa, fb = (values[tuple(p.astype(int).T)] - level for p in (a, b))
-    off = np.full(len(rows), np.inf)
-    found = at[rows]
-    todo, last = np.arange(len(rows)), np.zeros(len(rows))
+    sides: Sequence[_Sides], level: float, function: Function
+) -> tuple[list[Array], float]:
+    """Return vertices (V, 2) by false position between nodes (the Illinois algorithm)."""
+    counts = [len(own.inside) for own in sides]
+    if not sum(counts):
+        return [own.vertices for own in sides], 0.0
+    a, b = (np.concatenate([own.ends[k] for own in sides]) for k in (0, 1))
+    fa, fb = (np.concatenate([own.values[k] for own in sides]) - level for k in (0, 1))
+    off, found = np.full(len(a), np.inf), a.copy()
+    todo, last = np.arange(len(a)), np.zeros(len(a))
     for _ in range(MAX_STEPS):
         width = fb[todo] - fa[todo]
         share = np.clip(-fa[todo] / np.where(width == 0, 1.0, width), 0.0, 1.0)
         here = a[todo] + share[:, None] * (b[todo] - a[todo])
-        f = function(low + here * step) - level
+        f = function(here) - level
         better = abs(f) < abs(off[todo])
         found[todo[better]], off[todo[better]] = here[better], f[better]
         same = (f >= 0) == (fa[todo] >= 0)
@@ -277,5 +375,7 @@ def _on_level(
         todo = todo[abs(off[todo]) > TOLERANCE]
         if not len(todo):
             break
-    at[rows] = found
-    return at, float(np.sqrt(np.mean(off**2)))
+    parts = np.split(found, np.cumsum(counts)[:-1])
+    for own, part in zip(sides, parts, strict=True):
+        own.vertices[own.inside] = part
+    return [own.vertices for own in sides], float(np.sqrt(np.mean(off**2)))
