@@ -12,6 +12,7 @@ from orbiflow.density import (
     QuotientSpace,
     Torus,
     compare_samples,
+    density_picture,
     summarize_axes,
     summarize_directions,
 )
@@ -205,3 +206,16 @@ def test_frames_are_compared_by_name() -> None:
         compare_samples({"a": other, "b": one}, "sphere")
     with pytest.raises(SettingError, match="in the order lat, lon"):
         summarize_directions(other)
+
+
+def test_pictures_of_fractions_are_of_the_plane() -> None:
+    places = 10 * RNG.normal(0.3, 0.05, (40, 2))
+    spaces = [QuotientSpace("p4g", cell=(10.0, 10.0), fractional=own) for own in (False, True)]
+    assert spaces[1].cartesian == spaces[0] != spaces[1]
+    density = made(spaces[0]).fit(places).density_
+    other = made(spaces[1]).fit(places / 10).density_
+    drawn = [
+        next(axes.images[0].get_array() for axes in density_picture(own).figure.axes if axes.images)
+        for own in (density, other)
+    ]
+    assert np.abs(np.asarray(drawn[0]) - np.asarray(drawn[1])).max() < 0.05
