@@ -84,7 +84,8 @@ OTHERS = frozenset((
     "speed", "velocity", "wspd", "ws", "gust", "pressure", "humidity", "rain", "precipitation",
     "depth", "height", "width", "size", "area", "volume", "resolution", "occupancy", "bfactor",
     "score", "energy", "charge", "magnitude", "mag", "price", "year", "month", "date", "time",
-    "timestamp", "age", "probability", "pvalue", "density", "log_prob", "hdr",
+    "timestamp", "hour", "hours", "day", "weekday", "doy", "age", "probability", "pvalue",
+    "density", "log_prob", "hdr",
 ))
 # fmt: on
 """Words for quantities that do not come back to themselves after a turn."""

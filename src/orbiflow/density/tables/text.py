@@ -35,6 +35,9 @@ from orbiflow.errors import InputFileError, literal
 MAX_LINE = 2**20
 """Characters of a line at most."""
 
+DEGREES = "write decimal degrees, negative in the south and in the west"
+_IN_DEGREES = re.compile(r"\d.*[°'\"NSEWO]\s*$|^[NSEWO]\s*\d")
+
 SAMPLE = 100
 """Rows looked at to find the layout."""
 
@@ -299,7 +302,13 @@ def _number(path: Path, line: int, name: str, cell: str, decimal: str) -> float:
     hint = f"write decimal {right}, not {wrong}, or say with {{decimal}} that they are {wrong}"
     raise TableError(
         literal(f"{path}: line {line}: column {quote(name)}: {quote(cell)} is not a number; ")
-        + (hint if comma else "correct it or drop the line")
+        + (
+            hint
+            if comma
+            else DEGREES
+            if _IN_DEGREES.search(cell)
+            else "correct it or drop the line"
+        )
     )
 
 
