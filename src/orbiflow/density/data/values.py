@@ -303,6 +303,10 @@ def _places(space: str, values: Array, names: Sequence[str], unit: str | None) -
             "degrees: if they are radians, convert them; if not, give the unit degrees"
         )
         doubts.append(Doubt(text, True))
+    for name, column, word in ((names[0], lat, "south"), (names[1], lon, "west")):
+        if {word, word[0]}.intersection(words_of(name)) and bool((column >= 0).all()):
+            text = f"{name!r} seems to count to the {word}, by its name: if so, make it negative"
+            doubts.append(Doubt(text, True))
     hours = "ra" in words_of(names[1]) and bool(((lon >= 0) & (lon < 24)).all())
     if hours and float(np.ptp(lon)) > 12 and float(np.ptp(lat)) > 40:
         text = f"{names[1]!r} is between 0 and 24: if it is in hours, multiply it by 15"

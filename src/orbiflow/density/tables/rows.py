@@ -134,7 +134,7 @@ def read_rows(
     return _weighed(TableRows(path, table, None, group, rows.header), weighing, counting)
 
 
-def _drop(rows: RowSettings) -> dict[str, bool]:
+def _drop(rows: RowSettings) -> dict[str, Any]:
     """Return what `read_table` does with rows that lack a value."""
     dropped = rows.drop_missing or rows.missing == "drop"
     return {"drop_missing": dropped, "keep_missing": rows.missing == "marginalise"}

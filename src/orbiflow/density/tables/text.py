@@ -43,6 +43,7 @@ SAMPLE = 100
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
 _LONE_COMMA = re.compile(r"[+-]?\d+(\.\d{3})*(,\d+)?")
+_LEADING_ZERO = re.compile(r",0\d")
 _WHOLE = re.compile(r"[+-]?\d+")
 _UNDECODED = re.compile("[\udc80-\udcff]")
 _SEPARATOR = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
@@ -156,7 +157,7 @@ def layout_of(
     check_count(path, len(rows[0]), tables.MAX_COLUMNS, "columns")
     for (number, _), row in zip(sample, rows, strict=True):
         _check_length(path, number, row, first, len(rows[0]), delimiter)
-    marks = marks_of(rows, delimiter, decimal)
+    marks = marks_of(rows, delimiter if len(rows[0]) > 1 else "", decimal)
     classes = [
         tuple(kind_of(plain(cell, marks.decimal)) for cell in column)
         for column in zip(*rows, strict=True)
@@ -178,7 +179,8 @@ def _refuse_doubtful(path: Path, layout: Layout, picked: Sequence[int]) -> None:
     """Refuse columns whose commas may be before decimals or thousands."""
     for column, cell in layout.marks.doubtful:
         if column in picked:
-            right, other = cell.replace(",", ""), cell.replace(",", ".")
+            mark = "," if "," in cell else "."
+            right, other = cell.replace(mark, ""), cell.replace(mark, ".")
             raise TableError(
                 literal(
                     f"{path}: column {quote(layout.names[column])}: {cell!r} may be {right} or {other}"
@@ -200,8 +202,13 @@ def _delimiter(lines: list[str]) -> str:
     """
     first, *rest = lines
     lone = all(_LONE_COMMA.fullmatch(line.strip()) for line in rest)
-    if "," not in first and lone and any("," in line for line in rest):
-        return ";"
+    if lone and any("," in line for line in rest):
+        headed = "," not in first
+        # no second column of whole numbers has zeros in front
+        if headed or (
+            _LONE_COMMA.fullmatch(first.strip()) and _LEADING_ZERO.search(",".join(lines))
+        ):
+            return ";"
     if _is_spaced(lines[len(lines) > 1 :]):
         return " "
     counts = {mark: [line.count(mark) for line in lines] for mark in "\t;,"}
