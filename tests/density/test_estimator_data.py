@@ -79,6 +79,17 @@ def test_more_columns_than_those_of_the_fit_are_refused(fitted: DensityEstimator
         fitted.score_samples(frame(np.hstack([ANGLES, ANGLES[:, :1]]), "phi,psi,chi"))
 
 
+def test_fits_without_names_take_frames_by_position() -> None:
+    estimator = made("torus", unit="degrees").fit(ANGLES)
+    right = estimator.score_samples(ANGLES)
+    assert np.array_equal(estimator.score_samples(frame(ANGLES, "phi,psi")), right)
+    unnamed = DensityEstimator.fitted(estimator.density_, columns=["column2", "column3"])
+    assert np.array_equal(unnamed.score_samples(frame(ANGLES, "phi,psi")), right)
+    sphere = made("sphere").fit(PLACES)
+    with pytest.raises(SettingError, match="in the order lat, lon"):
+        sphere.score_samples(frame(PLACES[:, ::-1], "lon,lat"))
+
+
 def test_names_are_of_the_last_fit(fitted: DensityEstimator) -> None:
     estimator = made("torus", unit="degrees").fit(frame(ANGLES, "phi,psi"))
     assert list(estimator.feature_names_in_) == ["phi", "psi"]
