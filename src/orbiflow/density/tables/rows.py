@@ -321,7 +321,8 @@ def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
     if where.cell is not None and not where.fractional:
         doubts += fraction_doubts(table.values, where.cell[: len(table.columns)])
     for doubt in doubts:
-        tell(Note(f"WARNING: {doubt.text}" if doubt.is_serious else doubt.text))
+        words = doubt.text.replace("(fractional)", "(--fractional)")
+        tell(Note(f"WARNING: {words}" if doubt.is_serious else words))
     return unit
 
 

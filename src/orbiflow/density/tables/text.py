@@ -12,6 +12,7 @@ import math
 import re
 from array import array
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -283,12 +284,12 @@ def _numbers(
     path: Path, cells: list[str], lines: array[int], names: tuple[str, ...], decimal: str
 ) -> list[float]:
     """Return the cells of the last of `lines`, row after row, as floats; NaN for missing ones."""
-    try:
+    text = "".join(cells)
+    if "_" not in text and text.isascii() and (decimal == "." or "." not in text):
         # float takes 1_000 and other digits than ASCII's
-        if decimal == "." and "_" not in (text := "".join(cells)) and text.isascii():
-            return list(map(float, cells))
-    except ValueError:
-        pass
+        plainly = cells if decimal == "." else [cell.replace(",", ".") for cell in cells]
+        with suppress(ValueError):
+            return list(map(float, plainly))
     k, start = len(names), len(lines) - len(cells) // len(names)
     return [
         _number(path, lines[start + i // k], names[i % k], cell, decimal)
