@@ -122,7 +122,7 @@ def test_angles_beyond_a_turn_are_told(summary: Summary) -> None:
     turning = np.cumsum(RNG.uniform(0, 40, 50))[:, None]
     done, _ = summary(text("heading", turning), "--space", "torus", "--unit", "degrees")
     assert done.status == 0, done.err
-    assert "values of 'heading' are beyond a turn, the farthest " in done.out
+    assert "beyond a turn, the farthest " in done.out
     assert "WARNING" not in done.out
 
 
@@ -313,6 +313,17 @@ def test_numbers_of_columns_are_those_of_the_table(tmp_path: Path, orbiflow: Any
     done = orbiflow(*conditional, "1=-60")
     assert done.status == 2
     assert "no column '1'; there are column2, column3, column4" in done.err
+
+
+def test_a_number_of_a_named_column_is_told(tmp_path: Path, orbiflow: Any) -> None:
+    rows = np.degrees(RNG.vonmises([0, 1, 2, 3], 4, (60, 4)))
+    (tmp_path / "a.csv").write_text(text("omega,phi,psi,chi", rows))
+    columns = ("--columns", "2,3,4", "--unit", "degrees", "--space", "torus")
+    assert fit(orbiflow, tmp_path / "a.csv", tmp_path / "m", *columns).status == 0
+    for command in (("conditional", "--given", "2=-60"), ("marginal", "--columns", "2")):
+        done = orbiflow("density", *command, "-m", tmp_path / "m", "--out", tmp_path / "c")
+        said = "took 2 for psi, number 2 among the model's columns (phi, psi, chi)"
+        assert said in " ".join(done.out.split())
 
 
 def test_a_score_takes_columns_in_the_order_of_the_fit(tmp_path: Path, orbiflow: Any) -> None:

@@ -125,7 +125,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "dim": (lambda: Torus("2"), "dim must be a whole number from 1 to 64"),  # type: ignore[arg-type]
     "unit": (lambda: Torus(2, unit=None), "unit must be radians"),  # type: ignore[arg-type]
     "form": (lambda: Sphere(form=["latlon"]), "form must be latlon or vector"),  # type: ignore[arg-type]
-    "rotation": (lambda: Sphere(rotation="none"), "rotation: expected numbers"),
+    "rotation": (lambda: Sphere(rotation="none"), "rotation: expected an array"),
     "clear_rotation": (lambda: clear_rotation(torus, [[0.0, 0.0]]), "a RoundSpace"),  # type: ignore[arg-type]
     "make_space": (lambda: make_space(torus), "unknown space"),  # type: ignore[arg-type]
     "from_chart": (lambda: torus.from_chart(torch.rand(3, 3)), r"got .*\(3, 3\)"),
@@ -134,7 +134,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "to bytes": (lambda: density_to_bytes("density"), "density must be an? Density"),  # type: ignore[arg-type]
     "read": (lambda: read_density(3), "the file must be a path, got 3"),  # type: ignore[arg-type]
     "estimator": (lambda: DensityEstimator(3).fit(POINTS), "unknown space 3"),  # type: ignore[arg-type]
-    "estimator's data": (lambda: DensityEstimator().fit(["a"]), "shape"),
+    "estimator's data": (lambda: DensityEstimator().fit([1.0]), "shape"),
 }
 
 

@@ -200,7 +200,7 @@ def test_what_cannot_be_chosen_is_refused() -> None:
             make_space("sphere"), smooth("sphere"), DensitySettings(components=("chains",))
         )
     with pytest.raises(OrbiflowError, match="a flow has 3 dimensions at most"):
-        DensityEstimator("torus", components="flow,chains").fit(
+        DensityEstimator("torus", unit="degrees", components="flow,chains").fit(
             np.zeros((50, 5)) + np.arange(50)[:, None]
         )
     with pytest.raises(OrbiflowError, match="at least 10 different points, got 3 among 30"):

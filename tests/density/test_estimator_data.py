@@ -12,6 +12,7 @@ from orbiflow.density import (
     QuotientSpace,
     Torus,
     compare_samples,
+    density_picture,
     summarize_axes,
     summarize_directions,
 )
@@ -76,6 +77,17 @@ def test_frames_of_other_columns_are_refused(
 def test_more_columns_than_those_of_the_fit_are_refused(fitted: DensityEstimator) -> None:
     with pytest.raises(OrbiflowError, match="choose those of the fit"):
         fitted.score_samples(frame(np.hstack([ANGLES, ANGLES[:, :1]]), "phi,psi,chi"))
+
+
+def test_fits_without_names_take_frames_by_position() -> None:
+    estimator = made("torus", unit="degrees").fit(ANGLES)
+    right = estimator.score_samples(ANGLES)
+    assert np.array_equal(estimator.score_samples(frame(ANGLES, "phi,psi")), right)
+    unnamed = DensityEstimator.fitted(estimator.density_, columns=["column2", "column3"])
+    assert np.array_equal(unnamed.score_samples(frame(ANGLES, "phi,psi")), right)
+    sphere = made("sphere").fit(PLACES)
+    with pytest.raises(SettingError, match="in the order lat, lon"):
+        sphere.score_samples(frame(PLACES[:, ::-1], "lon,lat"))
 
 
 def test_names_are_of_the_last_fit(fitted: DensityEstimator) -> None:
@@ -205,3 +217,16 @@ def test_frames_are_compared_by_name() -> None:
         compare_samples({"a": other, "b": one}, "sphere")
     with pytest.raises(SettingError, match="in the order lat, lon"):
         summarize_directions(other)
+
+
+def test_pictures_of_fractions_are_of_the_plane() -> None:
+    places = 10 * RNG.normal(0.3, 0.05, (40, 2))
+    spaces = [QuotientSpace("p4g", cell=(10.0, 10.0), fractional=own) for own in (False, True)]
+    assert spaces[1].cartesian == spaces[0] != spaces[1]
+    density = made(spaces[0]).fit(places).density_
+    other = made(spaces[1]).fit(places / 10).density_
+    drawn = [
+        next(axes.images[0].get_array() for axes in density_picture(own).figure.axes if axes.images)
+        for own in (density, other)
+    ]
+    assert np.abs(np.asarray(drawn[0]) - np.asarray(drawn[1])).max() < 0.05

@@ -25,7 +25,7 @@ from orbiflow.flows import Flow
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 DATA = np.random.default_rng(0).normal([20.0, 40.0], 10.0, (60, 2))
-QUICK: dict[str, Any] = {"max_frequency": 1, "segments": 1, "iterations": 3}
+QUICK: dict[str, Any] = {"unit": "degrees", "max_frequency": 1, "segments": 1, "iterations": 3}
 
 pytestmark = pytest.mark.usefixtures("quick_fits")
 

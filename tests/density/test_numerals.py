@@ -30,8 +30,12 @@ RIGHT = {
     "run;h\na;1\u00a0025,5\nb;48,5\n": [1025.5, 48.5],
     "run;h\na;1\u202f025\nb;48\n": [1025, 48],
     "run,h\na,1'025.5\nb,48\n": [1025.5, 48],
+    "25,05\n98,75\n": [25.05, 98.75],  # without a header
+    "1,0\n2,10\n30,0\n": [0, 10, 0],
     # as before: a point alone is before decimals, a comma between semicolons as well
     "run,h\na,1.025\nb,2.100\n": [1.025, 2.1],
+    "run,h\na,1.025\nb,7\nc,2.100\n": [1.025, 7, 2.1],
+    "run,h\na,1.025\nb,12\nc,2.125\n": [1.025, 12, 2.125],
     "run;h\na;48,004\nb;48,896\n": [48.004, 48.896],
     "run;h\na;0,123\nb;48,896\n": [0.123, 48.896],
     'run,h\na,"1,5"\nb,"1,025"\n': [1.5, 1.025],
@@ -60,6 +64,9 @@ def test_numbers_are_read_as_they_are_written(content: str, tmp_path: Path) -> N
 
 
 DOUBTFUL = {
+    "h\n1,025\n1,140\n": (1025, 1.025),
+    "h\n1.025\n998\n1.140\n": (1025, 1.025),
+    "run;h\na;1.025\nb;998\nc;1.140\n": (1025, 1.025),
     'run,h\na,"1,025"\nb,"1,100"\n': (1025, 1.025),
     "run\th\na\t1,025\nb\t2,500\n": (1025, 1.025),
     'run,h\na,"12,345"\nb,"-1,100"\n': (12345, 12.345),
@@ -72,8 +79,10 @@ def test_what_may_be_thousands_or_decimals_is_asked(content: str, tmp_path: Path
     with pytest.raises(TableError, match=r"column 'h': '.*' may be .* or .*; say with decimal"):
         read_table(path, columns=["h"], width=None)
     whole, fraction = DOUBTFUL[content]
-    assert read_table(path, columns=["h"], width=None, decimal=".").values[0, 0] == whole
-    assert read_table(path, columns=["h"], width=None, decimal=",").values[0, 0] == fraction
+    found = [
+        read_table(path, columns=["h"], width=None, decimal=mark).values[0, 0] for mark in ".,"
+    ]
+    assert sorted(found) == [fraction, whole]
 
 
 def test_only_columns_that_are_read_must_be_clear(tmp_path: Path) -> None:

@@ -187,7 +187,8 @@ DATA = np.random.default_rng(1).normal(20, 10, (100, 2))
 @pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("space", SPACES)
 def test_saved_and_read(space: str, tmp_path) -> None:
-    estimator = DensityEstimator(space, max_frequency=2, segments=2, iterations=3).fit(DATA)
+    flow = {"max_frequency": 2, "segments": 2, "iterations": 3}
+    estimator = DensityEstimator(space, unit="degrees", **flow).fit(DATA)
     path = tmp_path / "density.safetensors"
     path.write_bytes(density_to_bytes(estimator.density_, columns=["a", "b"]))
     density, extra = read_density(path)
@@ -202,7 +203,7 @@ def test_files_that_are_no_density(tmp_path) -> None:
     with pytest.raises(InputFileError, match="cannot read"):
         read_density(path)
     estimator = DensityEstimator(
-        "torus", components="flow", max_frequency=1, segments=1, iterations=0
+        "torus", unit="degrees", components="flow", max_frequency=1, segments=1, iterations=0
     ).fit(DATA)
     good = density_to_bytes(estimator.density_)
     length = int.from_bytes(good[:8], "little")

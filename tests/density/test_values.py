@@ -122,6 +122,14 @@ def test_right_ascension_in_hours_is_doubted() -> None:
     assert doubts_of("sphere", sky * np.array([1, 15]), None, "dec", "ra") == []
 
 
+def test_longitudes_to_the_west_are_doubted() -> None:
+    west = np.abs(places(50, 50))
+    assert doubts_of("sphere", west, None, "lat_n", "lon_w") == [True]
+    assert doubts_of("sphere", west, None, "Latitude (S)", "Longitude (W)") == [True, True]
+    assert doubts_of("sphere", west * [1, -1], None, "lat", "lon_w") == []
+    assert doubts_of("sphere", west, None, "lat_n", "lon_e") == []
+
+
 def test_quantities_that_are_no_angles_are_doubted() -> None:
     table = RNG.uniform(-180, 180, (30, 2))
     for name in ("temperature", "bond length", "count", "windSpeed", "B-factor resolution"):

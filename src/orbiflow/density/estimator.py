@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import numbers
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
@@ -342,9 +343,10 @@ class DensityEstimator:
         """Return data with the columns of a frame in the order in which `fit` has seen them."""
         data, names = as_data(X)
         fitted = [str(name) for name in getattr(self, "feature_names_in_", ())]
-        if names is None or not fitted or list(names) == fitted:
-            if names is not None and not fitted:
-                check_columns(self.space_.name, names)
+        if names is None or list(names) == fitted:
+            return data
+        if all(re.fullmatch(r"(column|angle)\d+", name) for name in fitted):  # they have no names
+            check_columns(self.space_.name, names)
             return data
         if sorted(names) != sorted(fitted) or len(set(fitted)) < len(fitted):
             missing = [name for name in fitted if name not in names]

@@ -386,7 +386,7 @@ def test_mistakes(fields: dict[str, Any], names: set[str]) -> None:
         ({"group": "nothere"}, "no column 'nothere'"),
         ({"columns": ["phi", "chi"]}, "no column 'chi'"),
         ({"weights": "protein"}, "is not a number"),
-        ({"space": "sphere", "unit": None, "columns": ["phi"]}, "directions: expected"),
+        ({"space": "sphere", "unit": None, "columns": ["phi"]}, "takes a latitude and a longitude"),
     ],
 )
 def test_mistakes_that_the_table_shows(

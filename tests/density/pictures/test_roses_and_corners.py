@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -131,9 +132,9 @@ def test_a_rose_of_whole_tens_is_centred_on_north() -> None:
     )
     roses = [Rose("wind", turns)]
     (axes,) = roses_picture(roses, "degrees", "One", SHEETS["screen"]).figure.axes
+    bars: list[Any] = list(axes.patches)
     heights = {
-        round(np.degrees(bar.get_x() + bar.get_width() / 2) % 360): bar.get_height()
-        for bar in axes.patches
+        round(np.degrees(bar.get_x() + bar.get_width() / 2) % 360): bar.get_height() for bar in bars
     }
     shares = {angle: height**2 for angle, height in heights.items() if height > 0}
     assert shares[0] / sum(shares.values()) == pytest.approx((12 + 22 + 15 + 12) / 84)

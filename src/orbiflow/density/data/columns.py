@@ -73,12 +73,22 @@ def _directions(names: Sequence[str]) -> list[Arrangement]:
         return [_of_pair(pair) for pair in pairs]
     if found := _lettered(names, ("xyz",), "unit vectors"):
         return found
-    single = {name.strip().casefold(): k for k, name in enumerate(names)}
-    for north, east in (("b", "l"), ("y", "x")):
-        if north in single and east in single:
-            pair = (single[north], single[east])
-            return [Arrangement(pair, "latitude and longitude", is_sure=False)]
+    if found := _of_maps(names):
+        return found
     return _half_known(names)
+
+
+def _of_maps(names: Sequence[str]) -> list[Arrangement]:
+    """Return columns whose names are short for a latitude and a longitude: y, x; b, l; I, D."""
+    split = [tuple(word for word in words_of(name) if word not in ("wgs", "84")) for name in names]
+    pairs = [
+        (north, east)
+        for first, second in (("y", "x"), ("b", "l"), ("i", "d"))
+        for north, own in enumerate(split)
+        for east, other in enumerate(split)
+        if first in own and tuple(second if word == first else word for word in own) == other
+    ]
+    return [Arrangement(pair, "latitude and longitude", is_sure=False) for pair in pairs]
 
 
 def _of_pair(pair: Pair) -> Arrangement:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import product
 from typing import NamedTuple
 
 UNITS = {
@@ -84,7 +85,8 @@ OTHERS = frozenset((
     "speed", "velocity", "wspd", "ws", "gust", "pressure", "humidity", "rain", "precipitation",
     "depth", "height", "width", "size", "area", "volume", "resolution", "occupancy", "bfactor",
     "score", "energy", "charge", "magnitude", "mag", "price", "year", "month", "date", "time",
-    "timestamp", "age", "probability", "pvalue", "density", "log_prob", "hdr",
+    "timestamp", "hour", "hours", "day", "weekday", "doy", "age", "probability", "pvalue",
+    "density", "log_prob", "hdr",
 ))
 # fmt: on
 """Words for quantities that do not come back to themselves after a turn."""
@@ -170,15 +172,18 @@ def pairs_of(names: Sequence[str]) -> list[Pair]:
     """
     split = [words_of(name) for name in names]
     found: list[Pair] = []
+    lone: list[Pair] = []
     for family in FAMILIES:
         norths, easts = _rest(split, family.north), _rest(split, family.east)
-        same = [(i, j) for i, a in norths.items() for j, b in easts.items() if a == b and i != j]
-        if not same and len(norths) == 1 == len(easts) and norths.keys() != easts.keys():
-            same = [(*norths, *easts)]
         taken = {frozenset(pair[:2]) for pair in found}
-        found += [Pair(i, j, family) for i, j in same if frozenset((i, j)) not in taken]
+        for i, j in product(norths, easts):
+            if i != j and norths[i] == easts[j] and frozenset((i, j)) not in taken:
+                found.append(Pair(i, j, family))
+        if len(norths) == 1 == len(easts) and norths.keys() != easts.keys():
+            lone.append(Pair(*norths, *easts, family))
     known = {column for pair in found for column in pair[:2]}
-    return found + [pair for pair in _run_together(names) if not known & set(pair[:2])]
+    found += [pair for pair in _run_together(names) if not known & set(pair[:2])]
+    return found or lone[:1]
 
 
 def _rest(split: Sequence[list[str]], words: frozenset[str]) -> dict[int, tuple[str, ...]]:

@@ -5,27 +5,15 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from typing import Literal, NamedTuple, cast, get_args
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from orbiflow.arrays import Array
-from orbiflow.density.data.columns import (
-    ANGULAR,
-    DIRECTIONS,
-    ROTATIONS,
-    VECTORS,
-    Arrangement,
-    check_columns,
-)
+from orbiflow.density.data.columns import DIRECTIONS, ROTATIONS, Arrangement, check_columns
 from orbiflow.density.data.names import is_count_named, is_other_quantity, unit_named, words_of
+from orbiflow.density.data.units import TURN_TOLERANCE, TURNS, Unit, check_unit, is_angular
 from orbiflow.errors import DataWarning, SettingError, literal
-
-Unit = Literal["radians", "degrees", "turns"]
-TURNS: dict[str, float] = {"radians": 2 * math.pi, "degrees": 360.0, "turns": 1.0}
-
-TURN_TOLERANCE = 1e-4
-"""Share by which rounding may take an angle beyond a turn: 6.2832 is 2 pi."""
 
 FULL = 0.75
 """Share of a turn of radians that values fill where they seem to be radians."""
@@ -39,34 +27,6 @@ class Doubt(NamedTuple):
 
     text: str
     is_serious: bool
-
-
-def is_angular(space: str, columns: int) -> bool:
-    """Return whether data of so many columns are angles, which have a unit."""
-    return space in ANGULAR or (space in ROTATIONS and columns == 3)
-
-
-def check_unit(space: str, unit: str | None) -> None:
-    """Refuse a unit that there is not, and one of data that are not angles.
-
-    >>> check_unit("sphere", "radians")
-    Traceback (most recent call last):
-    ...
-    orbiflow.errors.SettingError: unit radians applies only to angles on the torus and the Klein \
-bottle: latitude and longitude are degrees; convert them, or give unit vectors x,y,z
-    """
-    if unit is not None and unit not in get_args(Unit):
-        raise SettingError(f"{{unit}} must be degrees, radians or turns, got {literal(repr(unit))}")
-    if unit is not None and space not in (*ANGULAR, *ROTATIONS, *VECTORS):
-        raise SettingError(
-            "{unit} applies only to angles: points of a quotient are in the unit of its cell; leave it "
-            "out"
-        )
-    if space in VECTORS and unit in ("radians", "turns"):
-        raise SettingError(
-            f"{{unit}} {unit} applies only to angles on the torus and the Klein bottle: latitude and "
-            "longitude are degrees; convert them, or give unit vectors x,y,z"
-        )
 
 
 def check_values(
@@ -89,17 +49,18 @@ def check_values(
     called = list(names) if names else [f"column{k}" for k in range(1, values.shape[1] + 1)]
     found = check_columns(space, names) if names else None
     doubts = [Doubt(found.note, False)] if found and found.note else []
-    doubts += _doubts_of_names(space, called, found, is_named=bool(names))
+    doubts += _doubts_of_names(space, values, called, found, is_named=bool(names))
     if is_angular(space, values.shape[1]):
         own, more = _angles(values, called, unit, cure)
         return own, doubts + more
     if space in DIRECTIONS and values.shape[1] == 2:
+        _refuse_no_places(values, called, cure)
         doubts += _places(space, values, called, unit)
     return "radians", doubts
 
 
 def _doubts_of_names(
-    space: str, names: Sequence[str], found: Arrangement | None, *, is_named: bool
+    space: str, values: Array, names: Sequence[str], found: Arrangement | None, *, is_named: bool
 ) -> list[Doubt]:
     """Return what columns were taken for, if their names do not say it."""
     listed = ", ".join(names)
@@ -107,6 +68,9 @@ def _doubts_of_names(
         return [Doubt(f"took {listed} as x, y, z, w: the quaternion's scalar is the last", False)]
     if space not in DIRECTIONS or len(names) != 2 or not is_named:
         return []
+    if found is None and "theta" in words_of(names[0]) and float(np.nanmin(values[:, 0])) >= 0:
+        text = f"took {names[0]} as latitude: if it is the angle from the pole, give 90 less it"
+        return [Doubt(text, True)]
     if found is None:
         return [
             Doubt(f"took {names[0]} as latitude and {names[1]} as longitude, in degrees", False)
@@ -199,8 +163,8 @@ def _doubts_of_angle(name: str, column: Array, turn: float) -> list[Doubt]:
     if beyond.any():
         most = column[np.nanargmax(np.abs(column))]
         text = (
-            f"{int(beyond.sum())} values of {name!r} are beyond a turn, the farthest {most:g}: they "
-            f"were taken modulo {turn:.10g}"
+            f"{name!r} has {int(beyond.sum())} beyond a turn, the farthest {most:g}, which count "
+            f"modulo {turn:.10g}"
         )
         doubts.append(Doubt(text, False))
     return doubts
@@ -260,8 +224,9 @@ def codes_among(column: Array, turn: float) -> list[float]:
     if 2 * int(beyond.sum()) > len(rest):  # angles that go on turning
         return []
     found = [code for code in distinct[named].tolist() if _is_code(code, rest, turn)]
-    if turn > 100 and 0 < int(beyond.sum()) <= MOST_CODES and _are_whole(rest):
-        found += rest[beyond & often].tolist()
+    if turn > 100 and 0 < int(beyond.sum()) <= MOST_CODES:
+        pairs = zip(rest[beyond].tolist(), often[beyond].tolist(), strict=True)
+        found += [value for value, again in pairs if _is_foreign(value, rest[~beyond], turn, again)]
     return sorted(found)
 
 
@@ -283,6 +248,16 @@ def _is_code(value: float, rest: Array, turn: float) -> bool:
     return value != round(value) and _are_whole(rest)
 
 
+def _is_foreign(value: float, rest: Array, turn: float, again: bool) -> bool:
+    """Return whether a value beyond a turn is no angle like all others, which keep within a turn."""
+    if value != round(value):
+        return False
+    if _are_whole(rest / 10) and len(rest) >= FEW_VALUES:  # rounded to ten degrees, as winds are
+        return again or value % 10 != 0
+    apart = float(np.abs(rest - value).min(initial=math.inf)) > CODE_GAP * turn
+    return again and (apart or _are_whole(rest))
+
+
 def _are_whole(values: Array) -> bool:
     return bool((values == np.round(values)).all())
 
@@ -293,6 +268,17 @@ def _counted(codes: Sequence[float], column: Array) -> str:
     words = [f"{code:.10g} in {n} row{'s' * (n > 1)}" for code, n in zip(codes, often, strict=True)]
     listed = words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
     return f"{listed}, which seem{'s' * (len(words) == 1)} to stand for missing values"
+
+
+def _refuse_no_places(values: Array, names: Sequence[str], cure: str) -> None:
+    """Refuse latitudes and longitudes (N, 2) some of which are codes for missing values."""
+    for name, column, most in zip(names, values.T, (90.0, 360.0), strict=True):
+        known = np.unique(
+            column[np.isfinite(column) & (np.abs(column) > most * (1 + TURN_TOLERANCE))]
+        )
+        codes = [v for v in known.tolist() if abs(v) in CODES or abs(v) > HUGE]
+        if codes and len(codes) == len(known):
+            raise SettingError(literal(f"column {name!r} has {_counted(codes, column)}: ") + cure)
 
 
 def _places(space: str, values: Array, names: Sequence[str], unit: str | None) -> list[Doubt]:
@@ -317,6 +303,10 @@ def _places(space: str, values: Array, names: Sequence[str], unit: str | None) -
             "degrees: if they are radians, convert them; if not, give the unit degrees"
         )
         doubts.append(Doubt(text, True))
+    for name, column, word in ((names[0], lat, "south"), (names[1], lon, "west")):
+        if {word, word[0]}.intersection(words_of(name)) and bool((column >= 0).all()):
+            text = f"{name!r} seems to count to the {word}, by its name: if so, make it negative"
+            doubts.append(Doubt(text, True))
     hours = "ra" in words_of(names[1]) and bool(((lon >= 0) & (lon < 24)).all())
     if hours and float(np.ptp(lon)) > 12 and float(np.ptp(lat)) > 40:
         text = f"{names[1]!r} is between 0 and 24: if it is in hours, multiply it by 15"

@@ -310,7 +310,7 @@ def marginal(
     with runtime.one_thread():
         density, extra = model_at(model)
         names = names_of(density, extra)
-        axes = axes_of(columns, names)
+        axes = axes_of(columns, names, on_event)
         folder = runtime.ResultFolder(out, written_files)
         progress = runtime.progress_events(on_event, cancel)
         progress(0.0, "integrating")

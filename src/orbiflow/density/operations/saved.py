@@ -24,7 +24,7 @@ from orbiflow.density.run_folder import SAMPLES, write_files
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.density.tables import Table, TableError, TableSettings, column_names, listing, to_csv
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError, literal
-from orbiflow.runtime import Note, Outcome, ResultFolder, Sink
+from orbiflow.runtime import Note, Outcome, ResultFolder, Sink, ignore
 
 if TYPE_CHECKING:
     from orbiflow.density.operations.queries import PartialSettings
@@ -138,10 +138,11 @@ DRAWN = 20_000
 """Samples in the picture of one angle."""
 
 
-def axes_of(wanted: Sequence[str], names: Sequence[str]) -> list[int]:
+def axes_of(wanted: Sequence[str], names: Sequence[str], tell: Sink = ignore) -> list[int]:
     """Return the numbers, from 0, of angles given by name, or else by number from 1.
 
-    Columns without a name have the numbers of their table, of which the model may have some alone.
+    Columns without a name have the numbers of their table, of which the model may have some alone. Of
+    those with names it is told which one a number means.
 
     >>> axes_of(["psi", "1"], ["phi", "psi"]), axes_of(["3"], ["column2", "column3"])
     ([1, 0], [1])
@@ -152,7 +153,12 @@ def axes_of(wanted: Sequence[str], names: Sequence[str]) -> list[int]:
     if all(unnamed):
         numbers = {found[1]: axis for axis, found in enumerate(unnamed) if found}
     asked = [one if one.casefold() in lower else numbers.get(one, one) for one in wanted]
-    return inference.axes_named(asked, names)
+    found = inference.axes_named(asked, names)
+    for one, axis in zip(wanted, found, strict=True):
+        if one.isdigit() and not all(unnamed):
+            place = f"number {one} among the model's columns ({', '.join(names)})"
+            tell(Note(f"took {one} for {names[axis]}, {place}"))
+    return found
 
 
 def condition_of(
@@ -167,13 +173,13 @@ def condition_of(
     All others are kept, or those of `columns`. A warning is told of angles that seem to be in another
     unit.
     """
-    axes = axes_of([name for name, _ in pairs], names)
+    axes = axes_of([name for name, _ in pairs], names, tell)
     values = list(zip(axes, (value for _, value in pairs), strict=True))
     given = inference.given_named(space, values, names)
     known = {names[axis]: value for axis, value in values}
     kept = [axis for axis in range(len(names)) if axis not in given]
     if columns is not None:
-        kept = axes_of(columns, names)
+        kept = axes_of(columns, names, tell)
         both = [names[axis] for axis in kept if axis in given]
         if both:
             raise SettingError(

@@ -16,7 +16,7 @@ from orbiflow.density.pictures.colours import chosen_scale, density_at_pixels, i
 from orbiflow.density.pictures.overlays import Colouring, log_natural
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import Square
-from orbiflow.density.spaces import Space
+from orbiflow.density.spaces import QuotientSpace, Space
 from orbiflow.drawing import Sheet, mark_symmetry
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import DirichletDomain
@@ -42,8 +42,11 @@ class Cell(Square):
             raise OrbiflowError(
                 f"a picture needs two dimensions, this {space.name} has {space.dimensions}"
             )
+        names = settings.names
+        if isinstance(space, QuotientSpace) and space.cartesian is not space:
+            space, names = space.cartesian, None  # angles and marks are those of the plane
         self.space, self.group = space, group
-        self.view = frames.view_of(space, settings.names, settings.center)
+        self.view = frames.view_of(space, names, settings.center)
         site = space.from_chart(torch.tensor(space.domain.site)[None])[0]
         self.domain = DirichletDomain(group, site)
         corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) - 0.5

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any, Self, cast
 
 import numpy as np
@@ -113,6 +114,11 @@ class QuotientSpace(Space):
         if abs(np.linalg.det(vectors)) < 1e-12:
             raise OrbiflowError("fractional must be vectors that span a cell, as columns")
         return vectors
+
+    @cached_property
+    def cartesian(self) -> QuotientSpace:
+        """The same space, with the same chart, whose data are Cartesian coordinates."""
+        return self if self._vectors is None else QuotientSpace(self._given)
 
     @classmethod
     def for_data(cls, data: Array, *, unit: str = "radians", seed: int = 0) -> Self:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 
-_MINUS = re.compile(r"[\u2212\u2013\ufe63\uff0d](?=[\d.,])")
+_MINUS = re.compile(r"[\u2010-\u2013\u2212\ufe63\uff0d](?=[\d.,])")
 _SPACED = re.compile(r"[+-]?\d{1,3}(?:[\u00a0\u202f\u2009 '\u2019]\d{3})+(?:[.,]\d*)?")
 _SPACES = re.compile(r"[\u00a0\u202f\u2009 '\u2019]")
 _MISSING = frozenset({"", "na", "n/a", "<na>", "nan", "null", "none", "-", "--"})
@@ -75,6 +75,8 @@ def marks_of(rows: Sequence[Sequence[str]], delimiter: str, asked: Mark | None) 
     (',', '.')
     >>> marks_of([["1,025"], ["1,100"]], ",", None).doubtful
     ((0, '1,025'),)
+    >>> marks_of([["1.025"], ["1.100"], ["998"]], ";", None).doubtful
+    ((0, '1.025'),)
     """
     cells = [cell.strip() for row in rows for cell in row]
     comma, point = (_evidence(cells, mark) for mark in (",", "."))
@@ -87,7 +89,7 @@ def marks_of(rows: Sequence[Sequence[str]], delimiter: str, asked: Mark | None) 
     if decimals["."] and not decimals[","]:
         return Marks(".", parted["."])
     if not comma.either:
-        return Marks(".")
+        return Marks(".", None, _like_thousands(rows))
     if delimiter == ";" and not point.either and not decimals["."]:
         return Marks(",")  # it parts cells because commas are in them
     doubtful: list[tuple[int, str]] = []
@@ -97,6 +99,19 @@ def marks_of(rows: Sequence[Sequence[str]], delimiter: str, asked: Mark | None) 
         if cell is not None and (decimals["."] or not _leaves_whole(own)):
             doubtful.append((k, cell))
     return Marks(".", comma.either, tuple(doubtful))
+
+
+def _like_thousands(rows: Sequence[Sequence[str]]) -> tuple[tuple[int, str], ...]:
+    """Return the columns whose points seem to part thousands, though decimals have points as a rule."""
+    found: list[tuple[int, str]] = []
+    for k, column in enumerate(zip(*rows, strict=False)):
+        own = [cell.strip() for cell in column]
+        points = [cell for cell in own if _PARTED["."].fullmatch(cell)]
+        others = [cell for cell in own if cell not in points and any(c.isdigit() for c in cell)]
+        zeros = any(cell.endswith("0") for cell in points)
+        if zeros and others and all(cell.isdigit() and len(cell) > 1 for cell in others):
+            found.append((k, points[0]))
+    return tuple(found)
 
 
 class _Evidence(NamedTuple):

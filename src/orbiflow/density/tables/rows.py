@@ -99,23 +99,25 @@ def read_rows(
     the rows, those of weights, counts and groups and, on a torus, those that are no angles by name.
     """
     rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
-    dropped = rows.drop_missing or rows.missing == "drop"
-    how: dict[str, Any] = {"has_header": rows.header, "drop_missing": dropped}
-    how |= {"missing_codes": rows.missing_codes, "decimal": rows.decimal}
-    name = None if group is None or rows.columns is not None else _name(path, group, rows.header)
+    how: dict[str, Any] = {"has_header": rows.header, "decimal": rows.decimal}
     weighing, counting = (
-        None if column is None else read_table(path, columns=[column], width=1, **how)
+        None
+        if column is None
+        else read_table(path, columns=[column], width=1, **how, **_drop(rows))
         for column in (rows.weights, getattr(rows, "counts", None))
     )
-    beside = [own for one in (weighing, counting) if one is not None for own in one.columns]
-    others = [*beside, *([name] if name else [])]
-    how["keep_missing"] = rows.missing == "marginalise"
+    others = [name for own in (weighing, counting) if own is not None for name in own.columns]
+    if group is not None and rows.columns is None:
+        others.append(_name(path, group, rows.header))
     columns = rows.columns
     if columns is None and space is not None:
         columns = _columns_by_name(path, space, width, others, rows.header, tell)
-    by_name = columns is not None
     try:
-        table = _read(path, columns, None if others else width, tell, how)
+        if columns is not None:
+            how |= {**_drop(rows), "missing_codes": rows.missing_codes}
+            table = read_table(path, columns=list(columns), width=None, **how)
+        else:
+            table = _all_columns(path, space, None if others else width, others, rows, tell)
     except MissingCellsError as error:
         if rows is not settings:  # the command has no way to keep them
             raise
@@ -124,24 +126,47 @@ def read_rows(
         ) from error
     for note in table.notes:
         tell(Note(note))
-    for other in () if by_name else others:
-        if other in table.columns and len(table.columns) > 1:
-            table = table.without(table.columns.index(other))
-    if space == "torus" and not by_name:
-        table = _angles_alone(table, tell)
     _check_width(path, table, space, width, others)
-    weights = counts = None
     if weighing is not None:
         _tell_of_weights(weighing, tell)
-        table, weights = _beside(path, table, weighing)
     elif counting is None and space == "torus" and hasattr(rows, "counts"):
         _tell_of_counts(path, table, rows.header, tell)
-    if counting is not None:
-        before = table.lines
-        table, counts = _beside(path, table, counting)
-        weights = None if weights is None else weights[np.isin(before, table.lines)]
-    found = TableRows(path, table, weights, group, rows.header)
-    return found if counts is None else found.repeated(counts)
+    return _weighed(TableRows(path, table, None, group, rows.header), weighing, counting)
+
+
+def _drop(rows: RowSettings) -> dict[str, Any]:
+    """Return what `read_table` does with rows that lack a value."""
+    dropped = rows.drop_missing or rows.missing == "drop"
+    return {"drop_missing": dropped, "keep_missing": rows.missing == "marginalise"}
+
+
+def _all_columns(
+    path: Path,
+    space: str | None,
+    width: int | None,
+    others: Sequence[str],
+    rows: RowSettings,
+    tell: Sink,
+) -> Table:
+    """Return all columns of numbers but those that are no data; then look at what is missing."""
+    how: dict[str, Any] = {"has_header": rows.header, "decimal": rows.decimal, "keep_missing": True}
+    try:
+        table = read_table(path, columns=None, width=width, **how)
+    except TableError as error:
+        # one more than wanted may be an identifier
+        table = read_table(path, columns=None, width=None, **how) if width is not None else None
+        if table is None or len((table := _without_identifiers(table, tell)).columns) != width:
+            raise error
+    for other in others:
+        if other in table.columns and len(table.columns) > 1:
+            table = table.without(table.columns.index(other))
+    if space == "torus":
+        table = _angles_alone(table, tell)
+    if width is None:
+        table = _without_identifiers(table, tell)
+    if space == "torus":
+        _tell_of_names(table, tell)
+    return table.complete(path, **_drop(rows), missing_codes=rows.missing_codes)
 
 
 def _columns_by_name(
@@ -169,17 +194,23 @@ def _columns_by_name(
 def _angles_alone(table: Table, tell: Sink) -> Table:
     """Return a table without the columns that are no angles by their names."""
     named = table.header is not None or table.delimiter is None
-    for name in table.columns if named else ():
+    counts_first = sorted(table.columns, key=lambda name: not is_count_named(name))
+    for name in counts_first if named else ():
         is_count = is_count_named(name)
         if (is_count or is_other_quantity(name)) and len(table.columns) > 1:
             table = table.without(table.columns.index(name))
             why = "which says how much or how often each row counts; --weights or --counts uses it"
             other = "which is no angle, by its name; name all columns to keep it"
             tell(Note(f"left out the column {name!r}, {why if is_count else other}"))
-    unknown = [name for name in table.columns if not is_angle_named(name)]
-    if named and unknown and not all(re.fullmatch(r"column\d+", name) for name in unknown):
-        tell(Note(f"took {listing(unknown)} as angle{'s' * (len(unknown) > 1)}"))
     return table
+
+
+def _tell_of_names(table: Table, tell: Sink) -> None:
+    """Tell which columns were taken as angles though their names do not say so."""
+    named = table.header is not None or table.delimiter is None
+    unknown = [name for name in table.columns if not is_angle_named(name)]
+    if named and any(re.fullmatch(r"column\d+", name) is None for name in unknown):
+        tell(Note(f"took {listing(unknown)} as angle{'s' * (len(unknown) > 1)}"))
 
 
 def _tell_of_counts(path: Path, table: Table, header: bool | None, tell: Sink) -> None:
@@ -232,45 +263,36 @@ def _check_width(
         )
 
 
-def _read(
-    path: Path, columns: Sequence[str] | None, width: int | None, tell: Sink, how: dict[str, Any]
-) -> Table:
-    if columns is not None:
-        return read_table(path, columns=list(columns), width=None, **how)
-    try:
-        table = read_table(path, columns=None, width=width, **how)
-    except TableError:
-        # one more than wanted may be an identifier
-        if width is None:
-            raise
-        table = _without_identifiers(read_table(path, columns=None, width=None, **how), tell)
-        if len(table.columns) != width:
-            raise
-        return table
-    return table if width is not None else _without_identifiers(table, tell)
-
-
 def _without_identifiers(table: Table, tell: Sink) -> Table:
     for column in reversed(range(len(table.columns))):
         name = table.columns[column]
         # what the header leaves empty is called "column1" by now
         given = name if table.header is None or name in table.header else ""
-        if len(table.columns) > 1 and is_identifier(given, table.values[:, column]):
+        known = table.values[~np.isnan(table.values[:, column]), column]
+        if len(table.columns) > 1 and is_identifier(given, known):
             table = table.without(column)
             tell(Note(f"left out the column {name!r}, which numbers the rows; name all to keep it"))
     return table
 
 
-def _beside(path: Path, table: Table, own: Table) -> tuple[Table, Array]:
-    """Return the rows that have a weight or count, and these (N,)."""
-    name = own.columns[0]
-    if name in table.columns:
-        raise TableError(
-            literal(f"{path}: {name!r} holds the rows' weights and cannot be a column of the data")
-            + " as well; leave it out of {columns}"
-        )
-    table = table.only(np.isin(table.lines, own.lines))
-    return table, own.values[np.isin(own.lines, table.lines), 0]
+def _weighed(rows: TableRows, weighing: Table | None, counting: Table | None) -> TableRows:
+    """Return the rows that have a weight and a count, with weights, as often as they are counted."""
+    for own in filter(None, (weighing, counting)):
+        if own.columns[0] in rows.table.columns:
+            name = own.columns[0]
+            raise TableError(
+                literal(
+                    f"{rows.path}: {name!r} holds the rows' weights and cannot be a column of the "
+                )
+                + "data as well; leave it out of {columns}"
+            )
+        rows = replace(rows, table=rows.table.only(np.isin(rows.table.lines, own.lines)))
+    at = rows.table.lines
+    if weighing is not None:
+        rows = replace(rows, weights=weighing.values[np.isin(weighing.lines, at), 0])
+    if counting is None:
+        return rows
+    return rows.repeated(counting.values[np.isin(counting.lines, at), 0])
 
 
 def _name(path: Path, column: str, header: bool | None) -> str:
@@ -299,7 +321,8 @@ def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
     if where.cell is not None and not where.fractional:
         doubts += fraction_doubts(table.values, where.cell[: len(table.columns)])
     for doubt in doubts:
-        tell(Note(f"WARNING: {doubt.text}" if doubt.is_serious else doubt.text))
+        words = doubt.text.replace("(fractional)", "(--fractional)")
+        tell(Note(f"WARNING: {words}" if doubt.is_serious else words))
     return unit
 
 

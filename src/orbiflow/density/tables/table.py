@@ -60,6 +60,25 @@ class Table:
         dropped = self.dropped | frozenset(self.lines[~kept].tolist())
         return replace(self, values=self.values[kept], lines=self.lines[kept], dropped=dropped)
 
+    def complete(
+        self,
+        path: Path,
+        *,
+        drop_missing: bool = False,
+        keep_missing: bool = False,
+        missing_codes: Sequence[float] = (),
+    ) -> Table:
+        """Return the table as `read_table` does, once it is known which columns are wanted."""
+        reading = Reading(
+            None,
+            len(self.columns),
+            drop_missing=drop_missing,
+            keep_missing=keep_missing,
+            missing_codes=missing_codes,
+        )
+        layout = {name: getattr(self, name) for name in ("header", "delimiter", "decimal")}
+        return finished(path, self.values, self.lines, self.columns, reading, self.notes, layout)
+
     def without(self, column: int) -> Table:
         """Return the table without a column, by its number from 0."""
         names = self.columns[:column] + self.columns[column + 1 :]
@@ -165,7 +184,7 @@ def finished(
 
     Lines (N,) number its rows in text; in other files these are numbered from 1.
     """
-    unit = "row" if lines is None else "line"
+    unit = "line" if layout is not None and layout["delimiter"] is not None else "row"
     lines = np.arange(1, len(values) + 1, dtype=np.int64) if lines is None else lines
     dropped, notes = frozenset[int](), list(notes)
     if reading.missing_codes:

@@ -12,6 +12,7 @@ import math
 import re
 from array import array
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -35,11 +36,15 @@ from orbiflow.errors import InputFileError, literal
 MAX_LINE = 2**20
 """Characters of a line at most."""
 
+DEGREES = "write decimal degrees, negative in the south and in the west"
+_IN_DEGREES = re.compile(r"\d.*[°'\"NSEWO]\s*$|^[NSEWO]\s*\d")
+
 SAMPLE = 100
 """Rows looked at to find the layout."""
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
 _LONE_COMMA = re.compile(r"[+-]?\d+(\.\d{3})*(,\d+)?")
+_LEADING_ZERO = re.compile(r",0\d")
 _WHOLE = re.compile(r"[+-]?\d+")
 _UNDECODED = re.compile("[\udc80-\udcff]")
 _SEPARATOR = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
@@ -153,7 +158,7 @@ def layout_of(
     check_count(path, len(rows[0]), tables.MAX_COLUMNS, "columns")
     for (number, _), row in zip(sample, rows, strict=True):
         _check_length(path, number, row, first, len(rows[0]), delimiter)
-    marks = marks_of(rows, delimiter, decimal)
+    marks = marks_of(rows, delimiter if len(rows[0]) > 1 else "", decimal)
     classes = [
         tuple(kind_of(plain(cell, marks.decimal)) for cell in column)
         for column in zip(*rows, strict=True)
@@ -175,7 +180,8 @@ def _refuse_doubtful(path: Path, layout: Layout, picked: Sequence[int]) -> None:
     """Refuse columns whose commas may be before decimals or thousands."""
     for column, cell in layout.marks.doubtful:
         if column in picked:
-            right, other = cell.replace(",", ""), cell.replace(",", ".")
+            mark = "," if "," in cell else "."
+            right, other = cell.replace(mark, ""), cell.replace(mark, ".")
             raise TableError(
                 literal(
                     f"{path}: column {quote(layout.names[column])}: {cell!r} may be {right} or {other}"
@@ -197,8 +203,13 @@ def _delimiter(lines: list[str]) -> str:
     """
     first, *rest = lines
     lone = all(_LONE_COMMA.fullmatch(line.strip()) for line in rest)
-    if "," not in first and lone and any("," in line for line in rest):
-        return ";"
+    if lone and any("," in line for line in rest):
+        headed = "," not in first
+        # no second column of whole numbers has zeros in front
+        if headed or (
+            _LONE_COMMA.fullmatch(first.strip()) and _LEADING_ZERO.search(",".join(lines))
+        ):
+            return ";"
     if _is_spaced(lines[len(lines) > 1 :]):
         return " "
     counts = {mark: [line.count(mark) for line in lines] for mark in "\t;,"}
@@ -273,12 +284,12 @@ def _numbers(
     path: Path, cells: list[str], lines: array[int], names: tuple[str, ...], decimal: str
 ) -> list[float]:
     """Return the cells of the last of `lines`, row after row, as floats; NaN for missing ones."""
-    try:
+    text = "".join(cells)
+    if "_" not in text and text.isascii() and (decimal == "." or "." not in text):
         # float takes 1_000 and other digits than ASCII's
-        if decimal == "." and "_" not in (text := "".join(cells)) and text.isascii():
-            return list(map(float, cells))
-    except ValueError:
-        pass
+        plainly = cells if decimal == "." else [cell.replace(",", ".") for cell in cells]
+        with suppress(ValueError):
+            return list(map(float, plainly))
     k, start = len(names), len(lines) - len(cells) // len(names)
     return [
         _number(path, lines[start + i // k], names[i % k], cell, decimal)
@@ -299,7 +310,13 @@ def _number(path: Path, line: int, name: str, cell: str, decimal: str) -> float:
     hint = f"write decimal {right}, not {wrong}, or say with {{decimal}} that they are {wrong}"
     raise TableError(
         literal(f"{path}: line {line}: column {quote(name)}: {quote(cell)} is not a number; ")
-        + (hint if comma else "correct it or drop the line")
+        + (
+            hint
+            if comma
+            else DEGREES
+            if _IN_DEGREES.search(cell)
+            else "correct it or drop the line"
+        )
     )
 
 
