@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from orbiflow.density import (
     AdaptiveKernels,
     DensityEstimator,
+    DensityLevels,
     highest_density_region,
     log_density_gradient,
     make_space,
+    outlines,
     places,
     summarize_angles,
     summarize_directions,
@@ -57,6 +59,20 @@ def test_a_town_is_as_sharp_as_its_rows(apart: float, wide: float) -> None:
     assert (np.linalg.norm(off, axis=1) < 4 * wide).mean() > 0.97
     region = highest_density_region(fit, 0.5)
     assert region.contains(new).mean() == pytest.approx(0.5, abs=0.08)
+
+
+@pytest.mark.parametrize(("apart", "wide"), [(600, 80), (60, 8)])
+def test_regions_of_a_town_are_outlined(apart: float, wide: float) -> None:
+    rows, _ = town(np.random.default_rng(8), 300, apart, wide)
+    fit = DensityEstimator("sphere", components=("kernels",)).fit(rows)
+    levels = DensityLevels(fit, samples=8000)
+    (outline,) = outlines(levels, [levels.highest(0.6)])
+    assert outline.mass == pytest.approx(0.6, abs=0.03)
+    assert outline.size == pytest.approx(outline.region.size, rel=0.1)
+    assert not outline.notes
+    west, south, east, north = np.radians(outline.shape.bounds) * EARTH
+    assert (north - south) < 6 * wide
+    assert (east - west) * math.cos(math.radians(MIDDLE[0])) < apart + 6 * wide
 
 
 @pytest.mark.parametrize("wide", [1e-4, 1e-5, 1e-6])

@@ -17,7 +17,7 @@ from orbiflow.density.fitting.chains import PRIOR, PRIOR_RESULTANT, concentratio
 from orbiflow.density.fitting.likelihood import training
 from orbiflow.density.fitting.repeats import places
 from orbiflow.density.fitting.rows import Rows, is_whole
-from orbiflow.density.models import FAINT, SHARPEST, AdaptiveKernels, kernel_rows
+from orbiflow.density.models import FAINT, LOG2_E, SHARPEST, AdaptiveKernels, kernel_rows
 from orbiflow.density.spaces import Space
 from orbiflow.typed_torch import linalg, special
 
@@ -171,8 +171,9 @@ def even_kernels(space: Space, centers: Tensor, kappa: float, weights: Tensor) -
 ITERATIONS, CONVERGED = 60, 1e-4
 """The most iterations of EM, and nats that each must gain."""
 
-BLOCK = 4_096
-"""Points worked on at a time."""
+BLOCK, BLOCK_ENTRIES = 4_096, 2**18
+"""The most points, and entries of images of points against components, worked on at a time: few enough
+for the cache."""
 
 
 @training()
@@ -202,9 +203,10 @@ def fit_mixture(
     images = space.features(points.nan_to_num(0.0))
     if not bool(whole.all()):
         images = images * ~torch.cat([absent, absent], dim=1)
-    blocks = torch.split(images, BLOCK, dim=1)
-    owns = [None] * len(blocks) if row_weights is None else torch.split(row_weights, BLOCK)
-    gaps = [None] * len(blocks) if bool(whole.all()) else torch.split(absent.to(images), BLOCK)
+    size = max(1, min(BLOCK, BLOCK_ENTRIES // (len(images) * components)))
+    blocks = torch.split(images, size, dim=1)
+    owns = [None] * len(blocks) if row_weights is None else torch.split(row_weights, size)
+    gaps = [None] * len(blocks) if bool(whole.all()) else torch.split(absent.to(images), size)
     every = list(zip(blocks, owns, gaps, strict=True))
     seen = images[:, whole]
 
@@ -248,21 +250,20 @@ def _expectation(
     count, total, score = torch.zeros_like(weights), torch.zeros_like(mean), 0.0
     unknown: Tensor | float = 0.0
     for images, own, absent in blocks:
-        joint = images @ rows + offsets
+        share = (images @ rows).add_(offsets)
         if absent is not None:  # a factor that is not there has no constant either
-            joint += absent @ (special.i0e(kappa).log() + kappa).mT
-        top = joint.amax(dim=(0, 2), keepdim=True)
-        share = (joint - top).clamp_min_(FAINT).exp_()
-        every = share.sum(dim=(0, 2), keepdim=True)
-        share /= every
-        likelihood = every.log() + top
+            share += absent @ (special.i0e(kappa).log() + kappa).mT
+        top = share.amax(dim=(0, 2))
+        share.sub_(top[:, None]).clamp_min_(FAINT).mul_(LOG2_E).exp2_()
+        every = share.sum(dim=(0, 2))
+        likelihood, row = every.log() + top, every.reciprocal()
         if own is not None:
-            share *= own[:, None]
-            likelihood = likelihood[0, :, 0] * own
-        count += share.sum(dim=(0, 1))
+            likelihood, row = likelihood * own, row * own
+        count += row @ share.sum(dim=0)
         if absent is not None:
-            unknown = unknown + share[0].mT @ absent
-        total += torch.einsum("enk,enm->km", share, images)
+            unknown = unknown + share[0].mT @ (absent * row[:, None])
+        weighed = images * row[:, None]
+        total += share.flatten(0, 1).mT @ weighed.flatten(0, 1)
         score += float(likelihood.sum())
     return count, count[:, None] - unknown, total, score
 

@@ -32,5 +32,6 @@ from .network import averaged_networks as averaged_networks
 from .network import log_conditional as log_conditional
 from .part import PartialDensity as PartialDensity
 from .terms import FAINT as FAINT
+from .terms import LOG2_E as LOG2_E
 from .terms import log_sum_exp as log_sum_exp
 from .terms import shares_of as shares_of
