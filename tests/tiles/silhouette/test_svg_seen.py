@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import resvg_py
 import shapely
-from hypothesis import given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 from scipy.ndimage import maximum_filter, minimum_filter
@@ -145,6 +145,38 @@ def test_any_stroke_is_what_a_renderer_draws(
         f'stroke-dashoffset="2" transform="{matrix}"/><circle cx="50" cy="50" r="12"/>'
     )
     assert agreement(f'{SVG} viewBox="0 0 100 100">{body}</svg>', 200) > 0.98
+
+
+TENTHS = st.integers(0, 10).map(lambda k: k / 10)
+
+
+@given(
+    ends=st.tuples(TENTHS, TENTHS, TENTHS, TENTHS),
+    stops=st.lists(st.tuples(TENTHS, st.sampled_from([0, 1])), min_size=2, max_size=5),
+    spread=st.sampled_from(["pad", "repeat", "reflect"]),
+    radial=st.booleans(),
+    turn=st.integers(-40, 40),
+)
+@settings(max_examples=60, deadline=None)
+def test_any_gradient_that_fades_is_what_a_renderer_draws(
+    ends: tuple[float, ...], stops: list[tuple[float, int]], spread: str, radial: bool, turn: int
+) -> None:
+    x1, y1, x2, y2 = ends
+    assume(np.hypot(x2 - x1, y2 - y1) > 0.25)
+    kind, vector = "linear", f'x1="{x1}" y1="{y1}" x2="{x2}" y2="{y2}"'
+    if radial:
+        kind, vector = "radial", f'cx="{x1}" cy="{y1}" r="{np.hypot(x2 - x1, y2 - y1):.3f}"'
+    inner = "".join(
+        f'<stop offset="{at}" stop-color="#000" stop-opacity="{opacity}"/>'
+        for at, opacity in sorted(stops, key=lambda stop: stop[0])
+    )
+    text = (
+        f'{SVG} viewBox="0 0 100 100"><{kind}Gradient id="g" spreadMethod="{spread}" {vector} '
+        f'gradientTransform="rotate({turn} .5 .5)">{inner}</{kind}Gradient>'
+        '<rect x="5" y="5" width="90" height="70" fill="url(#g)"/>'
+        '<circle cx="50" cy="87" r="11"/></svg>'
+    )
+    assert agreement(text, 200) > 0.97
 
 
 def covers(reading: Reading, *points: tuple[float, float]) -> list[bool]:
