@@ -12,7 +12,7 @@ from orbiflow.tiles.search import SearchSettings
 from orbiflow.tiles.silhouette import ReadingSettings
 
 # Endings of silhouettes that are no pictures: how these are read does not apply to them
-OUTLINES = (".svg", ".json", ".geojson", ".dat")
+OUTLINES = (".svg", ".json", ".geojson", ".dat", ".wkt")
 
 
 @operation("batch", keeps_partial=True, starts_processes=True)
@@ -37,7 +37,7 @@ def batch(
 
     Args:
         folder: Folder of silhouettes, searched with the folders inside: PNG, JPEG, WebP, SVG, and
-            polygons (.json, .dat).
+            polygons (.json, .geojson, .dat, .wkt).
         out: Folder for the results; an earlier batch there is resumed.
         match: Only files whose names fit a pattern, such as "*.svg".
         figures: Also write figures for print.
@@ -76,7 +76,7 @@ def _written(folder: Path) -> set[str]:
 TILES = Kind(
     things="silhouettes",
     items="files",
-    endings=(".png", ".jpg", ".jpeg", ".webp", ".svg", ".json", ".geojson", ".dat"),
+    endings=(".png", ".jpg", ".jpeg", ".webp", ".svg", ".json", ".geojson", ".dat", ".wkt"),
     most_bytes=64 * 2**20,
     reads="image",
     writes="out",

@@ -73,7 +73,7 @@ def escherize(
     overlay.png and model.safetensors; after a search for both, front.png, too.
 
     Args:
-        image: The silhouette: PNG, JPEG, WebP, SVG, or a polygon (.json, .dat).
+        image: The silhouette: PNG, JPEG, WebP, SVG, or a polygon (.json, .geojson, .dat, .csv, .wkt).
         out: Folder for the results, made if need be.
         figures: Also write for print tiling.pdf and overlay.pdf, and of the flow field.png and
             field.pdf.

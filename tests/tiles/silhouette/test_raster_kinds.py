@@ -232,3 +232,17 @@ def test_pictures_of_telephones_are_shrunk_and_said(
     assert reading.size == (size if orientation == 1 else size[::-1])
     assert "megapixels: 2 x 2 pixels became one" in reading.notes[0]
     assert iou(reading.outline, turned) > 0.995
+
+
+@pytest.mark.parametrize("label", [1, 12])
+def test_void_along_borders_is_no_label(label: int) -> None:
+    """As in VOC's segmentations: small labels, and 255 along the borders of objects."""
+    mask = np.zeros((120, 160), np.uint8)
+    mask[28:92, 38:122] = 255
+    mask[30:90, 40:120] = label
+    target = Target.from_mask(mask if label > 1 else mask.astype(np.int32))
+    assert target.area == pytest.approx(60 * 80, rel=0.01)
+    picture = np.zeros((120, 160), np.uint8)
+    picture[30:90, 40:120] = 255
+    picture[5, 5] = picture[7, 9] = 1
+    assert Target.from_mask(picture).area == pytest.approx(60 * 80, rel=0.01)

@@ -12,9 +12,9 @@ DARKEST = 10  # of 255: numbers no larger cannot be told apart as levels
 FEW = 40  # three numbers or more, and none larger, are labels if their regions are even
 MOST_LABELS = 256
 STRIP = 4_000_000  # pixels
-MAX_STRAY = (
-    0.1  # of the pixels on borders between regions: those of labels that fill no 3 x 3 pixels
-)
+VOID = 255  # what segmented photographs have along the borders of objects, which is no label
+# of the pixels on borders between regions: those of labels that fill no 3 x 3 pixels
+MAX_STRAY = 0.1
 
 _Mask = NDArray[np.bool_]
 
@@ -24,8 +24,13 @@ def label_mask(numbers: Array | NDArray[np.integer[Any]]) -> tuple[NDArray[np.ui
 
     Labels are small whole numbers, or 0, 1, 2 and so on, each of which fills regions. Levels of grey
     are not: between two levels of an anti-aliased or noisy picture there are others, which fill none.
-    The label that most of the border has is the background.
+    The label that most of the border has is the background. What is `VOID` beside small labels is
+    background, too.
     """
+    border = np.concatenate([numbers[0], numbers[-1], numbers[1:-1, 0], numbers[1:-1, -1]])
+    values, counts = np.unique(border, return_counts=True)
+    background = int(values[counts.argmax()])
+    given, numbers = numbers, _without_void(numbers, background)
     low, high = int(numbers.min()), int(numbers.max())
     if low < 0 or high > 65535 or low == high:
         return None
@@ -34,15 +39,13 @@ def label_mask(numbers: Array | NDArray[np.integer[Any]]) -> tuple[NDArray[np.ui
     counts = np.sum([np.bincount(strip.ravel(), minlength=high + 1) for strip in strips], axis=0)
     values = np.flatnonzero(counts)
     n = len(values)
-    are_few = high <= (DARKEST if n == 2 else FEW)
+    are_few = high <= (DARKEST if n == 2 and numbers is given else FEW)
     if n > MOST_LABELS or not (are_few or (n > 2 and low <= 1 and high - low == n - 1)):
         return None
     even = ndimage.maximum_filter(numbers, 3) == ndimage.minimum_filter(numbers, 3)
     filling = np.bincount(numbers[even], minlength=len(counts)) > 0
     if counts[~filling].sum() > MAX_STRAY * (~even).sum():
         return None
-    border = np.concatenate([numbers[0], numbers[-1], numbers[1:-1, 0], numbers[1:-1, -1]])
-    background = int(np.bincount(border).argmax())
     counts[background] = 0
     label, labelled = int(counts.argmax()), int(counts.sum())
     mask = np.where(numbers == label, 255, 0).astype(np.uint8)
@@ -56,3 +59,15 @@ def label_mask(numbers: Array | NDArray[np.integer[Any]]) -> tuple[NDArray[np.ui
         f"label mask: took label {label}, the largest of {n - 1} ({share}), background {background}; "
         "to take several, give them one label"
     )
+
+
+def _without_void(
+    numbers: Array | NDArray[np.integer[Any]], background: int
+) -> Array | NDArray[np.integer[Any]]:
+    """Return numbers with `VOID` as background, where what else there is are small labels."""
+    if int(numbers.max()) != VOID or background > FEW:
+        return numbers
+    kept = np.where(numbers == VOID, background, numbers)
+    labelled = int(np.count_nonzero(kept != background))
+    is_border = np.count_nonzero(numbers == VOID) < labelled
+    return kept if is_border and int(kept.max()) <= FEW else numbers

@@ -4,7 +4,7 @@ import { button, h, put } from "../dom.js";
 import { Feed } from "../events.js";
 import { alive, bytes, sentence } from "../words.js";
 
-const PICTURES = "image/*,.svg,.json,.dat";
+const PICTURES = "image/*,.svg,.json,.geojson,.dat,.wkt";
 const TABLES = /\.(csv|tsv|txt|npy|parquet)$/i;
 const stem = (name) => name.replace(/\.\w+$/, "");
 const hasCamera = () => Boolean(navigator.mediaDevices?.getUserMedia);
