@@ -3,6 +3,7 @@
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -187,7 +188,7 @@ DATA = np.random.default_rng(1).normal(20, 10, (100, 2))
 @pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("space", SPACES)
 def test_saved_and_read(space: str, tmp_path) -> None:
-    flow = {"max_frequency": 2, "segments": 2, "iterations": 3}
+    flow: dict[str, Any] = {"max_frequency": 2, "segments": 2, "iterations": 3}
     estimator = DensityEstimator(space, unit="degrees", **flow).fit(DATA)
     path = tmp_path / "density.safetensors"
     path.write_bytes(density_to_bytes(estimator.density_, columns=["a", "b"]))

@@ -180,7 +180,7 @@ def pairs_of(names: Sequence[str]) -> list[Pair]:
             if i != j and norths[i] == easts[j] and frozenset((i, j)) not in taken:
                 found.append(Pair(i, j, family))
         if len(norths) == 1 == len(easts) and norths.keys() != easts.keys():
-            lone.append(Pair(*norths, *easts, family))
+            lone.append(Pair(next(iter(norths)), next(iter(easts)), family))
     known = {column for pair in found for column in pair[:2]}
     found += [pair for pair in _run_together(names) if not known & set(pair[:2])]
     return found or lone[:1]
