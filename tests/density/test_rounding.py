@@ -112,6 +112,16 @@ def test_true_repeats_are_left() -> None:
     assert np.array_equal(fit.score_samples(twice), asked.score_samples(twice))
 
 
+def test_rounding_that_hardly_shows_is_left() -> None:
+    rng = np.random.default_rng(6)
+    space = make_space("torus", unit="degrees")
+    rows = rng.normal(0, 20, (2000, 2)).round(1)
+    found = repeats_of(space, space.to_chart(rows))
+    assert 0 < found.rows < 20
+    assert found.taken_for("auto") == "places"
+    assert not found.warnings("auto")
+
+
 @pytest.mark.parametrize("name", ["torus", "sphere", "klein-bottle", "projective-plane"])
 def test_rows_are_moved_by_half_a_step_at_most(name: str) -> None:
     space = make_space(name)

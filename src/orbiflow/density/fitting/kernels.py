@@ -204,7 +204,8 @@ def fit_mixture(
     if not bool(whole.all()):
         images = images * ~torch.cat([absent, absent], dim=1)
     size = max(1, min(BLOCK, BLOCK_ENTRIES // (len(images) * components)))
-    blocks = torch.split(images, size, dim=1)
+    # images of a point lie together: sums over them run along the memory
+    blocks = torch.split(images.transpose(0, 1).contiguous(), size)
     owns = [None] * len(blocks) if row_weights is None else torch.split(row_weights, size)
     gaps = [None] * len(blocks) if bool(whole.all()) else torch.split(absent.to(images), size)
     every = list(zip(blocks, owns, gaps, strict=True))
@@ -241,9 +242,9 @@ def _expectation(
 ) -> tuple[Tensor, Tensor, Tensor, float]:
     """Return what belongs to each component, and the log-likelihood.
 
-    Blocks are features of points, 0 where they are missing, their weights, and what is missing. What
-    belongs to a component are points (K,), those of them that know each angle (K, 1) or (K, d), and
-    sums (K, m) of their nearest images' features.
+    Blocks are features (n, E, m) of points, 0 where they are missing, their weights, and what is
+    missing. What belongs to a component are points (K,), those of them that know each angle (K, 1) or
+    (K, d), and sums (K, m) of their nearest images' features.
     """
     rows, offsets = kernel_rows(space, mean, kappa)
     rows, offsets = rows.mT.contiguous(), offsets + weights.log()
@@ -252,17 +253,18 @@ def _expectation(
     for images, own, absent in blocks:
         share = (images @ rows).add_(offsets)
         if absent is not None:  # a factor that is not there has no constant either
-            share += absent @ (special.i0e(kappa).log() + kappa).mT
-        top = share.amax(dim=(0, 2))
-        share.sub_(top[:, None]).clamp_min_(FAINT).mul_(LOG2_E).exp2_()
-        every = share.sum(dim=(0, 2))
+            share += (absent @ (special.i0e(kappa).log() + kappa).mT)[:, None]
+        flat = share.flatten(1)
+        top = flat.amax(dim=1)
+        flat.sub_(top[:, None]).clamp_min_(FAINT).mul_(LOG2_E).exp2_()
+        every = flat.sum(dim=1)
         likelihood, row = every.log() + top, every.reciprocal()
         if own is not None:
             likelihood, row = likelihood * own, row * own
-        count += row @ share.sum(dim=0)
+        count += row @ share.sum(dim=1)
         if absent is not None:
-            unknown = unknown + share[0].mT @ (absent * row[:, None])
-        weighed = images * row[:, None]
+            unknown = unknown + share[:, 0].mT @ (absent * row[:, None])
+        weighed = images * row[:, None, None]
         total += share.flatten(0, 1).mT @ weighed.flatten(0, 1)
         score += float(likelihood.sum())
     return count, count[:, None] - unknown, total, score

@@ -49,7 +49,7 @@ POLAR = 1e-6
 """Degrees from a pole within which the longitude is not looked at."""
 
 FEW = 0.01
-"""The share of rows that repeat another that does not count where columns are rounded."""
+"""The share of rows that repeat another up to which it does not matter why they do."""
 
 
 @dataclass(frozen=True)
@@ -141,10 +141,10 @@ def repeats_of(space: Space, points: Tensor) -> Repeats:
         cells = np.stack([_cells(own, s) for own, s in zip(data.T, steps, strict=True)], axis=1)
         explained = _explained(cells[:, moving])
         found = replace(found, step=max(step or 0.0 for step in steps), explained=explained)
-    if found.is_rounding:
-        spread = [_known(step, _turn(space, k)) for k, step in enumerate(steps)]
-    elif rows <= FEW * len(points):
+    if rows <= FEW * len(points):
         spread = [_spread(own, step) for own, step in zip(data.T, steps, strict=True)]
+    elif found.is_rounding:
+        spread = [_known(step, _turn(space, k)) for k, step in enumerate(steps)]
     else:
         return found
     return replace(found, spread=tuple(spread))
