@@ -57,9 +57,12 @@ def axes_named(wanted: Sequence[str | int], names: Sequence[str]) -> list[int]:
 
 def _named_axis(wanted: Any, names: Sequence[str]) -> int:
     if not isinstance(wanted, bool) and isinstance(wanted, numbers.Integral):
-        return as_whole(
-            wanted, f"the number of a column, of {', '.join(names)},", 0, len(names) - 1
-        )
+        if not 0 <= int(wanted) < len(names):
+            raise OrbiflowError(
+                f"no column {int(wanted)}: columns are numbered from 0 to {len(names) - 1} "
+                f"({', '.join(names)})"
+            )
+        return int(wanted)
     hits = [i for i, name in enumerate(names) if name == wanted]
     if not hits and isinstance(wanted, str):
         hits = [i for i, name in enumerate(names) if name.casefold() == wanted.casefold()]
