@@ -201,7 +201,9 @@ def test_columns_that_are_not_there() -> None:
     fit = DensityEstimator("torus", components=("kernels",))
     fit.fit(np.random.default_rng(0).vonmises(0.0, 4.0, (40, 2)))
     for number in (2, -1, 10**9):
-        with pytest.raises(OrbiflowError, match=r"columns are numbered from 0 to 1 \(angle1, angle2\)"):
+        with pytest.raises(
+            OrbiflowError, match=r"columns are numbered from 0 to 1 \(angle1, angle2\)"
+        ):
             fit.conditional({number: 1.0})
         with pytest.raises(OrbiflowError, match="columns are numbered"):
             fit.marginal(number)

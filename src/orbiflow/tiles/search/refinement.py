@@ -153,20 +153,23 @@ class _Descent:
         slope = float(before @ move)
         if not (slope < 0 and longest > 0):
             return False
-        self.blocked = False
+        touched = False
         length = min(self.length, LONGEST_MOVE * self.size / longest)
         for _ in range(HALVINGS):
             there = here + length * move
             outline = shapely.Polygon(self.space.polygon(there))
             if not outline.is_valid or _clearance(outline) < self.clearance:
-                self.blocked = True
+                touched = True
             else:
                 value, gradient = self.evaluated(there)
                 if value <= last + 1e-4 * length * slope and np.isfinite(gradient).all():
                     break
+                touched = False  # a shorter step was no better: it is the loss that ends it
             length /= 2
         else:
+            self.blocked = touched
             return False
+        self.blocked = touched
         bend = float(move @ (gradient - before))
         self.length = -length * slope / bend if bend > 0 else np.inf
         self.gradient = gradient
