@@ -44,7 +44,7 @@ def write(path: Path, columns: list[str], values: np.ndarray) -> None:
             "nowhere: there is no such folder; give the folder that `orbiflow density fit`",
         ),
         ("empty", "empty: there is no density.safetensors in it; give the folder that"),
-        ("damaged", "not a density saved by orbiflow, or damaged"),
+        ("damaged", "its checksum does not match"),
         ("torus.csv", "not a density saved by orbiflow, or damaged"),
     ],
 )
