@@ -257,4 +257,5 @@ def _why_empty(drawing: Drawing) -> str:
         parts = [f"{images} embedded image(s)"] * bool(images) + [f"{texts} text(s)"] * bool(texts)
         advice = "trace the image or give it as PNG" if images else "convert the text to paths"
         return f"no closed path: it holds only {' and '.join(parts)}; {advice}"
-    return "no closed path: the drawing has no shape that encloses an area"
+    left = "".join(f"; {note}" for note in drawing.left_out())
+    return f"no closed path: the drawing has no shape that encloses an area{left}"

@@ -107,7 +107,7 @@ class Clips:
         for child in source:  # a clip path holds shapes, not groups of them
             if is_own(child) and child.tag in SHAPES | {"text", "use"}:
                 found += drawing.visit(child, place)
-            elif child.tag in ("g", "svg", "symbol"):
+            elif child.tag in ("g", "svg", "symbol", "switch", "a", "image"):
                 drawing.notes.add(f"a <{child.tag}> in a <clipPath> clips nothing and is left out")
         return [shape for shape in found if not shape.decorates]
 

@@ -25,6 +25,7 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
 )
 from orbiflow.tiles.silhouette.readers.svg_style import Style, Styles
 from orbiflow.tiles.silhouette.readers.svg_transforms import (
+    MAX_TRANSFORM,
     NotATransform,
     origin_of,
     shift,
@@ -40,6 +41,7 @@ MAX_DRAWN = 10_000  # elements, those drawn again by <use>, clips, masks and mar
 MAX_TOKENS = 400_000  # commands and numbers in all path data; one with a fraction counts twice
 ROUNDING = 1e-9  # of the page: what reaches beyond it by less does not
 LANGUAGE = "en"  # what drawings in several languages are read in
+_SOURCE = "SourceGraphic"  # what a filter's first step is of
 _GROUPS = {"svg", "g", "a", "switch"}
 _OTHERS = {
     **{"image": "image", "text": "text", "flowRoot": "text", "foreignObject": "piece of HTML"},
@@ -226,7 +228,9 @@ class Drawing:
     def _cut(self, shapes: list[DrawnShape], style: Style, place: Place) -> list[DrawnShape]:
         """Return shapes cut by the clip and mask of their element, and note its other effects."""
         if style.get("filter", "none") != "none":
-            self.others["filter"] += 1
+            tint = self._tint(style["filter"])
+            self.others += Counter(["filter"] * (tint is None))
+            shapes = [replace(shape, tint=tint or shape.tint) for shape in shapes]
         for key, (note, harmless) in _EFFECTS.items():
             if style.get(key, "none").lower() not in {"none", *harmless}:
                 self.notes.add(note)
@@ -234,6 +238,29 @@ class Drawing:
             if shapes and style.get(key, "none") != "none":
                 shapes = self.clips.cut(shapes, key, style[key], place)
         return shapes
+
+    def _tint(self, text: str) -> str | None:
+        """Return the pure colour that a filter gives all it is of, as Canva's masks are made white.
+
+        None is of a filter that does more than that.
+        """
+        found = REFERENCE.fullmatch(text.strip())
+        target = "".join(filter(None, found.groups())) if found else ""
+        source = self.by_id.get(target[1:]) if target.startswith("#") else None
+        steps = [] if source is None or source.tag != "filter" else list(source)
+        if len(steps) != 1 or steps[0].tag != "feColorMatrix":
+            return None
+        if steps[0].get("type", "matrix") != "matrix" or steps[0].get("in", _SOURCE) != _SOURCE:
+            return None
+        words = (steps[0].get("values") or "")[:MAX_TRANSFORM].replace(",", " ").split()
+        try:
+            rows = np.array(words, float).reshape(4, 5)
+        except ValueError:
+            return None
+        pure = not rows[:3, :4].any() and ((rows[:3, 4] <= 0) | (rows[:3, 4] >= 1)).all()
+        if not (pure and (rows[3] == [0, 0, 0, 1, 0]).all()):
+            return None
+        return "#" + "".join("ff" if value >= 1 else "00" for value in rows[:3, 4])
 
     def _chosen(self, child: Element) -> bool:
         drawn = child.tag in _GROUPS | SHAPES | {"use", "text", "image"}
