@@ -68,6 +68,7 @@ class Drawing:
     - `ground`: The colour that CSS gives the page, if it gives one.
     - `window`: What of the plane is seen, which is wider than the page where its sides' ratio is not
       that of the size; None without a page.
+    - `view`: The map (3, 3) from user units to pixels.
     """
 
     def __init__(self, path: Source) -> None:
@@ -121,6 +122,7 @@ class Drawing:
         size = xmax - xmin, ymax - ymin
         place = Place(np.eye(3), size, {}, self.styles.rem, depth=-1).styled(style)
         self.window, view = self._window(style)
+        self.view = view
         ground = colour_of(style.get("background-color", "transparent"))
         self.ground = ground.colour if ground and ground.opacity == 1 else None
         about = np.linalg.inv(view) @ self.own_transform(self.root, style, place, "50% 50%") @ view
