@@ -27,7 +27,9 @@ from orbiflow.symmetry import (
     group_from_operators,
     operators,
     space_group,
+    translation,
 )
+from orbiflow.symmetry.group import generated
 
 SETTINGS = {row.xhm(): row for row in gemmi.spacegroup_table()}
 
@@ -257,6 +259,9 @@ SHIFTS = {
     "0.041667": "1/24",
     "0.16": "1/6",
     ".66": "2/3",
+    "0.33300": "1/3",
+    "0.3334": "1/3",
+    "0.49999": "1/2",
 }
 
 
@@ -283,6 +288,69 @@ def test_a_cif_with_operators_may_have_a_name_that_nobody_knows(tmp_path):
     path = tmp_path / "own.cif"
     path.write_text(f"{CORE}_space_group_name_H-M_alt 'P 32 (own axes)'\n{OPERATORS}\n")
     assert group_from_cif(path).order == 6
+
+
+MONOCLINIC = CORE.replace("120", "90").replace("beta 90", "beta 100")
+FOUR = "x,y,z;-x,y+1/2,-z+1/2;-x,-y,-z;x,-y+1/2,z+1/2"
+
+
+def cif(cell: str, listed: str = "", **symbols: object) -> str:
+    tags = {"hall": "_space_group_name_Hall", "hm": "_symmetry_space_group_name_H-M"}
+    tags |= {"alt": "_space_group_name_H-M_alt", "number": "_space_group_IT_number"}
+    lines = [f"{tags[key]} '{value}'" for key, value in symbols.items()]
+    loop = ["loop_", "_space_group_symop_operation_xyz", *listed.split(";")] if listed else []
+    return "\n".join([cell.strip(), *lines, *loop]) + "\n"
+
+
+CONTRADICTIONS = [
+    # an inversion lost; half of C 2/c; one sign, half or third mistyped; rounded beyond reading
+    (MONOCLINIC, "x,y,z;-x,y+1/2,-z+1/2", {"number": 14}, "of another type"),
+    (MONOCLINIC, "x,y,z;-x+1/2,y+1/2,-z+1/2", {"hm": "P 21/n"}, "of another type"),
+    (MONOCLINIC, "x,y,z;-x,y,-z+1/2;x+1/2,y+1/2,z", {"number": 15}, "of another type"),
+    (MONOCLINIC, FOUR.replace("-x", "-x+1/4"), {"hm": "P 1 2/m 1"}, "of another type"),
+    (MONOCLINIC, "x,y,z;-x+0.4,y+1/2,-z", {"hm": "P 1 2 1"}, "of another type"),
+    (MONOCLINIC, FOUR.replace("-y+1/2,z+1/2", "-y+1/2,z"), {"number": 14}, "imply 2 trans"),
+    (MONOCLINIC, FOUR.replace("-z+1/2", "-z+1/3"), {"hm": "P 21/c"}, "imply 6 trans"),
+    (MONOCLINIC, "x,y,z;-x,y+.49,-z", {"number": 4}, "imply 50 trans"),
+    (CORE, "x,y,z;-y,x-y,z+0.3;-x+y,-x,z+0.7", {"hm": "P 31"}, "imply 10 trans"),
+    # numbers of no group; settings of one type that differ
+    (MONOCLINIC, "", {"hm": "P 21/c", "number": 999}, "'999' is no number of a group"),
+    (MONOCLINIC, FOUR, {"number": 231}, "'231' is no number of a group"),
+    (MONOCLINIC, "", {"hall": "-P 2ybc", "hm": "P 21/n"}, "of the setting P 1 21/n 1"),
+    (MONOCLINIC, FOUR, {"hm": "P 21/n"}, "its 4 operators is of the setting P 1 21/c 1"),
+    (CORE.replace("120", "90"), "", {"alt": "P n m a", "hm": "P b n m"}, "of the setting P b n m"),
+    (MONOCLINIC.replace("100", "200"), "", {"number": 1}, "from 0 to 180 degrees"),
+]
+
+
+@pytest.mark.parametrize(("cell", "listed", "symbols", "reason"), CONTRADICTIONS)
+def test_cifs_that_contradict_themselves_are_refused(tmp_path, cell, listed, symbols, reason):
+    path = tmp_path / "bad.cif"
+    path.write_text(cif(cell, listed, **symbols), "utf-8")
+    with pytest.raises(InputFileError, match=reason):
+        group_from_cif(path)
+
+
+@settings(max_examples=10)
+@given(st.sampled_from(sorted(SETTINGS)), own.seeds)
+def test_groups_in_settings_of_no_table_agree_with_their_numbers(tmp_path_factory, name, seed):
+    group, rng = space_group(name), np.random.default_rng(seed)
+    shift = translation(group.lattice @ rng.integers(0, 7, 3) / 7)
+    moved = generated(group.lattice, [shift @ own @ shift.inverse() for own in group.cosets])
+    path = tmp_path_factory.mktemp("cif") / "group.cif"
+    path.write_text(cif_text(moved) + f"_space_group_IT_number {SETTINGS[name].number}\n")
+    assert group_from_cif(path).order == group.order
+
+
+def test_rhombohedral_axes_and_unknown_names_are_named_after_what_was_read(tmp_path):
+    path = tmp_path / "group.cif"
+    cell = CORE.replace("5.4052(1)", "4.9134").replace("90", "55").replace("120", "55")
+    path.write_text(cif(cell, hm="R -3 m", number=166))
+    assert group_from_cif(path).name == "R -3 m:R"
+    path.write_text(cif(MONOCLINIC, FOUR, hm="P 21/q"))
+    assert group_from_cif(path).name == "P 1 21/c 1"
+    path.write_text(cif(MONOCLINIC, hm="P 2~1~/c", number=0))
+    assert group_from_cif(path).order == 4
 
 
 def test_files_that_are_none_or_too_large_are_refused(tmp_path, monkeypatch):

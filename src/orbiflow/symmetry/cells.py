@@ -31,6 +31,10 @@ def cell_lattice(cell: ArrayLike) -> Array:
     lengths, angles = (*as_array(cell, "cell", shape).reshape(-1, 3), np.full(3, 90.0))[:2]
     if lengths.min() <= 0:
         raise refusal("cell", "of lengths above 0", lengths.min())
+    if abs(angles - 90).max() > 90:
+        raise GroupError(
+            f"no cell has the angles {angles.tolist()}: they lie from 0 to 180 degrees"
+        )
     cosines = np.cos(np.radians(angles))
     exact = np.where(np.isin(angles, (60, 90, 120)), np.round(2 * cosines) / 2, cosines)
     unit = np.eye(3)

@@ -23,6 +23,7 @@ _TYPESETTING: tuple[tuple[str, str], ...] = (
     (r"</?[A-Za-z][^<>]*>", ""),
     (r"\\(?:bar|overline)\s*(?:\{\s*(\d)\s*\}|(\d))", r"-\1\2"),
     (r"\\(?:mathrm|mathit|mathbf|mathsf|text|textit|textrm|rm|it)\b\s*", ""),
+    (r"~(\d)~", r"_\1"),
     (r"\\[,;:! ]|~", " "),
     (r"_\s*\{\s*(\d)\s*\}", r"_\1"),
     (r"[{}$]", ""),
@@ -64,24 +65,26 @@ def find_setting(gemmi: Any, name: str) -> Any | None:
 
     Blanks may be left out, or stand between the symbol's parts; letters may be large or small.
     """
-    table = _symbols(gemmi)
     text = plain(name)
     exact = next((row for row in gemmi.spacegroup_table() if row.xhm() == text), None)
-    if exact is not None:
-        return exact
-    text, extension = _without_extension(text)
+    settings = [exact] if exact is not None else settings_named(gemmi, name)
+    # the first listed of several: unique axis b before c and a, origin 1, hexagonal axes
+    return settings[0] if len({setting.number for setting in settings}) == 1 else None
+
+
+def settings_named(gemmi: Any, name: str) -> list[Any]:
+    """Return all rows that a symbol names, those in International Tables if any are: see above."""
+    text, extension = _without_extension(plain(name))
     written = [part.lower() for part in re.findall(r"^[A-Za-z]|[^ ]+", text)]
     if not text or not re.fullmatch(r"[A-Za-z][-_/ A-Za-z0-9]*", text):
-        return None
+        return []
     found = [
         symbol
-        for symbol in table.get("".join(written).replace("_", ""), ())
+        for symbol in _symbols(gemmi).get("".join(written).replace("_", ""), ())
         if _is_written(written, symbol.parts) and _has_extension(symbol.setting, extension)
     ]
     usual = [symbol.setting for symbol in found if symbol.is_usual]
-    settings = usual or [symbol.setting for symbol in found]
-    # the first listed of several: unique axis b before c and a, origin 1, hexagonal axes
-    return settings[0] if len({setting.number for setting in settings}) == 1 else None
+    return usual or [symbol.setting for symbol in found]
 
 
 def find_hall(gemmi: Any, name: str) -> list[Any] | None:

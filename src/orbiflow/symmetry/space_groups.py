@@ -2,6 +2,9 @@
 
 import importlib
 import re
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +12,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orbiflow.arguments import as_path, described
-from orbiflow.errors import GroupError, InputFileError, OrbiflowError, system_errors
+from orbiflow.arrays import Array
+from orbiflow.errors import (
+    GroupError,
+    InputFileError,
+    LatticeMismatchError,
+    OrbiflowError,
+    system_errors,
+)
 from orbiflow.symmetry.cells import cell_lattice, cell_parameters, fitting_cell
 from orbiflow.symmetry.group import CrystallographicGroup, checked_lattice
-from orbiflow.symmetry.group_symbols import find_hall, find_setting
+from orbiflow.symmetry.group_symbols import find_hall, find_setting, settings_named
 from orbiflow.symmetry.triplets import group_from_operators, operators, parse_operator
 
 MAX_CIF_BYTES = 64 * 2**20
@@ -55,7 +65,15 @@ def space_group(name: int | str, cell: ArrayLike | None = None) -> Crystallograp
         linear = np.stack([parse_operator(text, 3)[:, :3] for text in texts])
         a, b, c, *angles = fitting_cell(linear, cell_lattice(_TYPICAL)) or _TYPICAL
         cell = [1.0, round(b / a, 2), round(c / a, 2), *map(round, angles)]
-    return group_from_operators(texts, cell_lattice(cell), name=label)
+    try:
+        return group_from_operators(texts, cell_lattice(cell), name=label)
+    except LatticeMismatchError:
+        axes = label.removesuffix(":H") + ":R"  # which are meant if they fit and none are named
+        if not label.endswith(":H") or re.search(
+            r':|^[-H]|[HR"]$', str(name).strip(), re.IGNORECASE
+        ):
+            raise
+        return group_from_operators(_named(axes)[1], cell_lattice(cell), name=axes)
 
 
 def _named(name: int | str) -> tuple[str, list[str]]:
@@ -86,7 +104,7 @@ def group_from_cif(path: str | Path, cell: ArrayLike | None = None) -> Crystallo
     `cell`, as for `space_group`, is used in the place of the file's. Needs gemmi.
 
     Raises `InputFileError` for a file that cannot be read, describes no group, or contradicts itself:
-    operators, symbols and number must be of one type of group.
+    operators, symbols and number must be of one type of group, and of one setting.
     """
     path = as_path(path, "path")
     with system_errors(InputFileError, f"{path}: cannot be read"):
@@ -101,18 +119,21 @@ def group_from_cif(path: str | Path, cell: ArrayLike | None = None) -> Crystallo
             cell = [cif.as_number(values.get(tag, "?")[0]) for tag in _CELL]
         if not np.isfinite(cell).all():
             raise GroupError("its cell is not complete: give one as the argument cell")
-        names, numbers = _names(values)
         listed = next((values[tag] for tag in _OPERATORS if tag in values), None)
+        names, settings = _names(values)
         if listed is None:
             group = space_group(names[0], cell)
         else:
             basis = cell_lattice(cell)
             group = group_from_operators(listed, basis, name="".join(names[:1]).removeprefix(_SAID))
-            number = _number_of(operators(group, basis))
-            numbers |= {f"its {len(listed)} operators": number} if number else {}
-        if len({*numbers.values()}) > 1:
-            said = ", ".join(f"{what} is of number {number}" for what, number in numbers.items())
-            raise GroupError(f"it contradicts itself: {said}; correct it, or remove what is wrong")
+            own = _row_of(operators(group, basis))
+            if own is not None:
+                settings[f"its {len(listed)} operators"] = [own]
+                is_known = names and (_SAID in names[0] or _settings(_gemmi(), names[0]))
+                group = group if is_known else replace(group, name=own.xhm())
+            else:
+                _check_type(group, listed, basis, settings)
+        _check_agreement(settings)
         return group
     except StopIteration:
         raise InputFileError(f"{path}: it has neither operators nor a symbol of a group") from None
@@ -120,36 +141,108 @@ def group_from_cif(path: str | Path, cell: ArrayLike | None = None) -> Crystallo
         raise InputFileError(f"{path}: {error}") from error
 
 
-def _names(values: dict[str, list[str]]) -> tuple[list[str], dict[str, int]]:
-    """Return the names that a CIF gives its group, the most exact first, and the number of each.
+def _names(values: dict[str, list[str]]) -> tuple[list[str], dict[str, list[Any]]]:
+    """Return the names that a CIF gives its group, the most exact first, and what each may mean.
 
-    A Hall symbol that is none is passed over.
+    A Hall symbol that is none is passed over, and the number 0, which says that it is not known.
     """
     gemmi = _gemmi()
     names: list[str] = []
-    numbers: dict[str, int] = {}
+    settings: dict[str, list[Any]] = {}
     for tag, text in ((tag, values[tag][0]) for tag in _SYMBOLS if tag in values):
-        is_hall = tag in _HALL
-        hall = find_hall(gemmi, _SAID + text) if is_hall else None
-        if hall is None and is_hall:
+        if tag in _HALL:
+            if (hall := find_hall(gemmi, _SAID + text)) is None:
+                continue
+            found = [row] if (row := _row_of([op.triplet() for op in hall])) else []
+        elif tag in _NUMBERS and re.fullmatch("0+", text):
             continue
-        names.append(_SAID + text if is_hall else text)
-        number = _number_of([op.triplet() for op in hall]) if hall else None
-        if not is_hall and (row := _setting(gemmi, text)):
-            number = row.number
-        if number is not None:
-            numbers[f"{tag} {text}"] = number
-    return names, numbers
+        else:
+            found = _settings(gemmi, text)
+            if tag in _NUMBERS and not found:
+                raise GroupError(f"{tag} {described(text)} is no number of a group: 1 to 230 are")
+        names.append(_SAID + text if tag in _HALL else text)
+        if found:
+            settings[f"{tag} {text}"] = found
+    return names, settings
 
 
-def _number_of(triplets: list[str]) -> int | None:
-    """Return the number of the group of these operators, if its setting is in gemmi's tables."""
+def _settings(gemmi: Any, text: str) -> list[Any]:
+    """Return gemmi's rows that a number or a Hermann-Mauguin symbol may mean."""
+    if re.fullmatch(r"\d+", text.strip()):
+        return [row for row in gemmi.spacegroup_table() if row.number == int(text)]
+    return settings_named(gemmi, text)
+
+
+def _check_agreement(settings: dict[str, list[Any]]) -> None:
+    """Raise `GroupError` where what a CIF says has no type of group, or no setting, in common."""
+    numbers = {what: {str(row.number) for row in rows} for what, rows in settings.items()}
+    halls = {what: {str(row.hall) for row in rows} for what, rows in settings.items()}
+    if not settings or _have_common(halls.values()):
+        return
+    if not _have_common(numbers.values()):
+        said = ", ".join(f"{what} is of number {min(own)}" for what, own in numbers.items())
+    else:
+        named = {what: rows[0] for what, rows in settings.items() if not what.startswith(_NUMBERS)}
+        said = ", ".join(f"{what} is of the setting {row.xhm()}" for what, row in named.items())
+    raise GroupError(f"it contradicts itself: {said}; correct it, or remove what is wrong")
+
+
+def _have_common(sets: Iterable[set[str]]) -> bool:
+    first, *others = sets
+    return bool(first.intersection(*others))
+
+
+def _check_type(
+    group: CrystallographicGroup, listed: list[str], basis: Array, settings: dict[str, list[Any]]
+) -> None:
+    """Raise `GroupError` where operators in a setting that no table has are not of a named type.
+
+    Compared are the rotations and screws, reflections and glides, by their counts; and that the
+    operators imply no translations but those listed or of the names' own centring.
+    """
+    known = [row for rows in settings.values() for row in rows]
+    most = max((len(row.operations().cen_ops) for row in known), default=np.inf)
+    tables = [parse_operator(text, 3) for text in listed]
+    shifts = {tuple((t[:, 3] % 1).tolist()) for t in tables if np.allclose(t[:, :3], np.eye(3))}
+    implied = round(abs(float(np.linalg.det(basis))) / group.cell_volume)
+    if implied > max(most, len({*shifts, (0.0, 0.0, 0.0)})):
+        raise GroupError(
+            f"it contradicts itself: its operators imply {implied} translations within its cell and "
+            f"its name {most:.0f}; one of them may be mistyped, or rounded too coarsely"
+        )
+    own = _element_counts(group)
+    for what, rows in settings.items():
+        if own != _element_counts(space_group(f"Hall: {rows[0].hall}")):
+            raise GroupError(
+                f"it contradicts itself: its {len(listed)} operators are of another type of group, "
+                f"of order {group.order}, than {what}; correct it, or remove what is wrong"
+            )
+
+
+def _element_counts(group: CrystallographicGroup) -> Counter[tuple[int, int, int]]:
+    """Return how many cosets have a determinant, a trace, and a screw or glide of an order.
+
+    The order is how often the element is repeated until it equals one without a shift along itself.
+    All three are the same in every basis and for every origin.
+    """
+    counts: Counter[tuple[int, int, int]] = Counter()
+    shifts = group.translations @ group.inverse_lattice.T
+    nearby = np.stack(np.meshgrid(*[np.arange(-3, 4)] * 3), axis=-1).reshape(-1, 3)
+    for linear, shift in zip(group.integral_parts, shifts, strict=True):
+        along = np.mean([np.linalg.matrix_power(linear, k) for k in range(12)], axis=0)
+        apart = [abs((nearby - n * shift % 1) @ along.T).max(axis=1).min() for n in range(1, 7)]
+        orders = (n for n, distance in enumerate(apart, start=1) if distance < 1e-6)
+        counts[round(np.linalg.det(linear)), round(np.trace(linear)), next(orders, 0)] += 1
+    return counts
+
+
+def _row_of(triplets: list[str]) -> Any | None:
+    """Return gemmi's row of the group of these operators, if its tables have their setting."""
     gemmi = _gemmi()
     try:
-        found = gemmi.find_spacegroup_by_ops(gemmi.GroupOps([gemmi.Op(t) for t in triplets]))
+        return gemmi.find_spacegroup_by_ops(gemmi.GroupOps([gemmi.Op(t) for t in triplets]))
     except (RuntimeError, ValueError):  # a shift that is no 24th
         return None
-    return None if found is None else found.number
 
 
 def _values_by_tag(block: Any, cif: Any) -> dict[str, list[str]]:

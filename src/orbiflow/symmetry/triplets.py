@@ -23,6 +23,7 @@ from orbiflow.symmetry.isometry import Isometry, translation
 AXES = "xyz"
 MAX_LENGTH = 200
 ROUNDING = 1e-13  # the error of a shift that is meant to be a simple fraction
+LEAST = Fraction(1, 2000)  # three to five decimals of a shift are taken for rounded by so much
 _NUMBER = r"(?:\d{1,9}(?:/0*[1-9]\d{0,8}|\.\d{0,20})?|\.\d{1,20})"
 _TERM = re.compile(rf"([+-]?)({_NUMBER})?\*?([xyz]?)")
 
@@ -89,7 +90,9 @@ def _unrounded(text: str, value: Fraction) -> Fraction:
         return value
     parts = 6 if decimals == 2 else 24
     nearest = Fraction(round(value * parts), parts)
-    return nearest if abs(value - nearest) < Fraction(1, 10**decimals) else value
+    is_coarse = 3 <= decimals <= 5 and nearest.denominator > 1
+    error = max(Fraction(1, 10**decimals), LEAST if is_coarse else Fraction(0))
+    return nearest if abs(value - nearest) < error else value
 
 
 def _warn_of_rounding(texts: Iterable[str]) -> None:

@@ -298,3 +298,84 @@ def test_wkt(text: str) -> None:
 def test_wkt_without_an_outline_is_refused(text: str, message: str) -> None:
     with pytest.raises(InputFileError, match=message):
         read(text, "a.wkt")
+
+
+FIJI = [[178, -6], [179.2, -5.9], [-179.6, -6.1], [-178.9, -7.2], [-179.5, -8.3], [179.1, -8]]
+JOINED = [[x % 360, y] for x, y in FIJI]
+IN_WKT = ", ".join(f"{x} {y}" for x, y in [*FIJI, FIJI[0]])
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.csv", "lon,lat\n" + points(FIJI, ",")),
+        ("a.csv", "decimalLongitude,decimalLatitude\n" + points(FIJI, ",")),
+        ("a.csv", "id;latitude;longitude\n" + "".join(f"1;{y};{x}\n" for x, y in FIJI)),
+        ("a.wkt", f"SRID=4326;POLYGON (({IN_WKT}))"),
+    ],
+)
+def test_degrees_are_joined_at_the_date_line_in_every_format(name: str, text: str) -> None:
+    reading = read(text, name)
+    assert iou(reading.outline, JOINED) == pytest.approx(1)
+    assert "joined the shape where its longitudes jump by 360 degrees" in reading.notes
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.csv", points(FIJI, ",")),
+        ("a.json", json.dumps(FIJI)),
+        ("a.wkt", f"POLYGON (({IN_WKT}))"),
+    ],
+)
+def test_numbers_that_may_be_degrees_over_the_date_line_are_noted(name: str, text: str) -> None:
+    notes = read(text, name).notes
+    assert any("across the date line, save it as GeoJSON" in note for note in notes)
+
+
+def test_latitudes_and_longitudes_that_are_exchanged_are_said() -> None:
+    right = [[110 + x, 40 + y] for x, y in SHAPE]
+    exchanged = [[y, x] for x, y in right]
+    reading = read(json.dumps(polygon(exchanged)), "a.geojson")
+    assert iou(reading.outline, right) == pytest.approx(1)
+    assert "exchanged latitudes" in reading.notes[0]
+    notes = read(json.dumps(polygon([[10, 50], [11, 50], [11, 91]])), "a.geojson").notes
+    assert "beyond 90 are no latitudes" in notes[0]
+    with pytest.raises(InputFileError, match=r"line 2: 110.5 under 'lat' is no latitude"):
+        read("lat,lon\n" + points(right, ","), "a.csv")
+
+
+def test_rows_point_down_and_holes_may_come_first() -> None:
+    reading = read("row,col\n" + points([[y, x] for x, y in SHAPE], ","), "a.csv")
+    assert reading.y_down
+    assert iou(reading.outline, SHAPE) == pytest.approx(1)
+    content = {"type": "Polygon", "coordinates": [[[2, 1], [3, 1], [3, 1.5], [2, 1]], SHAPE]}
+    reading = read(json.dumps(content), "a.geojson")
+    assert iou(reading.outline, SHAPE) == pytest.approx(1)
+    assert "took the ring around the others for the outer one" in reading.notes
+
+
+def test_an_aerofoil_below_its_number_of_points_is_said_to_point_down() -> None:
+    upper, lower = aerofoil(0.12)
+    rows = [*upper[::-1], *lower[1:]]
+    reading = read(f"{len(rows)}\n" + points(rows))
+    assert reading.y_down
+    assert "took line 1 for the number of vertices" in reading.notes[-1]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.wkt", "CURVEPOLYGON (CIRCULARSTRING (0 0, 2 2, 4 0, 2 -2, 0 0))", "ST_CurveToLine"),
+        ("a.wkt", "SRID=4326;COMPOUNDCURVE ((0 0, 1 1))", "curved geometry"),
+        ("a.wkt", "MULTISURFACE (((0 0, 4 0, 4 4, 0 0)))", "curved geometry"),
+        ("a.wkt", "CIRCULARSTRING (0 0, 1 1, 2 0)", "curved geometry"),
+        ("a.dxf", "0\nSECTION\n2\nENTITIES\n0\nENDSEC\n0\nEOF\n", "is a DXF drawing"),
+        ("a.dxf", "999\nmade by hand\n  0\r\nSECTION\n", "is a DXF drawing"),
+        ("a.json", json.dumps({"geometryType": "esriGeometryPolygon", "features": []}), "of Esri"),
+        ("a.dat", "Two\n" + points([*SHAPE, [999.0, 999.0], *SHAPE]), "line 6: 999 parts"),
+    ],
+)
+def test_other_kinds_are_refused_by_their_cause(name: str, text: str, message: str) -> None:
+    with pytest.raises(InputFileError, match=message):
+        read(text, name)

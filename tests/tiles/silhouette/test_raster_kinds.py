@@ -246,3 +246,54 @@ def test_void_along_borders_is_no_label(label: int) -> None:
     picture[30:90, 40:120] = 255
     picture[5, 5] = picture[7, 9] = 1
     assert Target.from_mask(picture).area == pytest.approx(60 * 80, rel=0.01)
+
+
+@pytest.mark.parametrize("orientation", [5, 6, 7, 8])
+def test_plain_tiffs_that_are_turned_are_read_by_path(orientation: int, tmp_path: Any) -> None:
+    pixels = np.where(INSIDE[:, :90], 0, 255).astype(np.uint8)
+    turns = {5: "TRANSPOSE", 6: "ROTATE_90", 7: "TRANSVERSE", 8: "ROTATE_270"}
+    turned = Image.fromarray(pixels).transpose(Image.Transpose[turns[orientation]])
+    turned.save(tmp_path / "a.tif", tiffinfo={0x112: orientation})
+    assert iou(read_outline(tmp_path / "a.tif").outline, SHAPE) > 0.995
+
+
+@pytest.mark.parametrize(("labels", "note"), [((1, 2), "took label 1"), ((3, 0), "pixels of 3")])
+def test_whole_numbers_in_floating_point_are_labels(labels: tuple[int, int], note: str) -> None:
+    pixels = of_inside(labels[0], 0).astype(np.float32)
+    pixels[:10] = labels[1]
+    reading = read(tiff(pixels), "a.tif")
+    assert any(note in said for said in reading.notes)
+    assert iou(reading.outline, SHAPE) > 0.995
+
+
+@pytest.mark.parametrize("at", [0, 5])
+@pytest.mark.parametrize("width", [1, 3])
+@pytest.mark.parametrize("tones", [(0, 255), (255, 0), (40, 200)])
+def test_a_frame_around_a_solid_shape_is_left_out(
+    at: int, width: int, tones: tuple[int, int]
+) -> None:
+    kept = np.pad(of_inside(*tones).astype(np.uint8), 3, constant_values=tones[1])
+    framed = np.pad(np.pad(kept, width, constant_values=tones[0]), at, constant_values=tones[1])
+    reading = read_outline(FileContent(saved(Image.fromarray(framed)), "a.png"))
+    assert iou(reading.outline, SHAPE + at + width + 3) > 0.995
+    assert f"a line {width} pixel" in reading.notes[0]
+
+
+def test_a_frame_around_nothing_is_the_shape() -> None:
+    pixels = np.full((100, 100), 255, np.uint8)
+    pixels[10:90, 10:90], pixels[12:88, 12:88] = 0, 255
+    reading = read(saved(Image.fromarray(pixels)))
+    assert any("middle of its line" in note for note in reading.notes)
+
+
+@pytest.mark.parametrize("corner", [0, 9])
+def test_what_is_drawn_on_a_white_card_is_taken(corner: int) -> None:
+    card = Image.new("L", (110, 110))
+    ImageDraw.Draw(card).rounded_rectangle((4, 4, 105, 105), corner, 255)
+    levels = np.pad(of_inside(0, 255), 5, constant_values=255).astype(np.uint8)
+    image = Image.fromarray(np.dstack([levels] * 3 + [np.asarray(card)]))
+    reading = read(saved(image))
+    assert iou(reading.outline, SHAPE + 5) > 0.995
+    assert "the opaque part is a white card: took what is drawn on it" in reading.notes
+    photo = np.dstack([levels // 2 + 20] * 3 + [np.asarray(card)])  # grey: the card is the shape
+    assert OPAQUE in read(saved(Image.fromarray(photo))).notes

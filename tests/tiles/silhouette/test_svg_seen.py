@@ -304,6 +304,17 @@ def zigzag(count: int, step: float) -> str:
             "beyond 1e\\+12 user units",
         ),
         (f'<g transform="scale(0 1)">{PEN}{LINE}/></g>', "no closed path"),
+        (
+            '<filter id="f"><feFlood/></filter><mask id="m"><g filter="url(#f)">'
+            + DISC.format("")
+            + '</g></mask><rect width="90" height="90" mask="url(#m)"/>',
+            "no closed path: .*; left out 1 filter of the drawing",
+        ),
+        (
+            f'<clipPath id="c"><switch>{DISC.format("")}</switch></clipPath>'
+            '<rect width="90" height="90" clip-path="url(#c)"/>',
+            "no closed path: .*; a <switch> in a <clipPath> clips nothing",
+        ),
         ('<rect width="100" height="100"/><image href="x.png"/>', r"1 embedded image\(s\)"),
     ],
 )

@@ -40,7 +40,8 @@ _CONVERTIBLE = {
 }
 _BY_ENDING = {
     **dict.fromkeys(
-        (".ai", ".eps", ".cdr", ".pdf"), f"is a drawing of another program; {_SAVE_SVG}"
+        (".ai", ".eps", ".cdr", ".pdf", ".dxf", ".dwg"),
+        f"is a drawing of another program; {_SAVE_SVG}",
     ),
     ".psd": "is a Photoshop file; save it as PNG",
     **dict.fromkeys(
@@ -56,6 +57,7 @@ _SVG = re.compile(r"<(\w+:)?svg[\s>]")
 _WKT = re.compile(
     r"(SRID=\d+;)?\s*(MULTI)?(POLYGON|LINESTRING|POINT)|GEOMETRYCOLLECTION", re.IGNORECASE
 )
+_DXF = re.compile(r"(\s*999\s*\n.*\n)*\s*0\s*\n\s*SECTION\b")
 _COUNT_LINE = re.compile(r"\s*\d+\s*[\r\n]")
 _BY_NAME = {
     **{".svg": "svg", ".json": "json", ".geojson": "json", ".wkt": "wkt"},
@@ -122,6 +124,8 @@ def _kind(path: Source, head: bytes) -> str:
             return "json"
         if _WKT.match(text):
             return "wkt"
+        if _DXF.match(text):
+            raise InputFileError(f"{path}: is a DXF drawing; {_SAVE_SVG}")
         if _COUNT_LINE.match(text):
             return "points"
         # the reader that fits the name of a text file gives the best message

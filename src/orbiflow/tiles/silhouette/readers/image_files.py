@@ -1,5 +1,6 @@
 """Image files, decoded within bounds to what each pixel shows, whatever its depth and transparency."""
 
+import io
 import re
 import warnings
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from PIL import Image, UnidentifiedImageError
 
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.label_masks import DARKEST
-from orbiflow.tiles.silhouette.readers.reading import Source, check_file, opened, read_head
+from orbiflow.tiles.silhouette.readers.reading import Source, check_file, read_bytes, read_head
 
 MAX_BYTES = 64 * 2**20
 MAX_PIXELS = 40_000_000  # that are kept: of a larger image, several become one
@@ -78,7 +79,7 @@ def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
         with warnings.catch_warnings():
             # Pillow warns of damaged metadata and of sizes that are refused here anyway.
             warnings.simplefilter("ignore")
-            with Image.open(opened(path), formats=_FORMATS) as file:
+            with Image.open(_stream(path), formats=_FORMATS) as file:
                 return _first_shown(path, file, enough)
     except InputFileError:
         raise
@@ -93,6 +94,11 @@ def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
         raise InputFileError(
             f"{path}: the {_named(path)} is damaged or cut short ({exc}); export or download it again"
         ) from exc
+
+
+def _stream(path: Source) -> io.BytesIO:
+    """Return a file's bytes: some TIFFs that are turned Pillow misreads where it is given a path."""
+    return io.BytesIO(read_bytes(path, MAX_BYTES))
 
 
 def _named(path: Source) -> str:
@@ -217,7 +223,7 @@ class _Raw:
                 return cls(file, None, tuple(int(level) >> 8 for level in cast(Any, key)))
             if stored != "RGB;16B":
                 return cls(file, None, tuple(int(level) & 255 for level in cast(Any, key)))
-            with Image.open(opened(path), formats=_FORMATS) as again:
+            with Image.open(_stream(path), formats=_FORMATS) as again:
                 again.tile = [again.tile[0]._replace(args="RGB;16L")]  # the other byte of each
                 again.load()
             return cls(file, again, tuple(map(int, cast(Any, key))))
@@ -336,6 +342,12 @@ def _shrunk(path: Source, raw: _Raw, factor: int, notes: list[str]) -> Image.Ima
 def _numbers(raw: _Raw, normal: Image.Image) -> Numbers | None:
     """Return the numbers of the pixels that may be labels: see `DecodedImage`."""
     mode = raw.image.mode
+    if mode == "F" and raw.key is None:  # as ImageJ saves labels
+        values = np.asarray(raw.image)
+        is_whole = (
+            np.isfinite(values).all() and abs(values).max() <= 65535 and not (values % 1).any()
+        )
+        return values.astype(np.int32) if is_whole else None
     is_grey = mode == "L" or mode.startswith("I")
     if mode == "P" and normal.mode == "RGB":
         extrema: Any = normal.getextrema()

@@ -16,6 +16,7 @@ from skimage.filters import threshold_otsu
 from orbiflow.arguments import described, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.tiles.silhouette.readers.frames import is_card, without_frame
 from orbiflow.tiles.silhouette.readers.image_files import MAX_PIXELS, check_size, decoded_image
 from orbiflow.tiles.silhouette.readers.label_masks import label_mask
 from orbiflow.tiles.silhouette.readers.outline_drawings import outline_drawing
@@ -60,6 +61,9 @@ def read_image(
     image, notes = found.image, [*found.notes]
     if _is_hardly_cut_out(image):
         image, notes = _on_white(image), [*notes, "took the few transparent pixels for white"]
+    elif image.mode == "RGBA" and threshold is None and invert is None and is_card(image):
+        note = "the opaque part is a white card: took what is drawn on it"
+        image, notes = _on_white(image), [*notes, note]
     band, name, band_notes = _channel(path, image)
     picture = None
     if threshold is None and name == "luminance":
@@ -168,6 +172,10 @@ def choose_shape(
     cut = _cut(path, picture) if threshold is None else threshold
     given = "" if threshold is None else ", as given"
     above = channel > cut
+    framing: list[str] = []
+    if picture.name == "luminance" and invert is None:
+        channel, framing = without_frame(channel, above)
+        above = channel > cut
     if above.all() or not above.any():
         side = "above" if above.any() else "below"
         raise InputFileError(
@@ -186,8 +194,8 @@ def choose_shape(
     else:
         take_high, notes = _polarity(above, invert, f"threshold {cut:.2f}{given}")
     if take_high:
-        return Level(channel, cut, float(high)), notes
-    return Level(1 - channel, 1 - cut, 1 - float(low)), notes
+        return Level(channel, cut, float(high)), [*framing, *notes]
+    return Level(1 - channel, 1 - cut, 1 - float(low)), [*framing, *notes]
 
 
 def _cut(path: Source, picture: Picture) -> float:

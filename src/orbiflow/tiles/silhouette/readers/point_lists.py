@@ -16,6 +16,7 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.outlines import MAX_VERTICES, clean_ring
+from orbiflow.tiles.silhouette.readers.globe import may_be_joined, on_map, stretched
 from orbiflow.tiles.silhouette.readers.reading import Reading, Source, quoted, read_bytes
 
 MAX_BYTES = 16 * 2**20
@@ -25,6 +26,9 @@ COLUMNS = {
     "x": ("x", "lon", "lng", "long", "longitude", "easting", "east"),
     "y": ("y", "lat", "latitude", "northing", "north"),
 }
+DEGREES = frozenset(("lon", "lng", "long", "longitude", "lat", "latitude"))
+PIXELS = {"row": "y", "rows": "y", "col": "x", "cols": "x", "column": "x", "columns": "x"}
+BETWEEN = (999.0, 999.0)  # elements of an aerofoil, as XFOIL and MSES part them
 _AXES = {name: axis for axis, names in COLUMNS.items() for name in names}
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")  # of "pickup_longitude" and "decimalLatitude"
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?")
@@ -44,6 +48,11 @@ def read_points(path: Source) -> Reading:
     lines = _lines(path)
     first = lines[0]
     pairs = [_pair(line.text) for line in lines]
+    if BETWEEN in pairs[1:-1]:
+        raise InputFileError(
+            f"{path}: line {lines[pairs.index(BETWEEN)].number}: 999 parts the elements of an "
+            "aerofoil; save one outline alone"
+        )
     if pairs[0] is not None:
         known = np.array([pair for pair in pairs if pair is not None])
         is_title = _is_aerofoil(known[1:]) and abs(known[0]).max() > 2 * abs(known[1:]).max()
@@ -51,6 +60,9 @@ def read_points(path: Source) -> Reading:
     if re.fullmatch(r"\s*\d+\s*", first.text):
         return _counted(path, lines, pairs[1:])
     header = [_axis(cell) for cell in _cells(first.text)]
+    if not {"x", "y"} <= {*header}:
+        in_pixels = [PIXELS.get(cell.strip('"').lower(), "") for cell in _cells(first.text)]
+        header = in_pixels if {"x", "y"} <= {*in_pixels} else header
     if {"x", "y"} <= {*header} and len(header) == len(_cells(lines[min(1, len(lines) - 1)].text)):
         return _table(path, lines, header)
     if len(lines) > 3 and pairs[1] is not None:
@@ -165,6 +177,10 @@ def _counted(path: Source, lines: list[_Line], pairs: list[tuple[float, float] |
     if extra:
         what = f"left {len(extra)} line{'s' * (len(extra) > 1)} after the vertices unread"
         notes.append(f"{what} (line {extra[0].number} on)")
+    if n == len(known) and _is_aerofoil(known):
+        notes.append(
+            "took line 1 for the number of vertices, and y to point down, as in goal polygons"
+        )
     return Reading(outline, True, "dat", None, tuple(notes))
 
 
@@ -183,6 +199,7 @@ def _plain(path: Source, lines: list[_Line], title: str) -> Reading:
             f"{path}: line {later.number} begins another run of points, after a blank line; save one "
             "outline alone"
         )
+    notes += may_be_joined(points)
     outline, dropped = clean_ring(points, str(path), InputFileError)
     return Reading(outline, False, "dat", None, (*notes, *dropped, "took y to point up"))
 
@@ -239,6 +256,20 @@ def _table(path: Source, lines: list[_Line], header: list[str]) -> Reading:
         points.append((values[0], values[1]))
     if not points:
         raise InputFileError(f"{path}: there is no line below the header; export it again")
-    outline, dropped = clean_ring(points, str(path), InputFileError)
-    took = f"took {quoted(names[at[0]])} for x and {quoted(names[at[1]])} for y, which points up"
-    return Reading(outline, False, "dat", None, (took, *dropped))
+    notes: list[str] = []
+    ring = np.array(points)
+    is_down = names[at[1]].strip('"').lower() in PIXELS
+    are_degrees = all({w.lower() for w in _WORD.findall(names[i])} & DEGREES for i in at)
+    if are_degrees and (beyond := np.flatnonzero(abs(ring[:, 1]) > 90)).size:
+        line = lines[1 + int(beyond[0])]
+        raise InputFileError(
+            f"{path}: line {line.number}: {ring[beyond[0], 1]:g} under {quoted(names[at[1]])} is no "
+            "latitude, which lies from -90 to 90; are the names of the columns exchanged?"
+        )
+    if are_degrees:
+        ring, notes = on_map(path, ring)
+    outline, dropped = clean_ring(ring, str(path), InputFileError)
+    way = "down" if is_down else "up"
+    took = f"took {quoted(names[at[0]])} for x and {quoted(names[at[1]])} for y, which points {way}"
+    more = (*notes, *(stretched(outline) if are_degrees else ()))
+    return Reading(outline, is_down, "dat", None, (took, *dropped, *more))

@@ -1,6 +1,7 @@
 """Polygons in JSON, GeoJSON and WKT, with y up unless the file says otherwise."""
 
 import json
+import re
 from typing import Any
 
 import numpy as np
@@ -13,14 +14,19 @@ from orbiflow.errors import InputFileError
 from orbiflow.runtime import is_list, is_object
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.silhouette.outlines import clean_ring, outer_outline, outer_ring
+from orbiflow.tiles.silhouette.readers.globe import (
+    MERIDIAN,
+    is_on_globe,
+    may_be_joined,
+    on_map,
+    stretched,
+)
 from orbiflow.tiles.silhouette.readers.reading import Reading, Source, quoted, read_bytes
 
 MAX_BYTES = 16 * 2**20
 MAX_POLYGONS = 10_000
 POLYGON_KEYS = ("polygon", "tile", "outline")
-MAX_STEP = 90.0  # degrees of longitude: what crosses the date line has no longer step across it
-STRETCHED = 1.1  # more than so much wider than on the ground, longitudes are said to be as they are
-_MERIDIAN = "joined the shape where its longitudes jump by 360 degrees"
+_CURVES = re.compile(r"CURVE|CIRCULARSTRING|MULTISURFACE", re.IGNORECASE)
 _OTHERS = {
     "Topology": "is TopoJSON, which is not read; convert it to GeoJSON (mapshaper.org does)",
     "esri": 'is JSON of Esri ("rings"), which is not read; export GeoJSON',
@@ -38,6 +44,8 @@ def read_json(path: Source) -> Reading:
         return _geojson(path, content)
     points, y_down, notes = _find_polygon(path, content)
     _check_pairs(path, points)
+    if _is_finite(points):
+        notes += may_be_joined(np.array(points, dtype=float).reshape(-1, 2))
     outline, dropped = clean_ring(points, str(path), InputFileError)
     return Reading(outline, y_down, "json", None, (*notes, *dropped))
 
@@ -45,6 +53,11 @@ def read_json(path: Source) -> Reading:
 def read_wkt(path: Source) -> Reading:
     """Read the largest polygon of a text such as POLYGON ((0 0, 1 0, 0 1)), with y up."""
     text = read_bytes(path, MAX_BYTES).decode("utf-8-sig", errors="replace").strip()
+    if _CURVES.search(text):
+        raise InputFileError(
+            f"{path}: WKT of curved geometry, which is not read; convert it to a POLYGON of straight "
+            "sides (ST_CurveToLine does)"
+        )
     try:
         found = shapely.from_wkt(
             text.partition(";")[2] if text.upper().startswith("SRID") else text
@@ -54,7 +67,9 @@ def read_wkt(path: Source) -> Reading:
     parts = shapely.get_parts([found])
     if polygons := [part for part in parts if isinstance(part, Polygon) and not part.is_empty]:
         rings = [[shapely.get_coordinates(ring).tolist() for ring in _rings(p)] for p in polygons]
-        return _reading(path, rings, [])
+        return _reading(
+            path, rings, [], on_globe=bool(re.match(r"SRID=4326\s*;", text, re.IGNORECASE))
+        )
     raise InputFileError(f"{path}: WKT of type {found.geom_type}; save a POLYGON or MULTIPOLYGON")
 
 
@@ -83,7 +98,7 @@ def _find_polygon(path: Source, content: object) -> tuple[list[Any], bool, list[
         raise InputFileError(f"{path}: holds a single value, not a polygon; write [[x, y], ...]")
     keys = [key for key in POLYGON_KEYS if key in content]
     if not keys:
-        if "rings" in content or is_object(content.get("geometry")):
+        if content.keys() & {"rings", "geometryType"} or is_object(content.get("geometry")):
             raise InputFileError(f"{path}: {_OTHERS['esri']}")
         found = ", ".join(quoted(str(key)) for key in list(content)[:8]) or "nothing"
         raise InputFileError(
@@ -169,14 +184,16 @@ def _reading(
 ) -> Reading:
     """Return the largest of polygons, given by their rings, of which the first is the outer one."""
     rings: list[Array] = []
-    for outer, *holes in polygons:
-        _check_pairs(path, outer)
+    for first, *others in polygons:
+        outer, *holes = _outer_first(path, [first, *others])
+        if outer is not first:
+            notes = [*notes, "took the ring around the others for the outer one"]
         if holes and len(polygons) == 1:
             notes = [f"filled {len(holes)} hole{'s' * (len(holes) > 1)}", *notes]
         points = np.array(outer, dtype=float) if _is_finite(outer) else outer
-        if on_globe and isinstance(points, np.ndarray):
-            points, joined = _unwrapped(path, points)
-            notes += [note for note in joined if note not in notes]
+        if isinstance(points, np.ndarray):
+            points, more = on_map(path, points) if on_globe else (points, may_be_joined(points))
+            notes += [note for note in more if note not in notes]
         ring, dropped = clean_ring(points, str(path), InputFileError)
         rings.append(ring)
         notes += dropped
@@ -185,39 +202,32 @@ def _reading(
         notes += more
     else:
         ring = rings[0]
-    return Reading(ring, False, "json", None, (*notes, *(_stretched(ring) if on_globe else ())))
+    return Reading(ring, False, "json", None, (*notes, *(stretched(ring) if on_globe else ())))
+
+
+def _outer_first(path: Source, rings: list[list[Any]]) -> list[list[Any]]:
+    """Return the rings of a polygon, the outer one first: none has a larger box."""
+    _check_pairs(path, rings[0])
+    if len(rings) == 1:
+        return rings
+    for ring in rings[1:]:
+        _check_pairs(path, ring)
+    sizes = [
+        float(np.ptp(np.array(r, float), axis=0).prod()) if r and _is_finite(r) else 0.0
+        for r in rings
+    ]
+    outer = int(np.argmax(sizes))
+    return [rings[outer], *rings[:outer], *rings[outer + 1 :]]
 
 
 def _is_finite(points: list[Any]) -> bool:
     return all(abs(n) < 1e300 for pair in points for n in pair)
 
 
-def _is_on_globe(points: Array) -> bool:
-    return bool((abs(points[:, 0]) <= 360).all() and (abs(points[:, 1]) <= 90).all())
-
-
-def _unwrapped(path: Source, points: Array) -> tuple[Array, list[str]]:
-    """Return a ring with longitudes that do not jump at the date line, and a note if they did."""
-    steps = np.diff(np.append(points[:, 0], points[0, 0]))
-    jumps = abs(steps) > 180
-    if not jumps.any() or not _is_on_globe(points):
-        return points, []
-    is_short = bool((360 - abs(steps[jumps]) < MAX_STEP).all())
-    if not is_short and Polygon(points).is_valid:
-        return points, []  # a large shape whose sides are that long
-    if np.sum(np.round(steps / 360)):
-        raise InputFileError(
-            f"{path}: the ring goes around a pole or all around the globe: project it to a map first"
-        )
-    unwrapped = points.copy()
-    unwrapped[:, 0] = np.unwrap(points[:, 0], period=360.0)
-    return unwrapped, [_MERIDIAN]
-
-
 def _largest(rings: list[Array], on_globe: bool) -> tuple[Array, list[str]]:
     """Return the largest ring of what touching ones make together, and notes."""
     notes: list[str] = []
-    if on_globe and all(_is_on_globe(ring) for ring in rings):
+    if on_globe and all(is_on_globe(ring) for ring in rings):
         east = any(np.isclose(ring[:, 0].max(), 180, atol=1e-6) for ring in rings)
         west = [np.isclose(ring[:, 0].min(), -180, atol=1e-6) for ring in rings]
         if east and any(west):  # cut along the date line, as GeoJSON wants it
@@ -225,21 +235,7 @@ def _largest(rings: list[Array], on_globe: bool) -> tuple[Array, list[str]]:
                 ring + np.array([360.0 * is_west, 0.0])
                 for ring, is_west in zip(rings, west, strict=True)
             ]
-            notes.append(_MERIDIAN)
+            notes.append(MERIDIAN)
     whole = shapely.union_all([Polygon(ring) for ring in rings])
     shape, more = outer_outline(shapely.MultiPolygon(polygons_in(whole)))
     return outer_ring(shape), [*notes, *more]
-
-
-def _stretched(ring: Array) -> tuple[str, ...]:
-    """Return a note where degrees of longitude are much shorter than those of latitude."""
-    if not _is_on_globe(ring) or np.ptp(ring[:, 0]) > 180:
-        return ()
-    latitude = float(ring[:, 1].min() + ring[:, 1].max()) / 2
-    wide = 1 / max(np.cos(np.radians(latitude)), 1e-3)
-    if wide < STRETCHED:
-        return ()
-    return (
-        f"took longitudes and latitudes for x and y as they are: at latitude {latitude:.0f} the shape "
-        f"is {wide:.2g} times as wide as on the ground; project it first if that matters",
-    )

@@ -1,6 +1,5 @@
 """The result of every reader of silhouettes, and reading a file's bytes."""
 
-import io
 import stat
 from dataclasses import dataclass
 from pathlib import Path, PurePath
@@ -28,11 +27,6 @@ class FileContent:
 
 
 Source = Path | FileContent
-
-
-def opened(source: Source) -> Path | io.BytesIO:
-    """Return what libraries open: the path, or a stream of the bytes."""
-    return io.BytesIO(source.data) if isinstance(source, FileContent) else source
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,6 +38,8 @@ PAPER = "#ffffff"  # what a drawing without a background lies on
 SAME_COLOUR = 10  # of 255: colours whose channels differ by no more are one
 COVERING = 0.9  # opacity: more hides what lies below
 MOSTLY, NOTEWORTHY, OVER = 0.5, 0.001, 0.1  # shares of areas
+WHOLE, ALL_BUT = 0.999, 0.95  # shares of the page that a background covers: one shape, several
+MOST_STRIPS = 500  # rectangles that a background is made of, as strips or a chequerboard
 PLAIN = Brush("#000000", 1.0)
 
 
@@ -106,14 +108,18 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
         fills = [regions.shown(shape, regions.fill(shape)) for shape in drawing.shapes]
         layers = [[Layer(region, PLAIN)] for region in fills if region.area > 0]
         notes = ["nothing is painted: took the closed paths as filled"]
+    layers = [own for own in layers if own]
     paper, grounds = _background(layers, drawing)
-    shown = [layer for own in layers if own not in grounds for layer in own]
+    shown = [layer for k, own in enumerate(layers) if k not in grounds for layer in own]
     if not shown:
         raise InputFileError(f"{drawing.path}: {_why_empty(drawing)}")
     n = len(grounds)
     noun = "a background rectangle" if n == 1 else f"{n} background rectangles"
     notes += [f"left out {noun} that cover{'s' * (n == 1)} the whole drawing"] * (n > 0)
     seen, decided = _overlay(shown, paper)
+    colours = {layer.brush.colour for layer in shown if layer.brush.opacity >= FAINT}
+    if len(colours) > 1 and _solid(seen) >= ALL_BUT * _page(layers, drawing).area:
+        notes.append("the silhouette is all but the whole page; if that is a background, delete it")
     cut = regions.beyond / (regions.beyond + sum(layer.region.area for layer in shown))
     if cut > NOTEWORTHY:
         notes.append(f"left out what lies beyond the page: {percent(cut)} of what is painted")
@@ -124,27 +130,65 @@ def _numbers(box: Window | None) -> str:
     return " ".join(f"{value:g}" for value in box or ())
 
 
-def _background(
-    layers: list[list[Layer]], drawing: Drawing
-) -> tuple[str | None, list[list[Layer]]]:
-    """Return the background's colour, if it is painted, and the rectangles that are no more than it."""
+def _page(layers: list[list[Layer]], drawing: Drawing) -> shapely.Polygon:
+    """Return the page, or without one the box of what is painted."""
     every = [layer.region for own in layers for layer in own]
     xmin, ymin, xmax, ymax = drawing.box or shapely.total_bounds(every)
-    page = shapely.box(xmin, ymin, xmax, ymax)
+    return shapely.box(xmin, ymin, xmax, ymax)
 
-    def covers(own: list[Layer]) -> bool:  # but for 0.1% of the page
-        region = own[0].region
-        if region.envelope.intersection(page).area < 0.999 * page.area:
-            return False
-        solid = sum(filled(part).area for part in polygons_in(region))
-        return solid >= 0.999 * region.envelope.area
 
-    shown = [own for own in layers if own]
-    grounds = [own for own in shown if covers(own)]
-    if len(grounds) == len(shown) and not drawing.others.keys() & {"image", "text"}:
-        return drawing.ground, []
-    full = [own[0] for own in grounds if own[0].region.area >= 0.999 * page.area]  # no frames
-    return full[-1].brush.colour if full else drawing.ground, grounds
+def _background(layers: list[list[Layer]], drawing: Drawing) -> tuple[str | None, set[int]]:
+    """Return the background's colour, if it is painted, and which shapes are no more than it."""
+    if not layers:
+        return drawing.ground, set()
+    first, page = [own[0] for own in layers], _page(layers, drawing)
+    whole = {k for k, layer in enumerate(first) if _covers(layer.region, page)}
+    paving = set(range(_paving(layers, page)))
+    if whole == set(range(len(layers))) and not drawing.others.keys() & {"image", "text"}:
+        return drawing.ground, set()
+    # frames have no colour that others lie on
+    solid = [k for k in sorted(whole) if first[k].region.area >= WHOLE * page.area]
+    under = solid[-1:] or sorted(paving, key=lambda k: first[k].region.area)[-1:]
+    return first[under[0]].brush.colour if under else drawing.ground, whole | paving
+
+
+def _covers(region: BaseGeometry, page: shapely.Polygon) -> bool:
+    if region.envelope.intersection(page).area < WHOLE * page.area:
+        return False
+    return _without_holes(region).area >= WHOLE * region.envelope.area
+
+
+def _paving(layers: list[list[Layer]], page: shapely.Polygon) -> int:
+    """Return how many of the lowest shapes are rectangles that pave the page for others on them.
+
+    Corners may be rounded. Once the page is paved, what lies beside the rest or reaches from edge to
+    edge still belongs to it.
+    """
+    xmin, ymin, xmax, ymax = page.buffer(-(1 - WHOLE) * page.length / 4).bounds
+    ground: BaseGeometry = shapely.Polygon()
+    count, paved = 0, False
+    for own in layers[:MOST_STRIPS]:
+        parts = polygons_in(own[0].region)
+        if any(filled(part).area < ALL_BUT * part.envelope.area for part in parts):
+            break
+        region = _without_holes(own[0].region)
+        left, low, right, high = region.bounds
+        spans = (left <= xmin and right >= xmax) or (low <= ymin and high >= ymax)
+        beside = region.intersection(ground).area <= NOTEWORTHY * region.area
+        if paved and not spans and not beside:
+            break
+        ground, count = ground.union(region), count + 1
+        paved = ground.intersection(page).area >= ALL_BUT * page.area
+    on_it = [layer for own in layers[count:] for layer in own if layer.brush.opacity >= FAINT]
+    widest = max(
+        (own[0] for own in layers[:count]), key=lambda layer: layer.region.area, default=None
+    )
+    others = widest and any(not _alike(layer.brush.colour, widest.brush.colour) for layer in on_it)
+    return count if paved and others else 0
+
+
+def _without_holes(region: BaseGeometry) -> BaseGeometry:
+    return shapely.union_all([filled(part) for part in polygons_in(region)])
 
 
 def _overlay(layers: list[Layer], ground: str | None) -> tuple[BaseGeometry, list[str]]:
@@ -213,4 +257,5 @@ def _why_empty(drawing: Drawing) -> str:
         parts = [f"{images} embedded image(s)"] * bool(images) + [f"{texts} text(s)"] * bool(texts)
         advice = "trace the image or give it as PNG" if images else "convert the text to paths"
         return f"no closed path: it holds only {' and '.join(parts)}; {advice}"
-    return "no closed path: the drawing has no shape that encloses an area"
+    left = "".join(f"; {note}" for note in drawing.left_out())
+    return f"no closed path: the drawing has no shape that encloses an area{left}"

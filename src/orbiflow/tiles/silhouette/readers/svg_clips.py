@@ -17,13 +17,14 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
     DrawnShape,
     Place,
     bounds_of,
+    mapped,
     shape_paths,
     unit_box_matrix,
 )
 from orbiflow.tiles.silhouette.readers.svg_style import Style
 from orbiflow.tiles.silhouette.readers.svg_transforms import origin_of, shift
 from orbiflow.tiles.silhouette.readers.svg_units import as_number, length
-from orbiflow.tiles.silhouette.readers.svg_xml import is_own
+from orbiflow.tiles.silhouette.readers.svg_xml import reference
 
 if TYPE_CHECKING:
     from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
@@ -45,7 +46,7 @@ class Clips:
         """Return shapes cut by the property `clip-path` or `mask` of the element in a place."""
         drawing = self.drawing
         if REFERENCE.match(text) is None:
-            clip = _basic(text, shapes, place) if key == "clip-path" else None
+            clip = self._basic(text, shapes, place) if key == "clip-path" else None
             if clip is None:
                 drawing.notes.add(f"{key} {text[:40]!a} is not understood and left out")
             return _with(shapes, [clip] if clip else [])
@@ -58,6 +59,17 @@ class Clips:
             return shapes
         self._note_mode(text, key, source)
         return _with(shapes, self._clips(source, shapes, place))
+
+    def _basic(self, text: str, shapes: list[DrawnShape], place: Place) -> Clip | None:
+        """Return what a basic shape of CSS cuts, or None for others."""
+        if place.depth > 0:
+            return _basic(text, _reference_box(text, shapes, place), place)
+        # the outermost <svg> is a box of CSS: the page, in pixels
+        window, view = self.drawing.window, self.drawing.view
+        if window is None:
+            return None
+        corners = mapped(view, np.array(window).reshape(2, 2)).ravel().tolist()
+        return _basic(text, tuple(corners), place.moved(np.linalg.inv(view)))
 
     def _note_mode(self, text: str, key: str, source: Element) -> None:
         """Note what else is said of a clip or mask than which it is."""
@@ -105,9 +117,16 @@ class Clips:
             return drawing.children(source, place)
         found: list[DrawnShape] = []
         for child in source:  # a clip path holds shapes, not groups of them
-            if is_own(child) and child.tag in SHAPES | {"text", "use"}:
+            if child.tag == "use":
+                target = drawing.named(reference(child), "<use>")
+                if target is not None and target.tag in SHAPES | {"text"}:
+                    found += drawing.visit(child, place)
+                elif target is not None:
+                    what = f"a <use> of a <{target.tag[:40]}> in a <clipPath>"
+                    drawing.notes.add(f"{what} clips nothing and is left out")
+            elif child.tag in SHAPES | {"text"}:
                 found += drawing.visit(child, place)
-            elif child.tag in ("g", "svg", "symbol"):
+            elif child.tag in ("g", "svg", "symbol", "switch", "a", "image"):
                 drawing.notes.add(f"a <{child.tag}> in a <clipPath> clips nothing and is left out")
         return [shape for shape in found if not shape.decorates]
 
@@ -146,10 +165,9 @@ def _as_clip(tag: str, attributes: dict[str, str], place: Place, rule: str = "no
     return Clip([DrawnShape(paths, {"clip-rule": rule}, 1.0, place.matrix, 1.0, place)])
 
 
-def _basic(text: str, shapes: list[DrawnShape], place: Place) -> Clip | None:
+def _basic(text: str, box: Window | None, place: Place) -> Clip | None:
     """Return what a basic shape of CSS such as "circle(40% at center)" cuts, or None for others."""
     found = _BASIC.search(text)
-    box = _reference_box(text, shapes, place)
     if found is None or box is None:
         return None
     xmin, ymin, xmax, ymax = box

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -158,6 +158,8 @@ class StyleSheets:
         try:
             if max(map(len, text.split(","))) > MAX_SELECTOR:
                 raise SelectorError
+            # The library evaluates Python that it writes for a selector: all names and texts of the
+            # drawing stand in it as repr() quotes them, and numbers as parsed integers.
             compiled = compile_selector_list(rule.prelude, namespaces)
         except _NO_SELECTOR:
             self.notes.add(f"the selector {text[:40]!a} of the style sheet is not understood")
@@ -293,6 +295,13 @@ class _Node(ElementWrapper):
         self.namespace_url = namespace if brace else SVG
         self.etree_children = _Siblings(etree_element)
         self.etree_children.budget = self.budget
+
+    @cached_property
+    def lang(self) -> str:
+        """The language of the element, which SVG may write without a namespace."""
+        plain = self.etree_element.get("lang")
+        own = self.etree_element.get("{http://www.w3.org/XML/1998/namespace}lang", plain)
+        return own.lower() if own is not None else self.parent.lang if self.parent else ""
 
     @property
     def ancestors(self) -> Iterator["_Node"]:

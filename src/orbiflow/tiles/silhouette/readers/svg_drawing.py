@@ -25,6 +25,7 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
 )
 from orbiflow.tiles.silhouette.readers.svg_style import Style, Styles
 from orbiflow.tiles.silhouette.readers.svg_transforms import (
+    MAX_TRANSFORM,
     NotATransform,
     origin_of,
     shift,
@@ -40,6 +41,7 @@ MAX_DRAWN = 10_000  # elements, those drawn again by <use>, clips, masks and mar
 MAX_TOKENS = 400_000  # commands and numbers in all path data; one with a fraction counts twice
 ROUNDING = 1e-9  # of the page: what reaches beyond it by less does not
 LANGUAGE = "en"  # what drawings in several languages are read in
+_SOURCE = "SourceGraphic"  # what a filter's first step is of
 _GROUPS = {"svg", "g", "a", "switch"}
 _OTHERS = {
     **{"image": "image", "text": "text", "flowRoot": "text", "foreignObject": "piece of HTML"},
@@ -66,6 +68,7 @@ class Drawing:
     - `ground`: The colour that CSS gives the page, if it gives one.
     - `window`: What of the plane is seen, which is wider than the page where its sides' ratio is not
       that of the size; None without a page.
+    - `view`: The map (3, 3) from user units to pixels.
     """
 
     def __init__(self, path: Source) -> None:
@@ -119,6 +122,7 @@ class Drawing:
         size = xmax - xmin, ymax - ymin
         place = Place(np.eye(3), size, {}, self.styles.rem, depth=-1).styled(style)
         self.window, view = self._window(style)
+        self.view = view
         ground = colour_of(style.get("background-color", "transparent"))
         self.ground = ground.colour if ground and ground.opacity == 1 else None
         about = np.linalg.inv(view) @ self.own_transform(self.root, style, place, "50% 50%") @ view
@@ -226,7 +230,9 @@ class Drawing:
     def _cut(self, shapes: list[DrawnShape], style: Style, place: Place) -> list[DrawnShape]:
         """Return shapes cut by the clip and mask of their element, and note its other effects."""
         if style.get("filter", "none") != "none":
-            self.others["filter"] += 1
+            tint = self._tint(style["filter"])
+            self.others += Counter(["filter"] * (tint is None))
+            shapes = [replace(shape, tint=tint or shape.tint) for shape in shapes]
         for key, (note, harmless) in _EFFECTS.items():
             if style.get(key, "none").lower() not in {"none", *harmless}:
                 self.notes.add(note)
@@ -234,6 +240,29 @@ class Drawing:
             if shapes and style.get(key, "none") != "none":
                 shapes = self.clips.cut(shapes, key, style[key], place)
         return shapes
+
+    def _tint(self, text: str) -> str | None:
+        """Return the pure colour that a filter gives all it is of, as Canva's masks are made white.
+
+        None is of a filter that does more than that.
+        """
+        found = REFERENCE.fullmatch(text.strip())
+        target = "".join(filter(None, found.groups())) if found else ""
+        source = self.by_id.get(target[1:]) if target.startswith("#") else None
+        steps = [] if source is None or source.tag != "filter" else list(source)
+        if len(steps) != 1 or steps[0].tag != "feColorMatrix":
+            return None
+        if steps[0].get("type", "matrix") != "matrix" or steps[0].get("in", _SOURCE) != _SOURCE:
+            return None
+        words = (steps[0].get("values") or "")[:MAX_TRANSFORM].replace(",", " ").split()
+        try:
+            rows = np.array(words, float).reshape(4, 5)
+        except ValueError:
+            return None
+        pure = not rows[:3, :4].any() and ((rows[:3, 4] <= 0) | (rows[:3, 4] >= 1)).all()
+        if not (pure and (rows[3] == [0, 0, 0, 1, 0]).all()):
+            return None
+        return "#" + "".join("ff" if value >= 1 else "00" for value in rows[:3, 4])
 
     def _chosen(self, child: Element) -> bool:
         drawn = child.tag in _GROUPS | SHAPES | {"use", "text", "image"}

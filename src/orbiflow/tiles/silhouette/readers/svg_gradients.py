@@ -21,7 +21,7 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
     mapped,
     unit_box_matrix,
 )
-from orbiflow.tiles.silhouette.readers.svg_transforms import NotATransform, transform_matrix
+from orbiflow.tiles.silhouette.readers.svg_transforms import can_transform, transform_matrix
 from orbiflow.tiles.silhouette.readers.svg_units import as_number, length
 from orbiflow.tiles.silhouette.readers.svg_xml import reference
 
@@ -169,11 +169,11 @@ def _placed(
         if box is None or not (box[2] > box[0] and box[3] > box[1]):
             return None
         matrix, size = matrix @ unit_box_matrix(box), (1.0, 1.0)
-    try:
-        return matrix @ transform_matrix(attribute("gradientTransform", ""), (1.0, 1.0)), size
-    except NotATransform:
+    text = attribute("gradientTransform", "")
+    if not can_transform(text, css=False):
         drawing.notes.add("a gradientTransform is not understood and left out")
         return matrix, size
+    return matrix @ transform_matrix(text, (1.0, 1.0)), size
 
 
 _SERVERS = {"linearGradient", "radialGradient", "pattern"}

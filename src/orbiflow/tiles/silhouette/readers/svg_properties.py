@@ -93,7 +93,7 @@ def _reference(text: str, _: bool) -> str | None:
 
 
 def _transform(text: str, css: bool) -> str | None:
-    return text if not css or text.lower() == "none" or can_transform(text) else None
+    return text if text.lower() == "none" or can_transform(text, css=css) else None
 
 
 def _any(text: str, _: bool) -> str:

@@ -4,6 +4,7 @@
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import groupby
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
@@ -59,6 +60,7 @@ def paints(drawing: Drawing, shape: DrawnShape) -> dict[str, Paint]:
         paint = _paint(text, drawing, shape)
         if paint and (kind == "fill" or shape.width > 0):
             own = min(max(as_number(shape.paint.get(f"{kind}-opacity"), 1.0), 0.0), 1.0)
+            paint = _tinted(paint, shape.tint) if shape.tint else paint
             found[kind] = paint._replace(opacity=shape.opacity * paint.opacity * own)
     return {kind: paint for kind, paint in found.items() if paint.opacity > 0}
 
@@ -75,6 +77,14 @@ def _paint(text: str, drawing: Drawing, shape: DrawnShape) -> Paint | None:
         # without a colour it is the one that shows on what lies below
         brush = colour_of(shape.paint.get("color", CURRENT)) or brush
     return Paint(*brush) if brush and brush.opacity > 0 else None
+
+
+def _tinted(paint: Paint, tint: str) -> Paint:
+    """Return a paint in one colour, as opaque as before."""
+    if paint.gradient is None:
+        return paint._replace(colour=tint)
+    brushes = [Brush(tint, brush.opacity) for brush in paint.gradient.brushes]
+    return Paint(tint, paint.opacity, replace(paint.gradient, brushes=brushes))
 
 
 def _served(element: Element | None, drawing: Drawing, shape: DrawnShape) -> Paint | None:

@@ -50,6 +50,7 @@ class DrawnShape:
     path_length: float | None = None  # what its author takes for the length of its paths
     decorates: bool = False  # as a marker does, which is not part of the shape's box
     clips: tuple["Clip", ...] = ()  # what cuts it: it shows where all of these are
+    tint: str | None = None  # the colour that a filter gives it, whatever its paint
 
     @property
     def scale(self) -> float:

@@ -11,6 +11,10 @@ from orbiflow.tiles.silhouette.readers.svg_units import NUMBER, angle, length, q
 MAX_TRANSFORM = 2000  # characters
 _CALL = re.compile(r"\s*,?\s*([a-zA-Z0-9]+)\s*\(([^()]*)\)")
 _ARGUMENT = re.compile(rf"\s*,?\s*({NUMBER}(?:[a-z]+|%)?)", re.IGNORECASE)
+# a list of transforms as SVG's attributes write it: six names with plain numbers
+_ATTRIBUTE = re.compile(
+    r"(?:[\s,]*(?:matrix|translate|scale|rotate|skewX|skewY)\s*\([-+.,\s\deE]*\))*[\s,]*"
+)
 _KEYWORDS = {"left": "0%", "top": "0%", "center": "50%", "right": "100%", "bottom": "100%"}
 _Size = tuple[float, float]  # what percentages refer to
 _Make = Callable[[list[str], _Size, bool], Array]
@@ -37,10 +41,12 @@ def transform_matrix(text: str, size: _Size, *, css: bool = False) -> Array:
     return matrix
 
 
-def can_transform(text: str) -> bool:
-    """Return whether a text is a list of transforms of the plane as CSS writes it."""
+def can_transform(text: str, *, css: bool) -> bool:
+    """Return whether a text is a list of plane transforms as CSS or an attribute of SVG writes it."""
+    if not css and _ATTRIBUTE.fullmatch(text) is None:
+        return False
     try:
-        transform_matrix(text, (1.0, 1.0), css=True)
+        transform_matrix(text, (1.0, 1.0), css=css)
     except NotATransform:
         return False
     return True
