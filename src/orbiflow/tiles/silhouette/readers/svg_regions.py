@@ -207,7 +207,9 @@ class Regions:
         along = np.interp(_SAMPLES, paint.gradient.offsets, values)
         part = paint.gradient.part(values, FAINT, region)
         counts = along >= FAINT if part.area > 0 else along < FAINT
-        brush = Brush(paint.colour, float(along[counts].mean()))
+        beyond = values.max() if part.area > 0 else values.min()  # where it shows beyond its ends
+        opacity = along[counts].mean() if counts.any() else beyond
+        brush = Brush(paint.colour, float(opacity))
         if not 0 < part.area < (1 - NEARLY) * region.area:
             return Layer(region, brush)
         self.drawing.notes.add("left out what of a gradient is less than half visible")
