@@ -199,7 +199,7 @@ def key(case: Case, cache: Path) -> str:
     """Return what a cached result depends on: its commands, its inputs, and the cases it reads."""
     by_name = {case.name: case for case in corpus()}
     whole = hashlib.sha256(json.dumps(case.commands).encode())
-    for name in sorted((case.needs | case.needs_before) & by_name.keys()):
+    for name in sorted(case.needs & by_name.keys()):
         whole.update(key(by_name[name], cache).encode())
     for name in sorted(set(re.findall(r"\.\./inputs/([\w.-]+)", " ".join(case.commands)))):
         path = cache / "inputs" / name

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.density import TableError, append_columns, read_table
+from orbiflow.density.tables.numerals import Mark
 from orbiflow.errors import InputFileError
 from table_files import PROPERTY, write
 
@@ -79,8 +80,9 @@ def test_what_may_be_thousands_or_decimals_is_asked(content: str, tmp_path: Path
     with pytest.raises(TableError, match=r"column 'h': '.*' may be .* or .*; say with decimal"):
         read_table(path, columns=["h"], width=None)
     whole, fraction = DOUBTFUL[content]
+    marks: tuple[Mark, Mark] = (".", ",")
     found = [
-        read_table(path, columns=["h"], width=None, decimal=mark).values[0, 0] for mark in ".,"
+        read_table(path, columns=["h"], width=None, decimal=mark).values[0, 0] for mark in marks
     ]
     assert sorted(found) == [fraction, whole]
 
@@ -147,3 +149,10 @@ def test_a_column_without_a_value_is_named(tmp_path: Path) -> None:
     table = read_table(array, columns=None, width=None)
     assert table.columns == ("column1",)
     assert "left out the column: column2 has no value in any row" in table.notes
+
+
+@pytest.mark.parametrize("error", ["#N/A", "#DIV/0!", "#VALUE!", "#ref!"])
+def test_a_spreadsheets_error_begins_no_comment(error: str, tmp_path: Path) -> None:
+    path = write(tmp_path, f"a,b\n1,2\n{error},3\n4,5\n")
+    with pytest.raises(InputFileError, match="line 3"):
+        read_table(path, columns=["a", "b"], width=None)

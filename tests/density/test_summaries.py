@@ -119,13 +119,13 @@ def test_axes() -> None:
 @settings(max_examples=30)
 @given(st.lists(st.floats(-10, 10), min_size=2, max_size=40), st.floats(-3, 3))
 def test_against_scipy_and_turned(angles: list[float], turn: float) -> None:
-    (one,), _ = summarize_angles(angles)
+    (one,), _ = summarize_angles(angles, unit="radians")
     expected = stats.directional_stats(np.stack([np.cos(angles), np.sin(angles)], axis=1))
     assert one.resultant == pytest.approx(float(expected.mean_resultant_length), abs=1e-9)
     if one.mean is not None and one.resultant > 1e-6:
         assert math.cos(one.mean - stats.circmean(angles)) == pytest.approx(1)
         assert one.deviation == pytest.approx(stats.circstd(angles), rel=1e-4, abs=1e-6)
-    (other,), _ = summarize_angles(np.add(angles, turn))
+    (other,), _ = summarize_angles(np.add(angles, turn), unit="radians")
     for name in ("resultant", "rayleigh_p"):
         assert getattr(other, name) == pytest.approx(getattr(one, name), abs=1e-9)
     for name in ("kuiper_p", "watson_p"):  # they are rotation invariant, too
@@ -158,8 +158,8 @@ def test_groups_are_no_evidence_of_a_direction() -> None:
     labels = np.arange(120) // 6
     for _ in range(200):
         angles = np.repeat(rng.uniform(0, 2 * np.pi, 20), 6) + rng.normal(0, 0.1, 120)
-        (alone,), _ = summarize_angles(angles)
-        (grouped,), _ = summarize_angles(angles, groups=labels)
+        (alone,), _ = summarize_angles(angles, unit="radians")
+        (grouped,), _ = summarize_angles(angles, unit="radians", groups=labels)
         assert (grouped.kuiper_p, grouped.watson_p) == (None, None)
         naive += (alone.rayleigh_p or 0) < 0.05
         right += (grouped.rayleigh_p or 0) < 0.05
@@ -206,3 +206,18 @@ def test_what_cannot_be_told() -> None:
 def test_mistakes(given_: dict, message: str) -> None:
     with pytest.raises(OrbiflowError, match=message):
         summarize_angles([0.0, 1.0], **given_)
+
+
+def test_summaries_in_python_ask_as_the_command_line_does() -> None:
+    degrees = np.random.default_rng(0).normal(307, 20, 80) % 360
+    with pytest.raises(OrbiflowError, match="beyond 2 pi; give unit"):
+        summarize_angles(degrees)
+    coded = np.where(np.arange(80) % 8, degrees, 999.0)
+    with pytest.raises(OrbiflowError, match="999"):
+        summarize_angles(coded, unit="degrees")
+    hidden = np.ma.masked_array(np.ones(80), np.arange(80) == 3)
+    hidden.data[3] = 1e6
+    with pytest.raises(OrbiflowError, match="weights must be"):
+        summarize_angles(degrees, unit="degrees", weights=hidden)
+    with pytest.raises(OrbiflowError, match="weights: expected real numbers"):
+        summarize_angles(degrees, unit="degrees", weights=np.ones(80) * 1j)

@@ -62,7 +62,7 @@ def run(words: Sequence[str]) -> int:
 
 
 def _to_standard_error(text: str) -> None:
-    Console(stderr=True).print(text, soft_wrap=True, highlight=False)
+    Console(stderr=True, emoji=False).print(text, soft_wrap=True, highlight=False)
 
 
 def app_for(words: Sequence[str]) -> App:

@@ -29,7 +29,7 @@ from orbiflow.runtime import (
     find,
 )
 
-output, errors = Console(), Console(stderr=True)
+output, errors = Console(emoji=False), Console(stderr=True, emoji=False)
 
 EVERY = 10.0  # seconds between lines of progress on the standard error where there can be no bar
 

@@ -22,7 +22,7 @@ from scipy import optimize, special
 
 from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array
-from orbiflow.density.data import as_data, unit_of
+from orbiflow.density.data import as_data, as_numbers, unit_of
 from orbiflow.density.spaces import to_vectors, whole_turn
 from orbiflow.errors import OrbiflowError
 
@@ -161,7 +161,7 @@ def summarize_angles(
     data: ArrayLike,
     names: tuple[str, ...] | None = None,
     *,
-    unit: str = "radians",
+    unit: str | None = None,
     weights: ArrayLike | None = None,
     groups: ArrayLike | None = None,
     level: float = 0.95,
@@ -171,7 +171,7 @@ def summarize_angles(
     Args:
         data: Angles (n, d); a row counts in the columns in which it has a number.
         names: Names of the columns.
-        unit: "radians", "degrees" or "turns".
+        unit: "radians", "degrees" or "turns". Default: radians, if no value is beyond 2 pi.
         weights: How much each row counts (n,); only ratios matter.
         groups: What each row belongs to, (n,); rows of one group are not independent.
         level: Level of the intervals.
@@ -186,7 +186,7 @@ def summarize_angles(
         values[:, None] if values.ndim == 1 else values, "data", ("n", "d"), finite=False
     )
     names = names or found.names or tuple(f"column{k}" for k in range(1, values.shape[1] + 1))
-    turn = whole_turn(unit)
+    turn = whole_turn(unit_of("torus", values, names, unit))
     columns: list[AngleSummary] = []
     for name, column in zip(names, values.T, strict=True):
         own, rows = _chosen(column[:, None], weights, groups, level)
@@ -203,7 +203,7 @@ def _chosen(
 ) -> tuple[Array, _Rows]:
     """Return the rows that have all values and a weight."""
     whole = np.isfinite(values).all(axis=1)
-    given = np.ones(len(values)) if weights is None else np.asarray(weights, dtype=np.float64)
+    given = np.ones(len(values)) if weights is None else as_numbers(weights, "weights")
     if given.shape != whole.shape or not (np.isfinite(given).all() and (given >= 0).all()):
         raise OrbiflowError(f"weights must be {len(values)} numbers, none below 0")
     whole &= given > 0

@@ -307,8 +307,9 @@ def _places(space: str, values: Array, names: Sequence[str], unit: str | None) -
         if {word, word[0]}.intersection(words_of(name)) and bool((column >= 0).all()):
             text = f"{name!r} seems to count to the {word}, by its name: if so, make it negative"
             doubts.append(Doubt(text, True))
-    hours = "ra" in words_of(names[1]) and bool(((lon >= 0) & (lon < 24)).all())
-    if hours and float(np.ptp(lon)) > 12 and float(np.ptp(lat)) > 40:
+    is_ascension = bool({"ra", "raj", "rektaszension"}.intersection(words_of(names[1])))
+    hours = is_ascension and bool(((lon >= 0) & (lon < 24)).all())
+    if hours and (np.ptp(lon) > 20 or (np.ptp(lon) > 12 and np.ptp(lat) > 40)):
         text = f"{names[1]!r} is between 0 and 24: if it is in hours, multiply it by 15"
         doubts.append(Doubt(text, True))
     return doubts

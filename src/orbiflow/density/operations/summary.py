@@ -110,16 +110,16 @@ def _summarised(rows: TableRows, space: str, unit: str, level: float) -> dict[st
         rows.table.values,
         {"weights": rows.weights, "groups": rows.labels, "level": level},
     )
-    if space == "torus":
-        made = summaries.summarize_angles(values, rows.table.columns, unit=unit, **how)
-        names = ("columns", "correlations")
-        return {n: [asdict(one) for one in part] for n, part in zip(names, made, strict=True)}
-    name, summarise = {
-        "sphere": ("directions", summaries.summarize_directions),
-        "projective-plane": ("axes", summaries.summarize_axes),
-    }[space]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # told already
+        if space == "torus":
+            made = summaries.summarize_angles(values, rows.table.columns, unit=unit, **how)
+            names = ("columns", "correlations")
+            return {n: [asdict(one) for one in part] for n, part in zip(names, made, strict=True)}
+        name, summarise = {
+            "sphere": ("directions", summaries.summarize_directions),
+            "projective-plane": ("axes", summaries.summarize_axes),
+        }[space]
         return {name: [asdict(summarise(values, unit="degrees", **how))]}
 
 

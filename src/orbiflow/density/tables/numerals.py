@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 _MINUS = re.compile(r"[\u2010-\u2013\u2212\ufe63\uff0d](?=[\d.,])")
 _SPACED = re.compile(r"[+-]?\d{1,3}(?:[\u00a0\u202f\u2009 '\u2019]\d{3})+(?:[.,]\d*)?")
 _SPACES = re.compile(r"[\u00a0\u202f\u2009 '\u2019]")
-_MISSING = frozenset({"", "na", "n/a", "<na>", "nan", "null", "none", "-", "--"})
+_MISSING = frozenset({"", "na", "n/a", "<na>", "nan", "null", "none", "-", "--", "#n/a", "#na"})
 
 Mark = Literal[".", ","]
 OTHER: dict[str, Mark] = {".": ",", ",": "."}

@@ -47,6 +47,8 @@ _LONE_COMMA = re.compile(r"[+-]?\d+(\.\d{3})*(,\d+)?")
 _LEADING_ZERO = re.compile(r",0\d")
 _WHOLE = re.compile(r"[+-]?\d+")
 _UNDECODED = re.compile("[\udc80-\udcff]")
+# what spreadsheets write in a cell without a value, which begins no comment
+_SHEET_ERROR = re.compile(r"#(?:N/?A|NULL!|DIV/0!|VALUE!|REF!|NAME\?|NUM!)", re.IGNORECASE)
 _SEPARATOR = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
 """Excel's first line, which says what separates cells."""
 
@@ -132,7 +134,7 @@ def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
                     )
                 text = line.strip()
                 if text:
-                    is_comment = text[0] == "#" or (
+                    is_comment = (text[0] == "#" and not _SHEET_ERROR.match(text)) or (
                         number == 1 and _SEPARATOR.fullmatch(line.rstrip("\r\n"))
                     )
                     yield number, line.rstrip("\n"), bool(is_comment)
