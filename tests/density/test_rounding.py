@@ -132,3 +132,40 @@ def test_rows_are_moved_by_half_a_step_at_most(name: str) -> None:
     assert float(space.distance(points, still).max()) < 1e-7
     off = (space.features(points)[0] - space.features(moved)).norm(dim=-1).amin(dim=0)
     assert 0 < float(off.max()) <= 0.05 * 2**0.5 * (np.pi / 180 if space.is_round else 1.0) * 1.01
+
+
+@pytest.mark.parametrize(
+    ("parts", "unit", "digits"),
+    [
+        (16, "degrees", 0),
+        (32, "degrees", 0),
+        (36, "radians", 4),
+        (16, "radians", 2),
+        (24, "turns", 3),
+        (2160, "degrees", 4),
+    ],
+)
+def test_directions_that_were_rounded_twice(parts: int, unit: str, digits: int) -> None:
+    """Points of the compass in whole degrees: 0, 23, 45, 68 and so on."""
+    turn = {"degrees": 360.0, "radians": 2 * np.pi, "turns": 1.0}[unit]
+    angles = np.random.default_rng(0).vonmises(1.0, 2.0 if parts < 100 else 2000, 1500) % (
+        2 * np.pi
+    )
+    rows = np.round(rounded(angles / (2 * np.pi), 1 / parts) * turn, digits)
+    space = make_space("torus", dim=1, unit=unit)
+    found = repeats_of(space, space.to_chart(rows[:, None]))
+    assert found.is_rounding
+    assert found.spread == pytest.approx([turn / parts])
+    estimator = DensityEstimator("torus", unit=unit, components=("kernels",))
+    with pytest.warns(DataWarning, match="brings about"):
+        estimator.fit(rows[:, None])
+    peak = np.exp(estimator.score_samples(rows[:, None]).max()) * turn
+    assert peak < 1.3 * 2 * np.pi * np.exp(2) / 14.32 if parts < 100 else peak < 150
+
+
+def test_places_that_lie_on_a_coarse_grid_by_chance_are_places() -> None:
+    rng = np.random.default_rng(0)
+    few = rng.choice(360, 60, replace=False)
+    rows = rng.choice(few, 2000).astype(float)
+    space = make_space("torus", dim=1, unit="degrees")
+    assert not any(repeats_of(space, space.to_chart(rows[:, None])).spread)

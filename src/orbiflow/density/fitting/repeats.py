@@ -39,6 +39,13 @@ OFF, MOST_OFF = 1e-11, 1e-3
 MANY = 2.0
 """If there are more than so many times the repeats that rounding explains, they are real."""
 
+PARTS = (16, 24, 32, 36, 48, 64, 72, 120, 144, 180, 240, 360, 720, 1440, 2160, 4320, 10_800, 21_600)
+"""Parts of a turn to which directions are rounded before they are rounded again: points of the compass,
+hours, degrees, minutes of time and of arc."""
+
+COARSER = 3.0
+"""How many times as large as the step of all values such a step is at least."""
+
 FEWEST_VALUES = 8
 """The fewest different values that are taken for rounded, and steps in a turn: fewer may be states."""
 
@@ -135,16 +142,22 @@ def repeats_of(space: Space, points: Tensor) -> Repeats:
     data = _coordinates(space, points)
     if data is None or len(counts) < FEWEST_VALUES:
         return found
-    steps = [_step(own, _turn(space, k)) for k, own in enumerate(data.T)]
+    turns = [_turn(space, k) for k in range(data.shape[1])]
+    steps = [_step(own, turn) for own, turn in zip(data.T, turns, strict=True)]
     moving = np.ptp(data, axis=0) > 0
     if rows and all(step or not moves for step, moves in zip(steps, moving, strict=True)):
-        cells = np.stack([_cells(own, s) for own, s in zip(data.T, steps, strict=True)], axis=1)
-        explained = _explained(cells[:, moving])
+        explained = _share_explained(data, steps, moving)
         found = replace(found, step=max(step or 0.0 for step in steps), explained=explained)
+    if found.step is not None and not found.is_rounding and rows > FEW * len(points):
+        coarse = [_coarser(own, step, max(turns)) for own, step in zip(data.T, steps, strict=True)]
+        again = _share_explained(data, coarse, moving)
+        twice = replace(found, step=max(step or 0.0 for step in coarse), explained=again)
+        if twice.is_rounding:
+            found, steps = twice, coarse
     if rows <= FEW * len(points):
         spread = [_spread(own, step) for own, step in zip(data.T, steps, strict=True)]
     elif found.is_rounding:
-        spread = [_known(step, _turn(space, k)) for k, step in enumerate(steps)]
+        spread = [_known(step, turn) for step, turn in zip(steps, turns, strict=True)]
     else:
         return found
     return replace(found, spread=tuple(spread))
@@ -209,6 +222,23 @@ def _step(column: Array, turn: float) -> float | None:
     return next((step for step in fine if _are_multiples(values, step, turn, off)), None)
 
 
+def _coarser(column: Array, step: float | None, turn: float) -> float | None:
+    """Return a larger step of which all values (N,) are multiples but for rounding to `step`.
+
+    Points of the compass in whole degrees are 0, 23, 45, 68 and so on. Where there is none, it is the
+    step itself.
+    """
+    if step is None:
+        return None
+    values = np.unique(column)
+    for coarse in sorted({turn / parts for parts in PARTS} - {0.0}, reverse=True):
+        if coarse < COARSER * step:
+            break
+        if _are_multiples(values, coarse, 0.0, 0.51 * step):
+            return coarse
+    return step
+
+
 def _are_multiples(values: Array, step: float, turn: float, off: float) -> bool:
     """Return whether values, or those a turn further, are multiples of a step but for rounding."""
     found = np.zeros(len(values), dtype=bool)
@@ -238,6 +268,14 @@ def _spread(column: Array, step: float | None) -> float:
         return 0.0
     explained = _explained(cells[:, None])
     return step if explained is not None and explained * MANY >= 1 else 0.0
+
+
+def _share_explained(
+    data: Array, steps: list[float | None], moving: NDArray[np.bool_]
+) -> float | None:
+    """Return what steps of columns explain of the repeats of data (N, k), as `_explained` does."""
+    cells = np.stack([_cells(own, s) for own, s in zip(data.T, steps, strict=True)], axis=1)
+    return _explained(cells[:, moving])
 
 
 def _explained(cells: NDArray[np.int64]) -> float | None:
