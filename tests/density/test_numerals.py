@@ -156,3 +156,12 @@ def test_a_spreadsheets_error_begins_no_comment(error: str, tmp_path: Path) -> N
     path = write(tmp_path, f"a,b\n1,2\n{error},3\n4,5\n")
     with pytest.raises(InputFileError, match="line 3"):
         read_table(path, columns=["a", "b"], width=None)
+
+
+def test_decimal_commas_that_begin_late(tmp_path: Path) -> None:
+    rows = [f"{k};1" for k in range(100, 250)] + ["353,621;1", "128,250;1"]
+    path = write(tmp_path, "\n".join(["angle;n", *rows]) + "\n")
+    with pytest.raises(TableError, match=r"'353,621' may be 353621 or 353\.621; say with decimal"):
+        read_table(path, columns=["angle"], width=None)
+    found = read_table(path, columns=["angle"], width=None, decimal=",").values
+    assert found[-2:, 0].tolist() == [353.621, 128.25]

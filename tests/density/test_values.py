@@ -170,3 +170,12 @@ def test_rounding_may_take_a_latitude_beyond_the_pole() -> None:
         to_vectors([[-999.0, 0.0]])
     with pytest.raises(OrbiflowError, match="longitude 999 is beyond 360 degrees: is it a code"):
         to_vectors([[9.0, 999.0]])
+
+
+@pytest.mark.parametrize(
+    ("code", "step"), [(-1.0, 1.0), (99.0, 10.0), (-999.25, 0.1), (-888.8, 0.1), (-555.5, 0.1)]
+)
+def test_more_codes(code: float, step: float) -> None:
+    angles = np.round(np.random.default_rng(0).uniform(0, 359, 60) / step) * step
+    assert codes_among(np.where(np.arange(60) % 7, angles, code), 360.0) == [code]
+    assert codes_among(angles, 360.0) == []

@@ -186,7 +186,8 @@ def _radians(values: Array, names: Sequence[str]) -> Unit:
 
 # fmt: off
 CODES = frozenset({
-    77.0, 88.0, 99.0, 99.9, 99.99, 777.0, 888.0, 990.0, 998.0, 999.0, 999.9, 999.99, 7777.0, 8888.0,
+    1.0, 77.0, 88.0, 99.0, 99.9, 99.99, 777.0, 888.0, 888.8, 990.0, 998.0, 999.0, 999.25, 999.9, 999.99,
+    7777.0, 8888.0,
     9990.0, 9996.0, 9998.0, 9999.0, 9999.9, 9999.99, 32766.0, 32767.0, 32768.0, 65535.0, 99999.0,
     99999.9, 999999.0, 9999999.0, 2147483647.0, 2147483648.0,
 })
@@ -245,13 +246,13 @@ def _is_code(value: float, rest: Array, turn: float) -> bool:
         return False
     if value < 0:  # the only negative value of a compass
         return float(rest.min()) >= 0 and float(rest.max()) > turn / 2
+    if _are_whole(rest / 10):  # rounded to ten degrees, as winds are
+        return value % 10 != 0
     return value != round(value) and _are_whole(rest)
 
 
 def _is_foreign(value: float, rest: Array, turn: float, again: bool) -> bool:
     """Return whether a value beyond a turn is no angle like all others, which keep within a turn."""
-    if value != round(value):
-        return False
     if _are_whole(rest / 10) and len(rest) >= FEW_VALUES:  # rounded to ten degrees, as winds are
         return again or value % 10 != 0
     apart = float(np.abs(rest - value).min(initial=math.inf)) > CODE_GAP * turn

@@ -22,11 +22,13 @@ class Marks(NamedTuple):
     - `parted`: A number whose thousands are parted, if there is one.
     - `doubtful`: The columns, from 0, whose numbers may be a thousand times what they are, each with a
       number of them.
+    - `is_asked`: Whether the user said which mark is before decimals.
     """
 
     decimal: Mark
     parted: str | None = None
     doubtful: tuple[tuple[int, str], ...] = ()
+    is_asked: bool = False
 
 
 def with_minus(text: str) -> str:
@@ -83,7 +85,7 @@ def marks_of(rows: Sequence[Sequence[str]], delimiter: str, asked: Mark | None) 
     decimals = {",": comma.decimal or point.parted, ".": point.decimal or comma.parted}
     parted = {".": comma.parted or comma.either, ",": point.parted or point.either}
     if asked is not None:
-        return Marks(asked, parted[asked])
+        return Marks(asked, parted[asked], is_asked=True)
     if decimals[","] and not decimals["."]:
         return Marks(",", parted[","])
     if decimals["."] and not decimals[","]:

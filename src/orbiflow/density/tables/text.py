@@ -21,7 +21,15 @@ from pathlib import Path
 import numpy as np
 
 from orbiflow.density.tables import table as tables
-from orbiflow.density.tables.numerals import Mark, Marks, kind_of, marks_of, plain, with_minus
+from orbiflow.density.tables.numerals import (
+    OTHER,
+    Mark,
+    Marks,
+    kind_of,
+    marks_of,
+    plain,
+    with_minus,
+)
 from orbiflow.density.tables.table import (
     BLOCK,
     Reading,
@@ -94,10 +102,10 @@ def read_text(path: Path, reading: Reading) -> Table:
         lines.append(number)
         cells.extend([row[i] for i in picked])
         if len(cells) >= BLOCK * len(picked):
-            values.extend(_numbers(path, cells, lines, names, layout.decimal))
+            values.extend(_numbers(path, cells, lines, names, layout.marks))
             cells.clear()
             check_count(path, len(lines), reading.max_rows, "rows")
-    values.extend(_numbers(path, cells, lines, names, layout.decimal))
+    values.extend(_numbers(path, cells, lines, names, layout.marks))
     check_count(path, len(lines), reading.max_rows, "rows")
     rows, at = np.frombuffer(values).reshape(-1, len(picked)), np.frombuffer(lines, dtype=np.int64)
     named = {name: getattr(layout, name) for name in ("header", "delimiter", "decimal")}
@@ -182,14 +190,17 @@ def _refuse_doubtful(path: Path, layout: Layout, picked: Sequence[int]) -> None:
     """Refuse columns whose commas may be before decimals or thousands."""
     for column, cell in layout.marks.doubtful:
         if column in picked:
-            mark = "," if "," in cell else "."
-            right, other = cell.replace(mark, ""), cell.replace(mark, ".")
-            raise TableError(
-                literal(
-                    f"{path}: column {quote(layout.names[column])}: {cell!r} may be {right} or {other}"
-                )
-                + "; say with {decimal} which mark is before decimals, . or ,"
-            )
+            raise _two_ways(path, layout.names[column], cell)
+
+
+def _two_ways(path: Path, name: str, cell: str) -> TableError:
+    """Return what to say of a number that may have decimals or thousands."""
+    mark = "," if "," in cell else "."
+    right, other = cell.replace(mark, ""), cell.replace(mark, ".")
+    return TableError(
+        literal(f"{path}: column {quote(name)}: {cell!r} may be {right} or {other}")
+        + "; say with {decimal} which mark is before decimals, . or ,"
+    )
 
 
 def _delimiter(lines: list[str]) -> str:
@@ -283,10 +294,10 @@ def _has_header(
 
 
 def _numbers(
-    path: Path, cells: list[str], lines: array[int], names: tuple[str, ...], decimal: str
+    path: Path, cells: list[str], lines: array[int], names: tuple[str, ...], marks: Marks
 ) -> list[float]:
     """Return the cells of the last of `lines`, row after row, as floats; NaN for missing ones."""
-    text = "".join(cells)
+    text, decimal = "".join(cells), marks.decimal
     if "_" not in text and text.isascii() and (decimal == "." or "." not in text):
         # float takes 1_000 and other digits than ASCII's
         plainly = cells if decimal == "." else [cell.replace(",", ".") for cell in cells]
@@ -294,19 +305,22 @@ def _numbers(
             return list(map(float, plainly))
     k, start = len(names), len(lines) - len(cells) // len(names)
     return [
-        _number(path, lines[start + i // k], names[i % k], cell, decimal)
+        _number(path, lines[start + i // k], names[i % k], cell, marks)
         for i, cell in enumerate(cells)
     ]
 
 
-def _number(path: Path, line: int, name: str, cell: str, decimal: str) -> float:
+def _number(path: Path, line: int, name: str, cell: str, marks: Marks) -> float:
+    decimal, other = marks.decimal, OTHER[marks.decimal]
     number = plain(cell, decimal)
     kind = kind_of(number)
     if kind == "missing":
         return math.nan
     if kind == "number":
+        either = cell.count(other) == 1 and decimal not in cell
+        if either and marks.parted is None and not marks.is_asked:
+            raise _two_ways(path, name, cell)  # the first rows have shown nothing of the kind
         return float(number)
-    other = "," if decimal == "." else "."
     comma = kind_of(plain(cell, other)) == "number"
     right, wrong = ("points", "commas") if decimal == "." else ("commas", "points")
     hint = f"write decimal {right}, not {wrong}, or say with {{decimal}} that they are {wrong}"
