@@ -366,3 +366,19 @@ def test_tables_after_public_bug_reports(name: str, summary: Summary) -> None:
     if mean is not None:
         (found,) = document["columns" if space == "torus" else "directions"]
         assert found["mean"] == pytest.approx(mean, abs=0.06)
+
+
+@pytest.mark.parametrize("names", ["lat,ns,lon,ew", "Latitude,N/S,Longitude,E/W"])
+def test_hemispheres_in_columns_of_their_own(names: str, orbiflow, tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    path = tmp_path / "places.csv"
+
+    def said(south: str, west: str) -> str:
+        rows = [
+            f"{33 + rng.random():.3f},{south},{70 + rng.random():.3f},{west}" for _ in range(30)
+        ]
+        path.write_text("\n".join([names, *rows]) + "\n")
+        return orbiflow("density", "summary", path, "--space", "sphere").err
+
+    assert "says which rows are south or west" in said("S", "W")
+    assert "south or west" not in said("N", "E")

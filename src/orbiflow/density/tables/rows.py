@@ -22,6 +22,7 @@ from orbiflow.density.data import (
     is_angle_named,
     is_count_named,
     is_other_quantity,
+    words_of,
 )
 from orbiflow.density.tables.files import column_names, is_identifier, read_labels, read_table
 from orbiflow.density.tables.settings import SPACES, RowSettings, SpaceSettings, TableSettings
@@ -127,11 +128,34 @@ def read_rows(
     for note in table.notes:
         tell(Note(note))
     _check_width(path, table, space, width, others)
+    if space in ("sphere", "projective-plane"):
+        _check_hemispheres(path, table, rows.header)
     if weighing is not None:
         _tell_of_weights(weighing, tell)
     elif counting is None and space == "torus" and hasattr(rows, "counts"):
         _tell_of_counts(path, table, rows.header, tell)
     return _weighed(TableRows(path, table, None, group, rows.header), weighing, counting)
+
+
+_HEMISPHERES = {"N", "S", "E", "W", "NORTH", "SOUTH", "EAST", "WEST"}
+
+
+def _check_hemispheres(path: Path, table: Table, header: bool | None) -> None:
+    """Refuse degrees to the south or west that only a column of letters tells of."""
+    for name in column_names(path, has_header=header) or ():
+        words = {"ns", "ew", "n", "e", "hemisphere", "hemi", "dir", "direction"}
+        if name in table.columns or not words.intersection(words_of(name)):
+            continue
+        letters = {
+            cell.strip().upper() for cell in read_labels(path, name, table, has_header=header)
+        }
+        if letters <= _HEMISPHERES and letters & {"S", "W", "SOUTH", "WEST"}:
+            raise TableError(
+                literal(
+                    f"{path}: column {name!r} says which rows are south or west, and it is not read: "
+                    "make their latitudes and longitudes negative"
+                )
+            )
 
 
 def _drop(rows: RowSettings) -> dict[str, Any]:
