@@ -135,6 +135,8 @@ def test_tasks_begin_with_processes_that_are_ready(tmp_path: Path) -> None:
     def spawn() -> Any:
         ready.acquire()  # a process that takes its time to start
         made.append(ByHand(len(made)))
+        if len(made) > 2:  # a spare: what has not begun waits to be ended
+            made[-1].begin(made[0].call)  # pyright: ignore[reportArgumentType]
         return made[-1]
 
     queue = WorkQueue(store, slots={"long": 3, "quick": 1}, spares=1, spawn=spawn)
@@ -149,7 +151,6 @@ def test_tasks_begin_with_processes_that_are_ready(tmp_path: Path) -> None:
         pass
     assert [process.task for process in made[:2]] == tasks
     ready.release()
-    made[2].begin(made[0].call)  # pyright: ignore[reportArgumentType] - the spare, so that it ends
     queue.close()
     join_tasks()
     join_tasks("processes")
