@@ -210,8 +210,8 @@ MOST_CODES = 3
 def codes_among(column: Array, turn: float) -> list[float]:
     """Return values of a column (N,) that seem to stand for missing ones.
 
-    They are numbers such as 999 or -99 far from all others, or a few whole numbers beyond a turn that
-    come again and again, where other values keep within a turn.
+    They are numbers such as 999 or -99 far from all others, or a few numbers beyond a turn that come
+    again and again, where other values keep within a turn.
 
     >>> codes_among(np.array([10.0, 350.0, 20.0, 999.0, 990.0]), 360.0)
     [990.0, 999.0]
