@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from orbiflow.density import DensityEstimator, make_space
-from orbiflow.density.fitting.repeats import repeats_of, spread_evenly
+from orbiflow.density.fitting.repeats import Repeats, repeats_of, spread_evenly
 from orbiflow.errors import DataWarning
 
 Rows = NDArray[np.float64]
@@ -127,8 +128,11 @@ def test_rows_are_moved_by_half_a_step_at_most(name: str) -> None:
     space = make_space(name)
     data = space.from_chart(space.uniform(200, torch.Generator().manual_seed(0)))
     points = space.to_chart(data)
-    moved = spread_evenly(space, points, (0.1, 0.1), torch.Generator().manual_seed(1))
-    still = spread_evenly(space, points, (0.0, 0.0), torch.Generator().manual_seed(1))
+    found = Repeats(0, 200, None, None, (0.1, 0.1))
+    moved = spread_evenly(space, points, found, torch.Generator().manual_seed(1))
+    still = spread_evenly(
+        space, points, replace(found, spread=(0.0, 0.0)), torch.Generator().manual_seed(1)
+    )
     assert float(space.distance(points, still).max()) < 1e-7
     off = (space.features(points)[0] - space.features(moved)).norm(dim=-1).amin(dim=0)
     assert 0 < float(off.max()) <= 0.05 * 2**0.5 * (np.pi / 180 if space.is_round else 1.0) * 1.01
@@ -169,3 +173,64 @@ def test_places_that_lie_on_a_coarse_grid_by_chance_are_places() -> None:
     rows = rng.choice(few, 2000).astype(float)
     space = make_space("torus", dim=1, unit="degrees")
     assert not any(repeats_of(space, space.to_chart(rows[:, None])).spread)
+
+
+def mixed(rng: np.random.Generator, values: Rows, coarse: float, fine: float, share: float) -> Rows:
+    """Round a share of rows (N, k) coarsely, the others finely (0: not at all)."""
+    chosen = rng.random(len(values)) < share
+    rest = rounded(values, fine) if fine else values
+    return np.where(chosen[:, None], rounded(values, coarse), rest)
+
+
+MIXTURES = [(10.0, 1.0, 0.5), (5.0, 0.01, 0.9), (10.0, 0.0, 0.5), (5.0, 1.0, 0.3), (30.0, 1.0, 0.3)]
+
+
+@pytest.mark.parametrize(("coarse", "fine", "share"), MIXTURES)
+@pytest.mark.parametrize("dim", [1, 2])
+def test_some_values_rounded_more_coarsely_have_no_spikes(
+    coarse: float, fine: float, share: float, dim: int
+) -> None:
+    rng = np.random.default_rng(7)
+    rows = mixed(rng, np.degrees(rng.vonmises(1.0, 0.5, (2000, dim))), coarse, fine, share)
+    space = make_space("torus", dim=dim, unit="degrees")
+    found = repeats_of(space, space.to_chart(rows))
+    for heap in found.heaps:
+        assert heap is not None
+        assert heap.step == pytest.approx(coarse)
+        assert heap.share == pytest.approx(share, abs=0.08)
+    estimator = DensityEstimator("torus", unit="degrees", components=("kernels",))
+    with pytest.warns(DataWarning, match=f"are rounded to {coarse:g}"):
+        estimator.fit(rows)
+    on = estimator.score_samples(np.full((1, dim), 60.0))
+    off = estimator.score_samples(np.full((1, dim), 60.0 + coarse / 2))
+    assert abs(float(on[0] - off[0])) < 0.2
+
+
+def test_usual_values_are_no_heaps() -> None:
+    """Calm winds, states, crowded hours, stations of mixed precision and narrow peaks."""
+    rng = np.random.default_rng(8)
+    line = make_space("torus", dim=1, unit="degrees")
+    plane, sphere = make_space("torus", unit="degrees"), make_space("sphere")
+    calm = np.where(rng.random(2000) < 0.3, 0.0, rng.uniform(0, 360, 2000).round())
+    narrow = np.where(rng.random(2000) < 0.3, rng.normal(100, 1, 2000), rng.uniform(0, 360, 2000))
+    for column in (calm, narrow.round(), rng.normal(40, 3, 2000).round(1), narrow):
+        assert not any(repeats_of(line, line.to_chart(column[:, None])).heaps)
+    states = rng.choice([-60.0, 60, 180], (2000, 2))
+    states[:1000] = rng.normal(0, 50, (1000, 2)).round(1)
+    assert not any(repeats_of(plane, plane.to_chart(states)).heaps)
+    stations = np.stack([rng.uniform(30, 60, 400), rng.uniform(0, 40, 400)], axis=1)
+    stations = mixed(rng, stations, 1.0, 0.01, 0.5)[rng.integers(0, 400, 4000)]
+    assert not any(repeats_of(sphere, sphere.to_chart(stations)).heaps)
+
+
+@pytest.mark.parametrize("unit", ["degrees", "radians"])
+def test_points_of_the_compass_are_enough(unit: str) -> None:
+    """Eight directions, which stand for eighths of the circle."""
+    turn = 360.0 if unit == "degrees" else 2 * np.pi
+    angles = np.random.default_rng(9).vonmises(1.0, 1.0, 2000) / (2 * np.pi)
+    rows = (rounded(angles, 1 / 8) * turn)[:, None]
+    estimator = DensityEstimator("torus", unit=unit, components=("kernels", "mixture"))
+    with pytest.warns(DataWarning, match="brings about"):
+        estimator.fit(rows)
+    peak = np.exp(estimator.score_samples([[turn / (2 * np.pi)]])) * turn / (2 * np.pi)
+    assert float(peak[0]) == pytest.approx(np.e / (2 * np.pi * 1.26607), rel=0.15)

@@ -123,12 +123,12 @@ def fit_automatic(
     rows, settings, notes = _rows(space, points, weights, groups, settings, check_missing(missing))
     found = repeats_of(space, rows[is_whole(rows)].points)
     whole = " that lack no angle" if found.places + found.rows < len(rows) else ""
-    if found.places < LEAST_PLACES:
+    taken_for = found.taken_for(settings.repeats)
+    if found.places < LEAST_PLACES and not (taken_for == "rounding" and found.can_be_undone):
         raise OrbiflowError(
             f"a density needs at least {LEAST_PLACES} different points{whole}, got {found.places} "
             f"among {len(rows)}"
         )
-    taken_for = found.taken_for(settings.repeats)
     rows, together = _without_rounding(space, rows, found, taken_for, settings.seed)
     generator = torch.Generator().manual_seed(settings.seed)
     folds = folds_of(rows, together=together, generator=generator)
@@ -175,10 +175,10 @@ def _without_rounding(
     space: Space, rows: Rows, found: Repeats, taken_for: str, seed: int
 ) -> tuple[Rows, bool]:
     """Return rows as they may have been before they were rounded, and if equal ones stay together."""
-    if taken_for != "rounding" or not any(found.spread):
+    if taken_for != "rounding" or not found.can_be_undone:
         return rows, taken_for == "rounding"
     generator = torch.Generator().manual_seed(seed)
-    points = spread_evenly(space, rows.points, found.spread, generator)
+    points = spread_evenly(space, rows.points, found, generator)
     return replace(rows, points=points), False
 
 

@@ -14,6 +14,7 @@ from orbiflow.arguments import as_instance, as_points
 from orbiflow.density.fitting.folds import LEAST_PLACES
 from orbiflow.density.fitting.likelihood import Refinement
 from orbiflow.density.fitting.repeats import Repeats, places
+from orbiflow.density.fitting.rounding import Heap
 from orbiflow.density.fitting.rows import mean_of
 from orbiflow.density.inference import at_observed
 from orbiflow.density.models import Density, FlowDensity
@@ -139,6 +140,7 @@ def _repeats_from(document: Mapping[str, Any]) -> Repeats:
     values: dict[str, Any] = dict(document)
     for name in ("spread", "columns"):  # which version 0.1 did not write
         values[name] = tuple(values.get(name, ()))
+    values["heaps"] = tuple(heap and Heap(*heap) for heap in values.get("heaps", ()))
     return Repeats(**values)
 
 
