@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import torch
 
 from orbiflow.arrays import Array
 from orbiflow.runtime import Cancel
 from orbiflow.tiles.art.page import HIDDEN, ArtPage
-from orbiflow.tiles.motifs import NOWHERE, Grid, Runs, rgb_of, ring_sides, runs
+from orbiflow.tiles.motifs import NOWHERE, Grid, Runs, bilinear, rgb_of, ring_sides, runs
 
 BAND = 2_000_000  # number of samples that are computed at a time
 
@@ -41,10 +40,16 @@ def render_page(
         found = runs(ring_sides(rings[near]), first, rows * samples, page.width * samples)
         unpainted = (found.label < 0) | (page.colours[near[found.label]] == HIDDEN)
         named = found._replace(label=np.where(unpainted, NOWHERE, near[found.label]))
-        colours = look(named, first).reshape(1, 3, rows * samples, page.width * samples)
-        mean = torch.nn.functional.avg_pool2d(colours, samples)[0].permute(1, 2, 0)
-        result[top : top + rows] = (mean * 255 + 0.5).clamp_(0, 255).byte().numpy()
+        colours = look(named, first).reshape(rows * samples, page.width * samples, 3)
+        mean = _pooled(colours, samples) * 255 + 0.5
+        result[top : top + rows] = mean.clip(0, 255).astype(np.uint8)
     return result
+
+
+def _pooled(colours: Array, samples: int) -> Array:
+    """Return the mean of `samples` x `samples` colours for each pixel."""
+    parts = [colours[i::samples, j::samples] for i in range(samples) for j in range(samples)]
+    return sum(parts[1:], parts[0]) / len(parts)
 
 
 class _Lookup:
@@ -58,9 +63,7 @@ class _Lookup:
         # all colours in one tall raster, and a strip of paper under them
         strip = np.broadcast_to(rgb_of(paper).astype(np.float32), (8, width, 3))
         tall = np.concatenate([coloured.reshape(count * height, width, 3), strip])
-        self.raster = torch.from_numpy(np.ascontiguousarray(tall.transpose(2, 0, 1)))[None]
-        self.size = np.array([width, len(tall)], dtype=np.float64)
-        self.width = page.width * samples
+        self.raster = np.ascontiguousarray(tall, dtype=np.float32)
         # from samples to texels: linear @ sample + offset, one a copy
         to_page = copies.group.linear_parts[copies.cosets]
         forward = page.linear @ to_page * samples
@@ -74,28 +77,18 @@ class _Lookup:
         self.linear = np.concatenate([self.linear, np.zeros((1, 2, 2))])
         self.offset = np.concatenate([self.offset, [[width / 2, count * height + 4.0]]])
 
-    def __call__(self, found: Runs, top: int) -> torch.Tensor:
-        """Return the samples' colours (3, samples), row by row."""
+    def __call__(self, found: Runs, top: int) -> Array:
+        """Return the samples' colours (samples, 3), row by row."""
         kept = found.length > 0
         own = Runs(*(part[kept] for part in found))
         linear, offset = self.linear[own.label], self.offset[own.label]
         y = own.row + top + 0.5
-        # texel = start + step * column; normalised to -1 .. 1
+        # texel = start + step * column
         start = offset + linear[:, :, 1] * y[:, None] + linear[:, :, 0] * (own.start + 0.5)[:, None]
-        start = start / self.size * 2 - 1
-        step = linear[:, :, 0] / self.size * 2
-        length = torch.from_numpy(own.length)
-        total = int(own.length.sum())
+        at = np.concatenate([start, linear[:, :, 0]], axis=1).astype(np.float32)
         first = np.cumsum(own.length) - own.length
-        along = torch.arange(total) - torch.repeat_interleave(torch.from_numpy(first), length)
-        at = torch.from_numpy(np.concatenate([start, step], axis=1).astype(np.float32))
-        spread = torch.repeat_interleave(at, length, dim=0)
-        grid = spread[:, :2] + along[:, None].float() * spread[:, 2:]
-        colours = torch.nn.functional.grid_sample(
-            self.raster,
-            grid[None, None],
-            mode="bilinear",
-            padding_mode="border",
-            align_corners=False,
+        along = np.arange(own.length.sum()) - own.spread(first)
+        spread = own.spread(at)
+        return bilinear(
+            self.raster, spread[:, :2] + along[:, None].astype(np.float32) * spread[:, 2:]
         )
-        return colours[0, :, 0]

@@ -30,7 +30,7 @@ class Runs(NamedTuple):
 
     def spread(self, values: NDArray) -> NDArray:
         """Return one value for each sample (rows x width,) from one for each run."""
-        return np.repeat(values, self.length)
+        return np.repeat(values, self.length, axis=0)
 
 
 class Sides(NamedTuple):
@@ -39,6 +39,29 @@ class Sides(NamedTuple):
     start: Array  # with `end`: (S, 2) in samples, y down: sample (i, j) lies at (j + 1/2, i + 1/2)
     end: Array
     label: Integers  # the region (S,)
+
+
+def bilinear(colours: Array, places: Array) -> Array:
+    """Return colours (height, width, k) at places (N, 2), linear between the centres of texels: (N, k).
+
+    Texel (i, j) has its centre at (j + 1/2, i + 1/2). Beyond the outermost centres colours go on as
+    they are there.
+    """
+    height, width, channels = colours.shape
+    texels = colours.reshape(-1, channels)
+    x = (places[:, 0] - 0.5).clip(0, width - 1)
+    y = (places[:, 1] - 0.5).clip(0, height - 1)
+    left, top = x.astype(np.int64), y.astype(np.int64)
+    right = (left < width - 1).astype(np.int64)
+    below = np.where(top < height - 1, width, 0)
+    at = top * width + left
+    x, y = (x - left)[:, None], (y - top)[:, None]
+    upper, lower = texels.take(at, axis=0), texels.take(at + below, axis=0)
+    upper += x * (texels.take(at + right, axis=0) - upper)
+    lower += x * (texels.take(at + right + below, axis=0) - lower)
+    lower -= upper
+    lower *= y
+    return upper + lower
 
 
 def ring_sides(rings: Array) -> Sides:

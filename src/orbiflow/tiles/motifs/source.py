@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from PIL import Image
 from scipy.ndimage import distance_transform_edt
 
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import triangle_sides
-from orbiflow.tiles.motifs.raster import Grid, polygon_sides, region_sides, runs
+from orbiflow.tiles.motifs.raster import Grid, bilinear, polygon_sides, region_sides, runs
 from orbiflow.tiles.search import matched
 from orbiflow.tiles.silhouette import Covered, Frame, Target, open_image
 from orbiflow.tiles.tile import EscherTile, TileMap, TileSource
@@ -123,15 +122,11 @@ def carried_picture(picture: Picture, tile: EscherTile, grid: Grid) -> tuple[Arr
     """
     small = picture.reduced(1 / grid.density)
     places = _places(tile, grid)
-    at = torch.from_numpy((small.covered.shares(places) * 2 - 1).astype(np.float32))
     straight = np.asarray(small.image, dtype=np.float32) / 255
     straight[..., :3] *= straight[..., 3:]
     straight = _spread(straight, small.covered.shares(tile.silhouette_outline) * small.image.size)
-    values = torch.from_numpy(np.ascontiguousarray(straight.transpose(2, 0, 1)))[None]
-    found = torch.nn.functional.grid_sample(
-        values, at[None], mode="bilinear", padding_mode="border", align_corners=False
-    )[0]
-    result = found.permute(1, 2, 0).numpy()
+    at = (small.covered.shares(places) * small.image.size).astype(np.float32)
+    result = bilinear(straight, at.reshape(-1, 2)).reshape(*places.shape[:2], 4)
     return result[..., :3], result[..., 3]
 
 
