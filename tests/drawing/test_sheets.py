@@ -152,7 +152,8 @@ def test_print_leaves_title_and_legend_to_the_caption() -> None:
 
 
 def test_pages_of_one_pdf() -> None:
-    pictures = [tiling_picture(bent_tile("IH4")), flow_picture(example(SPACES[0]))]
+    printed = density_picture(example(SPACES[0]), sheet=Sheet.column())
+    pictures = [printed, flow_picture(example(SPACES[0]))]
     assert [p.sheet.format for p in pictures] == ["pdf", "png"]
     document = pypdfium2.PdfDocument(pdf_pages(pictures))
     assert [round(page.get_width()) for page in document] == [241, 576]

@@ -7,7 +7,7 @@ of the size, since they have a palette: the colours that were used, and mixtures
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from itertools import combinations
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from orbiflow.arrays import Array, Window
-from orbiflow.drawing.sheet import Picture, Sheet, check_size
+from orbiflow.drawing.sheet import check_size
 
 FINER = 3
 """Factor by which each side of a pixel is drawn finer."""
@@ -64,7 +64,7 @@ class Raster:
     """A picture of a window of the plane, and below it a strip for a legend.
 
     Things are drawn in the order in which they are added, and only when `image` is called; until then
-    they are `shapes` and `texts`, which `vector_picture` draws as curves.
+    they are `shapes` and `texts`, which a printed picture has as curves.
 
     Args:
         window: The window (xmin, ymin, xmax, ymax), in the units of all points.
@@ -138,10 +138,13 @@ class Raster:
 
     def image(self) -> Image.Image:
         """Return the picture in RGB."""
-        picture = Image.new("RGB", (self.width, self.height))
-        rows = max(1, MAX_FINE_PIXELS // (self.width * FINER**2))
-        for top in range(0, self.height, rows):
-            picture.paste(self._band(top, min(rows, self.height - top)), (0, top))
+        palette = [value for colour in self.colours for value in rgb(colour)]
+
+        def draw(band: Image.Image, top: int, rows: int) -> None:
+            band.putpalette(palette)
+            self._draw(band, top, rows)
+
+        picture = in_bands("P", (self.width, self.height), 0, draw)
         pen = ImageDraw.Draw(picture)
         for place, text, size, anchor in self.texts:
             pen.text(place, text, fill=INK, font=font(size), anchor=anchor)
@@ -156,9 +159,7 @@ class Raster:
             self.colours.append(colour)
         return self.colours.index(colour)
 
-    def _band(self, top: int, rows: int) -> Image.Image:
-        band = Image.new("P", (self.width * FINER, rows * FINER))
-        band.putpalette([value for colour in self.colours for value in rgb(colour)])
+    def _draw(self, band: Image.Image, top: int, rows: int) -> None:
         pen = ImageDraw.Draw(band)
         for shape in self.shapes:
             reach = shape.width if isinstance(shape, Drawn) else 1.0
@@ -166,12 +167,40 @@ class Raster:
             if high < top or low > top + rows:
                 continue
             if isinstance(shape, Drawn):
-                _draw_line(pen, _fine(shape.points, top), shape.width * FINER, shape.colour)
+                draw_line(pen, _fine(shape.points, top), shape.width * FINER, shape.colour)
             elif shape.holes:
                 _draw_with_holes(band, shape, top)
             else:
                 pen.polygon(_fine(shape.points, top).ravel().tolist(), fill=shape.colour)
-        return band.convert("RGB").reduce(FINER)
+
+
+def in_bands(
+    mode: str,
+    size: tuple[int, int],
+    ground: int | tuple[int, int, int, int],
+    draw: Callable[[Image.Image, int, int], None],
+) -> Image.Image:
+    """Return a picture that is drawn band by band, `FINER` times as fine, and averaged.
+
+    Args:
+        mode: "P", for colours of a palette, or "RGBA".
+        size: Width and height in pixels.
+        ground: The colour of what nothing is drawn on, as Pillow takes it.
+        draw: Draws on a band that begins at a row of the picture and has so many of its rows.
+    """
+    width, height = size
+    whole = Image.new("RGB" if mode == "P" else mode, size)
+    most = max(1, MAX_FINE_PIXELS // (width * FINER**2))
+    for top in range(0, height, most):
+        rows = min(most, height - top)
+        band = Image.new(mode, (width * FINER, rows * FINER), ground)
+        draw(band, top, rows)
+        if mode == "P":
+            part = band.convert("RGB").reduce(FINER)
+        else:  # transparent pixels have no colour
+            part = band.convert("RGBa").reduce(FINER).convert("RGBA")
+        whole.paste(part, (0, top))
+    return whole
 
 
 def _fine(points: Array, top: int) -> Array:
@@ -179,7 +208,10 @@ def _fine(points: Array, top: int) -> Array:
     return (points - (0.0, top)) * FINER - 0.5
 
 
-def _draw_line(pen: ImageDraw.ImageDraw, path: Array, width: float, colour: int) -> None:
+def draw_line(
+    pen: ImageDraw.ImageDraw, path: Array, width: float, colour: int | tuple[int, ...]
+) -> None:
+    """Draw a line with round joints and ends along points (N, 2) in pixels."""
     whole = max(1, round(width))
     pen.line(path.ravel().tolist(), fill=colour, width=whole)
     if whole < 3:
@@ -251,41 +283,6 @@ def rgb(colour: str) -> tuple[int, int, int]:
 def font(size: float) -> Any:
     """Return Pillow's own font, `size` pixels high."""
     return ImageFont.load_default(size=size)
-
-
-MIN_WIDTH = 0.25
-"""Width in points below which lines fade in print."""
-
-
-def vector_picture(raster: Raster, sheet: Sheet, *, title: str, caption: str) -> Picture:
-    """Draw a raster without a strip as curves, as wide as the sheet, with lines in proportion.
-
-    The words of a strip would be too small on a narrow sheet; the caption has them.
-    """
-    from matplotlib.collections import LineCollection, PathCollection
-    from matplotlib.path import Path
-
-    figure = sheet.figure(sheet.width * raster.height / raster.width, raster.paper)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set_axis_off()
-    axes.set_xlim(0, raster.width)
-    axes.set_ylim(raster.height, 0)
-    point = 72 * sheet.width / raster.width
-    for order, shape in enumerate(raster.shapes):
-        colour = raster.colours[shape.colour]
-        if isinstance(shape, Filled):
-            rings = [shape.points, *shape.holes]
-            parts = [Path(np.concatenate([ring, ring[:1]]), closed=True) for ring in rings]
-            path = Path.make_compound_path(*parts)
-            # a hairline in its own colour, or the paper would show where two fills meet
-            made = PathCollection([path], facecolors=colour, edgecolors=colour, linewidths=0.1)
-        else:
-            width = max(point * shape.width, MIN_WIDTH)
-            made = LineCollection([shape.points], colors=colour, linewidths=width, capstyle="round")
-        made.set_joinstyle("round")
-        made.set_zorder(order)
-        axes.add_collection(made, autolim=False)
-    return Picture(figure, sheet, title, caption)
 
 
 STRIP = 0.075

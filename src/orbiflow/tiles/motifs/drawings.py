@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
-from orbiflow.drawing import Palette, plane_axes, png_bytes
+from orbiflow.drawing import Palette, png_bytes
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.motifs.engraving import engraved, eye
@@ -27,10 +27,11 @@ from orbiflow.tiles.scene import (
     Motif,
     Part,
     Raster,
+    Sheet,
     Style,
     boundary,
-    curves_path,
-    draw_paths,
+    painted,
+    shape_of,
 )
 from orbiflow.tiles.silhouette import (
     Drawing,
@@ -169,9 +170,6 @@ def read_over(path: str | Path, tile: EscherTile) -> Over:
     return Over(picture, None, picture.notes)
 
 
-DOTS = 100
-
-
 def paint_motif(paint: Paint, motif: Motif) -> None:
     """Draw a motif, antialiased, over a painting."""
     grid = paint.grid
@@ -187,23 +185,12 @@ def paint_motif(paint: Paint, motif: Motif) -> None:
 
 def _canvas(parts: list[Part], grid: Grid) -> Array:
     """Return parts drawn as RGBA (height, width, 4), straight, 0 to 1."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(grid.width / DOTS, grid.height / DOTS), dpi=DOTS)
-    figure.patch.set_alpha(0)
-    axes = plane_axes(figure, (0.0, 0.0, grid.width, grid.height), y_down=True)
-    axes.set_aspect("auto")  # which rounding would otherwise decide
+    shapes = []
     for part in parts:
-        fill, stroke = (
-            "#000000" if colour == INK else colour
-            for colour in (part.style.fill, part.style.stroke)
-        )
-        style = Style(fill, stroke, part.style.width * 72 / DOTS if stroke else 0)
-        draw_paths(axes, [curves_path(part.curves)], style, part.opacity)
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    return np.asarray(canvas.buffer_rgba(), dtype=np.float32) / 255
+        fill, stroke = ("#000000" if colour == INK else colour for colour in part.style[:2])
+        shapes.append(shape_of(part._replace(style=Style(fill, stroke, part.style.width))))
+    drawn = painted([Sheet(tuple(shapes))], (grid.width, grid.height))
+    return np.asarray(drawn, dtype=np.float32) / 255
 
 
 def drawn_motif(

@@ -16,10 +16,9 @@ from orbiflow.arrays import Array, Window
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import border, triangle_sides
 from orbiflow.tiles.motion.morph import Morph, OwnFrame
-from orbiflow.tiles.pictures import ASPECT, default_window
 from orbiflow.tiles.silhouette import Bending
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tilings import Copies, Tile, colouring, copies_meeting
+from orbiflow.tiles.tilings import ASPECT, Copies, Tile, colouring, copies_meeting, default_window
 
 
 class Places(NamedTuple):

@@ -16,11 +16,11 @@ import shapely
 from orbiflow.arrays import Array
 from orbiflow.drawing import PALETTES, STRIP, rendered, window_of
 from orbiflow.tiles.pages.overview import FILLED, LEFT_OUT, OUTLINE
-from orbiflow.tiles.pictures import RAMP, default_window
+from orbiflow.tiles.pictures import RAMP
 from orbiflow.tiles.search import ClassFailure, rounded_for, why_poor
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tilings import Colouring, colouring, copies_meeting
+from orbiflow.tiles.tilings import Colouring, colouring, copies_meeting, default_window
 
 # The files in every tile's folder
 TILE_FILES = ("tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors")

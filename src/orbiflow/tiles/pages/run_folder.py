@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from orbiflow.arguments import as_instance, as_path
-from orbiflow.drawing import Picture, Sheet
+from orbiflow.drawing import Sheet
 from orbiflow.runtime import (
     Note,
     ResultFolder,
@@ -24,15 +24,17 @@ from orbiflow.runtime import (
 from orbiflow.tiles.pages.overview import is_read_png, overview_png
 from orbiflow.tiles.pages.page import TILE_FILES, index_page
 from orbiflow.tiles.pictures import (
+    PrintedPicture,
     bending_picture,
     comparison,
     front_png,
     overlay_picture,
+    tile_svg,
     tiling_picture,
     tiling_raster,
+    tiling_svg,
 )
 from orbiflow.tiles.result_file import RESULT, folder_names
-from orbiflow.tiles.scene import tile_svg, tiling_svg
 from orbiflow.tiles.search import SearchResult, report
 from orbiflow.tiles.silhouette import Target, doubts
 from orbiflow.tiles.tile import EscherTile, TileMap
@@ -69,7 +71,7 @@ def write_tile_folder(
     if not result.certificate.valid:
         title += ", NOT CERTIFIED"
 
-    def overlay_for_print() -> Picture:
+    def overlay_for_print() -> PrintedPicture:
         if result.bent is None or result.rest is None:
             return overlay_picture(tile, target.outline, y_down=y_down)
         return bending_picture(tile, result.rest, result.bent, y_down=y_down)

@@ -5,9 +5,10 @@ from .overlays import bending_raster as bending_raster
 from .overlays import comparison as comparison
 from .overlays import overlay_picture as overlay_picture
 from .overlays import overlay_raster as overlay_raster
-from .tilings import ASPECT as ASPECT
+from .printed import PrintedPicture as PrintedPicture
+from .tile_drawings import tile_svg as tile_svg
+from .tile_drawings import tiling_picture as tiling_picture
+from .tile_drawings import tiling_svg as tiling_svg
 from .tilings import classes_png as classes_png
-from .tilings import default_window as default_window
-from .tilings import tiling_picture as tiling_picture
 from .tilings import tiling_raster as tiling_raster
 from .tilings import tilings_png as tilings_png

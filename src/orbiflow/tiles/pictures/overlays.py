@@ -12,19 +12,9 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import as_array
 from orbiflow.arrays import Array
-from orbiflow.drawing import (
-    Picture,
-    Raster,
-    Sheet,
-    arrow,
-    caption,
-    captioned,
-    dashes,
-    rgb,
-    strip_middle,
-    vector_picture,
-)
+from orbiflow.drawing import Raster, Sheet, arrow, caption, captioned, dashes, rgb, strip_middle
 from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.pictures.printed import PrintedPicture
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Tile
@@ -76,12 +66,12 @@ def overlay_picture(
     *,
     y_down: bool = False,
     sheet: Sheet | None = None,
-) -> Picture:
+) -> PrintedPicture:
     """Return the picture of `overlay_raster` for print, in curves; the caption has its legend."""
     raster = overlay_raster(tile, target, width_px=1600, y_down=y_down, label=None)
     title = f"Tile {tile.isohedral_class} over the silhouette".replace("  ", " ")
     caption = "Grey: in both. Orange: missing, in the silhouette alone. Blue: added."
-    return vector_picture(raster, sheet or Sheet.column(), title=title, caption=caption)
+    return PrintedPicture.of(raster, sheet or Sheet.column(), title=title, caption=caption)
 
 
 def _legend(raster: Raster) -> None:
@@ -183,7 +173,7 @@ def comparison(
 
 def bending_picture(
     tile: Tile, rest: Array, bent: Array, *, y_down: bool = False, sheet: Sheet | None = None
-) -> Picture:
+) -> PrintedPicture:
     """Return the picture of `bending_raster` for print, in curves; the caption has its legend."""
     raster = bending_raster(tile, rest, bent, width_px=1600, y_down=y_down, label=None)
     title = f"Silhouette bent into a tile {tile.isohedral_class}".strip()
@@ -191,7 +181,7 @@ def bending_picture(
         "Dashed: the silhouette as it was, with arrows to where it went. The tile's outline is "
         "coloured by how far each point moved, from blue, little, to red, far."
     )
-    return vector_picture(raster, sheet or Sheet.column(), title=title, caption=caption)
+    return PrintedPicture.of(raster, sheet or Sheet.column(), title=title, caption=caption)
 
 
 def _ramp(stops: tuple[str, ...], count: int) -> tuple[str, ...]:

@@ -18,7 +18,6 @@ from orbiflow.drawing import (
     CENTER_COLOURS,
     DEFAULT_PALETTE,
     LINE_COLOUR,
-    Picture,
     Raster,
     Sheet,
     cell_ring,
@@ -30,7 +29,6 @@ from orbiflow.drawing import (
     palette,
     palette_png,
     plane_axes,
-    vector_picture,
 )
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import identity
@@ -45,27 +43,13 @@ from orbiflow.tiles.tilings import (
     aspects,
     colouring,
     copies_meeting,
+    default_window,
     patch,
 )
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-ASPECT = 1.5
-"""Width over height of the default window."""
-
-
-def default_window(tile: Tiles) -> Window:
-    """Return a landscape window around the tile or prototiles, some four to five tiles across."""
-    tiling = as_tiling(tile)
-    width, height = tiling.box[1] - tiling.box[0]
-    # by area, but so that a long tile with its limbs among its neighbours shows whole
-    across = max(5.5 * math.sqrt(tiling.tile_area), 1.8 * width, 1.4 * ASPECT * height)
-    x, y = tiling.center
-    half, high = across / 2, across / 2 / ASPECT
-    return float(x - half), float(y - high), float(x + half), float(y + high)
-
 
 OUTLINE_PX = 0.8 * 200 / 72  # the usual width of outlines: 0.8 points at 200 dots per inch
 
@@ -106,23 +90,6 @@ def tiling_raster(
         for ring in rings:
             raster.line(ring, chosen.outline, outline_px, closed=True)
     return raster
-
-
-def tiling_picture(
-    tile: Tiles,
-    window: Window | None = None,
-    *,
-    colours: Colouring | None = None,
-    y_down: bool = False,
-    sheet: Sheet | None = None,
-) -> Picture:
-    """Return the picture of `tiling_raster` for print, in curves."""
-    raster = tiling_raster(tile, window, colours=colours, y_down=y_down, outline_px=3.0)
-    kind = tile.isohedral_class if isinstance(tile, Tile) else ""
-    count = len(as_tiling(tile).prototiles)
-    title = f"Tiling by copies of {'a tile' if count == 1 else f'{count} tiles'}"
-    title += f" of class {kind}" if kind else ""
-    return vector_picture(raster, sheet or Sheet.column(), title=title, caption="")
 
 
 PANEL_ASPECT = 1.25  # width over height of the part of a tiling that a panel of `tilings_png` shows

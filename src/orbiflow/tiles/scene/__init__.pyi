@@ -4,13 +4,14 @@ from .flattening import flattened as flattened
 from .flattening import lines_of as lines_of
 from .flattening import polylines as polylines
 from .flattening import region_of as region_of
-from .formats import INCH as INCH
-from .formats import curves_path as curves_path
-from .formats import draw_paths as draw_paths
 from .formats import write_dxf as write_dxf
 from .formats import write_json as write_json
-from .formats import write_pdf as write_pdf
-from .formats import write_png as write_png
+from .pdf import write_pdf as write_pdf
+from .png import INCH as INCH
+from .png import Sheet as Sheet
+from .png import painted as painted
+from .png import shape_of as shape_of
+from .png import write_png as write_png
 from .scene import INK as INK
 from .scene import Box as Box
 from .scene import Curve as Curve
@@ -26,6 +27,4 @@ from .scene import bezier as bezier
 from .scene import clipped as clipped
 from .scene import rectangle as rectangle
 from .svg import Numbers as Numbers
-from .svg import tile_svg as tile_svg
-from .svg import tiling_svg as tiling_svg
 from .svg import write_svg as write_svg

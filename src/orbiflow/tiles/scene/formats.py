@@ -1,35 +1,15 @@
-"""A scene as DXF, JSON, PDF or PNG; SVG has a file of its own."""
+"""A scene as DXF or JSON, for cutters, CAD and programs."""
 
 from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from PIL import Image
 
-from orbiflow.drawing import plane_axes
-from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.scene.flattening import flattened
-from orbiflow.tiles.scene.scene import (
-    Curve,
-    Layer,
-    Part,
-    PlacedTile,
-    Raster,
-    Scene,
-    Style,
-    Uses,
-    clipped,
-)
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.path import Path as PlotPath
+from orbiflow.tiles.scene.scene import Layer, PlacedTile, Scene, clipped
 
 
 def write_dxf(scene: Scene, *, tolerance: float) -> str:
@@ -141,129 +121,3 @@ def _layer(scene: Scene, layer: Layer, tolerance: float) -> dict[str, Any]:
 
 def _rounded(values: np.ndarray, decimals: int = 4) -> list[Any]:
     return (np.round(values, decimals) + 0.0).tolist()
-
-
-INCH = 25.4
-"""An inch in mm."""
-
-PLOT_TOLERANCE = 0.01  # distance in mm at which curves are cut for a picture
-
-
-def drawn(scene: Scene, *, least_width: float = 0.0) -> Figure:
-    """Return a figure of the page in real size; strokes are at least `least_width` mm wide."""
-    from matplotlib.figure import Figure
-    from matplotlib.patches import Rectangle
-
-    scene = flattened(scene, PLOT_TOLERANCE)
-    figure = Figure(figsize=(scene.width / INCH, scene.height / INCH))
-    figure.patch.set_facecolor("white")
-    axes = plane_axes(figure, (0.0, 0.0, scene.width, scene.height), y_down=True)
-    axes.set_aspect("auto")  # which rounding would otherwise decide
-
-    def points(style: Style) -> Style:
-        return style._replace(width=max(style.width, least_width) * 72 / INCH)
-
-    for layer in scene.layers:
-        # as it is in files of vectors
-        how = "bilinear" if least_width else "none"
-        artists = [_image(axes, item, how) for item in layer.items if isinstance(item, Raster)]
-        artists += [
-            draw_paths(axes, [curves_path(item.curves)], points(item.style), item.opacity)
-            for item in layer.items
-            if isinstance(item, Part)
-        ]
-        paths = []
-        for item in layer.items:
-            if isinstance(item, Uses):
-                paths += [curves_path([c]) for c in item.curves(scene.symbols[item.symbol])]
-            elif isinstance(item, Curve):
-                paths.append(curves_path([item]))
-        artists.append(draw_paths(axes, paths, points(layer.style)))
-        for artist in artists if layer.clipped else ():
-            box = scene.clip
-            window = Rectangle((box.left, box.top), box.width, box.height)
-            window.set_transform(axes.transData)
-            artist.set_clip_path(window)
-    return figure
-
-
-def _image(axes: Axes, raster: Raster, interpolation: str) -> Artist:
-    """Draw a picture of pixels on axes of mm, in its place."""
-    from matplotlib.image import AxesImage
-    from matplotlib.transforms import Affine2D
-
-    width, height = raster.size
-    image = AxesImage(axes, interpolation=interpolation, extent=(0, width, height, 0))
-    image.set_data(np.asarray(Image.open(io.BytesIO(raster.png))))
-    place = np.vstack([np.column_stack([raster.linear, raster.offset]), [0, 0, 1]])
-    image.set_transform(Affine2D(place) + axes.transData)
-    image.set_zorder(1)  # as curves, so that what comes later lies above
-    axes.add_artist(image)
-    return image
-
-
-def draw_paths(axes: Axes, paths: list[PlotPath], style: Style, opacity: float = 1.0) -> Artist:
-    """Draw paths on axes, with the stroke's width in points."""
-    from matplotlib.collections import PathCollection
-
-    collection = PathCollection(
-        paths, facecolors=style.fill or "none", edgecolors=style.stroke or "none",
-        linewidths=style.width, alpha=opacity if opacity < 1 else None,
-        joinstyle="round", capstyle="round",
-    )  # fmt: skip
-    axes.add_collection(collection, autolim=False)
-    return collection
-
-
-def curves_path(curves: Iterable[Curve]) -> PlotPath:
-    """Return several curves as one path of matplotlib's, filled together."""
-    from matplotlib.path import Path as PlotPath
-
-    points, codes = [np.zeros((0, 2))], [np.zeros(0, dtype=np.uint8)]
-    for curve in curves:
-        # of straight pieces only the end is kept
-        straight = np.repeat(curve.straight, 3)
-        kept = ~straight
-        kept[2::3] = True
-        points += [curve.start[None], curve.pieces[:, 1:].reshape(-1, 2)[kept]]
-        along = np.where(straight, PlotPath.LINETO, PlotPath.CURVE4)[kept]
-        codes += [np.array([PlotPath.MOVETO]), along]
-        if curve.closed:
-            points.append(curve.start[None])
-            codes.append(np.array([PlotPath.CLOSEPOLY]))
-    path = PlotPath(np.concatenate(points), np.concatenate(codes))
-    path.should_simplify = False
-    return path
-
-
-def write_pdf(scene: Scene) -> bytes:
-    """Return the scene as a PDF of one page; the same scene gives the same bytes."""
-    buffer = io.BytesIO()
-    metadata = {
-        "Title": scene.title,
-        "Subject": " ".join(scene.notes),
-        "Creator": "orbiflow",
-        "CreationDate": None,
-    }
-    drawn(scene).savefig(buffer, format="pdf", metadata=metadata, facecolor="none")
-    return buffer.getvalue()
-
-
-MOST_PIXELS = 100_000_000
-
-
-def write_png(scene: Scene, *, dpi: float = 300.0) -> bytes:
-    """Return the scene as a PNG that gives its resolution, so that it prints in real size."""
-    width, height = (side * dpi / INCH for side in (scene.width, scene.height))
-    if width * height > MOST_PIXELS or max(width, height) >= 2**16:
-        raise OrbiflowError(
-            f"at {dpi:g} dots per inch the page has {width:.0f} x {height:.0f} pixels; "
-            f"choose fewer dots or another format"
-        )
-    if min(width, height) < 1:
-        raise OrbiflowError(f"at {dpi:g} dots per inch the page has no pixel; choose more dots")
-    figure = drawn(scene, least_width=INCH / dpi)
-    buffer = io.BytesIO()
-    metadata = {"Title": scene.title, "Description": " ".join(scene.notes), "Software": "orbiflow"}
-    figure.savefig(buffer, format="png", dpi=dpi, metadata=metadata)
-    return buffer.getvalue()

@@ -1,35 +1,19 @@
-"""Scenes as SVG, for Inkscape, Illustrator, browsers and cutters; and the SVG of a tile or a tiling.
+"""A scene as SVG, for Inkscape, Illustrator, browsers and cutters.
 
 One user unit is one millimetre, and layers are those of Inkscape. A scene's copies are one short
-line each; `tile_svg` and `tiling_svg` write plain paths without symbols, transforms or style
-sheets, which some programs drop.
+line each.
 """
 
 from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from orbiflow.arrays import Array, Window, checked_window
-from orbiflow.drawing import DEFAULT_PALETTE, palette
-from orbiflow.tiles.pictures import default_window
-from orbiflow.tiles.scene.scene import (
-    Box,
-    Curve,
-    Layer,
-    Motif,
-    Part,
-    Raster,
-    Scene,
-    Style,
-    Uses,
-    rectangle,
-)
-from orbiflow.tiles.tilings import Colouring, Tile, Tiles, as_tiling, colouring, patch
+from orbiflow.tiles.scene.scene import Curve, Layer, Motif, Part, Raster, Scene, Style, Uses
 
 _HEADER = """<?xml version="1.0" encoding="UTF-8"?>
 <svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" \
@@ -174,80 +158,3 @@ def _uses(uses: Uses, reach: float, number: Numbers) -> Iterator[str]:
         place = f"{number(x)},{number(y)}"
         how = f"translate({place})" if still[which] else f"matrix({matrices[which]},{place})"
         yield f'    <use xlink:href="#{uses.symbol}" transform="{how}"/>\n'
-
-
-TILE_WIDTH, TILING_WIDTH = 100.0, 300.0
-"""Widths of the pages of `tile_svg` and `tiling_svg` in mm."""
-
-
-def tile_svg(tile: Tile, *, y_down: bool = False, title: str = "") -> str:
-    """Return the SVG of one tile, on a page with a small margin; arguments as for `tiling_svg`."""
-    colours = palette(DEFAULT_PALETTE)
-    low, high = tile.polygon.min(axis=0), tile.polygon.max(axis=0)
-    margin = 0.04 * float((high - low).max())
-    page = _Page((*(low - margin), *(high + margin)), TILE_WIDTH, y_down)
-    style = Style(colours.fill(1), colours.outline, 0.3)
-    layer = Layer("tile", "tiles", style, (page.curve(tile.polygon),))
-    return page.document([layer], title or _name(tile), "A tile of the plane, made with orbiflow")
-
-
-def tiling_svg(
-    tile: Tiles,
-    window: Window | None = None,
-    *,
-    colours: Colouring | None = None,
-    y_down: bool = False,
-    title: str = "",
-) -> str:
-    """Return the SVG of the tiles that meet a window, clipped to it: one closed path per tile.
-
-    Each colour's paths are a group, with the ids "colour-1", "colour-2" ... Every tile has a stroke,
-    so that no paper shines through between neighbours. For another size or palette see `export`.
-
-    Args:
-        tile, window, colours, y_down: As for `tiling_raster`.
-        title: The file's title. Default: the class.
-
-    Raises:
-        OrbiflowError: If the window is empty or holds too many tiles.
-    """
-    chosen, tiling = palette(DEFAULT_PALETTE), as_tiling(tile)
-    colours = colours or colouring(tiling)
-    page = _Page(window or default_window(tile), TILING_WIDTH, y_down)
-    groups: list[list[Curve]] = [[] for _ in range(colours.count)]
-    for element in patch(tiling, page.window):
-        polygon = tiling.prototiles[element.prototile].polygon
-        groups[colours.colour(element)].append(page.curve(element(polygon)))
-    border = rectangle(Box(0.0, 0.0, page.width, page.height))
-    layers = [Layer("paper", "paper", Style(chosen.paper), (border,))]
-    for number, curves in enumerate(groups):
-        style = Style(chosen.fill(number), chosen.outline, 0.25)
-        layers.append(Layer(f"colour {number + 1}", "tiles", style, tuple(curves), clipped=True))
-    what = "An isohedral tiling" if len(tiling.prototiles) == 1 else "A tiling"
-    note = (
-        f"{what} of the plane ({_name(tile)}), made with orbiflow. "
-        "Each path is one tile; groups collect the tiles of one colour."
-    )
-    return page.document(layers, title or f"Tiling {_name(tile)}", note)
-
-
-class _Page:
-    """A window of a tile's coordinates on a page in millimetres, with y pointing down."""
-
-    def __init__(self, window: Sequence[float], width_mm: float, y_down: bool) -> None:
-        xmin, ymin, xmax, ymax = self.window = checked_window(window)
-        self.width, self.height = width_mm, width_mm * (ymax - ymin) / (xmax - xmin)
-        self._origin = np.array([xmin, ymin if y_down else ymax])
-        self._scale = np.array([1.0, 1.0 if y_down else -1.0]) * (width_mm / (xmax - xmin))
-
-    def curve(self, ring: Array) -> Curve:
-        return Curve.polyline((ring - self._origin) * self._scale, closed=True)
-
-    def document(self, layers: list[Layer], title: str, note: str) -> str:
-        scene = Scene(self.width, self.height, tuple(layers), title=title, notes=(note,))
-        return write_svg(scene, decimals=4)
-
-
-def _name(tile: Tiles) -> str:
-    kind = tile.isohedral_class if isinstance(tile, Tile) else ""
-    return " ".join(part for part in (kind, tile.group.name) if part) or "tile"

@@ -16,10 +16,12 @@ from .surroundings import arrangement as arrangement
 from .surroundings import aspects as aspects
 from .surroundings import neighbours as neighbours
 from .surroundings import patch as patch
+from .tile_copies import ASPECT as ASPECT
 from .tile_copies import Copies as Copies
 from .tile_copies import Placed as Placed
 from .tile_copies import copies_inside as copies_inside
 from .tile_copies import copies_meeting as copies_meeting
+from .tile_copies import default_window as default_window
 from .tile_edges import EdgeClass as EdgeClass
 from .tile_edges import EdgeIdentification as EdgeIdentification
 from .tile_edges import EdgeImage as EdgeImage

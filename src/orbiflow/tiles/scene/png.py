@@ -1,0 +1,213 @@
+"""A scene as pixels: drawn several times finer by Pillow, then averaged."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from PIL import Image, ImageDraw
+from PIL.PngImagePlugin import PngInfo
+
+from orbiflow.arrays import Array
+from orbiflow.drawing import FINER, draw_line, in_bands, rgb
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.geometry import signed_area
+from orbiflow.tiles.scene.flattening import flattened
+from orbiflow.tiles.scene.scene import Box, Curve, Layer, Part, Raster, Scene, Style
+
+INCH = 25.4
+"""An inch in mm."""
+
+MOST_PIXELS = 100_000_000
+"""Pixels of a page, at most."""
+
+LONGEST_SIDE = 2**16 - 1
+"""Pixels of a side, at most."""
+
+FLATNESS = 0.1
+"""Distance in pixels of curves from the polygons that are drawn."""
+
+
+def write_png(scene: Scene, *, dpi: float = 300.0) -> bytes:
+    """Return the scene as a PNG that gives its resolution, so that it prints in real size.
+
+    Lines are at least a pixel wide.
+
+    Raises:
+        OrbiflowError: If the page would have too many pixels, or none.
+    """
+    width, height = (side * dpi / INCH for side in (scene.width, scene.height))
+    if width * height > MOST_PIXELS or max(width, height) > LONGEST_SIDE:
+        raise OrbiflowError(
+            f"at {dpi:g} dots per inch the page has {width:.0f} x {height:.0f} pixels; "
+            f"choose fewer dots or another format"
+        )
+    if min(width, height) < 1:
+        raise OrbiflowError(f"at {dpi:g} dots per inch the page has no pixel; choose more dots")
+    scale = dpi / INCH
+    scene = flattened(scene, FLATNESS / scale)
+    sheets = [_sheet(scene, layer, scale) for layer in scene.layers]
+    picture = painted(sheets, (round(width), round(height)), ground="#ffffff").convert("RGB")
+    info = PngInfo()
+    for key, text in (("Title", scene.title), ("Description", " ".join(scene.notes))):
+        info.add_text(key, text)
+    info.add_text("Software", "orbiflow")
+    buffer = io.BytesIO()
+    picture.save(buffer, "PNG", dpi=(dpi, dpi), pnginfo=info)
+    return buffer.getvalue()
+
+
+class Shape(NamedTuple):
+    """Curves that are drawn as one, as polygons and lines in pixels."""
+
+    rings: tuple[Array, ...]  # to fill; holes run the other way
+    lines: tuple[Array, ...]  # to stroke
+    style: Style  # with the stroke's width in pixels
+    opacity: float
+
+    @property
+    def box(self) -> tuple[float, float]:
+        """The least and the largest y of what is drawn, in pixels."""
+        every = np.concatenate([ring[:, 1] for ring in self.lines])
+        return float(every.min() - self.style.width), float(every.max() + self.style.width)
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """What is drawn of a layer, from the bottom up, and the window that it shows in, in pixels."""
+
+    items: tuple[Shape | Raster, ...]
+    window: Box | None = None
+
+
+def _sheet(scene: Scene, layer: Layer, scale: float) -> Sheet:
+    """Return a layer of a scene, whose motifs are flattened, at `scale` pixels a mm."""
+    window = None
+    if layer.clipped:
+        window = Box(*(side * scale for side in scene.clip))
+    return Sheet(tuple(_items(scene, layer, scale)), window)
+
+
+def _items(scene: Scene, layer: Layer, scale: float) -> Iterator[Shape | Raster]:
+    for item in layer.items:
+        if isinstance(item, Raster):
+            yield item.moved(scale * np.eye(2), np.zeros(2))
+        elif isinstance(item, Part):
+            yield shape_of(item.moved(scale * np.eye(2), np.zeros(2)), least_width=1.0)
+        else:
+            curves = [item] if isinstance(item, Curve) else item.curves(scene.symbols[item.symbol])
+            for curve in curves:
+                moved = Part((curve,), layer.style).moved(scale * np.eye(2), np.zeros(2))
+                yield shape_of(moved, least_width=1.0)
+
+
+def shape_of(part: Part, *, least_width: float = 0.0) -> Shape:
+    """Return curves in pixels as what is drawn, with strokes at least so many pixels wide."""
+    points = [curve.flattened(FLATNESS) for curve in part.curves]
+    closed = [curve.closed for curve in part.curves]
+    lines = [np.concatenate([p, p[:1]]) if c else p for p, c in zip(points, closed, strict=True)]
+    width = max(part.style.width, least_width) if part.style.stroke else 0.0
+    rings = tuple(ring for ring in points if len(ring) > 2) if part.style.fill else ()
+    return Shape(rings, tuple(lines), part.style._replace(width=width), part.opacity)
+
+
+def painted(
+    sheets: Sequence[Sheet], size: tuple[int, int], *, ground: str | None = None
+) -> Image.Image:
+    """Return layers, from the bottom up, as a picture in RGBA: on a ground, or on nothing."""
+    start = (0, 0, 0, 0) if ground is None else (*rgb(ground), 255)
+
+    def draw(band: Image.Image, top: int, rows: int) -> None:
+        for sheet in sheets:
+            _draw_sheet(band, sheet, top, rows)
+
+    return in_bands("RGBA", size, start, draw)
+
+
+def _draw_sheet(band: Image.Image, sheet: Sheet, top: int, rows: int) -> None:
+    """Draw a layer on a band, FINER times as fine, of so many rows of pixels from `top` on."""
+    below = None if sheet.window is None else band.copy()
+    for item in sheet.items:
+        if isinstance(item, Raster):
+            _draw_raster(band, item, top)
+            continue
+        low, high = item.box
+        if low <= top + rows and high >= top:
+            _draw_shape(band, item, top)
+    if sheet.window is not None and below is not None:
+        left, upper, right, lower = (
+            round(FINER * (side - shift))
+            for side, shift in zip(sheet.window, (0, top, 0, top), strict=True)
+        )
+        inside = Image.new("1", band.size)
+        ImageDraw.Draw(inside).rectangle([left, upper, right - 1, lower - 1], fill=1)
+        below.paste(band, (0, 0), inside)
+        band.paste(below, (0, 0))
+
+
+def _draw_shape(band: Image.Image, shape: Shape, top: int) -> None:
+    """Draw a shape on a band."""
+    rings = [_fine(ring, top) for ring in shape.rings]
+    lines = [_fine(line, top) for line in shape.lines]
+    opaque = shape.opacity >= 1
+    canvas = band if opaque else Image.new("RGBA", band.size)
+    pen = ImageDraw.Draw(canvas)
+    if shape.style.fill and rings:
+        _fill(canvas, pen, rings, (*rgb(shape.style.fill), 255))
+    if shape.style.stroke:
+        colour = (*rgb(shape.style.stroke), 255)
+        for line in lines:
+            draw_line(pen, line, shape.style.width * FINER, colour)
+    if not opaque:
+        canvas.putalpha(canvas.getchannel("A").point(lambda alpha: alpha * shape.opacity))
+        band.alpha_composite(canvas)
+
+
+def _fill(
+    canvas: Image.Image,
+    pen: ImageDraw.ImageDraw,
+    rings: Sequence[Array],
+    colour: tuple[int, int, int, int],
+) -> None:
+    """Fill rings as one; those that run the other way than the largest are holes."""
+    if len(rings) == 1:
+        pen.polygon(rings[0].ravel().tolist(), fill=colour)
+        return
+    areas = [signed_area(ring) for ring in rings]
+    order = np.argsort(-np.abs(areas), kind="stable")
+    mask = Image.new("1", canvas.size)
+    cut = ImageDraw.Draw(mask)
+    for k in order.tolist():
+        filled = areas[k] * areas[order[0]] > 0
+        cut.polygon(rings[k].ravel().tolist(), fill=int(filled))
+    canvas.paste(colour, (0, 0), mask)
+
+
+def _draw_raster(band: Image.Image, raster: Raster, top: int) -> None:
+    """Draw a picture of pixels on a band, linear between its pixels."""
+    linear, offset = raster.linear * FINER, (raster.offset - (0.0, top)) * FINER
+    corners = raster._replace(linear=linear, offset=offset).corners
+    low = np.floor(corners.min(axis=0)).astype(int).clip(0, band.size)
+    high = np.ceil(corners.max(axis=0)).astype(int).clip(0, band.size)
+    width, height = (high - low).tolist()
+    if width < 1 or height < 1:
+        return
+    inverse = np.linalg.inv(linear)
+    start = inverse @ (low - offset)
+    (a, b), (c, d) = inverse.tolist()
+    picture = Image.open(io.BytesIO(raster.png)).convert("RGBA").convert("RGBa")
+    own = picture.transform(
+        (width, height),
+        Image.Transform.AFFINE,
+        (a, b, float(start[0]), c, d, float(start[1])),
+        resample=Image.Resampling.BILINEAR,
+    )
+    band.alpha_composite(own.convert("RGBA"), tuple(low.tolist()))
+
+
+def _fine(points: Array, top: int) -> Array:
+    # whole numbers are the middles of pixels for Pillow
+    return (points - (0.0, top)) * FINER - 0.5
