@@ -83,7 +83,7 @@ def _doubts_of_names(
     return []
 
 
-CURE = "replace them by NaN, which `missing` treats, or leave their rows out"
+NAN_CURE = "replace them by NaN, which `missing` treats, or leave their rows out"
 """What to do in Python with codes for missing values."""
 
 
@@ -95,7 +95,7 @@ def unit_of(
     Warns:
         DataWarning: Of serious doubts, at so many calls from here.
     """
-    found, doubts = check_values(space, values, names, unit, CURE)
+    found, doubts = check_values(space, values, names, unit, NAN_CURE)
     for doubt in doubts:
         if doubt.is_serious:
             warnings.warn(doubt.text, DataWarning, stacklevel=stacklevel)
@@ -107,7 +107,7 @@ def _angles(
 ) -> tuple[Unit, list[Doubt]]:
     """Return the unit of angles (N, k), and doubts; refuse codes and values of no known unit."""
     own, doubts = _unit_of(names, unit)
-    refuse_codes(values, names, own or "degrees", cure)
+    _refuse_no_angles(values, names, own or "degrees", cure)
     if own is None:
         own = _radians(values, names)
         text = "no unit was given and all values are within 2 pi: they were read as radians"
@@ -151,6 +151,21 @@ def _other_unit(values: Array, unit: str) -> str | None:
     if unit == "radians" and is_large and 2 * int((np.abs(known) > 2 * math.pi).sum()) > len(known):
         return "most values are beyond 2 pi and all within 360: if they are degrees, give that unit"
     return None
+
+
+def seeming_unit(values: Array, unit: str) -> Unit | None:
+    """Return the other unit in which angles (N, k) may be by their size alone, or None.
+
+    >>> seeming_unit(np.array([[1.5, -3.0]]), "degrees"), seeming_unit(np.array([[90.0]]), "radians")
+    ('radians', 'degrees')
+    """
+    most = float(np.nanmax(np.abs(values), initial=0.0))
+    within = most <= 2 * math.pi * (1 + TURN_TOLERANCE)
+    if unit == "degrees":
+        return "radians" if within else None
+    if most <= TURNS[unit] * (1 + TURN_TOLERANCE):
+        return None
+    return "radians" if within else "degrees"
 
 
 def _doubts_of_angle(name: str, column: Array, turn: float) -> list[Doubt]:
@@ -231,8 +246,16 @@ def codes_among(column: Array, turn: float) -> list[float]:
     return sorted(found)
 
 
-def refuse_codes(values: Array, names: Sequence[str], unit: str, cure: str) -> None:
-    """Refuse angles (N, k) some of which seem to stand for missing values; `cure` says what to do."""
+def refuse_codes(space: str, values: Array, names: Sequence[str], unit: str, cure: str) -> None:
+    """Refuse data (N, k) some of which seem to stand for missing values; `cure` says what to do."""
+    if is_angular(space, values.shape[1]):
+        _refuse_no_angles(values, names, unit, cure)
+    elif space in DIRECTIONS and values.shape[1] == 2:
+        _refuse_no_places(values, names, cure)
+
+
+def _refuse_no_angles(values: Array, names: Sequence[str], unit: str, cure: str) -> None:
+    """Refuse angles (N, k) some of which are codes for missing values."""
     for name, column in zip(names, values.T, strict=True):
         if codes := codes_among(column, TURNS[unit]):
             raise SettingError(literal(f"column {name!r} has {_counted(codes, column)}: ") + cure)
