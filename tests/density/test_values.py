@@ -172,6 +172,36 @@ def test_rounding_may_take_a_latitude_beyond_the_pole() -> None:
         to_vectors([[9.0, 999.0]])
 
 
+NUMBERED = np.column_stack([RNG.permutation(90)[:30], RNG.uniform(-180, 180, (30, 2))])
+
+
+@pytest.mark.parametrize("name", ["Unnamed: 0", "index", "level_0", "resid", "id", "site_id", "#"])
+def test_columns_that_number_the_rows_are_doubted(name: str) -> None:
+    assert doubts_of("torus", NUMBERED, "degrees", name, "phi", "psi") == [True]
+    assert True in doubts_of("p1", NUMBERED, None, name, "a", "b")
+    repeated = NUMBERED // np.array([5, 1, 1])
+    if name not in ("site_id", "#"):
+        assert doubts_of("torus", repeated, "degrees", name, "phi", "psi") == [True]
+
+
+def test_rows_that_are_numbered_without_a_name_are_doubted() -> None:
+    ordered = np.column_stack([np.arange(30), NUMBERED[:, 1:]])
+    assert doubts_of("torus", ordered, "degrees") == [True]
+
+
+@pytest.mark.parametrize("name", ["a", "x", "wind", "phi", "indexed", "idle", "angle id"])
+def test_whole_angles_number_no_rows(name: str) -> None:
+    assert doubts_of("torus", NUMBERED, "degrees", name, "phi", "psi") == []
+    assert doubts_of("torus", np.arange(0, 360.0)[:, None], "degrees", name) == []
+    ordered = np.column_stack([np.arange(-90, 90.0), np.zeros(180)])
+    assert doubts_of("sphere", ordered, None, "lat", "lon") == []
+
+
+def test_one_is_an_angle_among_whole_tens() -> None:
+    assert codes_among(np.array([*WIND, 1.0]), 360.0) == []
+    assert codes_among(np.array([*WIND, -1.0]), 360.0) == [-1.0]
+
+
 @pytest.mark.parametrize(
     ("code", "step"), [(-1.0, 1.0), (99.0, 10.0), (-999.25, 0.1), (-888.8, 0.1), (-555.5, 0.1)]
 )

@@ -9,6 +9,7 @@ from .columns import chosen_arrangement as chosen_arrangement
 from .frames import as_data as as_data
 from .frames import as_numbers as as_numbers
 from .frames import require_values as require_values
+from .identifiers import is_identifier as is_identifier
 from .names import LATITUDES as LATITUDES
 from .names import LONGITUDES as LONGITUDES
 from .names import Pair as Pair

@@ -11,6 +11,7 @@ import numpy as np
 
 from orbiflow.arrays import Array
 from orbiflow.density.data.columns import DIRECTIONS, ROTATIONS, Arrangement, check_columns
+from orbiflow.density.data.identifiers import is_identifier
 from orbiflow.density.data.names import is_count_named, is_other_quantity, unit_named, words_of
 from orbiflow.density.data.units import TURN_TOLERANCE, TURNS, Unit, check_unit, is_angular
 from orbiflow.errors import DataWarning, SettingError, literal
@@ -50,6 +51,7 @@ def check_values(
     found = check_columns(space, names) if names else None
     doubts = [Doubt(found.note, False)] if found and found.note else []
     doubts += _doubts_of_names(space, values, called, found, is_named=bool(names))
+    doubts += _doubts_of_identifiers(space, values, called)
     if is_angular(space, values.shape[1]):
         own, more = _angles(values, called, unit, cure)
         return own, doubts + more
@@ -81,6 +83,19 @@ def _doubts_of_names(
         )
         return [Doubt(text, True)]
     return []
+
+
+def _doubts_of_identifiers(space: str, values: Array, names: Sequence[str]) -> list[Doubt]:
+    """Return a doubt for each column of (N, k) that seems to number the rows."""
+    if len(values) < FEW_ROWS or len(names) < 2:
+        return []
+    angular = is_angular(space, len(names))  # whose names are doubted for themselves
+    return [
+        Doubt(f"{name!r} seems to number the rows: if so, leave it out", True)
+        for name, column in zip(names, values.T, strict=True)
+        if is_identifier(name, column[~np.isnan(column)])
+        and not (angular and is_other_quantity(name))
+    ]
 
 
 NAN_CURE = "replace them by NaN, which `missing` treats, or leave their rows out"
@@ -201,13 +216,13 @@ def _radians(values: Array, names: Sequence[str]) -> Unit:
 
 # fmt: off
 CODES = frozenset({
-    1.0, 77.0, 88.0, 99.0, 99.9, 99.99, 777.0, 888.0, 888.8, 990.0, 998.0, 999.0, 999.25, 999.9, 999.99,
+    77.0, 88.0, 99.0, 99.9, 99.99, 777.0, 888.0, 888.8, 990.0, 998.0, 999.0, 999.25, 999.9, 999.99,
     7777.0, 8888.0,
     9990.0, 9996.0, 9998.0, 9999.0, 9999.9, 9999.99, 32766.0, 32767.0, 32768.0, 65535.0, 99999.0,
     99999.9, 999999.0, 9999999.0, 2147483647.0, 2147483648.0,
 })
 # fmt: on
-"""Numbers, or their opposites, that tables have in the place of missing values."""
+"""Numbers, or their opposites, that tables have in the place of missing values; -1 is one as well."""
 
 HUGE = 1e15
 """What is larger is no angle: netCDF fills gaps with 9.97e36."""
@@ -234,7 +249,8 @@ def codes_among(column: Array, turn: float) -> list[float]:
     []
     """
     distinct, counts = np.unique(column[np.isfinite(column)], return_counts=True)
-    named = np.isin(np.abs(distinct), list(CODES)) | (np.abs(distinct) > HUGE)
+    sizes = np.abs(distinct)
+    named = np.isin(sizes, list(CODES)) | (sizes > HUGE) | (distinct == -1)
     rest, often = distinct[~named], counts[~named] > 1
     beyond = np.abs(rest) > turn * (1 + TURN_TOLERANCE)
     if 2 * int(beyond.sum()) > len(rest):  # angles that go on turning

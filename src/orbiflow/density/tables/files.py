@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import io
 import math
-import re
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain, count
@@ -15,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.density.data import is_angle_named
 from orbiflow.density.tables import text
 from orbiflow.density.tables.numerals import Mark
 from orbiflow.density.tables.table import (
@@ -212,34 +210,6 @@ def read_labels(
             "it in"
         )
     return np.array([found[line] for line in table.lines.tolist()])
-
-
-IDENTIFIER_NAMES = frozenset({"#", "id", "idx", "index", "key", "no", "no.", "nr", "number", "row"})
-"""Names of columns that number the rows with any different whole numbers."""
-
-INDEX_NAMES = re.compile(r"|unnamed: \d+|__index_level_\d+__|level_\d+")
-"""Names that pandas gives to an index when it writes it: any whole numbers there are no data."""
-
-
-def is_identifier(name: str, values: NDArray[np.float64]) -> bool:
-    """Return whether a column (N,) numbers the rows, one by one or by its name.
-
-    One that is called after an angle does not.
-
-    >>> is_identifier("item", np.arange(5.0)), is_identifier("item", np.array([1.0, 1.0, 2.0]))
-    (True, False)
-    >>> is_identifier("phi", np.arange(5.0))
-    False
-    """
-    if len(values) < 3 or not bool((values == np.round(values)).all()) or is_angle_named(name):
-        return False
-    if bool((np.diff(values) == 1).all()):
-        return True
-    word = name.strip().casefold()
-    if INDEX_NAMES.fullmatch(word):
-        return True
-    named = word in IDENTIFIER_NAMES or word.endswith(("_id", " id"))
-    return named and len(np.unique(values)) == len(values)
 
 
 MAX_NPY_HEADER = 10_000

@@ -21,10 +21,11 @@ from orbiflow.density.data import (
     fraction_doubts,
     is_angle_named,
     is_count_named,
+    is_identifier,
     is_other_quantity,
     words_of,
 )
-from orbiflow.density.tables.files import column_names, is_identifier, read_labels, read_table
+from orbiflow.density.tables.files import column_names, read_labels, read_table
 from orbiflow.density.tables.settings import SPACES, RowSettings, SpaceSettings, TableSettings
 from orbiflow.density.tables.table import MissingCellsError, Table, TableError, find, listing, quote
 from orbiflow.errors import SettingError, literal
