@@ -123,6 +123,16 @@ def test_angles_that_seem_to_be_in_another_unit(folder: Path, tmp_path: Path, or
     assert "'psi' must be a finite number, got inf" in orbiflow(*one, "psi=1e400").err
 
 
+def test_cells_in_another_unit_than_the_model(folder: Path, tmp_path: Path, orbiflow) -> None:
+    data = tmp_path / "cells.csv"
+    data.write_text("phi,psi\n0.5 rad,1 rad\n0.1 rad,1.5 rad\n")
+    how = ("density", "score", data, "--out", tmp_path / "x.csv", "-m")
+    assert orbiflow(*how, folder / "torus").status == 0
+    refused = orbiflow(*how, folder / "degrees")
+    assert refused.status == 2
+    assert "the cells are in radians, and the model's data in degrees: convert them" in refused.err
+
+
 @pytest.mark.parametrize(
     ("out", "message"),
     [

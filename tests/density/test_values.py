@@ -108,11 +108,17 @@ def test_radians_on_the_sphere_are_refused(space: str) -> None:
     for radians in (places(1, 1), places(0.4, 1), turned):
         with pytest.raises(SettingError, match=r"they are radians, it seems.*numpy.degrees"):
             unit_of(space, radians)
-        assert doubts_of(space, radians, "degrees") == []
-    assert doubts_of(space, places(0.5, 0.3)) == [True]
-    assert doubts_of(space, places(57, 57)) == []
-    assert doubts_of(space, places(0.5, 0.3) + np.array([48, 11])) == []
-    assert doubts_of(space, places(1, 1, rows=5)) == []
+        assert True not in doubts_of(space, radians, "degrees")
+    assert True in doubts_of(space, places(0.5, 0.3))
+    assert True not in doubts_of(space, places(57, 57))
+    assert True not in doubts_of(space, places(0.5, 0.3) + np.array([48, 11]))
+    assert True not in doubts_of(space, places(1, 1, rows=5))
+
+
+def test_it_is_said_what_columns_without_names_are_taken_for() -> None:
+    (doubt,) = check_values("sphere", places(57, 57), None, None, "cure")[1]
+    assert doubt == ("took column1 as latitude and column2 as longitude, in degrees", False)
+    assert doubts_of("sphere", RNG.normal(size=(9, 3))) == []
 
 
 def test_right_ascension_in_hours_is_doubted() -> None:

@@ -12,6 +12,7 @@ from .frames import require_values as require_values
 from .identifiers import is_identifier as is_identifier
 from .names import LATITUDES as LATITUDES
 from .names import LONGITUDES as LONGITUDES
+from .names import UNITS as UNITS
 from .names import Pair as Pair
 from .names import is_angle_named as is_angle_named
 from .names import is_count_named as is_count_named

@@ -50,7 +50,7 @@ def check_values(
     called = list(names) if names else [f"column{k}" for k in range(1, values.shape[1] + 1)]
     found = check_columns(space, names) if names else None
     doubts = [Doubt(found.note, False)] if found and found.note else []
-    doubts += _doubts_of_names(space, values, called, found, is_named=bool(names))
+    doubts += _doubts_of_names(space, values, called, found)
     doubts += _doubts_of_identifiers(space, values, called)
     if is_angular(space, values.shape[1]):
         own, more = _angles(values, called, unit, cure)
@@ -62,13 +62,13 @@ def check_values(
 
 
 def _doubts_of_names(
-    space: str, values: Array, names: Sequence[str], found: Arrangement | None, *, is_named: bool
+    space: str, values: Array, names: Sequence[str], found: Arrangement | None
 ) -> list[Doubt]:
     """Return what columns were taken for, if their names do not say it."""
     listed = ", ".join(names)
     if space in ROTATIONS and len(names) == 4 and found is None:
         return [Doubt(f"took {listed} as x, y, z, w: the quaternion's scalar is the last", False)]
-    if space not in DIRECTIONS or len(names) != 2 or not is_named:
+    if space not in DIRECTIONS or len(names) != 2:
         return []
     if found is None and "theta" in words_of(names[0]) and float(np.nanmin(values[:, 0])) >= 0:
         text = f"took {names[0]} as latitude: if it is the angle from the pole, give 90 less it"

@@ -43,7 +43,7 @@ def data_doubts(
         SettingError: For codes for missing values; `cure` says what to do with them.
     """
     space, width = density.space, values.shape[1] if values.ndim == 2 else 0
-    unit = _unit_of(space, width)
+    unit = data_unit(space, width)
     if unit is None or not values.size:
         return []
     called = [f"column{k}" for k in range(1, width + 1)] if names is None else list(names)
@@ -87,7 +87,7 @@ def given_doubts(space: Space, given: Mapping[str, float]) -> list[str]:
     return [_beyond(name, value, unit, other) for name, value in beyond.items()]
 
 
-def _unit_of(space: Space, width: int) -> str | None:
+def data_unit(space: Space, width: int) -> str | None:
     """Return the unit of a space's data of so many columns, None if they have none."""
     if is_angular(space.name, width):
         return str(getattr(space, "angle_unit", space.unit))

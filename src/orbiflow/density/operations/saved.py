@@ -102,6 +102,10 @@ def check_fits(
                 + literal(f"'{','.join(wanted)}'")
             )
         check_columns(space.name, table.columns)
+    unit, own = table.unit, inference.data_unit(space, len(table.columns))
+    if unit is not None and own not in (None, unit):
+        text = f"{data}: the cells are in {unit}, and the model's data in {own}: convert them"
+        raise TableError(literal(text))
     for doubt in inference.data_doubts(density, table.values, table.columns, tables.CURE):
         tell(Note(f"WARNING: {data}: {doubt}"))
 

@@ -185,11 +185,10 @@ def _all_columns(
     for other in others:
         if other in table.columns and len(table.columns) > 1:
             table = table.without(table.columns.index(other))
-    if space == "torus":
-        table = _angles_alone(table, tell)
     if width is None:
         table = _without_identifiers(table, tell)
     if space == "torus":
+        table = _angles_alone(table, tell)
         _tell_of_names(table, tell)
     return table.complete(path, **_drop(rows), missing_codes=rows.missing_codes)
 
@@ -339,16 +338,24 @@ def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
         tell(
             Note("no cell was given: its lengths are taken to be about 1, in the unit of the data")
         )
-    named = (
-        None if all(re.fullmatch(r"column\d+", name) for name in table.columns) else table.columns
-    )
-    unit, doubts = check_values(space, table.values, named, where.unit, CURE)
+    unit, doubts = check_values(space, table.values, table.columns, _asked_unit(where, table), CURE)
     if where.cell is not None and not where.fractional:
         doubts += fraction_doubts(table.values, where.cell[: len(table.columns)])
     for doubt in doubts:
         words = doubt.text.replace("(fractional)", "(--fractional)")
         tell(Note(f"WARNING: {words}" if doubt.is_serious else words))
     return unit
+
+
+def _asked_unit(where: SpaceSettings, table: Table) -> str | None:
+    """Return the unit that is asked for or, of angles, else what the cells say; refuse two."""
+    said = table.unit if where.space in SPACES else None
+    if said is not None and where.unit not in (None, said):
+        raise TableError(
+            literal(f"the cells of {listing(table.columns)} are in {said}")
+            + f" and {{unit}} {where.unit} was asked for: leave it out"
+        )
+    return where.unit or said
 
 
 CURE = (

@@ -1,0 +1,87 @@
+"""Angles that a cell writes with a unit or as a compass word, and times of day, which are none."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from orbiflow.density.data import UNITS
+from orbiflow.density.tables.numerals import OTHER, kind_of, plain
+
+COMPASS = "compass"
+"""The unit of words such as NNE: bearings in degrees, north 0 and clockwise."""
+
+_POINTS = "N,NNE,NE,ENE,E,ESE,SE,SSE,S,SSW,SW,WSW,W,WNW,NW,NNW"
+_DEGREES = {point: f"{22.5 * k:g}" for k, point in enumerate(_POINTS.split(","))}
+_LONG = {"NORTH": "N", "EAST": "E", "SOUTH": "S", "WEST": "W"}
+
+_WITH_UNIT = re.compile(r"([+-]?[\d.,][^A-Za-z°]*(?:[eE][+-]?\d+)?)\s*([A-Za-z]+|°)\.?")
+_RINGS = str.maketrans("º˚", "°°")
+"""Signs that look like that of degrees."""
+
+_TIME = re.compile(r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp][Mm])?")
+
+
+def unit_of_cells(cells: Sequence[str]) -> str | None:
+    """Return the unit that cells of a column write, `COMPASS` if they are compass words, or None.
+
+    The first may be a name. Hemispheres, which are N or S alone, or E or W, are no compass words.
+
+    >>> unit_of_cells(["phi", "70.3 deg", "-12.5 deg"]), unit_of_cells(["70.3", "1.2 rad"])
+    ('degrees', 'radians')
+    >>> unit_of_cells(["wind", "NNE", "s"]), unit_of_cells(["side", "N", "S"])
+    ('compass', None)
+    """
+    found = next((unit for cell in cells if (unit := unit_of_cell(cell))), None)
+    if found is not None:
+        return found
+    words = [cell for cell in cells[1:] if kind_of(cell) != "missing"]
+    points = {_point(word) for word in words}
+    is_compass = points <= _DEGREES.keys() and not (points <= {"N", "S"} or points <= {"E", "W"})
+    return COMPASS if is_compass else None
+
+
+def unit_of_cell(cell: str) -> str | None:
+    """Return the unit of angles after the number in a cell, or None.
+
+    >>> unit_of_cell("70.3°"), unit_of_cell("1.2e-3 rad"), unit_of_cell("70.3"), unit_of_cell("3 km")
+    ('degrees', 'radians', None, None)
+    """
+    found = _parted(cell)
+    return UNITS.get(found[2].casefold()) if found else None
+
+
+def bare(cell: str, unit: str | None) -> str:
+    """Return the number in a cell of a column of this unit, or the cell if it is written otherwise.
+
+    >>> bare("70,3 deg", "degrees"), bare("NNE", "compass"), bare("70.3", None)
+    ('70,3', '22.5', '70.3')
+    """
+    if unit is None:
+        return cell
+    if unit == COMPASS:
+        return _DEGREES.get(_point(cell), cell)
+    found = _parted(cell)
+    return found[1].rstrip() if found else cell
+
+
+def is_time(cell: str) -> bool:
+    """Return whether a cell is a time of day, such as 05:12."""
+    return _TIME.fullmatch(cell.strip()) is not None
+
+
+def are_times(cells: Sequence[str]) -> bool:
+    """Return whether all cells of a column are times of day but the first, which may be a name."""
+    return len(cells) > 1 and all(is_time(cell) or kind_of(cell) == "missing" for cell in cells[1:])
+
+
+def _parted(cell: str) -> re.Match[str] | None:
+    """Return a number and the letters after it."""
+    found = _WITH_UNIT.fullmatch(cell.strip().translate(_RINGS))
+    is_number = found and any(kind_of(plain(found[1], mark)) == "number" for mark in OTHER)
+    return found if is_number else None
+
+
+def _point(cell: str) -> str:
+    word = re.sub(r"[\s_-]", "", cell.upper())
+    return re.sub("|".join(_LONG), lambda found: _LONG[found[0]], word)
