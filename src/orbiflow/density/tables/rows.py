@@ -101,25 +101,14 @@ def read_rows(
     the rows, those of weights, counts and groups and, on a torus, those that are no angles by name.
     """
     rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
-    how: dict[str, Any] = {"has_header": rows.header, "decimal": rows.decimal}
     weighing, counting = (
-        None
-        if column is None
-        else read_table(path, columns=[column], width=1, **how, **_drop(rows))
-        for column in (rows.weights, getattr(rows, "counts", None))
+        _one_column(path, column, rows) for column in (rows.weights, getattr(rows, "counts", None))
     )
     others = [name for own in (weighing, counting) if own is not None for name in own.columns]
     if group is not None and rows.columns is None:
         others.append(_name(path, group, rows.header))
-    columns = rows.columns
-    if columns is None and space is not None:
-        columns = _columns_by_name(path, space, width, others, rows.header, tell)
     try:
-        if columns is not None:
-            how |= {**_drop(rows), "missing_codes": rows.missing_codes}
-            table = read_table(path, columns=list(columns), width=None, **how)
-        else:
-            table = _all_columns(path, space, None if others else width, others, rows, tell)
+        table = _data_columns(path, space, width, others, rows, tell)
     except MissingCellsError as error:
         if rows is not settings:  # the command has no way to keep them
             raise
@@ -129,13 +118,43 @@ def read_rows(
     for note in table.notes:
         tell(Note(note))
     _check_width(path, table, space, width, others)
-    if space in ("sphere", "projective-plane"):
+    if space in DIRECTIONS:
         _check_hemispheres(path, table, rows.header)
     if weighing is not None:
         _tell_of_weights(weighing, tell)
     elif counting is None and space == "torus" and hasattr(rows, "counts"):
         _tell_of_counts(path, table, rows.header, tell)
     return _weighed(TableRows(path, table, None, group, rows.header), weighing, counting)
+
+
+def _how(rows: RowSettings) -> dict[str, Any]:
+    """Return how `read_table` finds numbers."""
+    return {"has_header": rows.header, "decimal": rows.decimal}
+
+
+def _one_column(path: Path, column: str | None, rows: RowSettings) -> Table | None:
+    """Return a column of weights or counts, if one was named."""
+    if column is None:
+        return None
+    return read_table(path, columns=[column], width=1, **_how(rows), **_drop(rows))
+
+
+def _data_columns(
+    path: Path,
+    space: str | None,
+    width: int | None,
+    others: Sequence[str],
+    rows: RowSettings,
+    tell: Sink,
+) -> Table:
+    """Return the columns that were asked for, or else those that the space takes beside `others`."""
+    columns = rows.columns
+    if columns is None and space is not None:
+        columns = _columns_by_name(path, space, width, others, rows.header, tell)
+    if columns is None:
+        return _all_columns(path, space, None if others else width, others, rows, tell)
+    how: dict[str, Any] = {**_how(rows), **_drop(rows), "missing_codes": rows.missing_codes}
+    return read_table(path, columns=list(columns), width=None, **how)
 
 
 _HEMISPHERES = {"N", "S", "E", "W", "NORTH", "SOUTH", "EAST", "WEST"}
@@ -174,7 +193,7 @@ def _all_columns(
     tell: Sink,
 ) -> Table:
     """Return all columns of numbers but those that are no data; then look at what is missing."""
-    how: dict[str, Any] = {"has_header": rows.header, "decimal": rows.decimal, "keep_missing": True}
+    how: dict[str, Any] = {**_how(rows), "keep_missing": True}
     try:
         table = read_table(path, columns=None, width=width, **how)
     except TableError as error:
