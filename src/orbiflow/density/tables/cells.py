@@ -13,6 +13,9 @@ COMPASS = "compass"
 
 _POINTS = "N,NNE,NE,ENE,E,ESE,SE,SSE,S,SSW,SW,WSW,W,WNW,NW,NNW"
 _DEGREES = {point: f"{22.5 * k:g}" for k, point in enumerate(_POINTS.split(","))}
+_CALM = frozenset({"CALM", "VRB", "VAR", "VARIABLE"})
+"""Words for winds without a direction."""
+
 _LONG = {"NORTH": "N", "EAST": "E", "SOUTH": "S", "WEST": "W"}
 
 _WITH_UNIT = re.compile(r"([+-]?[\d.,][^A-Za-z°]*(?:[eE][+-]?\d+)?)\s*([A-Za-z]+|°)\.?")
@@ -35,8 +38,7 @@ def unit_of_cells(cells: Sequence[str]) -> str | None:
     found = next((unit for cell in cells if (unit := unit_of_cell(cell))), None)
     if found is not None:
         return found
-    words = [cell for cell in cells[1:] if kind_of(cell) != "missing"]
-    points = {_point(word) for word in words}
+    points = {_point(cell) for cell in cells[1:] if kind_of(bare(cell, COMPASS)) != "missing"}
     is_compass = points <= _DEGREES.keys() and not (points <= {"N", "S"} or points <= {"E", "W"})
     return COMPASS if is_compass else None
 
@@ -60,9 +62,15 @@ def bare(cell: str, unit: str | None) -> str:
     if unit is None:
         return cell
     if unit == COMPASS:
-        return _DEGREES.get(_point(cell), cell)
+        point = _point(cell)
+        return "" if point in _CALM else _DEGREES.get(point, cell)
     found = _parted(cell)
     return found[1].rstrip() if found else cell
+
+
+def is_like_angle(cell: str) -> bool:
+    """Return whether a cell that is no number may be meant as an angle: one with digits, or a word."""
+    return any(letter.isdigit() for letter in cell) or _point(cell) in _DEGREES
 
 
 def is_time(cell: str) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from orbiflow.density.tables.cells import (
     COMPASS,
     are_times,
     bare,
+    is_like_angle,
     is_time,
     unit_of_cell,
     unit_of_cells,
@@ -40,6 +41,7 @@ class Layout:
     - `header`: The names in the header line, None if there is none.
     - `header_line`: The number of that line, which may be a comment.
     - `names`: The columns' names. `numeric`: Which columns hold numbers.
+    - `spoiled`: Columns called after angles that are text, by name, each with a cell that is no number.
     - `units`: The unit that the cells of each column write, or None.
     - `first`: The number of the first line that is no comment.
     - `marks`: How numbers are written.
@@ -51,6 +53,7 @@ class Layout:
     names: tuple[str, ...]
     numeric: tuple[bool, ...]
     units: tuple[str | None, ...]
+    spoiled: Mapping[str, str]
     first: int
     marks: Marks
 
@@ -108,7 +111,8 @@ def layout_of(
         classes = [column[1:] for column in classes]
     names = tuple(name or f"column{i}" for i, name in enumerate(header or [""] * len(classes), 1))
     numeric = _numeric(names, written, units, classes)
-    return Layout(delimiter, header, header_line, names, numeric, units, first, marks)
+    spoiled = _spoiled(names, written, classes, numeric)
+    return Layout(delimiter, header, header_line, names, numeric, units, spoiled, first, marks)
 
 
 def _first_lines(path: Path) -> tuple[list[tuple[int, str]], list[tuple[int, str]]]:
@@ -166,6 +170,22 @@ def _numeric(
     if any(sure):
         return tuple(sure)
     return tuple(found) if any(found) else tuple(map(are_times, written))
+
+
+def _spoiled(
+    names: Sequence[str],
+    written: Sequence[Sequence[str]],
+    classes: Sequence[Sequence[str]],
+    numeric: Sequence[bool],
+) -> dict[str, str]:
+    """Return the text columns that are called after angles and seem to be such, each with a cell."""
+    found: dict[str, str] = {}
+    for name, cells, kinds, is_number in zip(names, written, classes, numeric, strict=True):
+        own = cells[len(cells) - len(kinds) :]
+        if not is_number and is_angle_named(name) and 2 * sum(map(is_like_angle, own)) > len(own):
+            words = [cell for cell, kind in zip(own, kinds, strict=True) if kind == "word"]
+            found[name] = min(words, key=is_like_angle, default="")
+    return found
 
 
 def _delimiter_of(path: Path, lines: Sequence[str]) -> str:

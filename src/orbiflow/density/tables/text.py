@@ -63,10 +63,10 @@ def read_text(path: Path, reading: Reading) -> Table:
     check_count(path, len(lines), reading.max_rows, "rows")
     rows, at = np.frombuffer(values).reshape(-1, len(picked)), np.frombuffer(lines, dtype=np.int64)
     table = tables.finished(path, rows, at, names, reading, notes, layout.of_table())
-    return replace(table, notes=(*table.notes, *_notes(layout, names, comments)))
+    return replace(table, notes=(*table.notes, *_notes(layout, reading, names, comments)))
 
 
-def _notes(layout: Layout, names: Sequence[str], comments: int) -> list[str]:
+def _notes(layout: Layout, reading: Reading, names: Sequence[str], comments: int) -> list[str]:
     """Return how the cells and lines of the columns that were taken were read, in words."""
     notes: list[str] = []
     if layout.decimal == ",":
@@ -79,6 +79,11 @@ def _notes(layout: Layout, names: Sequence[str], comments: int) -> list[str]:
         listed = listing([name for name in names if own.get(name) == unit])
         words = "compass words as degrees, north 0 and clockwise" if unit == COMPASS else unit
         notes.append(f"read {words}, as the cells say: {listed}")
+    if not reading.columns:
+        notes += [
+            f"WARNING: left out {name!r}, whose name is an angle's: {quote(cell)} is no number"
+            for name, cell in layout.spoiled.items()
+        ]
     if layout.header is not None:
         where = "comment line" if layout.is_header_comment else "line"
         notes.append(f"took {where} {layout.header_line} as the header: {listing(layout.header)}")
