@@ -410,3 +410,13 @@ def test_headers_in_comments_are_read(summary: Summary) -> None:
     assert document["directions"][0]["mean"][0] == pytest.approx(40, abs=1)
     done, _ = summary(text("", EAST[:, [1, 0]]), "--space", "sphere")
     assert "took column1 as latitude and column2 as longitude, in degrees" in done.out
+
+
+@pytest.mark.parametrize(("size", "is_serious"), [(100.0, False), (3.0, True)])
+def test_columns_beside_those_whose_cells_have_a_unit(
+    size: float, is_serious: bool, summary: Summary
+) -> None:
+    rows = "".join(f"{v:.1f}°,{v / 180 * size:.3f}\n" for v in RNG.uniform(-180, 180, 30))
+    done, _ = summary("phi,psi\n" + rows, "--space", "torus")
+    assert "psi: no unit in the cells, read as degrees as the others are" in done.out
+    assert ("WARNING" in done.out) == is_serious

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array
 from orbiflow.density.data import (
     DIRECTIONS,
+    Doubt,
     Unit,
     check_values,
     chosen_arrangement,
@@ -23,6 +24,8 @@ from orbiflow.density.data import (
     is_count_named,
     is_identifier,
     is_other_quantity,
+    seeming_unit,
+    unit_named,
     words_of,
 )
 from orbiflow.density.tables.files import column_names, read_labels, read_table
@@ -358,12 +361,23 @@ def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
             Note("no cell was given: its lengths are taken to be about 1, in the unit of the data")
         )
     unit, doubts = check_values(space, table.values, table.columns, _asked_unit(where, table), CURE)
+    doubts += _doubts_of_units(table)
     if where.cell is not None and not where.fractional:
         doubts += fraction_doubts(table.values, where.cell[: len(table.columns)])
     for doubt in doubts:
         words = doubt.text.replace("(fractional)", "(--fractional)")
         tell(Note(f"WARNING: {words}" if doubt.is_serious else words))
     return unit
+
+
+def _doubts_of_units(table: Table) -> list[Doubt]:
+    """Return a doubt if cells of some columns write a unit, and those of others may have another."""
+    plain = [name for name in table.columns if name not in table.units and not unit_named(name)]
+    if table.unit != "degrees" or not plain:
+        return []
+    values = table.values[:, [table.columns.index(name) for name in plain]]
+    text = f"{listing(plain)}: no unit in the cells, read as degrees as the others are"
+    return [Doubt(text, seeming_unit(values, "degrees") is not None)]
 
 
 def _asked_unit(where: SpaceSettings, table: Table) -> str | None:
