@@ -52,6 +52,11 @@ def test_mixed_units_are_refused(content: str, words: str, tmp_path: Path) -> No
         read_table(write(tmp_path, content), columns=None, width=1)
 
 
+def test_a_column_of_units_is_a_column(tmp_path: Path) -> None:
+    path = write(tmp_path, "phi,unit\n-1.390,deg\n2.500,deg\n")
+    assert read_table(path, columns=None, width=1).values.tolist() == [[-1.39], [2.5]]
+
+
 def test_columns_in_different_units_are_refused(tmp_path: Path) -> None:
     table = read_table(write(tmp_path, "a,b\n70 deg,1 rad\n"), columns=None, width=2)
     with pytest.raises(TableError, match=r"different units \(a in degrees, b in radians\)"):
@@ -82,7 +87,8 @@ def test_labels_are_no_compass_words(content: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "times", ["05:12\n17:03\n", "05:12:33\n17:03:01.5\n", "5:12 am\n\n7:03 PM\n"]
+    "times",
+    ["05:12\n17:03\n", "05:12:33\n17:03:01.5\n", "5:12 am\n\n7:03 PM\n", "-5h12m33s\n7h3m\n"],
 )
 def test_times_of_day_are_refused_by_cause(times: str, tmp_path: Path) -> None:
     for content in (times, "time\n" + times):
@@ -99,6 +105,9 @@ HEADED = {
     "# lon lat\n1,2\n3,4\n": ("lon", "lat"),
     "# lon, lat\n1 2\n3 4\n": ("lon", "lat"),
     "## a,b\n1,2\n3,4\n": ("a", "b"),
+    "# Columns: lon lat\n1 2\n3 4\n": ("lon", "lat"),
+    "# time series\n1 2\n3 4\n": None,
+    "# time phi\n1 2\n3 4\n": ("time", "phi"),
     "# by hand\n1,2\n3,4\n": None,
     "# angles of all residues\n1 2\n3 4\n": None,
     "# 5 6\n1 2\n3 4\n": None,

@@ -154,6 +154,13 @@ def test_units_are_refused_where_there_are_none() -> None:
         check_unit("torus", "grad")
 
 
+def test_places_on_a_torus_are_doubted() -> None:
+    table = RNG.uniform(-80, 80, (30, 2))
+    assert doubts_of("torus", table, "degrees", "lat", "lon") == [True]
+    for names in (("phi", "psi"), ("azimuth", "altitude"), ("lon", "phi"), ("dip", "strike")):
+        assert True not in doubts_of("torus", table, "degrees", *names)
+
+
 def test_fractions_of_a_cell_are_doubted() -> None:
     inside = RNG.uniform(0, 1, (30, 3))
     assert fraction_doubts(inside, (8.0, 9.0, 10.0))[0].is_serious

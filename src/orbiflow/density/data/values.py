@@ -12,7 +12,14 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.density.data.columns import DIRECTIONS, ROTATIONS, Arrangement, check_columns
 from orbiflow.density.data.identifiers import is_identifier
-from orbiflow.density.data.names import is_count_named, is_other_quantity, unit_named, words_of
+from orbiflow.density.data.names import (
+    LATITUDES,
+    is_count_named,
+    is_other_quantity,
+    pairs_of,
+    unit_named,
+    words_of,
+)
 from orbiflow.density.data.units import TURN_TOLERANCE, TURNS, Unit, check_unit, is_angular
 from orbiflow.errors import DataWarning, SettingError, literal
 
@@ -66,6 +73,9 @@ def _doubts_of_names(
 ) -> list[Doubt]:
     """Return what columns were taken for, if their names do not say it."""
     listed = ", ".join(names)
+    if space == "torus" and any(pair.family.north is LATITUDES for pair in pairs_of(names)):
+        text = f"{listed} have a latitude and a longitude, by their names: those are of the sphere"
+        return [Doubt(text, True)]
     if space in ROTATIONS and len(names) == 4 and found is None:
         return [Doubt(f"took {listed} as x, y, z, w: the quaternion's scalar is the last", False)]
     if space not in DIRECTIONS or len(names) != 2:

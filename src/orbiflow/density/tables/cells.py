@@ -22,7 +22,9 @@ _WITH_UNIT = re.compile(r"([+-]?[\d.,][^A-Za-z°]*(?:[eE][+-]?\d+)?)\s*([A-Za-z]
 _RINGS = str.maketrans("º˚", "°°")
 """Signs that look like that of degrees."""
 
-_TIME = re.compile(r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp][Mm])?")
+_TIME = re.compile(
+    r"[+-]?\d{1,3}(:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp][Mm])?|h\s*\d{1,2}m?(\s*\d{1,2}([.,]\d+)?s)?)"
+)
 
 
 def unit_of_cells(cells: Sequence[str]) -> str | None:
@@ -74,7 +76,7 @@ def is_like_angle(cell: str) -> bool:
 
 
 def is_time(cell: str) -> bool:
-    """Return whether a cell is a time of day, such as 05:12."""
+    """Return whether a cell is a time of day or in sixties, such as 05:12 or 5h12m33s."""
     return _TIME.fullmatch(cell.strip()) is not None
 
 
@@ -86,7 +88,11 @@ def are_times(cells: Sequence[str]) -> bool:
 def _parted(cell: str) -> re.Match[str] | None:
     """Return a number and the letters after it."""
     found = _WITH_UNIT.fullmatch(cell.strip().translate(_RINGS))
-    is_number = found and any(kind_of(plain(found[1], mark)) == "number" for mark in OTHER)
+    is_number = (
+        found
+        and not found[1].rstrip().endswith(",")
+        and any(kind_of(plain(found[1], mark)) == "number" for mark in OTHER)
+    )
     return found if is_number else None
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orbiflow.density.data import is_angle_named
+from orbiflow.density.data import is_angle_named, is_count_named, is_other_quantity, pairs_of
 from orbiflow.density.tables import table as tables
 from orbiflow.density.tables.cells import (
     COMPASS,
@@ -138,18 +138,26 @@ def _header_among(
     (('lon', 'lat'), 2)
     """
     for number, line in reversed(comments):
-        text = line.strip().lstrip("#").strip()
+        text = re.sub(r"^\w+:\s+", "", line.strip().lstrip("#").strip())  # such as "Columns: "
         words = re.split(r"\s*[,;\t]\s*|\s+", text)
         cells = words if delimiter == " " else text.split(delimiter)
         if len(cells) != width:
             if not any(map(is_angle_named, words)):  # a sentence
                 continue
             cells = words
+        elif cells == words and _is_sentence(words):
+            continue
         names = tuple(cell.strip().strip('"').strip() for cell in cells)
         is_named = all(kind_of(plain(name, ".")) == "word" for name in names)
         if is_named and len(set(names)) == len(names) == width:
             return names, number
     return None, None
+
+
+def _is_sentence(words: Sequence[str]) -> bool:
+    """Return whether words name no angle or place, and one would have its column left out."""
+    known = any(map(is_angle_named, words)) or bool(pairs_of(words))
+    return not known and any(is_other_quantity(word) or is_count_named(word) for word in words)
 
 
 def _numeric(
