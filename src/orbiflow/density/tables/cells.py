@@ -18,7 +18,7 @@ _CALM = frozenset({"CALM", "VRB", "VAR", "VARIABLE"})
 
 _LONG = {"NORTH": "N", "EAST": "E", "SOUTH": "S", "WEST": "W"}
 
-_WITH_UNIT = re.compile(r"([+-]?[\d.,][^A-Za-z°]*(?:[eE][+-]?\d+)?)\s*([A-Za-z]+|°)\.?")
+_WITH_UNIT = re.compile(r"([+-]?[\d.,](?:[^A-Za-z°]*[\d.])?(?:[eE][+-]?\d+)?)\s*([A-Za-z]+|°)\.?")
 _RINGS = str.maketrans("º˚", "°°")
 """Signs that look like that of degrees."""
 
@@ -82,17 +82,14 @@ def is_time(cell: str) -> bool:
 
 def are_times(cells: Sequence[str]) -> bool:
     """Return whether all cells of a column are times of day but the first, which may be a name."""
-    return len(cells) > 1 and all(is_time(cell) or kind_of(cell) == "missing" for cell in cells[1:])
+    words = [cell for cell in cells[1:] if kind_of(cell) != "missing"]
+    return bool(words) and all(map(is_time, words))
 
 
 def _parted(cell: str) -> re.Match[str] | None:
     """Return a number and the letters after it."""
     found = _WITH_UNIT.fullmatch(cell.strip().translate(_RINGS))
-    is_number = (
-        found
-        and not found[1].rstrip().endswith(",")
-        and any(kind_of(plain(found[1], mark)) == "number" for mark in OTHER)
-    )
+    is_number = found and any(kind_of(plain(found[1], mark)) == "number" for mark in OTHER)
     return found if is_number else None
 
 
