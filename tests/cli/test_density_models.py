@@ -88,8 +88,9 @@ def test_another_number_of_columns(command: str, folder: Path, tmp_path: Path, o
 def test_angles_that_seem_to_be_in_another_unit(folder: Path, tmp_path: Path, orbiflow) -> None:
     out = tmp_path / "x.csv"
 
-    def said(data: str, model: str) -> str:
-        done = orbiflow("density", "score", folder / data, "-m", folder / model, "--out", out)
+    def said(data: str, model: str, *options: str) -> str:
+        given = ("-m", folder / model, "--out", out, *options)
+        done = orbiflow("density", "score", folder / data, *given)
         assert done.status == 0, done.err
         return done.out
 
@@ -102,10 +103,34 @@ def test_angles_that_seem_to_be_in_another_unit(folder: Path, tmp_path: Path, or
     assert "all values are within 2 pi, and the model's angles are in degrees" in said(
         "torus.csv", "degrees"
     )
+    assert "latitudes and longitudes are in degrees: if these are radians" in said(
+        "torus.csv", "sphere", "--columns", "1,2"
+    )
     one = ("density", "conditional", "-m", folder / "torus", "--out", tmp_path / "m", "--given")
     assert "WARNING: column 'psi' has 45, beyond 2 pi" in orbiflow(*one, "psi=45").out
     assert "WARNING" not in orbiflow(*one, "psi=4.5").out
+    degrees = (
+        "density",
+        "conditional",
+        "-m",
+        folder / "degrees",
+        "--out",
+        tmp_path / "m",
+        "--given",
+    )
+    assert "WARNING: column 'psi' has 400, beyond 360" in orbiflow(*degrees, "psi=400").out
+    assert "stand for a missing value: leave it out" in orbiflow(*degrees, "psi=-999").err
     assert "'psi' must be a finite number, got inf" in orbiflow(*one, "psi=1e400").err
+
+
+def test_cells_in_another_unit_than_the_model(folder: Path, tmp_path: Path, orbiflow) -> None:
+    data = tmp_path / "cells.csv"
+    data.write_text("phi,psi\n0.5 rad,1 rad\n0.1 rad,1.5 rad\n")
+    how = ("density", "score", data, "--out", tmp_path / "x.csv", "-m")
+    assert orbiflow(*how, folder / "torus").status == 0
+    refused = orbiflow(*how, folder / "degrees")
+    assert refused.status == 2
+    assert "the cells are in radians, and the model's data in degrees: convert them" in refused.err
 
 
 @pytest.mark.parametrize(

@@ -382,3 +382,41 @@ def test_hemispheres_in_columns_of_their_own(names: str, orbiflow, tmp_path: Pat
 
     assert "says which rows are south or west" in said("S", "W")
     assert "south or west" not in said("N", "E")
+
+
+def test_units_of_cells_are_those_of_the_columns(summary: Summary) -> None:
+    torus = ("--space", "torus")
+    cells = "".join(f"{v:.3f} deg,{v / 2:.3f} deg\n" for v in RNG.normal(1, 0.5, 30))
+    done, document = summary("phi,psi\n" + cells, *torus)
+    assert (done.status, document["unit"]) == (0, "degrees")
+    done, _ = summary("phi,psi\n" + cells, *torus, "--unit", "radians")
+    assert done.status == 2
+    assert "the cells of phi, psi are in degrees and --unit radians was asked for" in done.err
+    done, _ = summary("lat,lon\n" + cells.replace("deg", "rad"), "--space", "sphere")
+    assert "latitude and longitude are degrees; convert them" in done.err
+    assert summary("lat,lon\n" + cells, "--space", "sphere")[0].status == 0
+
+
+def test_winds_in_words_are_summarised(summary: Summary) -> None:
+    done, document = summary("wind\n" + "NE\nENE\nE\n" * 9, "--space", "torus")
+    assert done.status == 0, done.err
+    assert document["columns"][0]["mean"] == pytest.approx(67.5)
+    assert "compass words as degrees" in done.out
+
+
+def test_headers_in_comments_are_read(summary: Summary) -> None:
+    rows = text("# lon lat", EAST[:, :2], " ")
+    done, document = summary(rows, "--space", "sphere")
+    assert document["directions"][0]["mean"][0] == pytest.approx(40, abs=1)
+    done, _ = summary(text("", EAST[:, [1, 0]]), "--space", "sphere")
+    assert "took column1 as latitude and column2 as longitude, in degrees" in done.out
+
+
+@pytest.mark.parametrize(("size", "is_serious"), [(100.0, False), (3.0, True)])
+def test_columns_beside_those_whose_cells_have_a_unit(
+    size: float, is_serious: bool, summary: Summary
+) -> None:
+    rows = "".join(f"{v:.1f}°,{v / 180 * size:.3f}\n" for v in RNG.uniform(-180, 180, 30))
+    done, _ = summary("phi,psi\n" + rows, "--space", "torus")
+    assert "psi: no unit in the cells, read as degrees as the others are" in done.out
+    assert ("WARNING" in done.out) == is_serious

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbiflow.density import append_columns, is_identifier, read_table
+from orbiflow.density import append_columns, read_table
+from orbiflow.density.data import is_identifier
 from orbiflow.errors import InputFileError
 from table_files import write
 

@@ -108,11 +108,17 @@ def test_radians_on_the_sphere_are_refused(space: str) -> None:
     for radians in (places(1, 1), places(0.4, 1), turned):
         with pytest.raises(SettingError, match=r"they are radians, it seems.*numpy.degrees"):
             unit_of(space, radians)
-        assert doubts_of(space, radians, "degrees") == []
-    assert doubts_of(space, places(0.5, 0.3)) == [True]
-    assert doubts_of(space, places(57, 57)) == []
-    assert doubts_of(space, places(0.5, 0.3) + np.array([48, 11])) == []
-    assert doubts_of(space, places(1, 1, rows=5)) == []
+        assert True not in doubts_of(space, radians, "degrees")
+    assert True in doubts_of(space, places(0.5, 0.3))
+    assert True not in doubts_of(space, places(57, 57))
+    assert True not in doubts_of(space, places(0.5, 0.3) + np.array([48, 11]))
+    assert True not in doubts_of(space, places(1, 1, rows=5))
+
+
+def test_it_is_said_what_columns_without_names_are_taken_for() -> None:
+    (doubt,) = check_values("sphere", places(57, 57), None, None, "cure")[1]
+    assert doubt == ("took column1 as latitude and column2 as longitude, in degrees", False)
+    assert doubts_of("sphere", RNG.normal(size=(9, 3))) == []
 
 
 def test_right_ascension_in_hours_is_doubted() -> None:
@@ -148,6 +154,13 @@ def test_units_are_refused_where_there_are_none() -> None:
         check_unit("torus", "grad")
 
 
+def test_places_on_a_torus_are_doubted() -> None:
+    table = RNG.uniform(-80, 80, (30, 2))
+    assert doubts_of("torus", table, "degrees", "lat", "lon") == [True]
+    for names in (("phi", "psi"), ("azimuth", "altitude"), ("lon", "phi"), ("dip", "strike")):
+        assert True not in doubts_of("torus", table, "degrees", *names)
+
+
 def test_fractions_of_a_cell_are_doubted() -> None:
     inside = RNG.uniform(0, 1, (30, 3))
     assert fraction_doubts(inside, (8.0, 9.0, 10.0))[0].is_serious
@@ -170,6 +183,36 @@ def test_rounding_may_take_a_latitude_beyond_the_pole() -> None:
         to_vectors([[-999.0, 0.0]])
     with pytest.raises(OrbiflowError, match="longitude 999 is beyond 360 degrees: is it a code"):
         to_vectors([[9.0, 999.0]])
+
+
+NUMBERED = np.column_stack([RNG.permutation(90)[:30], RNG.uniform(-180, 180, (30, 2))])
+
+
+@pytest.mark.parametrize("name", ["Unnamed: 0", "index", "level_0", "resid", "id", "site_id", "#"])
+def test_columns_that_number_the_rows_are_doubted(name: str) -> None:
+    assert doubts_of("torus", NUMBERED, "degrees", name, "phi", "psi") == [True]
+    assert True in doubts_of("p1", NUMBERED, None, name, "a", "b")
+    repeated = NUMBERED // np.array([5, 1, 1])
+    if name not in ("site_id", "#"):
+        assert doubts_of("torus", repeated, "degrees", name, "phi", "psi") == [True]
+
+
+def test_rows_that_are_numbered_without_a_name_are_doubted() -> None:
+    ordered = np.column_stack([np.arange(30), NUMBERED[:, 1:]])
+    assert doubts_of("torus", ordered, "degrees") == [True]
+
+
+@pytest.mark.parametrize("name", ["a", "x", "wind", "phi", "indexed", "idle", "angle id"])
+def test_whole_angles_number_no_rows(name: str) -> None:
+    assert doubts_of("torus", NUMBERED, "degrees", name, "phi", "psi") == []
+    assert doubts_of("torus", np.arange(0, 360.0)[:, None], "degrees", name) == []
+    ordered = np.column_stack([np.arange(-90, 90.0), np.zeros(180)])
+    assert doubts_of("sphere", ordered, None, "lat", "lon") == []
+
+
+def test_one_is_an_angle_among_whole_tens() -> None:
+    assert codes_among(np.array([*WIND, 1.0]), 360.0) == []
+    assert codes_among(np.array([*WIND, -1.0]), 360.0) == [-1.0]
 
 
 @pytest.mark.parametrize(

@@ -122,7 +122,6 @@ from .summaries import summarize_axes as summarize_axes
 from .summaries import summarize_directions as summarize_directions
 from .tables.files import append_columns as append_columns
 from .tables.files import column_names as column_names
-from .tables.files import is_identifier as is_identifier
 from .tables.files import read_labels as read_labels
 from .tables.files import read_table as read_table
 from .tables.files import to_csv as to_csv

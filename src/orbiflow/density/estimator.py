@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import numbers
 import re
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
@@ -14,7 +15,14 @@ from numpy.typing import ArrayLike
 
 from orbiflow.arguments import as_instance, as_whole, refusal
 from orbiflow.arrays import Array
-from orbiflow.density.data import as_data, check_columns, is_angular, require_values, unit_of
+from orbiflow.density.data import (
+    NAN_CURE,
+    as_data,
+    check_columns,
+    is_angular,
+    require_values,
+    unit_of,
+)
 from orbiflow.density.fitting import (
     DensitySettings,
     FitReport,
@@ -28,14 +36,16 @@ from orbiflow.density.fitting import (
 from orbiflow.density.inference import (
     at_observed,
     axes_named,
-    chart_of_observed,
+    chart_of_rows,
     conditional,
+    data_doubts,
+    given_doubts,
     given_named,
     marginal,
 )
 from orbiflow.density.models import Density, flow_obstacle, log_density_gradient
 from orbiflow.density.spaces import QuotientSpace, Space, check_measure, space_for
-from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.errors import DataWarning, OrbiflowError, SettingError
 from orbiflow.settings import check_names, fields_of
 
 RandomState: TypeAlias = int | np.integer | np.random.RandomState | np.random.Generator | None
@@ -95,6 +105,8 @@ class DensityEstimator:
     (1,)
     """
 
+    density_: Density
+    report_: FitReport
     feature_names_in_: np.ndarray
     __signature__ = _signature()
 
@@ -148,32 +160,28 @@ class DensityEstimator:
         data, names = as_data(X)
         self.space_ = self._space_for(data, names)
         points = self._chart(data)
-        self.density_: Density
-        self.report_: FitReport
         if flow_obstacle(self.space_):
             _refuse_flows(settings, self.space_)
         settings.check_rows(self.missing, None if groups is None else "groups")
+        how: dict[str, Any] = {"weights": sample_weight, "progress": progress}
         if settings.flow_alone:
-            found = fit_density(
-                self.space_, points, settings.flow, weights=sample_weight, progress=progress
-            )
+            found = fit_density(self.space_, points, settings.flow, **how)
         else:
-            found = fit_automatic(
-                self.space_,
-                points,
-                settings,
-                missing=self.missing,
-                weights=sample_weight,
-                groups=groups,
-                progress=progress,
-            )
+            how |= {"missing": self.missing, "groups": groups}
+            found = fit_automatic(self.space_, points, settings, **how)
+        self._keep(found, data.shape[1], names)
+        return self
+
+    def _keep(
+        self, found: tuple[Density, FitReport], width: int, names: tuple[str, ...] | None
+    ) -> None:
+        """Set what there is after a fit to columns of these names."""
         self.density_, self.report_ = found
-        self.n_features_in_ = int(data.shape[1])
+        self.n_features_in_ = int(width)
         if names is not None:
             self.feature_names_in_ = np.array(names, dtype=object)
         elif hasattr(self, "feature_names_in_"):
             del self.feature_names_in_  # of an earlier fit
-        return self
 
     def settings(self) -> DensitySettings:
         """Return the settings of a fit, which are checked here."""
@@ -211,6 +219,9 @@ class DensityEstimator:
         density, names = self._fitted(), self._column_names()
         both: list[tuple[str | int, float]] = [*(given or {}).items(), *angles.items()]
         known = given_named(self.space_, both, names)
+        values = {names[axis]: float(value) for axis, (_, value) in zip(known, both, strict=True)}
+        for doubt in given_doubts(self.space_, values):
+            warnings.warn(doubt, DataWarning, stacklevel=2)
         left = [name for axis, name in enumerate(names) if axis not in known]
         return self._of(conditional(density, known), left)
 
@@ -241,13 +252,15 @@ class DensityEstimator:
         """Log densities (N,) in nats at data (N, k), with respect to `measure` (see `MEASURES`).
 
         Of rows that lack angles (NaN), with `missing="marginalise"`, of the angles that they have. The
-        columns of a data frame are found by the names that `fit` has seen.
+        columns of a data frame are found by the names that `fit` has seen. Data that are likelier in
+        another unit than the fit's are a `DataWarning`.
+
+        Raises:
+            OrbiflowError: before `fit`, and for data that are not of its space and columns, or have
+                codes for missing values.
         """
-        density = self._fitted()
-        check_measure(measure, density.space)
-        with torch.no_grad():
-            points = self._chart(self._in_order(X))
-            return at_observed(density, points, measure=measure).numpy()
+        check_measure(measure, self._fitted().space)
+        return self._log_densities(self._checked(X), measure)
 
     def score_gradient(self, X: ArrayLike) -> Array:
         """Gradients (N, k) of the log density in natural measure, in the data's own coordinates.
@@ -255,14 +268,14 @@ class DensityEstimator:
         In nats per unit of each angle; per degree of latitude and longitude; of unit vectors the
         tangent vector that points uphill, per radian. See `log_density_gradient`.
         """
-        return log_density_gradient(self._fitted(), self._in_order(X))[1]
+        return log_density_gradient(self._fitted(), self._checked(X))[1]
 
     def score(
         self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None
     ) -> float:
         """Mean log density of data (N, k), weighted, in natural measure."""
         del y
-        scores = torch.tensor(self.score_samples(X))
+        scores = torch.tensor(self._log_densities(self._checked(X), "natural"))
         rows = weighed(scores[:, None], sample_weight)
         return mean_of(rows.points[:, 0], rows.weights)
 
@@ -339,6 +352,17 @@ class DensityEstimator:
             return self.space
         return space_for(self.space, data, unit=found, seed=self.settings().seed)
 
+    def _checked(self, X: ArrayLike) -> Array:
+        """Return data in the order of the fit; warn of those that seem to be in another unit."""
+        density, data = self._fitted(), self._in_order(X)
+        names = getattr(self, "feature_names_in_", None)
+        for doubt in data_doubts(density, data, names, NAN_CURE):
+            warnings.warn(doubt, DataWarning, stacklevel=3)
+        return data
+
+    def _log_densities(self, data: Array, measure: str) -> Array:
+        return at_observed(self.density_, self._chart(data), measure=measure).numpy()
+
     def _in_order(self, X: ArrayLike) -> Array:
         """Return data with the columns of a frame in the order in which `fit` has seen them."""
         data, names = as_data(X)
@@ -359,9 +383,8 @@ class DensityEstimator:
 
     def _chart(self, data: np.ndarray) -> torch.Tensor:
         """Points of data (N, k); with missing angles where they may be."""
-        if check_missing(self.missing) == "marginalise" and self.space_.is_torus:
-            return chart_of_observed(self.space_, data)
-        return self.space_.to_chart(data)
+        may_lack = check_missing(self.missing) == "marginalise" and self.space_.is_torus
+        return chart_of_rows(self.space_, data, may_lack=may_lack)
 
     def _column_names(self) -> list[str]:
         return [str(name) for name in getattr(self, "feature_names_in_", self.space_.columns)]

@@ -9,8 +9,10 @@ from .columns import chosen_arrangement as chosen_arrangement
 from .frames import as_data as as_data
 from .frames import as_numbers as as_numbers
 from .frames import require_values as require_values
+from .identifiers import is_identifier as is_identifier
 from .names import LATITUDES as LATITUDES
 from .names import LONGITUDES as LONGITUDES
+from .names import UNITS as UNITS
 from .names import Pair as Pair
 from .names import is_angle_named as is_angle_named
 from .names import is_count_named as is_count_named
@@ -19,13 +21,16 @@ from .names import pairs_of as pairs_of
 from .names import unit_named as unit_named
 from .names import words_of as words_of
 from .units import TURN_TOLERANCE as TURN_TOLERANCE
+from .units import TURNS as TURNS
 from .units import Unit as Unit
 from .units import check_unit as check_unit
 from .units import is_angular as is_angular
 from .values import CODES as CODES
+from .values import NAN_CURE as NAN_CURE
 from .values import Doubt as Doubt
 from .values import check_values as check_values
 from .values import codes_among as codes_among
 from .values import fraction_doubts as fraction_doubts
 from .values import refuse_codes as refuse_codes
+from .values import seeming_unit as seeming_unit
 from .values import unit_of as unit_of

@@ -86,10 +86,11 @@ OTHERS = frozenset((
     "depth", "height", "width", "size", "area", "volume", "resolution", "occupancy", "bfactor",
     "score", "energy", "charge", "magnitude", "mag", "price", "year", "month", "date", "time",
     "timestamp", "hour", "hours", "day", "weekday", "doy", "age", "probability", "pvalue",
-    "density", "log_prob", "hdr",
+    "density", "log_prob", "hdr", "id", "ids", "idx", "index", "resid", "resi", "resseq", "resnum",
+    "residue", "serial",
 ))
 # fmt: on
-"""Words for quantities that do not come back to themselves after a turn."""
+"""Words for quantities and numbers that do not come back to themselves after a turn."""
 
 # fmt: off
 COUNTS = frozenset((

@@ -11,7 +11,15 @@ import numpy as np
 
 from orbiflow.arrays import Array
 from orbiflow.density.data.columns import DIRECTIONS, ROTATIONS, Arrangement, check_columns
-from orbiflow.density.data.names import is_count_named, is_other_quantity, unit_named, words_of
+from orbiflow.density.data.identifiers import is_identifier
+from orbiflow.density.data.names import (
+    LATITUDES,
+    is_count_named,
+    is_other_quantity,
+    pairs_of,
+    unit_named,
+    words_of,
+)
 from orbiflow.density.data.units import TURN_TOLERANCE, TURNS, Unit, check_unit, is_angular
 from orbiflow.errors import DataWarning, SettingError, literal
 
@@ -49,7 +57,8 @@ def check_values(
     called = list(names) if names else [f"column{k}" for k in range(1, values.shape[1] + 1)]
     found = check_columns(space, names) if names else None
     doubts = [Doubt(found.note, False)] if found and found.note else []
-    doubts += _doubts_of_names(space, values, called, found, is_named=bool(names))
+    doubts += _doubts_of_names(space, values, called, found)
+    doubts += _doubts_of_identifiers(space, values, called)
     if is_angular(space, values.shape[1]):
         own, more = _angles(values, called, unit, cure)
         return own, doubts + more
@@ -60,13 +69,16 @@ def check_values(
 
 
 def _doubts_of_names(
-    space: str, values: Array, names: Sequence[str], found: Arrangement | None, *, is_named: bool
+    space: str, values: Array, names: Sequence[str], found: Arrangement | None
 ) -> list[Doubt]:
     """Return what columns were taken for, if their names do not say it."""
     listed = ", ".join(names)
+    if space == "torus" and any(pair.family.north is LATITUDES for pair in pairs_of(names)):
+        text = f"{listed} have a latitude and a longitude, by their names: those are of the sphere"
+        return [Doubt(text, True)]
     if space in ROTATIONS and len(names) == 4 and found is None:
         return [Doubt(f"took {listed} as x, y, z, w: the quaternion's scalar is the last", False)]
-    if space not in DIRECTIONS or len(names) != 2 or not is_named:
+    if space not in DIRECTIONS or len(names) != 2:
         return []
     if found is None and "theta" in words_of(names[0]) and float(np.nanmin(values[:, 0])) >= 0:
         text = f"took {names[0]} as latitude: if it is the angle from the pole, give 90 less it"
@@ -83,7 +95,20 @@ def _doubts_of_names(
     return []
 
 
-CURE = "replace them by NaN, which `missing` treats, or leave their rows out"
+def _doubts_of_identifiers(space: str, values: Array, names: Sequence[str]) -> list[Doubt]:
+    """Return a doubt for each column of (N, k) that seems to number the rows."""
+    if len(values) < FEW_ROWS or len(names) < 2:
+        return []
+    angular = is_angular(space, len(names))  # whose names are doubted for themselves
+    return [
+        Doubt(f"{name!r} seems to number the rows: if so, leave it out", True)
+        for name, column in zip(names, values.T, strict=True)
+        if is_identifier(name, column[~np.isnan(column)])
+        and not (angular and is_other_quantity(name))
+    ]
+
+
+NAN_CURE = "replace them by NaN, which `missing` treats, or leave their rows out"
 """What to do in Python with codes for missing values."""
 
 
@@ -95,7 +120,7 @@ def unit_of(
     Warns:
         DataWarning: Of serious doubts, at so many calls from here.
     """
-    found, doubts = check_values(space, values, names, unit, CURE)
+    found, doubts = check_values(space, values, names, unit, NAN_CURE)
     for doubt in doubts:
         if doubt.is_serious:
             warnings.warn(doubt.text, DataWarning, stacklevel=stacklevel)
@@ -107,7 +132,7 @@ def _angles(
 ) -> tuple[Unit, list[Doubt]]:
     """Return the unit of angles (N, k), and doubts; refuse codes and values of no known unit."""
     own, doubts = _unit_of(names, unit)
-    refuse_codes(values, names, own or "degrees", cure)
+    _refuse_no_angles(values, names, own or "degrees", cure)
     if own is None:
         own = _radians(values, names)
         text = "no unit was given and all values are within 2 pi: they were read as radians"
@@ -153,6 +178,21 @@ def _other_unit(values: Array, unit: str) -> str | None:
     return None
 
 
+def seeming_unit(values: Array, unit: str) -> Unit | None:
+    """Return the other unit in which angles (N, k) may be by their size alone, or None.
+
+    >>> seeming_unit(np.array([[1.5, -3.0]]), "degrees"), seeming_unit(np.array([[90.0]]), "radians")
+    ('radians', 'degrees')
+    """
+    most = float(np.nanmax(np.abs(values), initial=0.0))
+    within = most <= 2 * math.pi * (1 + TURN_TOLERANCE)
+    if unit == "degrees":
+        return "radians" if within else None
+    if most <= TURNS[unit] * (1 + TURN_TOLERANCE):
+        return None
+    return "radians" if within else "degrees"
+
+
 def _doubts_of_angle(name: str, column: Array, turn: float) -> list[Doubt]:
     """Return doubts about a column (N,) of angles."""
     doubts: list[Doubt] = []
@@ -186,13 +226,13 @@ def _radians(values: Array, names: Sequence[str]) -> Unit:
 
 # fmt: off
 CODES = frozenset({
-    1.0, 77.0, 88.0, 99.0, 99.9, 99.99, 777.0, 888.0, 888.8, 990.0, 998.0, 999.0, 999.25, 999.9, 999.99,
+    77.0, 88.0, 99.0, 99.9, 99.99, 777.0, 888.0, 888.8, 990.0, 998.0, 999.0, 999.25, 999.9, 999.99,
     7777.0, 8888.0,
     9990.0, 9996.0, 9998.0, 9999.0, 9999.9, 9999.99, 32766.0, 32767.0, 32768.0, 65535.0, 99999.0,
     99999.9, 999999.0, 9999999.0, 2147483647.0, 2147483648.0,
 })
 # fmt: on
-"""Numbers, or their opposites, that tables have in the place of missing values."""
+"""Numbers, or their opposites, that tables have in the place of missing values; -1 is one as well."""
 
 HUGE = 1e15
 """What is larger is no angle: netCDF fills gaps with 9.97e36."""
@@ -219,7 +259,8 @@ def codes_among(column: Array, turn: float) -> list[float]:
     []
     """
     distinct, counts = np.unique(column[np.isfinite(column)], return_counts=True)
-    named = np.isin(np.abs(distinct), list(CODES)) | (np.abs(distinct) > HUGE)
+    sizes = np.abs(distinct)
+    named = np.isin(sizes, list(CODES)) | (sizes > HUGE) | (distinct == -1)
     rest, often = distinct[~named], counts[~named] > 1
     beyond = np.abs(rest) > turn * (1 + TURN_TOLERANCE)
     if 2 * int(beyond.sum()) > len(rest):  # angles that go on turning
@@ -231,8 +272,16 @@ def codes_among(column: Array, turn: float) -> list[float]:
     return sorted(found)
 
 
-def refuse_codes(values: Array, names: Sequence[str], unit: str, cure: str) -> None:
-    """Refuse angles (N, k) some of which seem to stand for missing values; `cure` says what to do."""
+def refuse_codes(space: str, values: Array, names: Sequence[str], unit: str, cure: str) -> None:
+    """Refuse data (N, k) some of which seem to stand for missing values; `cure` says what to do."""
+    if is_angular(space, values.shape[1]):
+        _refuse_no_angles(values, names, unit, cure)
+    elif space in DIRECTIONS and values.shape[1] == 2:
+        _refuse_no_places(values, names, cure)
+
+
+def _refuse_no_angles(values: Array, names: Sequence[str], unit: str, cure: str) -> None:
+    """Refuse angles (N, k) some of which are codes for missing values."""
     for name, column in zip(names, values.T, strict=True):
         if codes := codes_among(column, TURNS[unit]):
             raise SettingError(literal(f"column {name!r} has {_counted(codes, column)}: ") + cure)

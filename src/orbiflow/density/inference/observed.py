@@ -65,3 +65,8 @@ def chart_of_observed(space: Space, data: ArrayLike) -> Tensor:
     torus = check_torus(space, "densities of rows that lack angles")
     values = observed_rows(data, "data", torus)
     return torus.project(torch.as_tensor(values / torus.period))
+
+
+def chart_of_rows(space: Space, data: ArrayLike, *, may_lack: bool) -> Tensor:
+    """Return data (N, k) of any space as points, with missing angles if they `may_lack` some."""
+    return chart_of_observed(space, data) if may_lack else space.to_chart(data)

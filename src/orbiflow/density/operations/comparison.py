@@ -147,7 +147,7 @@ def _compare_models(
         if own not in found:
             tell_once = runtime.ignore if found else read.tell
             found[own] = read.rows(data, own, tell_once)
-            check_fits(data, found[own].table, density.space, extra, tell_once)
+            check_fits(data, found[own].table, density, extra, tell_once)
         values = found[own].table.values
 
         def told(share: float, k: int = k) -> None:

@@ -76,7 +76,7 @@ def plot(
     if data is not None:
         reading = with_columns_of(table, data, extra, on_event)
         found = tables.read_rows(data, reading, on_event).table
-        check_fits(data, found, space, extra, on_event)
+        check_fits(data, found, density, extra, on_event)
         points = found.values
 
     told = runtime.progress_events(on_event, cancel)

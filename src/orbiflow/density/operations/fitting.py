@@ -12,15 +12,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from orbiflow import runtime
 from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
-from orbiflow.density import comparing, models, pictures, spaces, tables
+from orbiflow.density import comparing, inference, models, pictures, spaces, tables
 from orbiflow.density.data import is_angular
-from orbiflow.density.fitting import ComponentSettings, DensitySettings
+from orbiflow.density.fitting import ComponentSettings, DensitySettings, mean_of, weighed
 from orbiflow.density.run_folder import write_files, written_files
 from orbiflow.density.tables import CountedRowSettings, RowSettings, SpaceSettings
 from orbiflow.errors import DataWarning
 from orbiflow.settings import Hidden, Option, SettingError
 
 if TYPE_CHECKING:
+    from orbiflow.arrays import Array
     from orbiflow.density.estimator import DensityEstimator
     from orbiflow.density.spaces import Space
     from orbiflow.density.tables import TableRows
@@ -147,7 +148,7 @@ def _document(
         "columns": rows.table.columns,
         "settings": {name: asked[name] for name in REPORTED},
         "log_likelihood": {
-            "natural": estimator.score(rows.table.values[scored], sample_weight=weights),
+            "natural": _mean_score(estimator, rows.table.values[scored], weights),
             "natural_rows": len(scored),
             "uniform": -math.log(space.volume),
             "square_train": -report.train_nll,
@@ -155,6 +156,15 @@ def _document(
         },
         "report": report.to_json(),
     }
+
+
+def _mean_score(estimator: DensityEstimator, values: Array, weights: Array | None) -> float:
+    """Return the mean log density of rows (N, k) of the fit, which were checked then."""
+    may_lack = estimator.missing == "marginalise"
+    points = inference.chart_of_rows(estimator.space_, values, may_lack=may_lack)
+    scores = inference.at_observed(estimator.density_, points, measure="natural")
+    counted = weighed(scores[:, None], weights)
+    return mean_of(counted.points[:, 0], counted.weights)
 
 
 def _words(document: Mapping[str, Any], rows: int, out: Path) -> tuple[str, str]:

@@ -84,7 +84,7 @@ def score(
         density, extra = model_at(model)
         spaces.check_measure(settings.measure, density.space)
         rows = tables.read_rows(data, with_columns_of(reading, data, extra, on_event), on_event)
-        check_fits(data, rows.table, density.space, extra, on_event)
+        check_fits(data, rows.table, density, extra, on_event)
         progress = runtime.progress_events(on_event, cancel)
         columns, mean, over, notes = score_rows(density, rows, settings, progress, may_lack)
     weighted = "" if reading.weights is None else f", weighted by {reading.weights}"
@@ -116,7 +116,7 @@ def score_rows(
     from orbiflow.density import inference
 
     space, values = density.space, rows.table.values
-    points = inference.chart_of_observed(space, values) if may_lack else space.to_chart(values)
+    points = inference.chart_of_rows(space, values, may_lack=may_lack)
     known = ~points.isnan()
     whole = known.all(dim=1).numpy()
     name = "log_prob" if whole.all() else "log_prob_marginal"

@@ -17,7 +17,7 @@ import torch
 
 from orbiflow.arrays import Array
 from orbiflow.density import inference, pictures, tables
-from orbiflow.density.data import TURN_TOLERANCE, check_columns, is_angular, refuse_codes
+from orbiflow.density.data import check_columns
 from orbiflow.density.fitting import Progress as InProgress
 from orbiflow.density.models import Density, Mixture, density_to_bytes, read_density
 from orbiflow.density.run_folder import SAMPLES, write_files
@@ -28,9 +28,6 @@ from orbiflow.runtime import Note, Outcome, ResultFolder, Sink, ignore
 
 if TYPE_CHECKING:
     from orbiflow.density.operations.queries import PartialSettings
-
-FEW_ROWS = 10
-"""Fewer may all be within 2 pi degrees without a word."""
 
 
 def model_at(path: Path) -> tuple[Density, dict[str, Any]]:
@@ -80,8 +77,11 @@ def with_columns_of(
     return settings.replace(columns=names)
 
 
-def check_fits(data: Path, table: Table, space: Space, extra: dict[str, Any], tell: Sink) -> None:
+def check_fits(
+    data: Path, table: Table, density: Density, extra: dict[str, Any], tell: Sink
+) -> None:
     """Check that a table can be of a model, and warn of angles that seem to be in another unit."""
+    space = density.space
     wanted: list[str] = list(extra.get("columns") or space.columns)
     if len(table.columns) not in space.widths:
         count = len(table.columns)
@@ -102,28 +102,12 @@ def check_fits(data: Path, table: Table, space: Space, extra: dict[str, Any], te
                 + literal(f"'{','.join(wanted)}'")
             )
         check_columns(space.name, table.columns)
-    if space.unit is not None and is_angular(space.name, len(table.columns)):
-        refuse_codes(table.values, table.columns, space.unit, tables.CURE)
-    warning = unit_warning(space, table.values, table.columns)
-    if warning:
-        tell(Note(f"WARNING: {data}: {warning}"))
-
-
-def unit_warning(space: Space, values: Array, columns: Sequence[str]) -> str | None:
-    """Return what makes one doubt that angles (N, k) are in the model's unit, or None."""
-    most = np.nanmax(np.abs(values), axis=0, initial=0.0)
-    beyond = float(most.max()) > 2 * math.pi * (1 + TURN_TOLERANCE)
-    if space.unit == "radians" and beyond:
-        return (
-            f"column {columns[int(most.argmax())]!r} has {most.max():g}, beyond 2 pi, and the model's "
-            "angles are in radians: if these are degrees, convert them"
-        )
-    if space.unit == "degrees" and not beyond and len(values) >= FEW_ROWS:
-        return (
-            "all values are within 2 pi, and the model's angles are in degrees: if these are radians, "
-            "convert them"
-        )
-    return None
+    unit, own = table.unit, inference.data_unit(space, len(table.columns))
+    if unit is not None and own not in (None, unit):
+        text = f"{data}: the cells are in {unit}, and the model's data in {own}: convert them"
+        raise TableError(literal(text))
+    for doubt in inference.data_doubts(density, table.values, table.columns, tables.CURE):
+        tell(Note(f"WARNING: {data}: {doubt}"))
 
 
 PICTURE = "density.png"
@@ -186,9 +170,8 @@ def condition_of(
                 literal(repr(both[0]))
                 + " is both among {columns} and {given}; name it in one of them"
             )
-    warning = unit_warning(space, np.array([list(known.values())]), list(known))
-    if warning:
-        tell(Note(f"WARNING: {warning}"))
+    for doubt in inference.given_doubts(space, known):
+        tell(Note(f"WARNING: {doubt}"))
     return known, given, kept
 
 

@@ -1,6 +1,5 @@
 from .files import append_columns as append_columns
 from .files import column_names as column_names
-from .files import is_identifier as is_identifier
 from .files import read_labels as read_labels
 from .files import read_table as read_table
 from .files import to_csv as to_csv

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import io
 import math
-import re
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain, count
@@ -15,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orbiflow.density.data import is_angle_named
 from orbiflow.density.tables import text
+from orbiflow.density.tables.layout import layout_of
+from orbiflow.density.tables.lines import split_line, text_lines
 from orbiflow.density.tables.numerals import Mark
 from orbiflow.density.tables.table import (
     BLOCK,
@@ -52,7 +52,9 @@ def read_table(
 
     In text, cells are separated by tabs, semicolons, commas or whitespace, and a quoted cell may not
     run over a line's end. Blank lines and lines that begin with # are skipped; the first other line is
-    a header if a cell in it is neither a number nor a missing value. Decimal commas and parted
+    a header if a cell in it is neither a number nor a missing value, or else the last of those above
+    it if it has a word for each column. Numbers may have a unit of angles, such as 70.3°, and compass
+    words are bearings in degrees. Decimal commas and parted
     thousands are read where the numbers of the file tell which is which; `decimal` says so otherwise.
     `.npy` files hold a 2-dimensional array of numbers or a 1-dimensional structured one.
 
@@ -85,15 +87,15 @@ def append_columns(
         names = _free_names(columns, table.columns)
         return to_csv((*table.columns, *names), np.column_stack([table.values, *values]))
     path, end, done, out = Path(path_of_source), table.delimiter, 0, bytearray()
-    header, lines = table.header, [*table.lines.tolist(), -1]
+    lines = [*table.lines.tolist(), -1]
     changed = InputFileError(f"{path}: the file changed after it was read; run this again")
-    for number, line, is_comment in text.text_lines(path):
-        if is_comment:
-            out += f"{line}\n".encode()
-            continue
-        if header is not None:
-            cells = [_name_cell(name, end) for name in _free_names(columns, header)]
-            header = None
+    for number, line, is_comment in text_lines(path):
+        if number == table.header_line:
+            cells = [_name_cell(name, end) for name in _free_names(columns, table.header or ())]
+            if is_comment and end not in line:  # of other marks than the rows
+                line, cells = " ".join([line, *cells]), []
+        elif is_comment:
+            cells = []
         elif number in table.dropped:
             cells = ["nan" if end == " " else ""] * len(values)
         elif lines[done] == number:
@@ -178,7 +180,7 @@ def column_names(
     path = Path(path)
     kind = kind_of_file(path)
     if kind == "text":
-        return text.layout_of(path, wanted, has_header).header
+        return layout_of(path, wanted, has_header).header
     return _npy_header(path)[1].names if kind == "npy" else _parquet_names(path)
 
 
@@ -200,10 +202,10 @@ def read_labels(
             cells = [cell for batch in batches for cell in batch.column(0).to_pylist()]
         found = {k: "" if c is None else str(c).strip() for k, c in enumerate(cells, start=1)}
     else:
-        layout = text.layout_of(path, [column], has_header)
+        layout = layout_of(path, [column], has_header)
         index = find(path, layout.names, column)
-        for number, line, is_comment in text.text_lines(path):
-            cells = [] if is_comment else text.split_line(path, number, line, layout.delimiter)
+        for number, line, is_comment in text_lines(path):
+            cells = [] if is_comment else split_line(path, number, line, layout.delimiter)
             found[number] = cells[index].strip() if index < len(cells) else ""
     missing = [line for line in table.lines.tolist() if not found.get(line)]
     if missing:
@@ -212,34 +214,6 @@ def read_labels(
             "it in"
         )
     return np.array([found[line] for line in table.lines.tolist()])
-
-
-IDENTIFIER_NAMES = frozenset({"#", "id", "idx", "index", "key", "no", "no.", "nr", "number", "row"})
-"""Names of columns that number the rows with any different whole numbers."""
-
-INDEX_NAMES = re.compile(r"|unnamed: \d+|__index_level_\d+__|level_\d+")
-"""Names that pandas gives to an index when it writes it: any whole numbers there are no data."""
-
-
-def is_identifier(name: str, values: NDArray[np.float64]) -> bool:
-    """Return whether a column (N,) numbers the rows, one by one or by its name.
-
-    One that is called after an angle does not.
-
-    >>> is_identifier("item", np.arange(5.0)), is_identifier("item", np.array([1.0, 1.0, 2.0]))
-    (True, False)
-    >>> is_identifier("phi", np.arange(5.0))
-    False
-    """
-    if len(values) < 3 or not bool((values == np.round(values)).all()) or is_angle_named(name):
-        return False
-    if bool((np.diff(values) == 1).all()):
-        return True
-    word = name.strip().casefold()
-    if INDEX_NAMES.fullmatch(word):
-        return True
-    named = word in IDENTIFIER_NAMES or word.endswith(("_id", " id"))
-    return named and len(np.unique(values)) == len(values)
 
 
 MAX_NPY_HEADER = 10_000

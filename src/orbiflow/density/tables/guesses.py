@@ -19,11 +19,11 @@ from orbiflow.density.data import (
     codes_among,
     is_angle_named,
     is_count_named,
+    is_identifier,
     is_other_quantity,
     pairs_of,
     words_of,
 )
-from orbiflow.density.tables.files import is_identifier
 from orbiflow.density.tables.table import Table
 
 MOST_ANGLES = 7

@@ -47,10 +47,8 @@ def plain(cell: str, decimal: str) -> str:
     ('1025.2', '1025', '48,2', '1025.5')
     """
     cell = cell.strip()
-    if not cell.isascii() or " " in cell or "'" in cell:
-        cell = cell.removesuffix("°").rstrip()
-        if _SPACED.fullmatch(cell):
-            cell = _SPACES.sub("", cell)
+    if (not cell.isascii() or " " in cell or "'" in cell) and _SPACED.fullmatch(cell):
+        cell = _SPACES.sub("", cell)
     other = OTHER[decimal]
     if other in cell:
         if not _parted(other).fullmatch(cell):

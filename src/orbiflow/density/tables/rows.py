@@ -15,16 +15,20 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array
 from orbiflow.density.data import (
     DIRECTIONS,
+    Doubt,
     Unit,
     check_values,
     chosen_arrangement,
     fraction_doubts,
     is_angle_named,
     is_count_named,
+    is_identifier,
     is_other_quantity,
+    seeming_unit,
+    unit_named,
     words_of,
 )
-from orbiflow.density.tables.files import column_names, is_identifier, read_labels, read_table
+from orbiflow.density.tables.files import column_names, read_labels, read_table
 from orbiflow.density.tables.settings import SPACES, RowSettings, SpaceSettings, TableSettings
 from orbiflow.density.tables.table import MissingCellsError, Table, TableError, find, listing, quote
 from orbiflow.errors import SettingError, literal
@@ -100,25 +104,14 @@ def read_rows(
     the rows, those of weights, counts and groups and, on a torus, those that are no angles by name.
     """
     rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
-    how: dict[str, Any] = {"has_header": rows.header, "decimal": rows.decimal}
     weighing, counting = (
-        None
-        if column is None
-        else read_table(path, columns=[column], width=1, **how, **_drop(rows))
-        for column in (rows.weights, getattr(rows, "counts", None))
+        _one_column(path, column, rows) for column in (rows.weights, getattr(rows, "counts", None))
     )
     others = [name for own in (weighing, counting) if own is not None for name in own.columns]
     if group is not None and rows.columns is None:
         others.append(_name(path, group, rows.header))
-    columns = rows.columns
-    if columns is None and space is not None:
-        columns = _columns_by_name(path, space, width, others, rows.header, tell)
     try:
-        if columns is not None:
-            how |= {**_drop(rows), "missing_codes": rows.missing_codes}
-            table = read_table(path, columns=list(columns), width=None, **how)
-        else:
-            table = _all_columns(path, space, None if others else width, others, rows, tell)
+        table = _data_columns(path, space, width, others, rows, tell)
     except MissingCellsError as error:
         if rows is not settings:  # the command has no way to keep them
             raise
@@ -128,13 +121,43 @@ def read_rows(
     for note in table.notes:
         tell(Note(note))
     _check_width(path, table, space, width, others)
-    if space in ("sphere", "projective-plane"):
+    if space in DIRECTIONS:
         _check_hemispheres(path, table, rows.header)
     if weighing is not None:
         _tell_of_weights(weighing, tell)
     elif counting is None and space == "torus" and hasattr(rows, "counts"):
         _tell_of_counts(path, table, rows.header, tell)
     return _weighed(TableRows(path, table, None, group, rows.header), weighing, counting)
+
+
+def _how(rows: RowSettings) -> dict[str, Any]:
+    """Return how `read_table` finds numbers."""
+    return {"has_header": rows.header, "decimal": rows.decimal}
+
+
+def _one_column(path: Path, column: str | None, rows: RowSettings) -> Table | None:
+    """Return a column of weights or counts, if one was named."""
+    if column is None:
+        return None
+    return read_table(path, columns=[column], width=1, **_how(rows), **_drop(rows))
+
+
+def _data_columns(
+    path: Path,
+    space: str | None,
+    width: int | None,
+    others: Sequence[str],
+    rows: RowSettings,
+    tell: Sink,
+) -> Table:
+    """Return the columns that were asked for, or else those that the space takes beside `others`."""
+    columns = rows.columns
+    if columns is None and space is not None:
+        columns = _columns_by_name(path, space, width, others, rows.header, tell)
+    if columns is None:
+        return _all_columns(path, space, None if others else width, others, rows, tell)
+    how: dict[str, Any] = {**_how(rows), **_drop(rows), "missing_codes": rows.missing_codes}
+    return read_table(path, columns=list(columns), width=None, **how)
 
 
 _HEMISPHERES = {"N", "S", "E", "W", "NORTH", "SOUTH", "EAST", "WEST"}
@@ -173,7 +196,7 @@ def _all_columns(
     tell: Sink,
 ) -> Table:
     """Return all columns of numbers but those that are no data; then look at what is missing."""
-    how: dict[str, Any] = {"has_header": rows.header, "decimal": rows.decimal, "keep_missing": True}
+    how: dict[str, Any] = {**_how(rows), "keep_missing": True}
     try:
         table = read_table(path, columns=None, width=width, **how)
     except TableError as error:
@@ -184,11 +207,10 @@ def _all_columns(
     for other in others:
         if other in table.columns and len(table.columns) > 1:
             table = table.without(table.columns.index(other))
-    if space == "torus":
-        table = _angles_alone(table, tell)
     if width is None:
         table = _without_identifiers(table, tell)
     if space == "torus":
+        table = _angles_alone(table, tell)
         _tell_of_names(table, tell)
     return table.complete(path, **_drop(rows), missing_codes=rows.missing_codes)
 
@@ -338,16 +360,35 @@ def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
         tell(
             Note("no cell was given: its lengths are taken to be about 1, in the unit of the data")
         )
-    named = (
-        None if all(re.fullmatch(r"column\d+", name) for name in table.columns) else table.columns
-    )
-    unit, doubts = check_values(space, table.values, named, where.unit, CURE)
+    unit, doubts = check_values(space, table.values, table.columns, _asked_unit(where, table), CURE)
+    doubts += _doubts_of_units(table)
     if where.cell is not None and not where.fractional:
         doubts += fraction_doubts(table.values, where.cell[: len(table.columns)])
     for doubt in doubts:
         words = doubt.text.replace("(fractional)", "(--fractional)")
         tell(Note(f"WARNING: {words}" if doubt.is_serious else words))
     return unit
+
+
+def _doubts_of_units(table: Table) -> list[Doubt]:
+    """Return a doubt if cells of some columns write a unit, and those of others may have another."""
+    plain = [name for name in table.columns if name not in table.units and not unit_named(name)]
+    if table.unit != "degrees" or not plain:
+        return []
+    values = table.values[:, [table.columns.index(name) for name in plain]]
+    text = f"{listing(plain)}: no unit in the cells, read as degrees as the others are"
+    return [Doubt(text, seeming_unit(values, "degrees") is not None)]
+
+
+def _asked_unit(where: SpaceSettings, table: Table) -> str | None:
+    """Return the unit that is asked for or, of angles, else what the cells say; refuse two."""
+    said = table.unit if where.space in SPACES else None
+    if said is not None and where.unit not in (None, said):
+        raise TableError(
+            literal(f"the cells of {listing(table.columns)} are in {said}")
+            + f" and {{unit}} {where.unit} was asked for: leave it out"
+        )
+    return where.unit or said
 
 
 CURE = (

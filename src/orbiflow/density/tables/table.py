@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,8 @@ class Table:
     - `notes`: What was decided for the user, in plain words.
     - `header`: Names of all columns in a text file's header line, None if there is none.
     - `delimiter`: Delimiter of a text file, " " for runs of whitespace; None for npy and Parquet.
+    - `header_line`: The number of that line, which may be a comment.
+    - `units`: Units that the cells of a text file write, by the columns' names.
     - `decimal`: Mark before the decimals of a text file, "." or ",".
     - `dropped`: Numbers of the lines that were left out because a value was missing.
     """
@@ -53,7 +55,22 @@ class Table:
     header: tuple[str, ...] | None
     delimiter: str | None
     decimal: str = "."
+    header_line: int | None = None
+    units: Mapping[str, str] = field(default_factory=dict[str, str])
     dropped: frozenset[int] = frozenset()
+
+    @property
+    def unit(self) -> str | None:
+        """The unit that cells of the columns write, None if they write none.
+
+        Raises:
+            TableError: If there are several.
+        """
+        own = {name: self.units[name] for name in self.columns if name in self.units}
+        if len(set(own.values())) > 1:
+            listed = ", ".join(f"{name} in {unit}" for name, unit in own.items())
+            raise TableError(literal(f"the cells are in different units ({listed}): convert them"))
+        return next(iter(own.values()), None)
 
     def only(self, kept: NDArray[np.bool_]) -> Table:
         """Return the rows that are kept, (N,) of bool; the others are dropped."""
@@ -76,7 +93,8 @@ class Table:
             keep_missing=keep_missing,
             missing_codes=missing_codes,
         )
-        layout = {name: getattr(self, name) for name in ("header", "delimiter", "decimal")}
+        names = ("header", "header_line", "delimiter", "decimal", "units")
+        layout = {name: getattr(self, name) for name in names}
         return finished(path, self.values, self.lines, self.columns, reading, self.notes, layout)
 
     def without(self, column: int) -> Table:

@@ -1,0 +1,120 @@
+"""What makes one doubt that data, or known angles, are in the unit of a density."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import torch
+
+from orbiflow.arrays import Array
+from orbiflow.density.data import (
+    DIRECTIONS,
+    TURN_TOLERANCE,
+    TURNS,
+    codes_among,
+    is_angular,
+    refuse_codes,
+    seeming_unit,
+)
+from orbiflow.density.inference.observed import at_observed
+from orbiflow.density.models import Density
+from orbiflow.density.spaces import Space
+from orbiflow.errors import OrbiflowError, SettingError, literal
+
+FEW_ROWS = 10
+"""Fewer may all be small by accident."""
+
+MOST_ROWS = 256
+"""Rows by which it is judged in which unit data are likelier."""
+
+WORDS = {"radians": "2 pi", "degrees": "360", "turns": "1"}
+"""A turn in each unit."""
+
+
+def data_doubts(
+    density: Density, values: Array, names: Sequence[str] | None, cure: str
+) -> list[str]:
+    """Return what makes one doubt that data (N, k), of which some may be missing, are in its unit.
+
+    One doubts if the values may be in another unit and are likelier in it, by the density.
+
+    Raises:
+        SettingError: For codes for missing values; `cure` says what to do with them.
+    """
+    space, width = density.space, values.shape[1] if values.ndim == 2 else 0
+    unit = data_unit(space, width)
+    if unit is None or not values.size:
+        return []
+    called = [f"column{k}" for k in range(1, width + 1)] if names is None else list(names)
+    # a few angles in radians that go on turning may be among the codes
+    read_as = unit if len(values) >= FEW_ROWS else "degrees"
+    refuse_codes(space.name, values, called, read_as, cure)
+    other = _likelier_unit(density, values, unit)
+    if other is None:
+        return []
+    if unit == "degrees":
+        what = "angles are" if is_angular(space.name, width) else "latitudes and longitudes are"
+        text = (
+            f"all values are within 2 pi, and the model's {what} in degrees: if these are {other}"
+        )
+        return [f"{text}, convert them"]
+    most = np.nanmax(np.abs(values), axis=0, initial=0.0)
+    return [_beyond(called[int(most.argmax())], float(most.max()), unit, other)]
+
+
+def _likelier_unit(density: Density, values: Array, unit: str) -> str | None:
+    """Return another unit in which values (N, k) may be by their size, and are likelier, or None."""
+    other = seeming_unit(values, unit)
+    if other is None or (unit != "radians" and len(values) < FEW_ROWS):
+        return None
+    return other if _is_likelier(density, values, TURNS[unit] / TURNS[other]) else None
+
+
+def given_doubts(space: Space, given: Mapping[str, float]) -> list[str]:
+    """Return what makes one doubt that known angles, by name, are in the unit of a torus.
+
+    Raises:
+        SettingError: For a code for missing values.
+    """
+    unit = str(space.unit)
+    for name, value in given.items():
+        if codes_among(np.array([value]), TURNS["degrees"]):
+            text = f"{name!r} is {value:g}, which seems to stand for a missing value: leave it out"
+            raise SettingError(literal(text))
+    beyond = {n: v for n, v in given.items() if abs(v) > TURNS[unit] * (1 + TURN_TOLERANCE)}
+    other = "radians" if unit == "turns" else "degrees"
+    return [_beyond(name, value, unit, other) for name, value in beyond.items()]
+
+
+def data_unit(space: Space, width: int) -> str | None:
+    """Return the unit of a space's data of so many columns, None if they have none."""
+    if is_angular(space.name, width):
+        return str(getattr(space, "angle_unit", space.unit))
+    return "degrees" if space.name in DIRECTIONS and width == 2 else None
+
+
+def _beyond(name: str, value: float, unit: str, other: str) -> str:
+    text = (
+        f"column {name!r} has {value:g}, beyond {WORDS[unit]}, and the model's angles are in {unit}"
+    )
+    turn = TURNS[unit]
+    return f"{text}: " + (
+        f"it counts as {value % turn:g}" if other == unit else f"if these are {other}, convert them"
+    )
+
+
+def _is_likelier(density: Density, values: Array, factor: float) -> bool:
+    """Return whether values (N, k) are likelier as a rule if they are multiplied by a factor."""
+    whole = values[np.isfinite(values).all(axis=1)]
+    if not len(whole):
+        return False
+    some = whole[:: 1 + len(whole) // MOST_ROWS]
+    try:
+        one, other = (
+            at_observed(density, density.space.to_chart(data), measure="uniform")
+            for data in (some, some * factor)
+        )
+    except OrbiflowError:  # beyond what the space takes
+        return False
+    return float(torch.median(other - one)) > 0

@@ -1,0 +1,290 @@
+"""How a text file is laid out: its delimiter, its header, and how its cells are written."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from orbiflow.density.data import is_angle_named, is_count_named, is_other_quantity, pairs_of
+from orbiflow.density.tables import table as tables
+from orbiflow.density.tables.cells import (
+    COMPASS,
+    are_times,
+    bare,
+    is_like_angle,
+    is_time,
+    unit_of_cell,
+    unit_of_cells,
+)
+from orbiflow.density.tables.lines import SEPARATOR, check_length, split_line, text_lines
+from orbiflow.density.tables.numerals import Mark, Marks, kind_of, marks_of, plain, with_minus
+from orbiflow.density.tables.table import TableError, check_count
+from orbiflow.errors import InputFileError, literal
+
+SAMPLE = 100
+"""Rows looked at to find the layout."""
+
+DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
+_LONE_COMMA = re.compile(r"[+-]?\d+(\.\d{3})*(,\d+)?")
+_LEADING_ZERO = re.compile(r",0\d")
+_WHOLE = re.compile(r"[+-]?\d+")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The layout of a text file.
+
+    - `delimiter`: The mark between cells, " " for runs of whitespace.
+    - `header`: The names in the header line, None if there is none.
+    - `header_line`: The number of that line, which may be a comment.
+    - `names`: The columns' names. `numeric`: Which columns hold numbers.
+    - `spoiled`: Columns called after angles that are text, by name, each with a cell that is no number.
+    - `units`: The unit that the cells of each column write, or None.
+    - `first`: The number of the first line that is no comment.
+    - `marks`: How numbers are written.
+    """
+
+    delimiter: str
+    header: tuple[str, ...] | None
+    header_line: int | None
+    names: tuple[str, ...]
+    numeric: tuple[bool, ...]
+    units: tuple[str | None, ...]
+    spoiled: Mapping[str, str]
+    first: int
+    marks: Marks
+
+    @property
+    def is_header_comment(self) -> bool:
+        """Whether the header is a comment."""
+        return self.header_line is not None and self.header_line < self.first
+
+    @property
+    def decimal(self) -> Mark:
+        """The mark before decimals."""
+        return self.marks.decimal
+
+    def of_table(self) -> dict[str, Any]:
+        """Return what a table says of its layout, by the names of its fields."""
+        units = zip(self.names, self.units, strict=True)
+        found = {name: "degrees" if own == COMPASS else own for name, own in units if own}
+        names = ("header", "header_line", "delimiter", "decimal")
+        return {**{name: getattr(self, name) for name in names}, "units": found}
+
+
+def layout_of(
+    path: Path,
+    columns: Sequence[str] | None,
+    has_header: bool | None = None,
+    decimal: Mark | None = None,
+) -> Layout:
+    """Find the layout of a text file from its first rows."""
+    comments, sample = _first_lines(path)
+    if not sample:
+        raise InputFileError(f"{path}: only comments and blank lines; export it again")
+    first = sample[0][0]
+    delimiter = _delimiter_of(path, [line for _, line in sample])
+    rows = [split_line(path, number, line, delimiter) for number, line in sample]
+    check_count(path, len(rows[0]), tables.MAX_COLUMNS, "columns")
+    for (number, _), row in zip(sample, rows, strict=True):
+        check_length(path, number, row, first, len(rows[0]), delimiter)
+    written = list(zip(*rows, strict=True))
+    units = tuple(unit_of_cells(column) for column in written)
+    cells = [[bare(cell, own) for cell, own in zip(row, units, strict=True)] for row in rows]
+    marks = marks_of(cells, delimiter if len(rows[0]) > 1 else "", decimal)
+    classes = [
+        tuple(kind_of(plain(cell, marks.decimal)) for cell in column)
+        for column in zip(*cells, strict=True)
+    ]
+    header, header_line = None, None
+    if has_header is None:
+        has_header = _has_header(path, first, rows[0], classes, columns)
+        if not has_header:
+            header, header_line = _header_among(comments, len(rows[0]), delimiter)
+    if has_header:
+        header, header_line = tuple(cell.strip().strip('"').strip() for cell in rows[0]), first
+        if len(rows) == 1:
+            raise InputFileError(f"{path}: line {first} is a header and no row follows; add rows")
+        classes = [column[1:] for column in classes]
+    names = tuple(name or f"column{i}" for i, name in enumerate(header or [""] * len(classes), 1))
+    numeric = _numeric(names, written, units, classes)
+    spoiled = _spoiled(names, written, classes, numeric)
+    return Layout(delimiter, header, header_line, names, numeric, units, spoiled, first, marks)
+
+
+def _first_lines(path: Path) -> tuple[list[tuple[int, str]], list[tuple[int, str]]]:
+    """Return the comments above the first rows, and these, with the numbers of their lines."""
+    comments: list[tuple[int, str]] = []
+    sample: list[tuple[int, str]] = []
+    for number, line, is_comment in text_lines(path):
+        if not is_comment:
+            sample.append((number, line))
+        elif not sample:
+            comments.append((number, line))
+        if len(sample) == SAMPLE:
+            break
+    return comments, sample
+
+
+def _header_among(
+    comments: Sequence[tuple[int, str]], width: int, delimiter: str
+) -> tuple[tuple[str, ...] | None, int | None]:
+    """Return the last comment that names as many columns, as numpy.savetxt writes it, and its line.
+
+    >>> _header_among([(1, "# by me"), (2, "# lon, lat"), (3, "# 1, 2")], 2, ",")
+    (('lon', 'lat'), 2)
+    """
+    for number, line in reversed(comments):
+        text = re.sub(r"^\w+:\s+", "", line.strip().lstrip("#").strip())  # such as "Columns: "
+        words = re.split(r"\s*[,;\t]\s*|\s+", text)
+        cells = words if delimiter == " " else text.split(delimiter)
+        if len(cells) != width:
+            if not any(map(is_angle_named, words)):  # a sentence
+                continue
+            cells = words
+        elif cells == words and _is_sentence(words):
+            continue
+        names = tuple(cell.strip().strip('"').strip() for cell in cells)
+        is_named = all(kind_of(plain(name, ".")) == "word" for name in names)
+        if is_named and len(set(names)) == len(names) == width:
+            return names, number
+    return None, None
+
+
+def _is_sentence(words: Sequence[str]) -> bool:
+    """Return whether words name no angle or place, and one would have its column left out."""
+    known = any(map(is_angle_named, words)) or bool(pairs_of(words))
+    return not known and any(is_other_quantity(word) or is_count_named(word) for word in words)
+
+
+def _numeric(
+    names: Sequence[str],
+    written: Sequence[Sequence[str]],
+    units: Sequence[str | None],
+    classes: Sequence[Sequence[str]],
+) -> tuple[bool, ...]:
+    """Return which columns hold numbers, or what is refused by cause where no other does.
+
+    Compass words may be labels: they are numbers if the name is an angle's, or there are no others.
+    """
+    found = [c.count("number") >= max(1, c.count("word")) for c in classes]
+    sure = [
+        own and (unit != COMPASS or is_angle_named(name))
+        for own, unit, name in zip(found, units, names, strict=True)
+    ]
+    if any(sure):
+        return tuple(sure)
+    return tuple(found) if any(found) else tuple(map(are_times, written))
+
+
+def _spoiled(
+    names: Sequence[str],
+    written: Sequence[Sequence[str]],
+    classes: Sequence[Sequence[str]],
+    numeric: Sequence[bool],
+) -> dict[str, str]:
+    """Return the text columns that are called after angles and seem to be such, each with a cell."""
+    found: dict[str, str] = {}
+    for name, cells, kinds, is_number in zip(names, written, classes, numeric, strict=True):
+        own = cells[len(cells) - len(kinds) :]
+        if not is_number and is_angle_named(name) and 2 * sum(map(is_like_angle, own)) > len(own):
+            words = [cell for cell, kind in zip(own, kinds, strict=True) if kind == "word"]
+            found[name] = min(words, key=is_like_angle, default="")
+    return found
+
+
+def _delimiter_of(path: Path, lines: Sequence[str]) -> str:
+    """Return the mark between cells that the file says, as Excel does, or else that its lines show."""
+    _, top, _ = next(text_lines(path))
+    said = SEPARATOR.fullmatch(top)
+    return said[1] if said else _delimiter([with_minus(line) for line in lines])
+
+
+def _has_header(
+    path: Path,
+    first: int,
+    row: list[str],
+    classes: list[tuple[str, ...]],
+    columns: Sequence[str] | None,
+) -> bool:
+    tops = [column[0] for column in classes]
+    if "word" not in tops:
+        return False
+    if "number" not in tops or len(classes[0]) == 1:
+        return True
+    if any(column[0] == "word" and "number" in column[1:] for column in classes):
+        return True
+    # `Paris,48.9,2.4` above `Rome,41.9,12.5` is a row; `city,2019,2020` above it is a header
+    names = {cell.strip().casefold() for cell in row}
+    wanted = [name.strip() for name in columns or ()]
+    by_number = all(tables.is_number(name, len(row)) for name in wanted)
+    if not by_number and all(name.casefold() in names for name in wanted):
+        return True
+    raise TableError(
+        literal(
+            f"{path}: line {first} may be a header or a row, as its numbers stand above numbers "
+        )
+        + "and its words above words; say with {header} which it is, put a header line of names above "
+        "it, or choose columns by the names in it with {columns}"
+    )
+
+
+def _delimiter(lines: list[str]) -> str:
+    r"""Return the mark that splits all lines into as many cells, or else splits most of them.
+
+    The semicolon is tried before the comma, which may be a decimal one. It also stands for none, where
+    a single column has decimal commas.
+
+    >>> _delimiter(["lat;lon", "1,5;2"]), _delimiter(["1, 2", "3, 4"]), _delimiter(["1 2", "3\t4"])
+    (';', ',', ' ')
+    >>> _delimiter(["angle", "1.025,2", "998,7"])
+    ';'
+    """
+    first, *rest = lines
+    lone = all(_LONE_COMMA.fullmatch(line.strip()) for line in rest)
+    if lone and any("," in line for line in rest):
+        headed = "," not in first
+        # no second column of whole numbers has zeros in front
+        if headed or (
+            _LONE_COMMA.fullmatch(first.strip()) and _LEADING_ZERO.search(",".join(lines))
+        ):
+            return ";"
+    if _is_lone(lines[len(lines) > 1 :]):
+        return ";"
+    if _is_spaced(lines[len(lines) > 1 :]):
+        return " "
+    counts = {mark: [line.count(mark) for line in lines] for mark in "\t;,"}
+    for mark, count in counts.items():
+        if count[0] and len(set(count)) == 1:
+            return mark
+    for mark, count in counts.items():
+        if 2 * sum(map(bool, count)) > len(lines):
+            return mark
+    return " " if any(len(line.split()) > 1 for line in lines) else ","
+
+
+def _is_lone(lines: list[str]) -> bool:
+    """Return whether lines are cells of a single column, some with a space before a unit.
+
+    >>> _is_lone(["70.3 deg", "1.2"]), _is_lone(["1, 70.3 deg", "2, 1.2"]), _is_lone(["1 2"])
+    (True, False, False)
+    """
+    whole = [unit_of_cell(line) is not None or is_time(line) for line in lines]
+    others = [line for line, own in zip(lines, whole, strict=True) if not own]
+    return any(whole) and not any(re.search(r"[;\t\s]", line.strip()) for line in others)
+
+
+def _is_spaced(lines: list[str]) -> bool:
+    """Return whether all lines are numbers separated by spaces, some with decimal commas.
+
+    >>> _is_spaced(["1,5 2", "3 4,25"]), _is_spaced(["1, 2", "3, 4"])
+    (True, False)
+    """
+    cells = [line.split() for line in lines]
+    flat = [cell for row in cells for cell in row]
+    numbers = all(DECIMAL_COMMA.fullmatch(cell) or _WHOLE.fullmatch(cell) for cell in flat)
+    some = any("," in cell for cell in flat)
+    return numbers and some and all(len(row) > 1 for row in cells) and "\t" not in "".join(lines)
