@@ -9,7 +9,9 @@ from .mesh import Mesh as Mesh
 from .mesh import harmonic as harmonic
 from .mesh import local_thickness as local_thickness
 from .mesh import triangulate as triangulate
+from .outlines import DISC_OVERREACH as DISC_OVERREACH
 from .outlines import Samples as Samples
+from .outlines import opened as opened
 from .outlines import sampled as sampled
 from .pins import Pins as Pins
 from .readers.files import read_outline as read_outline
