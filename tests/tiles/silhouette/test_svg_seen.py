@@ -278,6 +278,38 @@ def test_what_counts_as_shape(body: str, area: float, note: str) -> None:
     assert any(note in said for said in reading.notes) or not note
 
 
+ROUND = '<circle cx="{}" cy="50" r="30" {}/>'
+WHITE = '<rect width="100" height="100" fill="#fff"/>'
+TWO = ROUND.format(40, 'opacity=".3"') + ROUND.format(50, 'opacity=".3"')
+IN_GROUP = ROUND.format(40, "") + ROUND.format(60, "")
+FAINT = {
+    "two that are seen where they overlap": TWO,
+    "three": ROUND.format(30, 'fill-opacity=".3"') + TWO,
+    "colours": TWO.replace("/>", ' fill="#100"/>', 1),
+    "a group is one": f'<g opacity=".3">{IN_GROUP}</g>' + ROUND.format(50, 'opacity=".3"'),
+    "groups in a group": f'<g opacity=".9"><g opacity=".4">{IN_GROUP}</g>{TWO}</g>',
+    "a half-transparent group": '<g opacity=".6">' + TWO.replace(".3", ".45") + f"</g>{TWO}",
+    "what is hidden between": f'{TWO}<rect width="50" height="100" fill="#fff"/>{TWO}',
+    "fill and stroke are one": f'<g stroke="#000" stroke-width="9" opacity=".4">{TWO}</g>{TWO}',
+    "beside an opaque one": f'<rect x="45" y="5" width="9" height="60"/>{TWO}',
+}
+
+
+@pytest.mark.parametrize("name", FAINT)
+def test_faint_shapes_are_seen_where_they_lie_on_one_another(name: str) -> None:
+    body = f"{WHITE}{FAINT[name]}"
+    assert agreement(f'{SVG} viewBox="0 0 100 100">{body}</svg>') > 0.98
+    assert not any("took faint" in note for note in read(body).notes)
+
+
+def test_faint_shapes_that_hardly_overlap_are_left_out_or_all_of_the_drawing() -> None:
+    apart = ROUND.format(21, 'opacity=".3"') + ROUND.format(79, 'opacity=".3"')
+    assert "took faint shapes, as there are no others" in read(apart).notes
+    reading = read(DISC.format("") + '<rect x="2" width="9" height="9" opacity=".3"/>' + apart)
+    assert any("left out 3 faint shapes" in note for note in reading.notes)
+    assert shapely.Polygon(reading.outline).area == pytest.approx(np.pi * 900, rel=3e-3)
+
+
 def zigzag(count: int, step: float) -> str:
     steps = np.random.default_rng(0).normal(0, step, (count, 2)).round(2).tolist()
     return "M50 50l" + " ".join(f"{x},{y}" for x, y in steps)

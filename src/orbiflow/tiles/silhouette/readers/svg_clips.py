@@ -93,7 +93,7 @@ class Clips:
         key = source, place.matrix.tobytes(), frame
         if key not in self._known:
             style = self.drawing.styles.standing(source)
-            inner = replace(place, opacity=1.0).styled({**style, "opacity": "1"})
+            inner = replace(place, groups=()).styled({**style, "opacity": "1"})
             if not mask:
                 inner = inner.moved(self.drawing.own_transform(source, style, inner))
             content = inner.moved(unit_box_matrix(box)) if boxed and box else inner

@@ -1,5 +1,6 @@
 """The shapes that a drawing shows: their geometry, where they stand, and how they are painted."""
 
+import math
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -83,6 +84,13 @@ class Clip:
     kind: str = "clip"  # "clip", "luminance" or "alpha"
 
 
+@dataclass(frozen=True, eq=False)
+class Group:
+    """An element that is painted as a whole and then laid over what is below with an opacity."""
+
+    opacity: float
+
+
 @dataclass(frozen=True)
 class Place:
     """Where in the drawing an element stands: what it inherits."""
@@ -92,9 +100,14 @@ class Place:
     style: Style
     rem: float = FONT_SIZE
     depth: int = 0
-    opacity: float = 1.0
+    groups: tuple[Group, ...] = ()  # those around that are not opaque, the outermost first
     context: tuple[str, str] = ("none", "none")  # the fill and stroke around a marker or <use>
     decorates: bool = False
+
+    @property
+    def opacity(self) -> float:
+        """The product of the opacities of all groups around."""
+        return math.prod(group.opacity for group in self.groups)
 
     def moved(self, matrix: Array) -> "Place":
         return replace(self, matrix=self.matrix @ matrix)
@@ -107,7 +120,8 @@ class Place:
             key: known[text] for key in ("fill", "stroke") if (text := style.get(key, "")) in known
         }
         style = {**style, **own} if own else style
-        return replace(self, depth=self.depth + 1, style=style, opacity=self.opacity * share)
+        groups = self.groups if share == 1 else (*self.groups, Group(share))
+        return replace(self, depth=self.depth + 1, style=style, groups=groups)
 
     def length(self, element: Element, key: str, text: str | None, usual: float = 0.0) -> float:
         """Return a length of an element in user units. Raises `BadElement` for what is none."""
