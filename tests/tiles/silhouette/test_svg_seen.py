@@ -278,6 +278,36 @@ def test_what_counts_as_shape(body: str, area: float, note: str) -> None:
     assert any(note in said for said in reading.notes) or not note
 
 
+CARD = '<rect x="{0}" y="{0}" width="{1}" height="{1}" rx="{2}" fill="#28c"/>'
+
+
+@pytest.mark.parametrize("drawn", ["#fff", "#000", "#e33"])
+@pytest.mark.parametrize(("at", "corner"), [(0, 0), (0, 22), (3, 0), (5, 15), (-5, 0)])
+def test_a_card_of_any_colour_is_left_out(at: int, corner: int, drawn: str) -> None:
+    card = CARD.format(at, 100 - 2 * at, corner)
+    reading = read(card + FISH + f' fill="{drawn}"/><circle cx="30" cy="45" r="3" fill="#28c"/>')
+    alone = read(FISH + "/>")
+    area = shapely.Polygon(alone.outline).area
+    assert shapely.Polygon(reading.outline).area == pytest.approx(area, rel=1e-6)
+    assert any("card" in note or "background" in note for note in reading.notes)
+
+
+@pytest.mark.parametrize(
+    "drawn",
+    [
+        "",
+        '<circle cx="30" cy="30" r="9" fill="#fff"/><circle cx="70" cy="70" r="9" fill="#fff"/>',
+        '<rect x="15" y="15" width="70" height="60" fill="#fff"/>',
+        '<path d="M50 50V0H60V50z" fill="#222"/>' + FISH + ' fill="#fff"/>',
+        FISH + ' fill="#28c"/>',
+    ],
+)
+def test_what_is_no_card_is_the_shape(drawn: str) -> None:
+    reading = read(CARD.format(5, 90, 9) + drawn)
+    assert shapely.Polygon(reading.outline).area == pytest.approx(90**2, rel=0.03)
+    assert not any("card" in note for note in reading.notes)
+
+
 ROUND = '<circle cx="{}" cy="50" r="30" {}/>'
 WHITE = '<rect width="100" height="100" fill="#fff"/>'
 TWO = ROUND.format(40, 'opacity=".3"') + ROUND.format(50, 'opacity=".3"')

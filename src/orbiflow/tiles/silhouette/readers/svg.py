@@ -20,6 +20,7 @@ from orbiflow.tiles.silhouette.outlines import (
     percent,
     simplified,
 )
+from orbiflow.tiles.silhouette.readers.frames import CARD, CARD_NOTE, CARD_SIDES, LEAST_DRAWN
 from orbiflow.tiles.silhouette.readers.reading import Reading, Source
 from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
 from orbiflow.tiles.silhouette.readers.svg_overlays import NOTEWORTHY, PLAIN, alike, overlay, solid
@@ -102,12 +103,16 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
         notes = ["nothing is painted: took the closed paths as filled"]
     layers = [own for own in layers if own]
     paper, grounds = _background(layers, drawing)
+    n, card = len(grounds), _card(layers, grounds, drawing)
+    carded = [CARD_NOTE] * (card is not None)
+    if card is not None:
+        paper, grounds = layers[card][0].brush.colour, grounds | {card}
     shown = [layer for k, own in enumerate(layers) if k not in grounds for layer in own]
     if not shown:
         raise InputFileError(f"{drawing.path}: {_why_empty(drawing)}")
-    n = len(grounds)
     noun = "a background rectangle" if n == 1 else f"{n} background rectangles"
     notes += [f"left out {noun} that cover{'s' * (n == 1)} the whole drawing"] * (n > 0)
+    notes += carded
     seen, decided = overlay(shown, paper)
     colours = {layer.brush.colour for layer in shown if layer.brush.opacity >= FAINT}
     if len(colours) > 1 and solid(seen) >= ALL_BUT * _page(layers, drawing).area:
@@ -177,6 +182,38 @@ def _paving(layers: list[list[Layer]], page: shapely.Polygon) -> int:
     )
     others = widest and any(not alike(layer.brush.colour, widest.brush.colour) for layer in on_it)
     return count if paved and others else 0
+
+
+def _card(layers: list[list[Layer]], grounds: set[int], drawing: Drawing) -> int | None:
+    """Return which shape is a card: a rectangle that all but fills the page, with a drawing on it."""
+    rest = [k for k in range(len(layers)) if k not in grounds]
+    if len(rest) < 2 or drawing.box is None:
+        return None
+    card, page = layers[rest[0]][0], shapely.box(*drawing.box)
+    on_it = [layer for k in rest[1:] for layer in layers[k] if layer.brush.opacity >= FAINT]
+    on_it = [layer for layer in on_it if not alike(layer.brush.colour, card.brush.colour)]
+    region = _without_holes(card.region)
+    drawn = shapely.union_all([layer.region for layer in on_it])
+    is_card = (
+        card.brush.opacity >= FAINT
+        and _is_rectangle(region)
+        and (_sides(region) >= CARD_SIDES * _sides(page)).all()
+        and drawn.difference(region).area <= NOTEWORTHY * drawn.area
+    )
+    if not is_card or drawn.is_empty:
+        return None
+    largest = outer_outline(drawn)[0]
+    is_drawing = (_sides(largest) > LEAST_DRAWN * _sides(region)).all()
+    return rest[0] if is_drawing and not _is_rectangle(largest) else None
+
+
+def _is_rectangle(region: BaseGeometry) -> bool:
+    return region.area >= CARD * region.envelope.area
+
+
+def _sides(region: BaseGeometry) -> Array:
+    bounds = np.array(region.bounds)
+    return bounds[2:] - bounds[:2]
 
 
 def _without_holes(region: BaseGeometry) -> BaseGeometry:
