@@ -23,7 +23,7 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
 )
 from orbiflow.tiles.silhouette.readers.svg_style import Style
 from orbiflow.tiles.silhouette.readers.svg_transforms import origin_of, shift
-from orbiflow.tiles.silhouette.readers.svg_units import as_number, length
+from orbiflow.tiles.silhouette.readers.svg_values import as_number, length
 from orbiflow.tiles.silhouette.readers.svg_xml import reference
 
 if TYPE_CHECKING:

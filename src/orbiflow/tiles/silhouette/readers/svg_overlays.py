@@ -12,8 +12,8 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.drawing import rgb
 from orbiflow.tiles.silhouette.outlines import outer_outline, percent
-from orbiflow.tiles.silhouette.readers.svg_colours import Brush
 from orbiflow.tiles.silhouette.readers.svg_regions import FAINT, Layer, painted
+from orbiflow.tiles.silhouette.readers.svg_values import Brush
 
 OVERLAY_GRID = 1e-9  # of the size of the drawing: the grid that the united outline is snapped to
 OVERLAY_GRID_FLOOR = 1e-12  # of the largest coordinate
