@@ -278,6 +278,33 @@ def test_what_counts_as_shape(body: str, area: float, note: str) -> None:
     assert any(note in said for said in reading.notes) or not note
 
 
+def test_a_page_with_a_hole_is_the_shape_and_said() -> None:
+    note = "the silhouette is all but the whole page; if the hole in it is the shape, fill that"
+    for hole, is_said in ((FISH.split('"')[1], True), ("M40 40H50V50H40z", False)):
+        reading = read(f'<path fill-rule="evenodd" d="M0 0H100V100H0z{hole}"/>')
+        assert (note in reading.notes) is is_said
+        assert shapely.Polygon(reading.outline).area == pytest.approx(1e4)
+
+
+INNER = FISH + ' transform="translate(18 18) scale(.65)" fill="{}"/>'
+
+
+@pytest.mark.parametrize(
+    ("drawn", "is_said"),
+    [
+        (INNER.format("#fd0"), True),
+        (INNER.format("#fff"), True),
+        (INNER.format("#028"), False),
+        ('<circle cx="40" cy="40" r="6" fill="#fd0"/>', False),
+        ("", False),
+    ],
+)
+def test_a_badge_is_the_shape_and_said(drawn: str, is_said: bool) -> None:
+    reading = read('<circle cx="50" cy="50" r="48" fill="#028"/>' + drawn)
+    assert any("disc with a drawing" in note for note in reading.notes) is is_said
+    assert shapely.Polygon(reading.outline).area == pytest.approx(np.pi * 48**2, rel=3e-3)
+
+
 CARD = '<rect x="{0}" y="{0}" width="{1}" height="{1}" rx="{2}" fill="#28c"/>'
 
 

@@ -33,6 +33,9 @@ FLATNESS_FLOOR = 1 / 20_000
 # of the size of the drawing: vertices nearer their chord than this are dropped
 COLLINEAR_TOLERANCE = 1e-6
 WHOLE, ALL_BUT = 0.999, 0.95  # shares of the page that a background covers: one shape, several
+DISC_DIGITS = 0.01  # of its box: how nearly a disc has the area of one
+BADGE_DRAWN = 0.5  # of a disc's width or height: more than an eye or a spot on it has
+MOSTLY_HOLE = 0.1  # of what fills the page: what is cut out of it is larger
 MOST_STRIPS = 500  # rectangles that a background is made of, as strips or a chequerboard
 
 
@@ -115,8 +118,18 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
     notes += carded
     seen, decided = overlay(shown, paper)
     colours = {layer.brush.colour for layer in shown if layer.brush.opacity >= FAINT}
-    if len(colours) > 1 and solid(seen) >= ALL_BUT * _page(layers, drawing).area:
-        notes.append("the silhouette is all but the whole page; if that is a background, delete it")
+    whole = solid(seen)
+    if whole >= ALL_BUT * _page(layers, drawing).area:
+        if len(colours) > 1:
+            note = "the silhouette is all but the whole page; if that is a background, delete it"
+            notes.append(note)
+        elif seen.area < (1 - MOSTLY_HOLE) * whole:
+            note = "the silhouette is all but the whole page; if the hole in it is the shape, fill that"
+            notes.append(note)
+    elif _is_badge(seen, shown):
+        notes.append(
+            "the silhouette is a disc with a drawing on it; if it is a background, delete it"
+        )
     cut = regions.beyond / (regions.beyond + sum(layer.region.area for layer in shown))
     if cut > NOTEWORTHY:
         notes.append(f"left out what lies beyond the page: {percent(cut)} of what is painted")
@@ -205,6 +218,25 @@ def _card(layers: list[list[Layer]], grounds: set[int], drawing: Drawing) -> int
     largest = outer_outline(drawn)[0]
     is_drawing = (_sides(largest) > LEAST_DRAWN * _sides(region)).all()
     return rest[0] if is_drawing and not _is_rectangle(largest) else None
+
+
+def _is_badge(seen: BaseGeometry, layers: list[Layer]) -> bool:
+    """Return whether what is seen is a disc in one colour with a drawing of another on it."""
+    whole = outer_outline(seen)[0]
+    gap = DISC_DIGITS * whole.envelope.area
+    if abs(whole.area - np.pi / 4 * whole.envelope.area) > gap:
+        return False
+    disc = max(layers, key=lambda layer: layer.region.area)
+    on_it = [
+        layer.region
+        for layer in layers
+        if layer.brush.opacity >= FAINT and not alike(layer.brush.colour, disc.brush.colour)
+    ]
+    is_round = whole.convex_hull.area - whole.area < gap and disc.region.area > whole.area - gap
+    if not on_it or not is_round:
+        return False
+    shares = _sides(outer_outline(shapely.union_all(on_it))[0]) / _sides(whole)
+    return bool(shares.min() > LEAST_DRAWN and shares.max() > BADGE_DRAWN)
 
 
 def _is_rectangle(region: BaseGeometry) -> bool:
