@@ -72,6 +72,39 @@ def test_every_short_symbol_is_of_its_number() -> None:
         assert found.number == row.number
 
 
+FULL = (
+    """
+P 2/m 2/m 2/m; P 2/n 2/n 2/n; P 2/c 2/c 2/m; P 2/b 2/a 2/n; P 21/m 2/m 2/a; P 2/n 21/n 2/a
+P 2/m 2/n 21/a; P 21/c 2/c 2/a; P 21/b 21/a 2/m; P 21/c 21/c 2/n; P 2/b 21/c 21/m; P 21/n 21/n 2/m
+P 21/m 21/m 2/n; P 21/b 2/c 21/n; P 21/b 21/c 21/a; P 21/n 21/m 21/a; C 2/m 2/c 21/m; C 2/m 2/c 21/a
+C 2/m 2/m 2/m; C 2/c 2/c 2/m; C 2/m 2/m 2/a; C 2/c 2/c 2/a; F 2/m 2/m 2/m; F 2/d 2/d 2/d
+I 2/m 2/m 2/m; I 2/b 2/a 2/m; I 21/b 21/c 21/a; I 21/m 21/m 21/a; P 4/m 2/m 2/m; P 4/m 2/c 2/c
+P 4/n 2/b 2/m; P 4/n 2/n 2/c; P 4/m 21/b 2/m; P 4/m 21/n 2/c; P 4/n 21/m 2/m; P 4/n 21/c 2/c
+P 42/m 2/m 2/c; P 42/m 2/c 2/m; P 42/n 2/b 2/c; P 42/n 2/n 2/m; P 42/m 21/b 2/c; P 42/m 21/n 2/m
+P 42/n 21/m 2/c; P 42/n 21/c 2/m; I 4/m 2/m 2/m; I 4/m 2/c 2/m; I 41/a 2/m 2/d; I 41/a 2/c 2/d
+P -3 1 2/m; P -3 1 2/c; P -3 2/m 1; P -3 2/c 1; R -3 2/m; R -3 2/c; P 6/m 2/m 2/m; P 6/m 2/c 2/c
+P 63/m 2/c 2/m; P 63/m 2/m 2/c; P 2/m -3; P 2/n -3; F 2/m -3; F 2/d -3; I 2/m -3; P 21/a -3
+I 21/a -3; P 4/m -3 2/m; P 4/n -3 2/n; P 42/m -3 2/n; P 42/n -3 2/m; F 4/m -3 2/m; F 4/m -3 2/c
+F 41/d -3 2/m; F 41/d -3 2/c; I 4/m -3 2/m; I 41/a -3 2/d
+""".replace("\n", ";")
+    .strip(";")
+    .split(";")
+)
+"""The full symbols in International Tables A that are none of the short ones, by their numbers."""
+
+ABBREVIATED = [*range(47, 75), *range(123, 143), *range(162, 168), *range(191, 195)]
+ABBREVIATED += [*range(200, 207), *range(221, 231)]
+
+
+@pytest.mark.parametrize("typesetting", TYPESETTING)
+def test_every_full_symbol_is_of_its_number(typesetting: str) -> None:
+    for number, symbol in zip(ABBREVIATED, FULL, strict=True):
+        for blanks in BLANKS.values():
+            found = find_setting(gemmi, blanks(TYPESETTING[typesetting](symbol.strip())))
+            assert found is not None, symbol
+            assert found.number == number, symbol
+
+
 @settings(max_examples=8)
 @given(st.integers(1, 230))
 def test_numbers(number: int) -> None:
@@ -107,6 +140,19 @@ KNOWN = {
     "I2_1": "I 1 21 1",
     "B2_1": "B 1 21 1",
     "B 2": "B 1 1 2",
+    "P_21/c": "P 1 21/c 1",
+    "P_1_21/c_1": "P 1 21/c 1",
+    "P_21": "P 1 21 1",
+    "P_n_m_a": "P n m a",
+    "I_41/a_m_d:2": "I 41/a m d:2",
+    "P 2_1/n 2_1/m 2_1/a": "P n m a",
+    "P2_1/n2_1/m2_1/a": "P n m a",
+    "P21/m21/n21/b": "P m n b",
+    "C 2/m 2/c 2_1/e": "C m c a",
+    "P_2/m_2/m_2/m": "P m m m",
+    r"$F\,4_1/d\,\bar{3}\,2/m$": "F d -3 m:1",
+    "F 41/d -3 2/m :2": "F d -3 m:2",
+    "R -3 2/c:R": "R -3 c:R",
 }
 
 
@@ -125,7 +171,13 @@ def test_names_that_people_write(name: str, setting: str) -> None:
             "P 3_2 1",
             "P3_21",
             "P 2_1 2_1 2 1",
-            "P_21",
+            "P_3_21",
+            "P_2_1/c",
+            "P 2/n 2/m 2/a",  # an axis that is none of P n m a
+            "P 21/n m a",
+            "P 42/m 2/m 2/m",
+            "P 3/m 2/m 2/m",
+            "P 2/m -3 2/m",
             "P2_7",
             "P2/_c",
             "P21/c/c",

@@ -30,6 +30,7 @@ from orbiflow.symmetry import (
     translation,
 )
 from orbiflow.symmetry.group import generated
+from orbiflow.symmetry.group_types import element_counts
 
 SETTINGS = {row.xhm(): row for row in gemmi.spacegroup_table()}
 
@@ -313,6 +314,25 @@ CONTRADICTIONS = [
     (MONOCLINIC, FOUR.replace("-z+1/2", "-z+1/3"), {"hm": "P 21/c"}, "imply 6 trans"),
     (MONOCLINIC, "x,y,z;-x,y+.49,-z", {"number": 4}, "imply 50 trans"),
     (CORE, "x,y,z;-y,x-y,z+0.3;-x+y,-x,z+0.7", {"hm": "P 31"}, "imply 10 trans"),
+    # the enantiomorph, about an origin of no table; others whose elements are alike
+    (
+        CORE,
+        "x,y,z;-y,x-y+1/5,z+2/3;-x+y-1/5,-x,z+1/3",
+        {"hm": "P 31"},
+        "number 145, of order 3, than",
+    ),
+    (
+        CORE,
+        "x,y,z;-y+.3,x-y,z+2/3;-x+y+.3,-x+.3,z+1/3",
+        {"number": 144},
+        "number 145, of order 3, than",
+    ),
+    (
+        MONOCLINIC,
+        "x,y,z;-x+1/5,y,-z;x+1/2,y+1/2,z;-x+7/10,y+1/2,-z",
+        {"number": 4},
+        "number 5, of order 2, than",
+    ),
     # numbers of no group; settings of one type that differ
     (MONOCLINIC, "", {"hm": "P 21/c", "number": 999}, "'999' is no number of a group"),
     (MONOCLINIC, FOUR, {"number": 231}, "'231' is no number of a group"),
@@ -340,6 +360,37 @@ def test_groups_in_settings_of_no_table_agree_with_their_numbers(tmp_path_factor
     path = tmp_path_factory.mktemp("cif") / "group.cif"
     path.write_text(cif_text(moved) + f"_space_group_IT_number {SETTINGS[name].number}\n")
     assert group_from_cif(path).order == group.order
+
+
+ENANTIOMORPHS = [
+    *((76, 78), (91, 95), (92, 96), (144, 145), (151, 153), (152, 154)),
+    *((169, 170), (171, 172), (178, 179), (180, 181), (212, 213)),
+]
+
+
+@pytest.mark.parametrize("shift", [(0.0, 0.0, 0.0), (0.2, 0.1, 0.3), (0.125, 0.0, 0.0)])
+@pytest.mark.parametrize(("number", "other"), [*ENANTIOMORPHS, (23, 24), (197, 199), (149, 150)])
+def test_types_whose_elements_are_alike_are_told_apart(tmp_path, number, other, shift):
+    lengths = (1, 1.2, 1.7) if number < 25 else (1, 1, 1 if number > 194 else 1.3)
+    cell = cell_lattice((*lengths, 90, 90, 120 if 142 < number < 195 else 90))
+    group, move = space_group(number, cell), translation(cell @ np.array(shift))
+    moved = generated(group.lattice, [move @ own @ move.inverse() for own in group.cosets])
+    text = cif_text(moved, cell)
+    path = tmp_path / "group.cif"
+    path.write_text(f"{text}_space_group_IT_number {number}\n")
+    assert group_from_cif(path).order == group.order
+    path.write_text(f"{text}_space_group_IT_number {other}\n")
+    with pytest.raises(InputFileError, match="it contradicts itself"):
+        group_from_cif(path)
+
+
+@pytest.mark.parametrize(("number", "other"), ENANTIOMORPHS)
+def test_enantiomorphs_differ_along_any_axes(number, other):
+    own, its = (element_counts(space_group(n)) for n in (number, other))
+    assert own != its
+    for row in SETTINGS.values():
+        if row.number == number:
+            assert element_counts(space_group(f"Hall: {row.hall}")) == own
 
 
 def test_rhombohedral_axes_and_unknown_names_are_named_after_what_was_read(tmp_path):

@@ -4,6 +4,7 @@ import html
 import re
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import product
 from typing import Any, NamedTuple
 
 MAX_LENGTH = 200
@@ -33,6 +34,9 @@ _TYPESETTING: tuple[tuple[str, str], ...] = (
     (r"(?<=\d)\s*[(\[](\d)[)\]]", r"_\1"),
 )
 _EXTENSION = re.compile(r"\s*:\s*([12HRSZ]|-?[abc][a-c1-6-]*)$|\s+([HRSZ])$", re.IGNORECASE)
+_ABBREVIATED = {"mmm", "4/mmm", "-3m", "6/mmm", "m-3", "m-3m"}
+"""Point groups whose short symbols leave out the axes across their mirrors."""
+
 _ORIGINS = {"S": "1", "Z": "2"}  # as the ICSD writes them
 _AFTER_2002 = {
     **{"A e m 2": "A b m 2", "A e a 2": "A b a 2"},
@@ -63,7 +67,8 @@ def plain(name: str) -> str:
 def find_setting(gemmi: Any, name: str) -> Any | None:
     """Return the row of gemmi's table that a Hermann-Mauguin symbol names, or None.
 
-    Blanks may be left out, or stand between the symbol's parts; letters may be large or small.
+    It may be short or full ("P n m a", "P 21/n 21/m 21/a"). Blanks may be left out, or stand between
+    the symbol's parts; letters may be large or small.
     """
     text = plain(name)
     exact = next((row for row in gemmi.spacegroup_table() if row.xhm() == text), None)
@@ -75,6 +80,8 @@ def find_setting(gemmi: Any, name: str) -> Any | None:
 def settings_named(gemmi: Any, name: str) -> list[Any]:
     """Return all rows that a symbol names, those in International Tables if any are: see above."""
     text, extension = _without_extension(plain(name))
+    if re.match(r"[A-Za-z]_", text):  # "P_21/c": no axis has a subscript there, so they are blanks
+        text = text.replace("_", " ")
     written = [part.lower() for part in re.findall(r"^[A-Za-z]|[^ ]+", text)]
     if not text or not re.fullmatch(r"[A-Za-z][-_/ A-Za-z0-9]*", text):
         return []
@@ -153,23 +160,69 @@ def _symbols(gemmi: Any) -> dict[str, list[_Symbol]]:
     """Return all symbols by their letters without blanks, in small letters."""
     table: dict[str, list[_Symbol]] = {}
     for number, row in enumerate(gemmi.spacegroup_table()):
-        for parts in _ways(row.hm, row.ext == "H"):
+        for parts in _ways(row):
             lower = tuple(part.lower() for part in parts)
             table.setdefault("".join(lower), []).append(_Symbol(lower, number < USUAL, row))
     return table
 
 
-def _ways(symbol: str, is_hexagonal: bool) -> list[list[str]]:
-    """Return the parts of a symbol as it is listed, and of other ways to write it."""
-    parts = symbol.split()
+def _ways(row: Any) -> list[list[str]]:
+    """Return the parts of a setting's symbol as it is listed, and of other ways to write it."""
+    parts: list[str] = row.hm.split()
     if not all(re.fullmatch(r"[A-Z]|-?[1-6]{1,2}(/[a-enm])?|[a-enm]", part) for part in parts):
         return []  # a few of gemmi's own, such as "P 21212(a)"
-    ways = [parts]
+    ways = [parts, *(new.split() for new, old in _AFTER_2002.items() if old == row.hm)]
     if len(parts) == 4 and parts[1:].count("1") == 2:  # monoclinic
         ways.append([parts[0], *(part for part in parts[1:] if part != "1")])
-    ways += [new.split() for new, old in _AFTER_2002.items() if old == symbol]
+    if row.point_group_hm() in _ABBREVIATED:
+        ways += [full for way in tuple(ways) for full in _full_symbols(row, way)]
     if len(parts) > 2 and parts[2] == "-3":  # cubic, before the bar was written
-        ways.append([*parts[:2], "3", *parts[3:]])
-    if is_hexagonal:  # as the PDB writes them
-        ways.append(["H", *parts[1:]])
+        ways += [[*way[:2], "3", *way[3:]] for way in tuple(ways)]
+    if row.ext == "H":  # as the PDB writes them
+        ways += [["H", *way[1:]] for way in tuple(ways)]
     return ways
+
+
+def _full_symbols(row: Any, parts: Sequence[str]) -> list[list[str]]:
+    """Return the parts of a short symbol with an axis before each mirror: "P 2/m 2/m 2/m" of P m m m.
+
+    Where a centred cell has two sorts of axes along one direction, either may be named.
+    """
+    point_group: str = row.point_group_hm()
+    directions: dict[int, int] = {}  # edges of the cell, by the place in the symbol
+    if point_group == "mmm":
+        directions = {1: 0, 2: 1, 3: 2}
+    elif point_group == "4/mmm":
+        directions = {2: 0}
+    elif point_group in ("m-3", "m-3m"):
+        directions = {1: 2}
+    fold = 4 if point_group == "m-3m" else 2
+    choices = [
+        [part]
+        if not re.fullmatch("[a-enm]", part)
+        else [f"{axis}/{part}" for axis in _axes(row, directions[at], fold)]
+        if at in directions
+        else [f"2/{part}"]
+        for at, part in enumerate(parts)
+    ]
+    return [list(full) for full in product(*choices)]
+
+
+def _axes(row: Any, edge: int, fold: int) -> list[str]:
+    """Return the rotation and screw axes of 2 or 4 that are along an edge of the cell."""
+    operations = row.operations()
+    unit = operations.sym_ops[0].DEN
+    trace = {2: -1, 4: 1}[fold]
+    turns = [
+        op
+        for op in operations.sym_ops
+        if op.det_rot() > 0
+        and op.rot[edge][edge] == unit
+        and sum(op.rot[k][k] for k in range(3)) == trace * unit
+    ]
+    shifts = {
+        (op.tran[edge] + centring[edge]) * fold // unit % fold
+        for op in turns
+        for centring in operations.cen_ops
+    }
+    return [f"{fold}{shift or ''}" for shift in sorted(shifts)]

@@ -2,7 +2,6 @@
 
 import importlib
 import re
-from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from orbiflow.errors import (
 from orbiflow.symmetry.cells import cell_lattice, cell_parameters, fitting_cell
 from orbiflow.symmetry.group import CrystallographicGroup, checked_lattice
 from orbiflow.symmetry.group_symbols import find_hall, find_setting, settings_named
+from orbiflow.symmetry.group_types import element_counts, number_about_any_origin
 from orbiflow.symmetry.triplets import group_from_operators, operators, parse_operator
 
 MAX_CIF_BYTES = 64 * 2**20
@@ -197,8 +197,9 @@ def _check_type(
 ) -> None:
     """Raise `GroupError` where operators in a setting that no table has are not of a named type.
 
-    Compared are the rotations and screws, reflections and glides, by their counts; and that the
-    operators imply no translations but those listed or of the names' own centring.
+    They are compared about every origin; along axes that no table has, only the rotations and screws,
+    reflections and glides, by their counts. The operators may imply no translations but those listed
+    or of the names' own centring.
     """
     known = [row for rows in settings.values() for row in rows]
     most = max((len(row.operations().cen_ops) for row in known), default=np.inf)
@@ -210,30 +211,19 @@ def _check_type(
             f"it contradicts itself: its operators imply {implied} translations within its cell and "
             f"its name {most:.0f}; one of them may be mistyped, or rounded too coarsely"
         )
-    own = _element_counts(group)
+    number = number_about_any_origin(_gemmi(), group, basis)
+    own = element_counts(group) if number is None else None
+    named = "" if number is None else f"number {number}, "
     for what, rows in settings.items():
-        if own != _element_counts(space_group(f"Hall: {rows[0].hall}")):
+        if number is None:
+            agrees = own == element_counts(space_group(f"Hall: {rows[0].hall}"))
+        else:
+            agrees = number in {row.number for row in rows}
+        if not agrees:
             raise GroupError(
                 f"it contradicts itself: its {len(listed)} operators are of another type of group, "
-                f"of order {group.order}, than {what}; correct it, or remove what is wrong"
+                f"{named}of order {group.order}, than {what}; correct it, or remove what is wrong"
             )
-
-
-def _element_counts(group: CrystallographicGroup) -> Counter[tuple[int, int, int]]:
-    """Return how many cosets have a determinant, a trace, and a screw or glide of an order.
-
-    The order is how often the element is repeated until it equals one without a shift along itself.
-    All three are the same in every basis and for every origin.
-    """
-    counts: Counter[tuple[int, int, int]] = Counter()
-    shifts = group.translations @ group.inverse_lattice.T
-    nearby = np.stack(np.meshgrid(*[np.arange(-3, 4)] * 3), axis=-1).reshape(-1, 3)
-    for linear, shift in zip(group.integral_parts, shifts, strict=True):
-        along = np.mean([np.linalg.matrix_power(linear, k) for k in range(12)], axis=0)
-        apart = [abs((nearby - n * shift % 1) @ along.T).max(axis=1).min() for n in range(1, 7)]
-        orders = (n for n, distance in enumerate(apart, start=1) if distance < 1e-6)
-        counts[round(np.linalg.det(linear)), round(np.trace(linear)), next(orders, 0)] += 1
-    return counts
 
 
 def _row_of(triplets: list[str]) -> Any | None:

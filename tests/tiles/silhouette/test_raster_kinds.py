@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 
 from orbiflow.errors import InputFileError
-from orbiflow.tiles import FileContent, Reading, Target, iou, read_outline
+from orbiflow.tiles import FileContent, Reading, Target, iou, read_outline, signed_area
+from orbiflow.tiles.silhouette.readers.frames import CARD_NOTE
 from png_files import COLOUR, PALETTE, png, saved
 
 # An L whose long arm points down and whose foot points right, in pixels.
@@ -286,14 +287,48 @@ def test_a_frame_around_nothing_is_the_shape() -> None:
     assert any("middle of its line" in note for note in reading.notes)
 
 
-@pytest.mark.parametrize("corner", [0, 9])
-def test_what_is_drawn_on_a_white_card_is_taken(corner: int) -> None:
-    card = Image.new("L", (110, 110))
-    ImageDraw.Draw(card).rounded_rectangle((4, 4, 105, 105), corner, 255)
-    levels = np.pad(of_inside(0, 255), 5, constant_values=255).astype(np.uint8)
-    image = Image.fromarray(np.dstack([levels] * 3 + [np.asarray(card)]))
-    reading = read(saved(image))
-    assert iou(reading.outline, SHAPE + 5) > 0.995
-    assert "the opaque part is a white card: took what is drawn on it" in reading.notes
-    photo = np.dstack([levels // 2 + 20] * 3 + [np.asarray(card)])  # grey: the card is the shape
-    assert OPAQUE in read(saved(Image.fromarray(photo))).notes
+CARDS = {"white": (255,) * 3, "blue": (40, 90, 200), "black": (0,) * 3, "yellow": (250, 210, 40)}
+
+
+def on_card(card: str, corner: int, drawn: Any) -> tuple[Any, Any]:
+    """Return a card of 102 pixels with something drawn on it (H, W, 3), and where it is, of 110."""
+    where = Image.new("L", (110, 110))
+    ImageDraw.Draw(where).rounded_rectangle((4, 4, 105, 105), corner, 255)
+    ink = (255,) * 3 if card in ("blue", "black") else (0, 0, 60)
+    shape = np.pad(np.asarray(drawn), 5)[..., None] > 0
+    return np.where(shape, ink, CARDS[card]).astype(np.uint8), np.asarray(where)
+
+
+@pytest.mark.parametrize("corner", [0, 20])
+@pytest.mark.parametrize("card", CARDS)
+def test_what_is_drawn_on_a_card_is_taken(card: str, corner: int) -> None:
+    pixels, where = on_card(card, corner, of_inside(1, 0))
+    cut_out = read(saved(Image.fromarray(np.dstack([pixels, where]))))
+    assert iou(cut_out.outline, SHAPE + 5) > 0.995
+    assert CARD_NOTE in cut_out.notes
+    paper = (120, 160, 130) if card in ("white", "yellow") else (250,) * 3
+    opaque = np.where(where[..., None] > 0, pixels, np.uint8(paper))
+    for mode in ("RGB", "L"):
+        reading = read(saved(Image.fromarray(opaque.astype(np.uint8)).convert(mode)))
+        assert iou(reading.outline, SHAPE + 5) > 0.99
+        assert CARD_NOTE in reading.notes
+
+
+@pytest.mark.parametrize("name", ["nothing", "specks", "a screen", "a photograph", "small"])
+def test_what_is_no_card_is_the_shape(name: str) -> None:
+    drawn = np.zeros((100, 100), int)
+    if name == "specks":  # as on dice
+        drawn[20:35, 20:35] = drawn[65:80, 65:80] = 1
+    elif name == "a screen":
+        drawn[15:85, 15:85] = 1
+    elif name != "nothing":
+        drawn = of_inside(1, 0)
+    pixels, where = on_card("blue", 9, drawn)
+    if name == "a photograph":
+        pixels = np.random.default_rng(0).integers(0, 255, pixels.shape).astype(np.uint8)
+    if name == "small":
+        pixels, where = (np.pad(a, [(0, 30), (0, 30), (0, 0)][: a.ndim]) for a in (pixels, where))
+    reading = read(saved(Image.fromarray(np.dstack([pixels, where]))))
+    assert CARD_NOTE not in reading.notes
+    assert OPAQUE in reading.notes
+    assert abs(signed_area(reading.outline)) == pytest.approx(102**2, rel=0.02)

@@ -278,6 +278,95 @@ def test_what_counts_as_shape(body: str, area: float, note: str) -> None:
     assert any(note in said for said in reading.notes) or not note
 
 
+def test_a_page_with_a_hole_is_the_shape_and_said() -> None:
+    note = "the silhouette is all but the whole page; if the hole in it is the shape, fill that"
+    for hole, is_said in ((FISH.split('"')[1], True), ("M40 40H50V50H40z", False)):
+        reading = read(f'<path fill-rule="evenodd" d="M0 0H100V100H0z{hole}"/>')
+        assert (note in reading.notes) is is_said
+        assert shapely.Polygon(reading.outline).area == pytest.approx(1e4)
+
+
+INNER = FISH + ' transform="translate(18 18) scale(.65)" fill="{}"/>'
+
+
+@pytest.mark.parametrize(
+    ("drawn", "is_said"),
+    [
+        (INNER.format("#fd0"), True),
+        (INNER.format("#fff"), True),
+        (INNER.format("#028"), False),
+        ('<circle cx="40" cy="40" r="6" fill="#fd0"/>', False),
+        ("", False),
+    ],
+)
+def test_a_badge_is_the_shape_and_said(drawn: str, is_said: bool) -> None:
+    reading = read('<circle cx="50" cy="50" r="48" fill="#028"/>' + drawn)
+    assert any("disc with a drawing" in note for note in reading.notes) is is_said
+    assert shapely.Polygon(reading.outline).area == pytest.approx(np.pi * 48**2, rel=3e-3)
+
+
+CARD = '<rect x="{0}" y="{0}" width="{1}" height="{1}" rx="{2}" fill="#28c"/>'
+
+
+@pytest.mark.parametrize("drawn", ["#fff", "#000", "#e33"])
+@pytest.mark.parametrize(("at", "corner"), [(0, 0), (0, 22), (3, 0), (5, 15), (-5, 0)])
+def test_a_card_of_any_colour_is_left_out(at: int, corner: int, drawn: str) -> None:
+    card = CARD.format(at, 100 - 2 * at, corner)
+    reading = read(card + FISH + f' fill="{drawn}"/><circle cx="30" cy="45" r="3" fill="#28c"/>')
+    alone = read(FISH + "/>")
+    area = shapely.Polygon(alone.outline).area
+    assert shapely.Polygon(reading.outline).area == pytest.approx(area, rel=1e-6)
+    assert any("card" in note or "background" in note for note in reading.notes)
+
+
+@pytest.mark.parametrize(
+    "drawn",
+    [
+        "",
+        '<circle cx="30" cy="30" r="9" fill="#fff"/><circle cx="70" cy="70" r="9" fill="#fff"/>',
+        '<rect x="15" y="15" width="70" height="60" fill="#fff"/>',
+        '<path d="M50 50V0H60V50z" fill="#222"/>' + FISH + ' fill="#fff"/>',
+        FISH + ' fill="#28c"/>',
+    ],
+)
+def test_what_is_no_card_is_the_shape(drawn: str) -> None:
+    reading = read(CARD.format(5, 90, 9) + drawn)
+    assert shapely.Polygon(reading.outline).area == pytest.approx(90**2, rel=0.03)
+    assert not any("card" in note for note in reading.notes)
+
+
+ROUND = '<circle cx="{}" cy="50" r="30" {}/>'
+WHITE = '<rect width="100" height="100" fill="#fff"/>'
+TWO = ROUND.format(40, 'opacity=".3"') + ROUND.format(50, 'opacity=".3"')
+IN_GROUP = ROUND.format(40, "") + ROUND.format(60, "")
+FAINT = {
+    "two that are seen where they overlap": TWO,
+    "three": ROUND.format(30, 'fill-opacity=".3"') + TWO,
+    "colours": TWO.replace("/>", ' fill="#100"/>', 1),
+    "a group is one": f'<g opacity=".3">{IN_GROUP}</g>' + ROUND.format(50, 'opacity=".3"'),
+    "groups in a group": f'<g opacity=".9"><g opacity=".4">{IN_GROUP}</g>{TWO}</g>',
+    "a half-transparent group": '<g opacity=".6">' + TWO.replace(".3", ".45") + f"</g>{TWO}",
+    "what is hidden between": f'{TWO}<rect width="50" height="100" fill="#fff"/>{TWO}',
+    "fill and stroke are one": f'<g stroke="#000" stroke-width="9" opacity=".4">{TWO}</g>{TWO}',
+    "beside an opaque one": f'<rect x="45" y="5" width="9" height="60"/>{TWO}',
+}
+
+
+@pytest.mark.parametrize("name", FAINT)
+def test_faint_shapes_are_seen_where_they_lie_on_one_another(name: str) -> None:
+    body = f"{WHITE}{FAINT[name]}"
+    assert agreement(f'{SVG} viewBox="0 0 100 100">{body}</svg>') > 0.98
+    assert not any("took faint" in note for note in read(body).notes)
+
+
+def test_faint_shapes_that_hardly_overlap_are_left_out_or_all_of_the_drawing() -> None:
+    apart = ROUND.format(21, 'opacity=".3"') + ROUND.format(79, 'opacity=".3"')
+    assert "took faint shapes, as there are no others" in read(apart).notes
+    reading = read(DISC.format("") + '<rect x="2" width="9" height="9" opacity=".3"/>' + apart)
+    assert any("left out 3 faint shapes" in note for note in reading.notes)
+    assert shapely.Polygon(reading.outline).area == pytest.approx(np.pi * 900, rel=3e-3)
+
+
 def zigzag(count: int, step: float) -> str:
     steps = np.random.default_rng(0).normal(0, step, (count, 2)).round(2).tolist()
     return "M50 50l" + " ".join(f"{x},{y}" for x, y in steps)

@@ -16,6 +16,7 @@ from orbiflow.tiles.exporting.placing import inset
 from orbiflow.tiles.exporting.skeletons import joined, shared_edges
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.scene import Box, Curve, Layer, Scene, rectangle
+from orbiflow.tiles.silhouette import DISC_OVERREACH, opened
 from orbiflow.tiles.tilings import copies_meeting
 
 LEAST_SHARE = 1 / 3  # the least area of a piece at the border, in tiles
@@ -73,7 +74,7 @@ def _chords(
     """Yield the lines that divide a face where it is a thin strip along the border."""
     if not face.intersects(border.buffer(GRID)):
         return
-    core = face.buffer(-width / 2).buffer(width / 2 * 1.01, quad_segs=16)
+    core = opened(face, width, DISC_OVERREACH)
     around, beside = face.exterior.buffer(10 * GRID), face.buffer(10 * GRID)
     for strip in polygons_in(face.difference(core)):
         if strip.exterior.intersection(border.buffer(GRID)).length < LEAST_STRIP * width:

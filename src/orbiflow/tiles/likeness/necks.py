@@ -23,6 +23,7 @@ from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array, Integers
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import arc_lengths, orient, polygons_in, ring_length
+from orbiflow.tiles.silhouette import DISC_OVERREACH, opened
 
 # the least length of the outline beyond a neck, in its widths: 1 / sin(11.5 degrees)
 OUTLINE_PER_WIDTH = 5.0
@@ -35,8 +36,6 @@ SIMPLIFICATION = 0.003
 SOUND_NECK_WIDTH = 0.05  # width, in square roots of the area, above which no neck looks cut through
 # the distance of points on the outline, in square roots of the area: the error for tapering parts
 POINT_SPACING = 0.0125
-QUARTER_SEGMENTS = 16  # the number of sides of a quarter of a disc
-DISC_OVERREACH = 0.005  # what discs of `QUARTER_SEGMENTS` reach beyond themselves, in radii
 
 
 class Thinnest(NamedTuple):
@@ -262,10 +261,9 @@ def _thin_share(
     polygon: shapely.Polygon, region: shapely.geometry.base.BaseGeometry, width: float
 ) -> float:
     """Return the share of the polygon's outline on parts of the region that no disc in it covers."""
-    eroded = region.buffer(-width / 2, quad_segs=QUARTER_SEGMENTS)
-    opened = eroded.buffer(width / 2 * (1 + DISC_OVERREACH), quad_segs=QUARTER_SEGMENTS)
-    parts = polygons_in(region.difference(opened))
-    lines = shapely.get_parts(polygon.exterior.difference(opened))
+    covered = opened(region, width, DISC_OVERREACH)
+    parts = polygons_in(region.difference(covered))
+    lines = shapely.get_parts(polygon.exterior.difference(covered))
     lengths = shapely.length(lines)
     lines, lengths = lines[lengths > 0], lengths[lengths > 0]
     if not parts or not len(lines):

@@ -9,7 +9,9 @@ from .mesh import Mesh as Mesh
 from .mesh import harmonic as harmonic
 from .mesh import local_thickness as local_thickness
 from .mesh import triangulate as triangulate
+from .outlines import DISC_OVERREACH as DISC_OVERREACH
 from .outlines import Samples as Samples
+from .outlines import opened as opened
 from .outlines import sampled as sampled
 from .pins import Pins as Pins
 from .readers.files import read_outline as read_outline
@@ -19,7 +21,6 @@ from .readers.reading import FileContent as FileContent
 from .readers.reading import Reading as Reading
 from .readers.reading import check_file as check_file
 from .readers.reading import read_head as read_head
-from .readers.svg_colours import lightness as lightness
 from .readers.svg_drawing import Drawing as Drawing
 from .readers.svg_paths import SubPath as SubPath
 from .readers.svg_paths import TooManyPoints as TooManyPoints
@@ -28,6 +29,7 @@ from .readers.svg_paths import fill as fill
 from .readers.svg_regions import Regions as Regions
 from .readers.svg_regions import paints as paints
 from .readers.svg_shapes import DrawnShape as DrawnShape
+from .readers.svg_values import lightness as lightness
 from .settings import ReadingSettings as ReadingSettings
 from .soft_target import SoftTarget as SoftTarget
 from .soft_target import signed_distance as signed_distance

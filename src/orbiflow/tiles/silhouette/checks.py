@@ -6,7 +6,7 @@ import numpy as np
 from shapely import Polygon
 
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette.outlines import THREAD, is_thread, percent
+from orbiflow.tiles.silhouette.outlines import THREAD, is_thread, opened, percent
 from orbiflow.tiles.silhouette.target import Target
 
 MOST_LEFT_OUT = 0.02  # of what was seen
@@ -98,4 +98,4 @@ def _hopeless(target: Target) -> list[str]:
 
 def _thin_share(shape: Polygon, width: float) -> float:
     """Return about which share of the outline is of parts thinner than a width."""
-    return 1 - shape.buffer(-width / 2).buffer(width / 2).length / shape.length
+    return 1 - opened(shape, width).length / shape.length

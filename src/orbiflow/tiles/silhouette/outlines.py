@@ -31,6 +31,7 @@ MIN_RELATIVE_AREA = 1e-9  # Relative to the square of the longer side of the bou
 THREAD = 0.06  # greatest width, of the length; animals have at least 0.14
 # Of the box's longer side: a polygon that is simple by less would cross itself when it is rescaled.
 CLEARANCE_DIGITS = 12
+DISC_OVERREACH = 1.005  # of the radius: without it, slivers are left along the outline
 _POSITION = re.compile(r"\[(\S+) (\S+)\]")
 
 
@@ -138,7 +139,7 @@ def is_thread(shape: Polygon, length: float) -> bool:
 def rounded(geometry: BaseGeometry, width: float) -> Polygon:
     """Return the largest part, filled, without gaps and then without limbs narrower than `width`."""
     solid = closed(geometry, width)
-    parts = polygons_in(solid.buffer(-width / 2).buffer(width / 2))
+    parts = polygons_in(opened(solid, width))
     return simplified(max(parts, key=lambda part: part.area, default=Polygon()), width / 50)
 
 
@@ -146,6 +147,15 @@ def closed(geometry: BaseGeometry, width: float) -> Polygon:
     """Return the largest part, filled, without gaps narrower than `width` (a morphological closing)."""
     parts = polygons_in(geometry.buffer(width / 2).buffer(-width / 2))
     return filled(max(parts, key=lambda part: filled(part).area, default=Polygon()))
+
+
+def opened(geometry: BaseGeometry, width: float, overreach: float = 1.0) -> BaseGeometry:
+    """Return all that discs of diameter `width` inside a geometry cover (a morphological opening).
+
+    Discs are polygons. An `overreach` of `DISC_OVERREACH` times their radius makes up for that, where
+    what they leave is looked at.
+    """
+    return geometry.buffer(-width / 2).buffer(width / 2 * overreach)
 
 
 def outer_ring(polygon: Polygon) -> Array:

@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arrays import Array
 from orbiflow.tiles.geometry import arc_lengths, polygons_in
-from orbiflow.tiles.silhouette.outlines import filled, simplified
+from orbiflow.tiles.silhouette.outlines import DISC_OVERREACH, filled, opened, simplified
 
 POINTS_PER_WIDTH = 16  # points on the outline for each width that is asked for
 MOST_POINTS = 12_000  # points on the outline, however long it is
@@ -27,9 +27,6 @@ MOST_POINTS = 12_000  # points on the outline, however long it is
 FACING_IN_PARTS, FACING_IN_GAPS = 1.7, 1.2
 # Between two sides of a gap the outline is so many times longer: where a leg begins is no gap
 OUTLINE_PER_GAP = 5.0
-DISC_OVERREACH = (
-    1.005  # of the radius: discs are polygons, which would leave slivers along the outline
-)
 OUTLINE_PER_WIDTH = 3.0  # the least length of the outline of a part that grows, in widths
 GAP_SHARE = 0.5  # of the width: the gaps that growing leaves, where there was as much
 # A ridge is of a tuft of hair if a wider place, by this factor, is nearer than its radius and a share
@@ -70,8 +67,7 @@ def thickened(shape: Polygon, width: float) -> Polygon:
 
 def _thin_parts(shape: Polygon, width: float) -> list[Polygon]:
     """Return the parts that no disc of a width inside the shape covers, but for mere corners."""
-    opened = shape.buffer(-width / 2).buffer(width / 2 * DISC_OVERREACH)
-    parts = polygons_in(shape.difference(opened))
+    parts = polygons_in(shape.difference(opened(shape, width, DISC_OVERREACH)))
     return [part for part in parts if part.length > OUTLINE_PER_WIDTH * width]
 
 

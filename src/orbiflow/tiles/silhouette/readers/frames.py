@@ -1,4 +1,4 @@
-"""What lies around a drawing and is no part of it: a frame of a thin line, a white card."""
+"""What lies around a drawing and is no part of it: a frame of a thin line, a card of one colour."""
 
 from collections.abc import Iterator
 
@@ -13,8 +13,11 @@ WIDEST = 0.03  # of the frame's shorter side: its line
 LEAST_SIDE = 0.5  # of the picture's: a frame's
 LEAST_DRAWN = 0.25  # of a frame's sides: what is drawn inside it
 CARD = 0.94  # of its box: what a card fills, round corners apart
-WHITE, BLACK = 0.9, 0.6  # luminances: a card is lighter than one, its drawing darker than the other
-MOST_BETWEEN = 0.05  # of a card's pixels: those between white and the drawing's tone
+CARD_SIDES = 0.85  # of the page's: a card's, which lies on another ground
+CARD_COLOURS, DRAWN_COLOURS = 25, 75  # of 255: a card's colours are nearer, its drawing's farther
+MOST_BETWEEN = 0.05  # of a card's pixels: those between its colour and the drawing's
+ENOUGH = 500  # pixels a side, in which a card is looked for
+CARD_NOTE = "left out the card that the drawing lies on; if it is the shape, remove what lies on it"
 _TOGETHER = np.ones((3, 3), dtype=int)
 _Mask = NDArray[np.bool_]
 
@@ -70,18 +73,74 @@ def _is_drawn_on(inside: _Mask) -> bool:
     return all(a > LEAST_DRAWN * b for a, b in zip(sides, inside.shape, strict=True))
 
 
-def is_card(image: Image.Image) -> bool:
-    """Whether the opaque part of an RGBA picture is a white rectangle with something dark on it."""
-    rgba = np.asarray(image)
-    opaque = rgba[..., 3] >= 128
+def without_card(image: Image.Image) -> Image.Image | None:
+    """Return a picture of the drawing alone that lies on a card, on a ground of its colour, or None.
+
+    A card is a rectangle, perhaps with round corners, of one colour, with a drawing of another on it.
+    It all but fills the picture, and around it the picture is transparent or of one colour.
+    """
+    if image.mode not in ("L", "RGB", "RGBA"):
+        return None
+    small = image.convert("RGBA").reduce(-(-max(image.size) // ENOUGH))
+    rgba = np.asarray(small)
+    rgb = rgba[..., :3].astype(int)
+    is_cut_out = rgba[..., 3].min() < 128
+    opaque = rgba[..., 3] >= 128 if is_cut_out else ~_margin(rgb)
+    colour = _card_colour(rgb, opaque)
+    is_margin = not is_cut_out and colour and abs(rgb[0, 0] - colour).max() <= CARD_COLOURS
+    if colour is None or is_margin:
+        return None
+    inside = Image.fromarray(ndimage.binary_erosion(opaque, iterations=2))  # without a blurred edge
+    ground = Image.new("RGB", image.size, colour)
+    ground.paste(image.convert("RGB"), mask=inside.resize(image.size, Image.Resampling.NEAREST))
+    return ground if image.mode != "L" else ground.convert("L")
+
+
+def _margin(rgb: NDArray[np.int_]) -> _Mask:
+    """Return what is joined to the border and has its usual colour (H, W); nothing, if it is thin."""
+    border = np.concatenate([rgb[0], rgb[-1], rgb[:, 0], rgb[:, -1]])
+    alike = abs(rgb - np.median(border, axis=0)).max(axis=2) <= CARD_COLOURS
+    labels = np.asarray(ndimage.label(alike)[0])
+    at_border = np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))
+    margin = np.isin(labels, at_border[at_border > 0])
+    width = int(WIDEST * min(margin.shape))
+    edges = (
+        margin[: width + 1],
+        margin[-width - 1 :],
+        margin[:, : width + 1],
+        margin[:, -width - 1 :],
+    )
+    return margin if all(edge.all() for edge in edges) else np.zeros_like(margin)
+
+
+def _card_colour(rgb: NDArray[np.int_], opaque: _Mask) -> tuple[int, ...] | None:
+    """Return the colour of the card that a part of a picture is, or None if it is none."""
     if opaque.all() or not opaque.any():
-        return False
+        return None
     box = ndimage.find_objects(opaque.astype(int))[0]
-    if opaque[box].mean() < CARD:
-        return False
-    grey = np.asarray(image.convert("RGB").convert("L"))[box] / 255
+    sides = zip(opaque[box].shape, opaque.shape, strict=True)
+    if opaque[box].mean() < CARD or any(a < CARD_SIDES * b for a, b in sides):
+        return None
     inside = ndimage.binary_erosion(opaque[box], iterations=2)
     rim = inside & ~ndimage.binary_erosion(inside, iterations=2)
-    light, dark = grey > WHITE, grey < BLACK
-    is_parted = (light | dark)[inside].mean() > 1 - MOST_BETWEEN
-    return bool(is_parted and light[rim].mean() > 0.9 and _is_drawn_on(dark & inside))
+    if not rim.any():
+        return None
+    colour = np.median(rgb[box][rim], axis=0).astype(int)
+    apart = abs(rgb - colour).max(axis=2)
+    alike, other = apart[box] <= CARD_COLOURS, apart[box] > DRAWN_COLOURS
+    is_parted = (alike | other)[inside].mean() > 1 - MOST_BETWEEN
+    if is_parted and alike[rim].mean() > 0.9 and is_drawing(other & inside):
+        return tuple(colour.tolist())
+    return None
+
+
+def is_drawing(drawn: _Mask) -> bool:
+    """Return whether the largest part of what is drawn on a card is neither a speck nor a rectangle."""
+    labels = np.asarray(ndimage.label(drawn, _TOGETHER)[0])
+    if not labels.any():
+        return False
+    largest = int(np.bincount(labels.ravel())[1:].argmax()) + 1
+    box = ndimage.find_objects(labels)[largest - 1]
+    part = np.asarray(ndimage.binary_fill_holes(labels[box] == largest))
+    sides = zip(part.shape, drawn.shape, strict=True)
+    return bool(all(a > LEAST_DRAWN * b for a, b in sides) and part.mean() < CARD)

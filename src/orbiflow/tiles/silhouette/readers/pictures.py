@@ -16,7 +16,7 @@ from skimage.filters import threshold_otsu
 from orbiflow.arguments import described, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.tiles.silhouette.readers.frames import is_card, without_frame
+from orbiflow.tiles.silhouette.readers.frames import CARD_NOTE, without_card, without_frame
 from orbiflow.tiles.silhouette.readers.image_files import MAX_PIXELS, check_size, decoded_image
 from orbiflow.tiles.silhouette.readers.label_masks import label_mask
 from orbiflow.tiles.silhouette.readers.outline_drawings import outline_drawing
@@ -61,9 +61,8 @@ def read_image(
     image, notes = found.image, [*found.notes]
     if _is_hardly_cut_out(image):
         image, notes = _on_white(image), [*notes, "took the few transparent pixels for white"]
-    elif image.mode == "RGBA" and threshold is None and invert is None and is_card(image):
-        note = "the opaque part is a white card: took what is drawn on it"
-        image, notes = _on_white(image), [*notes, note]
+    elif threshold is None and invert is None and (drawn := without_card(image)) is not None:
+        image, notes = drawn, [*notes, CARD_NOTE]
     band, name, band_notes = _channel(path, image)
     picture = None
     if threshold is None and name == "luminance":
@@ -135,7 +134,11 @@ def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, str, list[s
         return image.convert("RGB").convert("L"), "luminance", []
     if low < 128 <= high:
         return alpha, "alpha", []
-    return _on_white(image).convert("L"), "luminance", ["laid the half-transparent image on white"]
+    return (
+        _on_white(image).convert("L"),
+        "luminance",
+        ["laid the half-transparent image on white"],
+    )
 
 
 def _hidden(image: Image.Image) -> str:

@@ -9,7 +9,6 @@ from shapely.errors import GEOSException
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arrays import Array, Window
-from orbiflow.drawing import rgb
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.silhouette.outlines import (
@@ -21,26 +20,23 @@ from orbiflow.tiles.silhouette.outlines import (
     percent,
     simplified,
 )
+from orbiflow.tiles.silhouette.readers.frames import CARD, CARD_NOTE, CARD_SIDES, LEAST_DRAWN
 from orbiflow.tiles.silhouette.readers.reading import Reading, Source
-from orbiflow.tiles.silhouette.readers.svg_colours import Brush
 from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
+from orbiflow.tiles.silhouette.readers.svg_overlays import NOTEWORTHY, PLAIN, alike, overlay, solid
 from orbiflow.tiles.silhouette.readers.svg_paths import MAX_POINTS, TooManyPoints, TooTangled
-from orbiflow.tiles.silhouette.readers.svg_regions import FAINT, Layer, Regions, painted
+from orbiflow.tiles.silhouette.readers.svg_regions import FAINT, Layer, Regions
 
 # Flattening error, of the size of each shape, and its floor, of the size of the drawing.
 FLATNESS = 1 / 2000
 FLATNESS_FLOOR = 1 / 20_000
-OVERLAY_GRID = 1e-9  # of the size of the drawing: the grid that the united outline is snapped to
-OVERLAY_GRID_FLOOR = 1e-12  # of the largest coordinate
 # of the size of the drawing: vertices nearer their chord than this are dropped
 COLLINEAR_TOLERANCE = 1e-6
-PAPER = "#ffffff"  # what a drawing without a background lies on
-SAME_COLOUR = 10  # of 255: colours whose channels differ by no more are one
-COVERING = 0.9  # opacity: more hides what lies below
-MOSTLY, NOTEWORTHY, OVER = 0.5, 0.001, 0.1  # shares of areas
 WHOLE, ALL_BUT = 0.999, 0.95  # shares of the page that a background covers: one shape, several
+DISC_DIGITS = 0.01  # of its box: how nearly a disc has the area of one
+BADGE_DRAWN = 0.5  # of a disc's width or height: more than an eye or a spot on it has
+MOSTLY_HOLE = 0.1  # of what fills the page: what is cut out of it is larger
 MOST_STRIPS = 500  # rectangles that a background is made of, as strips or a chequerboard
-PLAIN = Brush("#000000", 1.0)
 
 
 def read_svg(path: Source) -> Reading:
@@ -110,16 +106,30 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
         notes = ["nothing is painted: took the closed paths as filled"]
     layers = [own for own in layers if own]
     paper, grounds = _background(layers, drawing)
+    n, card = len(grounds), _card(layers, grounds, drawing)
+    carded = [CARD_NOTE] * (card is not None)
+    if card is not None:
+        paper, grounds = layers[card][0].brush.colour, grounds | {card}
     shown = [layer for k, own in enumerate(layers) if k not in grounds for layer in own]
     if not shown:
         raise InputFileError(f"{drawing.path}: {_why_empty(drawing)}")
-    n = len(grounds)
     noun = "a background rectangle" if n == 1 else f"{n} background rectangles"
     notes += [f"left out {noun} that cover{'s' * (n == 1)} the whole drawing"] * (n > 0)
-    seen, decided = _overlay(shown, paper)
+    notes += carded
+    seen, decided = overlay(shown, paper)
     colours = {layer.brush.colour for layer in shown if layer.brush.opacity >= FAINT}
-    if len(colours) > 1 and _solid(seen) >= ALL_BUT * _page(layers, drawing).area:
-        notes.append("the silhouette is all but the whole page; if that is a background, delete it")
+    whole = solid(seen)
+    if whole >= ALL_BUT * _page(layers, drawing).area:
+        if len(colours) > 1:
+            note = "the silhouette is all but the whole page; if that is a background, delete it"
+            notes.append(note)
+        elif seen.area < (1 - MOSTLY_HOLE) * whole:
+            note = "the silhouette is all but the whole page; if the hole in it is the shape, fill that"
+            notes.append(note)
+    elif _is_badge(seen, shown):
+        notes.append(
+            "the silhouette is a disc with a drawing on it; if it is a background, delete it"
+        )
     cut = regions.beyond / (regions.beyond + sum(layer.region.area for layer in shown))
     if cut > NOTEWORTHY:
         notes.append(f"left out what lies beyond the page: {percent(cut)} of what is painted")
@@ -183,63 +193,63 @@ def _paving(layers: list[list[Layer]], page: shapely.Polygon) -> int:
     widest = max(
         (own[0] for own in layers[:count]), key=lambda layer: layer.region.area, default=None
     )
-    others = widest and any(not _alike(layer.brush.colour, widest.brush.colour) for layer in on_it)
+    others = widest and any(not alike(layer.brush.colour, widest.brush.colour) for layer in on_it)
     return count if paved and others else 0
+
+
+def _card(layers: list[list[Layer]], grounds: set[int], drawing: Drawing) -> int | None:
+    """Return which shape is a card: a rectangle that all but fills the page, with a drawing on it."""
+    rest = [k for k in range(len(layers)) if k not in grounds]
+    if len(rest) < 2 or drawing.box is None:
+        return None
+    card, page = layers[rest[0]][0], shapely.box(*drawing.box)
+    on_it = [layer for k in rest[1:] for layer in layers[k] if layer.brush.opacity >= FAINT]
+    on_it = [layer for layer in on_it if not alike(layer.brush.colour, card.brush.colour)]
+    region = _without_holes(card.region)
+    drawn = shapely.union_all([layer.region for layer in on_it])
+    is_card = (
+        card.brush.opacity >= FAINT
+        and _is_rectangle(region)
+        and (_sides(region) >= CARD_SIDES * _sides(page)).all()
+        and drawn.difference(region).area <= NOTEWORTHY * drawn.area
+    )
+    if not is_card or drawn.is_empty:
+        return None
+    largest = outer_outline(drawn)[0]
+    is_drawing = (_sides(largest) > LEAST_DRAWN * _sides(region)).all()
+    return rest[0] if is_drawing and not _is_rectangle(largest) else None
+
+
+def _is_badge(seen: BaseGeometry, layers: list[Layer]) -> bool:
+    """Return whether what is seen is a disc in one colour with a drawing of another on it."""
+    whole = outer_outline(seen)[0]
+    gap = DISC_DIGITS * whole.envelope.area
+    if abs(whole.area - np.pi / 4 * whole.envelope.area) > gap:
+        return False
+    disc = max(layers, key=lambda layer: layer.region.area)
+    on_it = [
+        layer.region
+        for layer in layers
+        if layer.brush.opacity >= FAINT and not alike(layer.brush.colour, disc.brush.colour)
+    ]
+    is_round = whole.convex_hull.area - whole.area < gap and disc.region.area > whole.area - gap
+    if not on_it or not is_round:
+        return False
+    shares = _sides(outer_outline(shapely.union_all(on_it))[0]) / _sides(whole)
+    return bool(shares.min() > LEAST_DRAWN and shares.max() > BADGE_DRAWN)
+
+
+def _is_rectangle(region: BaseGeometry) -> bool:
+    return region.area >= CARD * region.envelope.area
+
+
+def _sides(region: BaseGeometry) -> Array:
+    bounds = np.array(region.bounds)
+    return bounds[2:] - bounds[:2]
 
 
 def _without_holes(region: BaseGeometry) -> BaseGeometry:
     return shapely.union_all([filled(part) for part in polygons_in(region)])
-
-
-def _overlay(layers: list[Layer], ground: str | None) -> tuple[BaseGeometry, list[str]]:
-    """Return the region that is seen of layers on a ground, and notes."""
-    paper = ground or PAPER
-    # Snapped to a grid: neighbours that all but share an edge would leave cracks between them.
-    bounds = shapely.total_bounds([layer.region for layer in layers])
-    size = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
-    grid = max(OVERLAY_GRID * size, OVERLAY_GRID_FLOOR * float(np.abs(bounds).max()))
-    opaque = [layer for layer in layers if layer.brush.opacity >= FAINT]
-    n = len(layers) - len(opaque)
-    if not opaque:
-        return painted(layers, [1] * n, grid), ["took faint shapes, as there are no others"]
-    notes = [f"left out {n} faint shape{'s' * (n > 1)}"] * (n > 0)
-    pale = [_alike(layer.brush.colour, paper) for layer in opaque]
-    signs = [
-        1 if not own else -1 if layer.brush.opacity >= COVERING else 0
-        for layer, own in zip(opaque, pale, strict=True)
-    ]
-    seen = painted(opaque, signs, grid)
-    if not any(pale):
-        return seen, notes
-    # what has the paper's colour and lies on the bare paper may be the shape itself
-    every = painted(opaque, [_sign(opaque, k, pale) for k in range(len(opaque))], grid)
-    hidden = 1 - _solid(seen) / (_solid(every) or 1.0)
-    if not seen.area > 0 or (ground is None and hidden > MOSTLY):
-        return every, [*notes, f"took shapes in {paper} too: they are most of the drawing"]
-    dark = painted(opaque, [int(not own) for own in pale], grid)
-    bitten = 1 - _solid(seen) / _solid(dark)
-    if bitten > NOTEWORTHY:
-        notes.append(
-            f"took shapes in {paper} for background, which hide {percent(bitten)} of the others; "
-            "give them another colour if they belong to the shape"
-        )
-    return seen, notes
-
-
-def _sign(layers: list[Layer], k: int, pale: list[bool]) -> int:
-    """Return -1 for a pale layer that lies over darker ones for a good part, else 1."""
-    below = [layer.region for layer, own in zip(layers[:k], pale, strict=False) if not own]
-    over = shapely.area(shapely.intersection(below, layers[k].region)).sum() if pale[k] else 0.0
-    return -1 if over > OVER * layers[k].region.area else 1
-
-
-def _alike(colour: str, other: str) -> bool:
-    both = (rgb(c if c[0] == "#" else PLAIN.colour) for c in (colour, other))
-    return max(abs(a - b) for a, b in zip(*both, strict=True)) <= SAME_COLOUR
-
-
-def _solid(region: BaseGeometry) -> float:
-    return outer_outline(region)[0].area if region.area > 0 else 0.0
 
 
 def _thinned(shape: shapely.Polygon, size: float) -> Array:

@@ -23,7 +23,7 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
 )
 from orbiflow.tiles.silhouette.readers.svg_style import Style
 from orbiflow.tiles.silhouette.readers.svg_transforms import origin_of, shift
-from orbiflow.tiles.silhouette.readers.svg_units import as_number, length
+from orbiflow.tiles.silhouette.readers.svg_values import as_number, length
 from orbiflow.tiles.silhouette.readers.svg_xml import reference
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ class Clips:
         key = source, place.matrix.tobytes(), frame
         if key not in self._known:
             style = self.drawing.styles.standing(source)
-            inner = replace(place, opacity=1.0).styled({**style, "opacity": "1"})
+            inner = replace(place, groups=()).styled({**style, "opacity": "1"})
             if not mask:
                 inner = inner.moved(self.drawing.own_transform(source, style, inner))
             content = inner.moved(unit_box_matrix(box)) if boxed and box else inner

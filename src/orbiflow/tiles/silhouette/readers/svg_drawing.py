@@ -11,7 +11,6 @@ from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.reading import Source, read_bytes
 from orbiflow.tiles.silhouette.readers.svg_clips import Clips, window_clip
-from orbiflow.tiles.silhouette.readers.svg_colours import colour_of
 from orbiflow.tiles.silhouette.readers.svg_markers import Markers
 from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
 from orbiflow.tiles.silhouette.readers.svg_shapes import (
@@ -22,6 +21,8 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
     bounds_of,
     path_tokens,
     shape_paths,
+    view_box,
+    view_matrix,
 )
 from orbiflow.tiles.silhouette.readers.svg_style import Style, Styles
 from orbiflow.tiles.silhouette.readers.svg_transforms import (
@@ -32,8 +33,7 @@ from orbiflow.tiles.silhouette.readers.svg_transforms import (
     single_transforms,
     transform_matrix,
 )
-from orbiflow.tiles.silhouette.readers.svg_units import as_number
-from orbiflow.tiles.silhouette.readers.svg_views import view_box, view_matrix
+from orbiflow.tiles.silhouette.readers.svg_values import as_number, colour_of
 from orbiflow.tiles.silhouette.readers.svg_xml import MAX_DEPTH, Notes, is_own, parse_xml, reference
 
 MAX_BYTES = 16 * 2**20

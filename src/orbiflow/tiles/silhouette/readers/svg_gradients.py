@@ -14,7 +14,6 @@ from shapely.geometry import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arrays import Array
-from orbiflow.tiles.silhouette.readers.svg_colours import CURRENT, Brush, colour_of, mean_colour
 from orbiflow.tiles.silhouette.readers.svg_shapes import (
     DrawnShape,
     bounds_of,
@@ -22,7 +21,14 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
     unit_box_matrix,
 )
 from orbiflow.tiles.silhouette.readers.svg_transforms import can_transform, transform_matrix
-from orbiflow.tiles.silhouette.readers.svg_units import as_number, length
+from orbiflow.tiles.silhouette.readers.svg_values import (
+    CURRENT,
+    Brush,
+    as_number,
+    colour_of,
+    length,
+    mean_colour,
+)
 from orbiflow.tiles.silhouette.readers.svg_xml import reference
 
 if TYPE_CHECKING:

@@ -9,10 +9,16 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from orbiflow.tiles.silhouette.readers.svg_paths import corners
-from orbiflow.tiles.silhouette.readers.svg_shapes import MARKED, DrawnShape, Place, mapped
+from orbiflow.tiles.silhouette.readers.svg_shapes import (
+    MARKED,
+    DrawnShape,
+    Place,
+    mapped,
+    view_box,
+    view_matrix,
+)
 from orbiflow.tiles.silhouette.readers.svg_transforms import shift
-from orbiflow.tiles.silhouette.readers.svg_units import angle, quantity
-from orbiflow.tiles.silhouette.readers.svg_views import view_box, view_matrix
+from orbiflow.tiles.silhouette.readers.svg_values import angle, quantity
 
 if TYPE_CHECKING:
     from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing

@@ -3,9 +3,8 @@
 import re
 from collections.abc import Callable
 
-from orbiflow.tiles.silhouette.readers.svg_colours import colour_of
 from orbiflow.tiles.silhouette.readers.svg_transforms import can_transform
-from orbiflow.tiles.silhouette.readers.svg_units import NUMBER, quantity
+from orbiflow.tiles.silhouette.readers.svg_values import NUMBER, colour_of, quantity
 
 WIDE = {"inherit", "initial", "unset", "revert", "revert-layer"}  # values of every property
 MAX_VALUE = 20_000  # characters

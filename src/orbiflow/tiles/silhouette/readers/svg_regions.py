@@ -18,20 +18,20 @@ from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.geometry import complex_points
 from orbiflow.tiles.silhouette.outlines import MAX_COORDINATE
-from orbiflow.tiles.silhouette.readers.svg_colours import (
-    CURRENT,
-    Brush,
-    colour_of,
-    lightness,
-    mean_colour,
-)
 from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
 from orbiflow.tiles.silhouette.readers.svg_gradients import Gradient, gradient_of, references
 from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, TooManyPoints, fill
 from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
-from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, DrawnShape
+from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, DrawnShape, Group
 from orbiflow.tiles.silhouette.readers.svg_strokes import Line, stroked
-from orbiflow.tiles.silhouette.readers.svg_units import as_number
+from orbiflow.tiles.silhouette.readers.svg_values import (
+    CURRENT,
+    Brush,
+    as_number,
+    colour_of,
+    lightness,
+    mean_colour,
+)
 
 FINER = 8  # the paths of strokes are flattened as much finer, as a wide pen magnifies what is left
 EDGE = 1e-3  # of the page's longer side: shapes that reach no farther beyond it are kept whole
@@ -110,6 +110,7 @@ class Layer(NamedTuple):
 
     region: BaseGeometry
     brush: Brush
+    groups: tuple[Group, ...] = ()  # whose opacities are in that of the brush
 
 
 class Regions:
@@ -220,7 +221,8 @@ class Regions:
         found = [
             self.layer(shape, kind, paint) for kind, paint in paints(self.drawing, shape).items()
         ]
-        return [layer for layer in found if layer.region.area > 0]
+        groups = shape.place.groups
+        return [layer._replace(groups=groups) for layer in found if layer.region.area > 0]
 
     def _clip(self, clip: Clip) -> BaseGeometry:
         if clip.kind == "clip":

@@ -1,5 +1,6 @@
 """The shapes that a drawing shows: their geometry, where they stand, and how they are painted."""
 
+import math
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -12,7 +13,8 @@ from orbiflow.arrays import Array, Window
 from orbiflow.tiles.silhouette.outlines import MAX_COORDINATE
 from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, sub_paths
 from orbiflow.tiles.silhouette.readers.svg_style import Style
-from orbiflow.tiles.silhouette.readers.svg_units import (
+from orbiflow.tiles.silhouette.readers.svg_transforms import shift
+from orbiflow.tiles.silhouette.readers.svg_values import (
     FONT_SIZE,
     as_number,
     length,
@@ -83,6 +85,13 @@ class Clip:
     kind: str = "clip"  # "clip", "luminance" or "alpha"
 
 
+@dataclass(frozen=True, eq=False)
+class Group:
+    """An element that is painted as a whole and then laid over what is below with an opacity."""
+
+    opacity: float
+
+
 @dataclass(frozen=True)
 class Place:
     """Where in the drawing an element stands: what it inherits."""
@@ -92,9 +101,14 @@ class Place:
     style: Style
     rem: float = FONT_SIZE
     depth: int = 0
-    opacity: float = 1.0
+    groups: tuple[Group, ...] = ()  # those around that are not opaque, the outermost first
     context: tuple[str, str] = ("none", "none")  # the fill and stroke around a marker or <use>
     decorates: bool = False
+
+    @property
+    def opacity(self) -> float:
+        """The product of the opacities of all groups around."""
+        return math.prod(group.opacity for group in self.groups)
 
     def moved(self, matrix: Array) -> "Place":
         return replace(self, matrix=self.matrix @ matrix)
@@ -107,7 +121,8 @@ class Place:
             key: known[text] for key in ("fill", "stroke") if (text := style.get(key, "")) in known
         }
         style = {**style, **own} if own else style
-        return replace(self, depth=self.depth + 1, style=style, opacity=self.opacity * share)
+        groups = self.groups if share == 1 else (*self.groups, Group(share))
+        return replace(self, depth=self.depth + 1, style=style, groups=groups)
 
     def length(self, element: Element, key: str, text: str | None, usual: float = 0.0) -> float:
         """Return a length of an element in user units. Raises `BadElement` for what is none."""
@@ -213,3 +228,33 @@ def unit_box_matrix(box: Window) -> Array:
 def mapped(matrix: Array, points: Array) -> Array:
     """Return points (N, 2) mapped by a matrix (3, 3)."""
     return points @ matrix[:2, :2].T + matrix[:2, 2]
+
+
+def view_box(element: Element) -> Window | None:
+    """Return the viewBox (x, y, width, height) of an element."""
+    text = element.get("viewBox")
+    if text is None:
+        return None
+    try:
+        x, y, width, height = map(float, text.replace(",", " ").split())
+    except ValueError as exc:
+        raise BadElement(element, f"viewBox {text[:60]!a} is not four numbers") from exc
+    if not (np.isfinite([x, y, width, height]).all() and width > 0 and height > 0):
+        raise BadElement(element, f"viewBox {text[:60]!a} has no area")
+    return x, y, width, height
+
+
+def view_matrix(element: Element, frame: Window) -> tuple[Array, tuple[float, float]]:
+    """Return the map (3, 3) of a viewBox into a frame, and what percentages refer to."""
+    box = view_box(element)
+    if box is None:
+        return shift(*frame[:2]), frame[2:]
+    words = (element.get("preserveAspectRatio") or "xMidYMid").lower().split()
+    align, slices = words[words[:1] == ["defer"]], "slice" in words
+    scale = np.array(frame[2:]) / box[2:]
+    if align != "none":
+        scale[:] = scale.max() if slices else scale.min()
+    spare = np.array(frame[2:]) - scale * box[2:]
+    share = [0.5 if f"{key}mid" in align else float(f"{key}max" in align) for key in "xy"]
+    x, y = np.array(frame[:2]) - scale * box[:2] + share * spare
+    return np.array([[scale[0], 0, x], [0, scale[1], y], [0, 0, 1.0]]), box[2:]

@@ -9,7 +9,7 @@ from tinycss2.ast import FunctionBlock, Node
 from orbiflow.tiles.silhouette.readers.reading import Source
 from orbiflow.tiles.silhouette.readers.svg_css import StyleSheets
 from orbiflow.tiles.silhouette.readers.svg_properties import INHERITED, WIDE, WITH_LENGTHS, checked
-from orbiflow.tiles.silhouette.readers.svg_units import FONT_SIZE, font_size, without_font_units
+from orbiflow.tiles.silhouette.readers.svg_values import FONT_SIZE, font_size, without_font_units
 from orbiflow.tiles.silhouette.readers.svg_xml import Notes
 
 MAX_VARIABLE = 10_000  # characters that a value with variables may come to

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from orbiflow.arrays import Array
-from orbiflow.tiles.silhouette.readers.svg_units import NUMBER, angle, length, quantity
+from orbiflow.tiles.silhouette.readers.svg_values import NUMBER, angle, length, quantity
 
 MAX_TRANSFORM = 2000  # characters
 _CALL = re.compile(r"\s*,?\s*([a-zA-Z0-9]+)\s*\(([^()]*)\)")
