@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from skimage.measure import find_contours
 
 from orbiflow.arrays import Array
+from orbiflow.contours import level_curves
 
 Function = Callable[[Array], Array]
 """A function from points (N, 2) to values (N,)."""
@@ -310,7 +310,7 @@ def all_filled(
 def _rings(values: Array, level: float) -> list[Array]:
     """Return closed lines (n, 2), in cells, at a level of values at nodes; they end at the border."""
     padded = np.pad(values, 1, constant_values=level - FAR_BELOW)
-    return [ring - 1 for ring in find_contours(padded, level)]
+    return [ring - 1 for ring in level_curves(padded, level)]
 
 
 def _area(rings: list[Array], vertices: Array) -> shapely.Geometry:

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import KDTree
-from skimage.measure import find_contours
 
 from orbiflow.arrays import Array
+from orbiflow.contours import level_curves
 from orbiflow.tiles.geometry import signed_area
 from orbiflow.tiles.silhouette.readers.tracing import Level
 
@@ -83,7 +83,7 @@ def _line_of(drawn: _Mask) -> _Mask:
 def _borders(values: Array, cut: float) -> tuple[Array, Array]:
     """Return points (N, 2) a pixel apart, row and column: the largest outer border, and inner ones."""
     padded = np.pad(values, 1, constant_values=cut - 1)
-    contours = find_contours(padded, cut, fully_connected="high")
+    contours = level_curves(padded, cut, joined=True)
     areas = np.array([signed_area(contour) for contour in contours])
     outer = contours[int(np.argmax(abs(areas)))]
     sign = np.sign(signed_area(outer))

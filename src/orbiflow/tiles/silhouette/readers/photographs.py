@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.cluster.vq import vq
-from skimage.color import rgb2lab
-from skimage.filters import threshold_otsu
-from skimage.transform import resize
 
 from orbiflow.arrays import Array
+from orbiflow.tiles.silhouette.readers.pixels import lab_of, resized, threshold_of
 
 SIDE = 400  # pixels: the shape is found in a picture of this size, its edge in the picture itself
 LUMINANCE = np.array([0.299, 0.587, 0.114])  # of red, green and blue, as Pillow weighs them
@@ -34,7 +32,7 @@ _Mask = NDArray[np.bool_]
 def is_photograph(rgb: Array) -> bool:
     """Whether an image (H, W, 3), 0 to 1, has more in it than two flat colours and their edges."""
     grey = rgb @ LUMINANCE
-    light = grey > threshold_otsu(grey)
+    light = grey > threshold_of(grey)
     flat = ndimage.maximum_filter(light, 5) == ndimage.minimum_filter(light, 5)
     lab = _lab(rgb)
     parts = [lab[part] for part in (flat & light, flat & ~light) if part.any()]
@@ -54,14 +52,14 @@ def shape_in(rgb: Array) -> Array:
     """
     scale = min(SIDE / max(rgb.shape), 1)
     size = tuple(round(scale * side) for side in rgb.shape[:2])
-    lab = _lab(resize(rgb, size, anti_aliasing=scale < 1))
+    lab = _lab(resized(rgb, size))
     region = _sharpest(ndimage.gaussian_filter(lab, (1, 1, 0)))
-    region = resize(region.astype(float), rgb.shape[:2]) > 0.5
+    region = resized(region.astype(float), rgb.shape[:2]) > 0.5
     return _matte(_lab(rgb), region, round(EDGE_WIDTH / scale))
 
 
 def _lab(rgb: Array) -> Array:
-    return rgb2lab(rgb) + np.array([16.0, 0.0, 0.0])
+    return lab_of(rgb) + np.array([16.0, 0.0, 0.0])
 
 
 def _sharpest(lab: Array) -> _Mask:
@@ -112,7 +110,7 @@ def _differing(surprise: Array, deepest: float, border: _Mask) -> _Mask:
     cost = DEPTH_COST * (1 - GAINS[shadows, None, None])
     far = np.sqrt(np.min(surprise[shadows] + cost**2, axis=0))
     far = ndimage.gaussian_filter(np.minimum(far, FAR), 0.7)
-    split = far > threshold_otsu(far)
+    split = far > threshold_of(far)
     level = (np.median(far[split]) + np.median(far[~split])) / 2
     return far > max(level, 1.2 * np.quantile(far[border], 0.95))
 

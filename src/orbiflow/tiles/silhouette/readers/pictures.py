@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from skimage.filters import threshold_otsu
 
 from orbiflow.arguments import described, is_tensor
 from orbiflow.arrays import Array
@@ -21,6 +20,7 @@ from orbiflow.tiles.silhouette.readers.image_files import MAX_PIXELS, check_size
 from orbiflow.tiles.silhouette.readers.label_masks import label_mask
 from orbiflow.tiles.silhouette.readers.outline_drawings import outline_drawing
 from orbiflow.tiles.silhouette.readers.photographs import is_photograph, shape_in
+from orbiflow.tiles.silhouette.readers.pixels import threshold_of
 from orbiflow.tiles.silhouette.readers.reading import FileContent, Reading, Source
 from orbiflow.tiles.silhouette.readers.tracing import Level, trace
 
@@ -206,7 +206,7 @@ def _cut(path: Source, picture: Picture) -> float:
     if picture.name != "luminance":
         return 0.5
     channel = picture.channel
-    above = channel > threshold_otsu(channel)
+    above = channel > threshold_of(channel)
     low, high = float(np.median(channel[~above])), float(np.median(channel[above]))
     if high - low < MIN_CONTRAST:
         raise InputFileError(

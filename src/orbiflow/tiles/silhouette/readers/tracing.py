@@ -9,9 +9,9 @@ from scipy import ndimage
 from shapely.affinity import scale as scaled
 from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
-from skimage.measure import find_contours
 
 from orbiflow.arrays import Array
+from orbiflow.contours import level_curves
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.silhouette.outlines import left_out, outer_ring, simplified
@@ -126,7 +126,7 @@ def _contours(level: Level, mask: NDArray[np.bool_]) -> list[Array]:
     # The margin mirrors the shape's level in the cut, so that a shape which runs off the image is
     # closed along the image's very edge.
     values = np.pad(values, 1, constant_values=outside)
-    contours = find_contours(values, level.cut, fully_connected="low")
+    contours = level_curves(values, level.cut)
     return [contour[:, ::-1] - 0.5 for contour in contours if len(contour) > 3]
 
 
