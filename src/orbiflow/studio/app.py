@@ -9,11 +9,12 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
-from fastapi import APIRouter, FastAPI, Request
-from fastapi.exceptions import RequestValidationError
-from fastapi.responses import FileResponse, JSONResponse
-from fastapi.staticfiles import StaticFiles
+from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse
+from starlette.routing import Mount
+from starlette.staticfiles import StaticFiles
 
 from orbiflow import __version__
 from orbiflow.drawing import PALETTES
@@ -24,7 +25,8 @@ from orbiflow.studio.animals import ANIMALS, animal_file
 from orbiflow.studio.guard import Guard, Refused
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.kinds_of_work import KINDS, RefusedSetting, kind_of_work, own_schema, presets
-from orbiflow.studio.requests import Here, Studio
+from orbiflow.studio.requests import Studio
+from orbiflow.studio.routes import Routes
 from orbiflow.studio.settings import Limits
 from orbiflow.studio.store import Missing, Store
 from orbiflow.studio.work_queue import WorkQueue
@@ -56,7 +58,7 @@ def create_app(
     hub = Hub(store)
 
     @asynccontextmanager
-    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+    async def lifespan(_app: Starlette) -> AsyncIterator[None]:
         hub.open(asyncio.get_running_loop())
         for kind in KINDS.values():  # no request waits for imports
             find(kind.work)
@@ -69,16 +71,16 @@ def create_app(
         await asyncio.to_thread(queue.close)
         store.close()
 
-    app = FastAPI(
-        title="orbiflow studio", lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None
+    modules = (density_routes, project_routes, tile_routes, picture_routes)
+    every = [*routes, *(route for module in modules for route in module.routes)]
+    pages = StaticFiles(directory=STATIC, html=True)
+    kinds = (Refused, OrbiflowError, HTTPException, Exception)
+    app = Starlette(
+        routes=[Mount("/api", routes=every), Mount("/", pages)],
+        exception_handlers=dict.fromkeys(kinds, _told),
+        lifespan=lifespan,
     )
     app.state.studio = Studio(store, queue, hub, limits)
-    app.include_router(routes, prefix="/api")
-    for module in (density_routes, project_routes, tile_routes, picture_routes):
-        app.include_router(module.routes, prefix="/api")
-    app.mount("/", StaticFiles(directory=STATIC, html=True))
-    for kind in (Refused, OrbiflowError, RequestValidationError, HTTPException, Exception):
-        app.add_exception_handler(kind, _told)
     return Guard(app, limits, port=port, token=token)
 
 
@@ -89,11 +91,11 @@ async def _settle(store: Store) -> None:
         await asyncio.to_thread(store.settle)
 
 
-routes = APIRouter()
+routes = Routes()
 
 
 @routes.get("/about")
-async def about(here: Here) -> dict[str, Any]:
+async def about(here: Studio) -> dict[str, Any]:
     """Return what the pages need to know of the studio."""
     limits = here.limits
     return {
@@ -132,8 +134,6 @@ async def _told(_request: Request, error: Exception) -> JSONResponse:
         return JSONResponse({"error": str(error), "setting": error.setting}, 422)
     if isinstance(error, OrbiflowError):
         return JSONResponse({"error": str(error)}, 422)
-    if isinstance(error, RequestValidationError):
-        return JSONResponse({"error": "this address is not complete; reload the page"}, 422)
     if isinstance(error, HTTPException):
         words = {404: "there is nothing here; go back to the start page"}
         text = words.get(error.status_code, "this request cannot be answered; reload the page")

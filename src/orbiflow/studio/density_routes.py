@@ -11,9 +11,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from fastapi import APIRouter, Request
-from fastapi.concurrency import run_in_threadpool
-from fastapi.responses import FileResponse, JSONResponse, Response
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.studio.density_files import (
@@ -27,7 +27,8 @@ from orbiflow.studio.density_files import (
     map_file,
 )
 from orbiflow.studio.guard import Refused
-from orbiflow.studio.requests import Here, Studio, body_object, save_body
+from orbiflow.studio.requests import Studio, body_object, save_body
+from orbiflow.studio.routes import Routes
 from orbiflow.studio.words import NAMES, plain_name
 
 EXAMPLES = {
@@ -44,7 +45,7 @@ MOST_AXES = 64
 TASKS = ("density table", "density fit", "density map", "density take")
 UNNAMED = (NAMES["density"], "My table")
 
-routes = APIRouter()
+routes = Routes()
 
 
 @routes.get("/density/surface.js")
@@ -54,7 +55,7 @@ async def script() -> FileResponse:
 
 
 @routes.get("/projects/{project}/density")
-async def density(project: str, here: Here) -> dict[str, Any]:
+async def density(project: str, here: Studio) -> dict[str, Any]:
     """Tell of a project's table, of what is fitted to it, and of tables to try."""
     home, table, fit = _home(here, project), None, None
     if (home / TABLE).is_file():
@@ -68,7 +69,7 @@ async def density(project: str, here: Here) -> dict[str, Any]:
 
 
 @routes.put("/projects/{project}/density/table")
-async def upload(request: Request, project: str, here: Here, name: str = "") -> dict[str, Any]:
+async def upload(request: Request, project: str, here: Studio, name: str = "") -> dict[str, Any]:
     """Take a table."""
     called = plain_name(name, "table.csv")
     file = _home(here, project) / f"table{ending_of(called)}"
@@ -77,7 +78,7 @@ async def upload(request: Request, project: str, here: Here, name: str = "") -> 
 
 
 @routes.post("/projects/{project}/density/example")
-async def example(request: Request, project: str, here: Here) -> dict[str, Any]:
+async def example(request: Request, project: str, here: Studio) -> dict[str, Any]:
     """Take a table of ours."""
     name = (await body_object(request)).get("name")
     if not isinstance(name, str) or name not in EXAMPLES:
@@ -88,13 +89,13 @@ async def example(request: Request, project: str, here: Here) -> dict[str, Any]:
 
 
 @routes.get("/projects/{project}/density/{fit}/surface")
-async def surface(project: str, fit: int, here: Here) -> Response:
+async def surface(project: str, fit: int, here: Studio) -> Response:
     """Give what the script draws."""
     return _document(fit_folder(_home(here, project), fit) / SURFACE)
 
 
 @routes.get("/projects/{project}/density/{fit}/map")
-async def flat(project: str, fit: int, here: Here, axes: str = "0") -> Response:
+async def flat(project: str, fit: int, here: Studio, axes: str = "0") -> Response:
     """Give the density on a grid, of one angle or of two."""
     chosen = axes.split("-")
     if len(chosen) > 2 or not all(a.isdecimal() and int(a) < MOST_AXES for a in chosen):

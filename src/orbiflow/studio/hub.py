@@ -7,10 +7,10 @@ import json
 from collections.abc import AsyncGenerator
 from typing import Any
 
-from fastapi.sse import KEEPALIVE_COMMENT, format_sse_event
-
 from orbiflow.studio.store import Missing, Store
 from orbiflow.studio.words import shown_project, shown_task
+
+KEEPALIVE_COMMENT = b": still here\n\n"
 
 PAUSE = 15.0  # seconds after which a stream without news says that it is still there
 BREATH = 0.02  # seconds in which changes are collected
@@ -106,4 +106,4 @@ class Hub:
 
 
 def _event(number: int, kind: str, data: Any) -> bytes:
-    return format_sse_event(data_str=json.dumps(data), event=kind, id=str(number))
+    return f"event: {kind}\ndata: {json.dumps(data)}\nid: {number}\n\n".encode()

@@ -15,7 +15,7 @@ from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.runtime import NEVER, Cancel, Note, Outcome, Sink, ignore, make_folder, operation
 from orbiflow.studio.settings import StudioSettings
 
-EXTRA = ("fastapi", "uvicorn", "platformdirs")
+EXTRA = ("starlette", "uvicorn", "platformdirs")
 
 
 @operation("studio", starts_processes=True)

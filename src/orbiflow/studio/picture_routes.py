@@ -6,25 +6,26 @@ import re
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from fastapi import APIRouter, Request
-from fastapi.concurrency import run_in_threadpool
-from fastapi.responses import FileResponse
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import FileResponse
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.studio.animals import ANIMALS, animal_file
 from orbiflow.studio.guard import Refused
-from orbiflow.studio.requests import Here, Studio, body_object, save_body
+from orbiflow.studio.requests import Studio, body_object, save_body
+from orbiflow.studio.routes import Routes
 from orbiflow.studio.words import MASKS, NAMES, plain_name
 from orbiflow.tiles import ReadingSettings
 
 PNG = b"\x89PNG\r\n\x1a\n"
 ENDING = re.compile("[.][a-z0-9]{1,7}")
 
-routes = APIRouter(prefix="/projects/{project}")
+routes = Routes(prefix="/projects/{project}")
 
 
 @routes.put("/input")
-async def upload(request: Request, project: str, here: Here, name: str = "") -> dict[str, Any]:
+async def upload(request: Request, project: str, here: Studio, name: str = "") -> dict[str, Any]:
     """Take a picture or drawing of any kind, as raw bytes."""
     here.store.project(project)
     called = plain_name(name, "picture")
@@ -35,7 +36,7 @@ async def upload(request: Request, project: str, here: Here, name: str = "") -> 
 
 
 @routes.post("/animal")
-async def animal(request: Request, project: str, here: Here) -> dict[str, Any]:
+async def animal(request: Request, project: str, here: Studio) -> dict[str, Any]:
     """Take one of the bundled animals."""
     name = str((await body_object(request)).get("name"))
     here.store.project(project)
@@ -71,7 +72,7 @@ async def _read_anew(here: Studio, project: str) -> dict[str, Any]:
 
 
 @routes.put("/reading")
-async def reading(request: Request, project: str, here: Here) -> dict[str, Any]:
+async def reading(request: Request, project: str, here: Studio) -> dict[str, Any]:
     """Read the picture anew, with other settings."""
     given = {k: v for k, v in (await body_object(request)).items() if v is not None}
     here.store.change(project, "silhouette", reading=ReadingSettings(**given).to_json())
@@ -79,7 +80,7 @@ async def reading(request: Request, project: str, here: Here) -> dict[str, Any]:
 
 
 @routes.put("/{mask}")
-async def put_mask(request: Request, project: str, mask: str, here: Here) -> dict[str, Any]:
+async def put_mask(request: Request, project: str, mask: str, here: Studio) -> dict[str, Any]:
     """Take what was painted over the picture."""
     file = _mask_file(here, project, mask)
     fresh = file.with_suffix(".new")
@@ -92,7 +93,7 @@ async def put_mask(request: Request, project: str, mask: str, here: Here) -> dic
 
 
 @routes.delete("/{mask}")
-async def delete_mask(project: str, mask: str, here: Here) -> dict[str, Any]:
+async def delete_mask(project: str, mask: str, here: Studio) -> dict[str, Any]:
     """Forget what was painted over the picture."""
     _mask_file(here, project, mask).unlink(missing_ok=True)
     return await _mask_changed(here, project, mask)
@@ -111,7 +112,7 @@ async def _mask_changed(here: Studio, project: str, mask: str) -> dict[str, Any]
 
 
 @routes.get("/{picture}.png")
-async def get_picture(project: str, picture: str, here: Here) -> FileResponse:
+async def get_picture(project: str, picture: str, here: Studio) -> FileResponse:
     """Return the backdrop, or what was painted over it."""
     here.store.project(project)
     file = here.store.home(project) / f"{picture}.png"

@@ -6,30 +6,31 @@ import json
 import secrets
 from typing import Any
 
-from fastapi import APIRouter, Request
-from fastapi.concurrency import run_in_threadpool
-from fastapi.responses import FileResponse, StreamingResponse
 from starlette.background import BackgroundTask
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import FileResponse, StreamingResponse
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_object
 from orbiflow.studio.guard import Refused
 from orbiflow.studio.kinds_of_work import kind_of_work
 from orbiflow.studio.project_file import ENDING, MOST_VIEW, write_project
-from orbiflow.studio.requests import Here, body_object, save_body
+from orbiflow.studio.requests import Studio, body_object, save_body
+from orbiflow.studio.routes import Routes
 from orbiflow.studio.words import NAMES, plain_name, shown_project, shown_summary, shown_task
 
-routes = APIRouter()
+routes = Routes()
 
 
 @routes.get("/projects")
-async def projects(here: Here) -> list[dict[str, Any]]:
+async def projects(here: Studio) -> list[dict[str, Any]]:
     """List all projects."""
     return [shown_summary(summary) for summary in here.store.summaries()]
 
 
 @routes.post("/projects")
-async def create(request: Request, here: Here) -> dict[str, Any]:
+async def create(request: Request, here: Studio) -> dict[str, Any]:
     """Make a project."""
     given = await body_object(request)
     kind = given.get("kind", "tile")
@@ -41,7 +42,7 @@ async def create(request: Request, here: Here) -> dict[str, Any]:
 
 
 @routes.post("/projects/open")
-async def open_file(request: Request, here: Here) -> dict[str, Any]:
+async def open_file(request: Request, here: Studio) -> dict[str, Any]:
     """Make a project of a file, once a task has taken up what is in it; of no other file."""
     made = here.store.create("tile", "Opened project", here.limits.projects)
     try:
@@ -57,7 +58,7 @@ async def open_file(request: Request, here: Here) -> dict[str, Any]:
 
 
 @routes.get("/projects/{project}/file")
-def file(project: str, here: Here) -> FileResponse:
+def file(project: str, here: Studio) -> FileResponse:
     """Save a project as a file."""
     with here.store.still():
         own, cards = here.store.project(project), here.store.cards(project)
@@ -77,14 +78,14 @@ def file(project: str, here: Here) -> FileResponse:
 
 
 @routes.get("/projects/{project}")
-async def get(project: str, here: Here) -> dict[str, Any]:
+async def get(project: str, here: Studio) -> dict[str, Any]:
     """Return all of a project, as it is at one moment."""
     with here.store.still():
         return shown_project(here.store, here.store.project(project))
 
 
 @routes.patch("/projects/{project}")
-async def patch(request: Request, project: str, here: Here) -> dict[str, Any]:
+async def patch(request: Request, project: str, here: Studio) -> dict[str, Any]:
     """Change a project's name, or parts of what its pages remember."""
     given, own = await body_object(request), here.store.project(project)
     changes: dict[str, Any] = {"changed_by": request.headers.get("x-orbiflow-client", "")[:80]}
@@ -101,7 +102,7 @@ async def patch(request: Request, project: str, here: Here) -> dict[str, Any]:
 
 
 @routes.delete("/projects/{project}")
-async def delete(project: str, here: Here) -> dict[str, Any]:
+async def delete(project: str, here: Studio) -> dict[str, Any]:
     """Delete a project with all its files."""
     here.store.project(project)
     await run_in_threadpool(here.queue.forget, project)
@@ -110,7 +111,7 @@ async def delete(project: str, here: Here) -> dict[str, Any]:
 
 
 @routes.post("/projects/{project}/tasks")
-async def task(request: Request, project: str, here: Here) -> dict[str, Any]:
+async def task(request: Request, project: str, here: Studio) -> dict[str, Any]:
     """Give a project work."""
     given = await body_object(request)
     operation, settings = given.get("operation"), given.get("settings", {})
@@ -127,7 +128,7 @@ async def task(request: Request, project: str, here: Here) -> dict[str, Any]:
 
 
 @routes.post("/tasks/{number}/{action}")
-async def steer(number: int, action: str, here: Here) -> dict[str, Any]:
+async def steer(number: int, action: str, here: Studio) -> dict[str, Any]:
     """Pause, resume or cancel a task."""
     queue = here.queue
     actions = {"pause": queue.pause, "resume": queue.resume, "cancel": queue.cancel}
@@ -138,7 +139,7 @@ async def steer(number: int, action: str, here: Here) -> dict[str, Any]:
 
 
 @routes.get("/projects/{project}/events")
-async def events(request: Request, project: str, here: Here, after: int = 0) -> StreamingResponse:
+async def events(request: Request, project: str, here: Studio, after: int = 0) -> StreamingResponse:
     """Stream what changes in a project, from some event on."""
     here.store.project(project)
     if here.hub.count >= here.limits.streams:

@@ -6,10 +6,10 @@ import json
 import secrets
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from fastapi import Depends, Request
-from fastapi.concurrency import run_in_threadpool
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
 
 from orbiflow.runtime import is_object
 from orbiflow.studio.guard import Refused
@@ -50,14 +50,6 @@ class Studio:
                 break
         await changes.aclose()
         return self.store.task(task)
-
-
-async def _studio(request: Request) -> Studio:
-    return request.app.state.studio
-
-
-Here = Annotated[Studio, Depends(_studio)]
-"""The studio, as a parameter of a route."""
 
 
 async def body_object(request: Request) -> dict[str, Any]:

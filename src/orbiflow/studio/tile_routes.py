@@ -6,19 +6,20 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from fastapi import APIRouter, Request
-from fastapi.responses import FileResponse
+from starlette.requests import Request
+from starlette.responses import FileResponse
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.studio.closeup_tasks import SPACE
 from orbiflow.studio.guard import Refused
-from orbiflow.studio.requests import Here, Studio, body_object
+from orbiflow.studio.requests import Studio, body_object
+from orbiflow.studio.routes import Routes
 from orbiflow.studio.takeaways import PREVIEW, export_folder
 from orbiflow.studio.tile_files import VIEW, best_stage, tile_number
 
 SANDBOX = {"content-security-policy": "sandbox; default-src 'none'; style-src 'unsafe-inline'"}
 
-routes = APIRouter()
+routes = Routes()
 
 
 def stage_of(here: Studio, project: str, tile: int) -> Path:
@@ -31,13 +32,13 @@ def stage_of(here: Studio, project: str, tile: int) -> Path:
 
 
 @routes.get("/projects/{project}/tiles/{tile}")
-async def view(project: str, tile: int, here: Here) -> FileResponse:
+async def view(project: str, tile: int, here: Studio) -> FileResponse:
     """Return what the page of a tile shows."""
     return FileResponse(stage_of(here, project, tile) / VIEW, media_type="application/json")
 
 
 @routes.delete("/projects/{project}/tiles/{tile}")
-async def delete(project: str, tile: int, here: Here) -> dict[str, Any]:
+async def delete(project: str, tile: int, here: Studio) -> dict[str, Any]:
     """Delete a tile."""
     here.store.delete_tile(project, tile)
     shutil.rmtree(here.store.home(project) / "tiles" / str(tile), ignore_errors=True)
@@ -45,7 +46,7 @@ async def delete(project: str, tile: int, here: Here) -> dict[str, Any]:
 
 
 @routes.get("/projects/{project}/tiles/{tile}/space")
-async def space(project: str, tile: int, here: Here) -> FileResponse:
+async def space(project: str, tile: int, here: Studio) -> FileResponse:
     """Return the space in which a tile is pulled."""
     file = stage_of(here, project, tile) / SPACE
     if not file.is_file():
@@ -56,7 +57,7 @@ async def space(project: str, tile: int, here: Here) -> FileResponse:
 
 
 @routes.post("/projects/{project}/tiles/{tile}/pulled")
-async def pulled(request: Request, project: str, tile: int, here: Here) -> dict[str, Any]:
+async def pulled(request: Request, project: str, tile: int, here: Studio) -> dict[str, Any]:
     """Make a tile of one that was pulled, and return its card."""
     given = await body_object(request)
     stage_of(here, project, tile)
@@ -79,12 +80,12 @@ def _made(here: Studio, task: int, name: str) -> Path:
 
 
 @routes.get("/takeaways/{task}/files/{name}")
-async def download(task: int, name: str, here: Here) -> FileResponse:
+async def download(task: int, name: str, here: Studio) -> FileResponse:
     """Return a file to keep."""
     return FileResponse(_made(here, task, name), filename=name, headers=SANDBOX)
 
 
 @routes.get("/takeaways/{task}/preview.png")
-async def preview(task: int, here: Here) -> FileResponse:
+async def preview(task: int, here: Studio) -> FileResponse:
     """Return a picture of what a task has made."""
     return FileResponse(_made(here, task, PREVIEW), headers=SANDBOX)
