@@ -219,7 +219,6 @@ def tile_json(tile: EscherTile) -> dict[str, Any]:
         "rating": rating and {"stars": rating.stars, "word": rating.word},
         "score": _or_none(tile.score),
         "objective": tile.objective,
-        "front": tile.front,
         "smoothed": tile.smoothed,
         "metrics": {
             **_or_none(tile.metrics.as_dict()),
@@ -280,7 +279,7 @@ def _measurements(entry: dict[str, Any]) -> dict[str, Any]:
 
 
 # Fields of an `EscherTile` that an entry states under the same name
-_PLAIN = ("objective", "front", "smoothed", "starts", "dropped", "seconds")
+_PLAIN = ("objective", "smoothed", "starts", "dropped", "seconds")
 
 
 def _tile(entry: dict[str, Any]) -> Tile:

@@ -160,7 +160,6 @@ class EscherTile:
     How it was found:
 
     - `objective`: What the search was after, "likeness" or "overlap".
-    - `front`: After a search for both, whether no other listed tile beats this one in both.
     - `starts`, `dropped`: The number of starts, and of those that gave no certified tile.
     - `seconds`: Computing time on one core.
     - `others`: More tiles of the class, if they were asked for.
@@ -190,7 +189,6 @@ class EscherTile:
     known_score: float | None = None
     rating: Rating | None = None
     objective: str = "overlap"
-    front: bool | None = None
     starts: int = 0
     dropped: int = 0
     seconds: float = 0.0
