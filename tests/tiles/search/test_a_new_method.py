@@ -10,7 +10,6 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import FourierField
 from orbiflow.runtime import Cancel
 from orbiflow.tiles import (
     CLASSES,
@@ -23,7 +22,7 @@ from orbiflow.tiles import (
     report,
 )
 from orbiflow.tiles.search import Goal, SearchMethod
-from orbiflow.tiles.search.candidates import OnProgress, StillTiles, waves
+from orbiflow.tiles.search.candidates import OnProgress, StillTiles
 from orbiflow.tiles.search.starts import template_starts
 from orbiflow.tiles.tilings import IsohedralClass
 from outlines import searched
@@ -96,14 +95,10 @@ def test_what_it_does_not_take_is_refused() -> None:
 @pytest.mark.parametrize("name", CLASSES)
 def test_tiles_that_no_flow_moves_are_those_of_a_flow_of_zero(name: str) -> None:
     kind = CLASSES[name]
-    assert waves(kind.group()) == FourierField(kind.group(), 1).size
     still = StillTiles(kind, template_starts(kind, turns=3, stretch=0.2))
     for index in (0, still.size - 1):
         tile, own = still.finished(index)
         other, flow = still.as_model().finished(index)
         assert np.abs(tile.polygon - other.polygon).max() < 1e-15
-        assert own.settings == flow.settings
-        assert list(own.arrays) == list(flow.arrays)
-        for key, array in own.arrays.items():
-            assert array.shape == flow.arrays[key].shape
-            assert np.array_equal(array, flow.arrays[key])
+        assert (own.has_flow, flow.has_flow) == (False, True)
+        assert own.arrays == {}

@@ -44,8 +44,8 @@ FIGURE_FILES = ("tiling.pdf", "overlay.pdf", *FIELD_FILES)
 
 def figure_files(result: EscherTile) -> tuple[str, ...]:
     """Return the `FIGURE_FILES` of a tile: there is no flow where the silhouette bent into the tile."""
-    likeness = result.objective == "likeness"
-    return tuple(file for file in FIGURE_FILES if not (likeness and file in FIELD_FILES))
+    flows = result.map is not None and result.map.has_flow
+    return tuple(file for file in FIGURE_FILES if flows or file not in FIELD_FILES)
 
 
 def write_tile_folder(
@@ -217,7 +217,7 @@ def write_run(
         (folder.path / READ_NEXT).unlink(missing_ok=True)
         return []
     if tiles and figures and not any(FIELD_FILES[0] in figure_files(tile) for tile in tiles):
-        on_event(Note("no flow made these tiles, so there is none to draw: the silhouette bent"))
+        on_event(Note("no flow made these tiles, so there is none to draw"))
     with folder.replaced() as staged:
         if picture:
             write_atomic(staged / READ, picture)
