@@ -4,12 +4,13 @@ A ring is a float64 array (..., N, 2) whose last vertex does not repeat the firs
 a stack of rings. Functions with `AnyRing` take tensors as well and are differentiable.
 """
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 from shapely.geometry import LineString, Polygon
-from shapely.geometry.base import BaseGeometry, BaseMultipartGeometry
+from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import is_tensor
 from orbiflow.arrays import Array, Complex, Integers
@@ -211,6 +212,5 @@ def polygons_in(geometry: BaseGeometry) -> list[Polygon]:
     """Return the polygons in `geometry`, without its lines and points."""
     if isinstance(geometry, Polygon):
         return [] if geometry.is_empty else [geometry]
-    if not isinstance(geometry, BaseMultipartGeometry):
-        return []
-    return [polygon for part in geometry.geoms for polygon in polygons_in(part)]
+    parts: Iterable[BaseGeometry] = getattr(geometry, "geoms", ())
+    return [polygon for part in parts for polygon in polygons_in(part)]

@@ -207,7 +207,7 @@ def test_an_overview_of_a_long_silhouette(flowed: EscherTile, wide: float) -> No
 
 
 def test_the_page_is_one_of_the_files_of_a_run(tmp_path: Path) -> None:
-    (tmp_path / "result.json").write_text('{"schema_version": 1, "tiles": [{"class": "IH4"}]}')
+    (tmp_path / "result.json").write_text('{"schema_version": 2, "tiles": [{"class": "IH4"}]}')
     known = written_files(tmp_path)
     assert {"index.html", "overview.png", "IH4/field.png", "IH4/tiling.png"} <= known
     assert folder_names(["IH4", "IH4"]) == ["IH4", "IH4-2"]
