@@ -76,7 +76,10 @@ def _entry(digest: str) -> bytes:
 def _check_sum(data: bytes, digest: object) -> str:
     """Return what is wrong with a file by its checksum, "" if nothing is."""
     if not isinstance(digest, str) or len(digest) != len(_ZEROS):
-        return "it has no checksum, so whether it is damaged cannot be told: save it again with orbiflow"
+        return (
+            "it has no checksum, so whether it is damaged cannot be told; it was changed, or another "
+            "program wrote it: save it again with orbiflow"
+        )
     if hashlib.sha256(data.replace(_entry(digest), _entry(_ZEROS), 1)).hexdigest() != digest:
         return (
             "it was damaged or changed after it was saved: its checksum does not match; use a copy"
