@@ -56,7 +56,6 @@ PRESENT = Renamed(
         "* read.png": "what was read is drawn before the search",
         "* index.html": "the page has commands, palettes and stars",
         "* overview.png": "the sheet has stars and names of arrangements",
-        "* front.png": "has stars, and the border of the tiles that are listed",
         "* model.safetensors": "the map carries the silhouette's whole outline",
         "*dxf* a.dxf": "layers have colours",
         "* density.safetensors": "saved as a mixture, in format 5",
@@ -111,8 +110,6 @@ SEARCHES = {
     f"--figures {ONE}",
     "overlap-normal": f"{IN}/turtle.png --classes IH4 --objective overlap --max-frequency 6 "
     f"--emphasis {IN}/white.png {ONE}",
-    "both": f"{IN}/spider_120.dat --classes IH2,IH4 --effort fast --objective both "
-    f"--min-neck 0.05 {ONE}",
     "occupancy": f"{IN}/squirrel.dat --classes IH4,IH5 --method occupancy --turns 3 --iterations 40 "
     f"--seed 3 {ONE}",
     "inverted": f"{IN}/inverted.png --classes IH4 --effort fast --invert --threshold 0.4 {ONE}",
@@ -301,7 +298,8 @@ def artwork() -> list[Case]:
         "--outline 2 --tile IH4",
         "hatch": "../search-pins/run --engrave --strokes hatch --eye 600,150,20 --size 400x300 "
         "--tile-size 200",
-        "feathers": "../search-both/run --engrave --strokes feathers --size 400x300 --tile-size 200",
+        "feathers": "../search-likeness/run --engrave --strokes feathers --size 400x300 "
+        "--tile-size 200",
         "echoes": "../search-overlap/run --engrave --strokes echoes --size 60x40mm --tile-size 25mm "
         "--dpi 150",
     }

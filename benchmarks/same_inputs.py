@@ -29,7 +29,7 @@ def write_inputs(folder: Path, examples: Path) -> None:
     for path in (
         *(silhouettes / name for name in ("squirrel.dat", "turtle.png", "night-monkey.png")),
         silhouettes / "barbet.svg",
-        *(nagata / "bat_60.dat", nagata / "bat_60.dat", nagata / "spider_120.dat"),
+        nagata / "bat_60.dat",
     ):
         shutil.copy(path, folder)
     shutil.copy(examples / "artwork" / "barbet.svg", folder / "drawing.svg")

@@ -78,7 +78,7 @@ def write_run(folder: Path, name: str, *, model: bool = True) -> Path:
     target, own, tile = animal("squirrel.dat"), bent_squirrel(name), squirrel(name)
     polygon = tile.tile.polygon
     document = {
-        "schema_version": 1,
+        "schema_version": 2,
         "input": {**target.report()},
         "tiles": [
             {

@@ -107,7 +107,7 @@ def boot_run(folder: Path) -> Path:
     """Write the folder of a run with three tiles."""
     folder.mkdir()
     document = {
-        "schema_version": 1,
+        "schema_version": 2,
         "input": {"source": "pictures/boot.png", "y_down": True},
         "tiles": [entry("IH6"), entry("IH4"), entry("IH6")],
     }

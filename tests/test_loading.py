@@ -24,6 +24,7 @@ from orbiflow.tiles import (
     Tile,
     TileMap,
     export,
+    load_model,
     read_document,
 )
 from orbiflow.tiles.result_file import tile_json
@@ -202,7 +203,9 @@ def test_a_tile_does_its_own_work(folders: Path, tmp_path: Path) -> None:
     assert (tmp_path / "a.png").is_file()
     small = AnimationSettings(seconds=0.5, fps=4, size=64)
     assert tile.animate(tmp_path / "a.gif", small).is_file()
-    assert tile.model().isohedral_class.name == "IH6"
+    for call in (tile.model, lambda: load_model(folders / "turtle" / "IH6" / "model.safetensors")):
+        with pytest.raises(OrbiflowError, match="no flow made this tile"):
+            call()
 
 
 def test_a_tile_that_does_not_tile(folders: Path, tmp_path: Path) -> None:

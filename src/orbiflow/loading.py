@@ -160,7 +160,7 @@ def _estimator(path: Path) -> DensityEstimator:
         if "settings" in document:  # a marginal or a conditional was not fitted
             report = report_from_json(document["report"])
             given = dict(document["settings"])
-            settings = {name: given[name] for name in _SETTINGS if name in given}
+            settings = {name: given[name] for name in _SETTINGS}
         if unit := density.space.settings().get("unit"):
             settings["unit"] = unit
         return DensityEstimator.fitted(density, report, extra.get("columns"), **settings)

@@ -145,7 +145,7 @@ def test_mistakes(case: str, result: Path, tmp_path: Path, orbiflow) -> None:
 
 def damaged(**changes: Any) -> str:
     document = {
-        "schema_version": 1,
+        "schema_version": 2,
         "input": {"source": "boot.png", "y_down": True},
         "tiles": [{**entry("IH6"), **changes}],
     }

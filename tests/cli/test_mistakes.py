@@ -123,7 +123,7 @@ BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
     "objective": (["--objective", "beauty"], "--objective"),
     "neck": (["--min-neck", "3"], "--min-neck ... from 0 to 0.2, got ... 3"),
     "objective of occupancy": (
-        ["--method", "occupancy", "--objective", "both"],
+        ["--method", "occupancy", "--objective", "likeness"],
         "--objective applies only to --method descent",
     ),
     "frequency 2.5": (["--max-frequency", "2.5"], "--max-frequency"),
@@ -156,7 +156,7 @@ BAD_OPTIONS: dict[str, tuple[list[str], str]] = {
     "pin that is no file": (["--pin", "head.png"], "head.png"),
     "pins of overlap": (
         ["--objective", "overlap", "--pin", "9,9"],
-        "--pin applies only to --objective likeness or both",
+        "--pin applies only to --objective likeness",
     ),
     "pins of occupancy": (
         ["--method", "occupancy", "--pin", "9,9"],

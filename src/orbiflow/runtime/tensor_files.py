@@ -77,8 +77,8 @@ def _check_sum(data: bytes, digest: object) -> str:
     """Return what is wrong with a file by its checksum, "" if nothing is."""
     if not isinstance(digest, str) or len(digest) != len(_ZEROS):
         return (
-            "it has no checksum, so whether it is damaged cannot be told; it is of an earlier orbiflow "
-            "or was changed: save it again with this one"
+            "it has no checksum, so whether it is damaged cannot be told; it was changed, or another "
+            "program wrote it: save it again with orbiflow"
         )
     if hashlib.sha256(data.replace(_entry(digest), _entry(_ZEROS), 1)).hexdigest() != digest:
         return (

@@ -97,7 +97,6 @@ from .scene.scene import Style as Style
 from .scene.scene import Uses as Uses
 from .scene.svg import write_svg as write_svg
 from .search.bent_map import carried_on as carried_on
-from .search.both_search import BothSearch as BothSearch
 from .search.candidates import Fit as Fit
 from .search.descent import fit_descent as fit_descent
 from .search.escherize_settings import EscherizeSettings as EscherizeSettings

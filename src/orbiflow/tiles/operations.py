@@ -70,7 +70,7 @@ def escherize(
 
     Writes read.png, a picture of what was read, into the folder at once. Then come result.json,
     overview.png and index.html, and for each class a folder with tile.svg, tiling.svg, tiling.png,
-    overlay.png and model.safetensors; after a search for both, front.png, too.
+    overlay.png and model.safetensors.
 
     Args:
         image: The silhouette: PNG, JPEG, WebP, SVG, or a polygon (.json, .geojson, .dat, .csv, .wkt).
@@ -117,10 +117,8 @@ def _tables(tiles: Sequence[EscherTile]) -> list[Table]:
     """Return what is said of the tiles, in words and in figures; nothing of none."""
     if not tiles:
         return []
-    best = "Tiles, best first"
-    title = best if tiles[0].front is None else "Tiles for likeness, then for overlap"
     figures = _table("Figures", [_figures(tile) for tile in tiles])
-    return [_table(title, [_words(tile) for tile in tiles]), figures]
+    return [_table("Tiles, best first", [_words(tile) for tile in tiles]), figures]
 
 
 def _table(title: str, rows: Sequence[dict[str, str]]) -> Table:
@@ -130,12 +128,13 @@ def _table(title: str, rows: Sequence[dict[str, str]]) -> Table:
 
 def _words(tile: EscherTile) -> dict[str, str]:
     """What is said of a tile, in 80 characters."""
-    row = {"class": f"{tile.name} ({tile.group_name})"}
-    if tile.front is not None:
-        row |= {"for": tile.objective, "front": "yes" if tile.front else "near"}
     rating, lies = tile.rating, tile.arrangement
-    row |= {"stars": str(rating or ""), "likeness": rating.word if rating else ""}
-    return {**row, "how its copies lie": lies or "NOT CERTIFIED: they do not tile"}
+    return {
+        "class": f"{tile.name} ({tile.group_name})",
+        "stars": str(rating or ""),
+        "likeness": rating.word if rating else "",
+        "how its copies lie": lies or "NOT CERTIFIED: they do not tile",
+    }
 
 
 def _figures(tile: EscherTile) -> dict[str, str]:
@@ -175,17 +174,8 @@ def _closing(out: Path, written: bool, result: SearchResult, seconds: float) -> 
 
 def _remarks(result: SearchResult) -> list[str]:
     """What the user should know of a search's tiles."""
-    tiles, found, remarks = result.tiles, result.found, list[str]()
-    if tiles and tiles[0].front is not None:
-        best = sum(tile.front is True for tile in tiles)
-        near = "" if best == len(tiles) else f", {len(tiles) - best} near these"
-        remarks.append(
-            f"{len(tiles)} of {len(found)} tiles are listed: {best} that no other of them beats in "
-            f"both deformation and overlap{near}"
-        )
-    for name in sorted(result.interrupted & {tile.isohedral_class for tile in tiles}):
-        remarks.append(f"{name} has its first tile only: its search was interrupted")
-    return remarks
+    names = sorted(result.interrupted & {tile.isohedral_class for tile in result.tiles})
+    return [f"{name} has its first tile only: its search was interrupted" for name in names]
 
 
 def _measures(tile: EscherTile) -> dict[str, Any]:
@@ -195,7 +185,6 @@ def _measures(tile: EscherTile) -> dict[str, Any]:
         "group": tile.group_name,
         "objective": tile.objective,
         "deformation": tile.deformation,
-        "front": tile.front,
         "arrangement": tile.arrangement,
         "stars": tile.rating and tile.rating.stars,
         "word": tile.rating and tile.rating.word,

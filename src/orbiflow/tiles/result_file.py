@@ -29,7 +29,7 @@ from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import ISOHEDRAL_TYPES, Tile, isohedral_class
 
 RESULT, TILE_MODEL = "result.json", "model.safetensors"
-SCHEMA_VERSION = 2  # 1 is read, too
+SCHEMA_VERSION = 2
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".gif", ".svg", ".pdf")
 MOST_NAMED = 5  # runs that a message names
 
@@ -121,10 +121,10 @@ def read_document(path: str | Path) -> tuple[Path, dict[str, Any]]:
             raise
         raise InputFileError(f"{error}; if it is a silhouette, {first}") from error
     layout = document.get("schema_version", SCHEMA_VERSION)
-    if layout not in range(1, SCHEMA_VERSION + 1):
+    if layout != SCHEMA_VERSION:
         raise InputFileError(
-            f"{file}: schema_version must be 1 to {SCHEMA_VERSION}, got {described(layout)}; if a "
-            "newer orbiflow wrote the file, update this one"
+            f"{file}: schema_version must be {SCHEMA_VERSION}, got {described(layout)}; if a newer "
+            "orbiflow wrote the file, update this one, otherwise search again"
         )
     return file, document
 
@@ -219,7 +219,6 @@ def tile_json(tile: EscherTile) -> dict[str, Any]:
         "rating": rating and {"stars": rating.stars, "word": rating.word},
         "score": _or_none(tile.score),
         "objective": tile.objective,
-        "front": tile.front,
         "smoothed": tile.smoothed,
         "metrics": {
             **_or_none(tile.metrics.as_dict()),
@@ -260,7 +259,7 @@ def _measurements(entry: dict[str, Any]) -> dict[str, Any]:
     own = ("deformation", "bent_iou", "pinned")
     found = {name: metrics.pop(name, None) for name in own}
     fidelity = metrics.pop("fidelity", None)
-    if fidelity is not None and "merged" in fidelity:  # version 0.1 measured something else
+    if fidelity is not None:
         found["fidelity"] = Fidelity(**{**fidelity, "pieces": tuple(fidelity["pieces"])})
     if metrics.get("iou") is not None:
         found["metrics"] = ShapeMetrics(**{**metrics, "window": tuple(metrics["window"])})
@@ -280,7 +279,7 @@ def _measurements(entry: dict[str, Any]) -> dict[str, Any]:
 
 
 # Fields of an `EscherTile` that an entry states under the same name
-_PLAIN = ("objective", "front", "smoothed", "starts", "dropped", "seconds")
+_PLAIN = ("objective", "smoothed", "starts", "dropped", "seconds")
 
 
 def _tile(entry: dict[str, Any]) -> Tile:

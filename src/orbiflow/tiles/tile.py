@@ -51,7 +51,7 @@ class TileMap:
     """The maps behind one tile, as plain arrays that processes send and files keep.
 
     - `settings`: The flow's class, max_frequency, segments, smoothness, steps, method and mirrored;
-      empty if no flow is known.
+      empty without a flow, as after a search for likeness.
     - `arrays`: The flow's float64 parameters by name, and its start tile if that is not the template.
     - `frame`: Where the silhouette's normal form, in which both maps act, lies in the input.
     - `bending`: The map from the silhouette onto the tile, in normal form.
@@ -61,6 +61,11 @@ class TileMap:
     arrays: dict[str, Array] = field(default_factory=dict[str, Array])
     frame: Frame | None = None
     bending: Bending | None = None
+
+    @property
+    def has_flow(self) -> bool:
+        """Whether a flow made the tile."""
+        return bool(self.settings or self.arrays)
 
     def to_bytes(self) -> bytes:
         """Return the contents of a `model.safetensors` file."""
@@ -160,7 +165,6 @@ class EscherTile:
     How it was found:
 
     - `objective`: What the search was after, "likeness" or "overlap".
-    - `front`: After a search for both, whether no other listed tile beats this one in both.
     - `starts`, `dropped`: The number of starts, and of those that gave no certified tile.
     - `seconds`: Computing time on one core.
     - `others`: More tiles of the class, if they were asked for.
@@ -190,7 +194,6 @@ class EscherTile:
     known_score: float | None = None
     rating: Rating | None = None
     objective: str = "overlap"
-    front: bool | None = None
     starts: int = 0
     dropped: int = 0
     seconds: float = 0.0
@@ -337,11 +340,11 @@ class EscherTile:
         """Return the flow that made the tile, as a torch module.
 
         Raises:
-            OrbiflowError: if no flow is known.
+            OrbiflowError: if no flow made it, or none is known.
         """
         from orbiflow.tiles.search import as_model
 
-        if self.map is None or not self.map.settings:
+        if self.map is None:
             raise OrbiflowError(f"{self.name}: the flow that made this tile is not known")
         return as_model(self.map)
 

@@ -29,7 +29,6 @@ from orbiflow.tiles import (
     escherize_class,
     export,
     read_result,
-    save_tiles,
     with_map,
 )
 from orbiflow.tiles import write_run as write_folder
@@ -200,22 +199,10 @@ def test_a_notebook_shows_exports_and_artwork(tmp_path: Path, found: EscherTile)
     assert Image.open(io.BytesIO(artwork(found, SMALL)._repr_png_())).size == (90, 60)
 
 
-def test_scores_and_stars_of_version_0_1_are_read_as_they_were(tmp_path: Path) -> None:
-    """Its measures were others, so its scores stay; what is computed from the new ones is not known."""
+def test_measures_are_read_whole_or_not_at_all(tmp_path: Path) -> None:
     run = write_run(tmp_path / "run", "IH5", model=False)
     document = json.loads((run / "result.json").read_text("utf-8"))
-    kept = {"pieces": [0.1, 0.2, 0.1], "notches": 0.2, "narrowed": 0.1, "cost": 0.3, "necks": 0.0}
     (entry,) = document["tiles"]
-    document["schema_version"] = 1
-    entry["metrics"] = {"fidelity": kept}
-    entry |= {"score": 0.37, "rating": {"stars": 3.5, "word": "good"}}
-    (run / "result.json").write_text(json.dumps(document))
-    found = read_result(run)
-    assert (found.fidelity, found.score, str(found.rating)) == (None, 0.37, "★★★½")
-    again = read_result(save_tiles([found], tmp_path / "again"))
-    assert (again.fidelity, again.score, again.rating) == (None, 0.37, found.rating)
-    assert json.loads((tmp_path / "again" / "result.json").read_text())["schema_version"] == 2
-    # measures of this version are read; half of them are refused
     kept = {"pieces": [0.1, 0.2], "stretched": 0.2, "thickness": 0.1, "blunted": 3.0}
     kept |= {"moved": 0.01, "merged": 0.05, "cost": 0.3, "length": 6.0}
     entry["metrics"] = {"fidelity": kept}
@@ -227,10 +214,10 @@ def test_scores_and_stars_of_version_0_1_are_read_as_they_were(tmp_path: Path) -
         read_result(run)
 
 
-@pytest.mark.parametrize("version", [0, 3, None, "2"])
-def test_results_of_unknown_layouts_are_refused(tmp_path: Path, version: object) -> None:
+@pytest.mark.parametrize("version", [0, 1, 3, None, "2"])
+def test_results_of_other_layouts_are_refused(tmp_path: Path, version: object) -> None:
     run = write_run(tmp_path / "run", "IH5", model=False)
     document = json.loads((run / "result.json").read_text("utf-8"))
     (run / "result.json").write_text(json.dumps({**document, "schema_version": version}))
-    with pytest.raises(InputFileError, match=rf"1 to 2, got {version!r}; .*update this one"):
+    with pytest.raises(InputFileError, match=rf"must be 2, got {version!r}; .*update this one"):
         read_result(run)

@@ -175,17 +175,6 @@ def test_what_is_not_certified_says_so(target: Target, flowed: EscherTile) -> No
     assert "Not certified: it <overlaps> itself." in page.words
 
 
-def test_after_a_search_for_both_the_page_says_what_for(
-    target: Target, bent: EscherTile, flowed: EscherTile
-) -> None:
-    both = [replace(bent, front=True), replace(flowed, front=False)]
-    page = Page(index_page(both, target, ["IH4", "IH6"]))
-    assert "found for likeness: no other here beats it in both" in page.words
-    assert "found for overlap: near the best" in page.words
-    assert {"href": "front.png"} in page.all("a")
-    assert {"href": "front.png"} not in Page(index_page([bent], target, ["IH4"])).all("a")
-
-
 def test_figures_are_those_that_were_taken(
     target: Target, bent: EscherTile, flowed: EscherTile
 ) -> None:
@@ -218,7 +207,7 @@ def test_an_overview_of_a_long_silhouette(flowed: EscherTile, wide: float) -> No
 
 
 def test_the_page_is_one_of_the_files_of_a_run(tmp_path: Path) -> None:
-    (tmp_path / "result.json").write_text('{"schema_version": 1, "tiles": [{"class": "IH4"}]}')
+    (tmp_path / "result.json").write_text('{"schema_version": 2, "tiles": [{"class": "IH4"}]}')
     known = written_files(tmp_path)
     assert {"index.html", "overview.png", "IH4/field.png", "IH4/tiling.png"} <= known
     assert folder_names(["IH4", "IH4"]) == ["IH4", "IH4-2"]

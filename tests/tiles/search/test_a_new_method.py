@@ -10,7 +10,6 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import FourierField
 from orbiflow.runtime import Cancel
 from orbiflow.tiles import (
     CLASSES,
@@ -22,8 +21,8 @@ from orbiflow.tiles import (
     escherize,
     report,
 )
-from orbiflow.tiles.search import BothSearch, Goal, SearchMethod
-from orbiflow.tiles.search.candidates import OnProgress, StillTiles, waves
+from orbiflow.tiles.search import Goal, SearchMethod
+from orbiflow.tiles.search.candidates import OnProgress, StillTiles
 from orbiflow.tiles.search.starts import template_starts
 from orbiflow.tiles.tilings import IsohedralClass
 from outlines import searched
@@ -66,7 +65,7 @@ def blas_threads() -> list[int]:
 
 
 def test_no_part_of_it_shares_its_work_among_threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    # the measure of a search for both was outside: two threads took ten times as long as one
+    # two threads of linear algebra took ten times as long as one
     threads: list[int] = []
 
     def told(name: str) -> None:
@@ -78,12 +77,12 @@ def test_no_part_of_it_shares_its_work_among_threads(monkeypatch: pytest.MonkeyP
 
         monkeypatch.setattr(TemplateSearch, name, part)
 
-    for name in ("sketch", "fit", "least_neck", "finish"):
+    for name in ("sketch", "fit", "least_neck"):
         told(name)
     with threadpool_limits(2, user_api="blas"):
         assert set(blas_threads()) == {2}
         escherize(BOOT, EscherizeSettings(classes=("IH4",)), method=TemplateSearch())
-    assert len(threads) >= 4
+    assert len(threads) >= 3
     assert set(threads) == {1}
 
 
@@ -91,21 +90,15 @@ def test_what_it_does_not_take_is_refused() -> None:
     pins = Pins.at(BOOT, [(0.2, 0.2)])
     with pytest.raises(OrbiflowError, match="pins"):
         searched(BOOT, ["IH4"], TemplateSearch(), pins=pins)
-    with pytest.raises(OrbiflowError, match="fits twice"):
-        BothSearch().fit(Goal(BOOT), CLASSES["IH4"])
 
 
 @pytest.mark.parametrize("name", CLASSES)
 def test_tiles_that_no_flow_moves_are_those_of_a_flow_of_zero(name: str) -> None:
     kind = CLASSES[name]
-    assert waves(kind.group()) == FourierField(kind.group(), 1).size
     still = StillTiles(kind, template_starts(kind, turns=3, stretch=0.2))
     for index in (0, still.size - 1):
         tile, own = still.finished(index)
         other, flow = still.as_model().finished(index)
         assert np.abs(tile.polygon - other.polygon).max() < 1e-15
-        assert own.settings == flow.settings
-        assert list(own.arrays) == list(flow.arrays)
-        for key, array in own.arrays.items():
-            assert array.shape == flow.arrays[key].shape
-            assert np.array_equal(array, flow.arrays[key])
+        assert (own.has_flow, flow.has_flow) == (False, True)
+        assert own.arrays == {}

@@ -11,7 +11,6 @@ from PIL import Image
 
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.fields import FourierField
 from orbiflow.runtime import Note
 from orbiflow.symmetry import wallpaper_group
 from orbiflow.tiles import (
@@ -31,7 +30,6 @@ from orbiflow.tiles import (
 )
 from orbiflow.tiles.geometry import subdivided
 from orbiflow.tiles.operations import classes
-from orbiflow.tiles.search.candidates import waves
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
 from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.overlap_search import OverlapSearch
@@ -132,11 +130,6 @@ def test_a_vertex_that_is_moved_by_a_millionth_is_refused(name: str) -> None:
     ahead = polygon[middle + 1] - polygon[middle - 1]
     polygon[middle] += 1e-6 * np.array([-ahead[1], ahead[0]]) / np.linalg.norm(ahead)
     assert not certify(Tile(polygon, tile.group)).valid
-
-
-def test_the_parameters_of_the_least_fields_are_counted() -> None:
-    for kind in ISOHEDRAL_TYPES.values():
-        assert waves(kind.group()) == FourierField(kind.group(), 1).size
 
 
 @pytest.mark.parametrize("name", SYMMETRIC)

@@ -12,9 +12,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Cancelled, ClassFailed, Event, Preview, Progress, TileFound
 from orbiflow.tiles import (
     CLASSES,
-    BothSearch,
     ClassFailure,
-    EscherizeSettings,
     EscherTile,
     LikenessSearch,
     OccupancySearch,
@@ -256,52 +254,6 @@ def test_settings_of_no_method_are_refused(wrong: object) -> None:
         escherize(TARGET, method=wrong)  # pyright: ignore[reportArgumentType]
     with pytest.raises(OrbiflowError, match="the target must be a Target"):
         escherize("turtle.png")  # pyright: ignore[reportArgumentType]
-
-
-@pytest.mark.usefixtures("hasty_measure")
-def test_of_both_objectives_one_may_fail() -> None:
-    bar = Target.from_polygon([[0, 0], [60, 0], [60, 1], [0, 1]])
-    likeness = LikenessSearch(
-        placements=20, held=4, starts=1, finalists=1, rounds=4, multiples=(2,)
-    )
-    alone = escherize_class(bar, "IH7", likeness)
-    assert isinstance(alone, ClassFailure)
-    both = escherize_class(bar, "IH7", BothSearch(likeness, BRIEF))
-    assert isinstance(both, EscherTile)
-    assert {tile.objective for tile in both.family()} == {"overlap"}
-    assert all(tile.deformation is not None for tile in both.family())
-
-
-@pytest.mark.usefixtures("hasty_measure")
-def test_both_objectives_give_a_short_list_likeness_first() -> None:
-    likeness = LikenessSearch(
-        placements=20, held=6, starts=4, finalists=3, rounds=4, multiples=(2,)
-    )
-    settings = BothSearch(likeness, BRIEF)
-    events: list[Event] = []
-    own = EscherizeSettings(classes=("IH6", "IH7"))
-    search = escherize(SQUIRREL, own, method=settings, on_event=events.append)
-    results, found = search.tiles, search.found
-    assert not search.failures
-    shares = [event.share for event in events if isinstance(event, Progress)]
-    assert shares == sorted(shares)
-    assert shares[-1] <= 1
-    objectives = [r.objective for r in results]
-    assert objectives == sorted(objectives)  # alphabet is on our side
-    assert set(objectives) == {"likeness", "overlap"}
-    for kind in ("likeness", "overlap"):
-        scores = [r.score for r in results if r.objective == kind]
-        assert scores == sorted(scores, reverse=True)
-    assert len(found) >= len(results)
-    places = [(r.deformation or 0.0, r.metrics.iou) for r in found]
-    for r in results:
-        assert r.deformation is not None
-        beaten = any(d < r.deformation and iou > r.metrics.iou for d, iou in places)
-        assert r.front == (not beaten)
-        assert r.certificate.valid
-    assert results[objectives.index("overlap")].deformation != 0
-    alike = mutual_iou([r.normal_tile.polygon for r in results])
-    assert all(alike(i, j) < 0.9 for i in range(len(results)) for j in range(i))
 
 
 @pytest.mark.parametrize(

@@ -122,10 +122,8 @@ def report_from_json(document: Mapping[str, Any]) -> FitReport:
             Refinement(**stage | {k: _figures(stage[k]) for k in ("train", "validation")})
             for stage in values.pop("stages")
         )
-        evidence = values.pop("components" if "components" in values else "parts")  # version 0.1
-        components = tuple(ComponentEvidence(**entry) for entry in evidence)
+        components = tuple(ComponentEvidence(**entry) for entry in values.pop("components"))
         repeats = values.pop("repeats")
-        values.pop("shares", None)  # version 0.1 wrote them without names
         return FitReport(
             stages=stages,
             components=components,
@@ -138,9 +136,9 @@ def report_from_json(document: Mapping[str, Any]) -> FitReport:
 
 def _repeats_from(document: Mapping[str, Any]) -> Repeats:
     values: dict[str, Any] = dict(document)
-    for name in ("spread", "columns"):  # which version 0.1 did not write
-        values[name] = tuple(values.get(name, ()))
-    values["heaps"] = tuple(heap and Heap(*heap) for heap in values.get("heaps", ()))
+    for name in ("spread", "columns"):
+        values[name] = tuple(values[name])
+    values["heaps"] = tuple(heap and Heap(*heap) for heap in values["heaps"])
     return Repeats(**values)
 
 

@@ -184,8 +184,6 @@ def _write_words(
         pen.text((left, below + 76 + 32 * k), line, INK, font(_WORDS), anchor="ls")
     words = f"{result.isohedral_class} ({result.group_name}), "
     words += "certified" if valid else "NOT CERTIFIED"
-    if result.front is not None:
-        words += f", for {result.objective}"
     colour = FAINT if valid else WARNING
     under = below + 80 + 32 * len(lines)
     pen.text((left, under), words, colour, font(_WORDS), anchor="ls")

@@ -64,7 +64,6 @@ def index_page(
         read=read,
         marks=(OUTLINE, LEFT_OUT, FILLED),
         silhouette=_silhouette(target),
-        compared=any(result.front is not None for result in results),
         notes=target.notes,
         remarks=[text for text in (rounded_for(results), results and why_poor(results[0])) if text],
         tiles=tiles,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 from orbiflow.arguments import as_instance, as_path
@@ -27,7 +27,6 @@ from orbiflow.tiles.pictures import (
     PrintedPicture,
     bending_picture,
     comparison,
-    front_png,
     overlay_picture,
     tile_svg,
     tiling_picture,
@@ -47,8 +46,8 @@ FIGURE_FILES = ("tiling.pdf", "overlay.pdf", *FIELD_FILES)
 
 def figure_files(result: EscherTile) -> tuple[str, ...]:
     """Return the `FIGURE_FILES` of a tile: there is no flow where the silhouette bent into the tile."""
-    likeness = result.objective == "likeness"
-    return tuple(file for file in FIGURE_FILES if not (likeness and file in FIELD_FILES))
+    flows = result.map is not None and result.map.has_flow
+    return tuple(file for file in FIGURE_FILES if flows or file not in FIELD_FILES)
 
 
 def write_tile_folder(
@@ -99,7 +98,7 @@ def write_tile_folder(
     return [write_atomic(folder / name, contents[name]()) for name in names]
 
 
-OVERVIEW, INDEX, FRONT, READ = "overview.png", "index.html", "front.png", "read.png"
+OVERVIEW, INDEX, READ = "overview.png", "index.html", "read.png"
 # what was read for a search that has not replaced an earlier run yet
 READ_NEXT = "read-next.png"
 
@@ -107,7 +106,7 @@ READ_NEXT = "read-next.png"
 def write_gallery(
     result: SearchResult, out: Path, *, figures: bool = False, shown_out: str = "."
 ) -> None:
-    """Write each tile's folder, `overview.png`, `index.html` and, after a search for both, `front.png`.
+    """Write each tile's folder, `overview.png` and `index.html`.
 
     As many processes as searched draw `figures`; without these, starting one would take longer than
     drawing. There is at least one tile. `shown_out` is what the page's commands call the folder.
@@ -132,8 +131,6 @@ def write_gallery(
     read, more = (out / READ).is_file(), {"failures": failures, "figures": extra}
     page = index_page(tiles, target, names, out=shown_out, read=read, colours=colours, **more)
     write_atomic(out / INDEX, page)
-    if result.method.objective == "both":
-        _write_front(tiles, result.found, out)
 
 
 def _draw(
@@ -142,16 +139,6 @@ def _draw(
     """Write the folder of one tile; this may run in a worker process."""
     tile, colours, folder = item
     write_tile_folder(tile, target, folder, colours=colours, figures=figures)
-
-
-def _write_front(tiles: Sequence[EscherTile], found: Sequence[EscherTile], out: Path) -> None:
-    """Write the listed tiles among all that were found, by deformation and overlap."""
-    listed = {id(tile.tile) for tile in tiles}
-    known = [tile for tile in (*found, *tiles) if tile.deformation is not None]
-    if known:
-        others = [tile for tile in known if id(tile.tile) not in listed]
-        chosen = [tile for tile in tiles if tile.deformation is not None]
-        write_atomic(out / FRONT, front_png(chosen, others))
 
 
 def written_files(folder: Path) -> set[str]:
@@ -167,10 +154,9 @@ def written_files(folder: Path) -> set[str]:
         ours, classes = False, []
     if not ours:
         return {READ} if is_read_png(folder / READ) else set()
-    front = {FRONT} if document.get("objective") == "both" else set()
     files = (*TILE_FILES, *FIGURE_FILES)
     inside = {f"{name}/{file}" for name in folder_names(classes) for file in files}
-    return {RESULT, OVERVIEW, INDEX, READ, READ_NEXT} | front | inside
+    return {RESULT, OVERVIEW, INDEX, READ, READ_NEXT} | inside
 
 
 def result_folder(out: str | Path) -> ResultFolder:
@@ -233,7 +219,7 @@ def write_run(
         (folder.path / READ_NEXT).unlink(missing_ok=True)
         return []
     if tiles and figures and not any(FIELD_FILES[0] in figure_files(tile) for tile in tiles):
-        on_event(Note("no flow made these tiles, so there is none to draw: the silhouette bent"))
+        on_event(Note("no flow made these tiles, so there is none to draw"))
     with folder.replaced() as staged:
         if picture:
             write_atomic(staged / READ, picture)

@@ -1,4 +1,3 @@
-from .front import front_png as front_png
 from .overlays import RAMP as RAMP
 from .overlays import bending_picture as bending_picture
 from .overlays import bending_raster as bending_raster

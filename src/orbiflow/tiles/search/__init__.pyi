@@ -1,6 +1,5 @@
 from .bent_map import carried_on as carried_on
 from .bent_map import matched as matched
-from .both_search import BothSearch as BothSearch
 from .candidates import Fit as Fit
 from .descent import fit_descent as fit_descent
 from .escherize_settings import EscherizeSettings as EscherizeSettings

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError
-from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles.geometry import kept_vertices, plane_points, subdivided
 from orbiflow.tiles.search.tile_space import NearestTiles
 from orbiflow.tiles.tile import TileMap
@@ -193,12 +193,30 @@ def _simplified(curve: Array, tolerance: float) -> Array:
 OnProgress = Callable[[float, float], None]
 """Called with the share of the work done and the best loss so far."""
 
-# Names under which the arrays of a map hold the start tile, if it is not the template
-VERTICES, CORNERS = "prototile.outline", "prototile.corners"
-
 
 def silent(_share: float, _loss: float) -> None:
     """Report no progress."""
+
+
+class Candidates(ABC):
+    """Tiles of one class that are not certified yet."""
+
+    @property
+    @abstractmethod
+    def size(self) -> int:
+        """The number of candidates."""
+
+    @abstractmethod
+    def finished(self, index: int, *, force: bool = False) -> tuple[Tile, TileMap]:
+        """Return the polygon of a candidate with its group, and the flow that made it, if one did.
+
+        Raises:
+            CertificationError: if it has folded, unless `force` is set.
+        """
+
+    @abstractmethod
+    def as_model(self) -> TileModel:
+        """Return the candidates as a torch module, to be trained."""
 
 
 class Fit(NamedTuple):
@@ -211,7 +229,7 @@ class Fit(NamedTuple):
     - `bent`: After a search for likeness, the bent silhouette of each finalist.
     """
 
-    candidates: StillTiles | TileModel
+    candidates: Candidates
     starts: int
     crossed: int
     enough: int
@@ -223,30 +241,8 @@ class Fit(NamedTuple):
         return self.candidates.as_model()
 
 
-STEPS = 8  # integration steps with which a flow's polygon is first computed
-
-
-def waves(group: CrystallographicGroup) -> int:
-    """Return the number of parameters of a symmetric field of frequency 1, without torch.
-
-    It is the trace of the mean over the group, which projects on the symmetric fields.
-
-    >>> from orbiflow.symmetry import wallpaper_group
-    >>> waves(wallpaper_group("p4"))
-    4
-    """
-    box = np.indices((3,) * group.dim).reshape(group.dim, -1).T - 1
-    images = np.unique(np.concatenate([box @ part for part in group.integral_parts]), axis=0)
-    trace = 0.0
-    for element, part in zip(group.cosets, group.integral_parts, strict=True):
-        still = images[(images @ part == images).all(axis=1)]
-        phase = 2 * np.pi * still @ group.inverse_lattice @ element.translation
-        trace += float(np.cos(phase).sum() * np.trace(element.linear))
-    return round(trace / group.order)
-
-
 @dataclass(frozen=True, eq=False)
-class StillTiles:
+class StillTiles(Candidates):
     """Start tiles as candidates: no flow moves them, and torch is not needed."""
 
     kind: IsohedralClass
@@ -258,46 +254,26 @@ class StillTiles:
         return len(self.prototiles)
 
     def finished(self, index: int, *, force: bool = False) -> tuple[Tile, TileMap]:
-        """Return the polygon of a candidate with its group, and a flow that stays where it is."""
-        own, steps = self.prototiles.take([index]), STEPS
-        vertices, corners, offset = own.vertices[0], own.corners[0], own.offset[0]
-
-        def moved(points: Array) -> Array:
-            nonlocal steps  # what a flow's convergence costs, for the record
-            steps *= 2
-            return points
-
+        """Return the polygon of a candidate with its group, and a map without a flow."""
+        own = self.prototiles.take([index])
         c, s = np.cos(own.angle[0]), np.sin(own.angle[0])
         sign = -1.0 if own.mirrored[0] else 1.0
         turn = np.exp(own.log_scale[0]) * np.array([[c, -s * sign], [s, c * sign]])
         # einsum rounds each product, as torch does for a flow's tile; matmul does not
         linear = np.einsum("ij,jk->ik", turn, self.kind.stretch(own.stretch[0]))
         tile = simplest_tile(
-            self.kind, vertices, corners.tolist(), linear, offset, moved=moved, force=force
+            self.kind,
+            own.vertices[0],
+            own.corners[0].tolist(),
+            linear,
+            own.offset[0],
+            moved=lambda points: points,
+            force=force,
         )
-        settings = {
-            "class": self.kind.name,
-            "max_frequency": 1,
-            "segments": 1,
-            "smoothness": 0.0,
-            "steps": steps,
-            "method": "rk4",
-            "mirrored": bool(own.mirrored[0]),
-        }
-        arrays = {
-            "angle": own.angle[0],
-            "log_scale": own.log_scale[0],
-            "offset": offset,
-            "shape": np.zeros(self.kind.shape_dim),
-            "stretch": own.stretch[0],
-            "flow.segments.0.parameters_": np.zeros(waves(self.kind.group())),
-            VERTICES: vertices,
-            CORNERS: corners,
-        }
-        return tile, TileMap(settings, {name: np.array(a) for name, a in arrays.items()})
+        return tile, TileMap()
 
     def as_model(self) -> TileModel:
-        """Return the candidates as a torch module, with a field of frequency 1 that is zero."""
+        """Return the candidates as a torch module, to be trained: its field is zero."""
         from orbiflow.tiles.search.tile_model import TileModel
 
         own = self.prototiles

@@ -44,12 +44,9 @@ class SearchSettings(Settings, group="Search"):
     effort: Annotated[Literal["fast", "normal", "best"], OnlyWith(method="descent")] = "normal"
     """How long the search takes: seconds, a quarter of a minute, or minutes."""
 
-    objective: Annotated[Literal["likeness", "overlap", "both"], OnlyWith(method="descent")] = (
-        "likeness"
-    )
+    objective: Annotated[Literal["likeness", "overlap"], OnlyWith(method="descent")] = "likeness"
     """With likeness, the silhouette bends until it is a tile, and every limb is kept. With overlap,
-    the tile covers the silhouette as it is. With both, the result is a short list of the best
-    compromises."""
+    the tile covers the silhouette as it is."""
 
     method: Literal["descent", "occupancy"] = "descent"
     """The descent, or the paper's occupancy loss for comparison."""
@@ -63,7 +60,7 @@ class SearchSettings(Settings, group="Search"):
     max_frequency: Annotated[
         int | None,
         Range(0, 60),
-        OnlyWith(objective=("overlap", "both")),
+        OnlyWith(objective="overlap"),
         OVERLAP,
         DefaultText("10, or 15 for effort best"),
     ] = None
@@ -91,7 +88,6 @@ class SearchSettings(Settings, group="Search"):
     @property
     def search_method(self) -> SearchMethod:
         """The method that is asked for: with what is set here, and otherwise its own defaults."""
-        from orbiflow.tiles.search.both_search import BothSearch
         from orbiflow.tiles.search.likeness_search import LikenessSearch
         from orbiflow.tiles.search.overlap_search import OccupancySearch, OverlapSearch
 
@@ -99,11 +95,7 @@ class SearchSettings(Settings, group="Search"):
             return OccupancySearch(**self._shared(OccupancySearch))
         if self.objective == "overlap":
             return OverlapSearch.for_effort(self.effort, **self._shared(OverlapSearch))
-        likeness = LikenessSearch.for_effort(self.effort, **self._shared(LikenessSearch))
-        if self.objective == "likeness":
-            return likeness
-        overlap = OverlapSearch.for_effort(self.effort, **self._shared(OverlapSearch))
-        return BothSearch(likeness, overlap)
+        return LikenessSearch.for_effort(self.effort, **self._shared(LikenessSearch))
 
     def _shared(self, kind: type[Any]) -> dict[str, Any]:
         """The settings that a method has, too."""
@@ -124,7 +116,7 @@ class EscherizeSettings(SearchSettings, group="Search"):
     pin: Annotated[
         tuple[str, ...] | None,
         Repeated(),
-        OnlyWith(method="descent", objective=("likeness", "both")),
+        OnlyWith(method="descent", objective="likeness"),
         LIKENESS,
     ] = None
     """A part that keeps its shape while the rest bends: x,y or x,y,radius in the coordinates of the

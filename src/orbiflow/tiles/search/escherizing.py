@@ -48,10 +48,8 @@ class SearchResult:
     """What a search found.
 
     - `target`: The silhouette.
-    - `tiles`: Certified tiles, best first, with their ratings; after a search for both those for
-      likeness come first.
+    - `tiles`: Certified tiles, best first, with their ratings.
     - `failures`: The classes that gave none, and why.
-    - `found`: All tiles that were found, those that are not listed among them.
     - `method`: The method that was used, with its settings.
     - `emphasis`, `pins`: What had to survive, and what did not bend.
     - `seconds`: How long it took.
@@ -63,7 +61,6 @@ class SearchResult:
     target: Target
     tiles: Sequence[EscherTile] = ()
     failures: Sequence[ClassFailure] = ()
-    found: Sequence[EscherTile] = ()
     method: SearchMethod = field(default_factory=lambda: LikenessSearch.for_effort("normal"))
     emphasis: Emphasis | None = None
     pins: Pins | None = None
@@ -134,13 +131,13 @@ def escherize(
         on_event(Note(_told(near, names)))
     workers = min(settings.workers or 1, len(names))
     shown = None if on_tile is None else _rating(on_tile, target)
-    record = Record(names, on_event, shown, most=method.shown(settings.per_class))
+    record = Record(names, on_event, shown, most=settings.per_class)
     with contextlib.suppress(Cancelled):
         _search_by_levels(task, names, workers, record, cancel)
     tiles, failures, left = record.finish()
-    tiles, seconds = method.short_list(tiles), time.perf_counter() - begin
+    seconds = time.perf_counter() - begin
     return SearchResult(
-        target, tiles, failures, record.found, method, emphasis, pins, seconds, workers, left, near
+        target, tiles, failures, method, emphasis, pins, seconds, workers, left, near
     )
 
 
@@ -324,39 +321,28 @@ def _work_on(
 def _outcome(task: _Task, kind: IsohedralClass, progress: OnProgress, cancel: Cancel) -> Outcome:
     """Return the best certified tile of a class, which holds the others, or why there is none."""
     begin = time.perf_counter()
-    chosen: list[EscherTile] = []
-    reasons: list[str] = []
-    done = 0.0
-    for share, method in task.method.parts():
-
-        def told(own: float, loss: float, done: float = done, share: float = share) -> None:
-            progress(done + share * own, loss)
-
-        try:
-            chosen += _chosen_tiles(task, kind, method, told, cancel)
-        except CertificationError as error:  # the other part may give one
-            reasons.append(str(error))
-        done += share
-    if not chosen:
-        return ClassFailure(kind.name, "; ".join(dict.fromkeys(reasons)))
+    try:
+        chosen = _chosen_tiles(task, kind, progress, cancel)
+    except CertificationError as error:
+        return ClassFailure(kind.name, str(error))
     seconds = time.perf_counter() - begin
     best, *others = (tile.changed(seconds=seconds) for tile in chosen)
     return best.changed(others=tuple(others))
 
 
 def _chosen_tiles(
-    task: _Task, kind: IsohedralClass, method: SearchMethod, progress: OnProgress, cancel: Cancel
-) -> Sequence[EscherTile]:
-    """Return the tiles of one fit that are shown, best first, no two of them alike.
+    task: _Task, kind: IsohedralClass, progress: OnProgress, cancel: Cancel
+) -> list[EscherTile]:
+    """Return the tiles of a class that are shown, best first, no two of them alike.
 
     They are those of the first goal that has some.
 
     Raises:
         CertificationError: If none has, with the first one's reason.
     """
-    count = task.method.shown(task.per_class)
+    method, count = task.method, task.per_class
 
-    def found(goal: Goal, share: float) -> Sequence[EscherTile]:
+    def found(goal: Goal, share: float) -> list[EscherTile]:
         fit = method.fit(goal, kind, count, progress, cancel)
         tiles = best_tiles(
             goal.target,
@@ -366,9 +352,8 @@ def _chosen_tiles(
             original=task.goal.target,
             smoothed=share,
         )
-        chosen = [tiles[k] for k in without_twins(tiles, count)]
         cancel.check()
-        return task.method.finish(chosen, goal)
+        return [tiles[k] for k in without_twins(tiles, count)]
 
     # many small systems: several threads would wait for each other, ten times as long as they work
     with one_thread(), one_blas_thread():

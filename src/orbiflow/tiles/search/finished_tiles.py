@@ -6,7 +6,6 @@ import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -26,12 +25,9 @@ from orbiflow.tiles.likeness import (
 )
 from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
-from orbiflow.tiles.search.candidates import Fit, StillTiles
+from orbiflow.tiles.search.candidates import Candidates, Fit
 from orbiflow.tiles.silhouette import Target, is_hopeless
 from orbiflow.tiles.tile import EscherTile
-
-if TYPE_CHECKING:
-    from orbiflow.tiles.search.tile_model import TileModel
 
 # How a target is made, for messages
 HOW = "Target.read, Target.from_mask and Target.from_polygon make one"
@@ -183,7 +179,7 @@ def rounded_for(tiles: Sequence[EscherTile]) -> str:
 
 
 def certified_tiles(
-    target: Target, found: Fit | StillTiles | TileModel, *, force: bool = False
+    target: Target, found: Fit | Candidates, *, force: bool = False
 ) -> list[EscherTile]:
     """Return polygons of what was fitted to a target, each proved to tile the plane, best first.
 
@@ -197,11 +193,8 @@ def certified_tiles(
         CertificationError: if none of them is certified and `force` is not set.
     """
     as_instance(target, Target, "the target", HOW)
-    if not isinstance(found, Fit):
-        if not hasattr(found, "finished"):
-            as_instance(
-                found, Fit, "what was found", "fit_tile gives a Fit, load_model a TileModel"
-            )
+    if isinstance(found, Candidates):
         found = Fit(found, found.size, 0, found.size)
+    as_instance(found, Fit, "what was found", "fit_tile gives a Fit, load_model a TileModel")
     with one_thread(), one_blas_thread():
         return best_tiles(target, found, force=force)

@@ -10,7 +10,7 @@ from orbiflow.arguments import refusal
 from orbiflow.errors import CertificationError
 from orbiflow.runtime import NEVER, Cancel, one_thread
 from orbiflow.settings import Range, Settings
-from orbiflow.tiles.search.candidates import Fit, OnProgress
+from orbiflow.tiles.search.candidates import Fit, OnProgress, StillTiles
 from orbiflow.tiles.search.escherize_settings import Count, Seed
 from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS, Goal, SearchMethod
 from orbiflow.tiles.tilings import CLASSES, ISOHEDRAL_TYPES, IsohedralClass
@@ -130,7 +130,6 @@ class OverlapSearch(Settings, SearchMethod):
     def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:
         """Return the tiles nearest to the outline."""
         from orbiflow.tiles.search.starts import outline_starts
-        from orbiflow.tiles.search.tile_model import TileModel
 
         if self.starts != "outline":
             return super().sketch(goal, kind, cancel)
@@ -143,7 +142,7 @@ class OverlapSearch(Settings, SearchMethod):
         own = outline_starts(goal.target, kind, **few, cancel=cancel).prototiles
         if not len(own):
             raise CertificationError("no tile near the outline is simple")
-        return Fit(TileModel(kind, max_frequency=1, steps=1, prototiles=own), len(own), 0, 1)
+        return Fit(StillTiles(kind, own), len(own), 0, 1)
 
     def prepare(self, goal: Goal) -> None:
         """Draw the silhouette's soft edge."""

@@ -128,10 +128,6 @@ class SearchMethod(ABC):
         """Return the width of necks below which scores fall, in square roots of the area."""
         return 0.0
 
-    def parts(self) -> Sequence[tuple[float, SearchMethod]]:
-        """Return the methods that are used in turn for each class, each with its share of the work."""
-        return [(1.0, self)]
-
     def levels(self) -> Sequence[tuple[float, SearchMethod]]:
         """Return methods that find more and more, each with its share of the work.
 
@@ -140,25 +136,9 @@ class SearchMethod(ABC):
         """
         return [(0.05, Sketches(self)), (0.95, self)]
 
-    def shown(self, per_class: int) -> int:
-        """Return how many tiles of a class each part keeps."""
-        return per_class
-
     def in_order(self, names: Sequence[str]) -> list[str]:
         """Return classes in the order in which worker processes take them: the longest first."""
         return sorted(names, key=lambda name: -isohedral_class(name).stretch_dim)
-
-    def finish(
-        self,
-        tiles: Sequence[EscherTile],
-        goal: Goal,  # noqa: ARG002
-    ) -> Sequence[EscherTile]:
-        """Return one part's certified tiles of a class with whatever else is to be measured."""
-        return tiles
-
-    def short_list(self, tiles: Sequence[EscherTile]) -> list[EscherTile]:
-        """Return which of all tiles the search gives, in order."""
-        return list(tiles)
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ import numpy as np
 
 from orbiflow.runtime import ClassFailed, Preview, Progress, Sink, TileFound
 from orbiflow.tiles.likeness import diverse, mutual_iou
-from orbiflow.tiles.search.both_search import ALIKE
 from orbiflow.tiles.search.finished_tiles import ClassFailure
 from orbiflow.tiles.tile import EscherTile
 
+ALIKE = 0.9  # mutual IoU from which two tiles are one to the eye
 INTERRUPTED = "interrupted"  # the reason given for a class that was left undone
 Outcome = EscherTile | ClassFailure
 OnTile = Callable[[EscherTile, str], object]
@@ -51,12 +51,6 @@ class Record:
         self._done, self._last = 0.0 if self._last else self._done + self._share, last
         self._share = share
         return self
-
-    @property
-    def found(self) -> list[EscherTile]:
-        """All tiles of the classes that have an outcome."""
-        best = [found for found in self.outcomes.values() if isinstance(found, EscherTile)]
-        return [tile for first in best for tile in first.family()]
 
     def first_look(self, tile: EscherTile) -> None:
         """Keep a tile that the search is going to improve on."""
@@ -107,7 +101,7 @@ class Record:
             self.on_event(TileFound(found.name, iou, found.score, certified))
 
     def finish(self) -> tuple[list[EscherTile], list[ClassFailure], frozenset[str]]:
-        """Return tiles, best first, those for likeness before those for overlap; failures; who is left.
+        """Return tiles, best first; failures; who is left.
 
         Of a class that is left, a first look is its tile.
         """
@@ -117,9 +111,11 @@ class Record:
             first = self.firsts.get(name)
             sound = isinstance(first, EscherTile)
             self.outcome(first if sound else ClassFailure(name, INTERRUPTED), 0.0)
-        tiles = self.found
-        tiles.sort(key=lambda t: (t.objective != "likeness", -t.score, names.index(t.name)))
-        failures = [found for found in self.outcomes.values() if isinstance(found, ClassFailure)]
+        outcomes = self.outcomes.values()
+        best = [found for found in outcomes if isinstance(found, EscherTile)]
+        tiles = [tile for first in best for tile in first.family()]
+        tiles.sort(key=lambda tile: (-tile.score, names.index(tile.name)))
+        failures = [found for found in outcomes if isinstance(found, ClassFailure)]
         return tiles, failures, frozenset(left)
 
 

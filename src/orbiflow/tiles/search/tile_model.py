@@ -17,11 +17,11 @@ from torch import Tensor, nn
 
 from orbiflow.arguments import as_array, as_instance, as_number, as_whole, is_a
 from orbiflow.arrays import Array
-from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.tiles.search.candidates import CORNERS, VERTICES, Prototiles, simplest_tile
+from orbiflow.tiles.search.candidates import Candidates, Prototiles, simplest_tile
 from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS
 from orbiflow.tiles.silhouette import Bending, Frame
 from orbiflow.tiles.tile import TileMap, naming_file
@@ -29,8 +29,12 @@ from orbiflow.tiles.tilings import IsohedralClass, Tile
 from orbiflow.tiles.tilings import isohedral_class as class_of
 from orbiflow.typed_torch import linalg, listed
 
+# Names under which the arrays of a map hold the start tile, if it is not the template
+VERTICES, CORNERS = "prototile.outline", "prototile.corners"
+NO_FLOW = "no flow made this tile, so there is no model of it; a search for overlap has one"
 
-class TileModel(nn.Module):
+
+class TileModel(nn.Module, Candidates):
     """A stack of S candidate tiles of one isohedral class, in the target's normal form.
 
     The flow commutes with the class's group in the group's own frame; the lattice freedom L and the
@@ -359,6 +363,8 @@ def as_map(model: TileModel, frame: Frame | None = None, bending: Bending | None
 
 def as_model(stored: TileMap) -> TileModel:
     """Return the model again, float64, one candidate, in the target's normal form."""
+    if not stored.has_flow:
+        raise OrbiflowError(NO_FLOW)
     settings, arrays = stored.settings, stored.arrays
     # before anything is built: each segment takes time and memory
     segments = sum(name.startswith("flow.") for name in arrays)
@@ -394,9 +400,11 @@ def load_model(path: str | Path) -> TileModel:
     """Read the flow of a `model.safetensors`: one candidate, float64, in the target's normal form.
 
     Raises:
-        InputFileError: for a file that is missing, too large or not such a model.
+        InputFileError: for a file that is missing, too large or not such a model, or without a flow.
     """
     stored = TileMap.read(path)
+    if not stored.has_flow:
+        raise InputFileError(f"{path}: {NO_FLOW}")
     with naming_file(path):
         return as_model(stored)
 
