@@ -235,7 +235,7 @@ def test_ten_thousand_projects_at_the_usual_limits(tmp_path: Path) -> None:
 
         for _ in range(10_000):
             sent.append([])
-            await app(scope, receive, send)
+            await app(dict(scope), receive, send)
         return sent
 
     with studio(tmp_path) as client:
