@@ -40,10 +40,10 @@ docs: $(VENV)/.installed-docs
 	$(BIN)/python -m sphinx -b html -W --keep-going -q docs out/site
 	@echo "open out/site/index.html"
 
-paper: $(VENV)/.installed
+paper: $(VENV)/.installed-all
 	$(BIN)/python -m reproduction --out out/paper
 
-gallery: $(VENV)/.installed
+gallery: $(VENV)/.installed-all
 	$(BIN)/python docs/gallery/make.py
 
 wheel:
@@ -57,10 +57,15 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 	$(PIP) -e '.[studio]'
 	touch $@
 
+$(VENV)/.installed-all: pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(PIP) -e '.[all]'
+	touch $@ $(VENV)/.installed
+
 $(VENV)/.installed-dev: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(PIP) -e '.[dev]'
-	touch $@ $(VENV)/.installed
+	touch $@ $(VENV)/.installed $(VENV)/.installed-all
 
 $(VENV)/.installed-docs: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)

@@ -8,8 +8,8 @@ loads no numerical library: a name is looked up when it is first used.
 'p2'
 """
 
-import lazy_loader
+from orbiflow.extras import door
 
 __version__ = "0.1.0"
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = door(__name__, __file__)

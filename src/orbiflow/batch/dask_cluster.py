@@ -21,6 +21,7 @@ from typing import Any, Self, TypeAlias
 from orbiflow import __version__
 from orbiflow.batch.executors import Answer, Executor, Parcel, carry_out
 from orbiflow.errors import OrbiflowError
+from orbiflow.extras import naming_extras
 from orbiflow.runtime import Cancel, Note, Polled, Sink, one_thread
 
 Client: TypeAlias = Any
@@ -58,12 +59,8 @@ class DaskCluster(Executor):
 
     def __enter__(self) -> Self:
         """Connect, if there is a scheduler with workers that have the same orbiflow."""
-        try:
+        with naming_extras("a Dask scheduler"):
             importlib.import_module("distributed")
-        except ImportError as error:
-            raise OrbiflowError(
-                "a Dask scheduler needs dask.distributed: pip install distributed"
-            ) from error
         try:
             self._client = _connected(self.address, self.timeout)
         except Exception as error:  # of many kinds, down to an AssertionError of its event loop

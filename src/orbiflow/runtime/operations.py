@@ -42,6 +42,7 @@ from typing import Any, Literal, ParamSpec, TypeVar, cast
 
 from orbiflow.arguments import as_instance, described, meant
 from orbiflow.errors import OrbiflowError, SettingError, literal
+from orbiflow.extras import naming_extras
 from orbiflow.runtime.events import (
     Cancel,
     Cancelled,
@@ -224,9 +225,9 @@ class Call:
 
         tell(Started(self.operation.name))
         try:
-            outcome = self.operation.function(
-                **self.arguments, on_event=tell, cancel=cancel or Cancel()
-            )
+            own = self.operation
+            with naming_extras(f"orbiflow {own.name}"):
+                outcome = own.function(**self.arguments, on_event=tell, cancel=cancel or Cancel())
         except Cancelled:
             tell(Finished("cancelled", {}))
             raise
@@ -345,7 +346,8 @@ def find(name: str) -> Operation:
         hint = meant(name, list(OPERATIONS)) or f"there are {', '.join(OPERATIONS)}"
         raise SettingError(f"unknown operation {literal(described(name))}; {literal(hint)}")
     module, function = place.split(":")
-    return getattr(import_module(module), function).operation
+    with naming_extras(f"orbiflow {name}"):
+        return getattr(import_module(module), function).operation
 
 
 def call_from_json(document: object) -> Call:

@@ -1,5 +1,5 @@
 """The studio: tiles and densities made in a browser, by a web server on this very machine."""
 
-import lazy_loader
+from orbiflow.extras import door
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = door(__name__, __file__)

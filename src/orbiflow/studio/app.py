@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from starlette.staticfiles import StaticFiles
 from orbiflow import __version__
 from orbiflow.drawing import PALETTES
 from orbiflow.errors import OrbiflowError
+from orbiflow.extras import MissingExtraError
 from orbiflow.runtime import find
 from orbiflow.studio import density_routes, picture_routes, project_routes, tile_routes
 from orbiflow.studio.animals import ANIMALS, animal_file
@@ -61,8 +62,9 @@ def create_app(
     async def lifespan(_app: Starlette) -> AsyncIterator[None]:
         hub.open(asyncio.get_running_loop())
         for kind in KINDS.values():  # no request waits for imports
-            find(kind.work)
-            find(kind.makes or kind.work)
+            with suppress(MissingExtraError):
+                find(kind.work)
+                find(kind.makes or kind.work)
         queue.start()
         settling = asyncio.create_task(_settle(store))
         yield

@@ -8,14 +8,15 @@ import socket
 import threading
 import webbrowser
 from contextlib import suppress
-from importlib.util import find_spec
+from importlib import import_module
 from pathlib import Path
 
 from orbiflow.errors import OrbiflowError, SettingError, literal
+from orbiflow.extras import naming_extras
 from orbiflow.runtime import NEVER, Cancel, Note, Outcome, Sink, ignore, make_folder, operation
 from orbiflow.studio.settings import StudioSettings
 
-EXTRA = ("starlette", "uvicorn", "platformdirs")
+PACKAGES = ("starlette", "uvicorn", "platformdirs")
 
 
 @operation("studio", starts_processes=True)
@@ -27,11 +28,9 @@ def studio(
     Projects are kept, and searches that were not done go on when the studio is started again. The
     server ends with Ctrl-C.
     """
-    missing = [name for name in EXTRA if find_spec(name) is None]
-    if missing:
-        raise OrbiflowError(
-            f"the studio needs {', '.join(missing)}; install them with: pip install 'orbiflow[studio]'"
-        )
+    with naming_extras("the studio"):
+        for name in PACKAGES:
+            import_module(name)
     token = "" if settings.is_local else secrets.token_urlsafe(24)
     folder = settings.data or _usual_folder()
 

@@ -12,7 +12,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, StreamingResponse
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import is_object
+from orbiflow.runtime import find, is_object
 from orbiflow.studio.guard import Refused
 from orbiflow.studio.kinds_of_work import kind_of_work
 from orbiflow.studio.project_file import ENDING, MOST_VIEW, write_project
@@ -36,6 +36,8 @@ async def create(request: Request, here: Studio) -> dict[str, Any]:
     kind = given.get("kind", "tile")
     if not isinstance(kind, str) or kind not in NAMES:
         raise OrbiflowError("a project is of kind tile or density")
+    if kind == "density":
+        find("density fit")  # what it needs may not be installed
     name = plain_name(given.get("name"), NAMES[kind])
     made = here.store.create(kind, name, here.limits.projects)
     return shown_project(here.store, here.store.project(made))

@@ -1,5 +1,5 @@
 """Isometries, crystallographic groups and their catalogue."""
 
-import lazy_loader
+from orbiflow.extras import door
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = door(__name__, __file__)

@@ -12,13 +12,8 @@ from numpy.typing import ArrayLike
 
 from orbiflow.arguments import as_path, described
 from orbiflow.arrays import Array
-from orbiflow.errors import (
-    GroupError,
-    InputFileError,
-    LatticeMismatchError,
-    OrbiflowError,
-    system_errors,
-)
+from orbiflow.errors import GroupError, InputFileError, LatticeMismatchError, system_errors
+from orbiflow.extras import naming_extras
 from orbiflow.symmetry.cells import cell_lattice, cell_parameters, fitting_cell
 from orbiflow.symmetry.group import CrystallographicGroup, checked_lattice
 from orbiflow.symmetry.group_symbols import find_hall, find_setting, settings_named
@@ -268,9 +263,5 @@ def cif_text(group: CrystallographicGroup, lattice: ArrayLike | None = None) -> 
 
 
 def _gemmi() -> Any:
-    try:
+    with naming_extras("reading names of space groups and CIFs"):
         return importlib.import_module("gemmi")
-    except ImportError as error:
-        raise OrbiflowError(
-            'space groups by name and CIFs need the package gemmi: pip install "orbiflow[crystals]"'
-        ) from error

@@ -1,5 +1,5 @@
 """Models of densities: push-forwards of a base, kernels, chains, networks and their mixtures."""
 
-import lazy_loader
+from orbiflow.extras import door
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = door(__name__, __file__)

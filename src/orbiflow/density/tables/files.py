@@ -29,7 +29,8 @@ from orbiflow.density.tables.table import (
     finished,
     quote,
 )
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.errors import InputFileError
+from orbiflow.extras import naming_extras
 
 MAX_BYTES = 2 * 2**30
 _MAGIC = {"npy": b"\x93NUMPY", "parquet": b"PAR1"}
@@ -272,10 +273,8 @@ def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
 @contextmanager
 def _parquet(path: Path) -> Generator[Any]:
     """Open a Parquet file; whatever goes wrong inside is its damage."""
-    try:
+    with naming_extras(f"{path}: reading Parquet"):
         arrow, parquet = map(importlib.import_module, ("pyarrow", "pyarrow.parquet"))
-    except ImportError as exc:
-        raise OrbiflowError(f"{path}: reading Parquet needs pyarrow: pip install pyarrow") from exc
     try:
         with parquet.ParquetFile(path) as file:
             yield file
