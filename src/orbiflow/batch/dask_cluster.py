@@ -271,7 +271,8 @@ def _threads(client: Client) -> int:
 
 def _serve(header: str, data: bytes) -> tuple[str, dict[str, bytes]]:
     """Carry out a parcel in a worker."""
-    importlib.import_module("torch")  # what is not imported cannot be limited
+    with suppress(ModuleNotFoundError):
+        importlib.import_module("torch")  # what is not imported cannot be limited
 
     keep_memory()
     with one_thread():

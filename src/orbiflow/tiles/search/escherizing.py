@@ -9,10 +9,10 @@ import platform
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from importlib.metadata import version
 from typing import Any, cast
 
 import numpy as np
+import scipy
 import shapely
 
 from orbiflow import __version__
@@ -379,8 +379,8 @@ def report(result: SearchResult) -> dict[str, Any]:
         "versions": {
             "orbiflow": __version__,
             "python": platform.python_version(),
-            "torch": version("torch"),
             "numpy": np.__version__,
+            "scipy": scipy.__version__,
             "shapely": shapely.__version__,
         },
         "timings": {
