@@ -17,7 +17,7 @@ from orbiflow.arguments import as_instance, as_whole, refusal
 from orbiflow.arrays import Array
 from orbiflow.density.data import (
     NAN_CURE,
-    as_data,
+    data_of,
     check_columns,
     is_angular,
     require_values,
@@ -157,7 +157,7 @@ class DensityEstimator:
         """
         del y
         settings = self.settings()
-        data, names = as_data(X)
+        data, names = data_of(self._space_name(), X)
         self.space_ = self._space_for(data, names)
         points = self._chart(data)
         if flow_obstacle(self.space_):
@@ -334,13 +334,16 @@ class DensityEstimator:
         given = {name: getattr(self, name) for name in names}
         return {name: v for name, v in given.items() if v != defaults[name].default}
 
+    def _space_name(self) -> str:
+        return self.space.name if isinstance(self.space, Space) else str(self.space)
+
     def _space_for(self, data: Array, names: tuple[str, ...] | None) -> Space:
         """Return the space of data, once they are known to be of it, and warn of what is doubtful."""
         if data.ndim != 2:
             raise OrbiflowError(f"expected data of shape (N, k), got {data.shape}")
         require_values(data, names)
         own = self.space if isinstance(self.space, Space) else None
-        space, unit = str(self.space) if own is None else own.name, self.unit
+        space, unit = self._space_name(), self.unit
         if own is not None and is_angular(own.name, data.shape[1]):
             unit = str(getattr(own, "angle_unit", own.unit))
             if self.unit not in (None, unit):
@@ -365,7 +368,7 @@ class DensityEstimator:
 
     def _in_order(self, X: ArrayLike) -> Array:
         """Return data with the columns of a frame in the order in which `fit` has seen them."""
-        data, names = as_data(X)
+        data, names = data_of(self.space_.name, X, in_order=False, stacklevel=5)
         fitted = [str(name) for name in getattr(self, "feature_names_in_", ())]
         if names is None or list(names) == fitted:
             return data

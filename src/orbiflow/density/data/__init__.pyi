@@ -20,6 +20,12 @@ from .names import is_other_quantity as is_other_quantity
 from .names import pairs_of as pairs_of
 from .names import unit_named as unit_named
 from .names import words_of as words_of
+from .strikes import DIP_DIRECTION as DIP_DIRECTION
+from .strikes import data_of as data_of
+from .strikes import dip_directions as dip_directions
+from .strikes import strike_beside_dip as strike_beside_dip
+from .strikes import strike_for as strike_for
+from .strikes import strike_note as strike_note
 from .units import TURN_TOLERANCE as TURN_TOLERANCE
 from .units import TURNS as TURNS
 from .units import Unit as Unit

@@ -83,7 +83,8 @@ def score(
     with runtime.one_thread():
         density, extra = model_at(model)
         spaces.check_measure(settings.measure, density.space)
-        rows = tables.read_rows(data, with_columns_of(reading, data, extra, on_event), on_event)
+        read = with_columns_of(reading, data, extra, on_event)
+        rows = tables.read_rows(data, read, on_event, model_space=density.space.name)
         check_fits(data, rows.table, density, extra, on_event)
         progress = runtime.progress_events(on_event, cancel)
         columns, mean, over, notes = score_rows(density, rows, settings, progress, may_lack)

@@ -64,7 +64,8 @@ def with_columns_of(
         tell(Note(f"{data} has no header: its columns were taken for {', '.join(names)}"))
         return settings
     known = {name.casefold() for name in own}
-    missing = [name for name in names if name.casefold() not in known]
+    asked = tables.columns_in(own, names)
+    missing = [name for name in asked if name.casefold() not in known]
     if missing:
         some = f"no {', '.join(missing)} among " if len(missing) < len(names) else ""
         raise TableError(

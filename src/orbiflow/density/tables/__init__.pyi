@@ -12,6 +12,7 @@ from .guesses import seen_columns as seen_columns
 from .rows import CURE as CURE
 from .rows import TableRows as TableRows
 from .rows import angle_unit as angle_unit
+from .rows import columns_in as columns_in
 from .rows import read_rows as read_rows
 from .settings import CountedRowSettings as CountedRowSettings
 from .settings import GroupedRowSettings as GroupedRowSettings

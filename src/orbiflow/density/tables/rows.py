@@ -14,17 +14,22 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.density.data import (
+    DIP_DIRECTION,
     DIRECTIONS,
     Doubt,
     Unit,
     check_values,
     chosen_arrangement,
+    dip_directions,
     fraction_doubts,
     is_angle_named,
     is_count_named,
     is_identifier,
     is_other_quantity,
     seeming_unit,
+    strike_beside_dip,
+    strike_for,
+    strike_note,
     unit_named,
     words_of,
 )
@@ -96,12 +101,15 @@ def read_rows(
     space: str | None = None,
     width: int | None = None,
     group: str | None = None,
+    model_space: str | None = None,
 ) -> TableRows:
     """Return the rows of a table of `width` columns, and tell what was decided for the user.
 
     Without `columns` in the settings, those are taken whose names say that they are what the `space`
     takes, in its order. If no name says so, all columns of numbers are taken but those that number
     the rows, those of weights, counts and groups and, on a torus, those that are no angles by name.
+    Strikes beside dips become directions of dip on this space or on `model_space`, that of a model which
+    is asked about rows.
     """
     rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
     weighing, counting = (
@@ -120,6 +128,7 @@ def read_rows(
         ) from error
     for note in table.notes:
         tell(Note(note))
+    table = _with_dip_directions(table, rows, space or model_space, tell)
     _check_width(path, table, space, width, others)
     if space in DIRECTIONS:
         _check_hemispheres(path, table, rows.header)
@@ -154,10 +163,34 @@ def _data_columns(
     columns = rows.columns
     if columns is None and space is not None:
         columns = _columns_by_name(path, space, width, others, rows.header, tell)
+    if columns is not None:
+        columns = columns_in(column_names(path, has_header=rows.header) or (), columns)
     if columns is None:
         return _all_columns(path, space, None if others else width, others, rows, tell)
     how: dict[str, Any] = {**_how(rows), **_drop(rows), "missing_codes": rows.missing_codes}
     return read_table(path, columns=list(columns), width=None, **how)
+
+
+def columns_in(names: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
+    """Return the columns to read for those that are wanted: a strike for a direction of dip.
+
+    >>> columns_in(["strike", "dip"], ["dip", "dip_direction"])
+    ('dip', 'strike')
+    """
+    return tuple(strike_for(name, names) or name for name in wanted)
+
+
+def _with_dip_directions(table: Table, rows: RowSettings, space: str | None, tell: Sink) -> Table:
+    """Return a table whose strikes beside dips are directions of dip, where that is what is wanted."""
+    strike = strike_beside_dip(table.columns)
+    is_asked = rows.columns is not None and strike_for(rows.columns[-1], table.columns) is not None
+    if not strike or not (space in DIRECTIONS or is_asked):  # before its dip it will be refused
+        return table
+    tell(Note(strike_note(table.columns[strike])))
+    values = table.values.copy()
+    values[:, strike] = dip_directions(values[:, strike])
+    columns = (*table.columns[:strike], DIP_DIRECTION, *table.columns[strike + 1 :])
+    return replace(table, values=values, columns=columns)
 
 
 _HEMISPHERES = {"N", "S", "E", "W", "NORTH", "SOUTH", "EAST", "WEST"}
