@@ -1,3 +1,6 @@
+from .codes import CODES as CODES
+from .codes import codes_among as codes_among
+from .codes import refuse_codes as refuse_codes
 from .columns import ANGULAR as ANGULAR
 from .columns import DIRECTIONS as DIRECTIONS
 from .columns import ROTATIONS as ROTATIONS
@@ -6,6 +9,7 @@ from .columns import Arrangement as Arrangement
 from .columns import arrangements as arrangements
 from .columns import check_columns as check_columns
 from .columns import chosen_arrangement as chosen_arrangement
+from .doubts import Doubt as Doubt
 from .frames import as_data as as_data
 from .frames import as_numbers as as_numbers
 from .frames import require_values as require_values
@@ -20,6 +24,7 @@ from .names import is_other_quantity as is_other_quantity
 from .names import pairs_of as pairs_of
 from .names import unit_named as unit_named
 from .names import words_of as words_of
+from .places import place_doubts as place_doubts
 from .strikes import DIP_DIRECTION as DIP_DIRECTION
 from .strikes import data_of as data_of
 from .strikes import dip_directions as dip_directions
@@ -31,12 +36,9 @@ from .units import TURNS as TURNS
 from .units import Unit as Unit
 from .units import check_unit as check_unit
 from .units import is_angular as is_angular
-from .values import CODES as CODES
 from .values import NAN_CURE as NAN_CURE
-from .values import Doubt as Doubt
 from .values import check_values as check_values
-from .values import codes_among as codes_among
+from .values import doubts_of_other_columns as doubts_of_other_columns
 from .values import fraction_doubts as fraction_doubts
-from .values import refuse_codes as refuse_codes
 from .values import seeming_unit as seeming_unit
 from .values import unit_of as unit_of

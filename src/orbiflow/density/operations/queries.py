@@ -91,6 +91,10 @@ def score(
     weighted = "" if reading.weights is None else f", weighted by {reading.weights}"
     words = f"mean log density {mean:.4f} nats over {over}{weighted}; written to {out}"
     table = tables.append_columns(rows.table, data, columns)
+    notes += [
+        f"{data} has a column {name} already: the new one is {free}"
+        for name, free in tables.renamed_columns(rows.table, columns).items()
+    ]
     write_file(out, table, on_event, *notes, words)
     return runtime.Outcome({"file": str(out), "rows": len(rows.table.values), "mean": mean})
 
@@ -380,7 +384,7 @@ def _angle(text: str) -> tuple[str, float]:
     try:
         if not sign or not name.strip():
             raise ValueError
-        return name.strip(), float(value)
+        return name.strip(), float(tables.with_minus(value.strip()))
     except ValueError:
         raise SettingError(
             f"{{given}} must be angles such as psi=-45, got {literal(repr(text))}"

@@ -17,7 +17,7 @@ import torch
 
 from orbiflow.arrays import Array
 from orbiflow.density import inference, pictures, tables
-from orbiflow.density.data import check_columns
+from orbiflow.density.data import doubts_of_other_columns
 from orbiflow.density.fitting import Progress as InProgress
 from orbiflow.density.models import Density, Mixture, density_to_bytes, read_density
 from orbiflow.density.run_folder import SAMPLES, write_files
@@ -102,12 +102,14 @@ def check_fits(
                 + "{columns} "
                 + literal(f"'{','.join(wanted)}'")
             )
-        check_columns(space.name, table.columns)
     unit, own = table.unit, inference.data_unit(space, len(table.columns))
     if unit is not None and own not in (None, unit):
         text = f"{data}: the cells are in {unit}, and the model's data in {own}: convert them"
         raise TableError(literal(text))
-    for doubt in inference.data_doubts(density, table.values, table.columns, tables.CURE):
+    doubts = inference.data_doubts(density, table.values, table.columns, tables.CURE)
+    if [name.casefold() for name in table.columns] != [name.casefold() for name in wanted]:
+        doubts += doubts_of_other_columns(space.name, table.values, table.columns, own)
+    for doubt in doubts:
         tell(Note(f"WARNING: {data}: {doubt}"))
 
 

@@ -110,6 +110,14 @@ def append_columns(
     return bytes(out)
 
 
+def renamed_columns(table: Table, names: Iterable[str]) -> dict[str, str]:
+    """Return what `append_columns` calls columns whose names the file has already."""
+    taken = table.columns if table.delimiter is None else table.header or ()
+    wanted = list(names)
+    pairs = zip(wanted, _free_names(wanted, taken), strict=True)
+    return {name: free for name, free in pairs if name != free}
+
+
 def to_csv(columns: Sequence[str], values: ArrayLike) -> bytes:
     """Return values (N, k) as UTF-8 CSV under a header of k names, with 10 significant digits.
 

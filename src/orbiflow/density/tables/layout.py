@@ -256,7 +256,7 @@ def _delimiter(lines: list[str]) -> str:
         return ";"
     if _is_spaced(lines[len(lines) > 1 :]):
         return " "
-    counts = {mark: [line.count(mark) for line in lines] for mark in "\t;,"}
+    counts = {mark: [line.count(mark) for line in lines] for mark in "\t;|,"}
     for mark, count in counts.items():
         if count[0] and len(set(count)) == 1:
             return mark

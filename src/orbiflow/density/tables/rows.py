@@ -108,8 +108,7 @@ def read_rows(
     Without `columns` in the settings, those are taken whose names say that they are what the `space`
     takes, in its order. If no name says so, all columns of numbers are taken but those that number
     the rows, those of weights, counts and groups and, on a torus, those that are no angles by name.
-    Strikes beside dips become directions of dip on this space or on `model_space`, that of a model which
-    is asked about rows.
+    Strikes beside dips become directions of dip on this space or on `model_space`, that of a model.
     """
     rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
     weighing, counting = (
@@ -132,6 +131,8 @@ def read_rows(
     _check_width(path, table, space, width, others)
     if space in DIRECTIONS:
         _check_hemispheres(path, table, rows.header)
+    if space == "torus":
+        _tell_of_calm(path, table, rows, tell)
     if weighing is not None:
         _tell_of_weights(weighing, tell)
     elif counting is None and space == "torus" and hasattr(rows, "counts"):
@@ -212,6 +213,37 @@ def _check_hemispheres(path: Path, table: Table, header: bool | None) -> None:
                     "make their latitudes and longitudes negative"
                 )
             )
+
+
+SPEEDS = frozenset(
+    {"speed", "spd", "wspd", "wsp", "ws", "velocity", "vel", "sknt", "windspeed", "ff"}
+    | {"windgeschwindigkeit", "wg"}
+)
+"""Words for the speed of a wind, in names of columns."""
+
+
+def _tell_of_calm(path: Path, table: Table, rows: RowSettings, tell: Sink) -> None:
+    """Tell of directions that are 0 in just the rows in which a speed is 0, which have none."""
+    names = column_names(path, has_header=rows.header) or ()
+    beside = [n for n in names if SPEEDS.intersection(words_of(n)) and n not in table.columns]
+    if len(beside) != 1 or len(table.columns) != 1 or not (table.values == 0).any():
+        return
+    try:
+        speeds = read_table(path, columns=beside, width=1, keep_missing=True, **_how(rows))
+    except TableError:  # it is text
+        return
+    still = speeds.lines[speeds.values[:, 0] == 0]
+    zero = table.lines[table.values[:, 0] == 0]
+    both = np.isin(zero, still)
+    if not both.all() or np.isin(still, table.lines).sum() != len(zero):
+        return
+    several = "s" * (len(zero) > 1)
+    text = (
+        f"WARNING: {table.columns[0]!r} is 0 in just the {len(zero)} row{several} in which "
+        f"{beside[0]!r} is 0: calm has no direction; leave it out with --missing-codes 0 "
+        "--drop-missing"
+    )
+    tell(Note(text))
 
 
 def _drop(rows: RowSettings) -> dict[str, Any]:
