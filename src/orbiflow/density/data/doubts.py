@@ -58,7 +58,10 @@ def _calm(name: str, column: Array, turn: float) -> str | None:
         return None
     if float(column.min()) < 0 or not bool((column % 10 == 0).all()) or len(column) < FEW_ROWS:
         return None
-    rows = int((column == 0).sum())
+    rows, north, *beside = (int((column == v).sum()) for v in (0, turn, 10, turn - 10))
+    usual = sum(beside) / 2
+    if rows + north <= usual + 3 * usual**0.5:  # both are north, from rounding without a turn
+        return None
     return (
         f"{name!r} has both 0, in {rows} row{'s' * (rows > 1)}, and 360: of winds, 0 usually means "
         "calm and 360 north; leave out what is calm, which has no direction"

@@ -106,7 +106,8 @@ AXIAL = frozenset(
 # fmt: off
 OTHERS = frozenset((
     "temp", "temperature", "temperatur", "length", "len", "distance", "dist", "radius", "mass",
-    "speed", "spd", "sknt", "windspeed", "velocity", "wspd", "ws", "gust", "pressure", "humidity", "rain", "precipitation",
+    "speed", "spd", "sknt", "windspeed", "velocity", "wspd", "ws", "gust", "pressure", "humidity",
+    "rain", "precipitation",
     "depth", "height", "width", "size", "area", "volume", "resolution", "occupancy", "bfactor",
     "score", "energy", "charge", "magnitude", "mag", "price", "year", "month", "date", "time",
     "timestamp", "hour", "hours", "day", "weekday", "doy", "age", "probability", "pvalue",

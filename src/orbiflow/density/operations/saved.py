@@ -93,15 +93,11 @@ def check_fits(
             )
             + ": say with {columns} which they are, in this order"
         )
-    if list(table.columns) != wanted:
-        if sorted(table.columns) == sorted(wanted):
-            raise TableError(
-                literal(
-                    f"{data}: the model was fitted to {', '.join(wanted)}, in this order; give "
-                )
-                + "{columns} "
-                + literal(f"'{','.join(wanted)}'")
-            )
+    if list(table.columns) != wanted and sorted(table.columns) == sorted(wanted):
+        listed = literal(
+            f"{data}: the model was fitted to {', '.join(wanted)}, in this order; give "
+        )
+        raise TableError(listed + "{columns} " + literal(f"'{','.join(wanted)}'"))
     unit, own = table.unit, inference.data_unit(space, len(table.columns))
     if unit is not None and own not in (None, unit):
         text = f"{data}: the cells are in {unit}, and the model's data in {own}: convert them"

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from orbiflow.density.tables import text
 from orbiflow.density.tables.layout import layout_of
-from orbiflow.density.tables.lines import split_line, text_lines
+from orbiflow.density.tables.lines import is_utf16, split_line, text_lines
 from orbiflow.density.tables.numerals import Mark
 from orbiflow.density.tables.table import (
     BLOCK,
@@ -176,7 +176,7 @@ def kind_of_file(path: Path) -> str:
             return kind
         if path.suffix.lower() == f".{kind}":
             raise InputFileError(f"{path}: does not begin as a .{kind} file does; save it again")
-    if b"\0" in head:
+    if b"\0" in head and not is_utf16(head):
         raise InputFileError(f"{path}: binary data, not a table; save it as CSV in UTF-8")
     return "text"
 
