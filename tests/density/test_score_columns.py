@@ -46,7 +46,7 @@ DOUBTED = [
     ("places", (SKY / [1, 15]).set_axis(["DEC", "RA"], axis=1), "DEC,RA", "multiply it by 15"),
     ("sky", SKY / [1, 15], None, "multiply it by 15"),
     ("places", SKY.set_axis(["theta", "phi"], axis=1).abs(), "theta,phi", "give 90 less it"),
-    ("angles", (ANGLES * np.pi / 180).set_axis(["a_rad", "b_rad"], axis=1), "a_rad,b_rad", "say radians"),
+    ("angles", (ANGLES / 57.3).set_axis(["a_rad", "b_rad"], axis=1), "a_rad,b_rad", "say radians"),
 ]  # fmt: skip
 
 

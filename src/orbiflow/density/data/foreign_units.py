@@ -34,8 +34,9 @@ def refuse_foreign_units(names: Sequence[str], values: Array, unit: str | None) 
         most = float(np.nanmax(column, initial=0.0))
         least = float(np.nanmin(column, initial=0.0))
         if foreign := _unit_to_convert(name, least, most, unit):
-            cure = f"{CURES[foreign]}, and call the column otherwise"
-            raise SettingError(literal(f"{name!r} is in {foreign}, by its name: ") + cure)
+            renamed = "" if foreign == "cycles" else ", and call the column otherwise"
+            said = literal(f"{name!r} is in {foreign}, by its name: ")
+            raise SettingError(said + CURES[foreign] + renamed)
         if "grad" in words_of(name) and unit is None:
             raise SettingError(
                 literal(f"{name!r} is in degrees or in gon, by its name: ")
