@@ -90,6 +90,9 @@ def test_models_are_of_directions_of_dip(tmp_path: Path) -> None:
             assert list(scored.columns) == ["strike", "dip", "log_prob"]
             np.testing.assert_allclose(scored["log_prob"], wanted)
             np.testing.assert_array_equal(scored["strike"], STRIKE)
+        BY_DIRECTION.to_csv(tmp_path / "other.csv", index=False)
+        score(tmp_path / "other.csv", model=tmp_path / "model", out=tmp_path / "scored.csv")
+        np.testing.assert_allclose(pd.read_csv(tmp_path / "scored.csv")["log_prob"], wanted)
 
 
 def test_data_sets_with_strikes_and_directions_are_alike() -> None:

@@ -92,7 +92,13 @@ def test_tables_of_r_and_databases(content: str, encoding: str, tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
-    "content", ["phi,psi\n-60.5,-45,1\n-61,-44,2\n", "phi,psi\n1,-45,1\n1,-44,2\n", "1,2\n3,4,5\n"]
+    "content",
+    [
+        "phi,psi\n-60.5,-45,1\n-61,-44,2\n",
+        "a\n10 gon\n20 gon\n",
+        "phi,psi\n1,-45,1\n1,-44,2\n",
+        "1,2\n3,4,5\n",
+    ],
 )
 def test_headers_that_lack_another_name_are_refused(content: str, tmp_path: Path) -> None:
     with pytest.raises(InputFileError, match="give every line as many"):

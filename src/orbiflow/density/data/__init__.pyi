@@ -27,9 +27,9 @@ from .names import words_of as words_of
 from .places import place_doubts as place_doubts
 from .strikes import DIP_DIRECTION as DIP_DIRECTION
 from .strikes import data_of as data_of
+from .strikes import dip_direction_among as dip_direction_among
 from .strikes import dip_directions as dip_directions
 from .strikes import strike_beside_dip as strike_beside_dip
-from .strikes import strike_for as strike_for
 from .strikes import strike_note as strike_note
 from .units import TURN_TOLERANCE as TURN_TOLERANCE
 from .units import TURNS as TURNS

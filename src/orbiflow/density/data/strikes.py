@@ -31,13 +31,22 @@ def strike_beside_dip(names: Sequence[str]) -> int | None:
     return split.index(strike) if split in ([{"dip"}, strike], [strike, {"dip"}]) else None
 
 
-def strike_for(wanted: str, names: Sequence[str]) -> str | None:
-    """Return the one strike among columns that have no direction of dip, if that is `wanted`."""
+def dip_direction_among(wanted: str, names: Sequence[str]) -> str | None:
+    """Return the column that has the direction of dip, or else the strike, if that is `wanted`.
+
+    >>> dip_direction_among("dip_direction", ["dip", "DipDir"])
+    'DipDir'
+    >>> dip_direction_among("dipdir", ["strike", "dip"]), dip_direction_among("lat", ["strike", "dip"])
+    ('strike', None)
+    """
     lower = {name.casefold() for name in names}
     if words_of(wanted) != ["dipdir"] or wanted.casefold() in lower:
         return None
-    strikes = [name for name in names if "strike" in words_of(name)]
-    return strikes[0] if len(strikes) == 1 else None
+    for word in ("dipdir", "strike"):
+        found = [name for name in names if word in words_of(name)]
+        if found:
+            return found[0] if len(found) == 1 else None
+    return None
 
 
 def dip_directions(strikes: Array) -> Array:

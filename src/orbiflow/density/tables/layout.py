@@ -308,6 +308,8 @@ def _has_row_names(rows: Sequence[Sequence[str]]) -> bool:
         return False
     if any(kind_of(cell.strip('"'), is_top=True) != "word" for cell in top):
         return False
+    if not all("number" in map(kind_of, row[1:]) for row in rest):  # a number and its unit, perhaps
+        return False
     names = [row[0] for row in rest]
     are_words = all(kind_of(name) == "word" or _WHOLE.fullmatch(name) for name in names)
     return are_words and len(set(names)) == len(names)

@@ -20,6 +20,7 @@ from orbiflow.density.data import (
     Unit,
     check_values,
     chosen_arrangement,
+    dip_direction_among,
     dip_directions,
     fraction_doubts,
     is_angle_named,
@@ -28,11 +29,10 @@ from orbiflow.density.data import (
     is_other_quantity,
     seeming_unit,
     strike_beside_dip,
-    strike_for,
     strike_note,
     unit_named,
-    words_of,
 )
+from orbiflow.density.tables.beside import check_hemispheres, tell_of_calm, tell_of_counts
 from orbiflow.density.tables.files import column_names, read_labels, read_table
 from orbiflow.density.tables.settings import SPACES, RowSettings, SpaceSettings, TableSettings
 from orbiflow.density.tables.table import MissingCellsError, Table, TableError, find, listing, quote
@@ -130,13 +130,13 @@ def read_rows(
     table = _with_dip_directions(table, rows, space or model_space, tell)
     _check_width(path, table, space, width, others)
     if space in DIRECTIONS:
-        _check_hemispheres(path, table, rows.header)
+        check_hemispheres(path, table, rows.header)
     if space == "torus":
-        _tell_of_calm(path, table, rows, tell)
+        tell_of_calm(path, table, rows, tell)
     if weighing is not None:
         _tell_of_weights(weighing, tell)
     elif counting is None and space == "torus" and hasattr(rows, "counts"):
-        _tell_of_counts(path, table, rows.header, tell)
+        tell_of_counts(path, table, rows.header, tell)
     return _weighed(TableRows(path, table, None, group, rows.header), weighing, counting)
 
 
@@ -178,13 +178,16 @@ def columns_in(names: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
     >>> columns_in(["strike", "dip"], ["dip", "dip_direction"])
     ('dip', 'strike')
     """
-    return tuple(strike_for(name, names) or name for name in wanted)
+    return tuple(dip_direction_among(name, names) or name for name in wanted)
 
 
 def _with_dip_directions(table: Table, rows: RowSettings, space: str | None, tell: Sink) -> Table:
     """Return a table whose strikes beside dips are directions of dip, where that is what is wanted."""
     strike = strike_beside_dip(table.columns)
-    is_asked = rows.columns is not None and strike_for(rows.columns[-1], table.columns) is not None
+    is_asked = (
+        rows.columns is not None
+        and dip_direction_among(rows.columns[-1], table.columns) is not None
+    )
     if not strike or not (space in DIRECTIONS or is_asked):  # before its dip it will be refused
         return table
     tell(Note(strike_note(table.columns[strike])))
@@ -192,58 +195,6 @@ def _with_dip_directions(table: Table, rows: RowSettings, space: str | None, tel
     values[:, strike] = dip_directions(values[:, strike])
     columns = (*table.columns[:strike], DIP_DIRECTION, *table.columns[strike + 1 :])
     return replace(table, values=values, columns=columns)
-
-
-_HEMISPHERES = {"N", "S", "E", "W", "NORTH", "SOUTH", "EAST", "WEST"}
-
-
-def _check_hemispheres(path: Path, table: Table, header: bool | None) -> None:
-    """Refuse degrees to the south or west that only a column of letters tells of."""
-    for name in column_names(path, has_header=header) or ():
-        words = {"ns", "ew", "n", "e", "hemisphere", "hemi", "dir", "direction"}
-        if name in table.columns or not words.intersection(words_of(name)):
-            continue
-        letters = {
-            cell.strip().upper() for cell in read_labels(path, name, table, has_header=header)
-        }
-        if letters <= _HEMISPHERES and letters & {"S", "W", "SOUTH", "WEST"}:
-            raise TableError(
-                literal(
-                    f"{path}: column {name!r} says which rows are south or west, and it is not read: "
-                    "make their latitudes and longitudes negative"
-                )
-            )
-
-
-SPEEDS = frozenset(
-    {"speed", "spd", "wspd", "wsp", "ws", "velocity", "vel", "sknt", "windspeed", "ff"}
-    | {"windgeschwindigkeit", "wg"}
-)
-"""Words for the speed of a wind, in names of columns."""
-
-
-def _tell_of_calm(path: Path, table: Table, rows: RowSettings, tell: Sink) -> None:
-    """Tell of directions that are 0 in just the rows in which a speed is 0, which have none."""
-    names = column_names(path, has_header=rows.header) or ()
-    beside = [n for n in names if SPEEDS.intersection(words_of(n)) and n not in table.columns]
-    if len(beside) != 1 or len(table.columns) != 1 or not (table.values == 0).any():
-        return
-    try:
-        speeds = read_table(path, columns=beside, width=1, keep_missing=True, **_how(rows))
-    except TableError:  # it is text
-        return
-    still = speeds.lines[speeds.values[:, 0] == 0]
-    zero = table.lines[table.values[:, 0] == 0]
-    both = np.isin(zero, still)
-    if not both.all() or np.isin(still, table.lines).sum() != len(zero):
-        return
-    several = "s" * (len(zero) > 1)
-    text = (
-        f"WARNING: {table.columns[0]!r} is 0 in just the {len(zero)} row{several} in which "
-        f"{beside[0]!r} is 0: calm has no direction; leave it out with --missing-codes 0 "
-        "--drop-missing"
-    )
-    tell(Note(text))
 
 
 def _drop(rows: RowSettings) -> dict[str, Any]:
@@ -322,21 +273,6 @@ def _tell_of_names(table: Table, tell: Sink) -> None:
     unknown = [name for name in table.columns if not is_angle_named(name)]
     if named and any(re.fullmatch(r"column\d+", name) is None for name in unknown):
         tell(Note(f"took {listing(unknown)} as angle{'s' * (len(unknown) > 1)}"))
-
-
-def _tell_of_counts(path: Path, table: Table, header: bool | None, tell: Sink) -> None:
-    """Tell that a column beside evenly spaced, different angles may count them."""
-    names = column_names(path, has_header=header) or ()
-    beside = [name for name in names if is_count_named(name) and name not in table.columns]
-    if not beside or len(table.columns) != 1:
-        return
-    steps = np.diff(np.sort(table.values[:, 0]))
-    if len(steps) > 1 and steps.min() > 0 and bool(np.isclose(steps, steps.min(), rtol=0.01).all()):
-        text = (
-            f"the values of {table.columns[0]!r} are evenly spaced, as the middles of bins are: if "
-            f"{beside[0]!r} says how many rows are in each, give --counts {beside[0]}"
-        )
-        tell(Note(text))
 
 
 def _tell_of_weights(weighing: Table, tell: Sink) -> None:
