@@ -234,3 +234,29 @@ def test_points_of_the_compass_are_enough(unit: str) -> None:
         estimator.fit(rows)
     peak = np.exp(estimator.score_samples([[turn / (2 * np.pi)]])) * turn / (2 * np.pi)
     assert float(peak[0]) == pytest.approx(np.e / (2 * np.pi * 1.26607), rel=0.15)
+
+
+@pytest.mark.parametrize(("step", "values"), [(45.0, 7), (45.0, 5), (30.0, 7), (22.5, 6)])
+def test_some_points_of_the_compass_are_enough(step: float, values: int) -> None:
+    """Of 8 points of the compass some may not occur."""
+    rng = np.random.default_rng(0)
+    rows = rounded(rng.normal(160, 1.1 * step, 600), step)
+    rows = rows[abs(rows - 160) < step * values / 2, None] % 360
+    assert len(np.unique(rows)) == values
+    torus = make_space("torus", unit="degrees", dim=1)
+    found = repeats_of(torus, torus.to_chart(rows))
+    assert found.spread == (step,)
+    assert found.is_rounding
+
+
+@pytest.mark.parametrize(
+    "states",
+    [
+        [-60, 60, 180], [-65, 62, 178], [0, 90, 180, 270], [-60, 60, 180, 120, 0, -120],
+        [-63, 58, 177, 90, 0], [10, 55, 190, 235, 325], [0, 72, 144, 216, 288],
+    ],
+)  # fmt: skip
+def test_states_are_no_points_of_the_compass(states: list[float]) -> None:
+    rows = np.random.default_rng(0).choice(np.array(states, dtype=float), (600, 1))
+    torus = make_space("torus", unit="degrees", dim=1)
+    assert not repeats_of(torus, torus.to_chart(rows)).can_be_undone

@@ -157,7 +157,7 @@ def test_units_are_refused_where_there_are_none() -> None:
 def test_places_on_a_torus_are_doubted() -> None:
     table = RNG.uniform(-80, 80, (30, 2))
     assert doubts_of("torus", table, "degrees", "lat", "lon") == [True]
-    for names in (("phi", "psi"), ("azimuth", "altitude"), ("lon", "phi"), ("dip", "strike")):
+    for names in (("phi", "psi"), ("azimuth", "altitude"), ("lon", "phi"), ("dip", "dipdir")):
         assert True not in doubts_of("torus", table, "degrees", *names)
 
 

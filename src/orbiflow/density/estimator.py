@@ -17,8 +17,8 @@ from orbiflow.arguments import as_instance, as_whole, refusal
 from orbiflow.arrays import Array
 from orbiflow.density.data import (
     NAN_CURE,
-    as_data,
     check_columns,
+    data_of,
     is_angular,
     require_values,
     unit_of,
@@ -157,7 +157,7 @@ class DensityEstimator:
         """
         del y
         settings = self.settings()
-        data, names = as_data(X)
+        data, names = data_of(self._space_name(), X)
         self.space_ = self._space_for(data, names)
         points = self._chart(data)
         if flow_obstacle(self.space_):
@@ -334,13 +334,16 @@ class DensityEstimator:
         given = {name: getattr(self, name) for name in names}
         return {name: v for name, v in given.items() if v != defaults[name].default}
 
+    def _space_name(self) -> str:
+        return self.space.name if isinstance(self.space, Space) else str(self.space)
+
     def _space_for(self, data: Array, names: tuple[str, ...] | None) -> Space:
         """Return the space of data, once they are known to be of it, and warn of what is doubtful."""
         if data.ndim != 2:
-            raise OrbiflowError(f"expected data of shape (N, k), got {data.shape}")
+            raise _not_a_table(data)
         require_values(data, names)
         own = self.space if isinstance(self.space, Space) else None
-        space, unit = str(self.space) if own is None else own.name, self.unit
+        space, unit = self._space_name(), self.unit
         if own is not None and is_angular(own.name, data.shape[1]):
             unit = str(getattr(own, "angle_unit", own.unit))
             if self.unit not in (None, unit):
@@ -355,6 +358,8 @@ class DensityEstimator:
     def _checked(self, X: ArrayLike) -> Array:
         """Return data in the order of the fit; warn of those that seem to be in another unit."""
         density, data = self._fitted(), self._in_order(X)
+        if data.ndim != 2:
+            raise _not_a_table(data)
         names = getattr(self, "feature_names_in_", None)
         for doubt in data_doubts(density, data, names, NAN_CURE):
             warnings.warn(doubt, DataWarning, stacklevel=3)
@@ -365,7 +370,7 @@ class DensityEstimator:
 
     def _in_order(self, X: ArrayLike) -> Array:
         """Return data with the columns of a frame in the order in which `fit` has seen them."""
-        data, names = as_data(X)
+        data, names = data_of(self.space_.name, X, in_order=False, stacklevel=5)
         fitted = [str(name) for name in getattr(self, "feature_names_in_", ())]
         if names is None or list(names) == fitted:
             return data
@@ -373,6 +378,10 @@ class DensityEstimator:
             check_columns(self.space_.name, names)
             return data
         if sorted(names) != sorted(fitted) or len(set(fitted)) < len(fitted):
+            # a frame may have other cases, as tables may
+            cases = [name.casefold() for name in names]
+            if sorted(cases) == sorted({name.casefold() for name in fitted}):
+                return data[:, [cases.index(name.casefold()) for name in fitted]]
             missing = [name for name in fitted if name not in names]
             raise OrbiflowError(
                 f"the columns are {', '.join(names)}, and the fit has seen {', '.join(fitted)}"
@@ -398,6 +407,14 @@ class DensityEstimator:
         if not hasattr(self, "density_"):
             raise OrbiflowError("this estimator is not fitted yet: call fit first")
         return self.density_
+
+
+def _not_a_table(data: Array) -> OrbiflowError:
+    """Return what to say of data that are no rows and columns."""
+    cure = ""
+    if data.ndim == 1:
+        cure = "; of one row write [[...]], of one column data.reshape(-1, 1) (NumPy)"
+    return OrbiflowError(f"expected data of shape (N, k), got {data.shape}{cure}")
 
 
 def _refuse_flows(settings: DensitySettings, space: Space) -> None:

@@ -22,7 +22,7 @@ from scipy import optimize, special
 
 from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array
-from orbiflow.density.data import as_data, as_numbers, unit_of
+from orbiflow.density.data import as_data, as_numbers, data_of, unit_of
 from orbiflow.density.spaces import to_vectors, whole_turn
 from orbiflow.errors import OrbiflowError
 
@@ -423,7 +423,7 @@ def summarize_directions(
     `unit` is "degrees" for those that could be taken for radians, which are refused otherwise.
     `weights`, `groups` and `level` are those of `summarize_angles`.
     """
-    table, names = as_data(data)
+    table, names = data_of("sphere", data)
     unit_of("sphere", table, names, unit)
     vectors, rows = _chosen(to_vectors(table), weights, groups, level)
     mean, resultant, cone = _mean_direction(vectors, rows)
@@ -448,7 +448,7 @@ def summarize_axes(
     level: float = 0.95,
 ) -> AxisSummary:
     """Summarise axes, either end of each as in `summarize_directions`."""
-    table, names = as_data(data)
+    table, names = data_of("projective-plane", data)
     unit_of("projective-plane", table, names, unit)
     vectors, rows = _chosen(to_vectors(table), weights, groups, level)
     products = vectors[:, :, None] * vectors[:, None, :]

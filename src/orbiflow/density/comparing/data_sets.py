@@ -18,7 +18,7 @@ from orbiflow.arguments import as_array, is_a
 from orbiflow.arrays import Array
 from orbiflow.density.comparing.resampling import Groups, TestResult, mmd_test, resampled_sums
 from orbiflow.density.comparing.settings import ComparisonSettings
-from orbiflow.density.data import as_data, unit_of
+from orbiflow.density.data import data_of, unit_of
 from orbiflow.density.fitting import DensitySettings, Progress, fit_automatic
 from orbiflow.density.spaces import Space, space_for
 from orbiflow.errors import DataWarning, OrbiflowError
@@ -143,7 +143,8 @@ def compare_samples(
     >>> compare_samples({"a": one, "b": other}).differ
     True
     """
-    names, tables, columns = _two(samples)
+    name = space.name if isinstance(space, Space) else space
+    names, tables, columns = _two(samples, name)
     settings = settings or ComparisonSettings()
     seed = settings.seed
     if isinstance(space, Space):
@@ -178,12 +179,14 @@ def compare_samples(
 
 
 def _two(
-    samples: Mapping[str, ArrayLike],
+    samples: Mapping[str, ArrayLike], space: str
 ) -> tuple[list[str], list[np.ndarray], tuple[str, ...] | None]:
     """Return the names of two data sets, their values in one order, and the names of the columns."""
     if not is_a(samples, Mapping) or len(samples) != 2:
         raise OrbiflowError("give two data sets by their names, such as {'before': a, 'after': b}")
-    read = [as_data(table, f"data set {name}") for name, table in samples.items()]
+    read = [
+        data_of(space, table, f"data set {name}", stacklevel=4) for name, table in samples.items()
+    ]
     (first, columns), (second, others) = read
     if columns and others and columns != others and sorted(columns) == sorted(others):
         second = second[:, [others.index(name) for name in columns]]

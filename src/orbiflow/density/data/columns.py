@@ -13,6 +13,7 @@ from orbiflow.density.data.names import (
     LONGITUDES,
     UNITS,
     Pair,
+    foreign_unit,
     pairs_of,
     unit_named,
     words_of,
@@ -229,6 +230,8 @@ def _check_forms(space: str, names: Sequence[str]) -> None:
         for name, words in zip(names, split, strict=True):
             if words & FROM_POLE:
                 wrong.append((name, "is the angle from the pole: give the latitude, 90 less it"))
+            if (foreign := foreign_unit(name)) is not None:
+                wrong.append((name, f"is in {foreign}: convert it to degrees"))
             if unit_named(name) not in (None, "degrees"):
                 wrong.append((name, f"is in {unit_named(name)}: convert it to degrees"))
             if words & HOURS:

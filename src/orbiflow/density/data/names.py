@@ -14,6 +14,18 @@ UNITS = {
 }  # fmt: skip
 """Words for units of angles."""
 
+# fmt: off
+FOREIGN = {
+    "gon": "gon", "gons": "gon", "grads": "gon", "gradian": "gon", "gradians": "gon",
+    "arcmin": "arcminutes", "arcmins": "arcminutes", "arcminute": "arcminutes",
+    "arcminutes": "arcminutes", "arcsec": "arcseconds", "arcsecs": "arcseconds",
+    "arcsecond": "arcseconds", "arcseconds": "arcseconds", "mrad": "milliradians",
+    "mrads": "milliradians", "milliradian": "milliradians", "milliradians": "milliradians",
+    "mil": "mils, 6400 to a turn", "mils": "mils, 6400 to a turn", "cycles": "cycles",
+}
+# fmt: on
+"""Such units by the words of names; "grad" is gon in English and degrees in German."""
+
 _FORMATS = frozenset({"decimal", "dd", "wgs", "wgs84", "gps", "j2000", "2000", "icrs", "epoch"})
 """Words that say in which form a place is written, and not which place it is."""
 
@@ -26,7 +38,7 @@ LONGITUDES = frozenset(
 _DECLINATIONS = frozenset(
     {"dec", "decl", "declination", "déclinaison", "declinaison", "deklination"}
 )
-_AZIMUTHS = frozenset({"az", "azi", "azim", "azimuth", "azimut"})
+AZIMUTHS = frozenset({"az", "azi", "azim", "azimuth", "azimut", "azimuthal"})
 
 
 class Family(NamedTuple):
@@ -46,11 +58,11 @@ FAMILIES = (
     Family(LATITUDES, LONGITUDES),
     Family(_DECLINATIONS | {"de", "dej"}, frozenset({"ra", "raj", "rektaszension"})),
     Family(frozenset({"inc", "incl", "inclination", "inclinaison", "inklination"}), _DECLINATIONS),
-    Family(frozenset({"alt", "altitude", "el", "elev", "elevation"}), _AZIMUTHS),
-    Family(frozenset({"plunge", "plg"}), _AZIMUTHS | {"trend", "trd", "bearing"}, is_axial=True),
+    Family(frozenset({"alt", "altitude", "el", "elev", "elevation"}), AZIMUTHS),
+    Family(frozenset({"plunge", "plg"}), AZIMUTHS | {"trend", "trd", "bearing"}, is_axial=True),
     Family(
         frozenset({"dip"}),
-        _AZIMUTHS | {"dipdir", "strike"},
+        AZIMUTHS | {"dipdir", "strike"},
         is_axial=True,
         note="these are the lines of dip; for the poles of the planes, give latitude 90 - dip and "
         "longitude dip direction + 180, or strike - 90",
@@ -64,8 +76,14 @@ _NOT_PLACES = frozenset(
 )
 """Words of columns that say how well a place is known, or else about it."""
 
-FROM_POLE = frozenset({"colat", "colatitude", "zenith", "kolatitude", "polardistance"})
+FROM_POLE = frozenset(
+    {"colat", "colatitude", "zenith", "kolatitude", "polardistance"}
+    | {"sza", "vza", "polar", "polarwinkel"}
+)
 """Words for the angle from the pole, which is 90 degrees less the latitude."""
+
+FROM_VERTICAL = frozenset({"tilt", "inc", "incl", "inclination", "incidence", "neigung"})
+"""Words for an angle that, beside an azimuth, is counted from the vertical as a rule."""
 
 HOURS = frozenset({"h", "hr", "hrs", "hour", "hours", "hms"})
 
@@ -75,14 +93,21 @@ ANGLES = frozenset((
     "angle", "angles", "winkel", "dihedral", "torsion", "phase", "argument", "tilt", "roll",
     "pitch", "yaw", "direction", "dir", "wdir", "wd", "heading", "bearing", "course", "cog",
     "aspect", "strike", "trend", "rotation", "twist", "richtung", "windrichtung",
-)) | _AZIMUTHS
+)) | AZIMUTHS
 # fmt: on
 """Words for angles in general."""
+
+AXIAL = frozenset(
+    {"strike", "strikes", "orientation", "orientations", "axis", "axes", "axial", "fibre", "fibres"}
+    | {"fiber", "fibers", "lineation", "lineations", "lineament", "lineaments"}
+)
+"""Words for lines without an arrow, whose angles come back after half a turn."""
 
 # fmt: off
 OTHERS = frozenset((
     "temp", "temperature", "temperatur", "length", "len", "distance", "dist", "radius", "mass",
-    "speed", "velocity", "wspd", "ws", "gust", "pressure", "humidity", "rain", "precipitation",
+    "speed", "spd", "sknt", "windspeed", "velocity", "wspd", "ws", "gust", "pressure", "humidity",
+    "rain", "precipitation",
     "depth", "height", "width", "size", "area", "volume", "resolution", "occupancy", "bfactor",
     "score", "energy", "charge", "magnitude", "mag", "price", "year", "month", "date", "time",
     "timestamp", "hour", "hours", "day", "weekday", "doy", "age", "probability", "pvalue",
@@ -124,6 +149,15 @@ def unit_named(name: str) -> str | None:
     ('degrees', 'radians', None)
     """
     return next((UNITS[word] for word in words_of(name) if word in UNITS), None)
+
+
+def foreign_unit(name: str) -> str | None:
+    """Return the unit that a name says and that is not read, or None.
+
+    >>> foreign_unit("azimuth [gon]"), foreign_unit("phi_deg")
+    ('gon', None)
+    """
+    return next((FOREIGN[word] for word in words_of(name) if word in FOREIGN), None)
 
 
 def is_angle_named(name: str) -> bool:

@@ -11,9 +11,11 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.fitting.rounding import (
     FEW,
+    FEWEST_OF_STEPS,
     FEWEST_VALUES,
     MANY,
     Heap,
+    are_parts_of,
     coarser_step,
     heap_of,
     known_step,
@@ -157,22 +159,24 @@ def repeats_of(space: Space, points: Tensor) -> Repeats:
     rows = len(points) - len(counts)
     found = Repeats(rows, len(counts), None, None, columns=tuple(space.columns))
     data = _coordinates(space, points)
-    if data is None or len(counts) < FEWEST_VALUES:
+    if data is None or len(counts) < FEWEST_OF_STEPS:
         return found
     turns = [_turn(space, k) for k in range(data.shape[1])]
     steps = [step_of(own, turn) for own, turn in zip(data.T, turns, strict=True)]
+    if len(counts) < FEWEST_VALUES and not _are_parts(data, steps, turns):
+        return found
     moving = np.ptp(data, axis=0) > 0
     if heaps := _heaps(data, steps, turns):
         spread = [known_step(step, turn) for step, turn in zip(steps, turns, strict=True)]
         return replace(found, spread=tuple(spread), heaps=heaps)
     if rows and all(step or not moves for step, moves in zip(steps, moving, strict=True)):
-        explained = share_explained(data, steps, moving)
+        explained = share_explained(data, steps, turns, moving)
         found = replace(found, step=max(step or 0.0 for step in steps), explained=explained)
     if found.step is not None and not found.is_rounding and rows > FEW * len(points):
         coarse = [
             coarser_step(own, step, max(turns)) for own, step in zip(data.T, steps, strict=True)
         ]
-        again = share_explained(data, coarse, moving)
+        again = share_explained(data, coarse, turns, moving)
         twice = replace(found, step=max(step or 0.0 for step in coarse), explained=again)
         if twice.is_rounding:
             found, steps = twice, coarse
@@ -183,6 +187,14 @@ def repeats_of(space: Space, points: Tensor) -> Repeats:
     else:
         return found
     return replace(found, spread=tuple(spread))
+
+
+def _are_parts(data: Array, steps: list[float | None], turns: list[float]) -> bool:
+    """Return whether all columns of data (N, k) are multiples of parts of a turn, which are no few."""
+    return all(
+        step is not None and known_step(step, turn) > 0 and are_parts_of(own, step, turn)
+        for own, step, turn in zip(data.T, steps, turns, strict=True)
+    )
 
 
 def _heaps(
@@ -205,7 +217,7 @@ def _heaps(
     moving = np.ptp(some, axis=0) > 0
     if any(moves and not step for step, moves in zip(coarse, moving, strict=True)):
         return heaps  # a column that is not rounded: whole rows do not repeat by rounding
-    explained = share_explained(some, coarse, moving)
+    explained = share_explained(some, coarse, turns, moving)
     return heaps if explained is None or explained * MANY >= 1 else None
 
 

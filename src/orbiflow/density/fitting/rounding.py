@@ -31,6 +31,9 @@ COARSER = 3.0
 FEWEST_VALUES = 8
 """The fewest different values that are taken for rounded, and steps in a turn: fewer may be states."""
 
+FEWEST_OF_STEPS = 5
+"""The fewest different values of a column that are taken for rounded to whole parts of a turn."""
+
 ROWS_PER_VALUE = 8
 """Rows for each different value from which a column is rounded coarsely, though no rows repeat."""
 
@@ -104,6 +107,12 @@ def known_step(step: float | None, turn: float) -> float:
     return 0.0 if step is None or 0 < turn < FEWEST_VALUES * step * (1 - 1e-9) else step
 
 
+def are_parts_of(column: Array, step: float, turn: float) -> bool:
+    """Return whether values (N,) are multiples of a step that is a usual part of a turn."""
+    is_usual = _is_whole(turn / step) and round(turn / step) in (8, 12, *PARTS)
+    return is_usual and _are_multiples(column, step, turn, _off(column))
+
+
 def spread_of(column: Array, step: float | None) -> float:
     """Return the step over which to spread the values of a column, 0 if it is not rounded coarsely."""
     if step is None:
@@ -117,25 +126,37 @@ def spread_of(column: Array, step: float | None) -> float:
 
 
 def share_explained(
-    data: Array, steps: list[float | None], moving: NDArray[np.bool_]
+    data: Array, steps: list[float | None], turns: list[float], moving: NDArray[np.bool_]
 ) -> float | None:
     """Return what steps of columns explain of the repeats of data (N, k), as `_explained` does."""
+    around = [
+        round(turn / step) if step and _is_whole(turn / step) else 0
+        for step, turn in zip(steps, turns, strict=True)
+    ]
     cells = np.stack([cells_of(own, s) for own, s in zip(data.T, steps, strict=True)], axis=1)
-    return _explained(cells[:, moving])
+    return _explained(cells[:, moving], around=np.array(around)[moving])
 
 
-def _explained(cells: NDArray[np.int64], weights: Array | None = None) -> float | None:
+def _explained(
+    cells: NDArray[np.int64], weights: Array | None = None, around: NDArray[np.int64] | None = None
+) -> float | None:
     """Return the ratio of pairs of rows whose cells (N, k) are one apart to pairs that are equal.
 
-    Rows may have weights (N,): of each so many are there.
+    Rows may have weights (N,): of each so many are there. The last cell of a column is beside its first
+    one if there are so many `around` it (k,), and not 0.
     """
+    if around is not None:
+        cells = np.where(around > 0, cells % np.maximum(around, 1), cells)
     cells, place = np.unique(cells, axis=0, return_inverse=True)
     number = np.bincount(place.ravel(), weights, minlength=len(cells))
     equal = float((number * (number - 1) / 2).clip(0).sum())
     of = {tuple(cell): n for cell, n in zip(cells.tolist(), number.tolist(), strict=True)}
     apart = 0.0
     for shift in np.eye(cells.shape[1], dtype=np.int64):
-        beside = (cells + shift).tolist()
+        moved = cells + shift
+        if around is not None:
+            moved = np.where((around > 0) & (moved == around), 0, moved)
+        beside = moved.tolist()
         apart += sum(n * of.get(tuple(m), 0) for n, m in zip(of.values(), beside, strict=True))
     # of n rows in a cell n (n - 1) / 2 pairs are equal, and n m with the m of a cell beside it
     return apart / cells.shape[1] / 2 / equal if equal else None

@@ -14,6 +14,7 @@ from orbiflow.density.data import (
     TURNS,
     codes_among,
     is_angular,
+    place_doubts,
     refuse_codes,
     seeming_unit,
 )
@@ -37,7 +38,8 @@ def data_doubts(
 ) -> list[str]:
     """Return what makes one doubt that data (N, k), of which some may be missing, are in its unit.
 
-    One doubts if the values may be in another unit and are likelier in it, by the density.
+    One doubts if the values may be in another unit and are likelier in it, by the density, and what one
+    doubts of places.
 
     Raises:
         SettingError: For codes for missing values; `cure` says what to do with them.
@@ -50,15 +52,18 @@ def data_doubts(
     # a few angles in radians that go on turning may be among the codes
     read_as = unit if len(values) >= FEW_ROWS else "degrees"
     refuse_codes(space.name, values, called, read_as, cure)
+    found: list[str] = []
+    if not is_angular(space.name, width):
+        found = [doubt.text for doubt in place_doubts(space.name, values, called, unit)]
     other = _likelier_unit(density, values, unit)
     if other is None:
-        return []
+        return found
     if unit == "degrees":
         what = "angles are" if is_angular(space.name, width) else "latitudes and longitudes are"
         text = (
             f"all values are within 2 pi, and the model's {what} in degrees: if these are {other}"
         )
-        return [f"{text}, convert them"]
+        return [*found, f"{text}, convert them"]
     most = np.nanmax(np.abs(values), axis=0, initial=0.0)
     return [_beyond(called[int(most.argmax())], float(most.max()), unit, other)]
 

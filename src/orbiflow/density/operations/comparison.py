@@ -122,12 +122,19 @@ class _Reader(NamedTuple):
     progress: Callable[[float, str], None]
 
     def rows(
-        self, data: Path, columns: Columns, tell: runtime.Sink, where: SpaceSettings | None = None
+        self,
+        data: Path,
+        columns: Columns,
+        tell: runtime.Sink,
+        where: SpaceSettings | None = None,
+        model_space: str | None = None,
     ) -> TableRows:
         """Return rows, without the column of groups if columns are not named."""
         settings = self.settings.replace(columns=columns)
-        space = {} if where is None else {"space": where.space, "width": where.width}
-        return tables.read_rows(data, settings, tell, **space, group=self.group)
+        space: dict[str, Any] = {"group": self.group, "model_space": model_space}
+        if where is not None:
+            space |= {"space": where.space, "width": where.width}
+        return tables.read_rows(data, settings, tell, **space)
 
 
 def _compare_models(
@@ -146,7 +153,7 @@ def _compare_models(
         own = columns[name]
         if own not in found:
             tell_once = runtime.ignore if found else read.tell
-            found[own] = read.rows(data, own, tell_once)
+            found[own] = read.rows(data, own, tell_once, model_space=density.space.name)
             check_fits(data, found[own].table, density, extra, tell_once)
         values = found[own].table.values
 

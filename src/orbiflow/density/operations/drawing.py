@@ -75,7 +75,7 @@ def plot(
     points = None
     if data is not None:
         reading = with_columns_of(table, data, extra, on_event)
-        found = tables.read_rows(data, reading, on_event).table
+        found = tables.read_rows(data, reading, on_event, model_space=space.name).table
         check_fits(data, found, density, extra, on_event)
         points = found.values
 

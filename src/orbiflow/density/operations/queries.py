@@ -83,13 +83,18 @@ def score(
     with runtime.one_thread():
         density, extra = model_at(model)
         spaces.check_measure(settings.measure, density.space)
-        rows = tables.read_rows(data, with_columns_of(reading, data, extra, on_event), on_event)
+        read = with_columns_of(reading, data, extra, on_event)
+        rows = tables.read_rows(data, read, on_event, model_space=density.space.name)
         check_fits(data, rows.table, density, extra, on_event)
         progress = runtime.progress_events(on_event, cancel)
         columns, mean, over, notes = score_rows(density, rows, settings, progress, may_lack)
     weighted = "" if reading.weights is None else f", weighted by {reading.weights}"
     words = f"mean log density {mean:.4f} nats over {over}{weighted}; written to {out}"
     table = tables.append_columns(rows.table, data, columns)
+    notes += [
+        f"{data} has a column {name} already: the new one is {free}"
+        for name, free in tables.renamed_columns(rows.table, columns).items()
+    ]
     write_file(out, table, on_event, *notes, words)
     return runtime.Outcome({"file": str(out), "rows": len(rows.table.values), "mean": mean})
 
@@ -379,7 +384,7 @@ def _angle(text: str) -> tuple[str, float]:
     try:
         if not sign or not name.strip():
             raise ValueError
-        return name.strip(), float(value)
+        return name.strip(), float(tables.with_minus(value.strip()))
     except ValueError:
         raise SettingError(
             f"{{given}} must be angles such as psi=-45, got {literal(repr(text))}"

@@ -17,7 +17,7 @@ import torch
 
 from orbiflow.arrays import Array
 from orbiflow.density import inference, pictures, tables
-from orbiflow.density.data import check_columns
+from orbiflow.density.data import doubts_of_other_columns
 from orbiflow.density.fitting import Progress as InProgress
 from orbiflow.density.models import Density, Mixture, density_to_bytes, read_density
 from orbiflow.density.run_folder import SAMPLES, write_files
@@ -64,7 +64,8 @@ def with_columns_of(
         tell(Note(f"{data} has no header: its columns were taken for {', '.join(names)}"))
         return settings
     known = {name.casefold() for name in own}
-    missing = [name for name in names if name.casefold() not in known]
+    asked = tables.columns_in(own, names)
+    missing = [name for name in asked if name.casefold() not in known]
     if missing:
         some = f"no {', '.join(missing)} among " if len(missing) < len(names) else ""
         raise TableError(
@@ -92,21 +93,19 @@ def check_fits(
             )
             + ": say with {columns} which they are, in this order"
         )
-    if list(table.columns) != wanted:
-        if sorted(table.columns) == sorted(wanted):
-            raise TableError(
-                literal(
-                    f"{data}: the model was fitted to {', '.join(wanted)}, in this order; give "
-                )
-                + "{columns} "
-                + literal(f"'{','.join(wanted)}'")
-            )
-        check_columns(space.name, table.columns)
+    if list(table.columns) != wanted and sorted(table.columns) == sorted(wanted):
+        listed = literal(
+            f"{data}: the model was fitted to {', '.join(wanted)}, in this order; give "
+        )
+        raise TableError(listed + "{columns} " + literal(f"'{','.join(wanted)}'"))
     unit, own = table.unit, inference.data_unit(space, len(table.columns))
     if unit is not None and own not in (None, unit):
         text = f"{data}: the cells are in {unit}, and the model's data in {own}: convert them"
         raise TableError(literal(text))
-    for doubt in inference.data_doubts(density, table.values, table.columns, tables.CURE):
+    doubts = inference.data_doubts(density, table.values, table.columns, tables.CURE)
+    if [name.casefold() for name in table.columns] != [name.casefold() for name in wanted]:
+        doubts += doubts_of_other_columns(space.name, table.values, table.columns, own)
+    for doubt in doubts:
         tell(Note(f"WARNING: {data}: {doubt}"))
 
 

@@ -2,6 +2,7 @@ from .files import append_columns as append_columns
 from .files import column_names as column_names
 from .files import read_labels as read_labels
 from .files import read_table as read_table
+from .files import renamed_columns as renamed_columns
 from .files import to_csv as to_csv
 from .guesses import Column as Column
 from .guesses import Guess as Guess
@@ -9,9 +10,11 @@ from .guesses import code_notes as code_notes
 from .guesses import guess as guess
 from .guesses import seen_column as seen_column
 from .guesses import seen_columns as seen_columns
+from .numerals import with_minus as with_minus
 from .rows import CURE as CURE
 from .rows import TableRows as TableRows
 from .rows import angle_unit as angle_unit
+from .rows import columns_in as columns_in
 from .rows import read_rows as read_rows
 from .settings import CountedRowSettings as CountedRowSettings
 from .settings import GroupedRowSettings as GroupedRowSettings

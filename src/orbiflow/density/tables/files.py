@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from orbiflow.density.tables import text
 from orbiflow.density.tables.layout import layout_of
-from orbiflow.density.tables.lines import split_line, text_lines
+from orbiflow.density.tables.lines import is_utf16, split_line, text_lines
 from orbiflow.density.tables.numerals import Mark
 from orbiflow.density.tables.table import (
     BLOCK,
@@ -111,6 +111,14 @@ def append_columns(
     return bytes(out)
 
 
+def renamed_columns(table: Table, names: Iterable[str]) -> dict[str, str]:
+    """Return what `append_columns` calls columns whose names the file has already."""
+    taken = table.columns if table.delimiter is None else table.header or ()
+    wanted = list(names)
+    pairs = zip(wanted, _free_names(wanted, taken), strict=True)
+    return {name: free for name, free in pairs if name != free}
+
+
 def to_csv(columns: Sequence[str], values: ArrayLike) -> bytes:
     """Return values (N, k) as UTF-8 CSV under a header of k names, with 10 significant digits.
 
@@ -169,7 +177,7 @@ def kind_of_file(path: Path) -> str:
             return kind
         if path.suffix.lower() == f".{kind}":
             raise InputFileError(f"{path}: does not begin as a .{kind} file does; save it again")
-    if b"\0" in head:
+    if b"\0" in head and not is_utf16(head):
         raise InputFileError(f"{path}: binary data, not a table; save it as CSV in UTF-8")
     return "text"
 

@@ -8,7 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orbiflow.density.data import is_angle_named, is_count_named, is_other_quantity, pairs_of
+from orbiflow.density.data import (
+    UNITS,
+    is_angle_named,
+    is_count_named,
+    is_other_quantity,
+    pairs_of,
+    words_of,
+)
 from orbiflow.density.tables import table as tables
 from orbiflow.density.tables.cells import (
     COMPASS,
@@ -89,14 +96,21 @@ def layout_of(
     delimiter = _delimiter_of(path, [line for _, line in sample])
     rows = [split_line(path, number, line, delimiter) for number, line in sample]
     check_count(path, len(rows[0]), tables.MAX_COLUMNS, "columns")
+    if has_header is not False and _has_row_names(rows):
+        rows[0] = ["", *rows[0]]
     for (number, _), row in zip(sample, rows, strict=True):
         check_length(path, number, row, first, len(rows[0]), delimiter)
     written = list(zip(*rows, strict=True))
     units = tuple(unit_of_cells(column) for column in written)
     cells = [[bare(cell, own) for cell, own in zip(row, units, strict=True)] for row in rows]
     marks = marks_of(cells, delimiter if len(rows[0]) > 1 else "", decimal)
+    # a word on top is a name, but for "VRB" in a first row of numbers
+    is_row = any(kind_of(plain(cell, marks.decimal)) == "number" for cell in cells[0])
     classes = [
-        tuple(kind_of(plain(cell, marks.decimal)) for cell in column)
+        tuple(
+            kind_of(plain(cell, marks.decimal), is_top=row == 0 and not is_row)
+            for row, cell in enumerate(column)
+        )
         for column in zip(*cells, strict=True)
     ]
     header, header_line = None, None
@@ -148,7 +162,7 @@ def _header_among(
         elif cells == words and _is_sentence(words):
             continue
         names = tuple(cell.strip().strip('"').strip() for cell in cells)
-        is_named = all(kind_of(plain(name, ".")) == "word" for name in names)
+        is_named = all(kind_of(plain(name, "."), is_top=True) == "word" for name in names)
         if is_named and len(set(names)) == len(names) == width:
             return names, number
     return None, None
@@ -252,11 +266,11 @@ def _delimiter(lines: list[str]) -> str:
             _LONE_COMMA.fullmatch(first.strip()) and _LEADING_ZERO.search(",".join(lines))
         ):
             return ";"
-    if _is_lone(lines[len(lines) > 1 :]):
+    if _is_lone(lines[len(lines) > 1 :]) or _is_lone_under(first, rest):
         return ";"
     if _is_spaced(lines[len(lines) > 1 :]):
         return " "
-    counts = {mark: [line.count(mark) for line in lines] for mark in "\t;,"}
+    counts = {mark: [line.count(mark) for line in lines] for mark in "\t;|,"}
     for mark, count in counts.items():
         if count[0] and len(set(count)) == 1:
             return mark
@@ -264,6 +278,41 @@ def _delimiter(lines: list[str]) -> str:
         if 2 * sum(map(bool, count)) > len(lines):
             return mark
     return " " if any(len(line.split()) > 1 for line in lines) else ","
+
+
+def _is_lone_under(name: str, lines: list[str]) -> bool:
+    """Return whether lines are single numbers under a name with spaces.
+
+    >>> _is_lone_under("Direction (deg)", ["10", "20.5", "NA"]), _is_lone_under("phi psi", ["1", "2"])
+    (True, False)
+    """
+    words = name.split()
+    is_unit = [UNITS.keys() >= {*words_of(word)} for word in words]
+    are_names = all(map(is_angle_named, words)) and not any(is_unit)
+    if len(words) < 2 or are_names or re.search(r"[;,|\t]", name):
+        return False
+    kinds = [kind_of(line) for line in lines]
+    return "number" in kinds and "word" not in kinds
+
+
+def _has_row_names(rows: Sequence[Sequence[str]]) -> bool:
+    """Return whether a header lacks the name of the first column, the rows' names, as R writes it.
+
+    >>> _has_row_names([["phi", "psi"], ["1", "60.5", "-45"], ["2", "61", "-44"]])
+    True
+    >>> _has_row_names([["phi", "psi"], ["60.5", "-45", "1"], ["60.5", "-44", "2"]])
+    False
+    """
+    top, *rest = rows
+    if {len(row) for row in rest} != {len(top) + 1}:
+        return False
+    if any(kind_of(cell.strip('"'), is_top=True) != "word" for cell in top):
+        return False
+    if not all("number" in map(kind_of, row[1:]) for row in rest):  # a number and its unit, perhaps
+        return False
+    names = [row[0] for row in rest]
+    are_words = all(kind_of(name) == "word" or _WHOLE.fullmatch(name) for name in names)
+    return are_words and len(set(names)) == len(names)
 
 
 def _is_lone(lines: list[str]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import re
 from collections.abc import Iterator
@@ -18,8 +19,22 @@ MAX_LINE = 2**20
 _UNDECODED = re.compile("[\udc80-\udcff]")
 # what spreadsheets write in a cell without a value, which begins no comment
 _SHEET_ERROR = re.compile(r"#(?:N/?A|NULL!|DIV/0!|VALUE!|REF!|NAME\?|NUM!)", re.IGNORECASE)
+_SPACED = re.compile(r'"[^"]*"(?=\s|$)|\S+')
+"""Cells between spaces, which may be quoted."""
+
 SEPARATOR = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
 """Excel's first line, which says what separates cells."""
+
+
+def is_utf16(head: bytes) -> bool:
+    """Return whether a file's first bytes are the byte-order mark of UTF-16, and not of UTF-32."""
+    return head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) and head[2:4] != b"\0\0"
+
+
+def encoding_of(path: Path) -> str:
+    """Return the encoding of a text file: UTF-16 if it has its byte-order mark, or else UTF-8."""
+    with path.open("rb") as file:
+        return "utf-16" if is_utf16(file.read(4)) else "utf-8-sig"
 
 
 def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
@@ -28,7 +43,7 @@ def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
     Excel's first line "sep=;" counts as one.
     """
     try:
-        with path.open(encoding="utf-8-sig", errors="surrogateescape") as file:
+        with path.open(encoding=encoding_of(path), errors="surrogateescape") as file:
             for number, line in enumerate(iter(partial(file.readline, MAX_LINE), ""), start=1):
                 if not line.isascii() and _UNDECODED.search(line):
                     raise InputFileError(
@@ -45,6 +60,8 @@ def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
                         number == 1 and SEPARATOR.fullmatch(line.rstrip("\r\n"))
                     )
                     yield number, line.rstrip("\n"), bool(is_comment)
+    except UnicodeError as exc:
+        raise InputFileError(f"{path}: not UTF-16 text, as it begins; save it as UTF-8") from exc
     except OSError as exc:
         raise InputFileError(f"{path}: cannot be read ({exc.strerror}); check it") from exc
 
@@ -53,7 +70,7 @@ def split_line(path: Path, number: int, line: str, delimiter: str) -> list[str]:
     """Return the cells of a line, with plain minus signs before numbers."""
     line = with_minus(line)
     if delimiter == " ":
-        return line.split()
+        return [cell.strip('"') for cell in _SPACED.findall(line)] if '"' in line else line.split()
     if '"' not in line:
         return line.split(delimiter)
     try:

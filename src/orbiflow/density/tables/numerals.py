@@ -9,7 +9,12 @@ from typing import Literal, NamedTuple
 _MINUS = re.compile(r"[\u2010-\u2013\u2212\ufe63\uff0d](?=[\d.,])")
 _SPACED = re.compile(r"[+-]?\d{1,3}(?:[\u00a0\u202f\u2009 '\u2019]\d{3})+(?:[.,]\d*)?")
 _SPACES = re.compile(r"[\u00a0\u202f\u2009 '\u2019]")
-_MISSING = frozenset({"", "na", "n/a", "<na>", "nan", "null", "none", "-", "--", "#n/a", "#na"})
+_MISSING = frozenset(
+    {"", "na", "n/a", "<na>", "nan", "null", "none", "-", "--", "#n/a", "#na", "#value!", "#null!"}
+    | {"?", ".", "*", "\\n", "-1.#ind", "1.#qnan", "-nan", "nan(ind)", "-nan(ind)"}
+)
+_MISSING_WORDS = frozenset({"vrb", "mm", "m", "nil", "missing"})
+"""Words that are missing values among numbers, and names on top of them."""
 
 Mark = Literal[".", ","]
 OTHER: dict[str, Mark] = {".": ",", ",": "."}
@@ -47,6 +52,8 @@ def plain(cell: str, decimal: str) -> str:
     ('1025.2', '1025', '48,2', '1025.5')
     """
     cell = cell.strip()
+    if cell.casefold() in _MISSING:
+        return cell
     if (not cell.isascii() or " " in cell or "'" in cell) and _SPACED.fullmatch(cell):
         cell = _SPACES.sub("", cell)
     other = OTHER[decimal]
@@ -57,9 +64,14 @@ def plain(cell: str, decimal: str) -> str:
     return cell.replace(decimal, ".")
 
 
-def kind_of(cell: str) -> Literal["missing", "number", "word"]:
-    """Return what a cell is that `plain` returned."""
-    if cell.strip().casefold() in _MISSING:
+def kind_of(cell: str, *, is_top: bool = False) -> Literal["missing", "number", "word"]:
+    """Return what a cell is that `plain` returned; one on top of a column may be its name.
+
+    >>> kind_of("M"), kind_of("M", is_top=True)
+    ('missing', 'word')
+    """
+    word = cell.strip().casefold()
+    if word in _MISSING or (word in _MISSING_WORDS and not is_top):
         return "missing"
     try:
         float(cell)

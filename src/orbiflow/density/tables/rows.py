@@ -14,20 +14,25 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.density.data import (
+    DIP_DIRECTION,
     DIRECTIONS,
     Doubt,
     Unit,
     check_values,
     chosen_arrangement,
+    dip_direction_among,
+    dip_directions,
     fraction_doubts,
     is_angle_named,
     is_count_named,
     is_identifier,
     is_other_quantity,
     seeming_unit,
+    strike_beside_dip,
+    strike_note,
     unit_named,
-    words_of,
 )
+from orbiflow.density.tables.beside import check_hemispheres, tell_of_calm, tell_of_counts
 from orbiflow.density.tables.files import column_names, read_labels, read_table
 from orbiflow.density.tables.settings import SPACES, RowSettings, SpaceSettings, TableSettings
 from orbiflow.density.tables.table import MissingCellsError, Table, TableError, find, listing, quote
@@ -96,12 +101,14 @@ def read_rows(
     space: str | None = None,
     width: int | None = None,
     group: str | None = None,
+    model_space: str | None = None,
 ) -> TableRows:
     """Return the rows of a table of `width` columns, and tell what was decided for the user.
 
     Without `columns` in the settings, those are taken whose names say that they are what the `space`
     takes, in its order. If no name says so, all columns of numbers are taken but those that number
     the rows, those of weights, counts and groups and, on a torus, those that are no angles by name.
+    Strikes beside dips become directions of dip on this space or on `model_space`, that of a model.
     """
     rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
     weighing, counting = (
@@ -120,13 +127,16 @@ def read_rows(
         ) from error
     for note in table.notes:
         tell(Note(note))
+    table = _with_dip_directions(table, rows, space or model_space, tell)
     _check_width(path, table, space, width, others)
     if space in DIRECTIONS:
-        _check_hemispheres(path, table, rows.header)
+        check_hemispheres(path, table, rows.header)
+    if space == "torus":
+        tell_of_calm(path, table, rows, tell)
     if weighing is not None:
         _tell_of_weights(weighing, tell)
     elif counting is None and space == "torus" and hasattr(rows, "counts"):
-        _tell_of_counts(path, table, rows.header, tell)
+        tell_of_counts(path, table, rows.header, tell)
     return _weighed(TableRows(path, table, None, group, rows.header), weighing, counting)
 
 
@@ -154,31 +164,37 @@ def _data_columns(
     columns = rows.columns
     if columns is None and space is not None:
         columns = _columns_by_name(path, space, width, others, rows.header, tell)
+    if columns is not None:
+        columns = columns_in(column_names(path, has_header=rows.header) or (), columns)
     if columns is None:
         return _all_columns(path, space, None if others else width, others, rows, tell)
     how: dict[str, Any] = {**_how(rows), **_drop(rows), "missing_codes": rows.missing_codes}
     return read_table(path, columns=list(columns), width=None, **how)
 
 
-_HEMISPHERES = {"N", "S", "E", "W", "NORTH", "SOUTH", "EAST", "WEST"}
+def columns_in(names: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
+    """Return the columns to read for those that are wanted: a strike for a direction of dip.
+
+    >>> columns_in(["strike", "dip"], ["dip", "dip_direction"])
+    ('dip', 'strike')
+    """
+    return tuple(dip_direction_among(name, names) or name for name in wanted)
 
 
-def _check_hemispheres(path: Path, table: Table, header: bool | None) -> None:
-    """Refuse degrees to the south or west that only a column of letters tells of."""
-    for name in column_names(path, has_header=header) or ():
-        words = {"ns", "ew", "n", "e", "hemisphere", "hemi", "dir", "direction"}
-        if name in table.columns or not words.intersection(words_of(name)):
-            continue
-        letters = {
-            cell.strip().upper() for cell in read_labels(path, name, table, has_header=header)
-        }
-        if letters <= _HEMISPHERES and letters & {"S", "W", "SOUTH", "WEST"}:
-            raise TableError(
-                literal(
-                    f"{path}: column {name!r} says which rows are south or west, and it is not read: "
-                    "make their latitudes and longitudes negative"
-                )
-            )
+def _with_dip_directions(table: Table, rows: RowSettings, space: str | None, tell: Sink) -> Table:
+    """Return a table whose strikes beside dips are directions of dip, where that is what is wanted."""
+    strike = strike_beside_dip(table.columns)
+    is_asked = (
+        rows.columns is not None
+        and dip_direction_among(rows.columns[-1], table.columns) is not None
+    )
+    if not strike or not (space in DIRECTIONS or is_asked):  # before its dip it will be refused
+        return table
+    tell(Note(strike_note(table.columns[strike])))
+    values = table.values.copy()
+    values[:, strike] = dip_directions(values[:, strike])
+    columns = (*table.columns[:strike], DIP_DIRECTION, *table.columns[strike + 1 :])
+    return replace(table, values=values, columns=columns)
 
 
 def _drop(rows: RowSettings) -> dict[str, Any]:
@@ -257,21 +273,6 @@ def _tell_of_names(table: Table, tell: Sink) -> None:
     unknown = [name for name in table.columns if not is_angle_named(name)]
     if named and any(re.fullmatch(r"column\d+", name) is None for name in unknown):
         tell(Note(f"took {listing(unknown)} as angle{'s' * (len(unknown) > 1)}"))
-
-
-def _tell_of_counts(path: Path, table: Table, header: bool | None, tell: Sink) -> None:
-    """Tell that a column beside evenly spaced, different angles may count them."""
-    names = column_names(path, has_header=header) or ()
-    beside = [name for name in names if is_count_named(name) and name not in table.columns]
-    if not beside or len(table.columns) != 1:
-        return
-    steps = np.diff(np.sort(table.values[:, 0]))
-    if len(steps) > 1 and steps.min() > 0 and bool(np.isclose(steps, steps.min(), rtol=0.01).all()):
-        text = (
-            f"the values of {table.columns[0]!r} are evenly spaced, as the middles of bins are: if "
-            f"{beside[0]!r} says how many rows are in each, give --counts {beside[0]}"
-        )
-        tell(Note(text))
 
 
 def _tell_of_weights(weighing: Table, tell: Sink) -> None:

@@ -1,0 +1,134 @@
+"""Scoring asks the same of columns as fitting, and finds names in any case."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from orbiflow.density import DensityEstimator
+from orbiflow.density.operations.queries import conditional, score
+from orbiflow.density.tables import RowSettings
+from orbiflow.errors import DataWarning, OrbiflowError, SettingError
+from orbiflow.loading import save
+from orbiflow.runtime import Event, Note
+
+RNG = np.random.default_rng(0)
+PLACES = np.stack([RNG.normal(30, 8, 60), RNG.uniform(5, 350, 60)], axis=1)
+SKY = pd.DataFrame({"dec": PLACES[:, 0], "ra": PLACES[:, 1]})
+ANGLES = pd.DataFrame({"phi": RNG.normal(-60, 9, 60), "psi": RNG.normal(-45, 9, 60)})
+
+
+@pytest.fixture(scope="module")
+def models(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder, how = tmp_path_factory.mktemp("models"), {"components": "mixture"}
+    places = pd.DataFrame(PLACES, columns=["lat", "lon"])
+    made = {
+        "places": DensityEstimator("sphere", **how).fit(places),
+        "sky": DensityEstimator("sphere", **how).fit(SKY),
+        "angles": DensityEstimator("torus", unit="degrees", **how).fit(ANGLES),
+    }
+    return {name: save(model, folder / name) for name, model in made.items()}
+
+
+def told(model: Path, frame: pd.DataFrame, folder: Path, columns: str | None) -> str:
+    table, events = folder / "rows.csv", list[Event]()
+    frame.to_csv(table, index=False)
+    reading = RowSettings(columns=tuple(columns.split(",")) if columns else None)
+    score(table, reading=reading, model=model, out=folder / "scored.csv", on_event=events.append)
+    return " ".join(event.text for event in events if isinstance(event, Note))
+
+
+DOUBTED = [
+    ("places", SKY.set_axis(["x", "y"], axis=1), "x,y", "on maps it is the other way"),
+    ("places", (SKY / [1, 15]).set_axis(["DEC", "RA"], axis=1), "DEC,RA", "multiply it by 15"),
+    ("sky", SKY / [1, 15], None, "multiply it by 15"),
+    ("places", SKY.set_axis(["theta", "phi"], axis=1).abs(), "theta,phi", "give 90 less it"),
+    ("angles", (ANGLES / 57.3).set_axis(["a_rad", "b_rad"], axis=1), "a_rad,b_rad", "say radians"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("model", "frame", "columns", "words"), DOUBTED)
+def test_scores_tell_what_fits_tell(
+    model: str,
+    frame: pd.DataFrame,
+    columns: str | None,
+    words: str,
+    models: dict[str, Path],
+    tmp_path: Path,
+) -> None:
+    found = told(models[model], frame, tmp_path, columns)
+    assert "WARNING" in found
+    assert words in found
+
+
+USUAL = [
+    ("places", SKY.set_axis(["lat", "lon"], axis=1), None),
+    ("places", SKY.set_axis(["LAT", "Lon"], axis=1)[["Lon", "LAT"]], None),
+    ("places", SKY, "dec,ra"),
+    ("sky", SKY, None),
+    ("angles", ANGLES.set_axis(["Phi", "PSI"], axis=1), None),
+    ("angles", ANGLES.set_axis(["chi1", "chi2"], axis=1), "chi1,chi2"),
+    ("angles", ANGLES.set_axis(["a_deg", "b_deg"], axis=1), "a_deg,b_deg"),
+]
+
+
+@pytest.mark.parametrize(("model", "frame", "columns"), USUAL)
+def test_usual_columns_are_not_doubted(
+    model: str, frame: pd.DataFrame, columns: str | None, models: dict[str, Path], tmp_path: Path
+) -> None:
+    assert "WARNING" not in told(models[model], frame, tmp_path, columns)
+
+
+def test_columns_in_gon_are_refused(models: dict[str, Path], tmp_path: Path) -> None:
+    frame = ANGLES.set_axis(["a_gon", "b_gon"], axis=1)
+    with pytest.raises(SettingError, match=r"is in gon.*multiply by 0\.9"):
+        told(models["angles"], frame, tmp_path, "a_gon,b_gon")
+
+
+def test_hours_in_frames_are_doubted() -> None:
+    model = DensityEstimator("sphere", components="mixture").fit(SKY)
+    with pytest.warns(DataWarning, match="multiply it by 15") as caught:
+        model.score_samples(SKY / [1, 15])
+    assert caught[0].filename == __file__
+
+
+def test_a_second_column_of_scores_is_told(models: dict[str, Path], tmp_path: Path) -> None:
+    assert "already" not in told(models["angles"], ANGLES, tmp_path, None)
+    scored = pd.read_csv(tmp_path / "scored.csv")
+    found = told(models["angles"], scored, tmp_path, None)
+    assert "has a column log_prob already: the new one is log_prob_2" in found
+    assert list(pd.read_csv(tmp_path / "scored.csv"))[-2:] == ["log_prob", "log_prob_2"]
+
+
+def test_frames_have_names_in_any_case() -> None:
+    model = DensityEstimator("torus", unit="degrees", components="mixture").fit(ANGLES)
+    wanted = model.score_samples(ANGLES)
+    other = ANGLES.set_axis(["Phi", "PSI"], axis=1)
+    np.testing.assert_array_equal(model.score_samples(other), wanted)
+    np.testing.assert_array_equal(model.score_samples(other[["PSI", "Phi"]]), wanted)
+    for names in (["phi", "Phi"], ["phi", "chi"]):
+        with pytest.raises(OrbiflowError, match="choose those of the fit"):
+            model.score_samples(ANGLES.set_axis(names, axis=1))
+
+
+def test_one_flat_row_is_refused_with_its_cure() -> None:
+    model = DensityEstimator("torus", unit="degrees", components="mixture").fit(ANGLES)
+    for ask in (model.score_samples, model.score_gradient, model.score, model.fit):
+        with pytest.raises(OrbiflowError, match=r"got \(2,\); of one row write \[\[\.\.\.\]\]"):
+            ask([-60, -40])
+    assert model.score_samples([[-60, -40]]).shape == (1,)
+
+
+def test_what_is_given_may_have_a_typographic_minus(
+    models: dict[str, Path], tmp_path: Path
+) -> None:
+    found = [
+        conditional(model=models["angles"], given=(text,), out=tmp_path / str(k)).summary
+        for k, text in enumerate(("psi=−45", "psi = -45"))
+    ]
+    assert found[0]["columns"] == found[1]["columns"] == ["phi"]
+    one, other = ((tmp_path / name / "density.csv").read_text() for name in "01")
+    assert one == other
