@@ -82,7 +82,11 @@ def may_be_labels(indices: NDArray[np.integer[Any]], palette: NDArray[np.int64])
     used: list[int] = np.unique(indices).tolist()
     edge = np.concatenate([indices[0], indices[-1], indices[1:-1, 0], indices[1:-1, -1]])
     has_gaps = len(used) > 2 and used[-1] > len(used) - 1
-    return has_gaps and not palette[0].any() and 2 * np.count_nonzero(edge == 0) > len(edge)
+    return (
+        has_gaps
+        and sum(palette[0].tolist()) == 0
+        and 2 * int(np.count_nonzero(edge == 0)) > len(edge)
+    )
 
 
 def _are_as_in_voc(palette: NDArray[np.int64]) -> _Mask:
