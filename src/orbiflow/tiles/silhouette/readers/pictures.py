@@ -190,7 +190,10 @@ def choose_shape(
     low = np.median(channel[~above])
     if picture.name == "photograph":
         take_high = True
-        notes = ["photograph: shape told from its background by colour, shadows apart"]
+        notes = [
+            "photograph: the shape was told from its background by colour; look whether a shadow "
+            "belongs to it"
+        ]
     elif picture.name in _PARTS:
         take_high = not invert
         part = _PARTS[picture.name][not take_high]
