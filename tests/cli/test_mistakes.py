@@ -86,7 +86,7 @@ BAD_INPUTS: dict[str, tuple[Callable[[Path], Path], str]] = {
     "NaN in dat": (text("nan.dat", "3\n0 0\n1 0\nnan 1\n"), "line 4"),
     "two corners": (polygon([[0, 0], [1, 0]]), "2"),
     "no area": (polygon([[0, 0], [1, 0], [2, 0]]), "area"),
-    "no polygon": (polygon({"points": SQUARE}), '"polygon"'),
+    "no polygon": (polygon({"dots": SQUARE}), '"polygon"'),
     "broken JSON": (text("half.json", "[[0, 0], [1,"), "half.json"),
 }
 

@@ -177,3 +177,25 @@ def test_the_canonical_square_is_a_fundamental_domain_by_area(space):
     group = identification_group(space)
     assert group.cell_volume / group.order == pytest.approx(1.0, abs=1e-15)
     assert group.name == IDENTIFICATION_SPACES[space].group
+
+
+@pytest.mark.parametrize(
+    ("name", "standard", "point", "image"),
+    [
+        ("p11m", "pm", (0.1, 0.2), (0.1, -0.2)),
+        ("p11g", "pg", (0.1, 0.2), (0.6, -0.2)),
+        ("p2gm", "pmg", (0.1, 0.2), (0.1, 0.3)),
+    ],
+)
+def test_symbols_with_exchanged_axes(
+    name: str, standard: str, point: tuple[float, float], image: tuple[float, float]
+) -> None:
+    group = wallpaper_group(name, np.eye(2))
+    assert group.name == standard
+    images = [np.array(isometry(np.array(point))) for isometry in group.cosets]
+    assert any(np.allclose((found - image + 0.5) % 1, 0.5) for found in images)
+
+
+def test_large_letters_name_plane_groups() -> None:
+    assert wallpaper_group("P1") == wallpaper_group("p1")
+    assert wallpaper_group("P4GM").name == "p4g"

@@ -261,6 +261,48 @@ def test_plane_groups_are_read_with_blanks_or_refused(name: str) -> None:
     for written in (" ".join(name), f" {name} ", f"${name}$"):
         assert wallpaper_group(written).name == name
         assert group_by_name(written).name == name
-    for wrong in (f"{name}x", f"{name[0]}_{name[1:]}", name.upper()):
+    for capital in (name.capitalize(), name.upper()):
+        assert wallpaper_group(capital).name == name
+    for wrong in (f"{name}x", f"{name[0]}_{name[1:]}"):
         with pytest.raises(GroupError, match="unknown wallpaper group"):
             wallpaper_group(wrong)
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("227:2", "F d -3 m:2"),
+        ("227", "F d -3 m:1"),
+        ("62:cab", "P b n m"),
+        ("14:b1", "P 1 21/c 1"),
+        ("166:R", "R -3 m:R"),
+        ("No. 225", "F m -3 m"),
+        ("#225", "F m -3 m"),
+        ("P 4 / m m m", "P 4/m m m"),
+        ("I41/amdZ", "I 41/a m d:2"),
+        ("P4/nmmS", "P 4/n m m:1"),
+        ("Pbar1", "P -1"),
+        ("Fdbar3m", "F d -3 m:1"),
+        ("Pm3barm", "P m -3 m"),
+        ("F 4d 2 3 -1d", "F d -3 m:1"),
+        ("P 2c -2ac", "P c a 21"),
+        ("-P 2ac 2ab", "P b c a"),
+        ("-P 6c 2c", "P 63/m m c"),
+        ("-F 4vw 2vw 3", "F d -3 m:2"),
+    ],
+)
+def test_numbers_with_settings_and_symbols_of_hall(name: str, meant: str) -> None:
+    assert space_group(name).name == meant
+
+
+@pytest.mark.parametrize("name", ["14:3", "225:2", "300", "#0", "0:1", "P 31 2", "I 4 2 3", "-R 3"])
+def test_what_has_no_sure_meaning_is_refused(name: str) -> None:
+    with pytest.raises(GroupError, match="unknown space group"):
+        space_group(name)
+
+
+def test_no_symbol_of_hall_is_taken_for_another_group() -> None:
+    for row in gemmi.spacegroup_table():
+        found = find_hall(gemmi, row.hall)
+        if found is not None:
+            assert gemmi.GroupOps(found) == row.operations(), row.hall

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 
 import gemmi
 import numpy as np
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 
 import strategies as own
 from orbiflow.errors import (
+    DataWarning,
     GroupError,
     InputFileError,
     LatticeMismatchError,
@@ -413,3 +415,41 @@ def test_files_that_are_none_or_too_large_are_refused(tmp_path, monkeypatch):
         group_from_cif(tmp_path / "large.cif")
     with pytest.raises(GroupError, match="needs a group of 3 dimensions"):
         cif_text(own.identification_group("torus"))
+
+
+def cif_of(tmp_path, *lines):
+    cell = ["5", "6", "7", "90", "104", "90"]
+    tags = ["length_a", "length_b", "length_c", "angle_alpha", "angle_beta", "angle_gamma"]
+    text = ["data_x", *(f"_cell_{tag} {x}" for tag, x in zip(tags, cell, strict=True)), *lines]
+    path = tmp_path / "a.cif"
+    path.write_text("\n".join([*text, ""]), "utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ("_space_group_IT_number 14.0",),
+        ("_space_group_name_H-M_alt '.'", "_space_group_IT_number 14"),
+        ("_space_group_name_H-M_alt '?'", "_space_group_name_Hall '-P 2ybc'"),
+    ],
+)
+def test_a_cif_with_a_quoted_sign_for_unknown_or_a_decimal_number(tmp_path, lines):
+    expected = space_group(14, (5, 6, 7, 90, 104, 90))
+    assert group_from_cif(cif_of(tmp_path, *lines)) == expected
+
+
+def test_operators_without_a_name_that_make_the_lattice_finer_are_warned_of(tmp_path):
+    loop = ("loop_", "_space_group_symop_operation_xyz", "'x,y,z'")
+    with pytest.warns(DataWarning, match="imply 3 translations within the cell and list 1"):
+        group_from_cif(cif_of(tmp_path, *loop, "'-x,y+1/3,-z'"))
+
+
+@pytest.mark.parametrize("name", ["P 21/c", "C 2/c", "I 1 2/a 1"])
+def test_operators_without_a_name_that_list_their_centring_warn_of_nothing(tmp_path, name):
+    cell = cell_lattice((5, 6, 7, 90, 104, 90))
+    listed = operators(space_group(name, (5, 6, 7, 90, 104, 90)), cell)
+    loop = ("loop_", "_space_group_symop_operation_xyz", *(f"'{text}'" for text in listed))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        group_from_cif(cif_of(tmp_path, *loop))

@@ -68,6 +68,9 @@ _OTHER_SYMBOLS = {
     **{"p4mm": "p4m", "p4gm": "p4g", "p6mm": "p6m"},
 }
 
+_TURNED = {"p11m": "pm", "p11g": "pg", "p2gm": "pmg"}
+"""Symbols in the setting with exchanged axes."""
+
 
 def short_symbol(name: str) -> str:
     """Return the short symbol of a wallpaper group, and any other name as it is."""
@@ -79,14 +82,18 @@ def wallpaper_group(name: str, lattice: ArrayLike | None = None) -> Crystallogra
     """Return the wallpaper group `name`, one of `WALLPAPER_GROUPS`.
 
     The full symbol of the IUC ("p2mg" or "p 2 m g") and the orbifold's ("22*") name the same group as
-    the short one.
+    the short one. "p11m", "p11g" and "p2gm" are pm, pg and pmg with the other axis first. Letters may
+    be large.
     The lattice has basis vectors as columns, (2, 2); by default it is one of the group's system.
     Raises `GroupError` for an unknown name, or a lattice that is not of the group's system.
 
     >>> wallpaper_group("p6m").order
     12
     """
-    name = short_symbol(name)
+    name = short_symbol(str(name).lower())
+    turned = _TURNED.get(name.replace(" ", ""))
+    if turned is not None:
+        name = turned
     if name not in WALLPAPER_GROUPS:
         raise GroupError(
             f"unknown wallpaper group {name!r}; the 17 are {', '.join(WALLPAPER_GROUPS)}"
@@ -95,10 +102,13 @@ def wallpaper_group(name: str, lattice: ArrayLike | None = None) -> Crystallogra
     basis = np.asarray(LATTICES[row.system] if lattice is None else lattice, dtype=np.float64)
     if checked_lattice(basis).shape != (2, 2):
         raise GroupError(f"a wallpaper group needs a (2, 2) lattice, got shape {basis.shape}")
-    inverse = np.linalg.inv(basis)
+    generated_on = basis if turned is None else basis[:, ::-1]  # the other axis comes first
+    inverse = np.linalg.inv(generated_on)
     try:
         generators = [
-            Isometry(basis @ np.reshape(linear, (2, 2)) @ inverse, basis @ np.array(shift))
+            Isometry(
+                generated_on @ np.reshape(linear, (2, 2)) @ inverse, generated_on @ np.array(shift)
+            )
             for linear, shift in row.generators
         ]
     except NotAnIsometryError as error:

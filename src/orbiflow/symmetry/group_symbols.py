@@ -15,6 +15,11 @@ HALL = re.compile(
 """Symbols of Hall: a lattice, then rotations with their axes and shifts, and a change of origin."""
 
 _AXES_OF_HALL = re.compile(r"[xyz'\"*=]")  # letters of no other symbol
+_SHIFTS_OF_HALL = re.compile(r"\d[abcnuvwd]|-2")
+_NUMBERED = re.compile(
+    r"(?:(?:no\.?|number|\#)\s*)?0*([1-9]\d{0,2})(?:\.0*)?(?:\s*:\s*(\w[\w-]*|-\w+))?",
+    re.IGNORECASE,
+)
 _MINUS = "\u2010\u2011\u2012\u2013\u2014\u2212\ufe63\uff0d"
 _SUBSCRIPTS = {0x2080 + n: f"_{n}" for n in range(10)}
 _PLAIN = str.maketrans({**dict.fromkeys(_MINUS, "-"), "\u2044": "/", "\u2215": "/", "\u00a0": " "})
@@ -23,6 +28,8 @@ _TYPESETTING: tuple[tuple[str, str], ...] = (
     (r"<(\w+)[^<>]*overline[^<>]*>\s*(\d)\s*</\1>", r"-\2"),
     (r"</?[A-Za-z][^<>]*>", ""),
     (r"\\(?:bar|overline)\s*(?:\{\s*(\d)\s*\}|(\d))", r"-\1\2"),
+    (r"bar\s*(\d)", r"-\1"),
+    (r"(\d)bar(?!\s*\d)", r"-\1"),
     (r"\\(?:mathrm|mathit|mathbf|mathsf|text|textit|textrm|rm|it)\b\s*", ""),
     (r"~(\d)~", r"_\1"),
     (r"\\[,;:! ]|~", " "),
@@ -32,8 +39,11 @@ _TYPESETTING: tuple[tuple[str, str], ...] = (
     (r"[\u00af\u203e]\s*(?=\d)", "-"),
     (r"(\d)[\u00af\u203e]", r"-\1"),
     (r"(?<=\d)\s*[(\[](\d)[)\]]", r"_\1"),
+    (r"\s*/\s*", "/"),
 )
-_EXTENSION = re.compile(r"\s*:\s*([12HRSZ]|-?[abc][a-c1-6-]*)$|\s+([HRSZ])$", re.IGNORECASE)
+_EXTENSION = re.compile(
+    r"\s*:\s*([12HRSZ]|-?[abc][a-c1-6-]*)$|\s+([HR])$|\s*([SZ])$", re.IGNORECASE
+)
 _ABBREVIATED = {"mmm", "4/mmm", "-3m", "6/mmm", "m-3", "m-3m"}
 """Point groups whose short symbols leave out the axes across their mirrors."""
 
@@ -94,20 +104,45 @@ def settings_named(gemmi: Any, name: str) -> list[Any]:
     return usual or [symbol.setting for symbol in found]
 
 
+def settings_numbered(gemmi: Any, text: str) -> list[Any]:
+    """Return all rows that a number means, such as "62", "No. 225", "#225", "227:2" or "62:cab"."""
+    found = _NUMBERED.fullmatch(text.strip())
+    if found is None:
+        return []
+    extension = _plain_extension(found[2] or "")
+    return [
+        row
+        for row in gemmi.spacegroup_table()
+        if row.number == int(found[1]) and _has_extension(row, extension)
+    ]
+
+
 def find_hall(gemmi: Any, name: str) -> list[Any] | None:
-    """Return the operators of a symbol of Hall, said by "Hall:" or by letters of no other; or None."""
+    """Return the operators of a symbol of Hall, said by "Hall:" or written like no other; or None."""
     text = " ".join(name.split())
     said = re.fullmatch(r"hall\s*[:=]\s*(.*)", text, re.IGNORECASE)
     text = said[1] if said else text
     if not HALL.fullmatch(text):
         return None
-    known = {row.hall for row in gemmi.spacegroup_table()}
-    if not said and not (_AXES_OF_HALL.search(text) and text in known):
+    if not said and not _is_surely_of_hall(gemmi, text):
         return None
     try:
         return list(gemmi.symops_from_hall(text))
     except (RuntimeError, ValueError):
         return None
+
+
+def _is_surely_of_hall(gemmi: Any, text: str) -> bool:
+    """Whether a symbol of Hall is no Hermann-Mauguin symbol in any reading, nor all but one.
+
+    It has letters of axes, or two of these: a leading minus, shifts or an axis -2, several axes.
+    "-P 4" may be meant for P -4, and "P 2c" for P 2/c.
+    """
+    has_minus, has_several = text[0] == "-", text.count(" ") > 1
+    signs = (has_minus, bool(_SHIFTS_OF_HALL.search(text)), has_several)
+    is_sure = bool(_AXES_OF_HALL.search(text)) or (sum(signs) > 1 and any(signs[:2]))
+    is_listed = has_minus or text in {row.hall for row in gemmi.spacegroup_table()}
+    return is_sure and is_listed and not settings_named(gemmi, text)
 
 
 def _without_extension(text: str) -> tuple[str, str]:
@@ -117,9 +152,12 @@ def _without_extension(text: str) -> tuple[str, str]:
         return text[:-1].strip(), text[-1].upper()
     if found is None:
         return text, ""
-    given: str = found[1] or found[2]
+    return text[: found.start()], _plain_extension(found[1] or found[2] or found[3])
+
+
+def _plain_extension(given: str) -> str:
     extension = given.upper() if len(given) == 1 and given.upper() in "12HRSZ" else given.lower()
-    return text[: found.start()], _ORIGINS.get(extension, extension)
+    return _ORIGINS.get(extension, extension)
 
 
 def _has_extension(setting: Any, extension: str) -> bool:

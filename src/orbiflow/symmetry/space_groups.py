@@ -2,6 +2,7 @@
 
 import importlib
 import re
+import warnings
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -12,11 +13,22 @@ from numpy.typing import ArrayLike
 
 from orbiflow.arguments import as_path, described
 from orbiflow.arrays import Array
-from orbiflow.errors import GroupError, InputFileError, LatticeMismatchError, system_errors
+from orbiflow.errors import (
+    DataWarning,
+    GroupError,
+    InputFileError,
+    LatticeMismatchError,
+    system_errors,
+)
 from orbiflow.extras import naming_extras
 from orbiflow.symmetry.cells import cell_lattice, cell_parameters, fitting_cell
 from orbiflow.symmetry.group import CrystallographicGroup, checked_lattice
-from orbiflow.symmetry.group_symbols import find_hall, find_setting, settings_named
+from orbiflow.symmetry.group_symbols import (
+    find_hall,
+    find_setting,
+    settings_named,
+    settings_numbered,
+)
 from orbiflow.symmetry.group_types import element_counts, number_about_any_origin
 from orbiflow.symmetry.triplets import group_from_operators, operators, parse_operator
 
@@ -41,10 +53,11 @@ def space_group(name: int | str, cell: ArrayLike | None = None) -> Crystallograp
     Needs the package gemmi, whose tables have 564 settings: `pip install "orbiflow[crystals]"`.
 
     Args:
-        name: A number from 1 to 230, a Hermann-Mauguin symbol as it is typeset or typed ("P2_1/c",
-            "P 21/c", "P2(1)/c", "P 1 21/c 1", "Fd-3m:2", "R -3 m:R"), or a Hall symbol: "Hall: P 2", or
-            without that word where nothing else is written so ("-P 2ybc"). Without more it means
-            origin 1, hexagonal axes and the unique axis b.
+        name: A number from 1 to 230, perhaps with a setting ("227:2", "62:cab"); a Hermann-Mauguin
+            symbol as it is typeset or typed ("P2_1/c", "P 21/c", "P2(1)/c", "P 1 21/c 1", "Fd-3m:2",
+            "R -3 m:R"); or a Hall symbol: "Hall: P 2", or without that word where nothing else is
+            written so ("-P 2ybc", "F 4d 2 3 -1d"). Without more it means origin 1, hexagonal axes and
+            the unique axis b.
         cell: The conventional cell, as for `cell_lattice`. Default: one of its system with a = 1.
 
     Raises `GroupError` for an unknown name, or a cell that the group does not fit.
@@ -87,8 +100,8 @@ def _named(name: int | str) -> tuple[str, list[str]]:
 
 def _setting(gemmi: Any, text: str) -> Any | None:
     """Return gemmi's row of a number or a Hermann-Mauguin symbol, or None."""
-    if number := re.fullmatch(r"0*([1-9]\d{0,2})", text):
-        return gemmi.find_spacegroup_by_number(int(number[1]))
+    if numbered := settings_numbered(gemmi, text):
+        return numbered[0]
     return find_setting(gemmi, text)
 
 
@@ -121,6 +134,8 @@ def group_from_cif(path: str | Path, cell: ArrayLike | None = None) -> Crystallo
         else:
             basis = cell_lattice(cell)
             group = group_from_operators(listed, basis, name="".join(names[:1]).removeprefix(_SAID))
+            if not names:
+                _warn_of_finer_lattice(group, listed, basis)
             own = _row_of(operators(group, basis))
             if own is not None:
                 settings[f"its {len(listed)} operators"] = [own]
@@ -163,9 +178,7 @@ def _names(values: dict[str, list[str]]) -> tuple[list[str], dict[str, list[Any]
 
 def _settings(gemmi: Any, text: str) -> list[Any]:
     """Return gemmi's rows that a number or a Hermann-Mauguin symbol may mean."""
-    if re.fullmatch(r"\d+", text.strip()):
-        return [row for row in gemmi.spacegroup_table() if row.number == int(text)]
-    return settings_named(gemmi, text)
+    return settings_numbered(gemmi, text) or settings_named(gemmi, text)
 
 
 def _check_agreement(settings: dict[str, list[Any]]) -> None:
@@ -198,10 +211,8 @@ def _check_type(
     """
     known = [row for rows in settings.values() for row in rows]
     most = max((len(row.operations().cen_ops) for row in known), default=np.inf)
-    tables = [parse_operator(text, 3) for text in listed]
-    shifts = {tuple((t[:, 3] % 1).tolist()) for t in tables if np.allclose(t[:, :3], np.eye(3))}
-    implied = round(abs(float(np.linalg.det(basis))) / group.cell_volume)
-    if implied > max(most, len({*shifts, (0.0, 0.0, 0.0)})):
+    implied = _translations_in(group, basis)
+    if implied > max(most, _translations_listed(listed)):
         raise GroupError(
             f"it contradicts itself: its operators imply {implied} translations within its cell and "
             f"its name {most:.0f}; one of them may be mistyped, or rounded too coarsely"
@@ -219,6 +230,28 @@ def _check_type(
                 f"it contradicts itself: its {len(listed)} operators are of another type of group, "
                 f"{named}of order {group.order}, than {what}; correct it, or remove what is wrong"
             )
+
+
+def _translations_in(group: CrystallographicGroup, basis: Array) -> int:
+    return round(abs(float(np.linalg.det(basis))) / group.cell_volume)
+
+
+def _translations_listed(listed: list[str]) -> int:
+    tables = [parse_operator(text, 3) for text in listed]
+    shifts = {tuple((t[:, 3] % 1).tolist()) for t in tables if np.allclose(t[:, :3], np.eye(3))}
+    return len({*shifts, (0.0, 0.0, 0.0)})
+
+
+def _warn_of_finer_lattice(group: CrystallographicGroup, listed: list[str], basis: Array) -> None:
+    """Warn where operators that no name goes with imply translations that are not among them."""
+    implied, given = _translations_in(group, basis), _translations_listed(listed)
+    if implied > given:
+        warnings.warn(
+            f"the {len(listed)} operators imply {implied} translations within the cell and list "
+            f"{given}: its lattice is finer than the cell; is one mistyped, say 1/3 for 1/2?",
+            DataWarning,
+            stacklevel=3,
+        )
 
 
 def _row_of(triplets: list[str]) -> Any | None:
@@ -242,7 +275,8 @@ def _values_by_tag(block: Any, cif: Any) -> dict[str, list[str]]:
     columns = {tag.lower().replace(".", "_"): values for tag, values in columns.items()}
     wanted = columns.keys() & {*_CELL, *_OPERATORS, *_SYMBOLS}
     known = {tag: [cif.as_string(text) for text in columns[tag]] for tag in wanted}
-    return {tag: values for tag, values in known.items() if any(values)}
+    unknown = ({""}, {"."}, {"?"})  # as some programs write them, in quotes
+    return {tag: values for tag, values in known.items() if {*values} not in unknown}
 
 
 def cif_text(group: CrystallographicGroup, lattice: ArrayLike | None = None) -> str:

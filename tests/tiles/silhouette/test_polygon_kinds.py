@@ -131,9 +131,9 @@ def test_points_without_a_header(name: str, is_clockwise: bool) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("1,2,3\n4,5,6\n", r"'1,2,3' is not a number of vertices, a vertex"),
+        ("1,2,3\n4,5,6\n", r"'1,2,3' has 3 columns of numbers.*write a header"),
         ("0 0\n1 0\n1 1 5\n", "line 3: '1 1 5' is not a vertex.*name two in a header"),
-        ("0,5,1,5\n2,5,1,5\n", "is not a number of vertices, a vertex"),
+        ("0,5,1,5\n2,5,1,5\n", "has 4 columns of numbers"),
         ("0 0\n1 0\n1 1\n\n5 5\n6 5\n6 6\n", "line 5 begins another run of points"),
         ("x,y\n0,0\n1\n1,1\n", r"line 3: '1' has no two numbers under 'x' and 'y', of 2"),
         ("x,y,x\n0,0,1\n", "names several columns"),

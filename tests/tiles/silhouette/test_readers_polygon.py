@@ -12,6 +12,8 @@ from orbiflow.tiles import read_outline
 
 SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
 
+UP = 'took y to point up; if it points down, write {"outline": [...], "y_down": true}'
+
 
 def write(tmp_path: Path, content: str | bytes, name: str) -> Path:
     path = tmp_path / name
@@ -22,12 +24,13 @@ def write(tmp_path: Path, content: str | bytes, name: str) -> Path:
 @pytest.mark.parametrize(
     ("content", "y_down", "notes"),
     [
-        (SQUARE, False, ()),
-        ([*SQUARE, SQUARE[0]], False, ()),
-        ({"polygon": SQUARE}, False, ()),
+        (SQUARE, False, (UP,)),
+        ([*SQUARE, SQUARE[0]], False, (UP,)),
+        ({"polygon": SQUARE}, False, (UP,)),
         ({"outline": SQUARE, "y_down": True}, True, ()),
-        ({"tile": SQUARE, "ih": 4}, False, ()),
-        ({"tile": SQUARE, "polygon": SQUARE}, False, ('took "polygon", left tile unread',)),
+        ({"outline": SQUARE, "y_down": False}, False, ()),
+        ({"tile": SQUARE, "ih": 4}, False, (UP,)),
+        ({"tile": SQUARE, "polygon": SQUARE}, False, ('took "polygon", left tile unread', UP)),
         ({"type": "Polygon", "coordinates": [SQUARE]}, False, ()),
         (
             {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": [SQUARE, [[1, 1]]]}},
@@ -87,7 +90,7 @@ def test_repeated_vertices_are_dropped_and_said(tmp_path: Path) -> None:
     points = [[0, 0], [2, 0], [2, 0], [2, 0], [2, 2], [0, 2], [0, 0]]
     reading = read_outline(write(tmp_path, json.dumps(points), "a.json"))
     assert reading.outline.tolist() == SQUARE
-    assert reading.notes == ("dropped 2 repeated vertices",)
+    assert reading.notes == ("dropped 2 repeated vertices", UP)
 
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])

@@ -79,6 +79,24 @@ def test_smoothing_by_nothing_changes_nothing() -> None:
     assert target.smoothed(0.0) is target
 
 
+BAR = [[0, 40], [0, 0], [40, 0], [40, 19], [90, 19], [90, 21], [40, 21], [40, 40]]
+
+
+@pytest.mark.parametrize(
+    ("ring", "share", "limbs"),
+    [
+        (BAR, 0.03, "and 1 limb went"),
+        (BAR, 0.1, "and 1 limb went"),
+        (BAR, 0.01, "of the area went"),
+        ([[0, 0], [9, 0], [9, 8], [0, 8]], 0.05, "of the area went"),
+    ],
+)
+def test_smoothing_says_what_went(ring: list[list[float]], share: float, limbs: str) -> None:
+    note = Target.from_polygon(ring).smoothed(share).notes[-1]
+    assert note.startswith(f"rounded off what is narrower than {share:.1%} of the length")
+    assert note.endswith(limbs)
+
+
 def test_smoothing_that_leaves_nothing() -> None:
     with pytest.raises(OrbiflowError, match=r"smooth 0\.1 leaves nothing"):
         Target.from_polygon([[0, 0], [9, 0], [9, 0.2], [0, 0.2]]).smoothed(0.1)

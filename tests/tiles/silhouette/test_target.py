@@ -85,7 +85,10 @@ def test_report_is_json_ready(tmp_path: Path) -> None:
         "vertices": 4,
         "area": 4.0,
         "y_down": False,
-        "notes": ["dropped 1 repeated vertex"],
+        "notes": [
+            "dropped 1 repeated vertex",
+            'took y to point up; if it points down, write {"outline": [...], "y_down": true}',
+        ],
     }
 
 

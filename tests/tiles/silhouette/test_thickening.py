@@ -89,7 +89,7 @@ def test_fur_does_not_grow() -> None:
 def test_growing_is_said_and_comes_before_smoothing() -> None:
     target = spider(4)
     grown = ReadingSettings(thicken=0.04, smooth=0.03).shaped(target)
-    assert grown.notes[-1].startswith("grew parts thinner than 4.0% of the length, by ")
+    assert grown.notes[-2].startswith("grew parts thinner than 4.0% of the length, by ")
     assert thinnest_across(grown, 130) > 0.035 * 300
     with pytest.raises(OrbiflowError, match="thicken"):
         ReadingSettings(thicken=0.3)

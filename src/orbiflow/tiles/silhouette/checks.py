@@ -6,12 +6,14 @@ import numpy as np
 from shapely import Polygon
 
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette.outlines import THREAD, is_thread, opened, percent
+from orbiflow.tiles.silhouette.outlines import THREAD, filled, is_thread, opened, percent
 from orbiflow.tiles.silhouette.target import Target
 
 MOST_LEFT_OUT = 0.02  # of what was seen
 # Shares of the silhouette: smaller holes are eyes; larger ones are what the line of a drawing encloses.
 SMALL_HOLE, LARGE_HOLE = 0.02, 0.3
+CONVEX = 0.95  # of its convex hull: what a frame fills
+MOST_INSIDE = 0.1  # of the silhouette: more that lies in a hole is a shape of its own
 FEWEST_PIXELS = 40
 THIN = 3.0  # pixels
 MOSTLY_THIN = 0.5  # of the outline's length
@@ -58,7 +60,23 @@ def _missing(target: Target) -> list[str]:
             "large holes were filled, because a tile has none: if one is background, open it to the "
             f"outside in the drawing{level}"
         )
+    share = _share_inside(target, holes)
+    if share > MOST_INSIDE:
+        found.append(
+            f"another shape, of {percent(share)} of the silhouette, lies inside the hole that was "
+            "filled: if it is the one meant, remove the frame or lines around it"
+        )
     return found
+
+
+def _share_inside(target: Target, holes: list[Polygon]) -> float:
+    """Return the share of the silhouette, if it may be a frame, of the largest shape in its holes."""
+    outline = Polygon(target.outline)
+    if not holes or target.seen is None or outline.area < CONVEX * outline.convex_hull.area:
+        return 0.0
+    parts = [filled(part) for part in polygons_in(target.seen)]
+    inside = [part for part in parts if any(hole.contains(part) for hole in holes)]
+    return max((part.area for part in inside), default=0.0) / target.area
 
 
 def is_hopeless(target: Target) -> bool:

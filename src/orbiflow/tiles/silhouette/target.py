@@ -16,8 +16,15 @@ from shapely.geometry import Polygon
 from orbiflow.arguments import as_array, described, is_a, is_tensor
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.tiles.geometry import centroid, orient, signed_area
-from orbiflow.tiles.silhouette.outlines import clean_ring, closed, outer_ring, percent, rounded
+from orbiflow.tiles.geometry import centroid, orient, polygons_in, signed_area
+from orbiflow.tiles.silhouette.outlines import (
+    clean_ring,
+    closed,
+    opened,
+    outer_ring,
+    percent,
+    rounded,
+)
 from orbiflow.tiles.silhouette.readers import (
     MAX_BYTES,
     FileContent,
@@ -31,6 +38,8 @@ if TYPE_CHECKING:
     import torch
 
 FUR = 0.015  # of the silhouette's length: gaps narrower than this are not seen in a tile
+SLIVER = 0.1  # of a width: what is rounded off and thinner is no more than another polygon
+LIMB = 2.0  # widths: what is rounded off and longer is a limb, and no corner or bump
 SAME_ASPECT = 0.01  # relative difference up to which two aspect ratios count as the same
 
 
@@ -293,7 +302,8 @@ class Target(Reading):
     def smoothed(self, share: float) -> Self:
         """Return the silhouette with what is narrower than a share of its length rounded off.
 
-        Gaps are closed first, between its parts, too, and then limbs and bumps go.
+        Gaps are closed first, between its parts, too, and then limbs and bumps go. A note says how
+        much of the silhouette went, and how many limbs.
 
         Raises `OrbiflowError` if nothing is left.
 
@@ -310,7 +320,16 @@ class Target(Reading):
             raise OrbiflowError(
                 f"{self.source}: smooth {share:g} leaves nothing of the silhouette; choose less"
             )
-        return replace(self, outline=outer_ring(shape))
+        went = Polygon(self.outline).difference(shape)
+        width = share * length
+        parts = polygons_in(opened(went, SLIVER * width))
+        limbs = sum(_reach(part) > LIMB * width for part in parts)
+        lost = f"{percent(went.area / self.area)} of the area"
+        named = f" and {limbs} limb{'s' * (limbs > 1)}" if limbs else ""
+        note = (
+            f"rounded off what is narrower than {percent(share)} of the length: {lost}{named} went"
+        )
+        return replace(self, outline=outer_ring(shape), notes=(*self.notes, note))
 
     def thickened(self, share: float) -> Self:
         """Return the silhouette with parts thinner than a share of its length grown to this width.
@@ -378,6 +397,12 @@ class Target(Reading):
             "y_down": self.y_down,
             "notes": list(self.notes),
         }
+
+
+def _reach(part: Polygon) -> float:
+    """Return the longer side of a part's box."""
+    xmin, ymin, xmax, ymax = part.bounds
+    return max(xmax - xmin, ymax - ymin)
 
 
 def _held(stream: Any) -> FileContent:

@@ -20,8 +20,10 @@ from orbiflow.tiles.silhouette.readers.reading import (
     Source,
     check_file,
     read_head,
+    unzipped,
 )
 from orbiflow.tiles.silhouette.readers.svg import read_svg
+from orbiflow.tiles.silhouette.readers.svg_drawing import MAX_BYTES
 
 _HEAD_BYTES = 65536
 GAP = 0.03  # of the drawing's size: such gaps in an outline are closed
@@ -30,9 +32,10 @@ _IMAGE_MAGIC = (
     *(b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"BM"),
     *(b"GIF87a", b"GIF89a", b"II*\0", b"MM\0*"),
 )
+GZIP = b"\x1f\x8b"
 _SAVE_SVG = "open it in the program that made it, or in Inkscape, and save it as SVG or PNG"
 _CONVERTIBLE = {
-    b"\x1f\x8b": "is gzip-compressed (an .svgz?); decompress it first",
+    GZIP: "is compressed twice; decompress it first",
     b"%PDF": f"is a PDF or Illustrator file; {_SAVE_SVG}",
     b"%!PS": f"is a PostScript or Illustrator file; {_SAVE_SVG}",
     b"\xc5\xd0\xd3\xc6": f"is an EPS file; {_SAVE_SVG}",
@@ -78,6 +81,8 @@ def read_outline(
     """
     path = path if isinstance(path, FileContent) else as_path(path, "the silhouette's file")
     check_file(path)
+    if read_head(path, 2) == GZIP:
+        path = unzipped(path, MAX_BYTES)
     kind = _kind(path, read_head(path, _HEAD_BYTES))
     if kind == "image":
         return _bridged(read_image(path, threshold=threshold, invert=invert))

@@ -1,6 +1,7 @@
 """What lies around a drawing and is no part of it: a frame of a thin line, a card of one colour."""
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,8 @@ from scipy import ndimage
 from orbiflow.arrays import Array
 
 WIDEST = 0.03  # of the frame's shorter side: its line
+MARKS = 0.06  # of the frame's shorter side: how far the marks of axes reach out of it, or into it
+LEAST_LINE = 0.85  # of the box of a frame with its marks: its lines
 LEAST_SIDE = 0.5  # of the picture's: a frame's
 LEAST_DRAWN = 0.25  # of a frame's sides: what is drawn inside it
 CARD = 0.94  # of its box: what a card fills, round corners apart
@@ -18,6 +21,7 @@ CARD_COLOURS, DRAWN_COLOURS = 25, 75  # of 255: a card's colours are nearer, its
 MOST_BETWEEN = 0.05  # of a card's pixels: those between its colour and the drawing's
 ENOUGH = 500  # pixels a side, in which a card is looked for
 CARD_NOTE = "left out the card that the drawing lies on; if it is the shape, remove what lies on it"
+AXES_NOTE = "left out the frame around the drawing, with what lies outside of it"
 _TOGETHER = np.ones((3, 3), dtype=int)
 _Mask = NDArray[np.bool_]
 
@@ -27,29 +31,71 @@ def without_frame(channel: Array, above: _Mask) -> tuple[Array, list[str]]:
 
     `above` parts its light and its dark part, of which either may be the frame's.
     """
-    found = [(*frame, part) for part in (above, ~above) for frame in _frames(part)]
+    found = [frame for part in (above, ~above) for frame in _frames(part)]
     if not found:
         return channel, []
     # the innermost: a margin around a frame is one, too
-    box, width, part = min(found, key=lambda frame: np.prod([s.stop - s.start for s in frame[0]]))
-    band = np.zeros(part.shape, bool)  # with the line's own blurred edges
-    band[tuple(slice(max(side.start - 1, 0), side.stop + 1) for side in box)] = True
-    band[tuple(slice(side.start + width + 1, side.stop - width - 1) for side in box)] = False
-    kept = np.where(band, np.median(channel[~part]), channel)
-    pixels = f"{width} pixel{'s' * (width > 1)}"
-    return kept, [f"left out the frame around the drawing, a line {pixels} wide"]
+    frame = min(found, key=lambda frame: np.prod([s.stop - s.start for s in frame.box]))
+    line = ndimage.binary_dilation(frame.line, _TOGETHER)  # with its own blurred edges
+    if frame.has_marks:
+        line = line | ~_within(frame.box, line.shape)
+    drawn = above if (above & frame.line).any() else ~above
+    kept = np.where(line, np.median(channel[~drawn]), channel)
+    pixels = f"{frame.width} pixel{'s' * (frame.width > 1)}"
+    note = f"left out the frame around the drawing, a line {pixels} wide"
+    return kept, [AXES_NOTE if frame.has_marks else note]
 
 
-def _frames(part: _Mask) -> Iterator[tuple[tuple[slice, ...], int]]:
-    """Yield the boxes of frames in one part of a picture, and the widths of their lines."""
+class _Frame(NamedTuple):
+    """A frame's box and the width of its line, all its pixels, and whether it has marks of axes."""
+
+    box: tuple[slice, ...]
+    width: int
+    line: _Mask
+    has_marks: bool
+
+
+def _within(box: tuple[slice, ...], shape: tuple[int, ...]) -> _Mask:
+    inside = np.zeros(shape, bool)
+    inside[box] = True
+    return inside
+
+
+def _frames(part: _Mask) -> Iterator[_Frame]:
+    """Yield the frames in one part of a picture."""
     labels = np.asarray(ndimage.label(part, _TOGETHER)[0])
-    for number, box in enumerate(ndimage.find_objects(labels), start=1):
-        sides = [side.stop - side.start for side in box]
+    for number, outer in enumerate(ndimage.find_objects(labels), start=1):
+        sides = [side.stop - side.start for side in outer]
         if any(a < LEAST_SIDE * b for a, b in zip(sides, part.shape, strict=True)):
             continue
-        width = _line_width(labels[box] == number)
-        if width is not None and _is_drawn_on(part[box][width:-width, width:-width]):
-            yield box, width
+        line = labels == number
+        box = _without_marks(line[outer], outer)
+        inner = _inner_marks(line[box])
+        width = _line_width(line[box] & ~inner)
+        if width is None or not _is_drawn_on((part[box] & ~line[box])[width:-width, width:-width]):
+            continue
+        yield _Frame(box, width, line, box != outer or bool(inner.any()))
+
+
+def _without_marks(line: _Mask, outer: tuple[slice, ...]) -> tuple[slice, ...]:
+    """Return the box of the straight lines in an outer box, without short marks outside of it."""
+    most = max(1, int(MARKS * min(line.shape)))
+    found: list[slice] = []
+    for axis, side in enumerate(outer):
+        full = np.flatnonzero(line.mean(axis=1 - axis) > LEAST_LINE)
+        first, last = (int(full[0]), int(full[-1])) if full.size else (0, line.shape[axis] - 1)
+        is_near = first <= most and line.shape[axis] - 1 - last <= most
+        found.append(slice(side.start + first, side.start + last + 1) if is_near else side)
+    return tuple(found)
+
+
+def _inner_marks(line: _Mask) -> _Mask:
+    """Return the marks of axes that point inwards: what is near the line of a frame and lies inside."""
+    most = max(3, int(MARKS * min(line.shape)))
+    width = max(1, int(np.argmin(line[:, line.shape[1] // 3]) or 1))
+    inner = np.zeros_like(line)
+    inner[width:-width, width:-width] = line[width:-width, width:-width]
+    return np.zeros_like(line) if inner[most:-most, most:-most].any() else inner
 
 
 def _line_width(line: _Mask) -> int | None:

@@ -85,3 +85,15 @@ def stretched(ring: Array) -> tuple[str, ...]:
         f"took longitudes and latitudes for x and y as they are: at latitude {latitude:.0f} the shape "
         f"is {wide:.2g} times as wide as on the ground; project it first if that matters",
     )
+
+
+def at_date_line(rings: list[Array]) -> tuple[list[Array], list[str]]:
+    """Return rings put together that were cut along the date line, as GeoJSON wants it, and a note."""
+    if not all(is_on_globe(ring) for ring in rings):
+        return rings, []
+    east = any(np.isclose(ring[:, 0].max(), 180, atol=1e-6) for ring in rings)
+    west = [np.isclose(ring[:, 0].min(), -180, atol=1e-6) for ring in rings]
+    if not east or not any(west):
+        return rings, []
+    shifts = [np.array([360.0 * is_west, 0.0]) for is_west in west]
+    return [ring + shift for ring, shift in zip(rings, shifts, strict=True)], [MERIDIAN]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from orbiflow.errors import InputFileError
-from orbiflow.tiles.silhouette.readers.label_masks import DARKEST
+from orbiflow.tiles.silhouette.readers.label_masks import DARKEST, is_of_labels, may_be_labels
 from orbiflow.tiles.silhouette.readers.reading import Source, check_file, read_bytes, read_head
 
 MAX_BYTES = 64 * 2**20
@@ -46,7 +46,8 @@ class DecodedImage:
     - `size`: The width and height of the image in the file, turned, in pixels.
     - `shrunk`: How many of those pixels are one of `image`'s wide.
     - `numbers`: The whole number (H, W) that stands in the file for each pixel, if that may be a label:
-      of grey images, and of palettes without colours. Not of shrunk images.
+      of grey images, and of palettes without colours or of label masks. Not of shrunk images.
+    - `are_labels`: Whether the palette says that they are.
     - `notes`: What was decided for the user.
     """
 
@@ -55,6 +56,7 @@ class DecodedImage:
     shrunk: int
     numbers: Numbers | None
     notes: tuple[str, ...]
+    are_labels: bool = False
 
 
 def open_image(path: Source, *, enough: int | None = None) -> tuple[Image.Image, list[str]]:
@@ -190,7 +192,9 @@ def _frame(path: Source, file: Any, enough: int | None, notes: list[str]) -> Dec
         return DecodedImage(image, size, shrunk, None, tuple(notes))
     raw = raw if turn is None else raw.turned(turn)
     image = raw.normal(_scale(path, raw, notes))
-    return DecodedImage(image, size, 1, _numbers(raw, image), tuple(notes))
+    palette = _palette(raw, image)
+    are_labels = palette is not None and is_of_labels(palette)
+    return DecodedImage(image, size, 1, _numbers(raw, image, palette), tuple(notes), are_labels)
 
 
 def _shrinking(width: int, height: int, is_jpeg: bool) -> int:
@@ -339,7 +343,14 @@ def _shrunk(path: Source, raw: _Raw, factor: int, notes: list[str]) -> Image.Ima
     return whole
 
 
-def _numbers(raw: _Raw, normal: Image.Image) -> Numbers | None:
+def _palette(raw: _Raw, normal: Image.Image) -> NDArray[np.int64] | None:
+    """Return the colours (N, 3) of a palette without transparent ones, or None."""
+    if raw.image.mode != "P" or normal.mode != "RGB":
+        return None
+    return np.array(raw.image.getpalette() or [0, 0, 0], dtype=np.int64).reshape(-1, 3)
+
+
+def _numbers(raw: _Raw, normal: Image.Image, palette: NDArray[np.int64] | None) -> Numbers | None:
     """Return the numbers of the pixels that may be labels: see `DecodedImage`."""
     mode = raw.image.mode
     if mode == "F" and raw.key is None:  # as ImageJ saves labels
@@ -349,7 +360,8 @@ def _numbers(raw: _Raw, normal: Image.Image) -> Numbers | None:
         )
         return values.astype(np.int32) if is_whole else None
     is_grey = mode == "L" or mode.startswith("I")
-    if mode == "P" and normal.mode == "RGB":
+    if palette is not None:
         extrema: Any = normal.getextrema()
         is_grey = all(high - low < MIN_COLOURS for low, high in extrema)
+        is_grey |= is_of_labels(palette) or may_be_labels(np.asarray(raw.image), palette)
     return np.asarray(raw.image) if is_grey and raw.key is None else None

@@ -17,15 +17,20 @@ VOID = 255  # what segmented photographs have along the borders of objects, whic
 MAX_STRAY = 0.1
 
 _Mask = NDArray[np.bool_]
+VOC_LABELS = 21  # of Pascal VOC: DAVIS has the same colours up to there, and grey ones beyond
+ROUNDED = 1  # of 255: so much DAVIS's colours differ
+VGA_LIKE = 7  # of Windows' 16 colours, which are VOC's, too
 
 
-def label_mask(numbers: Array | NDArray[np.integer[Any]]) -> tuple[NDArray[np.uint8], str] | None:
+def label_mask(
+    numbers: Array | NDArray[np.integer[Any]], *, are_labels: bool = False
+) -> tuple[NDArray[np.uint8], str] | None:
     """Return where the largest label is, 255 and 0 (H, W), and a note; None if these are no labels.
 
     Labels are small whole numbers, or 0, 1, 2 and so on, each of which fills regions. Levels of grey
     are not: between two levels of an anti-aliased or noisy picture there are others, which fill none.
     The label that most of the border has is the background. What is `VOID` beside small labels is
-    background, too.
+    background, too. Where a palette says that they `are_labels`, they may be large, and lines.
     """
     border = np.concatenate([numbers[0], numbers[-1], numbers[1:-1, 0], numbers[1:-1, -1]])
     values, counts = np.unique(border, return_counts=True)
@@ -39,12 +44,12 @@ def label_mask(numbers: Array | NDArray[np.integer[Any]]) -> tuple[NDArray[np.ui
     counts = np.sum([np.bincount(strip.ravel(), minlength=high + 1) for strip in strips], axis=0)
     values = np.flatnonzero(counts)
     n = len(values)
-    are_few = high <= (DARKEST if n == 2 and numbers is given else FEW)
+    are_few = are_labels or high <= (DARKEST if n == 2 and numbers is given else FEW)
     if n > MOST_LABELS or not (are_few or (n > 2 and low <= 1 and high - low == n - 1)):
         return None
     even = ndimage.maximum_filter(numbers, 3) == ndimage.minimum_filter(numbers, 3)
     filling = np.bincount(numbers[even], minlength=len(counts)) > 0
-    if counts[~filling].sum() > MAX_STRAY * (~even).sum():
+    if not are_labels and counts[~filling].sum() > MAX_STRAY * (~even).sum():
         return None
     counts[background] = 0
     label, labelled = int(counts.argmax()), int(counts.sum())
@@ -59,6 +64,38 @@ def label_mask(numbers: Array | NDArray[np.integer[Any]]) -> tuple[NDArray[np.ui
         f"label mask: took label {label}, the largest of {n - 1} ({share}), background {background}; "
         "to take several, give them one label"
     )
+
+
+def is_of_labels(palette: NDArray[np.int64]) -> bool:
+    """Whether a palette (N, 3), of 0 to 255, is that of the label masks of Pascal VOC and DAVIS."""
+    return bool(_are_as_in_voc(palette[:VOC_LABELS]).all())
+
+
+def may_be_labels(indices: NDArray[np.integer[Any]], palette: NDArray[np.int64]) -> bool:
+    """Whether the numbers of a picture's colours (H, W) may be labels, by its palette.
+
+    They may be if most of the border is black and has the number 0, and numbers in between are left
+    out, which programs that count a picture's colours do not do.
+    """
+    if _are_as_in_voc(palette[:VGA_LIKE]).all():  # and no more: Windows' 16 colours
+        return False
+    used: list[int] = np.unique(indices).tolist()
+    edge = np.concatenate([indices[0], indices[-1], indices[1:-1, 0], indices[1:-1, -1]])
+    has_gaps = len(used) > 2 and used[-1] > len(used) - 1
+    return (
+        has_gaps
+        and sum(palette[0].tolist()) == 0
+        and 2 * int(np.count_nonzero(edge == 0)) > len(edge)
+    )
+
+
+def _are_as_in_voc(palette: NDArray[np.int64]) -> _Mask:
+    """Whether colours are Pascal VOC's: bits of a number are red's, green's and blue's in turn."""
+    numbers, colours = np.arange(len(palette)), np.zeros_like(palette)
+    for k in range(8):
+        for channel in range(3):
+            colours[:, channel] |= (numbers >> (3 * k + channel) & 1) << (7 - k)
+    return abs(colours - palette).max(axis=1) <= ROUNDED
 
 
 def _without_void(

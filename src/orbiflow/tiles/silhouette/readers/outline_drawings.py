@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import KDTree
+from shapely import MultiPoint
 
 from orbiflow.arrays import Array
 from orbiflow.contours import level_curves
@@ -14,6 +15,8 @@ from orbiflow.tiles.geometry import signed_area
 from orbiflow.tiles.silhouette.readers.tracing import Level
 
 MIN_BARE = 0.5  # of what the line encloses
+CONVEX = 0.95  # of its convex hull: what a frame fills
+MOST_INSIDE = 0.1  # of what a frame encloses: more is a shape of its own
 THINNEST = 0.7  # pixels: what is thinner is noise
 WIDEST = 0.07  # of the drawing's longer side: a wider line is a ring
 FAINTEST = (
@@ -43,6 +46,7 @@ def outline_drawing(level: Level, *, is_given: bool = False) -> OutlineDrawing |
 
     An anti-aliased line is fainter than its ink and breaks where it is cut at half of that. It is cut
     as close to the background as its noise allows, unless the cut `is_given`: its middle is the same.
+    A frame around another shape is none either: what fills it is doubted.
     """
     cut = level.cut if is_given else _faint_cut(level)
     mask = level.values > cut
@@ -55,6 +59,8 @@ def outline_drawing(level: Level, *, is_given: bool = False) -> OutlineDrawing |
     enclosed = int(inside.sum())
     if enclosed < MIN_BARE * areas.max() or shape.all():
         return None
+    if _largest_area(mask & inside) > MOST_INSIDE * areas.max() and _is_frame(shape):
+        return None
     outer, inner = _borders(level.values, cut)
     width = 2 * float(line.sum()) / (_length(outer) + _length(inner))
     if not THINNEST <= width <= WIDEST * max(np.ptp(np.nonzero(shape), axis=1)):
@@ -62,6 +68,18 @@ def outline_drawing(level: Level, *, is_given: bool = False) -> OutlineDrawing |
     values = _from_middle(line, inside, (outer, inner), width)
     values[mask & ~shape] = width
     return OutlineDrawing(Level(values, 0.0, width), width)
+
+
+def _largest_area(drawn: _Mask) -> int:
+    """Return the pixels of the largest part, with its holes filled."""
+    labels = np.asarray(ndimage.label(ndimage.binary_fill_holes(drawn), _ACROSS_CORNERS)[0])
+    return int(np.bincount(labels.ravel())[1:].max(initial=0))
+
+
+def _is_frame(shape: _Mask) -> bool:
+    """Whether a filled shape is all but convex, as frames are."""
+    border = np.argwhere(shape & ~ndimage.binary_erosion(shape))
+    return int(shape.sum()) > CONVEX * MultiPoint(border).convex_hull.area
 
 
 def _faint_cut(level: Level) -> float:

@@ -66,7 +66,8 @@ def read_image(
     band, name, band_notes = _channel(path, image)
     picture = None
     if threshold is None and name == "luminance":
-        if found.numbers is not None and (labels := label_mask(found.numbers)):
+        numbers, are_labels = found.numbers, found.are_labels
+        if numbers is not None and (labels := label_mask(numbers, are_labels=are_labels)):
             mask, note = labels
             picture = _drawing(Image.fromarray(mask), "mask", notes, [note])
         elif invert is None:
@@ -189,7 +190,10 @@ def choose_shape(
     low = np.median(channel[~above])
     if picture.name == "photograph":
         take_high = True
-        notes = ["photograph: shape told from its background by colour, shadows apart"]
+        notes = [
+            "photograph: the shape was told from its background by colour; look whether a shadow "
+            "belongs to it"
+        ]
     elif picture.name in _PARTS:
         take_high = not invert
         part = _PARTS[picture.name][not take_high]

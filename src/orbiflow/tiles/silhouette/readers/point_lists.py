@@ -9,35 +9,20 @@
 
 import re
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.outlines import MAX_VERTICES, clean_ring
-from orbiflow.tiles.silhouette.readers.globe import may_be_joined, on_map, stretched
-from orbiflow.tiles.silhouette.readers.reading import Reading, Source, quoted, read_bytes
+from orbiflow.tiles.silhouette.readers.globe import may_be_joined
+from orbiflow.tiles.silhouette.readers.point_tables import read_bare_table, read_table
+from orbiflow.tiles.silhouette.readers.reading import Reading, Source, quoted
+from orbiflow.tiles.silhouette.readers.text_lines import Line, cells_of, lines_of, value_of
 
-MAX_BYTES = 16 * 2**20
 HIGHEST = 0.6  # of an aerofoil's length: its height
 NEAR = 0.05  # of an aerofoil's length: its ends, and its nose, are so near those of its box
-COLUMNS = {
-    "x": ("x", "lon", "lng", "long", "longitude", "easting", "east"),
-    "y": ("y", "lat", "latitude", "northing", "north"),
-}
-DEGREES = frozenset(("lon", "lng", "long", "longitude", "lat", "latitude"))
-PIXELS = {"row": "y", "rows": "y", "col": "x", "cols": "x", "column": "x", "columns": "x"}
 BETWEEN = (999.0, 999.0)  # elements of an aerofoil, as XFOIL and MSES part them
-_AXES = {name: axis for axis, names in COLUMNS.items() for name in names}
-_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")  # of "pickup_longitude" and "decimalLatitude"
-_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?")
-
-
-class _Line(NamedTuple):
-    number: int  # in the file, from 1
-    text: str
-    run: int  # how many times blank lines came before it
 
 
 def read_points(path: Source) -> Reading:
@@ -45,7 +30,7 @@ def read_points(path: Source) -> Reading:
 
     Raises `InputFileError` for anything else, with the line that does not fit.
     """
-    lines = _lines(path)
+    lines = lines_of(path)
     first = lines[0]
     pairs = [_pair(line.text) for line in lines]
     if BETWEEN in pairs[1:-1]:
@@ -59,92 +44,38 @@ def read_points(path: Source) -> Reading:
         return _plain(path, lines[int(is_title) :], first.text if is_title else "")
     if re.fullmatch(r"\s*\d+\s*", first.text):
         return _counted(path, lines, pairs[1:])
-    header = [_axis(cell) for cell in _cells(first.text)]
-    if not {"x", "y"} <= {*header}:
-        in_pixels = [PIXELS.get(cell.strip('"').lower(), "") for cell in _cells(first.text)]
-        header = in_pixels if {"x", "y"} <= {*in_pixels} else header
-    if {"x", "y"} <= {*header} and len(header) == len(_cells(lines[min(1, len(lines) - 1)].text)):
-        return _table(path, lines, header)
+    if (table := read_table(path, lines)) is not None:
+        return table
     if len(lines) > 3 and pairs[1] is not None:
         return _plain(path, lines[1:], first.text)
+    if (table := read_bare_table(path, lines)) is not None:
+        return table
     raise InputFileError(
         f"{path}: line {first.number}: {quoted(first.text)} is not a number of vertices, a vertex (two "
         "numbers, `x y`) or a title of lines that are; save the polygon as one of these"
     )
 
 
-def _lines(path: Source) -> list[_Line]:
-    """Return lines that are neither blank nor comments."""
-    try:
-        text = read_bytes(path, MAX_BYTES).decode("utf-8-sig")
-    except UnicodeDecodeError as exc:
-        raise InputFileError(
-            f"{path}: not a text file (byte {exc.start} is not UTF-8); a list of points is one"
-        ) from exc
-    lines: list[_Line] = []
-    run = after_blank = 0
-    for number, line in enumerate(text.splitlines(), start=1):
-        if not line.strip():
-            after_blank = 1
-        elif not line.lstrip().startswith("#"):
-            run += after_blank if lines else 0
-            after_blank = 0
-            lines.append(_Line(number, line, run))
-    if not lines:
-        raise InputFileError(f"{path}: the file holds only blank lines; export it again")
-    return lines
-
-
-def _cells(text: str) -> list[str]:
-    """Return the cells of a line: parted by semicolons, tabs, commas or blanks, the first that it has.
-
-    Where blanks part them, every number may have a decimal comma.
-    """
-    text = text.strip()
-    for separator in (";", "\t"):
-        if separator in text:
-            return [cell.strip() for cell in text.rstrip(separator).split(separator)]
-    words = text.split()
-    if len(words) > 1 and all(re.fullmatch(r"[+-]?\d+,\d+", word) for word in words):
-        return words
-    if "," in text:
-        return [cell.strip() for cell in text.rstrip(",").split(",")]
-    return words
-
-
-def _value(cell: str) -> float | None:
-    cell = cell.strip().strip('"').replace("\u2212", "-")
-    if not _NUMBER.fullmatch(cell):
-        return None
-    return float(cell.replace(",", "."))
-
-
 def _pair(text: str) -> tuple[float, float] | None:
-    values = [_value(cell) for cell in _cells(text)]
+    values = [value_of(cell) for cell in cells_of(text)]
     if len(values) != 2 or values[0] is None or values[1] is None:
         return None
     return values[0], values[1]
 
 
-def _axis(cell: str) -> str:
-    """Return the axis that a column's name says, or ""."""
-    axes = {_AXES.get(word.lower(), "") for word in _WORD.findall(cell)} - {""}
-    return axes.pop() if len(axes) == 1 else ""
-
-
-def _vertex(path: Source, line: _Line) -> tuple[float, float]:
+def _vertex(path: Source, line: Line) -> tuple[float, float]:
     pair = _pair(line.text)
     if pair is not None and np.isfinite(pair).all():
         return pair
     where = f"{path}: line {line.number}: {quoted(line.text)}"
     if pair is not None or re.search(r"nan|inf", line.text, re.IGNORECASE):
         raise InputFileError(f"{where}: every coordinate must be a finite number")
-    more = len(_cells(line.text)) > 2
+    more = len(cells_of(line.text)) > 2
     cure = "; of more columns, name two in a header, x and y" if more else ""
     raise InputFileError(f"{where} is not a vertex; write two numbers, `x y`{cure}")
 
 
-def _counted(path: Source, lines: list[_Line], pairs: list[tuple[float, float] | None]) -> Reading:
+def _counted(path: Source, lines: list[Line], pairs: list[tuple[float, float] | None]) -> Reading:
     """Read a goal polygon, or an aerofoil whose title is a number."""
     first, rest = lines[0], lines[1:]
     title = first.text.strip()
@@ -184,7 +115,7 @@ def _counted(path: Source, lines: list[_Line], pairs: list[tuple[float, float] |
     return Reading(outline, True, "dat", None, tuple(notes))
 
 
-def _plain(path: Source, lines: list[_Line], title: str) -> Reading:
+def _plain(path: Source, lines: list[Line], title: str) -> Reading:
     """Read lines of two numbers, below a title or none: an aerofoil of one run or two, or a ring."""
     notes = [f"took line {lines[0].number - 1} for a title: {quoted(title)}"] if title else []
     points = np.array([_vertex(path, line) for line in lines])
@@ -233,43 +164,3 @@ def _is_aerofoil(points: Array) -> bool:
     steps = np.sign(np.diff(points[:, 0]))
     is_monotonic = (steps[:nose] <= 0).all() and (steps[nose:] >= 0).all()
     return bool(ends and is_monotonic and high[1] - low[1] < HIGHEST * length)
-
-
-def _table(path: Source, lines: list[_Line], header: list[str]) -> Reading:
-    """Read the columns x and y, or longitude and latitude, that a header names."""
-    if header.count("x") > 1 or header.count("y") > 1:
-        raise InputFileError(
-            f"{path}: line {lines[0].number}: {quoted(lines[0].text)} names several columns of x or "
-            "of y; keep one of each"
-        )
-    names = _cells(lines[0].text)
-    at = [header.index("x"), header.index("y")]
-    points: list[tuple[float, float]] = []
-    for line in lines[1:]:
-        cells = _cells(line.text)
-        values = [_value(cells[i]) if i < len(cells) == len(names) else None for i in at]
-        if values[0] is None or values[1] is None or not np.isfinite(np.array(values, float)).all():
-            raise InputFileError(
-                f"{path}: line {line.number}: {quoted(line.text)} has no two numbers under "
-                f"{quoted(names[at[0]])} and {quoted(names[at[1]])}, of {len(names)} columns"
-            )
-        points.append((values[0], values[1]))
-    if not points:
-        raise InputFileError(f"{path}: there is no line below the header; export it again")
-    notes: list[str] = []
-    ring = np.array(points)
-    is_down = names[at[1]].strip('"').lower() in PIXELS
-    are_degrees = all({w.lower() for w in _WORD.findall(names[i])} & DEGREES for i in at)
-    if are_degrees and (beyond := np.flatnonzero(abs(ring[:, 1]) > 90)).size:
-        line = lines[1 + int(beyond[0])]
-        raise InputFileError(
-            f"{path}: line {line.number}: {ring[beyond[0], 1]:g} under {quoted(names[at[1]])} is no "
-            "latitude, which lies from -90 to 90; are the names of the columns exchanged?"
-        )
-    if are_degrees:
-        ring, notes = on_map(path, ring)
-    outline, dropped = clean_ring(ring, str(path), InputFileError)
-    way = "down" if is_down else "up"
-    took = f"took {quoted(names[at[0]])} for x and {quoted(names[at[1]])} for y, which points {way}"
-    more = (*notes, *(stretched(outline) if are_degrees else ()))
-    return Reading(outline, is_down, "dat", None, (took, *dropped, *more))

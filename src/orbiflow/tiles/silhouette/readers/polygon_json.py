@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,20 +13,24 @@ from shapely.geometry.base import BaseGeometry
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 from orbiflow.runtime import is_list, is_object
-from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette.outlines import clean_ring, outer_outline, outer_ring
-from orbiflow.tiles.silhouette.readers.globe import (
-    MERIDIAN,
-    is_on_globe,
-    may_be_joined,
-    on_map,
-    stretched,
+from orbiflow.tiles.silhouette.outlines import clean_ring
+from orbiflow.tiles.silhouette.readers.globe import at_date_line, may_be_joined, on_map, stretched
+from orbiflow.tiles.silhouette.readers.json_points import (
+    POLYGON_KEYS,
+    Annotation,
+    annotations,
+    check_pairs,
+    is_finite,
+    largest_annotation,
+    rings_of,
 )
 from orbiflow.tiles.silhouette.readers.reading import Reading, Source, quoted, read_bytes
+from orbiflow.tiles.silhouette.readers.ring_parts import largest_of
 
 MAX_BYTES = 16 * 2**20
 MAX_POLYGONS = 10_000
-POLYGON_KEYS = ("polygon", "tile", "outline")
+UP = 'took y to point up; if it points down, write {"outline": [...], "y_down": true}'
+_KEYS = ", ".join(f'"{key}"' for key in POLYGON_KEYS)
 _CURVES = re.compile(r"CURVE|CIRCULARSTRING|MULTISURFACE", re.IGNORECASE)
 _OTHERS = {
     "Topology": "is TopoJSON, which is not read; convert it to GeoJSON (mapshaper.org does)",
@@ -36,18 +41,48 @@ _OTHERS = {
 def read_json(path: Source) -> Reading:
     """Read a polygon from JSON, with y up unless the file says otherwise.
 
-    Taken are: a list of [x, y] pairs; an object with such a list under "polygon", "tile" or
-    "outline", and optionally `"y_down": true`; GeoJSON, of which the largest polygon is kept.
+    Taken are: a list of [x, y] pairs, of objects with x and y, or of such lists; an object with lists
+    "x" and "y", or with any of these under a word of `POLYGON_KEYS`, and optionally `"y_down": true`;
+    GeoJSON; annotations of COCO and labelme, with y down. Of several polygons the largest is kept.
     """
     content = _content(path)
-    if is_object(content) and "type" in content and not any(key in content for key in POLYGON_KEYS):
-        return _geojson(path, content)
+    if is_object(content) and not any(key in content for key in POLYGON_KEYS):
+        if (found := annotations(path, content)) is not None:
+            return _annotated(path, *found)
+        if "type" in content and not content.keys() >= {"x", "y"}:
+            return _geojson(path, content)
     points, y_down, notes = _find_polygon(path, content)
-    _check_pairs(path, points)
-    if _is_finite(points):
-        notes += may_be_joined(np.array(points, dtype=float).reshape(-1, 2))
-    outline, dropped = clean_ring(points, str(path), InputFileError)
-    return Reading(outline, y_down, "json", None, (*notes, *dropped))
+    way = [UP] if y_down is None else []
+    rings = rings_of(path, points)
+    found = _of_rings(path, rings, bool(y_down))
+    return replace(found, notes=(*notes, *found.notes, *way))
+
+
+def _annotated(path: Source, found: list[Annotation], notes: list[str]) -> Reading:
+    for annotation in found:
+        for ring in annotation.rings:
+            check_pairs(path, ring)
+    best, more = largest_annotation(found)
+    reading = _of_rings(path, best.rings, True)
+    return replace(reading, notes=(*more, *notes, *reading.notes))
+
+
+def _of_rings(path: Source, rings: list[list[Any]], y_down: bool) -> Reading:
+    """Return the largest of rings whose numbers nobody calls degrees."""
+    cleaned: list[Array] = []
+    notes: list[str] = []
+    for points in rings:
+        check_pairs(path, points)
+        if is_finite(points):
+            notes += may_be_joined(np.array(points, dtype=float).reshape(-1, 2))
+        outline, dropped = clean_ring(points, str(path), InputFileError)
+        cleaned.append(outline)
+        notes += dropped
+    if len(cleaned) == 1:
+        return Reading(cleaned[0], y_down, "json", None, tuple(notes))
+    outline, more, seen = largest_of(cleaned)
+    notes = [f"took the largest part of {len(cleaned)} rings of points", *notes, *more]
+    return Reading(outline, y_down, "json", None, tuple(dict.fromkeys(notes)), seen=seen)
 
 
 def read_wkt(path: Source) -> Reading:
@@ -90,37 +125,31 @@ def _content(path: Source) -> object:
         raise InputFileError(f"{path}: not valid JSON ({exc})") from exc
 
 
-def _find_polygon(path: Source, content: object) -> tuple[list[Any], bool, list[str]]:
-    """Return the list of vertices in `content`, whether y points down, and notes."""
+def _find_polygon(path: Source, content: object) -> tuple[Any, bool | None, list[str]]:
+    """Return the vertices in `content`, whether y points down if it says so, and notes."""
     if is_list(content):
-        return content, False, []
+        return content, None, []
     if not is_object(content):
         raise InputFileError(f"{path}: holds a single value, not a polygon; write [[x, y], ...]")
     keys = [key for key in POLYGON_KEYS if key in content]
+    y_down = content.get("y_down")
+    if "y_down" in content and not isinstance(y_down, bool):
+        raise InputFileError(f'{path}: "y_down" must be true or false')
+    if not keys and content.keys() >= {"x", "y"}:
+        return content, y_down, []
     if not keys:
         if content.keys() & {"rings", "geometryType"} or is_object(content.get("geometry")):
             raise InputFileError(f"{path}: {_OTHERS['esri']}")
         found = ", ".join(quoted(str(key)) for key in list(content)[:8]) or "nothing"
         raise InputFileError(
-            f'{path}: none of "polygon", "tile", "outline" is in it (it has {found}); '
-            "put the list of vertices under one of them"
+            f"{path}: none of {_KEYS} is in it (it has {found}); put the list of vertices under one "
+            "of them"
         )
-    points, y_down = content[keys[0]], content.get("y_down", False)
-    if not isinstance(y_down, bool):
-        raise InputFileError(f'{path}: "y_down" must be true or false')
-    if not is_list(points):
+    points = content[keys[0]]
+    if not is_list(points) and not is_object(points):
         raise InputFileError(f'{path}: "{keys[0]}" must be a list of [x, y] pairs')
     notes = [f'took "{keys[0]}", left {", ".join(keys[1:])} unread'] if len(keys) > 1 else []
     return points, y_down, notes
-
-
-def _check_pairs(path: Source, points: list[Any]) -> None:
-    for i, pair in enumerate(points):
-        if not is_list(pair) or len(pair) != 2 or not all(type(n) in (int, float) for n in pair):
-            raise InputFileError(
-                f"{path}: vertex {i} (counted from 0) is {quoted(json.dumps(pair))}, not a pair of "
-                "numbers [x, y]"
-            )
 
 
 def _geojson(path: Source, content: dict[str, Any]) -> Reading:
@@ -190,52 +219,32 @@ def _reading(
             notes = [*notes, "took the ring around the others for the outer one"]
         if holes and len(polygons) == 1:
             notes = [f"filled {len(holes)} hole{'s' * (len(holes) > 1)}", *notes]
-        points = np.array(outer, dtype=float) if _is_finite(outer) else outer
+        points = np.array(outer, dtype=float) if is_finite(outer) else outer
         if isinstance(points, np.ndarray):
             points, more = on_map(path, points) if on_globe else (points, may_be_joined(points))
             notes += [note for note in more if note not in notes]
         ring, dropped = clean_ring(points, str(path), InputFileError)
         rings.append(ring)
         notes += dropped
-    if len(rings) > 1:
-        ring, more = _largest(rings, on_globe)
-        notes += more
-    else:
-        ring = rings[0]
-    return Reading(ring, False, "json", None, (*notes, *(stretched(ring) if on_globe else ())))
+    if len(rings) == 1:
+        more = stretched(rings[0]) if on_globe else ()
+        return Reading(rings[0], False, "json", None, (*notes, *more))
+    rings, joined = at_date_line(rings) if on_globe else (rings, [])
+    ring, more, seen = largest_of(rings)
+    notes = [*notes, *joined, *more, *(stretched(ring) if on_globe else ())]
+    return Reading(ring, False, "json", None, tuple(notes), seen=seen)
 
 
 def _outer_first(path: Source, rings: list[list[Any]]) -> list[list[Any]]:
     """Return the rings of a polygon, the outer one first: none has a larger box."""
-    _check_pairs(path, rings[0])
+    check_pairs(path, rings[0])
     if len(rings) == 1:
         return rings
     for ring in rings[1:]:
-        _check_pairs(path, ring)
+        check_pairs(path, ring)
     sizes = [
-        float(np.ptp(np.array(r, float), axis=0).prod()) if r and _is_finite(r) else 0.0
+        float(np.ptp(np.array(r, float), axis=0).prod()) if r and is_finite(r) else 0.0
         for r in rings
     ]
     outer = int(np.argmax(sizes))
     return [rings[outer], *rings[:outer], *rings[outer + 1 :]]
-
-
-def _is_finite(points: list[Any]) -> bool:
-    return all(abs(n) < 1e300 for pair in points for n in pair)
-
-
-def _largest(rings: list[Array], on_globe: bool) -> tuple[Array, list[str]]:
-    """Return the largest ring of what touching ones make together, and notes."""
-    notes: list[str] = []
-    if on_globe and all(is_on_globe(ring) for ring in rings):
-        east = any(np.isclose(ring[:, 0].max(), 180, atol=1e-6) for ring in rings)
-        west = [np.isclose(ring[:, 0].min(), -180, atol=1e-6) for ring in rings]
-        if east and any(west):  # cut along the date line, as GeoJSON wants it
-            rings = [
-                ring + np.array([360.0 * is_west, 0.0])
-                for ring, is_west in zip(rings, west, strict=True)
-            ]
-            notes.append(MERIDIAN)
-    whole = shapely.union_all([Polygon(ring) for ring in rings])
-    shape, more = outer_outline(shapely.MultiPolygon(polygons_in(whole)))
-    return outer_ring(shape), [*notes, *more]

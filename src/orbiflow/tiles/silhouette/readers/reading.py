@@ -1,6 +1,9 @@
 """The result of every reader of silhouettes, and reading a file's bytes."""
 
+import gzip
+import io
 import stat
+import zlib
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
@@ -94,6 +97,25 @@ def read_head(path: Source, n: int) -> bytes:
     except OSError as exc:
         reason = f"cannot be read ({exc.strerror})"
         raise InputFileError(f"{path}: {reason}; check its permissions") from exc
+
+
+def unzipped(path: Source, limit: int) -> FileContent:
+    """Return what a gzip-compressed file holds; refused if that is over `limit` bytes."""
+    name = str(path).removesuffix("z") if path.suffix.lower() == ".svgz" else str(path)
+    try:
+        with gzip.GzipFile(fileobj=io.BytesIO(read_bytes(path, limit))) as file:
+            data = file.read(limit + 1)
+    except (OSError, EOFError, zlib.error) as exc:
+        raise InputFileError(
+            f"{path}: the gzip-compressed file is damaged or cut short ({exc}); download it again"
+        ) from exc
+    if len(data) > limit:
+        raise InputFileError(
+            f"{path}: holds over {limit / 2**20:.0f} MB, the limit for this kind of file; simplify it"
+        )
+    if not data:
+        raise InputFileError(f"{path}: the gzip-compressed file is empty; export it again")
+    return FileContent(data, name)
 
 
 def quoted(text: str) -> str:

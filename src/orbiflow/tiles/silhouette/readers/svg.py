@@ -23,7 +23,15 @@ from orbiflow.tiles.silhouette.outlines import (
 from orbiflow.tiles.silhouette.readers.frames import CARD, CARD_NOTE, CARD_SIDES, LEAST_DRAWN
 from orbiflow.tiles.silhouette.readers.reading import Reading, Source
 from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
-from orbiflow.tiles.silhouette.readers.svg_overlays import NOTEWORTHY, PLAIN, alike, overlay, solid
+from orbiflow.tiles.silhouette.readers.svg_frames import without_axes, without_grid
+from orbiflow.tiles.silhouette.readers.svg_overlays import (
+    NOTEWORTHY,
+    PAPER,
+    PLAIN,
+    alike,
+    overlay,
+    solid,
+)
 from orbiflow.tiles.silhouette.readers.svg_paths import MAX_POINTS, TooManyPoints, TooTangled
 from orbiflow.tiles.silhouette.readers.svg_regions import FAINT, Layer, Regions
 
@@ -116,7 +124,10 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
     noun = "a background rectangle" if n == 1 else f"{n} background rectangles"
     notes += [f"left out {noun} that cover{'s' * (n == 1)} the whole drawing"] * (n > 0)
     notes += carded
+    shown, ruled = without_grid(shown, paper or PAPER)
     seen, decided = overlay(shown, paper)
+    seen, framed = without_axes(seen)
+    decided = [*ruled, *framed, *decided]
     colours = {layer.brush.colour for layer in shown if layer.brush.opacity >= FAINT}
     whole = solid(seen)
     if whole >= ALL_BUT * _page(layers, drawing).area:
