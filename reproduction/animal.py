@@ -31,6 +31,7 @@ from orbiflow.tiles import (
     OccupancySearch,
     Target,
     TileModel,
+    as_model,
     escherize_class,
     occupancy_loss,
     placed_field,
@@ -116,7 +117,7 @@ def _draw_method(canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings
     result = values[0]
     if not isinstance(result, EscherTile):
         raise OrbiflowError(f"{CLASS} gave no certified tile: {result.reason}")
-    pulled = Pulled(result.model())
+    pulled = Pulled(as_model(result))
     outline, ring = animal().normal, result.normal_tile.polygon
     figure = canvas.figure(0.30)
     boxes = [grid_box(0, k, 1, 4, title=0.12, gap=0.01) for k in range(4)]
@@ -219,7 +220,7 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
 
 
 def _numbers(tile: EscherTile) -> dict[str, float]:
-    error = equivariance_error(placed_field(tile.model()), tile.normal_tile.group.cosets)
+    error = equivariance_error(placed_field(as_model(tile)), tile.normal_tile.group.cosets)
     measures = {"iou": tile.metrics.iou, "edge_mismatch": tile.certificate.edge_mismatch}
     return {**measures, "symmetry_error": error}
 
@@ -237,7 +238,7 @@ def _draw_row(figure: Figure, row: int, outcome: Any, outline: Array) -> None:
     high = 1.75
     window = around(tile.center, high * aspect_of(figure, boxes[0]), high)
     draw_tiling(plane_axes(figure, window, box=boxes[1]), tile, window)
-    field = placed_field(outcome.model())
+    field = placed_field(as_model(outcome))
     ring = np.concatenate([tile.polygon, tile.polygon[:1]])
     for box in boxes[2:]:
         axes = plane_axes(figure, window, box=box)

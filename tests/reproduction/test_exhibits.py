@@ -13,7 +13,7 @@ from orbiflow.density import SPACES, kl_by_quadrature, make_space, midpoints
 from orbiflow.drawing import Sheet
 from orbiflow.fields import symmetrize
 from orbiflow.symmetry import identification_group, rotation_matrix
-from orbiflow.tiles import CLASSES, EscherTile, OccupancySearch, Target, compare
+from orbiflow.tiles import CLASSES, EscherTile, OccupancySearch, Target, as_model, compare
 from reproduction.animal import Pulled, animal, animal_tile
 from reproduction.classes import (
     GROUPS,
@@ -197,7 +197,7 @@ def test_a_fitted_density_goes_there_and_back() -> None:
 def test_the_flow_brings_samples_to_their_side() -> None:
     result = animal_tile("IH4", 3, 10, 15)
     assert isinstance(result, EscherTile)
-    pulled = Pulled(result.model())
+    pulled = Pulled(as_model(result))
     assert pulled.wrong(pulled.full).mean() < pulled.wrong(pulled.affine).mean()
     assert pulled.losses[1] < pulled.losses[0]
 

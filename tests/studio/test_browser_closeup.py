@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from orbiflow.studio.tile_files import tile_folder
-from orbiflow.tiles import EscherTile, certify
+from orbiflow.tiles import certify, read_result
 from studio.browser import RunningStudio, covers_page_once
 from studio_checks import serious_issues, untidy_parts
 
@@ -113,7 +113,7 @@ def test_pull_certify_undo_redo(closeup, studio: RunningStudio, searched: str, t
     second = proved(page, first)
     card = next(c for c in studio.project(searched)["tiles"] if c["id"] == second)
     assert (card["parent"], card["certified"]) == (first, True)
-    found = EscherTile.load(tile_folder(studio.folder / "projects" / searched, second))
+    found = read_result(tile_folder(studio.folder / "projects" / searched, second))
     assert certify(found.tile).valid
     assert covers_page_once(taken_away(studio, searched, second))
     page.keyboard.press("Control+z")

@@ -14,7 +14,15 @@ from bent_tiles import bent_tile
 from exported import dxf_lines
 from orbiflow.studio.closeup_tasks import with_drawing
 from orbiflow.studio.tile_files import put_tile, tile_folder, tile_number
-from orbiflow.tiles import EscherTile, ExportSettings, certify, export, scenes
+from orbiflow.tiles import (
+    EscherTile,
+    ExportSettings,
+    certify,
+    export,
+    read_result,
+    save_tiles,
+    scenes,
+)
 from orbiflow.tiles.exporting import laid_out
 from studio.served import SQUARE, Client, done, new_project
 
@@ -46,7 +54,7 @@ def test_a_pulled_tile_is_certified_and_can_be_pulled_again(client: Client, addr
     project, number = address.split("/tiles/")
     assert (card["parent"], card["certified"]) == (int(number), True)
     own = tile_folder(client.studio.store.home(project.split("/")[-1]), card["id"])
-    assert certify(EscherTile.load(own).tile).valid
+    assert certify(read_result(own).tile).valid
     view = client.get(f"{project}/tiles/{card['id']}").json()
     assert {"elements", "map", "silhouette_track", "tile_track", "polygon"} <= set(view)
     again = pulled_by(client, f"{project}/tiles/{card['id']}", -0.4)
@@ -105,13 +113,17 @@ def test_lines_over_the_outline_end_there_in_files(
     edge = {"colour": "#202020", "width": 2.5, "points": ring[: len(ring) // 2].tolist()}
     fill = {**edge, "width": 9.0, "points": [ring[0].tolist(), own.tile.center.tolist()]}
     folder, files, _ = with_drawing(
-        json.dumps({"strokes": [edge, fill]}), own.save(tmp_path / "tile"), {}, {}, tmp_path / "s"
+        json.dumps({"strokes": [edge, fill]}),
+        save_tiles([own], tmp_path / "tile"),
+        {},
+        {},
+        tmp_path / "s",
     )
     chosen: Any = {"purpose": purpose, "format": "dxf"}
     settings = ExportSettings(**chosen, tile_size=40, area=(60, 60))
     export(folder, tmp_path / "a.dxf", settings, picture=files["picture"])
     (scene,), _ = scenes(folder, settings, picture=files["picture"])
-    layout, _ = laid_out(EscherTile.load(folder), settings)
+    layout, _ = laid_out(read_result(folder), settings)
     outline = layout.outline.closed.flattened(0.01)
     tiles = shapely.union_all(
         [shapely.Polygon(outline @ tile.linear.T + tile.offset) for tile in scene.tiles]
@@ -123,7 +135,7 @@ def test_lines_over_the_outline_end_there_in_files(
 
 
 def test_nothing_drawn_changes_nothing(tmp_path: Path) -> None:
-    tile = EscherTile(bent_tile("IH4", 40.0)).save(tmp_path / "tile")
+    tile = save_tiles([EscherTile(bent_tile("IH4", 40.0))], tmp_path / "tile")
     for nothing in ("", "{}", '{"strokes": [], "eyes": []}'):
         assert with_drawing(nothing, tile, {}, {"a": 1}, tmp_path / "s") == (tile, {}, {"a": 1})
     assert not (tmp_path / "s").exists()
@@ -131,5 +143,5 @@ def test_nothing_drawn_changes_nothing(tmp_path: Path) -> None:
     result, files, settings = with_drawing(drawing, tile, {}, {}, tmp_path / "s")
     assert files["picture"].name == "drawing.svg"
     assert settings == {}
-    drawn = EscherTile.load(result)
-    assert np.array_equal(drawn.tile.polygon, EscherTile.load(tile).tile.polygon)
+    drawn = read_result(result)
+    assert np.array_equal(drawn.tile.polygon, read_result(tile).tile.polygon)

@@ -20,7 +20,7 @@ from orbiflow.runtime import ignore
 from orbiflow.studio import open_project, project_file
 from orbiflow.studio.project_file import FORMAT, PROJECT, write_project
 from orbiflow.studio.tile_files import put_tile
-from orbiflow.tiles import EscherTile
+from orbiflow.tiles import EscherTile, read_result, save_tiles
 from studio.served import SQUARE
 
 DOCUMENT: dict[str, Any] = {
@@ -74,7 +74,7 @@ def test_what_the_page_of_docs_says_of_it_runs(
     (tmp_path / "turtle.orbiflow").write_bytes(saved)
     exec(compile(snippet, "studio.md", "exec"), {})
     assert capsys.readouterr().out == "house IH4-IH4 True\n"
-    assert EscherTile.load(tmp_path / "turtle").certificate.valid
+    assert read_result(tmp_path / "turtle").certificate.valid
     assert (tmp_path / "turtles.png").stat().st_size > 1000
 
 
@@ -85,7 +85,9 @@ def test_what_was_saved_is_there_again(saved: bytes, tmp_path: Path) -> None:
     assert project.target.source == "house.json"
     (tile,) = project.tiles
     assert tile.certificate.valid
-    assert tile.save(tmp_path / "tile")  # whole, though the file was unpacked for a moment only
+    assert save_tiles(
+        [tile], tmp_path / "tile"
+    )  # whole, though the file was unpacked for a moment only
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,17 @@ from orbiflow.studio.pulled_tiles import pulled, space_json, variations
 from orbiflow.studio.tile_drawing import drawing_settings, with_any_map
 from orbiflow.studio.tile_view import elements_json, tile_view
 from orbiflow.symmetry import Line, reflection, rotation
-from orbiflow.tiles import EscherTile, ExportSettings, Frame, Tile, TileMap, read_over
+from orbiflow.tiles import (
+    EscherTile,
+    ExportSettings,
+    Frame,
+    Tile,
+    TileMap,
+    export,
+    read_over,
+    read_result,
+    save_tiles,
+)
 from orbiflow.tiles.search.bent_map import map_of_bent
 from outlines import bent_squirrel
 from strategies import seeds, wallpaper_groups
@@ -95,7 +105,7 @@ def test_the_map_goes_where_its_outline_went(name: str, y_down: bool, tmp_path: 
     assert np.abs(found.inverse(between[1]) - tile.inverse(between[0])).max() < 1e-6
     assert found.fidelity is not None
     assert found.rating is not None
-    loaded = EscherTile.load(found.save(tmp_path / "tile"))
+    loaded = read_result(save_tiles([found], tmp_path / "tile"))
     assert np.array_equal(loaded.tile.polygon, after)
     assert np.array_equal(loaded.forward(before), found.forward(before))
 
@@ -171,9 +181,8 @@ def test_drawings_reach_the_export(mapped: bool, y_down: bool, tmp_path: Path) -
     drawing = line_across(tile)
     filled = drawing_settings(drawing, tile, tmp_path)
     assert len(filled["eyes"]) == 1  # the other is beyond the silhouette
-    tile.export(
-        tmp_path / "out.svg", ExportSettings(eyes=filled["eyes"]), picture=filled["picture"]
-    )
+    settings = ExportSettings(eyes=filled["eyes"])
+    export(tile, tmp_path / "out.svg", settings, picture=filled["picture"])
     assert "#d02030" in (tmp_path / "out.svg").read_text()
     motif = read_over(filled["picture"], tile).drawing
     assert motif is not None

@@ -16,7 +16,7 @@ from orbiflow.studio import tasks
 from orbiflow.studio.settings import Job, SearchChoice
 from orbiflow.studio.tasks import read, search
 from orbiflow.studio.tile_files import best_stage, put_tile, tile_folder
-from orbiflow.tiles import EscherTile, OverlapSearch
+from orbiflow.tiles import EscherTile, OverlapSearch, read_result
 
 BOOT = b"[[0, 0], [30, 0], [34, 12], [22, 15], [20, 28], [8, 25]]"
 CHOICE = SearchChoice(effort="fast", classes=("IH4", "IH7"))
@@ -65,7 +65,7 @@ def test_tiles_appear_stage_by_stage(home: Path) -> None:
     assert seen[:2] == [(5000, "sketch"), (5050, "sketch")]
     assert [stage for _, stage in seen[-2:]] == ["final", "final"]
     for number in TILES:
-        tile = EscherTile.load(tile_folder(home, number))
+        tile = read_result(tile_folder(home, number))
         assert tile.certificate.valid
         assert tile.bending is not None
     assert not list((home / "tiles").glob(".*"))

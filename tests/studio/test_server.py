@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw
 from bent_tiles import bent_tile
 from orbiflow.runtime import ItemDone
 from orbiflow.studio.tile_files import put_tile, tile_number
-from orbiflow.tiles import EscherTile, certify
+from orbiflow.tiles import EscherTile, certify, read_result
 from studio.served import SQUARE, Client, done, join_tasks, new_project, studio
 
 
@@ -267,7 +267,7 @@ def test_a_project_goes_into_a_file_and_comes_back(client: Client, project: str)
     (before,), (after,) = one["tiles"], other["tiles"]
     assert {**after, "id": 0} == {**before, "id": 0}
     folder = client.studio.store.home(opened["id"]) / "tiles" / str(after["id"]) / "final" / "tile"
-    assert certify(EscherTile.load(folder).tile).valid
+    assert certify(read_result(folder).tile).valid
 
 
 def test_a_project_with_a_picture_that_was_painted_over_comes_back(client: Client) -> None:

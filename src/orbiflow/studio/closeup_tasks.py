@@ -19,6 +19,7 @@ from orbiflow.runtime import (
 )
 from orbiflow.studio.settings import Job
 from orbiflow.studio.tile_files import STAGES, best_stage, put_tile, tile_folder, tile_number
+from orbiflow.tiles import read_result, save_tiles
 
 SPACE = "space.json"
 PIXELS = (".png", ".jpg", ".jpeg", ".webp")  # of pictures on which lines can be drawn
@@ -32,12 +33,11 @@ def space(job: Job, tile: int, *, on_event: Sink = ignore, cancel: Cancel = NEVE
         tile: The number of the tile.
     """
     from orbiflow.studio.pulled_tiles import space_json
-    from orbiflow.tiles import EscherTile
 
     del on_event
     cancel.check()
     own = tile_folder(job.project, tile)
-    told = space_json(EscherTile.load(own))
+    told = space_json(read_result(own))
     write_json(own.parent / SPACE, told)
     return Outcome({"tile": tile})
 
@@ -58,10 +58,9 @@ def pull(
         parameters: Where it was pulled to, in the space that `studio space` wrote.
     """
     from orbiflow.studio.pulled_tiles import pulled, space_json
-    from orbiflow.tiles import EscherTile
 
     cancel.check()
-    found = pulled(EscherTile.load(tile_folder(job.project, tile)), parameters)
+    found = pulled(read_result(tile_folder(job.project, tile)), parameters)
     number, stage = tile_number(job.task, 0), STAGES[-1]
     put_tile(job.project, number, stage, found, on_event, parent=tile)
     if place := best_stage(job.project, number):  # at hand when it is pulled again
@@ -82,7 +81,6 @@ def with_drawing(
         scratch: A folder for what is written on the way.
     """
     from orbiflow.studio.tile_drawing import drawing_settings, with_any_map
-    from orbiflow.tiles import EscherTile
 
     try:
         parts = json.loads(drawing or "{}")
@@ -90,10 +88,10 @@ def with_drawing(
         raise OrbiflowError("the drawing is no JSON; reload the page") from None
     if not parts or not (parts.get("strokes") or parts.get("eyes")):
         return result, files, settings
-    given = EscherTile.load(result)
+    given = read_result(result)
     tile, scratch = with_any_map(given), make_folder(scratch)
     if tile is not given:
-        result = tile.save(scratch / "tile")
+        result = save_tiles([tile], scratch / "tile")
     under: Path | None = files.get("picture")
     if under is not None and under.suffix not in PIXELS:
         under = under.with_name("backdrop.png")

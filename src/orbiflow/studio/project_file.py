@@ -23,6 +23,7 @@ from orbiflow.errors import InputFileError, OrbiflowError, system_errors
 from orbiflow.runtime import is_object
 from orbiflow.studio.tile_files import PLACES, best_stage, tile_folder
 from orbiflow.studio.words import MASKS
+from orbiflow.tiles import read_result
 
 if TYPE_CHECKING:
     from orbiflow.tiles import EscherTile, Target
@@ -174,14 +175,13 @@ def reading_of(document: Mapping[str, Any]) -> tuple[str, Any]:
 
 def read_tiles(home: Path, document: Mapping[str, Any]) -> list[tuple[EscherTile, int, int | None]]:
     """Return the certified tiles in an unpacked project, each with its number and its parent's."""
-    from orbiflow.tiles import EscherTile
 
     found: list[tuple[EscherTile, int, int | None]] = []
     for entry in document["tiles"][:PLACES]:
         number = entry.get("id") if is_object(entry) else None
         if type(number) is not int or not (home / "tiles" / str(number) / "result.json").is_file():
             continue
-        tile = EscherTile.load(home / "tiles" / str(number))
+        tile = read_result(home / "tiles" / str(number))
         tile.require_certified(otherwise="so the project cannot be opened; save it again")
         tile = tile.changed(map_source=tile.map)  # its file may go
         parent = entry.get("parent")

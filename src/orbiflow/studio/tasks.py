@@ -28,7 +28,7 @@ from orbiflow.studio.tile_files import (
     tile_folder,
     tile_number,
 )
-from orbiflow.tiles import ReadingSettings
+from orbiflow.tiles import ReadingSettings, read_result
 
 if TYPE_CHECKING:
     from orbiflow.tiles import EscherizeSettings, EscherTile
@@ -127,9 +127,9 @@ def _search_settings(project: Path, choice: SearchChoice) -> EscherizeSettings:
 
 def _classes_like(project: Path, number: int) -> tuple[str, ...]:
     """Return the class of a tile, and those of the nine with the same group."""
-    from orbiflow.tiles import CLASSES, EscherTile, isohedral_class
+    from orbiflow.tiles import CLASSES, isohedral_class
 
-    own = EscherTile.load(tile_folder(project, number)).isohedral_class
+    own = read_result(tile_folder(project, number)).isohedral_class
     group = isohedral_class(own).group().name
     near = [name for name in CLASSES if isohedral_class(name).group().name == group]
     return tuple(dict.fromkeys([own, *near]))

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import ItemDone, Sink, write_json
+from orbiflow.tiles import save_tiles
 
 if TYPE_CHECKING:
     from orbiflow.tiles import EscherTile
@@ -35,7 +36,7 @@ def best_stage(home: Path, number: int) -> Path | None:
 
 
 def tile_folder(home: Path, number: int) -> Path:
-    """Return the folder of a tile, as `EscherTile.load` takes it.
+    """Return the folder of a tile, as `read_result` takes it.
 
     Raises:
         OrbiflowError: If there is none.
@@ -59,7 +60,7 @@ def put_tile(
         card = tile_card(tile, number, stage, parent)
         write_json(staged / CARD, card)
         write_json(staged / VIEW, tile_view(card, tile))
-        tile.save(staged / SAVED)
+        save_tiles([tile], staged / SAVED)
         place.parent.mkdir(parents=True, exist_ok=True)
         with suppress(OSError):  # a worker of a server that died was faster
             staged.rename(place)

@@ -82,6 +82,7 @@ from .pictures.tilings import tiling_raster as tiling_raster
 from .pictures.tilings import tilings_png as tilings_png
 from .result_file import RESULT as RESULT
 from .result_file import TILE_MODEL as TILE_MODEL
+from .result_file import as_tile as as_tile
 from .result_file import folder_names as folder_names
 from .result_file import read_document as read_document
 from .result_file import read_result as read_result

@@ -26,6 +26,7 @@ from orbiflow.settings import DefaultText, Ending, Hidden, Option, Parsed, Setti
 from orbiflow.tiles.art import ArtSettings
 from orbiflow.tiles.exporting import ExportSettings
 from orbiflow.tiles.motion import AnimationSettings
+from orbiflow.tiles.result_file import read_result
 from orbiflow.tiles.search import EscherizeSettings, class_names
 from orbiflow.tiles.silhouette import ReadingSettings
 from orbiflow.tiles.solids import SolidSettings
@@ -47,9 +48,8 @@ class TileChoice(Settings):
 
     def read(self, result: Path) -> EscherTile:
         """Return the tile of a run."""
-        from orbiflow.tiles.tile import EscherTile
 
-        return EscherTile.load(result, self.tile)
+        return read_result(result, self.tile)
 
 
 @operation("escherize", keeps_partial=True, starts_processes=True)

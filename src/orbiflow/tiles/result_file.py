@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from orbiflow.arguments import as_path, described
+from orbiflow.arguments import as_instance, as_path, described
 from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.runtime import (
@@ -25,7 +25,7 @@ from orbiflow.runtime import (
 )
 from orbiflow.symmetry import CrystallographicGroup, Isometry, checked_lattice
 from orbiflow.tiles.likeness import Fidelity, Rating, Recognisability, ShapeMetrics, Thinnest
-from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import ISOHEDRAL_TYPES, Tile, isohedral_class
 
 RESULT, TILE_MODEL = "result.json", "model.safetensors"
@@ -74,6 +74,20 @@ def read_result(path: str | Path, which: str | int | None = None) -> EscherTile:
     if not tile.isohedral_class:
         return found  # folders are named after classes: an unknown name leads nowhere
     return found.changed(map_source=file.parent / folder_names(names)[index] / TILE_MODEL)
+
+
+def as_tile(source: TileSource) -> EscherTile:
+    """Return the finished tile that is meant; the best one of a run's folder.
+
+    Raises:
+        OrbiflowError: For what holds no tile.
+        InputFileError: As `read_result`.
+    """
+    if isinstance(source, EscherTile):
+        return source
+    if isinstance(source, str | Path):
+        return read_result(source)
+    return EscherTile(as_instance(source, Tile, "the tile", "read_result(folder) gives one"))
 
 
 def _contents(file: Path, document: dict[str, Any]) -> tuple[list[str], str, dict[str, Any]]:

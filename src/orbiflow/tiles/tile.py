@@ -8,11 +8,11 @@ from collections.abc import Generator
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from orbiflow.arguments import as_instance, as_path
+from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
 from orbiflow.runtime import array_bytes, read_arrays
@@ -28,14 +28,6 @@ from orbiflow.tiles.likeness import (
 )
 from orbiflow.tiles.silhouette import Bending, Covered, Frame
 from orbiflow.tiles.tilings import Certificate, Tile, arrangement, certify
-
-if TYPE_CHECKING:
-    from orbiflow.tiles.art import ArtSettings, Artwork
-    from orbiflow.tiles.exporting import Exported, ExportSettings
-    from orbiflow.tiles.motion import AnimationSettings
-    from orbiflow.tiles.search import TileModel
-    from orbiflow.tiles.silhouette import Target
-    from orbiflow.tiles.solids import Solid, SolidSettings
 
 FORMAT = "orbiflow-tile/1"
 MAX_BYTES = 64 * 2**20
@@ -203,37 +195,6 @@ class EscherTile:
         if not self.name:
             object.__setattr__(self, "name", self.tile.isohedral_class or "tile")
 
-    @classmethod
-    def of(cls, source: TileSource) -> EscherTile:
-        """Return the finished tile that is meant; the best one of a run's folder.
-
-        Raises:
-            OrbiflowError: for what holds no tile.
-            InputFileError: as `load`.
-        """
-        if isinstance(source, EscherTile):
-            return source
-        if isinstance(source, str | Path):
-            return cls.load(source)
-        return cls(as_instance(source, Tile, "the tile", "EscherTile.load(folder) gives one"))
-
-    @staticmethod
-    def load(path: str | Path, which: str | int | None = None) -> EscherTile:
-        """Return a tile of a run; see `read_result`."""
-        from orbiflow.tiles.result_file import read_result
-
-        return read_result(path, which)
-
-    def save(self, folder: str | Path) -> Path:
-        """Write the tile as a folder that `load`, and every command on a result, takes.
-
-        Raises:
-            OutputError: if the folder holds anything else, or cannot be written.
-        """
-        from orbiflow.tiles.result_file import save_tiles
-
-        return save_tiles([self], folder)
-
     @property
     def isohedral_class(self) -> str:
         """The class, such as "IH4"; "" if it is not known."""
@@ -336,18 +297,6 @@ class EscherTile:
         """Return this tile and the others of its class."""
         return (self, *self.others)
 
-    def model(self) -> TileModel:
-        """Return the flow that made the tile, as a torch module.
-
-        Raises:
-            OrbiflowError: if no flow made it, or none is known.
-        """
-        from orbiflow.tiles.search import as_model
-
-        if self.map is None:
-            raise OrbiflowError(f"{self.name}: the flow that made this tile is not known")
-        return as_model(self.map)
-
     def forward(self, points: Any) -> Any:
         """Return where points (..., 2) of the silhouette go, in the input's coordinates.
 
@@ -387,60 +336,7 @@ class EscherTile:
             raise CertificationError(f"{self.name} is not certified ({reasons}), {otherwise}")
         return self.certificate
 
-    def draw(self, *, width_px: int = 1600) -> bytes:
-        """Return a PNG of the tiling."""
-        from orbiflow.tiles.pictures import tiling_raster
-
-        return tiling_raster(self.tile, y_down=self.y_down, width_px=width_px).png()
-
-    def draw_art(
-        self,
-        out: str | Path,
-        settings: ArtSettings | None = None,
-        *,
-        picture: str | Path | None = None,
-        target: Target | None = None,
-        force: bool = False,
-    ) -> Artwork:
-        """Write a picture of the tiling with something on its tiles; see `orbiflow.draw_art`."""
-        from orbiflow.tiles.art import draw_art
-
-        return draw_art(self, out, settings, picture=picture, target=target, force=force)
-
-    def export(
-        self,
-        out: str | Path,
-        settings: ExportSettings | None = None,
-        *,
-        picture: str | Path | None = None,
-        force: bool = False,
-    ) -> Exported:
-        """Write the tiling, its lines or its pieces in real size; see `orbiflow.tiles.export`."""
-        from orbiflow.tiles.exporting import export
-
-        return export(self, out, settings, picture=picture, force=force)
-
-    def solid(
-        self,
-        settings: SolidSettings | None = None,
-        *,
-        picture: str | Path | None = None,
-        force: bool = False,
-    ) -> Solid:
-        """Return a solid to print, which can `write` itself; see `orbiflow.tiles.make_solid`."""
-        from orbiflow.tiles.solids import make_solid
-
-        return make_solid(self, settings, picture=picture, force=force)
-
-    def animate(
-        self, out: str | Path, settings: AnimationSettings | None = None, *, force: bool = False
-    ) -> Path:
-        """Write an animation of the tile; see `orbiflow.tiles.animate`."""
-        from orbiflow.tiles.motion import animate
-
-        return animate(self, out, settings, force=force)
-
 
 TileSource: TypeAlias = EscherTile | Tile | str | Path
 """What functions take for a tile. A text or path is a tile's own folder in a run; or the run's folder
-or result.json, whose best tile is meant; `EscherTile.load` gives the others."""
+or result.json, whose best tile is meant; `read_result` gives the others."""

@@ -69,7 +69,7 @@ def test_pdf_has_its_real_size_curves_and_no_fonts(cut) -> None:
     assert [float(side) / 72 * 25.4 for side in box] == pytest.approx([210, 148], abs=1e-4)
     assert b"/FontFile" not in data
     objects = list(pypdfium2.PdfDocument(data)[0].get_objects())
-    assert {item.type for item in objects} == {pdfium.FPDF_PAGEOBJ_PATH}
+    assert {pdfium.FPDFPageObj_GetType(o) for o in objects} == {pdfium.FPDF_PAGEOBJ_PATH}
     kinds = [
         pdfium.FPDFPathSegment_GetType(pdfium.FPDFPath_GetPathSegment(item, k))
         for item in objects

@@ -13,7 +13,7 @@ from shapely.affinity import translate
 from artworks import squirrel
 from exported import dxf_lines, svg_lines, tile_of
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.tiles import EscherTile, ExportSettings, Scene, scenes, write_scene
+from orbiflow.tiles import ExportSettings, Scene, as_tile, scenes, write_scene
 from orbiflow.tiles.exporting.jigsaws import LEAST_SHARE
 from orbiflow.tiles.geometry import polygons_in
 
@@ -38,7 +38,7 @@ def faces(scene: Scene, form: Literal["svg", "dxf"] = "svg") -> list[shapely.Pol
 
 @cache
 def jigsaw(name: str) -> tuple[Scene, list[shapely.Polygon]]:
-    tile = squirrel(name[:-1]) if name.endswith("*") else EscherTile.of(tile_of(name, turn=1.1))
+    tile = squirrel(name[:-1]) if name.endswith("*") else as_tile(tile_of(name, turn=1.1))
     (scene,), _ = scenes(tile, ExportSettings(**OPTIONS))
     return scene, faces(scene)
 

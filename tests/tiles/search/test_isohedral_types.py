@@ -26,6 +26,8 @@ from orbiflow.tiles import (
     isohedral_class,
     near_symmetry,
     plane_points,
+    read_result,
+    save_tiles,
     signed_area,
 )
 from orbiflow.tiles.geometry import subdivided
@@ -204,7 +206,7 @@ def test_the_search_gives_symmetric_tiles_that_are_saved_and_loaded(tmp_path: Pa
     assert isinstance(tile, EscherTile)
     assert tile.certificate.valid
     assert tile.tile.tiling.stabilisers[0].order == 2
-    loaded = EscherTile.load(tile.save(tmp_path / "bat"))
+    loaded = read_result(save_tiles([tile], tmp_path / "bat"))
     assert loaded.isohedral_class == "IH13"
     assert loaded.certificate.valid
     assert tile.map is not None

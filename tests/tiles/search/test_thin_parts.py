@@ -16,7 +16,6 @@ from orbiflow.runtime import Cancel
 from orbiflow.tiles import (
     Emphasis,
     EscherizeSettings,
-    EscherTile,
     Fit,
     LikenessSearch,
     Pins,
@@ -29,6 +28,8 @@ from orbiflow.tiles import (
     fit_tile,
     index_page,
     iou,
+    read_result,
+    save_tiles,
 )
 from orbiflow.tiles.geometry import polygons_in, resampled
 from orbiflow.tiles.likeness import fidelity_to_original
@@ -114,8 +115,8 @@ def test_it_is_said_and_kept(found: SearchResult, tmp_path: Path) -> None:
     assert "narrower than 2 % of its length was rounded off" in index_page(
         found.tiles, HAIR, ["IH4", "IH6"]
     )
-    found.tiles[0].save(tmp_path / "tile")
-    assert EscherTile.load(tmp_path / "tile").smoothed == ROUNDED_OFF[0]
+    save_tiles(found.tiles[:1], tmp_path / "tile")
+    assert read_result(tmp_path / "tile").smoothed == ROUNDED_OFF[0]
 
 
 def test_a_blob_is_no_good_likeness_of_a_spider() -> None:

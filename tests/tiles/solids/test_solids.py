@@ -17,9 +17,9 @@ from exported import tile_of, tiles
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, SettingError
 from orbiflow.symmetry import wallpaper_group
 from orbiflow.tiles import (
-    EscherTile,
     SolidSettings,
     Tile,
+    as_tile,
     make_solid,
     polygons_in,
     read_solid,
@@ -155,7 +155,7 @@ def test_a_mould_casts_the_tile() -> None:
 def test_a_drawing_stands_on_the_mould_s_floor(relief: float) -> None:
     own = SolidSettings(kind="mould", height=6, relief=relief)
     page = ExportSettings(cut="pieces", tile_size=own.tile_size)
-    placed, _ = laid_out(EscherTile.of(tile_of("IH5")), page)
+    placed, _ = laid_out(as_tile(tile_of("IH5")), page)
     disc = shapely.Point(placed.tile.center).buffer(4)
     body = shape(Plan(own, placed, disc))["mould"]
     (island,) = (p for p in polygons_in(section(body, 2 + relief / 2)) if not p.interiors)
@@ -240,7 +240,7 @@ def test_a_drawing_that_is_dark_all_over_is_said_to_show_nothing(
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}">'
         f'<rect width="{width}" height="{height}" fill="{fill}"/></svg>'
     )
-    made = squirrel("IH4").solid(SolidSettings(kind="stamp"), picture=path)
+    made = make_solid(squirrel("IH4"), SolidSettings(kind="stamp"), picture=path)
     assert any("the drawing is dark all over" in note for note in made.notes) == said
 
 
@@ -314,9 +314,9 @@ def test_a_stamp_wants_lines(tmp_path: Path) -> None:
     tile, picture = squirrel("IH4"), tmp_path / "photo.png"
     Image.new("RGB", size_of(tile, 60)).save(picture)
     with pytest.raises(InputFileError, match="needs lines: draw it as SVG"):
-        tile.solid(SolidSettings(kind="stamp"), picture=picture)
+        make_solid(tile, SolidSettings(kind="stamp"), picture=picture)
     with pytest.raises(OrbiflowError, match="a cutter takes no picture; leave it out"):
-        tile.solid(SolidSettings(kind="cutter"), picture=picture)
+        make_solid(tile, SolidSettings(kind="cutter"), picture=picture)
 
 
 @pytest.mark.parametrize(("kind", "name"), [("tile", "a.stl"), ("puzzle", "a.3mf")])
@@ -350,10 +350,10 @@ def test_the_picture_of_a_solid_shows_what_is_in_front() -> None:
 
 
 def test_files_are_the_same_every_time(tmp_path: Path) -> None:
-    tile = EscherTile.of(tile_of("IH4"))
+    tile = as_tile(tile_of("IH4"))
     for name in ("a.stl", "a.3mf"):
-        once = tile.solid().write(tmp_path / name).read_bytes()
-        assert tile.solid().write(tmp_path / name).read_bytes() == once
+        once = make_solid(tile).write(tmp_path / name).read_bytes()
+        assert make_solid(tile).write(tmp_path / name).read_bytes() == once
         assert not once.startswith(b"solid")
     with pytest.raises(SettingError, match="stl or 3mf"):
-        tile.solid().write(tmp_path / "a.obj")
+        make_solid(tile).write(tmp_path / "a.obj")

@@ -20,6 +20,7 @@ from orbiflow.tiles.exporting.skeletons import skeleton_scene
 from orbiflow.tiles.exporting.templates import template_scene
 from orbiflow.tiles.likeness import narrowest_neck
 from orbiflow.tiles.motifs import Over, read_over, with_map
+from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.scene import (
     Scene,
     flattened,
@@ -115,7 +116,7 @@ def scenes(
     force: bool = False,
 ) -> tuple[list[Scene], tuple[str, ...]]:
     """Return the sheets, and what the user should know. Raises as `export`."""
-    given = EscherTile.of(tile)
+    given = as_tile(tile)
     certificate = given.require_certified(
         force=force, otherwise="so it is not exported; --force exports it, marked so"
     )

@@ -14,6 +14,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import triangle_sides
 from orbiflow.tiles.motifs.raster import Grid, bilinear, polygon_sides, region_sides, runs
+from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.search import matched
 from orbiflow.tiles.silhouette import Covered, Frame, Target, open_image
 from orbiflow.tiles.tile import EscherTile, TileMap, TileSource
@@ -28,9 +29,9 @@ def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
 
     Raises:
         OrbiflowError: If `source` holds no tile.
-        InputFileError: As `EscherTile.load`, and if a model belongs to another tile.
+        InputFileError: As `read_result`, and if a model belongs to another tile.
     """
-    tile = EscherTile.of(source)
+    tile = as_tile(source)
     if tile.no_map or (tile.bending is not None and tile.frame is not None):
         return tile
     frame, bending, known = tile.frame, None, tile.map or TileMap()

@@ -35,6 +35,7 @@ from orbiflow.tiles.motion.kinds import (
     morph,
 )
 from orbiflow.tiles.motion.settings import AnimationSettings
+from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.scene import Numbers
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import colouring
@@ -57,7 +58,7 @@ def animate(
         tile, settings, force, cancel: As for `export`, which raises the same errors.
     """
     out, cancel = as_path(out, "the file to animate to"), cancel or Cancel()
-    settings, given = (settings or AnimationSettings()).for_file(out), EscherTile.of(tile)
+    settings, given = (settings or AnimationSettings()).for_file(out), as_tile(tile)
 
     def told(share: float) -> None:
         cancel.check()
@@ -81,7 +82,7 @@ def animation(
     settings = (settings or AnimationSettings()).for_file(None)
     if settings.format == "mp4":
         require_ffmpeg()  # before the work
-    given, colours = EscherTile.of(tile), palette(settings.palette)
+    given, colours = as_tile(tile), palette(settings.palette)
     given.require_certified(force=force, otherwise="so it is not animated; --force animates it")
     made = motion(given, settings)
     told(0.0)

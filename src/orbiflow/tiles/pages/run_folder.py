@@ -79,9 +79,11 @@ def write_tile_folder(
         normal = result.normal_tile
         # flows need torch, which the search for likeness does without
         from orbiflow.drawing import field_picture
-        from orbiflow.tiles.search import placed_field
+        from orbiflow.tiles.search import as_model, placed_field
 
-        return field_picture(placed_field(result.model()), normal.group, normal, sheet=sheet).file()
+        return field_picture(
+            placed_field(as_model(result)), normal.group, normal, sheet=sheet
+        ).file()
 
     contents: dict[str, Callable[[], str | bytes]] = {
         "tile.svg": lambda: tile_svg(tile, y_down=y_down, title=title),

@@ -18,6 +18,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import NEVER, Cancel, one_blas_thread, one_thread
 from orbiflow.tiles.geometry import signed_area
 from orbiflow.tiles.likeness import narrowest_neck
+from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.search.tile_variations import MAX_POINTS, TileVariations, divided_tile
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import certify
@@ -80,7 +81,7 @@ def refine(
     if not callable(loss):
         how = "the loss must be a function of the polygon (N, 2), a tensor"
         raise OrbiflowError(f"{how}, got {described(loss)}")
-    start = EscherTile.of(tile)
+    start = as_tile(tile)
     start.require_certified(otherwise="so no loss can be lowered from it: give a tile that is")
     with one_thread(), one_blas_thread():
         space = TileVariations(divided_tile(start.tile, points))

@@ -24,7 +24,7 @@ from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles.search.candidates import Candidates, Prototiles, simplest_tile
 from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS
 from orbiflow.tiles.silhouette import Bending, Frame
-from orbiflow.tiles.tile import TileMap, naming_file
+from orbiflow.tiles.tile import EscherTile, TileMap, naming_file
 from orbiflow.tiles.tilings import IsohedralClass, Tile
 from orbiflow.tiles.tilings import isohedral_class as class_of
 from orbiflow.typed_torch import linalg, listed
@@ -361,9 +361,14 @@ def as_map(model: TileModel, frame: Frame | None = None, bending: Bending | None
     return TileMap(settings, arrays, frame, bending)
 
 
-def as_model(stored: TileMap) -> TileModel:
-    """Return the model again, float64, one candidate, in the target's normal form."""
-    if not stored.has_flow:
+def as_model(source: EscherTile | TileMap) -> TileModel:
+    """Return the flow that made a tile: float64, one candidate, in the target's normal form.
+
+    Raises:
+        OrbiflowError: If no flow made it, or none is known.
+    """
+    stored = source.map if isinstance(source, EscherTile) else source
+    if stored is None or not stored.has_flow:
         raise OrbiflowError(NO_FLOW)
     settings, arrays = stored.settings, stored.arrays
     # before anything is built: each segment takes time and memory

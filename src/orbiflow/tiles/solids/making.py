@@ -19,10 +19,11 @@ from orbiflow.errors import InputFileError
 from orbiflow.runtime import write_atomic
 from orbiflow.tiles.exporting import ExportSettings, dark_parts, laid_out, place_on
 from orbiflow.tiles.likeness import narrowest_slit
+from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.scene import Motif
 from orbiflow.tiles.solids.settings import SolidSettings
 from orbiflow.tiles.solids.shapes import Plan, shape
-from orbiflow.tiles.tile import EscherTile, TileSource
+from orbiflow.tiles.tile import TileSource
 
 STL_TRIANGLE = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
 
@@ -109,7 +110,7 @@ def make_solid(
         OrbiflowError: If the settings cannot be met.
         InputFileError: If the drawing cannot be read, or is a picture of pixels.
     """
-    settings, given = settings or SolidSettings(), EscherTile.of(tile)
+    settings, given = settings or SolidSettings(), as_tile(tile)
     settings.check_picture(picture)
     certificate = given.require_certified(
         force=force, otherwise="so no solid is made of it; --force makes one, marked so"
