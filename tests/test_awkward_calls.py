@@ -167,7 +167,7 @@ REFUSED: list[tuple[Call, Any, str]] = [
     (tiles.as_map, "IH4", "must be a TileModel"),
     (tiles.load_model, 3, "the model's file must be a path, got 3"),
     (lambda t: tiles.fit_descent(t, KIND, FAST), BOOT, "must be a Target, got a list of 7"),
-    (lambda s: tiles.fit_descent(TARGET, KIND, s), "fast", "must be an OverlapSearch"),
+    (lambda s: tiles.fit_descent(TARGET, KIND, s), "fast", "must be a SearchMethod"),
     (lambda t: tiles.OccupancySamples(t, 9, seed=0), BOOT, "must be a Target"),
     (lambda t: outline_starts(t, KIND, **FEW), BOOT, "must be a Target"),
     (lambda r: outline_starts(TARGET, KIND, resolutions=r, **FEW), (35,), "must divide vertices"),

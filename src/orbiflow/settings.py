@@ -45,7 +45,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Self, cast, dataclass_transform
+from typing import Annotated, Any, ClassVar, Self, cast, dataclass_transform
 
 from orbiflow.arguments import Range as Range
 from orbiflow.arguments import described, meant, one_of, placeholder, refusal
@@ -54,6 +54,12 @@ from orbiflow.kinds import FlagKind, Kind, OptionalKind, Refused, kind_of
 from orbiflow.kinds import Parsed as Parsed
 from orbiflow.kinds import Repeated as Repeated
 from orbiflow.kinds import Unit as Unit
+
+Count = Annotated[int, Range(1)]
+"""A whole number of things."""
+
+Seed = Annotated[int, Range(0, 2**32 - 1)]
+"""A seed of random numbers."""
 
 
 class Option:

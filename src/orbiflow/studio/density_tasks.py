@@ -23,7 +23,7 @@ from orbiflow.runtime import (
     write_atomic,
     write_json,
 )
-from orbiflow.settings import OnlyWith, Range, Settings
+from orbiflow.settings import Count, OnlyWith, Range, Settings
 from orbiflow.studio.density_files import (
     FIT,
     MAX_SHOWN,
@@ -131,7 +131,7 @@ def _view(folder: Path, data: Path, choice: FitChoice, tell: Sink) -> dict[str, 
 @operation("studio density map")
 def density_map(
     job: Job,
-    fit: Annotated[int, Range(1)],
+    fit: Count,
     axes: tuple[Annotated[int, Range(0, MAX_SHOWN)], ...],
     *,
     on_event: Sink = ignore,

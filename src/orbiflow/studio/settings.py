@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from orbiflow.settings import DefaultText, Option, Range, Settings
+from orbiflow.settings import Count, DefaultText, Option, Range, Seed, Settings
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
@@ -38,17 +38,17 @@ class Job(Settings):
     project: Path
     """Folder of the project."""
 
-    task: Annotated[int, Range(1)]
+    task: Count
     """Number of the task, from which it numbers what it makes."""
 
 
 class Limits(Settings):
     """What the server takes at most."""
 
-    upload: Annotated[int, Range(1)] = 64 * 2**20
+    upload: Count = 64 * 2**20
     """Bytes of a file that is uploaded."""
 
-    message: Annotated[int, Range(1)] = 2 * 2**20
+    message: Count = 2 * 2**20
     """Bytes of any other body."""
 
     seconds: Annotated[float, Range(above=0)] = 20.0
@@ -57,16 +57,16 @@ class Limits(Settings):
     slowest: Annotated[float, Range(0)] = 20_000.0
     """Bytes a second of a body, on average after the longest wait."""
 
-    uploads: Annotated[int, Range(1)] = 16
+    uploads: Count = 16
     """Bodies that are received at a time."""
 
-    projects: Annotated[int, Range(1)] = 1000
+    projects: Count = 1000
     """Projects."""
 
-    waiting: Annotated[int, Range(1)] = 20
+    waiting: Count = 20
     """Tasks of one project that are not done."""
 
-    streams: Annotated[int, Range(1)] = 100
+    streams: Count = 100
     """Streams of events at a time."""
 
 
@@ -86,5 +86,5 @@ class SearchChoice(Settings, group="Search"):
     like: Annotated[int | None, Range(1)] = None
     """Number of a tile: look longer, for more tiles whose copies lie like its copies."""
 
-    seed: Annotated[int, Range(0, 2**32 - 1)] = 0
+    seed: Seed = 0
     """Start of the random numbers: another one gives other tiles."""

@@ -123,6 +123,7 @@ from .search.tile_model import as_map as as_map
 from .search.tile_model import as_model as as_model
 from .search.tile_model import load_model as load_model
 from .search.tile_model import placed_field as placed_field
+from .search.tile_model import trainable as trainable
 from .search.tile_variations import TileVariations as TileVariations
 from .search.tile_variations import divided_tile as divided_tile
 from .silhouette.bending import Bending as Bending

@@ -20,6 +20,7 @@ from orbiflow.tiles import (
     Target,
     escherize,
     report,
+    trainable,
 )
 from orbiflow.tiles.search import Goal, SearchMethod
 from orbiflow.tiles.search.candidates import OnProgress, StillTiles
@@ -98,7 +99,7 @@ def test_tiles_that_no_flow_moves_are_those_of_a_flow_of_zero(name: str) -> None
     still = StillTiles(kind, template_starts(kind, turns=3, stretch=0.2))
     for index in (0, still.size - 1):
         tile, own = still.finished(index)
-        other, flow = still.as_model().finished(index)
+        other, flow = trainable(still).finished(index)
         assert np.abs(tile.polygon - other.polygon).max() < 1e-15
         assert (own.has_flow, flow.has_flow) == (False, True)
         assert own.arrays == {}

@@ -23,6 +23,7 @@ from orbiflow.tiles import (
     fit_descent,
     iou,
     isohedral_class,
+    trainable,
 )
 from orbiflow.tiles.likeness import boundary_iou
 from orbiflow.tiles.search.candidates import silent
@@ -121,7 +122,7 @@ def test_keep_selects_everything_alike(soft: SoftTarget) -> None:
 @pytest.mark.parametrize("name", CLASSES)
 def test_a_fit_certifies_and_survives_storage(name: str) -> None:
     found = fit_descent(TARGET, isohedral_class(name), QUICK)
-    tile, fine = extract_tile(found.model.take([0]))
+    tile, fine = extract_tile(trainable(found.candidates).take([0]))
     certificate = certify(tile)
     assert certificate.valid
     assert certificate.edge_mismatch < 1e-12
@@ -133,7 +134,9 @@ def test_a_fit_certifies_and_survives_storage(name: str) -> None:
 
 
 def test_the_inverse_of_the_flow_takes_the_tile_back() -> None:
-    model = fit_descent(TARGET, isohedral_class("IH6"), QUICK).model.take([0]).double()
+    model = (
+        trainable(fit_descent(TARGET, isohedral_class("IH6"), QUICK).candidates).take([0]).double()
+    )
     model.flow = model.flow.with_steps(4, method="rk4")
     with torch.no_grad():
         points = model.prototile()[0]
@@ -141,7 +144,9 @@ def test_the_inverse_of_the_flow_takes_the_tile_back() -> None:
 
 
 def test_broken_prototiles_are_refused() -> None:
-    saved = as_map(fit_descent(TARGET, isohedral_class("IH4"), QUICK).model.take([0]))
+    saved = as_map(
+        trainable(fit_descent(TARGET, isohedral_class("IH4"), QUICK).candidates).take([0])
+    )
     outline, corners = saved.arrays["prototile.outline"], saved.arrays["prototile.corners"]
     broken = {
         "shape": {"prototile.outline": outline[:, :1]},

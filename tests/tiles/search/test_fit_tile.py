@@ -18,6 +18,7 @@ from orbiflow.tiles import (
     fit_descent,
     fit_occupancy,
     fit_tile,
+    trainable,
 )
 from outlines import searched
 
@@ -54,7 +55,7 @@ def test_what_the_methods_of_their_own_give() -> None:
 
 
 def test_a_model_may_be_trained_before_it_is_certified() -> None:
-    model = fit_tile(TARGET, 4, SETTINGS["occupancy"]).model
+    model = trainable(fit_tile(TARGET, 4, SETTINGS["occupancy"]).candidates)
     before = certified_tiles(TARGET, model)[0]
     with torch.no_grad():
         model.angle.add_(0.3)

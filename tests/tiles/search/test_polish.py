@@ -16,6 +16,7 @@ from orbiflow.tiles import (
     fit_descent,
     iou,
     isohedral_class,
+    trainable,
 )
 from orbiflow.tiles.search.descent import polish
 from orbiflow.tiles.search.tile_model import extract_tile
@@ -62,7 +63,9 @@ def test_a_scaled_copy_is_pulled_back() -> None:
 
 @pytest.fixture(scope="module", params=["IH4", "IH5", "IH21"])
 def rough(request: pytest.FixtureRequest) -> TileModel:
-    return fit_descent(TARGET, isohedral_class(request.param), ROUGH).model.take([0])
+    return trainable(fit_descent(TARGET, isohedral_class(request.param), ROUGH).candidates).take(
+        [0]
+    )
 
 
 def test_polish_improves_and_certifies(rough: TileModel) -> None:

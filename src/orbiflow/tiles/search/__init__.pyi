@@ -29,5 +29,6 @@ from .tile_model import as_map as as_map
 from .tile_model import as_model as as_model
 from .tile_model import load_model as load_model
 from .tile_model import placed_field as placed_field
+from .tile_model import trainable as trainable
 from .tile_variations import TileVariations as TileVariations
 from .tile_variations import divided_tile as divided_tile

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 import shapely
@@ -37,11 +37,13 @@ from orbiflow.tiles.search.co_deformation import (
     held_on_tiles,
     shifted,
 )
-from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.starts import template_symmetries
 from orbiflow.tiles.search.tile_space import NearestTiles, Placements, TileSpace, best_placements
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass
+
+if TYPE_CHECKING:
+    from orbiflow.tiles.search.likeness_search import LikenessSearch
 
 TWIN = 2e-4  # mean squared distance of two bent outlines below which they are twins
 FIRST_ROUNDS = 6  # steps of the minimisation for all that are held

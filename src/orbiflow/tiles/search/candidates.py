@@ -20,7 +20,6 @@ from orbiflow.tiles.tilings import IsohedralClass, Tile
 
 if TYPE_CHECKING:
     from orbiflow.tiles.search.bending import PlacedBent
-    from orbiflow.tiles.search.tile_model import TileModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,10 +213,6 @@ class Candidates(ABC):
             CertificationError: if it has folded, unless `force` is set.
         """
 
-    @abstractmethod
-    def as_model(self) -> TileModel:
-        """Return the candidates as a torch module, to be trained."""
-
 
 class Fit(NamedTuple):
     """Finalists of one class, not certified yet.
@@ -234,11 +229,6 @@ class Fit(NamedTuple):
     crossed: int
     enough: int
     bent: tuple[PlacedBent, ...] = ()
-
-    @property
-    def model(self) -> TileModel:
-        """The candidates as a torch module, to be trained further."""
-        return self.candidates.as_model()
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,10 +261,3 @@ class StillTiles(Candidates):
             force=force,
         )
         return tile, TileMap()
-
-    def as_model(self) -> TileModel:
-        """Return the candidates as a torch module, to be trained: its field is zero."""
-        from orbiflow.tiles.search.tile_model import TileModel
-
-        own = self.prototiles
-        return TileModel(self.kind, max_frequency=1, smoothness=0.0, steps=1, prototiles=own)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from itertools import permutations
 from math import gcd
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -29,10 +29,12 @@ from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles.geometry import plane_points, reverse, signed_area
 from orbiflow.tiles.likeness import Elastic, Pinned, Stiffness, kept_of
-from orbiflow.tiles.search.likeness_search import LikenessSearch
 from orbiflow.tiles.search.tile_space import Placements, TileSpace
 from orbiflow.tiles.silhouette import Emphasis, Pins, Samples, Target, sampled, triangulate
 from orbiflow.tiles.tilings import IsohedralClass
+
+if TYPE_CHECKING:
+    from orbiflow.tiles.search.likeness_search import LikenessSearch
 
 TIGHTER = tuple(np.geomspace(1.2, 3000.0, 3))  # strengths of the springs, stage by stage
 ROUNDS = 3  # steps of choosing rotations and solving: in each stage, and of each neighbour

@@ -13,6 +13,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.optimize
@@ -27,12 +28,15 @@ from orbiflow.flows import METHODS, Flow
 from orbiflow.runtime import NEVER, Cancel, one_thread
 from orbiflow.tiles.likeness import Overlap, Recogniser, boundary_iou, prepared_region, rank_score
 from orbiflow.tiles.search.candidates import Fit, OnProgress, Prototiles, silent
-from orbiflow.tiles.search.overlap_search import OverlapSearch
+from orbiflow.tiles.search.search_method import SearchMethod
 from orbiflow.tiles.search.starts import Starts, outline_starts, template_starts
 from orbiflow.tiles.search.tile_model import TileModel
 from orbiflow.tiles.silhouette import Emphasis, SoftTarget, Target
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 from orbiflow.typed_torch import linalg
+
+if TYPE_CHECKING:
+    from orbiflow.tiles.search.overlap_search import OverlapSearch
 
 CALM = 0.4  # step length times the field's steepness, at most; less where `calm` finds it too bold
 
@@ -260,7 +264,7 @@ NEAR = 0.01  # IoU that a more recognisable candidate of a class may be behind t
 def fit_descent(
     target: Target,
     kind: IsohedralClass | str,
-    settings: OverlapSearch | None = None,
+    settings: OverlapSearch,
     *,
     emphasis: Emphasis | None = None,
     progress: OnProgress = silent,
@@ -272,7 +276,7 @@ def fit_descent(
     """
     kind = isohedral_class(kind)
     as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
-    settings = as_instance(settings or OverlapSearch(), OverlapSearch, "settings")
+    as_instance(settings, SearchMethod, "settings", "give an OverlapSearch")
     outline = shapely.Polygon(target.normal).exterior
     settings = settings.for_outline(outline.length)
     soft = shared_soft_target(target, emphasis)

@@ -8,13 +8,22 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from orbiflow.settings import DefaultText, Group, Needs, OnlyWith, Parsed, Range, Repeated, Settings
+from orbiflow.settings import (
+    Count,
+    DefaultText,
+    Group,
+    Needs,
+    OnlyWith,
+    Parsed,
+    Range,
+    Repeated,
+    Seed,
+    Settings,
+)
 
 if TYPE_CHECKING:
     from orbiflow.tiles.search.search_method import SearchMethod
 
-Count = Annotated[int, Range(1)]
-Seed = Annotated[int, Range(0, 2**32 - 1)]
 
 LIKENESS = Group("Search for likeness")
 OVERLAP = Group("Search for overlap")

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import NEVER, Cancel
-from orbiflow.settings import Range, Settings
+from orbiflow.settings import Count, Range, Seed, Settings
 from orbiflow.tiles.likeness import least_neck
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
-from orbiflow.tiles.search.escherize_settings import Count, Seed
 from orbiflow.tiles.search.search_method import Goal, SearchMethod, Sketches
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass

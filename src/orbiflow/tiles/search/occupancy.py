@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -17,12 +18,15 @@ from orbiflow.arguments import as_instance, as_whole
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.tiles.search.candidates import OnProgress, silent
 from orbiflow.tiles.search.descent import between
-from orbiflow.tiles.search.overlap_search import OccupancySearch
+from orbiflow.tiles.search.search_method import SearchMethod
 from orbiflow.tiles.search.starts import initial_poses, template_symmetries
 from orbiflow.tiles.search.tile_model import TileModel
 from orbiflow.tiles.silhouette import Target, signed_distance
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 from orbiflow.typed_torch import adam, linalg, listed
+
+if TYPE_CHECKING:
+    from orbiflow.tiles.search.overlap_search import OccupancySearch
 
 # Factor of the squared displacement of a pentagon's free vertex: keeps the template simple
 SHAPE_PENALTY = 0.02
@@ -78,7 +82,7 @@ def occupancy_loss(
 def fit_occupancy(
     target: Target,
     kind: IsohedralClass | str,
-    settings: OccupancySearch | None = None,
+    settings: OccupancySearch,
     progress: OnProgress = silent,
     *,
     cancel: Cancel = NEVER,
@@ -89,7 +93,7 @@ def fit_occupancy(
     """
     kind = isohedral_class(kind)
     as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
-    settings = as_instance(settings or OccupancySearch(), OccupancySearch, "settings")
+    as_instance(settings, SearchMethod, "settings", "give an OccupancySearch")
     # the mean over the candidates is all that couples them: separate fits, one tensor
     samples = OccupancySamples(target, 16384, seed=settings.seed)
     angles, mirrored = initial_poses(kind, settings.turns)

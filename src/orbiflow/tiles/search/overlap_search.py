@@ -9,9 +9,8 @@ from typing import Annotated, Any, ClassVar, Literal
 from orbiflow.arguments import refusal
 from orbiflow.errors import CertificationError
 from orbiflow.runtime import NEVER, Cancel, one_thread
-from orbiflow.settings import Range, Settings
+from orbiflow.settings import Count, Range, Seed, Settings
 from orbiflow.tiles.search.candidates import Fit, OnProgress, StillTiles
-from orbiflow.tiles.search.escherize_settings import Count, Seed
 from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS, Goal, SearchMethod
 from orbiflow.tiles.tilings import CLASSES, ISOHEDRAL_TYPES, IsohedralClass
 

@@ -21,7 +21,7 @@ from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.tiles.search.candidates import Candidates, Prototiles, simplest_tile
+from orbiflow.tiles.search.candidates import Candidates, Prototiles, StillTiles, simplest_tile
 from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS
 from orbiflow.tiles.silhouette import Bending, Frame
 from orbiflow.tiles.tile import EscherTile, TileMap, naming_file
@@ -249,10 +249,6 @@ class TileModel(nn.Module, Candidates):
         tile, fine = extract_tile(self.take([index]), force=force)
         return tile, as_map(fine)
 
-    def as_model(self) -> TileModel:
-        """Return the candidates as a torch module, which they are."""
-        return self
-
     def require_single(self) -> None:
         """Check that the model holds one candidate."""
         if self.size != 1:
@@ -265,6 +261,16 @@ class TileModel(nn.Module, Candidates):
         for name, buffer in exact.items():
             setattr(self, name, buffer.to(getattr(self, name).device))
         return self
+
+
+def trainable(candidates: Candidates) -> TileModel:
+    """Return candidates as a torch module, to be trained: that of start tiles has a field of zero."""
+    if isinstance(candidates, TileModel):
+        return candidates
+    if not isinstance(candidates, StillTiles):
+        raise OrbiflowError("expected the candidates of a fit; see fit_tile")
+    own = candidates.prototiles
+    return TileModel(candidates.kind, max_frequency=1, smoothness=0.0, steps=1, prototiles=own)
 
 
 def placed_field(model: TileModel) -> Callable[[Tensor], Tensor]:
