@@ -26,7 +26,6 @@ from orbiflow.settings import DefaultText, Ending, Hidden, Option, Parsed, Setti
 from orbiflow.tiles.art import ArtSettings
 from orbiflow.tiles.exporting import ExportSettings
 from orbiflow.tiles.motion import AnimationSettings
-from orbiflow.tiles.result_file import read_result
 from orbiflow.tiles.search import EscherizeSettings, class_names
 from orbiflow.tiles.silhouette import ReadingSettings
 from orbiflow.tiles.solids import SolidSettings
@@ -48,6 +47,7 @@ class TileChoice(Settings):
 
     def read(self, result: Path) -> EscherTile:
         """Return the tile of a run."""
+        from orbiflow.tiles.result_file import read_result
 
         return read_result(result, self.tile)
 
