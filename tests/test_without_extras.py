@@ -14,6 +14,7 @@ from orbiflow.extras import EXTRAS
 HERE = Path(__file__).parent
 TURTLE = HERE.parent / "examples" / "silhouettes" / "turtle.png"
 ANGLES = HERE.parent / "examples" / "density" / "backbone.csv"
+TORUS = "--space torus --columns phi,psi --unit degrees"
 BASE_HAS = ("starlette", "uvicorn", "platformdirs")
 """Packages of the studio, which is installed with the base by `make demo`."""
 
@@ -114,8 +115,8 @@ def test_the_studio_from_a_picture_to_files(bare: dict[str, str], tmp_path: Path
 @pytest.mark.parametrize(
     ("words", "who", "extra"),
     [
-        (f"density fit {ANGLES} --unit degrees", "orbiflow density fit needs torch", "density"),
-        (f"density summary {ANGLES}", "orbiflow density summary needs torch", "density"),
+        (f"density fit {ANGLES} {TORUS}", "orbiflow density fit needs torch", "density"),
+        (f"density summary {ANGLES} {TORUS}", "orbiflow density summary needs torch", "density"),
         (f"escherize {TURTLE} --objective overlap", "orbiflow escherize needs torch", "flows"),
         (f"escherize {TURTLE} --method occupancy", "orbiflow escherize needs torch", "flows"),
     ],

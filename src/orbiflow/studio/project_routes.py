@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import secrets
+from importlib import import_module
 from typing import Any
 
 from starlette.background import BackgroundTask
@@ -12,7 +13,8 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, StreamingResponse
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import find, is_object
+from orbiflow.extras import naming_extras
+from orbiflow.runtime import is_object
 from orbiflow.studio.guard import Refused
 from orbiflow.studio.kinds_of_work import kind_of_work
 from orbiflow.studio.project_file import ENDING, MOST_VIEW, write_project
@@ -37,7 +39,8 @@ async def create(request: Request, here: Studio) -> dict[str, Any]:
     if not isinstance(kind, str) or kind not in NAMES:
         raise OrbiflowError("a project is of kind tile or density")
     if kind == "density":
-        find("density fit")  # what it needs may not be installed
+        with naming_extras("a density"):
+            await run_in_threadpool(import_module, "matplotlib")
     name = plain_name(given.get("name"), NAMES[kind])
     made = here.store.create(kind, name, here.limits.projects)
     return shown_project(here.store, here.store.project(made))
