@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array
 from orbiflow.batch import Entry
 from orbiflow.density import comparing
-from orbiflow.density.cross_validation.operations import SCORES, UNIFORM, CrossValidation
+from orbiflow.density.cross_validation.settings import SCORES, UNIFORM, CrossValidation
 from orbiflow.density.data import Unit
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
 from orbiflow.density.inference import chart_of_observed
