@@ -25,6 +25,7 @@ from .flow import flow_obstacle as flow_obstacle
 from .kernels import SHARPEST as SHARPEST
 from .kernels import AdaptiveKernels as AdaptiveKernels
 from .kernels import kernel_rows as kernel_rows
+from .lattice import kernels_for as kernels_for
 from .mixture import Mixture as Mixture
 from .mixture import mixture_of as mixture_of
 from .network import VonMisesNetwork as VonMisesNetwork

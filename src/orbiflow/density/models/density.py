@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 LEVELS = 4
 """Levels of accuracy of kernels that stand for a density; each has a quarter of the error or less."""
 
-FIRST_GRID, GRID_BLOCK = {1: 256, 2: 48}, 2**12
-"""Points along an angle at first, by the number of angles, and points evaluated at a time."""
-
 BLOCK = 2**17
 """Points evaluated by a thread at a time where no gradient is asked for: bounds the memory."""
 
@@ -172,28 +169,15 @@ class Density(Distribution):
 
     def approximated(
         self, split: Split, space: Torus, level: int, tick: Callable[[], None]
-    ) -> list[Weighted]:
+    ) -> list[Weighted] | None:
         """Return kernels that together stand for the density of the angles kept and those given.
 
         One or two angles are kept. Each level, from 0 to `LEVELS` - 1, is finer than the one before
-        it, so that their difference tells the error. `tick` is called now and then.
+        it, so that their difference tells the error. `tick` is called now and then. None if there is
+        no better way than `log_marginal` on a grid.
         """
-        from orbiflow.density.models.lattice import lattice_kernels
-
-        count = FIRST_GRID[space.dim] * 2**level
-        line = (torch.arange(count, dtype=torch.float64)) / count
-        grid = torch.cartesian_prod(*[line] * space.dim).reshape(-1, space.dim)
-        values = grid.new_tensor(split.values)
-        parts: list[Tensor] = []
-        for block in torch.split(grid, GRID_BLOCK):
-            tick()
-            whole = torch.cat([block, values.expand(len(block), -1)], dim=1)
-            parts.append(self.log_marginal(whole, list(split.observed), level))
-        logs = torch.cat(parts)
-        log, kernels = lattice_kernels(
-            (logs - logs.max()).exp().reshape([count] * space.dim), space
-        )
-        return [(float(logs.max()) + log, kernels)]
+        del split, space, level, tick
+        return None
 
     def draw_given(
         self, count: int, given: Mapping[int, float], generator: torch.Generator

@@ -12,8 +12,9 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance
+from orbiflow.density.models.chain_nodes import quantiles
 from orbiflow.density.models.chain_sums import SCALES
-from orbiflow.density.models.chains import BLOCK, Factor, VonMisesChains, quantiles, waves
+from orbiflow.density.models.chains import BLOCK, Factor, VonMisesChains, waves
 from orbiflow.density.models.density import Density, Split, Weighted, in_blocks
 from orbiflow.density.models.elimination import eliminated, grids_for
 from orbiflow.density.models.files import within

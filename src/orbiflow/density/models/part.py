@@ -97,9 +97,9 @@ class PartialDensity(Density, kind="partial"):
 
     def approximated(
         self, split: Split, space: Torus, level: int, tick: Callable[[], None]
-    ) -> list[Weighted]:
+    ) -> list[Weighted] | None:
         found = self.whole.approximated(self._split_of(split), space, level, tick)
-        return [(log - self.log_given, part) for log, part in found]
+        return found and [(log - self.log_given, part) for log, part in found]
 
     def _split_of(self, split: Split) -> Split:
         """Return how the whole's angles are split, if those kept here are split again."""
