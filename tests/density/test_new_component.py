@@ -18,7 +18,6 @@ from orbiflow.density import (
     Density,
     Mixture,
     Space,
-    TabulatedDensity,
     Torus,
     UniformDensity,
     conditional,
@@ -128,11 +127,10 @@ def test_it_has_marginal_and_conditional_densities() -> None:
     torch.testing.assert_close(log_prob_observed(density, rows), own, rtol=1e-4, atol=1e-4)
 
 
-def test_it_is_drawn_tabulated_and_moved() -> None:
+def test_it_is_drawn_and_moved() -> None:
     density = mixture()
     line = torch.linspace(0.01, 0.99, 30, dtype=torch.float64)
     assert density_on_grid(density, line, line, "uniform").shape == (30, 30)
-    assert TabulatedDensity(density, 64).error < 1e-2
     assert highest_density_region(density, 0.5, samples=2000).size > 0
     assert density.to(torch.float32).sample(3).dtype == torch.float32
 

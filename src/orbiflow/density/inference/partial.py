@@ -327,8 +327,6 @@ def _log_sum(parts: list[tuple[float, Density]], points: Tensor) -> Tensor:
 
 
 def _mixture(parts: list[tuple[float, Density]]) -> Mixture:
-    # kernels first, where they are: the order of components is that of the draws of samples
-    parts = sorted(parts, key=lambda part: part[1].kernel_part is None)
     logs = torch.tensor([log for log, _ in parts], dtype=torch.float64)
     weights: list[float] = listed(torch.softmax(logs, dim=0).clamp_min(LEAST_WEIGHT))
     own = [part for _, part in parts]

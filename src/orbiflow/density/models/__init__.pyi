@@ -8,10 +8,9 @@ from .chains import chained as chained
 from .chains import waves as waves
 from .density import LEVELS as LEVELS
 from .density import Density as Density
+from .density import Pixel as Pixel
 from .density import Split as Split
 from .density import Weighted as Weighted
-from .evaluation import CHECKED as CHECKED
-from .evaluation import TabulatedDensity as TabulatedDensity
 from .evaluation import kl_by_quadrature as kl_by_quadrature
 from .evaluation import log_density_gradient as log_density_gradient
 from .evaluation import midpoints as midpoints

@@ -5,10 +5,10 @@ from __future__ import annotations
 import copy
 import math
 import numbers
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 import torch
@@ -20,15 +20,15 @@ from orbiflow.density.spaces import CHART, Space, Torus, check_measure
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import SideBySide, Tell, one_thread
 
-if TYPE_CHECKING:
-    from orbiflow.density.models.flow import FlowDensity
-    from orbiflow.density.models.kernels import AdaptiveKernels
-
 LEVELS = 4
 """Levels of accuracy of kernels that stand for a density; each has a quarter of the error or less."""
 
 BLOCK = 2**17
 """Points evaluated by a thread at a time where no gradient is asked for: bounds the memory."""
+
+Pixel = Callable[[Tensor], Tensor]
+"""The side of a pixel of a picture at chart points (N, d), in radians: along each axis (d,) of the
+frame of a flat space; (N, 1), or the same everywhere (), on a round one."""
 
 KINDS: dict[str, type[Density]] = {}
 """The classes of densities that a file can hold, by the names they have there."""
@@ -66,9 +66,12 @@ class Density(Distribution):
     has_fine_detail: bool = True
     """Whether the density may hold detail that a coarse picture would miss."""
 
+    is_carried: bool = False
+    """Whether a flow carries the density's mass to where it is: see `drift`."""
+
     error: float = 0.0
-    """Root mean square difference, in nats, from the density that a tabulated one stands for, where it
-    is dense; see `orbiflow.density.marginal`."""
+    """Root mean square difference, in nats, from the density that this one stands for, where it is
+    dense; see `orbiflow.density.marginal`."""
 
     largest_error: float = 0.0
     """The largest difference, in nats, that was found anywhere, also where hardly any mass is."""
@@ -119,19 +122,33 @@ class Density(Distribution):
         """Logarithm of a constant that the density, as in `log_density`, is never below."""
         return -math.inf
 
-    @property
-    def kernel_part(self) -> tuple[float, AdaptiveKernels] | None:
-        """The weight and the kernels that the density contains; None if there are none."""
-        return None
+    def parts(self) -> Iterator[tuple[float, Density]]:
+        """Yield what the density is a weighted sum of, each with its weight: itself if it is none."""
+        yield 1.0, self
 
-    def log_density_without_kernels(self, points: Tensor) -> Tensor:
-        """Return what `log_density` would be without `kernel_part`."""
-        return self.log_density(points)
+    def drift(self, points: Tensor) -> Tensor:
+        """Return the time mean of the flow's velocities (..., d) at chart points (..., d), float64."""
+        del points
+        raise OrbiflowError("the density has no flow: draw another picture of it")
 
-    @property
-    def flow_part(self) -> tuple[float, FlowDensity] | None:
-        """The weight and the density of the flow that the density contains; None if there is none."""
-        return None
+    def bumps(self) -> Tensor:
+        """Return chart points (P, d) about which there may be bumps narrower than any grid."""
+        return torch.zeros(0, self.space.chart_dim, dtype=torch.float64)
+
+    def is_narrower_than(self, pixel: Pixel) -> bool:
+        """Return whether a bump has a deviation below the side of a pixel."""
+        del pixel
+        return False
+
+    def averaged_over(self, pixel: Pixel) -> Density:
+        """Return a density whose bumps are averaged over pixels, the others as they are.
+
+        A bump narrower than a pixel would be seen or missed depending on where a grid falls. Half a
+        pixel is added to the deviation of each, in squares: then its values on the grid sum to its mass
+        within 2 %, wherever it lies.
+        """
+        del pixel
+        return self
 
     @classmethod
     def joined(cls, components: Sequence[Any], weights: Tensor) -> Self | None:

@@ -66,6 +66,7 @@ class FlowDensity(Density, kind="flow"):
 
     article = "a flow"
     has_fine_detail = False
+    is_carried = True
 
     def __init__(self, space: Space, flow: Flow, base: Density | None = None) -> None:
         super().__init__(space)
@@ -82,10 +83,10 @@ class FlowDensity(Density, kind="flow"):
         """The device of the flow's parameters."""
         return next((p.device for p in self.flow.parameters()), None)
 
-    @property
-    def flow_part(self) -> tuple[float, FlowDensity]:
-        """The density itself."""
-        return 1.0, self
+    def drift(self, points: Tensor) -> Tensor:
+        like = self._like()
+        vectors = [field(points.to(like)) for field in self.flow.segments]
+        return torch.stack(vectors).mean(dim=0).double().cpu()
 
     def log_chart(self, points: Tensor) -> Tensor:
         # flow, base and area are invariant: no need to project
