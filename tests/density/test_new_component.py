@@ -155,3 +155,19 @@ def test_what_is_missing_is_said(tmp_path: Path) -> None:
 
     with pytest.raises(OrbiflowError, match="integrated"):
         marginal(Silent(TORUS), 0)
+
+
+def test_its_parts_are_walked_through_mixtures_of_mixtures() -> None:
+    inner = mixture()
+    outer = Mixture([inner, UniformDensity(TORUS)], [0.5, 0.5])
+    found = [(weight, part.kind) for weight, part in outer.parts()]
+    kinds = ("wave", "kernels", "uniform", "chains", "uniform")
+    assert found == list(zip((0.25, 0.1, 0.05, 0.1, 0.5), kinds, strict=True))
+    at, pixel = even_grid(7, 2), torch.tensor(2.0)
+    wide = outer.averaged_over(lambda _points: pixel)
+    assert [part.kind for _, part in wide.parts()] == [*kinds]
+    assert not torch.allclose(wide.log_prob(at), outer.log_prob(at))
+    wave = inner.components[0]
+    assert wave.averaged_over(lambda _points: pixel) is wave
+    assert not wave.is_narrower_than(lambda _points: pixel)
+    assert inner.components[1].is_narrower_than(lambda _points: pixel)

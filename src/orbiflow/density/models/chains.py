@@ -17,8 +17,9 @@ from orbiflow.arguments import as_tensor
 from orbiflow.density.models.chain_nodes import MOST, MOST_ALONE, node_counts, nodes_of
 from orbiflow.density.models.chain_sums import SCALES, ChainFits, ChainSum
 from orbiflow.density.models.chain_tables import chain_tables
-from orbiflow.density.models.density import Density, Restriction, Split, Weighted, in_blocks
+from orbiflow.density.models.density import Density, Restriction, Split, Weighted
 from orbiflow.density.models.lattice import lattice_kernels
+from orbiflow.density.models.tensors import in_blocks
 from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance, is_a
-from orbiflow.density.models.density import Density, Restriction, Split, in_blocks
+from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.evaluation import midpoints
 from orbiflow.density.models.files import (
     density_from,
@@ -21,6 +21,7 @@ from orbiflow.density.models.files import (
     series_parts,
     within,
 )
+from orbiflow.density.models.tensors import in_blocks
 from orbiflow.density.spaces import Space, Torus, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow

@@ -10,8 +10,9 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance
-from orbiflow.density.models.density import Density, Restriction, Split, Weighted, in_blocks
+from orbiflow.density.models.density import Density, Restriction, Split, Weighted
 from orbiflow.density.models.files import density_from, density_parts, within
+from orbiflow.density.models.tensors import in_blocks
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list
