@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from orbiflow import runtime
 from orbiflow.batch import Column, Kind, Summary, WorkSettings, run_files
-from orbiflow.density import comparing, inference, models, pictures, spaces, tables
+from orbiflow.density import comparing, fitting, inference, models, pictures, spaces, tables
 from orbiflow.density.data import is_angular
-from orbiflow.density.fitting import ComponentSettings, DensitySettings, mean_of, weighed
+from orbiflow.density.fitting import ComponentSettings, DensitySettings
 from orbiflow.density.run_folder import write_files, written_files
 from orbiflow.density.tables import CountedRowSettings, RowSettings, SpaceSettings
 from orbiflow.errors import DataWarning
@@ -163,8 +163,8 @@ def _mean_score(estimator: DensityEstimator, values: Array, weights: Array | Non
     may_lack = estimator.missing == "marginalise"
     points = inference.chart_of_rows(estimator.space_, values, may_lack=may_lack)
     scores = inference.at_observed(estimator.density_, points, measure="natural")
-    counted = weighed(scores[:, None], weights)
-    return mean_of(counted.points[:, 0], counted.weights)
+    counted = fitting.weighed(scores[:, None], weights)
+    return fitting.mean_of(counted.points[:, 0], counted.weights)
 
 
 def _words(document: Mapping[str, Any], rows: int, out: Path) -> tuple[str, str]:
