@@ -53,13 +53,14 @@ def integral(density: Mixture) -> Integral:
 
 
 def _by_grid(density: Mixture) -> Integral:
-    part = density.kernel_part
-    assert part is not None
-    share, kernels = part
-    narrow = (kernels.concentrations > BROAD).any(dim=1)
     points = midpoints(density.space, GRID)
-    values = _chart_values(density, density.log_density_without_kernels(points))
-    fine, worst = 0.0, 0.0
+    values, fine, worst = points.new_zeros(len(points)), 0.0, 0.0
+    share, kernels = next(one for one in density.parts() if one[1].kind == "kernels")
+    assert isinstance(kernels, AdaptiveKernels)
+    for weight, part in density.parts():
+        if part is not kernels:
+            values = values + weight * part.log_prob(points).exp()
+    narrow = (kernels.concentrations > BROAD).any(dim=1)
     if not bool(narrow.all()):
         weight = share * float(kernels.weights[~narrow].sum())
         values = values + weight * _part(kernels, ~narrow).log_prob(points).exp()
@@ -67,13 +68,6 @@ def _by_grid(density: Mixture) -> Integral:
         mean, worst = _mean(_part(kernels, narrow))
         fine = share * float(kernels.weights[narrow].sum()) * mean
     return Integral(float(values.mean()) + fine, worst)
-
-
-def _chart_values(density: Mixture, logs: torch.Tensor) -> torch.Tensor:
-    """Densities per area of the square at the grid's points, from `Density.log_density`."""
-    if density.space.is_round:
-        logs = logs + density.space.log_area(midpoints(density.space, GRID))
-    return logs.exp()
 
 
 def _part(kernels: AdaptiveKernels, chosen: torch.Tensor) -> AdaptiveKernels:

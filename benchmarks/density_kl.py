@@ -25,6 +25,7 @@ from orbiflow.density import (
     SPACES,
     Density,
     DensitySettings,
+    FlowDensity,
     FlowSettings,
     fit_automatic,
     fit_density,
@@ -66,8 +67,9 @@ def run(
 
 def finer(density: Density) -> Density:
     """A flow's density with twice as many steps."""
-    part = density.flow_part
-    return part[1].with_steps(2 * part[1].flow.steps) if part else density
+    if not isinstance(density, FlowDensity):
+        return density
+    return density.with_steps(2 * density.flow.steps)
 
 
 def main() -> None:

@@ -6,9 +6,9 @@ Random 80/10/10 splits (--grouped: equal locations stay together, since duplicat
 log-likelihood in nats, per radian^2 or steradian, beside a von Mises or von Mises-Fisher kernel
 density estimate whose width and uniform floor are tuned on the same validation points, and the
 published rows of data/published.json (RFM: Riemannian flow matching; RDM: Riemannian diffusion
-model). Then the seconds for 100,000 query points, on the first split: exactly, by the kernels (timed
-on 5,000 and scaled) and from a table (with the root mean square error of its log densities). All are
-fitted as `density fit` does by default. The backbone angles are rounded; see `density_data.backbone`.
+model). Then the seconds for 100,000 query points, on the first split: exactly, and by the kernels
+(timed on 5,000 and scaled). All are fitted as `density fit` does by default. The backbone angles are
+rounded; see `density_data.backbone`.
 """
 
 from __future__ import annotations
@@ -24,22 +24,20 @@ from common import published
 from density_data import EARTH, TORI, Data, backbone, earth, splits
 from density_kde import KernelDensity
 
-from orbiflow.density import DensityEstimator, TabulatedDensity
+from orbiflow.density import DensityEstimator
 
 QUERIES, KERNEL_QUERIES = 100_000, 5_000
 PUBLISHED = {"quakes": "earthquake"}
 
 
 class Outcome(NamedTuple):
-    """Of one split: test NLL of both, fit and evaluation seconds, the table's error, the integral."""
+    """Of one split: test NLL of both, fit and evaluation seconds, the integral."""
 
     flow: float
     kde: float
     fit: float
     exact: float
     kernels: float
-    table: float
-    error: float
     mass: float
 
 
@@ -69,12 +67,7 @@ def run(job: tuple[str, int, bool]) -> Outcome:
     else:
         queries = rng.uniform(-np.pi, np.pi, (QUERIES, 2))
     models = [(estimator, QUERIES), (kde, KERNEL_QUERIES)]
-    error = np.nan
-    if not round_ and seed == 0:
-        table = TabulatedDensity(estimator.density_)
-        models.append((Tabulated(estimator, table), QUERIES))
-        error = table.error
-    times = [np.nan] * 3
+    times = [np.nan] * 2
     for number, (model, count) in enumerate(models if seed == 0 else []):
         begin = time.perf_counter()
         model.score_samples(queries[:count])
@@ -85,21 +78,8 @@ def run(job: tuple[str, int, bool]) -> Outcome:
         fit,
         times[0],
         times[1],
-        times[2],
-        error,
         estimator.report_.mass or 0.0,
     )
-
-
-class Tabulated(NamedTuple):
-    """A table that takes data in the user's units."""
-
-    estimator: DensityEstimator
-    table: TabulatedDensity
-
-    def score_samples(self, data: Data) -> Data:
-        """Log densities (N,), per radian^d."""
-        return self.table.log_prob(self.estimator.space_.to_chart(data), measure="natural").numpy()
 
 
 def main() -> None:
@@ -121,7 +101,7 @@ def main() -> None:
     print(f"{count} {'grouped' if options.grouped else 'random'} splits")
     print(
         "data         flow            kde      (difference)     rfm    rdm   fit s   100k: exact s"
-        "   kde s  table s   error     mass"
+        "   kde s     mass"
     )
     with ProcessPoolExecutor(options.workers) as pool:
         jobs = [(n, k, options.grouped) for n in names for k in range(count)]
@@ -129,13 +109,13 @@ def main() -> None:
         for name in names:
             rows = np.array([next(found) for _ in range(count)])
             mean, spread = rows.mean(axis=0), rows.std(axis=0)
-            mean[3:7] = rows[0, 3:7]  # what the first split alone was timed on
+            mean[3:5] = rows[0, 3:5]  # what the first split alone was timed on
             rfm, rdm = (figures[k].get(PUBLISHED.get(name, name), np.nan) for k in ("rfm", "rdm"))
-            worst = rows[abs(rows[:, 7] - 1).argmax(), 7]
+            worst = rows[abs(rows[:, 5] - 1).argmax(), 5]
             print(
                 f"{name:9}{mean[0]:7.3f} +- {spread[0]:.3f}{mean[1]:8.3f} +- {spread[1]:.3f}"
                 f"{mean[0] - mean[1]:9.3f}{rfm:11.2f}{rdm:7.2f}{mean[2]:8.1f}{mean[3]:16.2f}"
-                f"{mean[4]:8.2f}{mean[5]:9.3f}{mean[6]:8.1e}{worst:9.5f}",
+                f"{mean[4]:8.2f}{worst:9.5f}",
                 flush=True,
             )
 

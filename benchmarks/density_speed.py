@@ -1,13 +1,12 @@
-"""How fast default densities are fitted and evaluated: exactly, off a table, and kernel by kernel.
+"""How fast default densities are fitted and evaluated: exactly, and kernel by kernel.
 
     python benchmarks/density_speed.py [--rows N ...] [--points N] [--quick] [SPACE ...]
 
 Points in forty clusters of 0.01 to 0.3 radians. Fit: seconds of processor time, and by the clock on
 all cores that `taskset` leaves. Then evaluations a second of processor time, side by side in one run
 (exact ones also in seconds by the clock, all points together):
-of `log_prob`; of its gradient in the points; of all kernels for all points; and off a
-`TabulatedDensity`, once made. Off: largest differences in nats, of the exact one to that of all kernels
-(which knows the narrowest ones to 1e-9), and of the table to the exact one at the density's own points.
+of `log_prob`; of its gradient in the points; and of all kernels for all points. Off: the largest
+difference in nats of the exact one to that of all kernels, which knows the narrowest ones to 1e-9.
 --components: of the density, such as kernels. --search: `GridSearchCV` over five settings of 2,000
 points in five folds.
 """
@@ -24,13 +23,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from orbiflow.density import (
-    Density,
-    DensityEstimator,
-    Mixture,
-    TabulatedDensity,
-    log_density_gradient,
-)
+from orbiflow.density import AdaptiveKernels, DensityEstimator, Mixture, log_density_gradient
 from orbiflow.density.models import kernel_rows, log_sum_exp
 from orbiflow.density.models.terms import BLOCK_ENTRIES
 
@@ -73,9 +66,8 @@ def timed(function: Callable[[], torch.Tensor], points: int) -> tuple[torch.Tens
 
 def dense(density: Mixture, points: torch.Tensor) -> torch.Tensor:
     """Log density (N,), all kernels at all points, as the formula says."""
-    space, part = density.space, density.kernel_part
-    assert part is not None
-    weight, kernels = part
+    space, every = density.space, list(density.parts())
+    weight, kernels = next((w, part) for w, part in every if isinstance(part, AdaptiveKernels))
     rows, offsets = kernel_rows(space, space.features(kernels.centers)[0], kernels.concentrations)
     rows, offsets = rows.mT.contiguous(), offsets + kernels.weights.log()
     block = max(1, BLOCK_ENTRIES // len(offsets))
@@ -84,14 +76,14 @@ def dense(density: Mixture, points: torch.Tensor) -> torch.Tensor:
         for ends in space.features(points).split(block, dim=1)
     ]
     own = torch.cat(parts) + math.log(weight)
-    both = torch.logaddexp(own, density.log_density_without_kernels(points))
+    rest = [part.log_density(points) + math.log(w) for w, part in every if part is not kernels]
+    both = torch.stack([own, *rest]).logsumexp(dim=0)
     return both + space.log_area(points) if space.is_round else both
 
 
 def kernel_count(density: Mixture) -> int:
     """How many kernels there are."""
-    part = density.kernel_part
-    return 0 if part is None else len(part[1].weights)
+    return sum(len(part.bumps()) for _, part in density.parts())
 
 
 def line(space: str, rows: int, points: int, parts: str) -> str:
@@ -107,28 +99,17 @@ def line(space: str, rows: int, points: int, parts: str) -> str:
     drawn = density.sample((points,), generator)
     some = drawn[:DENSE]
     with torch.no_grad():
-        exact, of_exact = timed(lambda: density.log_prob(drawn), points)
+        _, of_exact = timed(lambda: density.log_prob(drawn), points)
         whole, of_dense = timed(lambda: dense(density, some), len(some))
     off = float((density.log_prob(some) - whole).detach().abs().max())
     few = min(points, 50_000)
     chart = density.space.from_chart(drawn[:few])
     _, of_slope = timed(lambda: torch.tensor(log_density_gradient(density, chart)[0]), few)
-    shown = f"{'':>12}{'':>10}"
-    if density.space.dim == 2:
-        shown = tabulated(density, drawn, exact)
     return (
         f"{space:18}{rows:8,}{fit:9.1f}{wall:9.1f}{kernel_count(density):10,}{of_exact}"
         f"{of_exact.wall:9.1f}{of_slope}"
-        f"{of_dense}{off:10.1e}{shown}"
+        f"{of_dense}{off:10.1e}"
     )
-
-
-def tabulated(density: Density, drawn: torch.Tensor, exact: torch.Tensor) -> str:
-    """Columns of the table's speed and error."""
-    table = TabulatedDensity(density)
-    with torch.no_grad():
-        found, speed = timed(lambda: table.log_prob(drawn), len(drawn))
-    return f"{speed}{float((found - exact).abs().max()):10.1e}"
 
 
 def search() -> str:
@@ -161,7 +142,7 @@ def main() -> None:
     points = 5_000 if options.quick else options.points
     print(
         f"{'space':18}{'rows':>8}{'fit, s':>9}{'wall, s':>9}{'kernels':>10}{'exact, 1/s':>12}"
-        f"{'wall, s':>9}{'slope, 1/s':>12}{'dense, 1/s':>12}{'off':>10}{'table, 1/s':>12}{'off':>10}"
+        f"{'wall, s':>9}{'slope, 1/s':>12}{'dense, 1/s':>12}{'off':>10}"
     )
     for count in rows:
         for space in spaces:

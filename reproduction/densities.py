@@ -153,9 +153,7 @@ def fitted(
     density, report = fit_density(there, samples, settings)
     places = midpoints(there, grid)
     with torch.no_grad():
-        part = density.flow_part
-        assert part is not None
-        values = part[1].with_steps(2 * part[1].flow.steps).log_prob(places)
+        values = density.with_steps(2 * density.flow.steps).log_prob(places)
     kl = kl_by_quadrature(weighted(target, there, places, measure), values)
     return Fitted(space, target, measure, density_to_bytes(density), kl, float(report.mass or 0.0))
 

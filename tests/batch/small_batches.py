@@ -11,8 +11,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from orbiflow.batch import Answer, Executor, Parcel, dask_cluster, executors
-from orbiflow.batch.executors import carry_out
+from orbiflow.batch import Answer, Executor, Parcel, dask_cluster
+from orbiflow.batch import parcels as parcels_module
+from orbiflow.batch.parcels import carry_out
 from orbiflow.runtime import Call, Cancel, Event, Failed, Finished, Sink, find
 from runtime.searches import BOOT, run
 
@@ -62,7 +63,7 @@ class Here(Executor):
             if cancel.cancelled:
                 return
             self.done.append(parcel.key)
-            found = _carried_out(parcel.header(), parcel.data, executors.MOST_WRITTEN)
+            found = _carried_out(parcel.header(), parcel.data, parcels_module.MOST_WRITTEN)
             yield Answer.from_worker(parcel.key, *found)
 
 

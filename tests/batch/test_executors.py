@@ -25,9 +25,17 @@ from batch.small_batches import (
     without_seconds,
 )
 from orbiflow import __version__
-from orbiflow.batch import Answer, Executor, LocalProcesses, Parcel, dask_cluster, executors
+from orbiflow.batch import (
+    Answer,
+    Executor,
+    LocalProcesses,
+    Parcel,
+    dask_cluster,
+    executors,
+    parcels,
+)
 from orbiflow.batch.dask_cluster import DaskCluster
-from orbiflow.batch.executors import carry_out
+from orbiflow.batch.parcels import carry_out
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Event, Failed, Finished, Note, Polled, find
 
@@ -244,7 +252,7 @@ def test_whatever_the_bytes_are_there_is_an_answer(data: bytes) -> None:
 
 
 def test_what_is_too_large_is_not_sent(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(executors, "MOST_WRITTEN", 1000)
+    monkeypatch.setattr(parcels, "MOST_WRITTEN", 1000)
     (answer,) = answers(Here(), boot_parcels(1)).values()
     assert state_of(answer) == "mistake"
     assert not answer.files

@@ -47,20 +47,3 @@ def test_the_gradient_is_that_of_the_scores(fitted, tmp_path: Path, orbiflow) ->
         np.testing.assert_allclose(
             found[:, 3 + axis], (ends[0] - ends[1]) / 2e-3, rtol=1e-3, atol=1e-4
         )
-
-
-def test_a_table_says_its_error(fitted, tmp_path: Path, orbiflow) -> None:
-    data, model = fitted
-    exact, read = tmp_path / "exact.csv", tmp_path / "read.csv"
-    assert orbiflow("density", "score", data, "--model", model, "--out", exact).status == 0
-    done = orbiflow("density", "score", data, "--model", model, "--table", "--out", read)
-    assert done.status == 0
-    assert "read off a table: the error is" in done.out
-    np.testing.assert_allclose(columns(exact)[1][:, 2], columns(read)[1][:, 2], atol=1e-3)
-
-
-def test_an_exact_gradient_off_a_table_is_refused(fitted, orbiflow) -> None:
-    data, model = fitted
-    done = orbiflow("density", "score", data, "--model", model, "--table", "--gradient")
-    assert done.status != 0
-    assert "give one of them" in done.err

@@ -81,16 +81,12 @@ def blended(
 
 def flow_of(density: Density) -> FlowDensity:
     """The density of its flow."""
-    part = density.flow_part
-    assert part is not None
-    return part[1]
+    return next(part for _, part in density.parts() if isinstance(part, FlowDensity))
 
 
 def kernels_of(density: Density) -> AdaptiveKernels:
     """The kernels that it contains."""
-    part = density.kernel_part
-    assert part is not None
-    return part[1]
+    return next(part for _, part in density.parts() if isinstance(part, AdaptiveKernels))
 
 
 def random_blend(

@@ -15,7 +15,6 @@ from orbiflow.density import (
     FlowSettings,
     Mixture,
     Sphere,
-    TabulatedDensity,
     Torus,
     UniformDensity,
     VonMisesChains,
@@ -73,8 +72,6 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "sample less": (lambda: a_density().sample(-1), "a number or shape of samples"),
     "midpoints": (lambda: midpoints(torus, 2.5), "resolution must be a whole number"),  # type: ignore[arg-type]
     "kl": (lambda: kl_by_quadrature(torch.ones(3), torch.ones(4)), r"\(3,\) and \(4,\)"),
-    "a table of nothing": (lambda: TabulatedDensity("x"), "a Density"),  # type: ignore[arg-type]
-    "a table's size": (lambda: TabulatedDensity(a_density(), 64.5), "resolution must be"),  # type: ignore[arg-type]
     "a base's space": (lambda: UniformDensity("sphere"), "space must be an? Space"),  # type: ignore[arg-type]
     "concentration": (lambda: VonMisesDensity(torus, "1"), "concentration must be positive"),  # type: ignore[arg-type]
     "kernels": (

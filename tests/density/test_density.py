@@ -22,7 +22,7 @@ from orbiflow.density import (
     kl_by_quadrature,
     midpoints,
 )
-from orbiflow.density.models.density import neighbourhoods
+from orbiflow.density.models.tensors import neighbourhoods
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow

@@ -12,7 +12,6 @@ from orbiflow.density import (
     Density,
     FlowDensity,
     Space,
-    TabulatedDensity,
     UniformDensity,
     VonMisesDensity,
     make_space,
@@ -22,15 +21,13 @@ from orbiflow.flows import Flow
 from strategies import central_difference, random_field, seeds
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
-KINDS = ("uniform", "von-mises", "blended", "tabulated")
+KINDS = ("uniform", "von-mises", "blended")
 
 
-def density_of(kind: str, space: Space, seed: int) -> Density | TabulatedDensity:
+def density_of(kind: str, space: Space, seed: int) -> Density:
     torch.manual_seed(seed % 2**31)
     flow = Flow(random_field(space.group, 2, seed, rms=0.05), steps=4, warn=False)
     base = VonMisesDensity(space) if kind == "von-mises" else UniformDensity(space)
-    if kind == "tabulated":
-        return TabulatedDensity(FlowDensity(space, flow), 16)
     if kind != "blended":
         return FlowDensity(space, flow, base)
     width = 1 if space.is_round else 2

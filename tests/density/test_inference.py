@@ -22,7 +22,7 @@ from orbiflow.density import (
     marginal,
     read_density,
 )
-from orbiflow.density.models import LEVELS, Split
+from orbiflow.density.models import LEVELS, Split, kernels_for
 
 seeds = st.integers(0, 2**31)
 GRID = 48
@@ -79,7 +79,7 @@ def test_tables_are_the_integral_at_every_level(
     truth = true_log(density, points, [one], values)
     found: list[torch.Tensor] = []
     for level in range(LEVELS - 1):
-        parts = density.approximated(split, Torus(1), level, lambda: None)
+        parts = kernels_for(density, split, Torus(1), level, lambda: None)
         found.append(
             torch.stack([log + own.log_prob(points) for log, own in parts]).logsumexp(dim=0)
         )

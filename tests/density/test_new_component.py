@@ -18,7 +18,6 @@ from orbiflow.density import (
     Density,
     Mixture,
     Space,
-    TabulatedDensity,
     Torus,
     UniformDensity,
     conditional,
@@ -128,11 +127,10 @@ def test_it_has_marginal_and_conditional_densities() -> None:
     torch.testing.assert_close(log_prob_observed(density, rows), own, rtol=1e-4, atol=1e-4)
 
 
-def test_it_is_drawn_tabulated_and_moved() -> None:
+def test_it_is_drawn_and_moved() -> None:
     density = mixture()
     line = torch.linspace(0.01, 0.99, 30, dtype=torch.float64)
     assert density_on_grid(density, line, line, "uniform").shape == (30, 30)
-    assert TabulatedDensity(density, 64).error < 1e-2
     assert highest_density_region(density, 0.5, samples=2000).size > 0
     assert density.to(torch.float32).sample(3).dtype == torch.float32
 
@@ -157,3 +155,19 @@ def test_what_is_missing_is_said(tmp_path: Path) -> None:
 
     with pytest.raises(OrbiflowError, match="integrated"):
         marginal(Silent(TORUS), 0)
+
+
+def test_its_parts_are_walked_through_mixtures_of_mixtures() -> None:
+    inner = mixture()
+    outer = Mixture([inner, UniformDensity(TORUS)], [0.5, 0.5])
+    found = [(weight, part.kind) for weight, part in outer.parts()]
+    kinds = ("wave", "kernels", "uniform", "chains", "uniform")
+    assert found == list(zip((0.25, 0.1, 0.05, 0.1, 0.5), kinds, strict=True))
+    at, pixel = even_grid(7, 2), torch.tensor(2.0)
+    wide = outer.averaged_over(lambda _points: pixel)
+    assert [part.kind for _, part in wide.parts()] == [*kinds]
+    assert not torch.allclose(wide.log_prob(at), outer.log_prob(at))
+    wave = inner.components[0]
+    assert wave.averaged_over(lambda _points: pixel) is wave
+    assert not wave.is_narrower_than(lambda _points: pixel)
+    assert inner.components[1].is_narrower_than(lambda _points: pixel)

@@ -8,8 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.fields import FourierField, SplineField, jacobian, padded, spline_sum
-from orbiflow.fields.spline_field import cubic_weights, spline_sum_with_divergence
+from orbiflow.fields import FourierField, SplineField, jacobian
+from orbiflow.fields.spline_field import (
+    cubic_weights,
+    padded,
+    spline_sum,
+    spline_sum_with_divergence,
+)
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup, identification_group, wallpaper_group
 from strategies import central_difference

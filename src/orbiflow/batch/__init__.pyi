@@ -1,7 +1,4 @@
-from .executors import Answer as Answer
-from .executors import Executor as Executor
 from .executors import LocalProcesses as LocalProcesses
-from .executors import Parcel as Parcel
 from .executors import WorkSettings as WorkSettings
 from .folder import BatchFolder as BatchFolder
 from .overview import Column as Column
@@ -9,6 +6,9 @@ from .overview import Entry as Entry
 from .overview import Kind as Kind
 from .overview import Summary as Summary
 from .overview import csv_bytes as csv_bytes
+from .parcels import Answer as Answer
+from .parcels import Executor as Executor
+from .parcels import Parcel as Parcel
 from .work import Item as Item
 from .work import run_files as run_files
 from .work import run_items as run_items

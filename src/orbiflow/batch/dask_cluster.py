@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Any, Self, TypeAlias
 
 from orbiflow import __version__
-from orbiflow.batch.executors import Answer, Executor, Parcel, carry_out
+from orbiflow.batch.parcels import Answer, Executor, Parcel, carry_out
 from orbiflow.errors import OrbiflowError
 from orbiflow.extras import naming_extras
 from orbiflow.runtime import Cancel, Note, Polled, Sink, one_thread

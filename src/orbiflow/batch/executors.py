@@ -1,44 +1,17 @@
-"""Who does the work of a batch: processes of this machine, or the workers of a Dask cluster.
-
-What travels is text and bytes: a call with the file that it reads, its last event with the files that
-it wrote.
-"""
+"""Who does the work of a batch: processes of this machine, or the workers of a Dask cluster."""
 
 from __future__ import annotations
 
-import json
 import os
-import tempfile
-from abc import ABC, abstractmethod
-from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, suppress
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing
 from importlib import import_module
-from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
-from orbiflow import __version__
-from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.runtime import (
-    Call,
-    Cancel,
-    Event,
-    Failed,
-    Finished,
-    Note,
-    Sink,
-    call_from_json,
-    event_from_json,
-    one_core,
-    process_context,
-    stays_inside,
-    work,
-)
+from orbiflow.batch.parcels import Answer, Executor, Parcel, carry_out
+from orbiflow.errors import SettingError
+from orbiflow.runtime import Cancel, Note, Sink, process_context, work
 from orbiflow.settings import DefaultText, NotWith, Range, Settings
-
-MOST_WRITTEN = 512 * 2**20
-"""The number of bytes that one call may write."""
 
 TRIES = 3
 """The number of processes that may die of one parcel."""
@@ -61,103 +34,6 @@ class WorkSettings(Settings, group="Work"):
     def check(self) -> None:
         if self.scheduler == "":
             raise SettingError("{scheduler} must be an address, such as tcp://10.0.0.5:8786")
-
-
-@dataclass(frozen=True)
-class Parcel:
-    """A call that reads one file and writes a folder, with the bytes of the file.
-
-    - `key`: What its answer is known by.
-    - `call`: The call; its paths are replaced where it runs.
-    - `reads`, `writes`: The names of these two parameters.
-    - `name`, `data`: The name of the file, and its bytes.
-    """
-
-    key: str
-    call: Call
-    reads: str
-    writes: str
-    name: str
-    data: bytes
-
-    def header(self) -> str:
-        """Return all but the file's bytes, as text."""
-        names = {"reads": self.reads, "writes": self.writes, "name": self.name}
-        return json.dumps({"version": __version__, "call": self.call.to_json(), **names})
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What came of a parcel.
-
-    - `key`: The parcel's key.
-    - `end`: The last event of its call.
-    - `files`: The files that it wrote, by path relative to its folder, with slashes.
-    """
-
-    key: str
-    end: Finished | Failed
-    files: Mapping[str, bytes]
-
-    @classmethod
-    def from_worker(cls, key: str, text: str, files: Mapping[str, bytes]) -> Answer:
-        """Return the answer that a worker gave in `carry_out`.
-
-        Raises:
-            OrbiflowError: If it is none, or has a file that would be written elsewhere.
-        """
-        end = event_from_json(json.loads(text))
-        if not isinstance(end, Finished | Failed):
-            raise OrbiflowError("a worker gave an answer without an end")
-        for name in files:
-            if not stays_inside(name):
-                raise OrbiflowError(f"a worker gave a file a name that cannot be used: {name!r}")
-        return cls(key, end, files)
-
-    @classmethod
-    def died(cls, key: str, times: int) -> Answer:
-        """Return the answer of a parcel that killed so many workers."""
-        message = (
-            f"{times} workers died while they were at it: was memory short? A simpler file may do"
-        )
-        return cls(key, Failed(message, "died"), {})
-
-
-class Executor(ABC):
-    """Runs many calls. Use it in a `with` block, which ends what it has begun.
-
-    Every executor gives the same answer to the same parcel, except for the seconds.
-    """
-
-    def __enter__(self) -> Self:
-        """Raise an `OrbiflowError` if there is nobody to work."""
-        return self
-
-    def __exit__(self, *_error: object) -> None:  # noqa: B027
-        """End what was begun."""
-
-    @property
-    @abstractmethod
-    def place(self) -> str:
-        """Who works, in words, such as "2 processes"."""
-
-    @abstractmethod
-    def answers(
-        self, parcels: Iterable[Parcel], tell: Sink, cancel: Cancel
-    ) -> Generator[Answer, None, None]:
-        """Yield an answer for each parcel, as they come, in this thread.
-
-        If a worker dies, another does its work again. A parcel that several workers die of is answered
-        by a `Failed` ("died"), and the others go on.
-
-        Args:
-            parcels: Taken in order when somebody is free for them, so that few are held at a time.
-            tell: Is told in a `Note` what the user should know of the workers.
-            cancel: Ends the work; what is unfinished then has no answer.
-
-        Raises:
-            OrbiflowError: If nobody is left to work.
-        """
 
 
 class LocalProcesses(Executor):
@@ -213,52 +89,3 @@ def _serve(
     order: tuple[str, bytes], _tell: Callable[[Any], None], cancel: Cancel
 ) -> tuple[str, dict[str, bytes]]:
     return carry_out(*order, cancel)
-
-
-def carry_out(header: str, data: bytes, cancel: Cancel) -> tuple[str, dict[str, bytes]]:
-    """Run a parcel's call in this thread, in a folder that is removed afterwards.
-
-    Returns:
-        The last event as text, and files, for `Answer.from_worker`. Whatever fails is in the event.
-    """
-    temporary = tempfile.TemporaryDirectory(prefix="orbiflow-", ignore_cleanup_errors=True)
-    with temporary as folder, one_core():
-        end, files = _run(json.loads(header), data, Path(folder), cancel)
-    text = json.dumps(end.to_json(), allow_nan=False)
-    for part in ("in", "out"):  # a folder that is gone is not to be named
-        text = text.replace(json.dumps(str(Path(folder, part, "_")))[1:-2], "")
-    return text, files
-
-
-def _run(
-    order: Mapping[str, Any], data: bytes, folder: Path, cancel: Cancel
-) -> tuple[Event, dict[str, bytes]]:
-    if order["version"] != __version__:
-        text = f"this worker has orbiflow {__version__}, not {order['version']}"
-        return Failed(text, "mistake"), {}
-    last: deque[Event] = deque([Failed("the work ended without a word", "error")], maxlen=1)
-    try:
-        read, written = folder / "in" / order["name"], folder / "out"
-        read.parent.mkdir()
-        read.write_bytes(data)
-        there = {order["reads"]: str(read), order["writes"]: str(written)}
-        call = call_from_json({**order["call"], **there})
-        with suppress(Exception):  # the last event says what
-            call.run(last.append, cancel)
-        return last[0], _packed(written)
-    except OSError as error:
-        return Failed(f"{type(error).__name__}: {error.strerror or error}", "error"), {}
-    except OrbiflowError as error:
-        return Failed(str(error), "mistake"), {}
-
-
-def _packed(folder: Path) -> dict[str, bytes]:
-    """Return all files in a folder, if there is one; raise an `OrbiflowError` if they are too large."""
-    paths = sorted(path for path in folder.rglob("*") if path.is_file())
-    size = sum(path.stat().st_size for path in paths)
-    if size > MOST_WRITTEN:
-        raise OrbiflowError(
-            f"its results are {size / 2**20:.0f} MB, more than the {MOST_WRITTEN / 2**20:.0f} MB that "
-            "are sent back; run it by itself"
-        )
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}

@@ -40,8 +40,6 @@ from .inference.partial import marginal as marginal
 from .models.chains import Factor as Factor
 from .models.chains import VonMisesChains as VonMisesChains
 from .models.density import Density as Density
-from .models.evaluation import CHECKED as CHECKED
-from .models.evaluation import TabulatedDensity as TabulatedDensity
 from .models.evaluation import kl_by_quadrature as kl_by_quadrature
 from .models.evaluation import log_density_gradient as log_density_gradient
 from .models.evaluation import midpoints as midpoints

@@ -12,9 +12,6 @@ from .protocol import prepared_with_jacobian as prepared_with_jacobian
 from .protocol import transformed as transformed
 from .spline_field import SplineField as SplineField
 from .spline_field import has_even_grid as has_even_grid
-from .spline_field import padded as padded
-from .spline_field import spline_sum as spline_sum
-from .spline_field import symbol as symbol
 from .symmetrization import PeriodicFeatures as PeriodicFeatures
 from .symmetrization import Symmetrized as Symmetrized
 from .symmetrization import periodic_operator as periodic_operator

@@ -26,10 +26,10 @@ from density.cross_validation.small_tables import (
     write_table,
 )
 from orbiflow.batch import executors, work
-from orbiflow.batch.executors import carry_out
+from orbiflow.batch.parcels import carry_out
 from orbiflow.density import DensityEstimator
 from orbiflow.density.cross_validation import overview
-from orbiflow.density.cross_validation.operations import setting_of
+from orbiflow.density.cross_validation.settings import setting_of
 from orbiflow.density.fitting import COMPONENTS
 from orbiflow.errors import OrbiflowError, OutputError, SettingError
 from orbiflow.runtime import Call, Cancel, Finished, ItemDone, Note, find

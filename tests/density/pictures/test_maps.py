@@ -32,7 +32,7 @@ from orbiflow.density import (
     samples_picture,
     to_vectors,
 )
-from orbiflow.density.pictures.colours import chosen_scale, density_at, density_on_map
+from orbiflow.density.pictures.colours import chosen_scale, density_at, density_over, round_pixel
 from orbiflow.density.pictures.maps import Map, pixels_of
 from orbiflow.density.pictures.projections import EqualEarth, Lambert, PlateCarree
 from orbiflow.drawing import Sheet, pdf_pages
@@ -105,7 +105,7 @@ def test_kernels_are_summed_as_finely_as_a_picture_needs(space: RoundSpace) -> N
     weights = torch.full((count,), 1 / count, dtype=torch.float64)
     kernels = AdaptiveKernels(space, centers, kappa, weights)
     density = Mixture([kernels, UniformDensity(space)], [0.99, 0.01])
-    found = density_on_map(density, points(300), "natural", 1e-9)
+    found = density_over(density, points(300), "natural", round_pixel(1e-9))
     np.testing.assert_allclose(found, density_at(density, points(300), "natural"), rtol=1e-4)
 
 

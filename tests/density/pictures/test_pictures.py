@@ -10,7 +10,7 @@ import pytest
 import torch
 from PIL import Image
 
-from density.blends import blended, identity_flow
+from density.blends import blended
 from orbiflow.density import (
     AdaptiveKernels,
     FlowDensity,
@@ -30,7 +30,13 @@ from orbiflow.density import (
     to_vectors,
 )
 from orbiflow.density.pictures import square as density_square
-from orbiflow.density.pictures.colours import chosen_scale, density_at, is_sharp, shading
+from orbiflow.density.pictures.colours import (
+    chosen_scale,
+    density_at,
+    is_sharp,
+    shading,
+    square_pixel,
+)
 from orbiflow.density.pictures.figures import few_colours
 from orbiflow.density.pictures.frames import angle_axis, axis_label, view_of
 from orbiflow.density.pictures.surfaces import boy_surface, mesh
@@ -252,7 +258,7 @@ def test_broad_kernels_are_drawn_as_they_are(space, measure):
     found = density_on_grid(density, t, t[:5], measure, pixel=1e-6)
     exact = density_at(density, grid, measure).reshape(9, 5)
     np.testing.assert_allclose(found, exact, rtol=1e-5)
-    assert not is_sharp(density, pixel=0.01)
+    assert not is_sharp(density, square_pixel(space, 0.01))
 
 
 @every_space
@@ -263,7 +269,7 @@ def test_peaks_narrower_than_a_pixel_keep_their_mass_wherever_they_lie(space, at
     assert values.mean() == pytest.approx(1.0, abs=0.03)
     peak = (np.array(np.unravel_index(values.argmax(), values.shape)) + 0.5) / 90
     assert abs(peak - at).max() < 1 / 90
-    assert is_sharp(density, pixel=1 / 90)
+    assert is_sharp(density, square_pixel(space, 1 / 90))
 
 
 @every_space
@@ -393,20 +399,3 @@ def test_coastlines_on_axes():
         boy_surface(to_vectors(where)),
         atol=1e-6,
     )
-
-
-@pytest.mark.parametrize("space", SPACES[:2], ids=lambda s: s.name)
-def test_kernels_are_summed_in_blocks(space, monkeypatch):
-    rng = np.random.default_rng(4)
-    kernels = AdaptiveKernels(
-        space,
-        points(50),
-        torch.tensor(rng.uniform(5, 500, (50, 2))),
-        torch.full((50,), 0.02).double(),
-    )
-    shares = torch.tensor([0.0, 0.9, 0.1]).double()
-    density = blended(space, identity_flow(space), UniformDensity(space), kernels, shares)
-    t = (torch.arange(30, dtype=torch.float64) + 0.5) / 30
-    whole = density_on_grid(density, t, t, "natural")
-    monkeypatch.setattr("orbiflow.density.pictures.colours._KERNELS", 7)
-    np.testing.assert_allclose(density_on_grid(density, t, t, "natural"), whole, rtol=1e-12)

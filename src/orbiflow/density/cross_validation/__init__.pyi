@@ -1,2 +1,2 @@
-from .operations import CvSettings as CvSettings
 from .operations import cross_validate as cross_validate
+from .settings import CvSettings as CvSettings

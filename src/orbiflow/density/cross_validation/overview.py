@@ -16,7 +16,7 @@ from orbiflow import __version__, batch, runtime
 from orbiflow.arrays import Array
 from orbiflow.batch import Entry
 from orbiflow.density.comparing import ModelComparison
-from orbiflow.density.cross_validation.operations import UNIFORM, CrossValidation, written_files
+from orbiflow.density.cross_validation.settings import UNIFORM, CrossValidation, written_files
 from orbiflow.density.cross_validation.splits import (
     Fit,
     HeldOut,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from orbiflow.arrays import Array
 from orbiflow.batch import Entry
 from orbiflow.density import comparing
-from orbiflow.density.cross_validation.operations import SCORES, UNIFORM, CrossValidation
+from orbiflow.density.cross_validation.settings import SCORES, UNIFORM, CrossValidation
 from orbiflow.density.data import Unit
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
 from orbiflow.density.inference import chart_of_observed
@@ -106,9 +106,14 @@ def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
         rows = rows.only(rows.weights > 0)  # others count for nothing
     table = rows.table
     unit = angle_unit(asked.where, table, tell)
-    seed = asked.density.seed
-    of_group = {"cell": where.cell, "fractional": where.fractional}
-    space = space_for(where.space, table.values, unit=unit, seed=seed, **of_group)
+    space = space_for(
+        where.space,
+        table.values,
+        unit=unit,
+        seed=asked.density.seed,
+        cell=where.cell,
+        fractional=where.fractional,
+    )
     marginalise = asked.rows.missing == "marginalise"
     points = chart_of_observed(space, table.values) if marginalise else space.to_chart(table.values)
     counts, place = places(points)

@@ -64,7 +64,7 @@ def _columns_of(data: Any, what: str) -> list[tuple[Any, Any]] | None:
         return [(name, data[name].values) for name in data.data_vars]
     if hasattr(data, "column_names"):  # pyarrow
         return [(n, _plain(data.column(k))) for k, n in enumerate(data.column_names)]
-    if isinstance(data, np.ndarray) and data.dtype.names:
+    if is_a(data, np.ndarray) and data.dtype.names:
         return [(name, data[name]) for name in data.dtype.names]
     frame: Any = data
     names = getattr(frame, "columns", None)
@@ -101,7 +101,7 @@ def as_numbers(data: Any, what: str) -> Array:
         raise OrbiflowError(
             f"{what}: expected an array or a data frame of numbers, got {described(data)}"
         )
-    mask = np.ma.getmaskarray(data) if isinstance(data, np.ma.MaskedArray) else None
+    mask = np.ma.getmaskarray(data) if is_a(data, np.ma.MaskedArray) else None
     try:
         array: NDArray[Any] = np.asarray(data)
     except (TypeError, ValueError) as error:  # ragged

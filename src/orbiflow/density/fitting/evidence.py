@@ -233,7 +233,8 @@ def assembled(
     share: float,
 ) -> Mixture:
     """Return the candidates in proportions (P,), made final with all rows, beside a flow's share."""
-    found: list[tuple[float, Density]] = []
+    before: list[tuple[float, Density]] = []
+    after: list[tuple[float, Density]] = []
     for family in families:
         chosen = [
             (name, float(weight))
@@ -241,12 +242,10 @@ def assembled(
             if own == family.name and weight > 0
         ]
         final = family.final(rows, candidates.fitted[family.name], [name for name, _ in chosen])
+        found = before if family.precedes_floor else after
         found += [(weight, part) for (_, weight), part in zip(chosen, final, strict=True)]
     floor = float(weights[candidates.floor].sum())
-    # the order of components is that in which samples are drawn: kernels before the floor
-    found.sort(key=lambda part: part[1].kernel_part is None)
-    kernels = sum(part.kernel_part is not None for _, part in found)
-    found.insert(kernels, (floor, UniformDensity(space)))
+    found = [*before, (floor, UniformDensity(space)), *after]
     total = sum(weight for weight, _ in found)
     others = [((1 - share) * weight / total, part) for weight, part in found]
     return mixture_of(others if flow is None else [(share, flow), *others])

@@ -59,6 +59,10 @@ class Family(ABC):
 
     name: str
 
+    precedes_floor: bool = False
+    """Whether its parts come before the floor: the order of components is that in which samples are
+    drawn."""
+
     kept: int | None = 2
     """How many names go on after the first fold, besides the best alone; None: any number."""
 
@@ -86,6 +90,7 @@ class KernelFamily(Family):
     narrowest: float = NARROWEST
     repeats: bool = True
     name = "kernels"
+    precedes_floor = True
     # other rows may prefer what has next to no weight, or its neighbours
     kept, negligible = None, 1e-8
     _names: list[str] | None = None
@@ -159,6 +164,7 @@ class MixtureFamily(SizedFamily):
     seed: int
     narrowest: float = NARROWEST
     name = "mixture"
+    precedes_floor = True
 
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
         train = train[:MOST_MIXED]

@@ -20,6 +20,7 @@ from orbiflow.density.models import (
     PartialDensity,
     Split,
     Weighted,
+    kernels_for,
     mixture_of,
 )
 from orbiflow.density.spaces import Torus
@@ -218,7 +219,7 @@ class _Left:
     def refine(self, space: Torus, tick: Callable[[], None]) -> list[tuple[float, Density]]:
         """Find kernels of the next level, and return those of the level before."""
         before = self.found
-        more = self.density.approximated(self.split, space, self.levels, tick)
+        more = kernels_for(self.density, self.split, space, self.levels, tick)
         self.found, self.levels = [(self.log + log, own) for log, own in more], self.levels + 1
         return before
 
@@ -326,8 +327,6 @@ def _log_sum(parts: list[tuple[float, Density]], points: Tensor) -> Tensor:
 
 
 def _mixture(parts: list[tuple[float, Density]]) -> Mixture:
-    # kernels first, where they are: the order of components is that of the draws of samples
-    parts = sorted(parts, key=lambda part: part[1].kernel_part is None)
     logs = torch.tensor([log for log, _ in parts], dtype=torch.float64)
     weights: list[float] = listed(torch.softmax(logs, dim=0).clamp_min(LEAST_WEIGHT))
     own = [part for _, part in parts]

@@ -8,10 +8,9 @@ from .chains import chained as chained
 from .chains import waves as waves
 from .density import LEVELS as LEVELS
 from .density import Density as Density
+from .density import Pixel as Pixel
 from .density import Split as Split
 from .density import Weighted as Weighted
-from .evaluation import CHECKED as CHECKED
-from .evaluation import TabulatedDensity as TabulatedDensity
 from .evaluation import kl_by_quadrature as kl_by_quadrature
 from .evaluation import log_density_gradient as log_density_gradient
 from .evaluation import midpoints as midpoints
@@ -25,6 +24,7 @@ from .flow import flow_obstacle as flow_obstacle
 from .kernels import SHARPEST as SHARPEST
 from .kernels import AdaptiveKernels as AdaptiveKernels
 from .kernels import kernel_rows as kernel_rows
+from .lattice import kernels_for as kernels_for
 from .mixture import Mixture as Mixture
 from .mixture import mixture_of as mixture_of
 from .network import VonMisesNetwork as VonMisesNetwork

@@ -9,16 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
 
+from orbiflow.density.models.chain_nodes import REACH, quantiles
 from orbiflow.density.models.chain_sums import SCALES
-from orbiflow.density.models.chains import REACH, VonMisesChains, quantiles
 from orbiflow.density.models.density import Split
 from orbiflow.density.models.lattice import KERNEL_STEP, sharpest_on
 from orbiflow.density.models.terms import FAINT, LOG2_E
 from orbiflow.typed_torch import broadcast, listed, special, unique
+
+if TYPE_CHECKING:
+    from orbiflow.density.models.chains import VonMisesChains
 
 SIZES = (24, 48, 96, 192, 384, 768, 1536, 3072)
 """Numbers of points of a grid along an angle."""

@@ -14,29 +14,16 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_tensor
+from orbiflow.density.models.chain_nodes import MOST, MOST_ALONE, node_counts, nodes_of
 from orbiflow.density.models.chain_sums import SCALES, ChainFits, ChainSum
-from orbiflow.density.models.density import Density, Restriction, Split, Weighted, in_blocks
+from orbiflow.density.models.chain_tables import chain_tables
+from orbiflow.density.models.density import Density, Restriction, Split, Weighted
+from orbiflow.density.models.lattice import lattice_kernels
+from orbiflow.density.models.tensors import in_blocks
 from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed, special, unique
-
-REACH = 7.0
-"""Deviations from its mean beyond which an angle has no nodes."""
-
-STEP = 0.9
-"""Deviations between nodes, with which the trapezoidal rule is off by exp(-2 pi^2 / STEP^2)."""
-
-FEWEST = 12
-"""The fewest nodes of an angle."""
-
-MOST, MOST_ALONE = 1024, 16_384
-"""The most nodes of several hidden angles of a chain together, and of one. Where several need more,
-the nodes are quasi-random."""
-
-TABLE = 2048
-"""Points of the distribution function whose inverse gives quasi-random nodes."""
-
 
 PILOTS, SPARED = 64, 1e-3
 """Draws of each component by which it is judged where angles are given, and the share of draws that
@@ -183,7 +170,7 @@ class VonMisesChains(Density, kind="chains"):
             if not hidden:
                 count += len(kappa)
                 continue
-            sizes = _sizes(means, kappa, hidden, seen)[1].prod(dim=1)
+            sizes = node_counts(means, kappa, hidden, seen)[1].prod(dim=1)
             if float(sizes.max()) > (MOST_ALONE if len(hidden) == 1 else MOST):
                 return None
             count += int(sizes.sum())
@@ -210,16 +197,10 @@ class VonMisesChains(Density, kind="chains"):
     def approximated(
         self, split: Split, space: Torus, level: int, tick: Callable[[], None]
     ) -> list[Weighted]:
-        from orbiflow.density.models.chain_tables import chain_tables
-        from orbiflow.density.models.lattice import lattice_kernels
-
         start = level * SHIFT % 1
         log_scale, tables = chain_tables(self, split, level, start, tick)
-        found: list[Weighted] = []
-        for table in tables:
-            log, kernels = lattice_kernels(table, space, start)
-            found.append((log_scale + log, kernels))
-        return found
+        found = (lattice_kernels(table, space, start) for table in tables)
+        return [(log_scale + log, kernels) for log, kernels in found]
 
     def _some(self, chosen: Tensor) -> list[tuple[float, VonMisesChains]]:
         """Return the chains of a mask (K,), with the logarithm of their weight, if they have any."""
@@ -295,8 +276,8 @@ BLOCK_ENTRIES = 2_000_000
 def _chains_at(chains: VonMisesChains, points: Tensor, observed: list[int], seed: int) -> Tensor:
     """Return log densities (N,) of the `observed` angles alone, at points (N, len(observed)).
 
-    Angles before others that are not observed are integrated out at `_nodes`, spread about their means,
-    which makes a mixture that is normalised however many nodes there are.
+    Angles before others that are not observed are integrated out at `nodes_of` them, spread about
+    their means, which makes a mixture that is normalised however many nodes there are.
     """
     angle = torch.zeros(len(points), chains.order.shape[1], dtype=torch.float64)
     angle[:, observed] = 2 * math.pi * points.double()
@@ -340,7 +321,7 @@ def _ordered_at(
     constant = chains.log_weights[which].flatten()
     constant = constant - special.i0e(kappa[:, seen]).log().sum(dim=1)
     found = angle.new_empty(len(angle), len(means))
-    for chosen, logs, offsets in _nodes(means, kappa, hidden, seen, seed):
+    for chosen, logs, offsets in nodes_of(means, kappa, hidden, seen, seed):
         parts = [
             _walked(part, means[chosen], kappa[chosen], order, logs, offsets)
             for part in torch.split(angle, max(1, BLOCK_ENTRIES // logs.numel()))
@@ -388,87 +369,3 @@ def _known_part(angle: Tensor, known: list[int]) -> Tensor:
     seen = torch.zeros(1 + 2 * d, dtype=angle.dtype)
     seen[[0, *(1 + j for j in known), *(1 + d + j for j in known)]] = 1
     return waves(angle) * seen
-
-
-def _nodes(
-    means: Tensor, kappa: Tensor, hidden: list[int], observed: list[int], seed: int
-) -> Iterator[tuple[Tensor, Tensor, dict[int, Tensor]]]:
-    """Yield numbers of components, and log weights (C, Q) of sum 1 and offsets (C, Q) of their nodes.
-
-    Offsets are by axis; components that need as many come together.
-
-    The trapezoidal rule over each hidden angle, as fine as it and the angles after it are sharp: to
-    analytic functions it converges exponentially (Trefethen and Weideman, 2014). For means
-    (C, d, 1 + 2 d) and concentrations (C, d); observed axes before a hidden one have slopes of 0 there.
-    """
-    count = len(kappa)
-    if not hidden:
-        yield torch.arange(count), kappa.new_zeros(count, 1), {}
-        return
-    reach, sizes = _sizes(means, kappa, hidden, observed)
-    wanted, number = unique(sizes, dim=0, return_inverse=True)
-    for k, size in enumerate(listed(wanted)):
-        chosen = torch.nonzero(number == k)[:, 0]
-        size = [min(int(s), MOST_ALONE) for s in size]
-        fits = len(size) == 1 or math.prod(size) <= MOST
-        own = kappa[chosen][:, hidden]
-        rule = _trapezoidal(own, reach[chosen], size) if fits else _sobol(own, seed)
-        yield chosen, rule[0], dict(zip(hidden, rule[1], strict=True))
-
-
-def _sizes(
-    means: Tensor, kappa: Tensor, hidden: list[int], observed: list[int]
-) -> tuple[Tensor, Tensor]:
-    """Return how far nodes reach from the mean of each hidden angle, and how many there are (C, H)."""
-    # concentrations (C, H) of the integrand in each hidden angle, which bends others
-    after, d = hidden + observed, kappa.shape[1]
-    slope = means[:, after][:, :, [1 + axis for axis in hidden]].square()
-    slope += means[:, after][:, :, [1 + d + axis for axis in hidden]].square()
-    sharp = kappa[:, hidden] + (kappa[:, after, None] * slope).sum(dim=1)
-    reach = (REACH / kappa[:, hidden].clamp_min(1e-12).sqrt()).clamp_max(math.pi)
-    sizes = (2 * reach * sharp.sqrt() / STEP).ceil().clamp_min(FEWEST)
-    return reach, FEWEST * torch.exp2((sizes / FEWEST).log2().ceil())  # few different ones
-
-
-def _trapezoidal(kappa: Tensor, reach: Tensor, sizes: list[int]) -> tuple[Tensor, list[Tensor]]:
-    """Return a product of rules: log weights (C, Q), and offsets (C, Q) for each axis."""
-    logs: list[Tensor] = []
-    offsets: list[Tensor] = []
-    for i, size in enumerate(sizes):
-        step = (torch.arange(size, dtype=kappa.dtype) + 0.5) / size * 2 - 1
-        offset = reach[:, i, None] * step
-        logs.append(torch.log_softmax(kappa[:, i, None] * (offset.cos() - 1), dim=1))
-        offsets.append(offset)
-    shape = (len(kappa), *sizes)
-
-    def spread(value: Tensor, i: int) -> Tensor:
-        own = [1] * len(sizes)
-        own[i] = sizes[i]
-        return value.reshape(len(kappa), *own).expand(shape).flatten(1)
-
-    total = torch.stack([spread(value, i) for i, value in enumerate(logs)]).sum(dim=0)
-    return total, [spread(value, i) for i, value in enumerate(offsets)]
-
-
-def _sobol(kappa: Tensor, seed: int) -> tuple[Tensor, list[Tensor]]:
-    """Return `MOST` quasi-random nodes of equal weights, by von Mises quantiles."""
-    count, axes = kappa.shape
-    engine = torch.quasirandom.SobolEngine(axes, scramble=True, seed=seed)
-    even = engine.draw(MOST, dtype=torch.float64)
-    logs = kappa.new_full((count, MOST), -math.log(MOST))
-    return logs, [quantiles(kappa[:, i], even[:, i]) for i in range(axes)]
-
-
-def quantiles(kappa: Tensor, even: Tensor) -> Tensor:
-    """Return von Mises quantiles (C, Q) of probabilities (Q,), by interpolation of a table."""
-    reach = (REACH / kappa.clamp_min(1e-12).sqrt()).clamp_max(math.pi)[:, None]
-    edge = torch.linspace(-1, 1, TABLE + 1, dtype=kappa.dtype) * reach
-    middle = (edge[:, 1:] + edge[:, :-1]) / 2
-    mass = torch.softmax(kappa[:, None] * (middle.cos() - 1), dim=1)
-    below = torch.cat([torch.zeros_like(mass[:, :1]), mass.cumsum(dim=1)], dim=1)
-    at = torch.searchsorted(below, even.expand(len(kappa), -1).contiguous(), right=True)
-    at = at.clamp(1, TABLE)
-    low = below.gather(1, at - 1)
-    part = ((even - low) / (below.gather(1, at) - low).clamp_min(1e-300)).clamp(0, 1)
-    start = edge.gather(1, at - 1)
-    return start + part * (edge.gather(1, at) - start)

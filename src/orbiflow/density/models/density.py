@@ -4,34 +4,30 @@ from __future__ import annotations
 
 import copy
 import math
-import numbers
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
-import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 from torch.distributions import Distribution, constraints
 
 from orbiflow.arguments import as_instance, as_points
+from orbiflow.density.models.tensors import destination, moved, neighbourhoods, shape_of, source_of
 from orbiflow.density.spaces import CHART, Space, Torus, check_measure
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import SideBySide, Tell, one_thread
 
-if TYPE_CHECKING:
-    from orbiflow.density.models.flow import FlowDensity
-    from orbiflow.density.models.kernels import AdaptiveKernels
-
 LEVELS = 4
 """Levels of accuracy of kernels that stand for a density; each has a quarter of the error or less."""
 
-FIRST_GRID, GRID_BLOCK = {1: 256, 2: 48}, 2**12
-"""Points along an angle at first, by the number of angles, and points evaluated at a time."""
-
 BLOCK = 2**17
 """Points evaluated by a thread at a time where no gradient is asked for: bounds the memory."""
+
+Pixel = Callable[[Tensor], Tensor]
+"""The side of a pixel of a picture at chart points (N, d), in radians: along each axis (d,) of the
+frame of a flat space; (N, 1), or the same everywhere (), on a round one."""
 
 KINDS: dict[str, type[Density]] = {}
 """The classes of densities that a file can hold, by the names they have there."""
@@ -69,9 +65,12 @@ class Density(Distribution):
     has_fine_detail: bool = True
     """Whether the density may hold detail that a coarse picture would miss."""
 
+    is_carried: bool = False
+    """Whether a flow carries the density's mass to where it is: see `drift`."""
+
     error: float = 0.0
-    """Root mean square difference, in nats, from the density that a tabulated one stands for, where it
-    is dense; see `orbiflow.density.marginal`."""
+    """Root mean square difference, in nats, from the density that this one stands for, where it is
+    dense; see `orbiflow.density.marginal`."""
 
     largest_error: float = 0.0
     """The largest difference, in nats, that was found anywhere, also where hardly any mass is."""
@@ -122,19 +121,33 @@ class Density(Distribution):
         """Logarithm of a constant that the density, as in `log_density`, is never below."""
         return -math.inf
 
-    @property
-    def kernel_part(self) -> tuple[float, AdaptiveKernels] | None:
-        """The weight and the kernels that the density contains; None if there are none."""
-        return None
+    def parts(self) -> Iterator[tuple[float, Density]]:
+        """Yield what the density is a weighted sum of, each with its weight: itself if it is none."""
+        yield 1.0, self
 
-    def log_density_without_kernels(self, points: Tensor) -> Tensor:
-        """Return what `log_density` would be without `kernel_part`."""
-        return self.log_density(points)
+    def drift(self, points: Tensor) -> Tensor:
+        """Return the time mean of the flow's velocities (..., d) at chart points (..., d), float64."""
+        del points
+        raise OrbiflowError("the density has no flow: draw another picture of it")
 
-    @property
-    def flow_part(self) -> tuple[float, FlowDensity] | None:
-        """The weight and the density of the flow that the density contains; None if there is none."""
-        return None
+    def bumps(self) -> Tensor:
+        """Return chart points (P, d) about which there may be bumps narrower than any grid."""
+        return torch.zeros(0, self.space.chart_dim, dtype=torch.float64)
+
+    def is_narrower_than(self, pixel: Pixel) -> bool:
+        """Return whether a bump has a deviation below the side of a pixel."""
+        del pixel
+        return False
+
+    def averaged_over(self, pixel: Pixel) -> Density:
+        """Return a density whose bumps are averaged over pixels, the others as they are.
+
+        A bump narrower than a pixel would be seen or missed depending on where a grid falls. Half a
+        pixel is added to the deviation of each, in squares: then its values on the grid sum to its mass
+        within 2 %, wherever it lies.
+        """
+        del pixel
+        return self
 
     @classmethod
     def joined(cls, components: Sequence[Any], weights: Tensor) -> Self | None:
@@ -172,28 +185,15 @@ class Density(Distribution):
 
     def approximated(
         self, split: Split, space: Torus, level: int, tick: Callable[[], None]
-    ) -> list[Weighted]:
+    ) -> list[Weighted] | None:
         """Return kernels that together stand for the density of the angles kept and those given.
 
         One or two angles are kept. Each level, from 0 to `LEVELS` - 1, is finer than the one before
-        it, so that their difference tells the error. `tick` is called now and then.
+        it, so that their difference tells the error. `tick` is called now and then. None if there is
+        no better way than `log_marginal` on a grid.
         """
-        from orbiflow.density.models.lattice import lattice_kernels
-
-        count = FIRST_GRID[space.dim] * 2**level
-        line = (torch.arange(count, dtype=torch.float64)) / count
-        grid = torch.cartesian_prod(*[line] * space.dim).reshape(-1, space.dim)
-        values = grid.new_tensor(split.values)
-        parts: list[Tensor] = []
-        for block in torch.split(grid, GRID_BLOCK):
-            tick()
-            whole = torch.cat([block, values.expand(len(block), -1)], dim=1)
-            parts.append(self.log_marginal(whole, list(split.observed), level))
-        logs = torch.cat(parts)
-        log, kernels = lattice_kernels(
-            (logs - logs.max()).exp().reshape([count] * space.dim), space
-        )
-        return [(float(logs.max()) + log, kernels)]
+        del split, space, level, tick
+        return None
 
     def draw_given(
         self, count: int, given: Mapping[int, float], generator: torch.Generator
@@ -407,89 +407,8 @@ class Restriction(NamedTuple):
     left: list[tuple[float, Density, Split]]
 
 
-def in_blocks(function: Callable[[Tensor], Tensor], points: Tensor, size: int) -> Tensor:
-    """Return a function of points (N, d) at points (..., d), evaluated at some of them at a time."""
-    flat = points.reshape(-1, points.shape[-1])
-    parts = [function(block) for block in torch.split(flat, size)]
-    return torch.cat(parts).reshape(points.shape[:-1])
-
-
-def neighbourhoods(points: Tensor, size: int) -> list[Tensor]:
-    """Return numbers of points (N, d) that lie together, at most `size` of them in each part.
-
-    Sums of kernels are the faster, the smaller the box around the points.
-    """
-    table = np.ascontiguousarray(points.detach().cpu().numpy().T)
-    parts, found = [np.arange(len(points))], list[Tensor]()
-    while parts:
-        at = parts.pop()
-        if len(at) <= size:
-            found.append(torch.as_tensor(at).to(points.device))
-            continue
-        some = table.take(at, axis=1)
-        order = np.argpartition(some[np.ptp(some, axis=1).argmax()], len(at) // 2)
-        parts += [at[order[len(at) // 2 :]], at[order[: len(at) // 2]]]
-    return found
-
-
 def log_area_factor(space: Space, measure: str) -> float:
     """Return what makes a `Density.log_density` one of another measure than the chart's area."""
     volume = math.log(space.volume)
     natural = 0.0 if space.is_round else -volume
     return natural + (volume if measure == "uniform" else 0.0)
-
-
-def destination(*wanted: Any) -> tuple[torch.device | None, torch.dtype | None]:
-    """Return a device and a dtype from what `torch.Tensor.to` takes: either, both, or a tensor.
-
-    >>> destination("cpu", torch.float32)
-    (device(type='cpu'), torch.float32)
-    """
-    device: torch.device | None = None
-    dtype: torch.dtype | None = None
-    for one in wanted:
-        if isinstance(one, torch.dtype):
-            dtype = one
-        elif isinstance(one, Tensor):
-            device, dtype = one.device, one.dtype
-        elif one is not None:
-            try:
-                device = torch.device(one)
-            except (RuntimeError, TypeError) as error:
-                raise OrbiflowError(
-                    f"expected a device or a dtype, such as 'cuda' or torch.float32, got {one!r}"
-                ) from error
-    if dtype is not None and not dtype.is_floating_point:
-        raise OrbiflowError(f"a density is evaluated in floating-point numbers, not in {dtype}")
-    return device, dtype
-
-
-def moved(value: Any, device: torch.device | None, dtype: torch.dtype | None = None) -> Any:
-    """Return a copy on the device of whatever can be moved; only modules change their dtype."""
-    if isinstance(value, nn.Module):  # which would move in place
-        return copy.deepcopy(value).to(device=device, dtype=dtype)
-    return value.to(device) if device is not None and hasattr(value, "to") else value
-
-
-def source_of(generator: torch.Generator | None) -> torch.Generator:
-    """Return the source of random numbers, by default torch's own."""
-    if generator is None:
-        return torch.default_generator
-    if generator.device.type != "cpu":
-        raise OrbiflowError(
-            f"samples are drawn on the CPU, the generator is on {generator.device}: give a "
-            "torch.Generator() without a device"
-        )
-    return generator
-
-
-def shape_of(sample_shape: Any) -> torch.Size:
-    """Return the shape of samples, which may be given as their number."""
-    sizes = (int(sample_shape),) if isinstance(sample_shape, numbers.Integral) else sample_shape
-    try:
-        shape = torch.Size(sizes)
-    except TypeError as error:
-        raise OrbiflowError(f"expected a number or shape of samples: {error}") from error
-    if any(size < 0 for size in shape):
-        raise OrbiflowError(f"expected a number or shape of samples, got {tuple(shape)}")
-    return shape

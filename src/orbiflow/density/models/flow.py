@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance, is_a
-from orbiflow.density.models.density import Density, Restriction, Split, in_blocks
+from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.evaluation import midpoints
 from orbiflow.density.models.files import (
     density_from,
@@ -21,6 +21,7 @@ from orbiflow.density.models.files import (
     series_parts,
     within,
 )
+from orbiflow.density.models.tensors import in_blocks
 from orbiflow.density.spaces import Space, Torus, rectangle
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
@@ -66,6 +67,7 @@ class FlowDensity(Density, kind="flow"):
 
     article = "a flow"
     has_fine_detail = False
+    is_carried = True
 
     def __init__(self, space: Space, flow: Flow, base: Density | None = None) -> None:
         super().__init__(space)
@@ -82,10 +84,10 @@ class FlowDensity(Density, kind="flow"):
         """The device of the flow's parameters."""
         return next((p.device for p in self.flow.parameters()), None)
 
-    @property
-    def flow_part(self) -> tuple[float, FlowDensity]:
-        """The density itself."""
-        return 1.0, self
+    def drift(self, points: Tensor) -> Tensor:
+        like = self._like()
+        vectors = [field(points.to(like)) for field in self.flow.segments]
+        return torch.stack(vectors).mean(dim=0).double().cpu()
 
     def log_chart(self, points: Tensor) -> Tensor:
         # flow, base and area are invariant: no need to project

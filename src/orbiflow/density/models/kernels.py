@@ -14,8 +14,8 @@ from torch import Tensor
 
 from orbiflow.arguments import as_tensor
 from orbiflow.arrays import Array
-from orbiflow.density.models.density import Density, Restriction, Split
-from orbiflow.density.models.near_sums import TOLERANCE, near_log_sum
+from orbiflow.density.models.density import Density, Pixel, Restriction, Split
+from orbiflow.density.models.near_sums import near_log_sum
 from orbiflow.density.models.terms import Terms, log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus, rectangle
 from orbiflow.errors import OrbiflowError
@@ -85,45 +85,29 @@ class AdaptiveKernels(Density, kind="kernels"):
         new._terms = _terms(self.space, self._terms.centers, new.concentrations, self.weights)
         return new
 
-    @property
-    def kernel_part(self) -> tuple[float, AdaptiveKernels]:
-        """The density itself."""
-        return 1.0, self
+    def bumps(self) -> Tensor:
+        return self.centers
 
-    def log_density_without_kernels(self, points: Tensor) -> Tensor:
-        return points.new_full(points.shape[:-1], -math.inf)
+    def is_narrower_than(self, pixel: Pixel) -> bool:
+        side = pixel(self.centers).to(self.concentrations)
+        return bool((self.concentrations**-0.5 < side).any())
 
-    def log_density(
-        self, points: Tensor, beside: float = -math.inf, tolerance: float = TOLERANCE
-    ) -> Tensor:
-        """Return log densities (...,) as any density does.
+    def averaged_over(self, pixel: Pixel) -> AdaptiveKernels:
+        half = pixel(self.centers).to(self.concentrations) / 2
+        return self.with_concentrations(1 / (1 / self.concentrations + half**2))
 
-        `tolerance` is the share of the sum of both that far kernels that are left out may add, at most,
-        and by which smooth ones that are interpolated may be off.
-        """
+    def log_density(self, points: Tensor, beside: float = -math.inf) -> Tensor:
         flat = points.reshape(-1, self.space.chart_dim).double()
         # images that turn the axes are of points, all others of kernels
         images = self.space.features(flat, slice(None, None, self.space.kernel_images))
         features = images.flatten(0, 1).mT
         if features.device.type == "cpu":
-            values = near_log_sum(self._terms, features.contiguous(), beside, tolerance)
+            values = near_log_sum(self._terms, features.contiguous(), beside)
         else:
             values = self._terms.plain_log_sum(features)
         if len(images) > 1:
             values = values.reshape(len(images), -1).logsumexp(dim=0)
         return values.reshape(points.shape[:-1]).to(points.dtype)
-
-    def parted(self, wide: Tensor) -> tuple[AdaptiveKernels | None, AdaptiveKernels | None, float]:
-        """Return the kernels of a mask (N,), the others, and the weight of the former.
-
-        Each has weights of sum 1; None if there are none.
-        """
-        found: list[AdaptiveKernels | None] = []
-        shares = [float(self.weights[which].sum()) for which in (wide, ~wide)]
-        for which, share in zip((wide, ~wide), shares, strict=True):
-            own = self.centers[which], self.concentrations[which], self.weights[which] / share
-            found.append(AdaptiveKernels(self.space, *own) if share > 0 else None)
-        return found[0], found[1], shares[0]
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         seed = int(torch.randint(2**31, (), generator=generator))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import torch
 from torch import Tensor
 
+from orbiflow.density.models.density import Density, Split, Weighted
 from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.spaces import Torus
 from orbiflow.typed_torch import fft, special
@@ -16,6 +18,30 @@ KERNEL_STEP = 0.65
 
 DROPPED = 1e-7
 """The weight that the lightest kernels may have together, to be left out."""
+
+FIRST_GRID, GRID_BLOCK = {1: 256, 2: 48}, 2**12
+"""Points along an angle at first, by the number of angles, and points evaluated at a time."""
+
+
+def kernels_for(
+    density: Density, split: Split, space: Torus, level: int, tick: Callable[[], None]
+) -> list[Weighted]:
+    """Return kernels as `Density.approximated` does, if need be through marginals on a grid."""
+    known = density.approximated(split, space, level, tick)
+    if known is not None:
+        return known
+    count = FIRST_GRID[space.dim] * 2**level
+    line = torch.arange(count, dtype=torch.float64) / count
+    grid = torch.cartesian_prod(*[line] * space.dim).reshape(-1, space.dim)
+    values = grid.new_tensor(split.values)
+    parts: list[Tensor] = []
+    for block in torch.split(grid, GRID_BLOCK):
+        tick()
+        whole = torch.cat([block, values.expand(len(block), -1)], dim=1)
+        parts.append(density.log_marginal(whole, list(split.observed), level))
+    logs = torch.cat(parts)
+    log, kernels = lattice_kernels((logs - logs.max()).exp().reshape([count] * space.dim), space)
+    return [(float(logs.max()) + log, kernels)]
 
 
 def sharpest_on(count: int, step: float = KERNEL_STEP) -> float:

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Self
 
 import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance, as_tensor
-from orbiflow.density.models.density import Density, Restriction, Split
+from orbiflow.density.models.density import Density, Pixel, Restriction, Split
 from orbiflow.density.models.files import density_from, density_parts, within
-from orbiflow.density.models.flow import FlowDensity
-from orbiflow.density.models.kernels import AdaptiveKernels
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list
@@ -85,35 +83,18 @@ class Mixture(Density, kind="mixture"):
         floors = [log + one.log_floor for log, one in self._weighted()]
         return torch.tensor(floors, dtype=torch.float64).logsumexp(0).item()
 
-    @property
-    def kernel_part(self) -> tuple[float, AdaptiveKernels] | None:
-        weighted = zip(self.components, listed(self.weights), strict=True)
-        found = ((weight, one.kernel_part) for one, weight in weighted)
-        parts = [(weight * own[0], own[1]) for weight, own in found if own is not None]
-        if len(parts) < 2:
-            return parts[0] if parts else None
-        weights = torch.tensor([weight for weight, _ in parts], dtype=torch.float64)
-        joined = AdaptiveKernels.joined([kernels for _, kernels in parts], weights)
-        return float(weights.sum()), joined
-
-    @property
-    def flow_part(self) -> tuple[float, FlowDensity] | None:
-        """The weight and the density of the first flow among the components."""
-        for one, weight in zip(self.components, listed(self.weights), strict=True):
-            if (own := one.flow_part) is not None:
-                return weight * own[0], own[1]
-        return None
-
     def log_density(self, points: Tensor, beside: float = -math.inf) -> Tensor:
         floor = float(torch.logaddexp(*torch.tensor([self.log_floor, beside], dtype=torch.float64)))
         return _log_sum(
             [own.log_density(points, floor - log) + log for log, own in self._weighted()]
         )
 
-    def log_density_without_kernels(self, points: Tensor) -> Tensor:
-        return _log_sum(
-            [own.log_density_without_kernels(points) + log for log, own in self._weighted()]
-        )
+    def parts(self) -> Iterator[tuple[float, Density]]:
+        for weight, own in zip(listed(self.weights), self.components, strict=True):
+            yield from ((weight * share, part) for share, part in own.parts())
+
+    def averaged_over(self, pixel: Pixel) -> Self:
+        return self._with(own.averaged_over(pixel) for own in self.components)
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         chosen = torch.multinomial(self.weights, count, replacement=True, generator=generator)
@@ -143,8 +124,11 @@ class Mixture(Density, kind="mixture"):
         return found
 
     def to(self, *wanted: Any) -> Self:
+        return self._with(own.to(*wanted) for own in self.components)
+
+    def _with(self, components: Iterable[Density]) -> Self:
         new = copy.copy(self)
-        new.components = tuple(own.to(*wanted) for own in self.components)
+        new.components = tuple(components)
         return new
 
     def header(self) -> dict[str, Any]:

@@ -18,8 +18,8 @@ from orbiflow.density.models.smooth_sums import Patch, gathered
 from orbiflow.density.models.terms import LOG2_E, Terms
 from orbiflow.typed_torch import applied
 
-TOLERANCE = 1e-12
-"""The share of a sum that may be left out, and that interpolation may miss."""
+LOG_TOLERANCE = math.log(1e-12)
+"""Logarithm of the share of a sum that may be left out, and that interpolation may miss."""
 
 FEW_POINTS, FEW_PAIRS = 256, 5_000_000
 """Tiles with fewer points, or fewer points times terms, are not divided further."""
@@ -43,12 +43,10 @@ STEEPEST = 600.0
 """Change of a term's logarithm across a tile above which its factors might overflow."""
 
 
-def near_log_sum(
-    terms: Terms, features: Tensor, floor: float = -math.inf, tolerance: float = TOLERANCE
-) -> Tensor:
+def near_log_sum(terms: Terms, features: Tensor, floor: float = -math.inf) -> Tensor:
     """Return the logarithm (N,) of a sum of terms at features (m, N).
 
-    It is exact within `tolerance` and rounding.
+    It is exact within `LOG_TOLERANCE` and rounding.
 
     Points are divided into tiles. Terms whose largest values in a tile are negligible beside the least
     sum there are left out; those that are smooth across the tile are summed at few places and
@@ -61,14 +59,14 @@ def near_log_sum(
     if features.shape[1] * terms.size < FEWEST_PAIRS:
         return terms.plain_log_sum(features)
     if not (features.requires_grad and torch.is_grad_enabled()):
-        return _Walk(features, terms, floor, tolerance).log_sum
-    return applied(_NearLogSum, features, terms, floor, tolerance)
+        return _Walk(features, terms, floor).log_sum
+    return applied(_NearLogSum, features, terms, floor)
 
 
 class _NearLogSum(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, features: Tensor, terms: Terms, floor: float, tolerance: float) -> Tensor:
-        walk = _Walk(features, terms, floor, tolerance, slope=True)
+    def forward(ctx: Any, features: Tensor, terms: Terms, floor: float) -> Tensor:
+        walk = _Walk(features, terms, floor, slope=True)
         ctx.save_for_backward(features, walk.slope)
         ctx.terms = terms
         return walk.log_sum
@@ -77,12 +75,12 @@ class _NearLogSum(torch.autograd.Function):
     def backward(ctx: Any, *gradients: Any) -> Any:
         features, slope = ctx.saved_tensors
         if not torch.is_grad_enabled():
-            return gradients[0] * slope, None, None, None
+            return gradients[0] * slope, None, None
         # second derivatives were asked for: let autograd have them
         view: Tensor = features.view_as(features)
         plain = ctx.terms.plain_log_sum(view)
         (found,) = torch.autograd.grad(plain, view, gradients[0], create_graph=True)
-        return found, None, None, None
+        return found, None, None
 
 
 class _Left(NamedTuple):
@@ -105,9 +103,8 @@ class _Walk:
     """Logarithms (N,) of sums, and their gradients (m, N) in the features if they are wanted."""
 
     def __init__(
-        self, features: Tensor, terms: Terms, floor: float, tolerance: float, *, slope: bool = False
+        self, features: Tensor, terms: Terms, floor: float, *, slope: bool = False
     ) -> None:
-        self.tolerance = math.log(tolerance)
         # the number of points of a tile from which on interpolation may pay
         self.worth = WORTH if terms.factors < 3 else math.inf
         features = features.detach()
@@ -121,7 +118,7 @@ class _Walk:
         tile, count, given = Tile(features, left.terms.factors), len(at), left.terms.size
         least, largest = tile.bounds(left.terms)
         bottom = log_add(left.beside, least)
-        far, lost = _negligible(largest, left.lost, bottom + self.tolerance)
+        far, lost = _negligible(largest, left.lost, bottom + LOG_TOLERANCE)
         if far is not None:
             near = ~far
             left = left._replace(terms=left.terms.only(near), lost=lost)
@@ -182,7 +179,7 @@ class _Walk:
         own = Patch(chart, patch.u if patch else chart.coordinates(features))
         some, top = terms.only(wide), largest[wide]
         errors = own.errors(some, top, tile)
-        smooth, lost = _negligible(errors, lost, bottom + self.tolerance)
+        smooth, lost = _negligible(errors, lost, bottom + LOG_TOLERANCE)
         if smooth is None or int(smooth.sum()) < WORTH_TERMS:
             return left
         if patch:

@@ -10,8 +10,9 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance
-from orbiflow.density.models.density import Density, Restriction, Split, Weighted, in_blocks
+from orbiflow.density.models.density import Density, Restriction, Split, Weighted
 from orbiflow.density.models.files import density_from, density_parts, within
+from orbiflow.density.models.tensors import in_blocks
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list
@@ -97,9 +98,9 @@ class PartialDensity(Density, kind="partial"):
 
     def approximated(
         self, split: Split, space: Torus, level: int, tick: Callable[[], None]
-    ) -> list[Weighted]:
+    ) -> list[Weighted] | None:
         found = self.whole.approximated(self._split_of(split), space, level, tick)
-        return [(log - self.log_given, part) for log, part in found]
+        return found and [(log - self.log_given, part) for log, part in found]
 
     def _split_of(self, split: Split) -> Split:
         """Return how the whole's angles are split, if those kept here are split again."""

@@ -295,8 +295,9 @@ def _names(paths: Sequence[Path]) -> list[str]:
 def _csv(found: ModelComparison | DataComparison) -> bytes:
     """Return the differences of models, or the figures of data sets, a row each."""
     document = found.to_json()
+    figures: dict[str, dict[str, Any]] = document.get("divergence") or {}
     rows: list[dict[str, Any]] = document.get("differences") or [
         {"figure": "p", "value": document["test"]["p"], "error": None, "low": None, "high": None},
-        *({"figure": name, **own} for name, own in (document["divergence"] or {}).items()),
+        *({"figure": name, **own} for name, own in figures.items()),
     ]
     return csv_bytes(list(rows[0]), [list(row.values()) for row in rows])

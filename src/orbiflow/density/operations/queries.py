@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -13,7 +11,7 @@ from orbiflow.density import comparing, fitting, models, regions, spaces, tables
 from orbiflow.density.run_folder import write_file, written_files
 from orbiflow.density.tables import RowSettings, check_table_name
 from orbiflow.errors import literal
-from orbiflow.settings import DefaultText, Needs, NotWith, Option, Range, SettingError, Settings
+from orbiflow.settings import DefaultText, Needs, Option, Range, SettingError, Settings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,12 +42,6 @@ class ScoreSettings(Settings, group="Scores"):
     """Add the gradient of log_prob, a column for each of the data's: per unit of each angle, per degree
     of lat and lon, tangent vectors of x,y,z."""
 
-    table: Annotated[bool, NotWith("gradient", because="{gradient} is exact, {table} is not")] = (
-        False
-    )
-    """Read log densities off a table, in two dimensions: faster where kernels are wide or a flow has a
-    weight. Its error is told."""
-
 
 @runtime.operation("density score")
 def score(
@@ -71,7 +63,7 @@ def score(
     """
     check_table_name(out)
     may_lack = reading.missing == "marginalise"
-    for name in ("region", "gradient", "table") if may_lack else ():
+    for name in ("region", "gradient") if may_lack else ():
         if getattr(settings, name):
             raise SettingError(
                 f"{{{name}}} requires complete rows; leave it out, or {{missing}} marginalise"
@@ -126,7 +118,7 @@ def score_rows(
     whole = known.all(dim=1).numpy()
     name = "log_prob" if whole.all() else "log_prob_marginal"
     notes: list[str] = []
-    columns = {name: _log_densities(density, points, settings, progress, notes)}
+    columns = {name: _log_densities(density, points, settings, progress)}
     if settings.gradient:
         columns |= _gradients(density, rows, progress)
     if settings.region:
@@ -143,32 +135,19 @@ def score_rows(
 
 
 def _log_densities(
-    density: models.Density,
-    points: Tensor,
-    settings: ScoreSettings,
-    progress: fitting.Progress,
-    notes: list[str],
+    density: models.Density, points: Tensor, settings: ScoreSettings, progress: fitting.Progress
 ) -> Array:
     import numpy as np
     import torch
 
     from orbiflow.density import inference
 
-    if settings.table:
-        progress(0.0, "making a table")
-        source = models.TabulatedDensity(density)
-        notes.append(
-            f"read off a table: the error is {source.error:.1e} nats at the density's own points, "
-            f"{source.largest:.1e} at most among {models.CHECKED} of them and as many anywhere"
-        )
-        log_prob: Callable[..., Tensor] = source.log_prob
-    else:
-        log_prob = partial(inference.at_observed, density)
     found: list[Array] = []
     end = SCORED if settings.gradient else 1.0
     for start in range(0, len(points), BLOCK):
         with torch.no_grad():
-            scores = log_prob(points[start : start + BLOCK], measure=settings.measure)
+            block = points[start : start + BLOCK]
+            scores = inference.at_observed(density, block, measure=settings.measure)
         found.append(scores.double().numpy())
         progress(end * min(1.0, (start + BLOCK) / len(points)), "scoring")
     return np.concatenate(found)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from orbiflow import runtime
+from orbiflow.arguments import is_a
 from orbiflow.batch import csv_bytes
 from orbiflow.density import tables
 from orbiflow.density.run_folder import write_file
@@ -82,7 +83,7 @@ def _csv(found: dict[str, Any]) -> bytes:
     for entry in next(iter(found.values())):
         flat: dict[str, Any] = {}
         for key, value in entry.items():
-            several = isinstance(value, tuple)
+            several = is_a(value, tuple)
             flat |= {f"{key}_{k}": v for k, v in enumerate(value, 1)} if several else {key: value}
         rows.append(flat)
     return csv_bytes(list(rows[0]), [list(row.values()) for row in rows])
@@ -106,10 +107,8 @@ def _summarised(rows: TableRows, space: str, unit: str, level: float) -> dict[st
     """Return the summaries of rows as JSON has them."""
     from orbiflow.density import summaries
 
-    values, how = (
-        rows.table.values,
-        {"weights": rows.weights, "groups": rows.labels, "level": level},
-    )
+    values = rows.table.values
+    how: dict[str, Any] = {"weights": rows.weights, "groups": rows.labels, "level": level}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # told already
         if space == "torus":
@@ -169,7 +168,7 @@ def _shown(key: str, value: Any) -> str:
         return "-"
     if isinstance(value, str):
         return value
-    if isinstance(value, Sequence):
+    if is_a(value, Sequence):
         return ", ".join(_shown(key, part) for part in value)
     if key.endswith("_p"):
         return f"{value:.2g}" if value > 1e-300 else "< 1e-300"

@@ -12,7 +12,13 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
 from orbiflow.density.pictures import frames
-from orbiflow.density.pictures.colours import chosen_scale, density_at_pixels, is_sharp, shading
+from orbiflow.density.pictures.colours import (
+    chosen_scale,
+    density_over,
+    is_sharp,
+    shading,
+    square_pixel,
+)
 from orbiflow.density.pictures.overlays import Colouring, log_natural
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import Square
@@ -70,15 +76,15 @@ class Cell(Square):
             for n in [round((high - low) / step)]
         )
         points = self.space.cover(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2))
-        pixel = float(step) / self.space.volume**0.5
-        values = density_at_pixels(density, points, settings.measure, pixel)
+        pixel = square_pixel(self.space, float(step) / self.space.volume**0.5)
+        values = density_over(density, points, settings.measure, pixel)
         log, reason = chosen_scale(density, settings.measure, settings.scale)
         shade, shape = shading(values, log=log), (len(y), len(x))
         logs = None
         if settings.regions:
             logs = log_natural(density, values, points, settings.measure).reshape(shape)
         note = ""
-        if is_sharp(density, pixel=pixel):
+        if is_sharp(density, pixel):
             note = f"peaks narrower than 1/{PIXELS} of the longer side are averaged over it"
         extent = (self.low[0], self.high[0], self.low[1], self.high[1])
         return Colouring(shade.places(values).reshape(shape), extent, shade, reason, note, logs)

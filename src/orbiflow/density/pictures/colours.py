@@ -11,15 +11,10 @@ import torch
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.models import AdaptiveKernels, Density, midpoints
+from orbiflow.density.models import Density, Pixel, midpoints
 from orbiflow.density.spaces import Space, rectangle
 
 COLOURS = "viridis"
-_TOLERANCE = 1e-5
-"""Relative error of the sums over kernels."""
-
-_KERNELS = 4096
-"""Kernels summed at a time: tables of all of them would be gigabytes."""
 
 _COARSE = 120
 """Points along a side by which a scale is chosen."""
@@ -41,40 +36,36 @@ def density_at(density: Density, points: Tensor, measure: str) -> Array:
     return density.log_prob(own, measure=measure).double().cpu().exp().numpy()
 
 
-@torch.no_grad()
 def density_on_grid(
     density: Density, x: Tensor, y: Tensor, measure: str, *, pixel: float | None = None
 ) -> Array:
     """Return the density (len(x), len(y)) on a grid of chart coordinates, float64.
 
-    A kernel narrower than a pixel would be seen or missed depending on where the grid falls. So half
-    a pixel is added to the deviation of each kernel, in squares: then its values on the grid sum to
-    its mass within 2 %, wherever it lies, and broad kernels stay as they are.
-    A `pixel` is as wide as the step of `x`, if nothing is said.
+    It is averaged over pixels (`Density.averaged_over`), as wide as the step of `x`, if no `pixel` is
+    given.
     """
-    shape = (len(x), len(y))
     points = torch.stack(torch.meshgrid(x, y, indexing="ij"), dim=-1).reshape(-1, 2)
-    if density.kernel_part is None:
-        return density_at(density, points, measure).reshape(shape)
-    half = _half_pixels(density.kernel_part[1], pixel or float(x[1] - x[0]))
-    return _averaged(density, points, measure, half, (x, y)).reshape(shape)
+    side = square_pixel(density.space, pixel or float(x[1] - x[0]))
+    return density_over(density, points, measure, side).reshape(len(x), len(y))
 
 
-@torch.no_grad()
-def density_on_map(density: Density, points: Tensor, measure: str, angle: float) -> Array:
-    """Return the density (N,) at chart points (N, 2) of a round space, averaged over pixels."""
-    if density.kernel_part is None:
-        return density_at(density, points, measure)
-    return _averaged(density, points, measure, torch.tensor(angle / 2))
+def density_over(density: Density, points: Tensor, measure: str, pixel: Pixel) -> Array:
+    """Return the density (N,) at chart points (N, 2), averaged over pixels."""
+    return density_at(density.averaged_over(pixel), points, measure)
 
 
-@torch.no_grad()
-def density_at_pixels(density: Density, points: Tensor, measure: str, pixel: float) -> Array:
-    """Return the density (N,) at chart points (N, 2) of a flat space, averaged over pixels."""
-    if density.kernel_part is None:
-        return density_at(density, points, measure)
-    half = _half_pixels(density.kernel_part[1], pixel)
-    return _averaged(density, points, measure, half)
+def square_pixel(space: Space, side: float) -> Pixel:
+    """Return how large a pixel is whose side is a share of the chart's square."""
+    if not space.is_round:
+        sides = 2 * math.pi * side / rectangle(space)
+        return lambda _points: sides
+    # the chart is conformal: a small square stays a square
+    return lambda points: side * (space.log_area(off_cones(points)) / 2).exp()[:, None]
+
+
+def round_pixel(angle: float) -> Pixel:
+    """Return a pixel of a map, as wide as an angle everywhere."""
+    return lambda _points: torch.tensor(angle)
 
 
 def chosen_scale(density: Density, measure: str, scale: str) -> tuple[bool, str]:
@@ -83,11 +74,7 @@ def chosen_scale(density: Density, measure: str, scale: str) -> tuple[bool, str]
         log = scale == "log"
         return log, f"colours are {'logarithmic' if log else 'linear'}, as asked for"
     even, pixel = midpoints(density.space, _COARSE), 0.5 / _COARSE
-    if density.space.has_square:
-        t = (torch.arange(_COARSE, dtype=torch.float64) + 0.5) / _COARSE
-        values = density_on_grid(density, t, t, measure, pixel=pixel).ravel()
-    else:
-        values = density_at_pixels(density, even, measure, pixel)
+    values = density_over(density, even, measure, square_pixel(density.space, pixel))
     areas = density.space.log_area(even).exp().numpy()
     dark = dark_share(values, areas)
     log = dark > DARK_SHARE
@@ -97,74 +84,9 @@ def chosen_scale(density: Density, measure: str, scale: str) -> tuple[bool, str]
     return log, f"colours are {'logarithmic' if log else 'linear'}, as {reason}"
 
 
-def is_sharp(density: Density, *, pixel: float | None = None, angle: float | None = None) -> bool:
+def is_sharp(density: Density, pixel: Pixel) -> bool:
     """Return whether peaks of a density may be narrower than the pixels of a picture."""
-    part = density.kernel_part
-    if part is None:
-        return False
-    half = torch.tensor(angle / 2) if angle else _half_pixels(part[1], pixel or 0.0)
-    return bool((part[1].concentrations ** -0.5 < 2 * half).any())
-
-
-def _averaged(
-    density: Density, points: Tensor, measure: str, half: Tensor, sides: tuple[Tensor, ...] = ()
-) -> Array:
-    """Return the density (N,) with kernels whose deviations are at least `half` a pixel.
-
-    Points of a flat space are a grid with these `sides`, x and y.
-    """
-    part = density.kernel_part
-    assert part is not None
-    weight, own = part
-    kappa = 1 / (1 / own.concentrations + half**2)
-    widened = AdaptiveKernels(own.space, own.centers, kappa, own.weights)
-    if density.space.is_round:
-        points = off_cones(points)
-        areas = density.space.log_area(points)
-        logs = density.log_density_without_kernels(points) + areas
-        sums = (widened.log_density(points, tolerance=_TOLERANCE) + areas).exp()
-    else:
-        logs = density.log_density_without_kernels(points)
-        if sides:
-            sums = _flat_sums(widened, *sides).reshape(-1)
-        else:
-            sums = widened.log_density(points, tolerance=_TOLERANCE).exp()
-    values = logs.exp() + weight * sums
-    return (values * density.space.log_density_factor(points, measure).exp()).numpy()
-
-
-def _half_pixels(kernels: AdaptiveKernels, pixel: float) -> Tensor:
-    """Return half a pixel's side in the kernels' angles, (d,), or, on round spaces, (N, 1)."""
-    if kernels.space.is_round:
-        # the chart is conformal: a small square stays a square
-        area = kernels.space.log_area(off_cones(kernels.centers)).exp()
-        return pixel / 2 * area.sqrt()[:, None]
-    return math.pi * pixel / rectangle(kernels.space)
-
-
-def _flat_sums(kernels: AdaptiveKernels, x: Tensor, y: Tensor) -> Tensor:
-    """Return the mixture on a grid: a matrix product, as kernels are products of one coordinate's."""
-    space = kernels.space
-    # cosets are rotations by half a turn and glides along the axes: each image of a grid is one
-    ends = [torch.stack([t, torch.zeros_like(t)], dim=-1) for t in (x, y)]
-    across = space.group.images(ends[0])[..., 0]
-    along = space.group.images(ends[1].flip(-1))[..., 1]
-    total = x.new_zeros(len(x), len(y))
-    for images in zip(across, along, strict=True):
-        for part in torch.arange(len(kernels.concentrations)).split(_KERNELS):
-            tables: list[tuple[Tensor, Tensor]] = []
-            sides = zip(images, rectangle(space).tolist(), strict=True)
-            for axis, (image, period) in enumerate(sides):
-                # kernels on a lattice share their places and widths along an axis
-                both = torch.stack([kernels.centers, kernels.concentrations])[:, part, axis]
-                (center, own), place = torch.unique(both, dim=1, return_inverse=True)
-                angle = 2 * math.pi * (image[:, None] - center) / period
-                values = (own * (angle.cos() - 1)).exp() / (period * torch.special.i0e(own))
-                tables.append((values, place))
-            (left, row), (right, column) = tables
-            weighed = right.T[column] * kernels.weights[part, None]
-            total += left @ torch.zeros(left.shape[1], len(y)).to(total).index_add(0, row, weighed)
-    return total
+    return any(part.is_narrower_than(pixel) for _, part in density.parts())
 
 
 MAX_DECADES = 5

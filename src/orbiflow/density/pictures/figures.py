@@ -11,7 +11,7 @@ import torch
 from PIL import Image
 from torch import Tensor
 
-from orbiflow.density.models import Density, FlowDensity
+from orbiflow.density.models import Density
 from orbiflow.density.pictures import frames, overlays
 from orbiflow.density.pictures.cell import Cell
 from orbiflow.density.pictures.coastlines import coastlines_for
@@ -24,7 +24,6 @@ from orbiflow.density.pictures.square import Square
 from orbiflow.density.regions import DensityRegion
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import Picture, Sheet, draw_flow, draw_magnitude
-from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import CrystallographicGroup
 
 if TYPE_CHECKING:
@@ -211,7 +210,7 @@ def flow_picture(
     draw_cells(axes, space.group, window, pen=sheet.pen)
     frames.colour_bar(axes.images[0], frame, sheet, SPEED)
     axes.set_axis_off()
-    weight, flow = flow_of(density)
+    weight, flow = carried_part(density)
     part = "" if flow is density else f", {100 * weight:.0f} % of the density"
     title = f"Flow{part} on the {space_title(space)}"
     signs = "canonical square outlined, its images thin"
@@ -220,12 +219,11 @@ def flow_picture(
     return Picture(frame.figure, sheet, title, f"The {signs}.")
 
 
-def flow_of(density: Density) -> tuple[float, FlowDensity]:
-    """Return the weight and the density of the flow to draw."""
-    part = density.flow_part
-    if part is None:
-        raise OrbiflowError("the density has no flow: draw another picture of it")
-    return part
+def carried_part(density: Density) -> tuple[float, Density]:
+    """Return the first part that a flow carries, with its weight; without one, the density itself."""
+    return next(
+        ((weight, own) for weight, own in density.parts() if own.is_carried), (1.0, density)
+    )
 
 
 def few_colours(png: bytes) -> bytes:
@@ -240,10 +238,7 @@ def few_colours(png: bytes) -> bytes:
 @torch.no_grad()
 def mean_field(density: Density, points: Tensor) -> Tensor:
     """Return the time mean of the flow's fields (..., d) at chart points (..., d), float64."""
-    flow = flow_of(density)[1].flow
-    like = next(iter(flow.parameters()), points)
-    vectors = [field(points.to(like)) for field in flow.segments]
-    return torch.stack(vectors).mean(dim=0).double().cpu()
+    return carried_part(density)[1].drift(points)
 
 
 def draw_cells(

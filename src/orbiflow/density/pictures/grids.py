@@ -131,6 +131,6 @@ def _globe(density: Density, space: RoundSpace) -> tuple[Array, Array]:
     lon = 360 * _middles(2 * count).numpy() - 180
     latlon = np.stack(np.meshgrid(lat, lon, indexing="ij"), axis=-1)
     points = space.vectors_to_chart(to_vectors(latlon.reshape(-1, 2)))
-    values = colours.density_on_map(density, points, NATURAL, math.pi / count)
+    values = colours.density_over(density, points, NATURAL, colours.round_pixel(math.pi / count))
     areas = np.repeat(np.cos(np.radians(lat))[:, None], 2 * count, axis=1)
     return values.reshape(areas.shape), areas

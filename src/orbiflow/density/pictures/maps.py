@@ -12,7 +12,13 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
 from orbiflow.density.pictures import frames
-from orbiflow.density.pictures.colours import chosen_scale, density_on_map, is_sharp, shading
+from orbiflow.density.pictures.colours import (
+    chosen_scale,
+    density_over,
+    is_sharp,
+    round_pixel,
+    shading,
+)
 from orbiflow.density.pictures.frames import INK, LETTER, chart_points, degrees_text
 from orbiflow.density.pictures.overlays import LIGHT, Colouring, log_natural
 from orbiflow.density.pictures.projections import Azimuthal, Mollweide, Projection, WorldMap
@@ -60,14 +66,15 @@ class Map:
     def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
         pixels = pixels_of(self.projection)
         points = cast(RoundSpace, self.space).vectors_to_chart(to_vectors(pixels.latlon))
-        values = density_on_map(density, points, settings.measure, pixels.angle)
+        pixel = round_pixel(pixels.angle)
+        values = density_over(density, points, settings.measure, pixel)
         log, reason = chosen_scale(density, settings.measure, settings.scale)
         shade = shading(values[pixels.within], pixels.areas[pixels.within], log=log)
         logs = None
         if settings.regions:
             logs = pixels.table(log_natural(density, values, points, settings.measure), math.nan)
         note = ""
-        if is_sharp(density, angle=pixels.angle):
+        if is_sharp(density, pixel):
             size = f"{math.degrees(pixels.angle):.2g}°"
             note = f"peaks narrower than {size} are averaged over it"
         places = pixels.table(shade.places(values), 0.0)

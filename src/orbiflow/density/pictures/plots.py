@@ -98,7 +98,7 @@ def plot_density(
         told(k / (len(makers) + 1), f"drawing {name}.{form}")
         pictures[name] = make()
     captions = tuple(f"{own.title}. {own.caption}".strip() for own in pictures.values())
-    flowless = shown.space.is_planar and shown.density.flow_part is None
+    flowless = shown.space.is_planar and not shown.flows
     notes = ("the flow has no part in this density, so that there is no picture of it",) * flowless
     if single:
         path = write_atomic(out, pdf_pages(list(pictures.values())))
@@ -157,6 +157,7 @@ class _Shown:
         self.points = self.samples if self.data is None else self.data
         self.map = chosen_map(space, self.points, settings) if space.is_round else None
         self.regions = region_lines(self.density, settings)
+        self.flows = figures.carried_part(density)[1].is_carried
 
     def makers(self) -> Mapping[str, Callable[[], Picture]]:
         """Return functions that draw the figures, by the names of their files without the ending."""
@@ -171,7 +172,7 @@ class _Shown:
         dots = self.points if settings.dots else None
         draw = partial(figures.density_picture, density, dots, settings, regions=self.regions)
         makers = {name: partial(draw, ground=ground) for name, ground in grounds.items()}
-        if density.flow_part is not None and self.space.has_square:
+        if self.flows and self.space.has_square:
             makers["flow"] = partial(figures.flow_picture, density, settings)
         if data is not None or settings.samples is not None:
             draw = partial(figures.samples_picture, density, data, samples, settings)

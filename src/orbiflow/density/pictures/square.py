@@ -12,7 +12,13 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, midpoints
 from orbiflow.density.pictures import frames
-from orbiflow.density.pictures.colours import chosen_scale, density_on_grid, is_sharp, shading
+from orbiflow.density.pictures.colours import (
+    chosen_scale,
+    density_on_grid,
+    is_sharp,
+    shading,
+    square_pixel,
+)
 from orbiflow.density.pictures.overlays import LIGHT, Colouring, log_natural
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import Space
@@ -76,7 +82,7 @@ class Square:
             points = torch.stack(torch.meshgrid(x, y, indexing="ij"), dim=-1).reshape(-1, 2)
             logs = log_natural(density, values.ravel(), points, settings.measure)
             logs = logs.reshape(count, count).T
-        note = average_note(count) if is_sharp(density, pixel=1 / count) else ""
+        note = average_note(count) if is_sharp(density, square_pixel(self.space, 1 / count)) else ""
         return Colouring(shade.places(values).T, (0, 1, 0, 1), shade, reason, note, logs)
 
     def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> frames.Room:

@@ -258,7 +258,7 @@ def surface_data(
         places, widths = uncrowded(immersion(space)(space.project(points)))
         data |= {"samples": packed(places, "<f4"), "widths": packed(widths, "<f4")}
         notes.append(SMALLER)
-    if colours.is_sharp(density, pixel=_SOFT / cells):
+    if colours.is_sharp(density, colours.square_pixel(density.space, _SOFT / cells)):
         notes.append(average_note(round(cells / _SOFT)))
     words = CAPTIONS[space.name].format(*(frames.axis_label(view, k) for k in (0, 1)))
     return {**data, "caption": f"{words} {frames.sentences(notes)}".strip()}

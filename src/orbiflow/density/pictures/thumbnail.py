@@ -19,7 +19,13 @@ from PIL import Image, ImageDraw
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, midpoints
 from orbiflow.density.pictures.cell import Cell
-from orbiflow.density.pictures.colours import COLOURS, density_on_grid, density_on_map, shading
+from orbiflow.density.pictures.colours import (
+    COLOURS,
+    density_on_grid,
+    density_over,
+    round_pixel,
+    shading,
+)
 from orbiflow.density.pictures.frames import view_of
 from orbiflow.density.pictures.maps import pixels_of
 from orbiflow.density.pictures.projections import chosen_map
@@ -104,7 +110,7 @@ def _map(density: Density, data: Array) -> Image.Image:
     projection = chosen_map(space, space.to_chart(data))
     pixels = pixels_of(projection, MAP_PLACES)
     points = space.vectors_to_chart(to_vectors(pixels.latlon))
-    values = density_on_map(density, points, "natural", pixels.angle)
+    values = density_over(density, points, "natural", round_pixel(pixels.angle))
     shade = shading(values[pixels.within], pixels.areas[pixels.within], log=None)
     places = pixels.table(shade.places(values), 0.0)
     left, right, below, above = pixels.extent

@@ -195,11 +195,9 @@ def _islands(
 
 
 def _peaks(density: Density) -> Tensor:
-    """Return chart points (P, 2) at which narrow islands may be: centres of kernels."""
-    part = density.kernel_part
-    if part is None:
-        return torch.zeros(0, 2, dtype=torch.float64)
-    places = unique((part[1].centers * 1e6).round(), dim=0) / 1e6
+    """Return chart points (P, 2) at which narrow islands may be."""
+    bumps = torch.cat([part.bumps() for _, part in density.parts()])
+    places = unique((bumps * 1e6).round(), dim=0) / 1e6
     chosen = torch.randperm(len(places), generator=torch.Generator().manual_seed(0))
     return places[chosen[:MAX_PEAKS]]
 
