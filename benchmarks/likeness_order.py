@@ -114,7 +114,7 @@ def fitted_weights(found: list[Marked]) -> Ring:
 def print_calibration(scores: Ring, readings: Ring) -> None:
     """Print scores (N,) by tenths, and which share of the marks (K, N) is good."""
     good = (readings >= GOOD).mean(axis=0)
-    tenths = np.array_split(np.argsort(scores), 10)
+    tenths = np.array_split(np.argsort(scores), min(10, len(scores)))
     print("\nscore, mean of a tenth  " + "".join(f"{scores[own].mean():6.2f}" for own in tenths))
     print(f"marks of {GOOD} or more    " + "".join(f"{good[own].mean():6.2f}" for own in tenths))
 

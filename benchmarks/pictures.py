@@ -4,7 +4,7 @@
 
 The silhouette is searched in nine classes at effort fast. Files: the least CPU time of three, for all
 tiles together. Artwork: pages of 3000 x 2000 pixels of the first tile, from few large tiles to many
-small ones. Start-up (imports) and the search are not counted. One thread.
+small ones, in CPU seconds. Start-up (imports) and the search are not counted. One thread.
 """
 
 from __future__ import annotations
@@ -89,13 +89,13 @@ def art_row(
     tile: EscherTile, name: str, settings: ArtSettings, picture: Picture | None = None
 ) -> None:
     """Print the times of one page."""
-    start = time.perf_counter()
+    start = time.process_time()
     art = artwork(tile, settings, picture=picture)
-    ready = time.perf_counter()
+    ready = time.process_time()
     pixels = render_artwork(art)
-    rendered = time.perf_counter()
+    rendered = time.process_time()
     content = png_of(pixels, settings.dpi)
-    end = time.perf_counter()
+    end = time.process_time()
     name = f"{name}, {art.page.width} x {art.page.height}"
     print(
         f"{name:34} {art.page.shown:>6.0f} {ready - start:>9.2f} {rendered - ready:>9.2f} "

@@ -65,7 +65,7 @@ def test_the_order_is_compared_with_marks(load, capsys, tmp_path, monkeypatch) -
 
     def tile(damage: float, *given: float) -> dict[str, object]:
         names = (*order.VALUES, "before", "energy", "displacement", "iou")
-        values = {name: damage for name in names} | {"pieces": [damage, damage], "length": 6.5}
+        values = dict.fromkeys(names, damage) | {"pieces": [damage, damage], "length": 6.5}
         values |= {"before": 1 - damage, "iou": 1 - damage, "overlap": 1 - damage}
         return {"values": values, "marks": dict(zip("AB", given, strict=True))}
 
