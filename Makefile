@@ -21,20 +21,15 @@ lint: $(VENV)/.installed-dev
 bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/field.py --quick
 	$(BIN)/python benchmarks/space_groups.py --quick
-	$(BIN)/python benchmarks/nine_classes.py --quick
-	$(BIN)/python benchmarks/tilings.py --quick
-	$(BIN)/python benchmarks/export.py --quick
 	$(BIN)/python benchmarks/escherization.py --quick
-	$(BIN)/python benchmarks/likeness_energy.py --quick || test $$? -eq 2
-	$(BIN)/python benchmarks/ablations.py --quick
+	$(BIN)/python benchmarks/pictures.py --quick
+	$(BIN)/python benchmarks/likeness_order.py
 	$(BIN)/python benchmarks/density_kl.py --quick
 	$(BIN)/python benchmarks/density_nll.py --quick || test $$? -eq 2 # its data are not here
-	$(BIN)/python benchmarks/density_rna.py --quick || test $$? -eq 2
 	$(BIN)/python benchmarks/density_unoriented.py --quick
-	$(BIN)/python benchmarks/density_many.py --quick
+	$(BIN)/python benchmarks/density_default.py --many --quick
 	$(BIN)/python benchmarks/density_inference.py --quick || test $$? -eq 2
 	$(BIN)/python benchmarks/density_record.py --quick || test $$? -eq 2
-	$(BIN)/python benchmarks/studio_load.py --quick
 
 docs: $(VENV)/.installed-docs
 	$(BIN)/python -m sphinx -b html -W --keep-going -q docs out/site

@@ -1,25 +1,22 @@
-"""What the benchmarks share: inputs, published figures, the best similarity of two shapes."""
+"""What the benchmarks share: inputs, published figures, shapes laid on each other and drawn."""
 
 from __future__ import annotations
 
 import json
 import os
-from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy.optimize
 import shapely
 from numpy.typing import NDArray
+from PIL import Image, ImageDraw
 
-from orbiflow.runtime import one_blas_thread
-from orbiflow.tiles import CLASSES, LikenessSearch, Target, isohedral_class, orient, plane_points
-from orbiflow.tiles.likeness import least_neck, near_symmetry
-from orbiflow.tiles.search.bending import bent_tiles
-from orbiflow.tiles.search.search_method import SYMMETRIC, Goal
+from orbiflow.tiles import Target
 
 ROOT = Path(__file__).resolve().parents[1]
+HELD = ROOT / "benchmarks" / "data"
 BUNDLED = ROOT / "examples" / "silhouettes"
 DATA = Path(os.environ.get("ORBIFLOW_DATA") or ROOT.parent / "shared" / "data")
 """What is not in the repository: see docs/benchmarks.md."""
@@ -40,17 +37,23 @@ GOALS = (
 Ring = NDArray[np.float64]
 
 
+SMOOTH = 3
+"""Pixels drawn for each pixel of a side."""
+
+
 def goal(name: str) -> Target:
-    """One of the nine goals, or another polygon of their authors, at its true aspect."""
-    path = BUNDLED / "nagata" / f"{name}.dat"
-    if not path.exists():
-        path = needed(DATA / "silhouettes" / "nagata" / f"{name}.dat", f"the polygon {name}")
-    return Target.read(path)
+    """One of the nine goals at its true aspect."""
+    return Target.read(BUNDLED / "nagata" / f"{name}.dat")
+
+
+def silhouettes() -> dict[str, dict[str, Any]]:
+    """The silhouettes whose tiles were judged, by name: part, source, by, licence, outline."""
+    return json.loads((HELD / "likeness_shapes.json").read_text())["silhouettes"]
 
 
 def published(section: str) -> dict[str, Any]:
     """Figures to compare with: "nine_goals" or "density_nll"; the file says where each comes from."""
-    document = json.loads((ROOT / "benchmarks" / "data" / "published.json").read_text())
+    document = json.loads((HELD / "published.json").read_text())
     return document[section]["figures"]
 
 
@@ -60,45 +63,6 @@ def needed(path: Path, what: str) -> Path:
         print(f"{what} are not here ({path}): docs/benchmarks.md says where to get them")
         raise SystemExit(2)
     return path
-
-
-class LikenessTile(NamedTuple):
-    """A tile of the search for likeness.
-
-    - `name`: of its class.
-    - `ring`: (M, 2) the tile, counter-clockwise with y up, up to a similarity.
-    - `bent`: (M, 2) the points of the target's outline on it, in the same frame.
-    - `source`: (M, 2) where they are on the target, in its normal form.
-    """
-
-    name: str
-    ring: Ring
-    bent: Ring
-    source: Ring
-
-
-def likeness_tiles(target: Target, effort: str) -> list[LikenessTile]:
-    """Tiles of all classes by the search for likeness, best first: the only place that calls it.
-
-    Where the silhouette is near to symmetric, symmetric tiles are among them, as in the search.
-    """
-    settings = LikenessSearch.for_effort(effort)
-    wide = least_neck(target.normal, settings.min_neck)
-    symmetric = SYMMETRIC.get(near_symmetry(target.normal).stabiliser, ())
-    found = []
-    for name in (*CLASSES, *symmetric):
-        kind = isohedral_class(name)
-        both = settings.hands(Goal(target), kind.divisor)
-        with one_blas_thread():
-            bents, _ = bent_tiles(both, kind, replace(settings, min_neck=wide))
-        for bent in bents:
-            n = bent.hand.fine.size
-            flip = (1.0, -1.0 if bent.hand.mirrored else 1.0)
-            outlines = bent.ring, bent.points[:n], bent.hand.fine.rest[:n]
-            rings = (orient(plane_points(z) * flip) for z in outlines)
-            found.append((-bent.score, LikenessTile(name, *rings)))
-    found.sort(key=lambda one: one[0])
-    return [tile for _, tile in found]
 
 
 def aligned(tile: Ring, goal: Ring, tries: int = 3) -> Ring:
@@ -149,3 +113,24 @@ def aligned(tile: Ring, goal: Ring, tries: int = 3) -> Ring:
         key=lambda found: found[0].fun,
     )
     return moved(best[0].x, best[1])
+
+
+def cell(ring: Ring, size: int, unit: float, colour: str = "black") -> Image.Image:
+    """A filled ring (M, 2), y up, in the middle of a white square of `size` pixels.
+
+    Args:
+        ring: in units of which one is `unit` pixels long.
+        size: of the picture's sides.
+        unit: pixels.
+        colour: of the filling.
+    """
+    middle = (ring.min(axis=0) + ring.max(axis=0)) / 2
+    pixels = ((ring - middle) * (1, -1) * unit + size / 2) * SMOOTH
+    picture = Image.new("RGB", (size * SMOOTH, size * SMOOTH), "white")
+    ImageDraw.Draw(picture).polygon([(float(x), float(y)) for x, y in pixels], fill=colour)
+    return picture.resize((size, size), Image.Resampling.LANCZOS)
+
+
+def common_unit(rings: list[Ring], size: int, share: float = 0.9) -> float:
+    """Pixels for one unit so that every ring fills at most `share` of a square of `size` pixels."""
+    return share * size / max(float(np.ptp(ring, axis=0).max()) for ring in rings)

@@ -2,22 +2,41 @@
 
 from __future__ import annotations
 
+import csv
 import math
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from common import DATA, needed
+from common import DATA, HELD, needed
 from numpy.typing import NDArray
 
 Data = NDArray[np.float64]
+Log = Callable[[Data], Data]
 
 TORI = ("general", "glycine", "proline", "prepro")
 EARTH = ("quakes", "fire")
 
 ROUNDED = 0.01
 """Radians, of the backbone angles."""
+
+
+class Drawn(NamedTuple):
+    """Rows of a data set.
+
+    - `data`: (N, k) in the units of `space`.
+    - `log_density`: where it is known.
+    - `trained`: rows to train on, default nine tenths.
+    - `group`: (N,) the protein, molecule or place of each row.
+    """
+
+    data: Data
+    space: str
+    log_density: Log | None = None
+    trained: int | None = None
+    group: NDArray[np.integer] | None = None
 
 
 def _file(name: str, what: str) -> Path:
@@ -111,6 +130,54 @@ def rna_structures() -> NDArray[np.str_]:
     """The structure (N,) that each row of `rna` is of."""
     path = _file("torus/rna.tsv", "the torsion angles of RNA")
     return np.loadtxt(path, usecols=0, dtype=str)
+
+
+def rna_angles() -> Drawn:
+    """Seven angles of RNA residues, in radians."""
+    _, group = np.unique(rna_structures(), return_inverse=True)
+    return Drawn(np.radians(rna()), "torus", group=group)
+
+
+def rotamers(name: str, angles: int, count: int) -> Drawn:
+    """Backbone and side-chain angles of the Top8000 proteins, in radians."""
+    path = _file(f"torus/top8000/rota8000-{name}.csv", "the rotamers")
+    rows = []
+    with path.open() as file:
+        for row in csv.reader(file):
+            try:
+                rows.append([float(cell) for cell in row[1 : 1 + angles]])
+            except ValueError:  # a missing angle
+                continue
+    order = np.random.default_rng(8).permutation(len(rows))[:count]
+    return Drawn(np.radians(np.array(rows))[order], "torus")
+
+
+def sidechains(dim: int) -> Drawn:
+    """Torsion angles of neighbouring residues with their side chains, from the repository.
+
+    4, 5 and 6 are phi, psi and two, three, four chi of one residue; 7 has phi, psi and three chi of one
+    and phi, psi of the next; from 8 on there are two residues, from 13 three, at most four apart.
+    """
+    with np.load(HELD / "sidechains.npz", allow_pickle=False) as arrays:
+        angles = np.radians(arrays[f"angles_{dim}"] / 100)
+        _, group = np.unique(arrays[f"structure_{dim}"], return_inverse=True)
+    return Drawn(angles, "torus", group=group)
+
+
+def backbone_windows(dim: int) -> Drawn:
+    """phi, psi of half as many residues in sequence, from the Top500 proteins; no residue twice."""
+    count, rows, group = dim // 2, [], []
+    for number, chain in enumerate(backbone_chains()):
+        at = 0
+        while at + count <= len(chain):
+            part = chain[at : at + count]
+            if np.isfinite(part).all():
+                rows.append(part.ravel())
+                group.append(number)
+                at += count
+            else:
+                at += 1
+    return Drawn(dequantised(np.array(rows)), "torus", group=np.array(group))
 
 
 def poles() -> Data:

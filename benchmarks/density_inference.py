@@ -18,8 +18,7 @@ import time
 
 import numpy as np
 import torch
-from common import DATA, needed
-from density_default_data import rotamers
+from density_data import rna, rotamers
 
 from orbiflow.density import DensityEstimator, Mixture, conditional, marginal
 from orbiflow.runtime import one_blas_thread
@@ -42,8 +41,7 @@ ASKED: dict[str, list[tuple[tuple[int, ...], dict[int, float]]]] = {
 def angles(name: str, rows: int) -> np.ndarray:
     """Angles in radians."""
     if name == "rna-7":
-        path = needed(DATA / "density" / "torus" / "rna.tsv", "the RNA angles")
-        return np.radians(np.loadtxt(path, usecols=range(2, 9)))[:rows]
+        return np.radians(rna())[:rows]
     residue = {"gln-5": "gln", "lys-6": "lys-1m"}[name]
     return np.asarray(rotamers(residue, int(name[-1]), rows).data)
 
@@ -111,7 +109,6 @@ def main() -> None:
     names = ["gln-5"] if options.quick else options.data or list(ASKED)
     if unknown := set(names) - set(ASKED):
         parser.error(f"no such data: {', '.join(sorted(unknown))}")
-    needed(DATA / "density" / "torus", "the angles of residues and of RNA")
     for name in names:
         rows, count = (400, 4) if options.quick else (options.rows, POINTS)
         density = DensityEstimator("torus", seed=0).fit(angles(name, rows)).density_

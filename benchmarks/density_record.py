@@ -7,7 +7,7 @@ RNA structures), with the integral of every density by quadrature (density_integ
 published figures. narrow: test NLL of a tuned kernel estimate with ever narrower kernels added, on
 both kinds of split. entropy: what an estimate by nearest neighbours says of the data's entropy, and
 of that of as many draws from our density, whose entropy is known. scheme: the published evaluation
-of kinetic diffusions on a density that is known (density_momentum.py). Needs the tables of
+of kinetic diffusions on a density that is known (density_limits.py). Needs the tables of
 docs/benchmarks.md, scheme nothing.
 """
 
@@ -22,12 +22,10 @@ from typing import NamedTuple
 import numpy as np
 import torch
 from common import published
-from density_compare import halves
-from density_data import EARTH, TORI, Data, backbone_and_chains, earth, rna, rna_structures
-from density_default_data import Drawn
+from density_data import EARTH, TORI, Data, Drawn, backbone_and_chains, earth, rna_angles
+from density_default import halves
 from density_integral import Integral, integral
-from density_limits import neighbour_entropy, with_narrow
-from density_momentum import excess, mass
+from density_limits import excess, mass, neighbour_entropy, with_narrow
 from numpy.typing import NDArray
 
 from orbiflow.density import DensityEstimator, Mixture
@@ -37,26 +35,17 @@ PUBLISHED_NAME = {"quakes": "earthquake"}
 METHODS = ("moser", "rsgm", "rdm", "rfm", "gfm", "tdm", "wkbc")
 
 
-class Grouped(NamedTuple):
-    """Rows, their space, and the group (N,) of each; whether groups are equal rows."""
-
-    drawn: Drawn
-    group: NDArray[np.integer]
-    equal: bool
-
-
-def load(name: str) -> Grouped:
-    """A data set of the record."""
-    if name in EARTH:
-        rows = earth(name)
-        _, group = np.unique(rows, axis=0, return_inverse=True)
-        return Grouped(Drawn(rows, "sphere"), group.ravel(), True)
+def load(name: str) -> Drawn:
+    """A data set of the record, with the group of each row: its place, protein chain or structure."""
     if name == "rna":
-        _, group = np.unique(rna_structures(), return_inverse=True)
-        return Grouped(Drawn(np.radians(rna()), "torus"), group, False)
-    rows, chain = backbone_and_chains(name)
-    _, group = np.unique(chain, return_inverse=True)
-    return Grouped(Drawn(rows, "torus"), group, False)
+        return rna_angles()
+    if name in EARTH:
+        rows, space = earth(name), "sphere"
+        _, group = np.unique(rows, axis=0, return_inverse=True)
+    else:
+        (rows, chain), space = backbone_and_chains(name), "torus"
+        _, group = np.unique(chain, return_inverse=True)
+    return Drawn(rows, space, group=group.ravel())
 
 
 class Row(NamedTuple):
@@ -69,9 +58,9 @@ class Row(NamedTuple):
 
 def fitted(name: str, seed: int, grouped: bool) -> tuple[DensityEstimator, Data, Data]:
     """The default, and the training and test rows."""
-    drawn, group, equal = load(name)
-    train, test = halves(drawn, seed, group if grouped else None)
-    repeats = "rounding" if grouped and equal else "places"
+    drawn = load(name)
+    train, test = halves(drawn, seed, drawn.group if grouped else None)
+    repeats = "rounding" if grouped and name in EARTH else "places"
     return DensityEstimator(drawn.space, seed=seed, repeats=repeats).fit(train), train, test
 
 
@@ -127,19 +116,20 @@ def narrow(_count: int, _pool: ProcessPoolExecutor, names: tuple[str, ...]) -> N
     print("test NLL of a kernel estimate, and with kernels of these deviations added (their share)")
     print(f"{'data':9}{'split':9}{'tuned':>8}" + "".join(f"{_width(k):>16}" for k in kappas))
     for name in names:
-        drawn, group, _ = load(name)
+        drawn = load(name)
         for what in ("random", "grouped"):
-            rest, test = halves(drawn, 0, group if what == "grouped" else None)
-            own = _groups(drawn, group, rest) if what == "grouped" else None
+            rest, test = halves(drawn, 0, drawn.group if what == "grouped" else None)
+            own = _groups(drawn, rest) if what == "grouped" else None
             train, held = halves(Drawn(rest, drawn.space), 1, own)
             base, found = with_narrow(train, held, test, kappas, round_=drawn.space == "sphere")
             cells = "".join(f"{nll:9.3f} ({share:4.1%})" for nll, share in found)
             print(f"{name:9}{what:9}{base:8.3f}{cells}", flush=True)
 
 
-def _groups(drawn: Drawn, group: NDArray[np.integer], rows: Data) -> NDArray[np.integer]:
+def _groups(drawn: Drawn, rows: Data) -> NDArray[np.integer]:
     """The group of each of some rows, by their values: those that are equal share one."""
-    own = {bytes(place): number for place, number in zip(drawn.data, group, strict=True)}
+    assert drawn.group is not None
+    own = {bytes(place): number for place, number in zip(drawn.data, drawn.group, strict=True)}
     return np.array([own[bytes(place)] for place in rows])
 
 
@@ -155,7 +145,7 @@ def entropy(_count: int, _pool: ProcessPoolExecutor, names: tuple[str, ...]) -> 
         f"{'data':9}{'rows':>8}{'true':>9}{'neighbour':>11}{'of rows':>9}{'draws':>9}{'corrected':>11}"
     )
     for name in names:
-        drawn, _, _ = load(name)
+        drawn = load(name)
         if drawn.space != "torus":
             continue
         torch.set_num_threads(1)

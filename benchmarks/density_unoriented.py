@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 import torch
 from density_data import Data, splits
-from density_unoriented_data import AXES, KLEIN, known, load
-from density_unoriented_kde import Kernel, UnorientedKernelDensity, tuned
+from density_kde import Kernel, UnorientedKernelDensity, tuned
+from density_known import AXES, KLEIN, known, unoriented
 
 from orbiflow.density import Density, DensityEstimator
 
@@ -111,7 +111,7 @@ def main() -> None:
         "     true  kde fit  flow fit   100k: kde s  flow s     mass"
     )
     for name in names:
-        data = load(name)
+        data = unoriented(name)
         rows = [run(name, data, seed, seconds, options.max_frequency) for seed in range(count)]
         print_row(name, len(data), rows)
         truth = known(name)

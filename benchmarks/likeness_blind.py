@@ -21,10 +21,24 @@ from typing import Any
 import numpy as np
 import scipy.stats
 import torch
-from common import GOALS, Ring
-from likeness_methods import BEFORE, METHODS, cell, common_unit, first_tiles
-from likeness_shapes import silhouettes
+from common import DATA, GOALS, HELD, Ring, aligned, cell, common_unit, goal, needed, silhouettes
 from PIL import Image, ImageDraw, ImageFont
+
+from orbiflow.tiles import LikenessSearch, OverlapSearch, Target, centroid, escherize, signed_area
+
+SEARCHES = {"overlap": OverlapSearch, "likeness": LikenessSearch}
+RIVALS = {"arap": "arap_EIR_top20", "est": "est_euclid_top20"}
+"""The methods whose tiles are files, and what the files call them."""
+
+BEFORE = "before"
+"""An earlier search for likeness: its first tiles lie in the folder of tiles as NAME-before.json."""
+
+METHODS = (*SEARCHES, *RIVALS, BEFORE)
+COLUMNS = (*METHODS, "trial")
+"""What `score` knows: the trial that the search for likeness grew from is in the answers of seed 97."""
+
+TRIES = 8
+"""Turns from which the best similarity is sought: three have missed it for a spider."""
 
 CELL, HEAD, BLUE = 300, 36, "#1f5fbf"  # pixels
 
@@ -60,6 +74,63 @@ number 1, of number 2, and so on; equal marks are a tie:
 """
 
 
+def target_of(name: str) -> Target:
+    """The silhouette of a goal, of data/likeness_shapes.json, or in a file."""
+    if name in GOALS:
+        return goal(name)
+    shape = silhouettes().get(name)
+    return Target.from_polygon(shape["outline"]) if shape else Target.read(needed(Path(name), name))
+
+
+def first_tiles(name: str, effort: str, folder: Path, methods: Sequence[str]) -> dict[str, Ring]:
+    """Of "target" and of each method that has one, its first tile: y up, area 1, upright.
+
+    Searches are slow: what was found is kept in `folder`, to be removed after a change of the search.
+    """
+    target = target_of(name)
+    found = {"target": np.asarray(target.normal)}
+    for method in methods:
+        kept = (
+            folder / f"{Path(name).stem}-{method}{f'-{effort}' if method in SEARCHES else ''}.json"
+        )
+        if method == BEFORE and not kept.exists():
+            raise SystemExit(
+                f"{name}: put the first tile of the search before, as points, in {kept}"
+            )
+        if not kept.exists():
+            folder.mkdir(parents=True, exist_ok=True)
+            kept.write_text(json.dumps(first_tile(name, target, method, effort)))
+        ring = np.array(json.loads(kept.read_text()))
+        if len(ring):
+            found[method] = (ring - centroid(ring)) / np.sqrt(abs(signed_area(ring)))
+    return found
+
+
+def first_tile(name: str, target: Target, method: str, effort: str) -> list[list[float]]:
+    """The first tile of one method laid on the target, or nothing."""
+    if method in SEARCHES:
+        tiles = escherize(target, method=SEARCHES[method].for_effort(effort)).tiles
+        ring = tiles[0].normal_tile.polygon if tiles else None
+    else:
+        ring = rival(name).get(method)
+    if ring is None:
+        return []
+    return aligned(np.asarray(ring), np.asarray(target.normal), TRIES).tolist()
+
+
+def rival(name: str) -> dict[str, list[list[float]]]:
+    """The first tiles of EST and ARAP, by method, where they are at hand."""
+    goals = DATA / "silhouettes" / "baseline_tiles" / f"{name}.json"
+    if goals.exists():
+        tiles = json.loads(goals.read_text())
+        return {method: tiles[key][0]["tile"] for method, key in RIVALS.items()}
+    icons = DATA / "silhouettes" / "icons" / "baselines.json"
+    known = json.loads(icons.read_text()) if icons.exists() else {}
+    fresh = json.loads((HELD / "likeness_rivals.json").read_text())
+    found = known.get(name.removesuffix("_80")) or fresh.get(name, {})
+    return {method: tile["tile"] for method, tile in found.items()}
+
+
 def shuffled(methods: Sequence[str], seed: int, round_number: int, index: int) -> list[str]:
     """The methods in the order of one picture: the first has number 1."""
     order = np.random.default_rng([seed, round_number, index]).permutation(len(methods))
@@ -83,10 +154,11 @@ def sheet(target: Ring, tiles: Sequence[Ring]) -> Image.Image:
 
 def make(options: argparse.Namespace) -> None:
     """Write the sheets, the instructions and the key."""
-    rows = {}
+    rows: dict[str, dict[str, Ring]] = {}
     for name in options.names or GOALS:
-        rows[name] = first_tiles(name, options.effort, options.tiles, tuple(options.methods))
-        print(f"{name}: {', '.join(m for m in rows[name] if m != 'target')}", flush=True)
+        found = first_tiles(name, options.effort, options.tiles, options.methods)
+        print(f"{name}: {', '.join(method for method in found if method != 'target')}", flush=True)
+        rows[Path(name).stem] = found
     sheets: Path = options.out / "sheets"
     key: dict[str, dict[str, list[str]]] = {}
     for number in range(1, options.rounds + 1):
@@ -150,7 +222,7 @@ def score(options: argparse.Namespace) -> None:
         except (ValueError, KeyError, TypeError) as error:
             raise SystemExit(f"{path}: {type(error).__name__}: {error}") from error
     rows = [row for _, row in named]
-    methods = [method for method in (*METHODS, BEFORE) if any(method in row for row in rows)]
+    methods = [method for method in COLUMNS if any(method in row for row in rows)]
     print(f"{len(rows)} rows from {len(options.answers)} files\n\nmean rank\n{'':18}", end="")
     print("".join(f"{method:>10}" for method in methods))
     for name in dict.fromkeys(name for name, _ in named):
@@ -208,15 +280,13 @@ def main() -> None:
     )
     commands = parser.add_subparsers(required=True)
     maker = commands.add_parser("make", help="write sheets and key")
-    maker.add_argument("names", nargs="*", help="silhouettes by name; default the nine goals")
+    maker.add_argument("names", nargs="*", help="silhouettes or files; default the nine goals")
     maker.add_argument("--out", type=Path, default=Path("out/blind"))
     maker.add_argument("--seed", type=int, default=0)
     maker.add_argument("--rounds", type=int, default=3)
     maker.add_argument("--effort", choices=("fast", "normal", "best"), default="normal")
-    maker.add_argument("--methods", nargs="+", choices=(*METHODS, BEFORE), default=list(METHODS))
-    maker.add_argument(
-        "--tiles", type=Path, default=Path("out/likeness"), help="of likeness_sheets.py"
-    )
+    maker.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS[:-1]))
+    maker.add_argument("--tiles", type=Path, default=Path("out/likeness"), help="kept there")
     maker.set_defaults(command=make)
     scorer = commands.add_parser("score", help="read answers")
     scorer.add_argument("answers", nargs="+", type=Path)

@@ -2,7 +2,7 @@
 
     python benchmarks/likeness_carving.py [--picture FILE.png] [NAME ...]
 
-For each silhouette of likeness_shapes.json the best tile of the classes IH4, IH5 and IH6 at effort
+For each silhouette of data/likeness_shapes.json the best tile of the classes IH4, IH5 and IH6 at effort
 fast, as bending leaves it and then carved: the foretold marks, and by how many radians the silhouette
 and the tiles turn in all. The picture shows the silhouette in blue and both tiles.
 """
@@ -15,9 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from common import Ring
-from likeness_methods import cell, common_unit
-from likeness_shapes import silhouettes
+from common import Ring, cell, common_unit, silhouettes
 from PIL import Image
 
 from orbiflow.arrays import Complex

@@ -40,15 +40,6 @@ EXCEPTIONS: dict[str, str] = {}
 """Imports that may go past a door, `file: module`, each with its reason."""
 
 
-OPENS_LATER_ROOMS = {
-    "orbiflow.tiles.tile": "a tile's methods are thin: each imports, when called, what does the work"
-}
-"""Files whose functions may import from later rooms, each with its reason."""
-
-OPEN_LATER = "orbiflow.tiles."
-"""The room whose one circle of lazy imports is not opened yet."""
-
-
 class Import(NamedTuple):
     """A name that a file imports: from where, and in which file that is defined."""
 
@@ -126,8 +117,6 @@ def test_a_room_imports_only_rooms_before_it(name: str) -> None:
     allowed = {"", *ROOMS[: ROOMS.index(name) + 1]} if name else {""}
     for found in ALL:
         own = dotted(found.file)
-        if own in OPENS_LATER_ROOMS and not found.at_start:
-            continue
         if room(own) == name and own not in ("orbiflow", "orbiflow.__main__"):
             assert room(found.module) in allowed, str(found)
 
@@ -147,8 +136,7 @@ def test_no_circles() -> None:
     graph: dict[str, set[str]] = {}
     for found in ALL:
         own = dotted(found.file)
-        later = own.startswith(OPEN_LATER) and not found.at_start
-        if not later and not found.for_types and found.module not in (own, *PACKAGES):
+        if not found.for_types and found.module not in (own, *PACKAGES):
             graph.setdefault(own, set()).add(found.module)
     try:
         list(TopologicalSorter(graph).static_order())

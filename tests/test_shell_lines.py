@@ -42,7 +42,7 @@ def test_there_are_lines_to_try() -> None:
         ("make everything", "everything"),
         ("python benchmarks/nothing.py", "benchmarks/nothing.py"),
         ("python benchmarks/escherization.py --effort most", "--effort"),
-        ("python benchmarks/ablations.py --fast", "--fast"),
+        ("python benchmarks/field.py --fast", "--fast"),
         ("python -m reproduction --quick", "--quick"),
         ("pip install '.[everything]'", "everything"),
         ("orbiflo escherize turtle.png", "orbiflo"),
@@ -56,7 +56,11 @@ def test_a_mistake_is_found(words: str, what: str) -> None:
 
 
 def test_what_is_left_out_is_told_apart() -> None:
-    for words in ("orbiflow density fit", "orbiflow export", "python benchmarks/artwork.py"):
+    for words in (
+        "orbiflow density fit",
+        "orbiflow export",
+        "python benchmarks/likeness_blind.py score",
+    ):
         refused = refusal(words.split())
         assert refused is not None
         assert refused.incomplete

@@ -22,15 +22,15 @@ def module_fixture(monkeypatch: pytest.MonkeyPatch):
 
 @pytest.mark.parametrize("dim", range(4, 15))
 def test_side_chains_of_all_dimensions_are_in_the_repository(module, dim: int) -> None:
-    drawn, group = module("density_many_data").sidechains(dim)
+    drawn = module("density_data").sidechains(dim)
     assert drawn.data.shape[1] == dim
-    assert len(drawn.data) == len(group) > 1_000
+    assert len(drawn.data) == len(drawn.group) > 1_000
     assert abs(drawn.data).max() <= math.pi
     assert len(np.unique(drawn.data, axis=0)) > 0.99 * len(drawn.data)
 
 
 def test_the_known_density_is_a_sum_over_paths(module) -> None:
-    drawn, _ = module("density_many_data").known(2)
+    drawn = module("density_known").hidden_markov_chain(2)
     grid = (np.arange(96) + 0.5) / 96 * 2 * np.pi - np.pi
     points = np.array(list(itertools.product(grid, grid)))
     assert np.exp(drawn.log_density(points)).mean() * 4 * np.pi**2 == pytest.approx(1, abs=1e-6)
@@ -41,10 +41,10 @@ def test_the_known_density_is_a_sum_over_paths(module) -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_groups_stay_on_one_side(module, seed: int) -> None:
-    compare, drawn = module("density_compare"), module("density_default_data").Drawn
+    halves, drawn = module("density_default").halves, module("density_data").Drawn
     group = np.random.default_rng(seed).integers(60, size=900)
     rows = np.stack([np.arange(900.0), group], axis=1)
-    train, test = compare.halves(drawn(rows, "torus"), seed, group)
+    train, test = halves(drawn(rows, "torus"), seed, group)
     assert len(train) + len(test) == 900
     assert 90 <= len(test) < 150
     assert not set(train[:, 1]) & set(test[:, 1])
@@ -84,7 +84,7 @@ def test_entropy_by_neighbours(module) -> None:
 
 
 def test_the_score_of_the_kinetic_diffusion(module) -> None:
-    momentum = module("density_momentum")
+    momentum = module("density_limits")
     rng = np.random.default_rng(3)
     angle, velocity = rng.uniform(-3, 3, 50), rng.normal(size=50)
 
@@ -103,7 +103,7 @@ def test_the_score_of_the_kinetic_diffusion(module) -> None:
 
 
 def test_the_published_evaluation_is_off_and_less_so_with_steps(module) -> None:
-    momentum = module("density_momentum")
+    momentum = module("density_limits")
     time = {"end": 15.0, "start": 1e-2}
     few, many = (momentum.excess(0.1, n, rows=1_000, **time) for n in (100, 1_000))
     assert few < -0.2

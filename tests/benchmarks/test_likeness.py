@@ -1,16 +1,16 @@
-"""The scorer of deformation energies, and the arithmetic of blind comparisons."""
+"""The order of tiles beside what judges said, and the arithmetic of blind comparisons."""
 
 import importlib
+import json
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-from orbiflow.tiles import resampled
+import shapely
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
-NAMES = ("common", "likeness_methods", "likeness_energy", "likeness_blind")
+NAMES = ("common", "likeness_blind", "likeness_order")
 
 
 @pytest.fixture(name="load")
@@ -25,36 +25,77 @@ def load_fixture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
         monkeypatch.delitem(sys.modules, name, raising=False)
 
 
-def similar(ring: np.ndarray, mirrored: bool) -> np.ndarray:
-    turned = 3 * ring @ np.array([[0.6, -0.8], [0.8, 0.6]]) + (5, 7)
-    return turned[::-1] * (1, -1) if mirrored else turned
+def test_each_silhouette_is_one_sound_outline_with_its_licence(load) -> None:
+    found = load("common").silhouettes()
+    assert len(found) == 158
+    parts = [shape["part"] for shape in found.values()]
+    assert [parts.count(part) for part in ("test", "learn", "ranked", "fresh")] == [29, 59, 38, 32]
+    for name, shape in found.items():
+        polygon = shapely.Polygon(shape["outline"])
+        assert polygon.is_valid, name
+        assert polygon.area == pytest.approx(1, abs=1e-3), name
+        assert 60 <= len(shape["outline"]) <= 120, name
+        assert all(shape[key] for key in ("source", "by", "licence")), name
 
 
-@pytest.mark.parametrize("name", ["bat_60", "spider_120"])
-@pytest.mark.parametrize("mirrored", [False, True])
-def test_a_similar_copy_costs_nothing(load, name: str, mirrored: bool) -> None:
-    outline = np.asarray(load("common").goal(name).normal)
-    scorer = load("likeness_energy").Scorer(outline)
-    copy = similar(np.roll(outline, 17, axis=0), mirrored)
-    assert scorer.of_vertices(copy) == pytest.approx(0, abs=1e-12)
-    # points miss the vertices: the energy is small, not nothing
-    points = similar(np.roll(resampled(outline, 240), 31, axis=0), mirrored)
-    assert scorer.of_points(points) < 0.02
-    fine = resampled(outline, 600, 0.3)
-    own = similar(fine, mirrored=False)
-    assert scorer.of_images(np.roll(own, 9, 0), np.roll(fine, 9, 0)) < 0.004
+def test_each_ranking_has_every_place_once_and_no_silhouette_of_the_test(load) -> None:
+    common = load("common")
+    shapes = common.silhouettes()
+    found = json.loads((common.HELD / "likeness_ranks.json").read_text())
+    assert len(found) == 65
+    for name, tiles in found.items():
+        assert shapes[name]["part"] in ("learn", "ranked")
+        for places in np.array([tile["places"] for tile in tiles]).T:
+            assert sorted(places) == list(range(1, len(tiles) + 1))
 
 
-def test_energy_is_that_of_the_strain(load) -> None:
-    """Stretched by (1 + e) along x and 1 / (1 + e) along y: 2 e^2 times the area, no rotation.
+def test_the_page_has_what_the_order_prints_of_good_tiles(load, capsys) -> None:
+    load("likeness_order").ranks()
+    lines = capsys.readouterr().out.splitlines()
+    printed = {line[:22].strip(): line[22:].split() for line in lines}
+    page = (BENCHMARKS.parent / "docs" / "likeness.md").read_text()
+    for label in ("the order", "without these three"):
+        rank, _, mark, wins, _, count = printed[label]
+        assert f"| {label} | {rank[1:]} | {mark} | {wins} of {count} |" in page
+    assert float(printed["the order"][2]) > float(printed["without these three"][2])
 
-    Cotangent weights integrate the Dirichlet energy of linear maps, here e^2 + e^2, whatever the
-    mesh; clipping changes a little.
-    """
-    outline = np.asarray(load("common").goal("penguin_60").normal)
-    scorer = load("likeness_energy").Scorer(outline)
-    stretched = outline * (1.02, 1 / 1.02)
-    assert scorer.of_vertices(stretched) == pytest.approx(2 * 0.02**2, rel=0.15)
+
+def test_the_order_is_compared_with_marks(load, capsys, tmp_path, monkeypatch) -> None:
+    order = load("likeness_order")
+
+    def tile(damage: float, *given: float) -> dict[str, object]:
+        names = (*order.VALUES, "before", "energy", "displacement", "iou")
+        values = dict.fromkeys(names, damage) | {"pieces": [damage, damage], "length": 6.5}
+        values |= {"before": 1 - damage, "iou": 1 - damage, "overlap": 1 - damage}
+        return {"values": values, "marks": dict(zip("AB", given, strict=True))}
+
+    like = {"part": "learn", "tiles": [tile(0.1, 9, 8), tile(0.2, 5, 5), tile(0.3, 1, 2)]}
+    unlike = {"part": "test", "tiles": [tile(0.1, 1, 2), tile(0.2, 2, 2), tile(0.3, 7, 7)]}
+    document = {"silhouettes": {"elk": like, "owl": like, "bat": unlike}}
+    (tmp_path / "likeness_pool.json").write_text(json.dumps(document))
+    monkeypatch.setattr(order, "HELD", tmp_path)
+    order.marks()
+    lines = capsys.readouterr().out.splitlines()
+    orders = [line.split()[-3:] for line in lines if line.startswith("the order  ")]
+    assert orders == [["1.00", "8.50", "0.00"], ["-1.00", "1.50", "5.50"]]
+    assert "learn: 6 tiles of 2 silhouettes" in lines
+    assert sum("fitted to the others" in line for line in lines) == 1
+
+
+def test_first_tiles_are_kept_and_what_is_not_at_hand_is_left_out(load, tmp_path: Path) -> None:
+    blind = load("likeness_blind")
+    own = tmp_path / "square.svg"
+    own.write_text('<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0h9v9h-9z"/></svg>')
+    kept = tmp_path / "tiles"
+    assert set(blind.first_tiles(str(own), "fast", kept, ("arap", "est"))) == {"target"}
+    with pytest.raises(SystemExit, match=r"square\.svg: put the first tile"):
+        blind.first_tiles(str(own), "fast", kept, ("before",))
+    (kept / "square-before.json").write_text("[[0, 0], [2, 0], [2, 2], [0, 2]]")
+    found = blind.first_tiles(str(own), "fast", kept, ("arap", "before"))
+    assert set(found) == {"target", "before"}
+    assert shapely.Polygon(found["before"]).area == pytest.approx(1)
+    fresh = next(name for name, s in load("common").silhouettes().items() if s["part"] == "fresh")
+    assert set(blind.rival(fresh)) == {"arap", "est"}
 
 
 def test_answers_become_ranks(load) -> None:

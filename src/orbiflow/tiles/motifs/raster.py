@@ -20,6 +20,10 @@ NOWHERE = -1  # the label of samples that lie in no region
 NUDGE = 3.1415926e-7
 
 
+BLOCK = 2**15
+"""Samples that are looked up at a time: what is computed for them stays in the processor's cache."""
+
+
 class Runs(NamedTuple):
     """R runs of samples, each in one region, row by row and from left to right."""
 
@@ -49,19 +53,23 @@ def bilinear(colours: Array, places: Array) -> Array:
     """
     height, width, channels = colours.shape
     texels = colours.reshape(-1, channels)
-    x = (places[:, 0] - 0.5).clip(0, width - 1)
-    y = (places[:, 1] - 0.5).clip(0, height - 1)
-    left, top = x.astype(np.int64), y.astype(np.int64)
-    right = (left < width - 1).astype(np.int64)
-    below = np.where(top < height - 1, width, 0)
-    at = top * width + left
-    x, y = (x - left)[:, None], (y - top)[:, None]
-    upper, lower = texels.take(at, axis=0), texels.take(at + below, axis=0)
-    upper += x * (texels.take(at + right, axis=0) - upper)
-    lower += x * (texels.take(at + right + below, axis=0) - lower)
-    lower -= upper
-    lower *= y
-    return upper + lower
+    right, below = int(width > 1), width * int(height > 1)
+    found = np.empty((len(places), channels), dtype=np.result_type(colours, places))
+    for start in range(0, len(places), BLOCK):
+        x, y = (places[start : start + BLOCK] - places.dtype.type(0.5)).T
+        x, y = x.clip(0, width - 1), y.clip(0, height - 1)
+        left = np.minimum(x.astype(np.int64), max(width - 2, 0))
+        top = np.minimum(y.astype(np.int64), max(height - 2, 0))
+        x, y = (x - left)[:, None], (y - top)[:, None]
+        at = top * width + left
+        # clipped, which nothing needs, is faster than checked
+        upper = texels.take(at, axis=0, mode="clip")
+        upper += x * (texels.take(at + right, axis=0, mode="clip") - upper)
+        at += below
+        lower = texels.take(at, axis=0, mode="clip")
+        lower += x * (texels.take(at + right, axis=0, mode="clip") - lower)
+        found[start : start + BLOCK] = upper + y * (lower - upper)
+    return found
 
 
 def ring_sides(rings: Array) -> Sides:
