@@ -6,8 +6,8 @@ Random 80/10/10 splits (--grouped: equal locations stay together, since duplicat
 log-likelihood in nats, per radian^d or steradian, beside a von Mises or von Mises-Fisher kernel
 density estimate whose width and uniform floor are tuned on the same validation points, and the
 published rows of data/published.json (RFM: Riemannian flow matching; RDM: Riemannian diffusion
-model). Then the seconds for 100,000 query points (10,000 of RNA), on the first split: by the default and
-by the kernels (timed on 5,000 and scaled). All are fitted as `density fit` does by default. The
+model). Then the seconds for 100,000 query points (10,000 of RNA), on the first split: by the default
+and by the kernels (timed on 5,000 and scaled). All are fitted as `density fit` does by default. The
 backbone angles are rounded; see `density_data.backbone`.
 """
 
