@@ -28,6 +28,7 @@ def test_a_compressed_drawing(name: str) -> None:
         (gzip.compress(b" " * (MAX_BYTES + 1)), "holds over 16 MB"),
         (gzip.compress(b"\0\1\2"), "unknown kind"),
     ],
+    ids=["cut short", "header alone", "empty", "twice", "too large", "unknown"],
 )
 def test_what_is_damaged_or_too_large_is_refused(data: bytes, message: str) -> None:
     with pytest.raises(InputFileError, match=message):
