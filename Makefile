@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint bench docs gallery paper wheel clean
+.PHONY: demo test explore lint bench docs gallery paper wheel clean
 
 demo: $(VENV)/.installed
 	$(BIN)/orbiflow escherize examples/silhouettes/turtle.png --out out/demo
@@ -12,6 +12,10 @@ demo: $(VENV)/.installed
 # A worker a core: more threads of linear algebra would only wait for each other.
 test: lint
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -q
+
+# Random inputs that no run has had before: `make test` takes the same ones for everyone.
+explore: $(VENV)/.installed-dev
+	ORBIFLOW_EXPLORE=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -q
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -13,10 +13,10 @@ torch.set_num_threads(1)
 torch.set_warn_always(True)  # a warning must not depend on which test comes first
 
 settings.register_profile(
-    "local", deadline=None, max_examples=30, suppress_health_check=[HealthCheck.too_slow]
+    "explore", deadline=None, max_examples=30, suppress_health_check=[HealthCheck.too_slow]
 )
-settings.register_profile("ci", settings.get_profile("local"), derandomize=True, database=None)
-settings.load_profile("ci" if os.environ.get("CI") else "local")
+settings.register_profile("same", settings.get_profile("explore"), derandomize=True, database=None)
+settings.load_profile("explore" if os.environ.get("ORBIFLOW_EXPLORE") else "same")
 
 
 # what it does when it is imported is for processes alone, and the search for doctests imports all
