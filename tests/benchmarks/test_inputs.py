@@ -81,4 +81,4 @@ def test_the_page_names_every_benchmark() -> None:
     helpers = {"common", "density_data", "density_integral", "density_kde", "density_known"}
     helpers |= {"density_limits", "same_cases", "same_compare", "same_files", "same_inputs"}
     for path in BENCHMARKS.glob("*.py"):
-        assert path.stem in helpers or f"`{path.name}" in page
+        assert path.stem in helpers or f"benchmarks/{path.name}" in page

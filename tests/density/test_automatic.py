@@ -201,7 +201,7 @@ def test_what_cannot_be_chosen_is_refused() -> None:
         )
     with pytest.raises(OrbiflowError, match="a flow has 3 dimensions at most"):
         DensityEstimator("torus", unit="degrees", components="flow,chains").fit(
-            np.zeros((50, 5)) + np.arange(50)[:, None]
+            np.random.default_rng(0).uniform(0, 360, (50, 5))
         )
     with pytest.raises(OrbiflowError, match="at least 10 different points, got 3 among 30"):
         fit_automatic(make_space("torus"), torch.rand(3, 2).repeat(10, 1))
