@@ -180,7 +180,7 @@ def inference() -> list[Case]:
             "density-scores",
             (
                 f"density score {query} --model {backbone} --measure uniform --out uniform.csv",
-                f"density score {query} --model {backbone} --measure square --table --out table.csv",
+                f"density score {query} --model {backbone} --measure square --out table.csv",
                 f"density score {query} --model {backbone} --region --samples 1000 --out region.csv",
                 f"density score {IN}/holes.csv --model {four} --columns a,b,c,d --missing marginalise "
                 "--out holes.csv",

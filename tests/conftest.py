@@ -15,7 +15,9 @@ torch.set_warn_always(True)  # a warning must not depend on which test comes fir
 settings.register_profile(
     "explore", deadline=None, max_examples=30, suppress_health_check=[HealthCheck.too_slow]
 )
-settings.register_profile("same", settings.get_profile("explore"), derandomize=True, database=None)
+settings.register_profile(
+    "same", settings.get_profile("explore"), derandomize=True, database=None, max_examples=15
+)
 settings.load_profile("explore" if os.environ.get("ORBIFLOW_EXPLORE") else "same")
 
 
