@@ -15,6 +15,7 @@ from orbiflow.tiles import (
     Target,
     escherize,
     escherize_class,
+    save_tiles,
 )
 
 README_PATH = Path(__file__).parents[1] / "README.md"
@@ -62,7 +63,7 @@ def test_the_model_snippet_maps_there_and_back(tmp_path, monkeypatch):
     found = escherize_class(target, "IH4", small)
     assert isinstance(found, EscherTile)
     (tmp_path / "out").mkdir()
-    found.save(tmp_path / "out" / "turtle")
+    save_tiles([found], tmp_path / "out" / "turtle")
     monkeypatch.chdir(tmp_path)
     names = run(snippet)
     np.testing.assert_allclose(np.asarray(names["back"]), np.asarray(names["eye"]), atol=1e-8)

@@ -307,7 +307,7 @@ def test_what_is_drawn_on_a_card_is_taken(card: str, corner: int) -> None:
     assert iou(cut_out.outline, SHAPE + 5) > 0.995
     assert CARD_NOTE in cut_out.notes
     paper = (120, 160, 130) if card in ("white", "yellow") else (250, 250, 250)
-    opaque = np.where(where[..., None] > 0, pixels, np.uint8(paper))
+    opaque = np.where(where[..., None] > 0, pixels, np.array(paper, dtype=np.uint8))
     for mode in ("RGB", "L"):
         reading = read(saved(Image.fromarray(opaque.astype(np.uint8)).convert(mode)))
         assert iou(reading.outline, SHAPE + 5) > 0.99
