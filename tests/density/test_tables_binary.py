@@ -105,7 +105,7 @@ def test_npy_column_that_is_text(tmp_path: Path) -> None:
 
 def test_parquet_without_pyarrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(OrbiflowError, match="needs pyarrow: pip install pyarrow"):
+    with pytest.raises(OrbiflowError, match=r"needs pyarrow.*pip install 'orbiflow\[parquet\]'"):
         read_table(write(tmp_path, "PAR1", "a.parquet"), columns=None, width=2)
     refuse(write(tmp_path, "1,2", "a.parquet"), "does not begin as a .parquet file")
 

@@ -6,7 +6,6 @@ import asyncio
 import socket
 import subprocess
 import sys
-from importlib import util
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -24,11 +23,7 @@ from orbiflow.studio.serving import PatientProtocol, Server
 
 
 def test_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    known = util.find_spec
-    monkeypatch.setattr(
-        "orbiflow.studio.operations.find_spec",
-        lambda name: None if name == "uvicorn" else known(name),
-    )
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
     with pytest.raises(OrbiflowError, match=r"needs uvicorn.*pip install 'orbiflow\[studio\]'"):
         studio(StudioSettings(data=tmp_path / "data", browser=False))
     assert not (tmp_path / "data").exists()

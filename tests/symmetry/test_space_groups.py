@@ -142,7 +142,7 @@ def test_cells_without_volume_are_refused(cell):
 
 def test_without_gemmi_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "gemmi", None)
-    with pytest.raises(OrbiflowError, match=r'pip install "orbiflow\[crystals\]"'):
+    with pytest.raises(OrbiflowError, match=r"pip install 'orbiflow\[crystals\]'"):
         space_group(1)
 
 

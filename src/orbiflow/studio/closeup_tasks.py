@@ -19,7 +19,6 @@ from orbiflow.runtime import (
 )
 from orbiflow.studio.settings import Job
 from orbiflow.studio.tile_files import STAGES, best_stage, put_tile, tile_folder, tile_number
-from orbiflow.tiles import read_result, save_tiles
 
 SPACE = "space.json"
 PIXELS = (".png", ".jpg", ".jpeg", ".webp")  # of pictures on which lines can be drawn
@@ -33,6 +32,7 @@ def space(job: Job, tile: int, *, on_event: Sink = ignore, cancel: Cancel = NEVE
         tile: The number of the tile.
     """
     from orbiflow.studio.pulled_tiles import space_json
+    from orbiflow.tiles import read_result
 
     del on_event
     cancel.check()
@@ -58,6 +58,7 @@ def pull(
         parameters: Where it was pulled to, in the space that `studio space` wrote.
     """
     from orbiflow.studio.pulled_tiles import pulled, space_json
+    from orbiflow.tiles import read_result
 
     cancel.check()
     found = pulled(read_result(tile_folder(job.project, tile)), parameters)
@@ -81,6 +82,7 @@ def with_drawing(
         scratch: A folder for what is written on the way.
     """
     from orbiflow.studio.tile_drawing import drawing_settings, with_any_map
+    from orbiflow.tiles import read_result, save_tiles
 
     try:
         parts = json.loads(drawing or "{}")

@@ -23,7 +23,6 @@ from orbiflow.errors import InputFileError, OrbiflowError, system_errors
 from orbiflow.runtime import is_object
 from orbiflow.studio.tile_files import PLACES, best_stage, tile_folder
 from orbiflow.studio.words import MASKS
-from orbiflow.tiles import read_result
 
 if TYPE_CHECKING:
     from orbiflow.tiles import EscherTile, Target
@@ -175,6 +174,7 @@ def reading_of(document: Mapping[str, Any]) -> tuple[str, Any]:
 
 def read_tiles(home: Path, document: Mapping[str, Any]) -> list[tuple[EscherTile, int, int | None]]:
     """Return the certified tiles in an unpacked project, each with its number and its parent's."""
+    from orbiflow.tiles import read_result
 
     found: list[tuple[EscherTile, int, int | None]] = []
     for entry in document["tiles"][:PLACES]:

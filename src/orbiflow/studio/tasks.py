@@ -28,7 +28,7 @@ from orbiflow.studio.tile_files import (
     tile_folder,
     tile_number,
 )
-from orbiflow.tiles import ReadingSettings, read_result
+from orbiflow.tiles import ReadingSettings
 
 if TYPE_CHECKING:
     from orbiflow.tiles import EscherizeSettings, EscherTile
@@ -127,7 +127,7 @@ def _search_settings(project: Path, choice: SearchChoice) -> EscherizeSettings:
 
 def _classes_like(project: Path, number: int) -> tuple[str, ...]:
     """Return the class of a tile, and those of the nine with the same group."""
-    from orbiflow.tiles import CLASSES, isohedral_class
+    from orbiflow.tiles import CLASSES, isohedral_class, read_result
 
     own = read_result(tile_folder(project, number)).isohedral_class
     group = isohedral_class(own).group().name

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import ItemDone, Sink, write_json
-from orbiflow.tiles import save_tiles
 
 if TYPE_CHECKING:
     from orbiflow.tiles import EscherTile
@@ -52,6 +51,7 @@ def put_tile(
 ) -> None:
     """Write a certified `EscherTile` as a stage of a tile, and tell that it is there."""
     from orbiflow.studio.tile_view import tile_card, tile_view
+    from orbiflow.tiles import save_tiles
 
     place = home / "tiles" / str(number) / stage
     if not place.is_dir():
