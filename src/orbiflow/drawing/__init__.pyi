@@ -24,6 +24,7 @@ from .raster import caption as caption
 from .raster import captioned as captioned
 from .raster import dashes as dashes
 from .raster import draw_line as draw_line
+from .raster import fine_places as fine_places
 from .raster import font as font
 from .raster import in_bands as in_bands
 from .raster import limited as limited

@@ -167,11 +167,11 @@ class Raster:
             if high < top or low > top + rows:
                 continue
             if isinstance(shape, Drawn):
-                draw_line(pen, _fine(shape.points, top), shape.width * FINER, shape.colour)
+                draw_line(pen, fine_places(shape.points, top), shape.width * FINER, shape.colour)
             elif shape.holes:
                 _draw_with_holes(band, shape, top)
             else:
-                pen.polygon(_fine(shape.points, top).ravel().tolist(), fill=shape.colour)
+                pen.polygon(fine_places(shape.points, top).ravel().tolist(), fill=shape.colour)
 
 
 def in_bands(
@@ -203,7 +203,8 @@ def in_bands(
     return whole
 
 
-def _fine(points: Array, top: int) -> Array:
+def fine_places(points: Array, top: int) -> Array:
+    """Return points (N, 2) in pixels as Pillow draws them on a band that begins at row `top`."""
     # whole numbers are the middles of pixels for Pillow
     return (points - (0.0, top)) * FINER - 0.5
 
@@ -227,7 +228,7 @@ def _draw_with_holes(band: Image.Image, shape: Filled, top: int) -> None:
     mask = Image.new("1", band.size)
     pen = ImageDraw.Draw(mask)
     for ring, inside in ((shape.points, 1), *((hole, 0) for hole in shape.holes)):
-        pen.polygon(_fine(ring, top).ravel().tolist(), fill=inside)
+        pen.polygon(fine_places(ring, top).ravel().tolist(), fill=inside)
     band.paste(shape.colour, (0, 0), mask)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw
 from PIL.PngImagePlugin import PngInfo
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import FINER, draw_line, in_bands, rgb
+from orbiflow.drawing import FINER, draw_line, fine_places, in_bands, rgb
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import signed_area
 from orbiflow.tiles.scene.flattening import flattened
@@ -67,12 +67,8 @@ class Shape(NamedTuple):
     lines: tuple[Array, ...]  # to stroke
     style: Style  # with the stroke's width in pixels
     opacity: float
-
-    @property
-    def box(self) -> tuple[float, float]:
-        """The least and the largest y of what is drawn, in pixels."""
-        every = np.concatenate([ring[:, 1] for ring in self.lines])
-        return float(every.min() - self.style.width), float(every.max() + self.style.width)
+    low: float  # with `high`: the least and the largest y of what is drawn
+    high: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +107,9 @@ def shape_of(part: Part, *, least_width: float = 0.0) -> Shape:
     lines = [np.concatenate([p, p[:1]]) if c else p for p, c in zip(points, closed, strict=True)]
     width = max(part.style.width, least_width) if part.style.stroke else 0.0
     rings = tuple(ring for ring in points if len(ring) > 2) if part.style.fill else ()
-    return Shape(rings, tuple(lines), part.style._replace(width=width), part.opacity)
+    heights = np.concatenate([line[:, 1] for line in lines])
+    reach = float(heights.min() - width), float(heights.max() + width)
+    return Shape(rings, tuple(lines), part.style._replace(width=width), part.opacity, *reach)
 
 
 def painted(
@@ -119,23 +117,26 @@ def painted(
 ) -> Image.Image:
     """Return layers, from the bottom up, as a picture in RGBA: on a ground, or on nothing."""
     start = (0, 0, 0, 0) if ground is None else (*rgb(ground), 255)
+    pngs = {item.png for sheet in sheets for item in sheet.items if isinstance(item, Raster)}
+    pictures = {png: Image.open(io.BytesIO(png)).convert("RGBA").convert("RGBa") for png in pngs}
 
     def draw(band: Image.Image, top: int, rows: int) -> None:
         for sheet in sheets:
-            _draw_sheet(band, sheet, top, rows)
+            _draw_sheet(band, sheet, top, rows, pictures)
 
     return in_bands("RGBA", size, start, draw)
 
 
-def _draw_sheet(band: Image.Image, sheet: Sheet, top: int, rows: int) -> None:
+def _draw_sheet(
+    band: Image.Image, sheet: Sheet, top: int, rows: int, pictures: Mapping[bytes, Image.Image]
+) -> None:
     """Draw a layer on a band, FINER times as fine, of so many rows of pixels from `top` on."""
     below = None if sheet.window is None else band.copy()
     for item in sheet.items:
         if isinstance(item, Raster):
-            _draw_raster(band, item, top)
+            _draw_raster(band, item, pictures[item.png], top)
             continue
-        low, high = item.box
-        if low <= top + rows and high >= top:
+        if item.low <= top + rows and item.high >= top:
             _draw_shape(band, item, top)
     if sheet.window is not None and below is not None:
         left, upper, right, lower = (
@@ -150,8 +151,8 @@ def _draw_sheet(band: Image.Image, sheet: Sheet, top: int, rows: int) -> None:
 
 def _draw_shape(band: Image.Image, shape: Shape, top: int) -> None:
     """Draw a shape on a band."""
-    rings = [_fine(ring, top) for ring in shape.rings]
-    lines = [_fine(line, top) for line in shape.lines]
+    rings = [fine_places(ring, top) for ring in shape.rings]
+    lines = [fine_places(line, top) for line in shape.lines]
     opaque = shape.opacity >= 1
     canvas = band if opaque else Image.new("RGBA", band.size)
     pen = ImageDraw.Draw(canvas)
@@ -186,7 +187,7 @@ def _fill(
     canvas.paste(colour, (0, 0), mask)
 
 
-def _draw_raster(band: Image.Image, raster: Raster, top: int) -> None:
+def _draw_raster(band: Image.Image, raster: Raster, picture: Image.Image, top: int) -> None:
     """Draw a picture of pixels on a band, linear between its pixels."""
     linear, offset = raster.linear * FINER, (raster.offset - (0.0, top)) * FINER
     corners = raster._replace(linear=linear, offset=offset).corners
@@ -198,7 +199,6 @@ def _draw_raster(band: Image.Image, raster: Raster, top: int) -> None:
     inverse = np.linalg.inv(linear)
     start = inverse @ (low - offset)
     (a, b), (c, d) = inverse.tolist()
-    picture = Image.open(io.BytesIO(raster.png)).convert("RGBA").convert("RGBa")
     own = picture.transform(
         (width, height),
         Image.Transform.AFFINE,
@@ -206,8 +206,3 @@ def _draw_raster(band: Image.Image, raster: Raster, top: int) -> None:
         resample=Image.Resampling.BILINEAR,
     )
     band.alpha_composite(own.convert("RGBA"), tuple(low.tolist()))
-
-
-def _fine(points: Array, top: int) -> Array:
-    # whole numbers are the middles of pixels for Pillow
-    return (points - (0.0, top)) * FINER - 0.5
