@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -24,22 +25,22 @@ from orbiflow.tiles import (
     ArtSettings,
     EscherTile,
     LikenessSearch,
+    Over,
     SearchResult,
     Target,
     TileMap,
     artwork,
     colouring,
     escherize,
-    overlay_raster,
+    overlay_picture,
     overview_png,
     render_artwork,
-    tile_svg,
-    tiling_raster,
-    tiling_svg,
+    tile_picture,
+    tiling_picture,
     with_map,
     write_gallery,
 )
-from orbiflow.tiles.art.making import png_of
+from orbiflow.tiles.make.art import png_of
 from orbiflow.tiles.motifs.source import Picture
 
 
@@ -50,13 +51,16 @@ def print_files(found: SearchResult, *, figures: bool) -> None:
     both, y_down = list(zip(results, colours, strict=True)), target.y_down
     print(f"{len(results)} tiles of {target.source}; CPU seconds for all of them")
     row("colouring", lambda: [colouring(result.tile) for result in results])
-    row("tile.svg", lambda: [tile_svg(r.tile, y_down=y_down) for r in results])
-    row("tiling.svg", lambda: [tiling_svg(r.tile, y_down=y_down, colours=c) for r, c in both])
+    row("tile.svg", lambda: [tile_picture(r.tile, y_down=y_down).svg() for r in results])
+    row(
+        "tiling.svg",
+        lambda: [tiling_picture(r.tile, y_down=y_down, colours=c).svg() for r, c in both],
+    )
     row(
         "tiling.png",
-        lambda: [tiling_raster(r.tile, y_down=y_down, colours=c).png() for r, c in both],
+        lambda: [tiling_picture(r.tile, y_down=y_down, colours=c).png() for r, c in both],
     )
-    row("overlay.png", lambda: [overlay_raster(r.tile, target.outline).png() for r in results])
+    row("overlay.png", lambda: [overlay_picture(r.tile, target.outline).png() for r in results])
     row("model", lambda: [(r.map or TileMap()).to_bytes() for r in results])
     row("overview.png", lambda: overview_png(results, target, colours))
     with tempfile.TemporaryDirectory() as folder:
@@ -75,14 +79,19 @@ def row(name: str, draw: Callable[[], object]) -> None:
 
 def print_artwork(tile: EscherTile, sizes: tuple[int, ...]) -> None:
     """Print how long pages of artwork take."""
-    render_artwork(artwork(tile, ArtSettings(size=(60, 40), strokes="hatch")))  # imports
+    render_artwork(artwork(tile, ArtSettings(area=(60, 40), dpi=25.4, strokes="hatch")))  # imports
     board = checkerboard(tile)
     print(f"\n{'':34} {'tiles':>6} {'prepare s':>9} {'render s':>9} {'PNG s':>6} {'MB':>6}")
     for size in sizes:
-        art_row(tile, f"picture, tiles of {size} px", ArtSettings(tile_size=size), board)
+        art_row(tile, f"picture, tiles of {size} px", pixel_page(tile_size=size), board)
     for strokes in ("hatch", "echoes", "feathers"):
-        art_row(tile, strokes, ArtSettings(tile_size=600, strokes=strokes))
-    art_row(tile, "repeat", ArtSettings(tile_size=600, repeat="basic", tolerance=0.05), board)
+        art_row(tile, strokes, pixel_page(tile_size=600, strokes=strokes))
+    art_row(tile, "repeat", pixel_page(tile_size=600, repeat="basic", stretch=0.05), board)
+
+
+def pixel_page(**options: Any) -> ArtSettings:
+    """Return settings of a page of 3000 x 2000 pixels, each of which is a millimetre."""
+    return ArtSettings(dpi=25.4, **options)
 
 
 def art_row(
@@ -90,15 +99,15 @@ def art_row(
 ) -> None:
     """Print the times of one page."""
     start = time.process_time()
-    art = artwork(tile, settings, picture=picture)
+    art = artwork(tile, settings, Over(picture))
     ready = time.process_time()
     pixels = render_artwork(art)
     rendered = time.process_time()
     content = png_of(pixels, settings.dpi)
     end = time.process_time()
-    name = f"{name}, {art.page.width} x {art.page.height}"
+    name = f"{name}, {art.width} x {art.height}"
     print(
-        f"{name:34} {art.page.shown:>6.0f} {ready - start:>9.2f} {rendered - ready:>9.2f} "
+        f"{name:34} {art.shown:>6.0f} {ready - start:>9.2f} {rendered - ready:>9.2f} "
         f"{end - rendered:>6.2f} {len(content) / 1e6:>6.1f}",
         flush=True,
     )

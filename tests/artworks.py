@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw
 
-from orbiflow.tiles import EscherTile, Frame, TileMap, as_map
+from orbiflow.tiles import ArtSettings, EscherTile, Frame, TileMap, as_map
 from orbiflow.tiles.motifs.source import Picture
 from orbiflow.tiles.result_file import group_json
 from orbiflow.tiles.search.bent_map import map_of_bent
@@ -28,6 +29,11 @@ def squirrel(name: str) -> EscherTile:
     placed = own.tile.transformed(frame.linear, frame.offset)
     maps = TileMap(frame=frame, bending=map_of_bent(own.bent, own.factor, own.shift, own.tile))
     return EscherTile(placed, y_down=target.y_down, name=f"squirrel-{name}", map_source=maps)
+
+
+def art_settings(**options: Any) -> ArtSettings:
+    """Settings of artwork, with lengths as people write them."""
+    return ArtSettings(**options)
 
 
 def upside_down(tile: EscherTile) -> EscherTile:

@@ -47,7 +47,7 @@ polygon_functions: dict[str, Call] = {
     "Recogniser": lambda ring: tiles.Recogniser(ring)(ring),
     "prepared_region": tiles.prepared_region,
     "Overlap": tiles.Overlap,
-    "overlay_raster": lambda ring: tiles.overlay_raster(TILE, ring, width_px=200).png(),
+    "overlay_picture": lambda ring: tiles.overlay_picture(TILE, ring).png(200),
 }
 MEASURING = ("Target", "iou", "compare", "hausdorff", "Recogniser")
 
@@ -127,7 +127,7 @@ REFUSED: list[tuple[Call, Any, str]] = [
     (tiles.neighbours, SQUARE, "must be a Tile"),
     (tiles.colouring, SQUARE, "must be a Tile"),
     (lambda t: patch(t, (0, 0, 1, 1)), SQUARE, "must be a Tile"),
-    (tiles.tiling_raster, SQUARE, "must be a Tile"),
+    (tiles.tiling_picture, SQUARE, "must be a Tile"),
     (lambda t: tiles.certify(TILE, tolerance=t), np.nan, "tolerance must be"),
     (lambda t: tiles.certify(TILE, tolerance=t), 0, "must be above 0, got 0"),
     (lambda t: tiles.certify(TILE, tolerance=t), "1e-9", "got '1e-9'"),

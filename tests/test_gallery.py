@@ -41,7 +41,7 @@ def test_files_are_there(entry: Entry) -> None:
     if entry.drawing:
         assert (ROOT / entry.drawing).is_file()
     assert entry.picture.stat().st_size <= MOST_BYTES
-    width, height = (int(side) for side in entry.size.split("x"))
+    width, height = (int(side) for side in entry.size.removesuffix("px").split("x"))
     with Image.open(entry.picture) as image:
         assert image.size == (width, height)
     assert entry.picture.with_suffix(".svg").is_file() == entry.svg

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import orbiflow
+from artworks import art_settings
 from orbiflow.density import DensityEstimator
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, OutputError
 from orbiflow.loading import LoadedRun
@@ -18,13 +19,12 @@ from orbiflow.runtime import find
 from orbiflow.symmetry import wallpaper_group
 from orbiflow.tiles import (
     AnimationSettings,
-    ArtSettings,
     EscherTile,
     ExportSettings,
     Tile,
     TileMap,
     animate,
-    draw_art,
+    art,
     export,
     load_model,
     read_document,
@@ -201,10 +201,11 @@ def test_what_is_loaded_is_taken(folders: Path, tmp_path: Path) -> None:
     tile = orbiflow.load(folders / "turtle" / "IH6")
     assert isinstance(tile, EscherTile)
     assert export(tile, tmp_path / "a.svg").files == (tmp_path / "a.svg",)
-    assert draw_art(tile, tmp_path / "a.png", ArtSettings(size=(90, 60))).page.width == 90
+    assert art(tile, tmp_path / "a.png", art_settings(area="90x60px")).width == 90
     assert (tmp_path / "a.png").is_file()
-    small = AnimationSettings(seconds=0.5, fps=4, size=64)
-    assert animate(tile, tmp_path / "a.gif", small).is_file()
+    small = AnimationSettings(**{"seconds": 0.5, "fps": 4, "area": "96x64px"})
+    animate(tile, tmp_path / "a.gif", small)
+    assert (tmp_path / "a.gif").is_file()
     with pytest.raises(OrbiflowError, match="no flow made this tile"):
         load_model(folders / "turtle" / "IH6" / "model.safetensors")
 

@@ -14,8 +14,8 @@ import pytest
 HOME = Path(__file__).parents[1] / "src" / "orbiflow"
 
 TILES = ["geometry", "tilings", "silhouette", "likeness", "tile", "result_file"]
-TILES += ["search", "scene", "pictures", "motifs", "exporting", "solids"]
-TILES += ["art", "motion", "pages"]
+TILES += ["search", "page", "write", "pictures", "motifs", "make", "solids"]
+TILES += ["motion", "pages"]
 DENSITY = ["data", "spaces", "models", "inference", "fitting"]
 DENSITY += [
     "estimator",

@@ -51,7 +51,7 @@ class Entry:
     image: str
     tile: str
     drawing: str = ""
-    size: str = "1000x750"
+    size: str = "1000x750px"
     seed: int = 0
     art: tuple[str, ...] = ()
     search: tuple[str, ...] = ()
@@ -74,9 +74,9 @@ class Entry:
         search = ["escherize", self.silhouette, "--classes", self.tile, *seed, *self.search]
         over = ["--picture", self.drawing] if self.drawing else []
         art = ["art", folder, *over, *self.art]
-        found = [[*search, "--out", folder], [*art, "--size", self.size, "--out", self.made]]
+        found = [[*search, "--out", folder], [*art, "--area", self.size, "--out", self.made]]
         if self.svg:
-            found.append([*art, "--size", self.size, "--out", f"{OUT}/{self.name}.svg"])
+            found.append([*art, "--area", self.size, "--out", f"{OUT}/{self.name}.svg"])
         return found
 
 

@@ -11,7 +11,10 @@ from .loading import save as save
 from .symmetry.catalogue import wallpaper_group as wallpaper_group
 from .symmetry.equivariance import assert_equivariant as assert_equivariant
 from .symmetry.group import CrystallographicGroup as CrystallographicGroup
-from .tiles.art.making import draw_art as draw_art
+from .tiles.operations import animate as animate
+from .tiles.operations import art as art
+from .tiles.operations import export as export
+from .tiles.operations import solid as solid
 from .tiles.search.escherize_settings import EscherizeSettings as EscherizeSettings
 from .tiles.search.escherizing import escherize as escherize
 from .tiles.search.escherizing import fit_tile as fit_tile

@@ -93,8 +93,8 @@ class NotDiscreteError(GroupError):
     """Generators whose closure modulo the lattice is not finite."""
 
 
-class CertificationError(OrbiflowError):
-    """A tile that does not tile the plane within the stated tolerance."""
+class CertificationError(SettingError):
+    """A tile that does not tile the plane within the stated tolerance, and is not forced."""
 
 
 class DataWarning(UserWarning):

@@ -55,6 +55,16 @@ class Repeated:
     """
 
 
+@dataclass(frozen=True)
+class InMemory:
+    """A path to something that was saved, or in Python the thing itself, annotated `Any`.
+
+    - `wanted`: What lies at the path.
+    """
+
+    wanted: str
+
+
 class Refused(ValueError):
     """A value that a kind does not take.
 
@@ -130,6 +140,21 @@ class PathKind(Kind):
         return Path(path)
 
     def plain(self, value: Any) -> str:
+        return str(value)
+
+
+class SavedKind(PathKind):
+    """A path to something that was saved, or the thing itself, which its taker checks."""
+
+    def __init__(self, wanted: str) -> None:
+        self.wanted = wanted
+
+    def read(self, value: Any, *, text: bool = False) -> Any:
+        return super().read(value) if text or path_text(value) is not None else value
+
+    def plain(self, value: Any) -> str:
+        if path_text(value) is None:
+            raise OrbiflowError(f"{described(value)} is in memory; save it and give its path")
         return str(value)
 
 
@@ -279,7 +304,8 @@ def kind_of(annotation: Any) -> Kind:
     unit = next((entry.name for entry in metadata if isinstance(entry, Unit)), "")
     allowed = next((entry for entry in metadata if isinstance(entry, Range)), ANY)
     repeated = any(isinstance(entry, Repeated) for entry in metadata)
-    kind = _plain_kind(annotation, allowed, unit, repeated)
+    saved = next((entry for entry in metadata if isinstance(entry, InMemory)), None)
+    kind = SavedKind(saved.wanted) if saved else _plain_kind(annotation, allowed, unit, repeated)
     parsed = next((entry for entry in metadata if isinstance(entry, Parsed)), None)
     return kind if parsed is None else ParsedKind(parsed, kind)
 

@@ -51,6 +51,7 @@ from orbiflow.arguments import Range as Range
 from orbiflow.arguments import described, meant, one_of, placeholder, refusal
 from orbiflow.errors import SettingError, literal
 from orbiflow.kinds import FlagKind, Kind, OptionalKind, Refused, kind_of
+from orbiflow.kinds import InMemory as InMemory
 from orbiflow.kinds import Parsed as Parsed
 from orbiflow.kinds import Repeated as Repeated
 from orbiflow.kinds import Unit as Unit
@@ -341,17 +342,20 @@ class Settings:
 
     def __post_init__(self) -> None:
         known = {entry.name: entry for entry in fields_of(type(self))}
-        for name in known:
-            if name in self.fields_given:
-                object.__setattr__(self, name, known[name].read(getattr(self, name)))
-        for name, value in self.defaults().items():
-            if name not in self.fields_given:
-                object.__setattr__(self, name, known[name].read(value))
-        for name, entry in known.items():
-            if entry.kind.needs:
-                object.__setattr__(self, name, entry.finish(getattr(self, name), vars(self)))
+        given = {name: getattr(self, name) for name in known if name in self.fields_given}
+        self._take(given, known)
+        self._take({k: v for k, v in self.defaults().items() if k not in given}, known)
         check_rules(known.values(), vars(self), self.fields_given)
         self.check()
+
+    def _take(self, values: Mapping[str, Any], known: Mapping[str, Field]) -> None:
+        """Read values of fields, and then the texts that need another field."""
+        for name, value in values.items():
+            object.__setattr__(self, name, known[name].read(value))
+        for name in values:
+            if known[name].kind.needs:
+                finished = known[name].finish(getattr(self, name), vars(self))
+                object.__setattr__(self, name, finished)
 
     def defaults(self) -> Mapping[str, Any]:
         """Return defaults that depend on other fields, for those that were not given."""

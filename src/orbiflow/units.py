@@ -46,20 +46,31 @@ _NUMBER = r"\+?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
 _UNIT = r"[a-z\"'µ]*"
 
 
-def length(text: str) -> float:
-    """Return a length in mm: a number and one of mm, cm, in, pt; 0 needs no unit.
+def length(text: str, dpi: float | None = None) -> float:
+    """Return a length in mm: a number and one of mm, cm, in, pt, or px where `dpi` is given.
+
+    0 needs no unit.
 
     Raises:
         OrbiflowError: If the unit is missing or unknown, or the length negative or too large.
 
-    >>> length("4 cm"), length("1in"), length("0")
-    (40.0, 25.4, 0.0)
+    >>> length("4 cm"), length("1in"), length("0"), length("150px", 300)
+    (40.0, 25.4, 0.0, 12.7)
     """
     found = re.fullmatch(rf"\s*({_NUMBER})\s*({_UNIT})\s*", text, flags=re.IGNORECASE)
     if not found:
         raise OrbiflowError(f"{text!r} is not a length; write a number and its unit, such as 40mm")
     number, unit = found[1], found[2].lower()
-    return 0.0 if float(number) == 0 and not unit else _millimetres(number, unit, text, number)
+    return 0.0 if float(number) == 0 and not unit else _millimetres(number, unit, text, number, dpi)
+
+
+def length_or_none(text: str, dpi: float | None = None) -> float:
+    """Return a length in mm as `length` does; 0 for "none".
+
+    >>> length_or_none("none"), length_or_none("3px", 25.4)
+    (0.0, 3.0)
+    """
+    return 0.0 if text.strip().lower() == "none" else length(text, dpi)
 
 
 def signed_length(text: str) -> float:
@@ -72,11 +83,11 @@ def signed_length(text: str) -> float:
     return -length(text[1:]) if text.startswith("-") else length(text)
 
 
-def size(text: str) -> tuple[float, float]:
+def size(text: str, dpi: float | None = None) -> tuple[float, float]:
     """Return width and height in mm of a text such as 300x200mm, 30cm x 200mm or 12x8 in.
 
-    >>> size("300x200mm"), size("1in × 5 cm")
-    ((300.0, 200.0), (25.4, 50.0))
+    >>> size("300x200mm"), size("1in × 5 cm"), size("300x150px", 300)
+    ((300.0, 200.0), (25.4, 50.0), (25.4, 12.7))
     """
     pattern = rf"\s*({_NUMBER})\s*({_UNIT})\s*[x×]\s*({_NUMBER})\s*({_UNIT})\s*"
     found = re.fullmatch(pattern, text, flags=re.IGNORECASE)
@@ -86,48 +97,25 @@ def size(text: str) -> tuple[float, float]:
         )
     width, first, height, last = found[1], found[2].lower(), found[3], found[4].lower()
     both = f"{width}x{height}"
-    return _millimetres(width, first or last, text, both), _millimetres(height, last, text, both)
+    return (
+        _millimetres(width, first or last, text, both, dpi),
+        _millimetres(height, last, text, both, dpi),
+    )
 
 
-def pixels(text: str, dpi: float) -> float:
-    """Return a number of pixels, or a length at `dpi` pixels an inch, in pixels.
-
-    >>> pixels("400", 300), pixels("1.5px", 300), pixels("25.4mm", 300)
-    (400.0, 1.5, 300.0)
-    """
-    found = re.fullmatch(rf"\s*({_NUMBER})\s*(px)?\s*", text, flags=re.IGNORECASE)
-    return length(text) * dpi / MILLIMETRES["in"] if found is None else float(found[1])
-
-
-def pixel_size(text: str, dpi: float) -> tuple[float, float]:
-    """Return width and height of a picture in pixels, which a length need not make whole.
-
-    >>> pixel_size("3000x2000", 300), pixel_size("1x2in", 100), pixel_size("story", 300)
-    ((3000, 2000), (100.0, 200.0), (1080, 1920))
-    """
-    if (name := text.strip().lower()) in POSTS:
-        return POSTS[name]
-    whole = re.fullmatch(r"\s*(\d{1,9})\s*(?:px)?\s*[x×]\s*(\d{1,9})\s*(?:px)?\s*", text)
-    if whole:
-        return int(whole[1]), int(whole[2])
-    if not re.search("[a-wyz]", text, flags=re.IGNORECASE):
-        raise OrbiflowError(
-            f"{text!r} is not a size in pixels; write two whole numbers, such as 3000x2000"
-        )
-    width, height = page_size(text, also=tuple(POSTS))
-    per = dpi / MILLIMETRES["in"]
-    return width * per, height * per
-
-
-def page_size(text: str, *, also: tuple[str, ...] = ()) -> tuple[float, float]:
+def page_size(text: str, dpi: float | None = None) -> tuple[float, float]:
     """Return width and height of a page in mm: two lengths, or one of `PAGES`, perhaps turned.
 
-    What cannot be read is answered with the names of all pages, and those that are known `also`.
+    At so many `dpi`, it may also be in pixels, or one of `POSTS`.
 
     >>> page_size("3x2cm"), page_size("A4"), page_size("letter-landscape")
     ((30.0, 20.0), (210, 297), (279.4, 215.9))
+    >>> page_size("story", 25.4)
+    (1080.0, 1920.0)
     """
     name, _, way = text.strip().lower().partition("-")
+    if dpi is not None and name in POSTS and not way:
+        return size("{}x{}px".format(*POSTS[name]), dpi)
     if name in PAGES and way in ("", "portrait", "landscape"):
         page = PAGES[name]
         if not way:
@@ -135,12 +123,12 @@ def page_size(text: str, *, also: tuple[str, ...] = ()) -> tuple[float, float]:
         short, long = sorted(page)
         return (long, short) if way == "landscape" else (short, long)
     if not re.search(r"\d.*[x×]", text, flags=re.IGNORECASE):
-        names = ", ".join((*also, *PAGES))
+        names = ", ".join((*(() if dpi is None else POSTS), *PAGES))
         raise OrbiflowError(
             f"{text!r} is not a page; write a size such as 300x200mm, or one of {names}, with "
             "-landscape or -portrait to turn it"
         )
-    return size(text)
+    return size(text, dpi)
 
 
 def colour(text: str) -> str:
@@ -185,19 +173,49 @@ PageSize = Annotated[
 ]
 """A width and a height, or a page's name."""
 
+PageArea = Annotated[
+    tuple[_Side, _Side],
+    Parsed(
+        page_size,
+        "a size such as 300x200mm or 3000x2000px, or a page such as A4 or A4-landscape",
+        "SIZE",
+        needs="dpi",
+    ),
+    Unit("mm"),
+]
+"""A `PageSize` that may also be in pixels, of which a field `dpi` says how large they are."""
+
+PageLength = Annotated[
+    float,
+    Parsed(length, "a length such as 40mm or 400px", "LENGTH", needs="dpi"),
+    Range(above=0, most=LONGEST_SIDE),
+    Unit("mm"),
+]
+"""A `Length` that may also be in pixels, of which a field `dpi` says how large they are."""
+
+LineWidth = Annotated[
+    float,
+    Parsed(length_or_none, "a width such as 0.3mm or 3px, or none", "LENGTH", needs="dpi"),
+    Range(0, LONGEST_SIDE),
+    Unit("mm"),
+]
+"""The width of a line: a length that may also be in pixels, or 0 for none."""
+
 Colour = Annotated[str, Parsed(colour, "a colour such as #2a9d8f", "COLOUR")]
 """A colour as #rrggbb."""
 
 
-def _millimetres(number: str, unit: str, text: str, numbers: str) -> float:
+def _millimetres(number: str, unit: str, text: str, numbers: str, dpi: float | None) -> float:
     """Return a number of a unit in mm; `numbers` are all of the text's, for the message."""
+    units = MILLIMETRES if dpi is None else {**MILLIMETRES, "px": MILLIMETRES["in"] / dpi}
     if not unit:
-        raise OrbiflowError(f"{text!r} has no unit; write {numbers}mm, {numbers}cm or {numbers}in")
-    if unit not in MILLIMETRES:
+        known = [f"{numbers}{name}" for name in units if name != "pt"]
+        raise OrbiflowError(f"{text!r} has no unit; write {', '.join(known[:-1])} or {known[-1]}")
+    if unit not in units:
         raise OrbiflowError(
-            f"{text!r} has the unknown unit {unit!r}; use one of {', '.join(MILLIMETRES)}"
+            f"{text!r} has the unknown unit {unit!r}; use one of {', '.join(units)}"
         )
-    value = float(number) * MILLIMETRES[unit]
+    value = float(number) * units[unit]
     if value > LONGEST:
         raise OrbiflowError(f"{text!r} is longer than 100 m; check number and unit")
     return value

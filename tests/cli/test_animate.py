@@ -22,14 +22,14 @@ def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_an_svg_of_a_bending_silhouette(folder: Path, tmp_path: Path, orbiflow) -> None:
     out = tmp_path / "boot.svg"
-    options = ["--kind", "bend", "--tile", "ih4", "--seconds", 3, "--size", 200]
+    options = ["--kind", "bend", "--tile", "ih4", "--seconds", 3, "--area", "200x134px"]
     outcome = orbiflow("animate", folder, "--out", out, *options, "--palette", "ochre")
     assert (outcome.status, outcome.err) == (0, "")
-    assert f"written {out}: bend of IH4, 3 s, 200 pixels wide" in outcome.out
+    assert f"written {out}: bend of IH4, 3 s, 200 x 134 pixels" in outcome.out
     assert 'dur="3s"' in out.read_text()
     # the same as the operation's own
     again = tmp_path / "again.svg"
-    given = {"kind": "bend", "seconds": 3.0, "size": 200, "palette": "ochre"}
+    given = {"kind": "bend", "seconds": 3.0, "area": "200x134px", "palette": "ochre"}
     find("animate").call({"result": folder, "out": again, **given}).run()
     assert again.read_text() == out.read_text()
 
@@ -38,7 +38,7 @@ def test_an_svg_of_a_bending_silhouette(folder: Path, tmp_path: Path, orbiflow) 
     ("options", "message"),
     [
         (["--out", "a.webm"], "--out must ... ends in .gif, .mp4 or .svg ... a.webm"),
-        (["--size", 99], "--size must be even ... 99"),
+        (["--area", "99x66px", "--out", "a.mp4"], "--area is 99 x 66 pixels ... even sides"),
         (["--palette", "mud"], "unknown palette 'mud'"),
         (["--tile", "IH7"], "holds no tile of IH7; there are IH4"),
     ],

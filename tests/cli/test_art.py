@@ -30,7 +30,7 @@ def picture_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-SMALL = ("--size", "120x80", "--tile-size", "60")
+SMALL = ("--area", "120x80px", "--tile-size", "60px")
 
 
 def test_a_picture(result: Path, picture: Path, tmp_path: Path, orbiflow) -> None:
@@ -53,7 +53,7 @@ def test_engraving_with_an_eye_as_svg(result: Path, tmp_path: Path, orbiflow) ->
 
 def test_a_repeat_says_its_size(result: Path, tmp_path: Path, orbiflow) -> None:
     out = tmp_path / "cell.png"
-    options = ("--repeat", "basic", "--tile-size", "30", "--colour", "aspect", "--palette", "sea")
+    options = ("--repeat", "basic", "--tile-size", "30px", "--colour", "aspect", "--palette", "sea")
     outcome = orbiflow("art", result, *options, "-o", out)
     assert outcome.status == 0, outcome.err
     with Image.open(out) as image:
@@ -79,24 +79,25 @@ def png_that_says(width: int, height: int) -> bytes:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--size", "0x100"), "--size ... from 1 to 30000, got 0"),
-        (("--size", "30000x30000"), "is too large ... --size ... at most 100 megapixels are made"),
-        (("--size", "999999999x2"), "--size ... from 1 to 30000"),
-        (("--size", "big"), "--size ... 'big' is not a page ... square, story, a2"),
-        (("--size", "300.5x200"), "write two whole numbers, such as 3000x2000"),
-        (("--tile-size", "0"), "--tile-size ... from 8 to 60000, got '0'"),
-        (("--tile-size", "1"), "--tile-size must be ... from 8"),
-        (("--tile-size", "9", "--size", "9000x9000"), "the most is 20000: choose larger tiles"),
+        (("--area", "0x100px"), "--area ... above 0 and at most 20000, got 0"),
+        (("--area", "30000x30000px"), "too large ... --area ... at most 100 megapixels are made"),
+        (("--area", "99999999x2px"), "is longer than 100 m"),
+        (("--area", "0.1x2px"), "a picture of 0 x 2 pixels shows nothing (--area)"),
+        (("--area", "big"), "--area ... 'big' is not a page ... square, story, a2"),
+        (("--area", "300x200"), "has no unit; write 300x200mm, 300x200cm, 300x200in or 300x200px"),
+        (("--tile-size", "0"), "--tile-size ... above 0"),
+        (("--tile-size", "1px"), "shows nothing (--tile-size) ... at least 8px"),
+        (("--tile-size", "9px", "--area", "9000x9000px"), "the most is 20000: choose larger tiles"),
         (("--palette", "neon"), "unknown palette 'neon'; there are delft"),
         (("--outline", "thick"), "--outline ... 'thick' is not a length"),
         (("--eye", "5,5"), "the eye at 5,5 lies outside the silhouette, which reaches from"),
         (("--eye", "here"), "--eye ... 'here' is not x,y or x,y,radius"),
         (("--eye", "nan,1"), "--eye ... must be a finite number, got nan"),
         (("--eye", "210,190,-3"), "--eye ... radius ... got 210,190,-3"),
-        (("--repeat", "basic", "--size", "30x30"), "--size and --repeat exclude each other"),
-        (("--tolerance", "0.1"), "--tolerance ... --repeat"),
-        (("--repeat", "basic", "--tolerance", "2"), "--tolerance must be ... from 0 to 0.2"),
-        (("--repeat", "basic", "--tile-size", "30000"), "the cell that repeats is too large"),
+        (("--repeat", "basic", "--area", "30x30px"), "--area and --repeat exclude each other"),
+        (("--stretch", "0.1"), "--stretch ... --repeat"),
+        (("--repeat", "basic", "--stretch", "2"), "--stretch must be ... from 0 to 0.2"),
+        (("--repeat", "basic", "--tile-size", "2500mm"), "the cell that repeats is too large"),
         (("--tile", "IH1"), "holds no tile of IH1"),
         (("--picture", "gone.png"), "gone.png: no such file"),
         (("--dpi", "0"), "--dpi must be ... from 1 to 10000"),
@@ -150,7 +151,7 @@ def test_other_endings(out: str, result: Path, tmp_path: Path, orbiflow) -> None
 
 def test_the_operation_tells_what_it_did(result: Path, tmp_path: Path) -> None:
     events = []
-    given = {"result": result, "out": tmp_path / "a.png", "size": "60x40", "tile_size": "40"}
+    given = {"result": result, "out": tmp_path / "a.png", "area": "60x40px", "tile_size": "40px"}
     outcome = find("art").call(given).run(events.append)
     assert outcome.summary["width"] == 60
     assert outcome.summary["class"] == "IH6"
@@ -161,7 +162,7 @@ def test_the_operation_tells_what_it_did(result: Path, tmp_path: Path) -> None:
 def test_nothing_is_written_if_it_is_cancelled(result: Path, tmp_path: Path) -> None:
     cancel = Cancel()
     cancel.cancel()
-    call = find("art").call({"result": result, "out": tmp_path / "a.png", "size": "60x40"})
+    call = find("art").call({"result": result, "out": tmp_path / "a.png", "area": "60x40px"})
     with pytest.raises(Cancelled):
         call.run(cancel=cancel)
     assert list(tmp_path.iterdir()) == []

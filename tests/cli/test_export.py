@@ -96,7 +96,7 @@ def test_numbered_sheets_and_their_events(result: Path, tmp_path: Path) -> None:
 MISTAKES: dict[str, tuple[list[str], str]] = {
     "no unit": (
         ["--tile-size", "40"],
-        "--tile-size ... '40' has no unit; write 40mm, 40cm or 40in",
+        "--tile-size ... '40' has no unit; write 40mm, 40cm, 40in or 40px",
     ),
     "no unit of the area": (["--area", "300x200"], "--area ... '300x200' has no unit"),
     "zero": (["--tile-size", "0mm"], "--tile-size ... above 0 and at most 20000, got '0mm'"),

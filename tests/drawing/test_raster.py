@@ -14,7 +14,7 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import Sheet, field_picture, palette
 from orbiflow.drawing.canvas import flow_lines, symmetric_seeds
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import Tile, classes_png, isohedral_class, overlay_raster, tiling_raster
+from orbiflow.tiles import Tile, classes_png, isohedral_class, overlay_picture, tiling_picture
 from orbiflow.tiles.pictures.overlays import ADDED, COMMON, MISSING
 
 
@@ -29,9 +29,7 @@ def share(image: Array, colour: str) -> float:
 
 @pytest.mark.parametrize("outline", [0.8, 0.0])
 def test_tiling_fills_the_picture_with_its_colours(bent_tile: Any, outline: float) -> None:
-    image = pixels(
-        tiling_raster(bent_tile("IH7"), width_px=600, outline_px=outline * 200 / 72).png()
-    )
+    image = pixels(tiling_picture(bent_tile("IH7"), outline=outline / 216).png(600))
     assert image.shape == (400, 600, 3)
     chosen = palette("delft")
     shares = [share(image, chosen.fill(k)) for k in range(3)]
@@ -46,7 +44,7 @@ def square(side: float, offset: float = 0.0) -> Array:
 
 def test_overlay_shows_missing_and_added_in_proportion() -> None:
     tile = Tile(square(1.0), isohedral_class("IH1").group(), "IH1")
-    image = pixels(overlay_raster(tile, square(1.0) + np.array([0.25, 0.0]), width_px=800).png())
+    image = pixels(overlay_picture(tile, square(1.0) + np.array([0.25, 0.0])).png(800))
     common, missing, added = (share(image, colour) for colour in (COMMON, MISSING, ADDED))
     assert common / missing == pytest.approx(3.0, rel=0.05)
     assert added == pytest.approx(missing, rel=0.05)
@@ -58,24 +56,24 @@ def test_overlay_shows_missing_and_added_in_proportion() -> None:
 def test_overlay_of_awkward_targets() -> None:
     tile = Tile(square(1.0), isohedral_class("IH1").group())
     bow_tie = np.array([[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]])
-    assert share(pixels(overlay_raster(tile, bow_tie, width_px=400).png()), ADDED) > 0.1
+    assert share(pixels(overlay_picture(tile, bow_tie).png(400)), ADDED) > 0.1
     with pytest.raises(OrbiflowError, match="no area"):
-        overlay_raster(tile, np.zeros((5, 2))).png()
+        overlay_picture(tile, np.zeros((5, 2))).png()
     with pytest.raises(OrbiflowError, match=r"outline is \(M >= 3, 2\)"):
-        overlay_raster(tile, np.zeros((5, 3))).png()
+        overlay_picture(tile, np.zeros((5, 3))).png()
 
 
 def test_y_down_turns_the_picture_over(bent_tile: Any) -> None:
     tile = bent_tile("IH5")
-    up = pixels(tiling_raster(tile, width_px=300).png()).astype(int)
-    down = pixels(tiling_raster(tile, width_px=300, y_down=True).png()).astype(int)
+    up = pixels(tiling_picture(tile).png(300)).astype(int)
+    down = pixels(tiling_picture(tile, y_down=True).png(300)).astype(int)
     assert np.abs(up[::-1] - down).mean() < 4.0
     assert np.abs(up - down).mean() > 10.0
 
 
 def test_absurd_sizes_are_refused(bent_tile: Any) -> None:
     with pytest.raises(OrbiflowError, match="cannot be made"):
-        tiling_raster(bent_tile("IH1"), width_px=10**6).png()
+        tiling_picture(bent_tile("IH1")).png(10**6)
 
 
 def test_field_picture(bent_tile: Any, equivariant: Any) -> None:

@@ -37,7 +37,6 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from orbiflow.tiles import bending_picture, overlay_picture, tiling_picture
-from orbiflow.tiles.pictures import tiling_raster
 from printed import check_inside, letters
 
 SPACES = [Torus(2, unit="degrees"), KleinBottle(), Sphere(), ProjectivePlane()]
@@ -186,9 +185,8 @@ def test_other_sheets_are_refused(width: Any, form: Any, message: str) -> None:
 @pytest.mark.parametrize("y_down", [False, True])
 def test_curves_show_what_the_pixels_show(y_down: bool) -> None:
     tile = bent_tile("IH6")
-    raster = tiling_raster(tile, width_px=400, y_down=y_down, outline_px=0.75)
-    pixels = np.asarray(raster.image(), dtype=float)
-    pdf = tiling_picture(tile, y_down=y_down).file()
+    picture = tiling_picture(tile, y_down=y_down, sheet=Sheet.column())
+    pixels, pdf = np.asarray(picture.image(400), dtype=float), picture.file()
     page = pypdfium2.PdfDocument(pdf)[0]
     drawn = page.render(scale=1200 / page.get_width()).to_pil().convert("RGB")
     drawn = np.asarray(drawn.resize((400, pixels.shape[0]), Image.Resampling.BOX), dtype=float)
@@ -200,8 +198,8 @@ def test_pictures_of_tiles_are_curves() -> None:
     tile = bent_tile("IH5", 7.0)
     goal = 1.02 * tile.polygon
     made = {
-        "Dashed": bending_picture(tile, goal, tile.polygon),
-        "Orange": overlay_picture(tile, goal, y_down=True),
+        "Dashed": bending_picture(tile, goal, tile.polygon, sheet=Sheet.column()),
+        "Orange": overlay_picture(tile, goal, y_down=True, sheet=Sheet.column()),
     }
     for word, picture in made.items():
         page = pypdfium2.PdfDocument(picture.file())[0]

@@ -14,7 +14,7 @@ from orbiflow.arrays import Array
 from orbiflow.studio.tile_view import tile_card
 from orbiflow.symmetry import Isometry
 from orbiflow.tiles import CLASSES, EscherTile, colouring, narrowest_neck
-from orbiflow.tiles.exporting import longer_side
+from orbiflow.tiles.page import longer_side
 from studio.browser import RunningStudio, covers_page_once, running_studio, small_searches
 from studio_checks import serious_issues, untidy_parts
 

@@ -23,7 +23,7 @@ from orbiflow.tiles import (
     save_tiles,
     scenes,
 )
-from orbiflow.tiles.exporting import laid_out
+from orbiflow.tiles.make import laid_out
 from studio.served import SQUARE, Client, done, new_project
 
 

@@ -178,10 +178,10 @@ def test_refusals_name_settings_in_plain_words(
     [
         ("export", {"area": "80x60mm", "cut": "skeleton"}, "house-40mm.svg"),
         ("export", {"area": "80x60mm", "purpose": "print"}, "house-print-40mm.pdf"),
-        ("art", {"size": "60x40"}, "house-picture.png"),
-        ("art", {"size": "60x40", "format": "svg"}, "house-picture.svg"),
+        ("art", {"area": "60x40px"}, "house-picture.png"),
+        ("art", {"area": "60x40px", "format": "svg"}, "house-picture.svg"),
         ("solid", {"kind": "stamp"}, "house-stamp.stl"),
-        ("animate", {"kind": "grow", "seconds": 0.5, "fps": 2, "size": 64}, "house.gif"),
+        ("animate", {"kind": "grow", "seconds": 0.5, "fps": 2, "area": "96x64px"}, "house.gif"),
     ],
 )
 def test_what_is_taken_away(

@@ -16,13 +16,6 @@ from .palettes import Palette as Palette
 from .palettes import PaletteName as PaletteName
 from .palettes import palette as palette
 from .raster import FINER as FINER
-from .raster import STRIP as STRIP
-from .raster import Filled as Filled
-from .raster import Raster as Raster
-from .raster import arrow as arrow
-from .raster import caption as caption
-from .raster import captioned as captioned
-from .raster import dashes as dashes
 from .raster import draw_line as draw_line
 from .raster import fine_places as fine_places
 from .raster import font as font
@@ -31,7 +24,6 @@ from .raster import limited as limited
 from .raster import palette_png as palette_png
 from .raster import png_bytes as png_bytes
 from .raster import rgb as rgb
-from .raster import strip_middle as strip_middle
 from .raster import window_of as window_of
 from .sheet import COLUMNS as COLUMNS
 from .sheet import FORMATS as FORMATS
@@ -40,6 +32,7 @@ from .sheet import WIDEST as WIDEST
 from .sheet import FigureFormat as FigureFormat
 from .sheet import Picture as Picture
 from .sheet import Sheet as Sheet
+from .sheet import check_size as check_size
 from .sheet import column_width as column_width
 from .sheet import pdf_pages as pdf_pages
 from .web_page import rendered as rendered

@@ -14,6 +14,7 @@ from orbiflow.runtime import (
     Cancel,
     Note,
     Outcome,
+    Progress,
     Sink,
     Table,
     Written,
@@ -21,35 +22,28 @@ from orbiflow.runtime import (
     check_output_folder,
     ignore,
     operation,
+    write_atomic,
 )
-from orbiflow.settings import DefaultText, Ending, Hidden, Option, Parsed, Settings
-from orbiflow.tiles.art import ArtSettings
-from orbiflow.tiles.exporting import ExportSettings
+from orbiflow.settings import DefaultText, Ending, Hidden, InMemory, Option, Parsed
+from orbiflow.tiles.make import ArtSettings, ExportSettings
 from orbiflow.tiles.motion import AnimationSettings
 from orbiflow.tiles.search import EscherizeSettings, class_names
 from orbiflow.tiles.silhouette import ReadingSettings
 from orbiflow.tiles.solids import SolidSettings
 
 if TYPE_CHECKING:
-    from orbiflow.tiles.exporting import Exported
+    from orbiflow.tiles.make import Artwork, Exported
     from orbiflow.tiles.search import SearchResult
-    from orbiflow.tiles.tile import EscherTile
+    from orbiflow.tiles.solids import Solid
+    from orbiflow.tiles.tile import EscherTile, TileSource
+else:  # what annotations mean when they are read, without heavy imports
+    Artwork = Exported = Solid = Outcome
+    TileSource = Annotated[
+        Any, InMemory("the folder of a run, its result.json, or a tile's folder")
+    ]
 
-
-class TileChoice(Settings):
-    """Which tile of a result is taken."""
-
-    tile: Annotated[str | None, DefaultText("1, or the tile whose folder is given")] = None
-    """A class, such as IH4, or a rank; 1 is best."""
-
-    force: bool = False
-    """Take a tile that is not certified; an exported file says so."""
-
-    def read(self, result: Path) -> EscherTile:
-        """Return the tile of a run."""
-        from orbiflow.tiles.result_file import read_result
-
-        return read_result(result, self.tile)
+Which = Annotated[str | None, DefaultText("1, or the tile whose folder is given")]
+"""Which tile of a run is taken: a class, such as IH4, or a rank; 1 is best."""
 
 
 @operation("escherize", keeps_partial=True, starts_processes=True)
@@ -203,127 +197,130 @@ def _tell(on_event: Sink, notes: Sequence[str], *files: Path) -> None:
         on_event(event)
 
 
+def _taken(
+    result: TileSource, tile: str | None, out: Path | None, name: str, picture: Path | None = None
+) -> tuple[EscherTile, Path]:
+    """Return the tile that is meant, and the file to write, which is by default named after it."""
+    from orbiflow.tiles.result_file import as_tile
+
+    given = as_tile(result, tile)
+    out = out or Path(name.format(given.name))
+    read = (result,) if isinstance(result, str | Path) else ()
+    check_output_file(out, *map(Path, read), picture)
+    return given, out
+
+
 @operation("export")
 def export(
-    result: Path,
-    settings: ExportSettings = ExportSettings(),
-    choice: TileChoice = TileChoice(),
-    *,
+    result: TileSource,
     out: Annotated[Path | None, Option("-o"), DefaultText("named after the tile")] = None,
+    settings: ExportSettings = ExportSettings(),
+    *,
+    tile: Which = None,
+    force: bool = False,
     picture: Path | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
-) -> Outcome:
+) -> Exported:
     """Write a tiling in real size: to print, to cut with a laser, to draw, to put on a page.
 
     Lengths are numbers with a unit: mm, cm, in or pt.
 
     Args:
         result: A search's folder, its result.json, or the folder of a tile in it.
-        out: The file.
+        out: The file; several sheets are numbered. Its ending decides the format unless one is given.
+        tile: A class, such as IH4, or a rank; 1 is best.
+        force: Take a tile that is not certified; a file to make things from says so.
         picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
+
+    Raises:
+        CertificationError: If the tile is not certified.
+        OrbiflowError: If the settings cannot be met, or nothing says the format.
+        OutputError: If a file cannot be written.
+        Cancelled: If it was cancelled; nothing is then written.
     """
     settings = settings.for_file(out)
 
-    from orbiflow.tiles import exporting
+    from orbiflow.tiles import make
 
-    tile = choice.read(result)
-    out = out or Path(f"{tile.name}.{settings.format}")
-    check_output_file(out, result, picture)
-    done = exporting.export(
-        tile, out, settings, picture=picture, force=choice.force, on_event=on_event, cancel=cancel
-    )
-    _tell(on_event, (*done.notes, _exported(done, settings, tile.isohedral_class)), *done.files)
-    return Outcome(
-        {
-            "files": [str(path) for path in done.files],
-            "tiles": done.tiles,
-            "class": tile.isohedral_class,
-            "tile_size": done.tile_size,
-        }
-    )
-
-
-def _exported(done: Exported, settings: ExportSettings, name: str) -> str:
-    width, height = settings.page
-    words = {
-        "skeleton": "tiles in outline",
-        "pieces": "pieces",
-        "jigsaw": "pieces of a jigsaw",
-        "template": "template",
-    }
-    what = words.get(settings.cut, "tiles")
-    count = done.scenes[0].facts.get("pieces", done.tiles)
-    files = str(done.files[0])
-    if len(done.files) > 1:
-        files = f"{len(done.files)} sheets, {done.files[0]} to {done.files[-1].name}"
-    return (
-        f"written {files}: {count} {what} of {name}, {done.tile_size:.4g} mm, on "
-        f"{width:g} x {height:g} mm"
-    )
+    given, out = _taken(result, tile, out, f"{{}}.{settings.format}", picture)
+    on_event(Progress(0.0, "laying out"))
+    sheets, notes = make.scenes(given, settings, picture=picture, force=force)
+    contents: list[str | bytes] = []  # all, before the first file
+    for k, sheet in enumerate(sheets):
+        cancel.check()
+        on_event(Progress((1 + k) / (1 + len(sheets)), "writing"))
+        contents.append(make.sheet_content(sheet, settings))
+    cancel.check()
+    names = make.sheet_names(out, len(contents))
+    files = tuple(write_atomic(name, text) for name, text in zip(names, contents, strict=True))
+    made = make.Exported(settings=settings, files=(), scenes=tuple(sheets), notes=notes)
+    done = made.written(files)
+    _tell(on_event, (*notes, done.words), *files)
+    return done
 
 
 @operation("art")
 def art(
-    result: Path,
-    settings: ArtSettings = ArtSettings(),
-    choice: TileChoice = TileChoice(),
-    *,
+    result: TileSource,
     out: Annotated[
         Path | None, Option("-o"), Ending(".png", ".svg"), DefaultText("a PNG named after the tile")
     ] = None,
+    settings: ArtSettings = ArtSettings(),
+    *,
+    tile: Which = None,
+    force: bool = False,
     picture: Path | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
-) -> Outcome:
+) -> Artwork:
     """Carry a picture of the silhouette onto its tile and repeat it over the plane.
 
-    Without a picture tiles are coloured by a palette, and --engrave draws inside them.
+    Without a picture tiles are coloured by a palette, and lines can be engraved in them.
 
     Args:
         result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file, .png or .svg.
+        tile: A class, such as IH4, or a rank; 1 is best.
+        force: Take a tile that is not certified; a file to make things from says so.
         picture: A picture over the silhouette, in the same frame: PNG, JPEG, WebP or an SVG drawing.
+
+    Raises:
+        InputFileError: If the picture cannot be read.
+        OrbiflowError: As `artwork` and `export` raise it.
     """
     settings = settings.for_file(out)
 
-    from orbiflow.tiles.art import draw_art
+    from orbiflow.tiles import make, motifs
 
-    tile = choice.read(result)
-    out = out or Path(f"{tile.name}.{settings.format}")
-    check_output_file(out, result, picture)
-    drawn = draw_art(
-        tile, out, settings, picture=picture, force=choice.force, on_event=on_event, cancel=cancel
+    given, out = _taken(result, tile, out, f"{{}}.{settings.format}", picture)
+    given.require_certified(
+        force=force, otherwise="so it is not drawn; {force} draws it all the same"
     )
-    page = drawn.page
-    note = (
-        f"written {out}: {page.width} x {page.height} pixels, {page.shown:.0f} tiles of "
-        f"{tile.isohedral_class}, {page.tile_size:.0f} pixels each"
-    )
-    _tell(on_event, (*drawn.notes, note), out)
-    return Outcome(
-        {
-            "file": str(out),
-            "width": page.width,
-            "height": page.height,
-            "tiles": page.shown,
-            "class": tile.isohedral_class,
-            "tile_size": page.tile_size,
-        }
-    )
+    on_event(Progress(0.0, "laying out"))
+    given = motifs.with_map(given)
+    over = None if picture is None else motifs.read_over(picture, given)
+    made = make.artwork(given, settings, over)
+    cancel.check()
+    on_event(Progress(0.2, "drawing"))
+    write_atomic(out, make.art_file(made, settings.file_format, cancel=cancel))
+    done = made.written(out)
+    _tell(on_event, (*made.notes, done.words), out)
+    return done
 
 
 @operation("solid")
 def solid(
-    result: Path,
-    settings: SolidSettings = SolidSettings(),
-    choice: TileChoice = TileChoice(),
-    *,
+    result: TileSource,
     out: Annotated[Path | None, Option("-o"), DefaultText("named after the tile")] = None,
+    settings: SolidSettings = SolidSettings(),
+    *,
+    tile: Which = None,
+    force: bool = False,
     picture: Path | None = None,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
-) -> Outcome:
+) -> Solid:
     """Make a solid to print in 3D: a tile, cookie cutter, stamp, mould or puzzle.
 
     It lies as it is printed, without supports. Lengths are numbers with a unit: mm, cm, in or pt.
@@ -331,47 +328,41 @@ def solid(
     Args:
         result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file, .stl or .3mf.
+        tile: A class, such as IH4, or a rank; 1 is best.
+        force: Take a tile that is not certified; a file to make things from says so.
         picture: An SVG drawing over the silhouette, in the same frame, for a stamp or mould.
+
+    Raises:
+        InputFileError: If the drawing cannot be read, or is a picture of pixels.
+        OrbiflowError: As `make_solid` and `export` raise it.
     """
     settings = settings.for_file(out)
     settings.check_picture(picture)
 
-    from orbiflow.tiles.solids import make_solid
+    from orbiflow.tiles.solids import make_solid, solid_file
 
-    tile = choice.read(result)
-    out = out or Path(f"{tile.name}-{settings.kind}.{settings.format}")
-    check_output_file(out, result, picture)
-    made = make_solid(tile, settings, picture=picture, force=choice.force)
+    given, out = _taken(result, tile, out, f"{{}}-{settings.kind}.{settings.format}", picture)
+    made = make_solid(given, settings, picture=picture, force=force)
     cancel.check()
-    made.write(out, settings.format)
-    size = " x ".join(f"{side:.1f}" for side in made.size)
-    cubic = made.volume / 1000
-    note = f"written {out}: {settings.kind} of {tile.isohedral_class}, {size} mm, {cubic:.1f} cm³"
-    _tell(on_event, (*made.notes, note), out)
-    return Outcome(
-        {
-            "file": str(out),
-            "kind": settings.kind,
-            "class": tile.isohedral_class,
-            "parts": len(made.parts),
-            "size": made.size.tolist(),
-            "volume": made.volume,
-        }
-    )
+    write_atomic(out, solid_file(made, settings.file_format))
+    done = made.written(out)
+    _tell(on_event, (*made.notes, done.words), out)
+    return done
 
 
 @operation("animate")
 def animate(
-    result: Path,
-    settings: AnimationSettings = AnimationSettings(),
-    choice: TileChoice = TileChoice(),
-    *,
+    result: TileSource,
     out: Annotated[
         Path | None,
         Option("-o"),
         Ending(".gif", ".mp4", ".svg"),
         DefaultText("a GIF named after the tile"),
     ] = None,
+    settings: AnimationSettings = AnimationSettings(),
+    *,
+    tile: Which = None,
+    force: bool = False,
     on_event: Sink = ignore,
     cancel: Cancel = NEVER,
 ) -> Outcome:
@@ -382,24 +373,37 @@ def animate(
     Args:
         result: A search's folder, its result.json, or the folder of a tile in it.
         out: The file: .gif, .svg, or .mp4, which needs ffmpeg.
+        tile: A class, such as IH4, or a rank; 1 is best.
+        force: Take a tile that is not certified; a file to make things from says so.
+
+    Raises:
+        OrbiflowError: As `export` raises it.
     """
     settings = settings.for_file(out)
 
+    from orbiflow.drawing import palette
     from orbiflow.tiles import motion
+    from orbiflow.tiles.tilings import colouring
 
-    tile = choice.read(result)
-    out = out or Path(f"{tile.name}-{settings.kind}.{settings.format}")
-    check_output_file(out, result)
-    motion.animate(tile, out, settings, force=choice.force, on_event=on_event, cancel=cancel)
-    size = out.stat().st_size
+    given, out = _taken(result, tile, out, f"{{}}-{settings.kind}.{settings.format}")
+    for note in palette(settings.palette).shortage(colouring(given.tile).count):
+        on_event(Note(note))
+
+    def told(share: float) -> None:
+        cancel.check()
+        on_event(Progress(share, "drawing"))
+
+    content = motion.animation(given, settings, force=force, told=told)
+    cancel.check()
+    write_atomic(out, content)
+    width, height = (round(side * settings.pixels) for side in settings.page)
     note = (
-        f"written {out}: {settings.kind} of {tile.isohedral_class}, {settings.seconds:g} s, "
-        f"{settings.size} pixels wide, {size / 1000:.0f} kB"
+        f"written {out}: {settings.kind} of {given.isohedral_class}, {settings.seconds:g} s, "
+        f"{width} x {height} pixels, {len(content) / 1000:.0f} kB"
     )
     _tell(on_event, (note,), out)
-    return Outcome(
-        {"file": str(out), "bytes": size, "class": tile.isohedral_class, "kind": settings.kind}
-    )
+    facts = {"bytes": len(content), "class": given.isohedral_class, "kind": settings.kind}
+    return Outcome({"file": str(out), **facts})
 
 
 @operation("classes")
@@ -425,7 +429,6 @@ def classes(
         classes: The classes, or all 81 types.
         out: Also draw them into this PNG file.
     """
-    from orbiflow.runtime import write_atomic
     from orbiflow.tiles.pictures import classes_png
     from orbiflow.tiles.tilings import CLASSES, ISOHEDRAL_TYPES, isohedral_class
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from orbiflow.arguments import as_instance, as_path, described
 from orbiflow.arrays import Array
-from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.errors import InputFileError, OrbiflowError, SettingError
 from orbiflow.runtime import (
     ResultFolder,
     is_list,
@@ -76,17 +76,21 @@ def read_result(path: str | Path, which: str | int | None = None) -> EscherTile:
     return found.changed(map_source=file.parent / folder_names(names)[index] / TILE_MODEL)
 
 
-def as_tile(source: TileSource) -> EscherTile:
-    """Return the finished tile that is meant; the best one of a run's folder.
+def as_tile(source: TileSource, which: str | int | None = None) -> EscherTile:
+    """Return the finished tile that is meant; of a run's folder `which`, or the best one.
 
     Raises:
         OrbiflowError: For what holds no tile.
         InputFileError: As `read_result`.
     """
+    if which is not None and not isinstance(source, str | Path):
+        raise SettingError(
+            "{tile} chooses among the tiles of a folder; leave it out for a tile in memory"
+        )
     if isinstance(source, EscherTile):
         return source
     if isinstance(source, str | Path):
-        return read_result(source)
+        return read_result(source, which)
     return EscherTile(as_instance(source, Tile, "the tile", "read_result(folder) gives one"))
 
 

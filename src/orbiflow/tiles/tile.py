@@ -14,7 +14,7 @@ import numpy as np
 
 from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
-from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
+from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, literal
 from orbiflow.runtime import array_bytes, read_arrays
 from orbiflow.tiles.geometry import border
 from orbiflow.tiles.likeness import (
@@ -329,11 +329,12 @@ class EscherTile:
     def require_certified(self, *, force: bool = False, otherwise: str) -> Certificate:
         """Return the certificate; raise `CertificationError` if it is not valid and `force` is not set.
 
-        `otherwise` says what does not happen to such a tile, and what to do.
+        `otherwise` says what does not happen to such a tile, and what to do, with names of arguments in
+        braces.
         """
         if not self.certificate.valid and not force:
-            reasons = "; ".join(self.certificate.reasons)
-            raise CertificationError(f"{self.name} is not certified ({reasons}), {otherwise}")
+            what = f"{self.name} is not certified ({'; '.join(self.certificate.reasons)})"
+            raise CertificationError(f"{literal(what)}, {otherwise}")
         return self.certificate
 
 

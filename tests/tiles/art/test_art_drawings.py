@@ -14,26 +14,26 @@ import pytest
 import shapely
 from PIL import Image
 
-from artworks import EYE, flat, squirrel
+from artworks import EYE, art_settings, flat, squirrel
 from orbiflow.drawing import palette
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles import (
     CLASSES,
-    ArtSettings,
     Artwork,
+    Over,
     Uses,
+    art_file,
     art_scene,
     artwork,
     read_outline,
     read_over,
     render_artwork,
-    write_artwork,
     write_dxf,
     write_pdf,
 )
-from orbiflow.tiles.scene import INK, Part
+from orbiflow.tiles.page import INK, Part
 
-PAGE = ArtSettings(size=(300, 200), tile_size=130, outline=0.0, samples=4)
+PAGE = art_settings(area="300x200px", tile_size="130px", outline=0.0, samples=4)
 
 
 def svg_of(name: str, body: str, folder: Path) -> Path:
@@ -50,7 +50,7 @@ def drawn(name: str, body: str, folder: Path, **options) -> Artwork:
     tile = squirrel(name)
     over = read_over(svg_of(name, body, folder), tile)
     settings = PAGE.replace(**options)
-    return artwork(tile, settings, drawing=over.drawing, notes=over.notes)
+    return artwork(tile, settings, over)
 
 
 BODY = f"""
@@ -129,7 +129,7 @@ def test_vector_and_raster_agree(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("strokes", ["hatch", "echoes", "feathers"])
 def test_engraving_keeps_to_the_tile_and_off_the_eye(strokes) -> None:
     tile = squirrel("IH6")
-    settings = PAGE.replace(strokes=strokes, eyes=(EYE,), tile_size=260)
+    settings = PAGE.replace(strokes=strokes, eyes=(EYE,), tile_size="260px")
     art = artwork(tile, settings)
     ink = art.motif.parts[0]
     assert ink.style.fill == INK
@@ -143,13 +143,13 @@ def test_engraving_keeps_to_the_tile_and_off_the_eye(strokes) -> None:
     radius = np.hypot(*(eye - middle).T)
     np.testing.assert_allclose(radius, radius[0], rtol=1e-6)  # round
     assert np.hypot(*(points - middle).T).min() > 1.5 * radius[0]
-    plain = artwork(tile, PAGE.replace(tile_size=260))
+    plain = artwork(tile, PAGE.replace(tile_size="260px"))
     assert (render_artwork(art) != render_artwork(plain)).any()
 
 
 def test_the_drawing_is_there_once(tmp_path: Path) -> None:
-    art = drawn("IH4", BODY, tmp_path, outline=2.0)
-    text = write_artwork(art, ".svg")
+    art = drawn("IH4", BODY, tmp_path, outline="2px")
+    text = art_file(art, "svg")
     assert isinstance(text, str)
     assert text.count("#ffcc00") == 1
     shown = len(re.findall('href="#motif"', text))
@@ -162,7 +162,7 @@ def test_the_drawing_is_there_once(tmp_path: Path) -> None:
 
 def test_a_picture_in_an_svg_is_one_image() -> None:
     tile = squirrel("IH4")
-    text = write_artwork(artwork(tile, PAGE, picture=flat(tile, "#c02040")), ".svg")
+    text = art_file(artwork(tile, PAGE, Over(flat(tile, "#c02040"))), "svg")
     assert isinstance(text, str)
     (data,) = re.findall('href="data:image/png;base64,([^"]+)"', text)
     image = np.asarray(Image.open(io.BytesIO(base64.b64decode(data))))
@@ -173,12 +173,12 @@ def test_other_formats_hold_artwork_unless_it_is_pixels(tmp_path: Path) -> None:
     art = drawn("IH4", BODY, tmp_path)
     scene, pixels = art_scene(art), np.asarray(render_artwork(art), dtype=float)
     page = pypdfium2.PdfDocument(write_pdf(scene))[0]
-    shown = page.render(scale=art.page.width / page.get_width()).to_pil().convert("RGB")
+    shown = page.render(scale=art.width / page.get_width()).to_pil().convert("RGB")
     assert np.abs(np.asarray(shown.resize(pixels.shape[1::-1])) - pixels).mean() < 3.4
     assert write_dxf(scene, tolerance=0.1).startswith("  0\nSECTION")
     tile = squirrel("IH4")
     with pytest.raises(OrbiflowError, match="made of pixels; choose SVG or PDF"):
-        write_dxf(art_scene(artwork(tile, PAGE, picture=flat(tile, "#c02040"))), tolerance=0.1)
+        write_dxf(art_scene(artwork(tile, PAGE, Over(flat(tile, "#c02040")))), tolerance=0.1)
 
 
 def test_gradients_and_what_is_left_out(tmp_path: Path) -> None:

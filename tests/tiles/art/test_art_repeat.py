@@ -8,23 +8,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from artworks import checkerboard, squirrel
+from artworks import art_settings, checkerboard, squirrel
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import rotation_matrix
-from orbiflow.tiles import CLASSES, ArtSettings, artwork, render_artwork
-from orbiflow.tiles.art.page import _page, rectangle
+from orbiflow.tiles import CLASSES, Over, Page, artwork, render_artwork
+from orbiflow.tiles.make.repeats import rectangle
+from orbiflow.tiles.page import Box
+
+
+def two_by_two(page: Page) -> Page:
+    """The same tiling on a page twice as wide and high."""
+    width, height = page.size
+    return replace(page, size=(2 * width, 2 * height), box=Box(0.0, 0.0, 2 * width, 2 * height))
 
 
 @pytest.mark.parametrize("how", ["aspect", "neighbour", "one"])
 @pytest.mark.parametrize("name", CLASSES)
 def test_two_by_two_is_the_same_plane(name: str, how) -> None:
     tile = squirrel(name)
-    settings = ArtSettings(repeat="basic", tile_size=60, colour=how, tolerance=0.05)
-    art = artwork(tile, settings, picture=None if how == "one" else checkerboard(tile))
+    settings = art_settings(repeat="basic", tile_size="60px", colour=how, stretch=0.05)
+    art = artwork(tile, settings, None if how == "one" else Over(checkerboard(tile)))
     cell = render_artwork(art)
-    page, size = art.page, (2 * art.page.width, 2 * art.page.height)
-    spread = _page(tile.tile, how, page.linear, page.offset, size, ())
-    twice = render_artwork(replace(art, page=spread))
+    twice = render_artwork(replace(art, page=two_by_two(art.page)))
     apart = np.abs(np.tile(cell, (2, 2, 1)).astype(int) - twice)
     assert apart.max() <= 1
 
@@ -33,8 +38,8 @@ def test_two_by_two_is_the_same_plane(name: str, how) -> None:
 @pytest.mark.parametrize("repeat", ["brick", "half-drop"])
 def test_rows_or_columns_moved_by_half_are_the_same_plane(repeat, name: str) -> None:
     tile = squirrel(name)
-    settings = ArtSettings(repeat=repeat, tile_size=60, tolerance=0.05)
-    art = artwork(tile, settings, picture=checkerboard(tile))
+    settings = art_settings(repeat=repeat, tile_size="60px", stretch=0.05)
+    art = artwork(tile, settings, Over(checkerboard(tile)))
     cell = render_artwork(art)
     height, width = cell.shape[:2]
     if repeat == "brick":
@@ -43,9 +48,7 @@ def test_rows_or_columns_moved_by_half_are_the_same_plane(repeat, name: str) -> 
     else:
         moved = np.roll(cell, height // 2, axis=0)
         pasted = np.hstack([np.vstack([cell, cell]), np.vstack([moved, moved])])
-    page = art.page
-    spread = _page(tile.tile, "neighbour", page.linear, page.offset, (2 * width, 2 * height), ())
-    twice = render_artwork(replace(art, page=spread))
+    twice = render_artwork(replace(art, page=two_by_two(art.page)))
     assert np.abs(pasted.astype(int) - twice).max() <= 1
 
 
@@ -69,9 +72,9 @@ def test_half_the_cell_where_the_lattice_has_it(turn: float, repeat) -> None:
 
 @pytest.mark.parametrize("name", ["IH2", "IH3", "IH5", "IH6", "IH7", "IH21", "IH28"])
 def test_lattices_with_a_rectangle_are_hardly_stretched(name: str) -> None:
-    art = artwork(squirrel(name), ArtSettings(repeat="basic", tile_size=300, tolerance=0.0))
-    assert re.search("whole pixels stretch it|nothing is stretched", art.page.notes[0])
-    values = np.linalg.svd(art.page.linear, compute_uv=False)
+    art = artwork(squirrel(name), art_settings(repeat="basic", tile_size="300px", stretch=0.0))
+    assert re.search("whole pixels stretch it|nothing is stretched", art.notes[0])
+    values = np.linalg.svd(art.page.stretch, compute_uv=False)
     assert values[0] / values[1] < 1.002  # whole pixels alone
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import shapely
 
-from artworks import EYE, squirrel, write_run
+from artworks import EYE, art_settings, squirrel, write_run
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.tiles import CLASSES, ArtSettings, artwork, read_result, signed_area, with_map
+from orbiflow.tiles import CLASSES, artwork, read_result, signed_area, with_map
 from orbiflow.tiles.search import matched
 from outlines import FOLDER, animal, bent_squirrel, disc, star
 
@@ -37,7 +37,7 @@ def test_without_a_map_outlines_are_matched(tmp_path: Path) -> None:
     known = squirrel("IH6").forward(np.array(EYE))
     # the bent head and the matched one are near each other
     assert np.hypot(*(moved - known)) < 0.15 * np.sqrt(abs(tile.tile.signed_area))
-    assert artwork(tile, ArtSettings(size=(60, 40), eyes=(EYE,))).motif.parts
+    assert artwork(tile, art_settings(area="60x40px", eyes=(EYE,))).motif.parts
 
 
 def test_without_a_map_or_silhouette_there_is_one_sentence(tmp_path: Path) -> None:
@@ -46,9 +46,9 @@ def test_without_a_map_or_silhouette_there_is_one_sentence(tmp_path: Path) -> No
     document["input"]["source"] = "gone.dat"
     (run / "result.json").write_text(json.dumps(document))
     tile = with_map(run)
-    assert artwork(tile, ArtSettings(size=(60, 40), strokes="hatch")).motif.parts
+    assert artwork(tile, art_settings(area="60x40px", strokes="hatch")).motif.parts
     with pytest.raises(OrbiflowError, match=r"its silhouette gone\.dat is not there"):
-        artwork(tile, ArtSettings(size=(60, 40), eyes=(EYE,)))
+        artwork(tile, art_settings(area="60x40px", eyes=(EYE,)))
     document["input"]["source"] = str(FOLDER / "nagata" / "bat_60.dat")
     (run / "result.json").write_text(json.dumps(document))
     with pytest.raises(OrbiflowError, match="is not the silhouette that it was"):

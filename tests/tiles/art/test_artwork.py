@@ -8,15 +8,25 @@ import shapely
 from PIL import Image
 from scipy.ndimage import binary_erosion
 
-from artworks import EYE, checkerboard, face, flat, picture, size_of, squirrel, upside_down
+from artworks import (
+    EYE,
+    art_settings,
+    checkerboard,
+    face,
+    flat,
+    picture,
+    size_of,
+    squirrel,
+    upside_down,
+)
 from orbiflow.drawing import palette
-from orbiflow.tiles import CLASSES, ArtSettings, Artwork, artwork, render_artwork
+from orbiflow.tiles import CLASSES, ArtSettings, Artwork, Over, artwork, render_artwork
 from orbiflow.tiles.motifs import picture_paint
 from orbiflow.tiles.motifs.raster import NOWHERE, region_sides, runs
 from orbiflow.tiles.motifs.source import _places
 from orbiflow.tiles.silhouette import triangulate
 
-PAGE = ArtSettings(size=(240, 160), tile_size=95, outline=0.0)
+PAGE = art_settings(area="240x160px", tile_size="95px", outline=0.0, dpi=25.4)  # a pixel is 1 mm
 
 
 def settings(**options) -> ArtSettings:
@@ -40,7 +50,7 @@ def rgb(colour: str) -> np.ndarray:
 @pytest.mark.parametrize("name", CLASSES)
 def test_a_flat_picture_covers_the_plane(name: str) -> None:
     tile = squirrel(name)
-    made = render_artwork(artwork(tile, PAGE, picture=flat(tile, "#c02040")))
+    made = render_artwork(artwork(tile, PAGE, Over(flat(tile, "#c02040"))))
     assert made.shape == (160, 240, 3)
     assert (made == rgb("#c02040")).all()
 
@@ -60,17 +70,16 @@ def test_each_sample_is_in_one_copy(name: str) -> None:
 def test_a_checkerboard_is_carried(name: str) -> None:
     tile = squirrel(name)
     board = checkerboard(tile, 6)
-    art = artwork(tile, settings(size=(480, 320), tile_size=200), picture=board)
+    art = artwork(tile, settings(area="480x320px", tile_size="200px"), Over(board))
     made = render_artwork(art)[..., 0] / 255.0
     rng = np.random.default_rng(1)
     row, column = rng.integers(0, 320, 4000), rng.integers(0, 480, 4000)
     points = np.stack([column, row], axis=1) + 0.5
     copy = owners(art, points)
-    own = (points - art.page.offset) @ np.linalg.inv(art.page.linear).T
-    group = art.page.tile.group
-    linear = group.linear_parts[art.page.copies.cosets[copy]]
-    own = np.einsum("mji,mj->mi", linear, own - art.page.copies.translations[copy])
-    from_here = tile.inverse(own)
+    place, copies = art.page.place, art.page.copies
+    linear = copies.group.linear_parts[copies.cosets[copy]]
+    own = np.einsum("mji,mj->mi", linear, points - copies.translations[copy])
+    from_here = tile.inverse((own - place.offset) @ np.linalg.inv(place.linear).T)
     share = (from_here - board.covered.low) / (board.covered.high - board.covered.low)
     x, y = share.T * np.array(board.image.size)[:, None] - 0.5
     longer = max(board.image.size)
@@ -87,10 +96,10 @@ def test_a_checkerboard_is_carried(name: str) -> None:
 @pytest.mark.parametrize("name", CLASSES)
 def test_every_copy_has_its_eye_mirrored_or_not(name: str) -> None:
     tile = squirrel(name)
-    art = artwork(tile, settings(size=(480, 320)), picture=face(tile))
+    art = artwork(tile, settings(area="480x320px"), Over(face(tile)))
     made = render_artwork(art).astype(int)
     eye = tile.forward(np.array(EYE))[None]
-    places = art.page.copies.images(eye)[:, 0] @ art.page.linear.T + art.page.offset
+    places = art.page.copies.images(art.page.place(eye))[:, 0]
     shown = ((places > 4) & (places < (476, 316))).all(axis=1)
     assert shown.sum() >= 4
     for x, y in places[shown]:
@@ -99,16 +108,16 @@ def test_every_copy_has_its_eye_mirrored_or_not(name: str) -> None:
         assert green < 60
     reds = ((made[..., 0] > 200) & (made[..., 1] < 60)).sum()
     assert reds < 40 * (shown.sum() + 8)
-    mirrored = np.linalg.det(art.page.tile.group.linear_parts) < 0
+    mirrored = np.linalg.det(tile.tile.group.linear_parts) < 0
     assert mirrored.any() == (name in ("IH2", "IH3", "IH5", "IH6"))
 
 
 def test_the_map_onto_the_raster_has_no_fold() -> None:
     tile = squirrel("IH6")
-    art = artwork(tile, PAGE, picture=flat(tile, "white"))
+    art = artwork(tile, PAGE, Over(flat(tile, "white")))
     grid = picture_paint(art.picture, art.tile, art.density, art.page.count).grid
     places = _places(tile, grid)
-    whole = np.asarray(binary_erosion(grid.inside(art.page.tile.polygon), iterations=2), dtype=bool)
+    whole = np.asarray(binary_erosion(grid.inside(tile.tile.polygon), iterations=2), dtype=bool)
     down, right = np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]
     turn = right[..., 0] * down[..., 1] - right[..., 1] * down[..., 0]
     inside = whole[:-1, :-1]
@@ -147,7 +156,7 @@ def test_the_fringe_of_a_cut_out_does_not_show() -> None:
     see_through = green.copy()
     see_through.putalpha(alpha)
     for image in (cut, see_through):
-        made = render_artwork(artwork(tile, PAGE, picture=picture(image, tile)))
+        made = render_artwork(artwork(tile, PAGE, Over(picture(image, tile))))
         np.testing.assert_allclose(made - rgb("#108030") + 0.0, 0, atol=1)
 
 
@@ -155,14 +164,14 @@ def test_a_transparent_picture_shows_the_palette() -> None:
     tile = squirrel("IH4")
     clear = picture(Image.new("RGBA", size_of(tile), (0, 0, 0, 0)), tile)
     plain = render_artwork(artwork(tile, PAGE))
-    np.testing.assert_array_equal(render_artwork(artwork(tile, PAGE, picture=clear)), plain)
+    np.testing.assert_array_equal(render_artwork(artwork(tile, PAGE, Over(clear))), plain)
 
 
 def test_outlines_part_tiles_of_one_colour() -> None:
-    art = artwork(squirrel("IH1"), settings(colour="one", outline=3.0, size=(480, 320)))
+    art = artwork(squirrel("IH1"), settings(colour="one", outline="3px", area="480x320px"))
     made = render_artwork(art).astype(int)
     edge = rgb(palette(art.settings.palette).outline)
-    rings = art.page.rings()
+    rings = np.array(art.page.rings())
     middles = (rings + np.roll(rings, -1, axis=1)).reshape(-1, 2) / 2
     shown = middles[((middles > 2) & (middles < (478, 318))).all(axis=1)]
     columns, rows = shown.astype(int).T
@@ -175,9 +184,9 @@ def test_a_silhouette_with_y_up_is_drawn_the_same_way_up(name: str) -> None:
     turned = upside_down(tile)
     image = checkerboard(tile).image
     image.paste(Image.new("RGBA", (200, 90), "red"), (30, 20))
-    options = {"outline": 2.0, "tile_size": 190}
+    options = {"outline": 2.0, "tile_size": 190.0}
     made = [
-        render_artwork(artwork(own, settings(**options), picture=picture(image, own)))
+        render_artwork(artwork(own, settings(**options), Over(picture(image, own))))
         for own in (tile, turned)
     ]
     apart = np.abs(made[0].astype(int) - made[1])

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from orbiflow.tiles.exporting import nesting
+from orbiflow.tiles.make import nesting
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from exported import tile_of, tiles
 from orbiflow.tiles import CLASSES, Curve, Tile
-from orbiflow.tiles.exporting.outlines import CORNER, fitted, outline, turning
+from orbiflow.tiles.page.outlines import CORNER, fitted, outline, turning
 
 
 def polyline(seed: int, count: int, rough: float) -> np.ndarray:

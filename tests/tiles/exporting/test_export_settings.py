@@ -45,7 +45,9 @@ from orbiflow.units import PAGES
         ({"dpi": 0.5}, "dpi must be .*from 1 to 10000"),
         ({"dpi": 600.0, "format": "svg"}, "dpi applies only to format png"),
         ({"purpose": "oven"}, "purpose must be laser"),
-        ({"purpose": "web", "colour": 3}, "no setting 'colour'"),
+        ({"purpose": "web", "colours": 3}, "no setting 'colours'"),
+        ({"cut": "skeleton", "colour": "one"}, "colour applies only to cut none"),
+        ({"cut": "skeleton", "outline": "none"}, "leaves cut skeleton without a line"),
         ({"filled": False, "palette": "sea"}, "palette has no effect: .*filled"),
     ],
 )
@@ -74,7 +76,7 @@ def test_beds_have_names_as_pages_have() -> None:
 def test_purposes() -> None:
     laser = ExportSettings(purpose="laser")
     assert (laser.file_format, laser.cut, laser.clip) == ("svg", "skeleton", False)
-    assert (laser.stroke, laser.stroke_width) == ("#ff0000", 0.01)
+    assert (laser.stroke, laser.outline) == ("#ff0000", 0.01)
     assert ExportSettings(purpose="print").file_format == "pdf"
     assert ExportSettings(purpose="print").clip
     assert ExportSettings(purpose="print", cut="pieces", clearance=0.2).clip is False

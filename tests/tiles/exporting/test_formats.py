@@ -15,14 +15,14 @@ from PIL import Image
 
 from exported import dxf_lines, tile_of
 from orbiflow.errors import CertificationError, OrbiflowError
-from orbiflow.tiles import EscherTile, ExportSettings, Tile, edges, export, scenes, write_scene
+from orbiflow.tiles import EscherTile, ExportSettings, Tile, edges, export, scenes, sheet_content
 
 TILE = tile_of("IH3")
 
 
 def content(**options) -> str | bytes:
     chosen = ExportSettings(**options)
-    return write_scene(scenes(TILE, chosen)[0][0], chosen)
+    return sheet_content(scenes(TILE, chosen)[0][0], chosen)
 
 
 @pytest.mark.parametrize("cut", ["none", "skeleton", "pieces"])
@@ -90,7 +90,7 @@ def test_png_has_its_real_size() -> None:
 
 
 def test_hairlines_show_in_a_png() -> None:
-    data = content(format="png", cut="skeleton", stroke_width=0.01, stroke="#ff0000", dpi=100.0)
+    data = content(format="png", cut="skeleton", outline=0.01, stroke="#ff0000", dpi=100.0)
     assert isinstance(data, bytes)
     pixels = np.asarray(Image.open(io.BytesIO(data)).convert("RGB"), dtype=int)
     assert (pixels[..., 1] < 100).mean() > 0.005
@@ -127,7 +127,7 @@ def test_json_says_where_every_tile_is() -> None:
 def test_what_is_not_certified_is_refused_or_says_so(form, tmp_path) -> None:
     bad = EscherTile(Tile(1.01 * TILE.polygon, TILE.group, "IH3"), name="boot-IH3")
     chosen = ExportSettings(format=form)
-    with pytest.raises(CertificationError, match=r"boot-IH3 is not certified .*--force exports it"):
+    with pytest.raises(CertificationError, match=r"boot-IH3 is not certified .* force exports it"):
         export(bad, tmp_path / "x", chosen)
     assert not list(tmp_path.iterdir())
     done = export(bad, tmp_path / f"x.{form}", chosen, force=True)

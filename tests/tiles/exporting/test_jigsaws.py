@@ -13,9 +13,9 @@ from shapely.affinity import translate
 from artworks import squirrel
 from exported import dxf_lines, svg_lines, tile_of
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.tiles import ExportSettings, Scene, as_tile, scenes, write_scene
-from orbiflow.tiles.exporting.jigsaws import LEAST_SHARE
+from orbiflow.tiles import ExportSettings, Scene, as_tile, scenes, sheet_content
 from orbiflow.tiles.geometry import polygons_in
+from orbiflow.tiles.make.jigsaws import LEAST_SHARE
 
 AREA, MARGIN, SIZE = (150.0, 110.0), 5.0, 35.0
 OPTIONS = {"cut": "jigsaw", "area": AREA, "margin": MARGIN, "tile_size": SIZE}
@@ -23,7 +23,7 @@ OPTIONS = {"cut": "jigsaw", "area": AREA, "margin": MARGIN, "tile_size": SIZE}
 
 def faces(scene: Scene, form: Literal["svg", "dxf"] = "svg") -> list[shapely.Polygon]:
     """The faces between the lines of the file, as any program would find them."""
-    text = write_scene(scene, ExportSettings(format=form, **OPTIONS))
+    text = sheet_content(scene, ExportSettings(format=form, **OPTIONS))
     assert isinstance(text, str)
     found = dxf_lines(text)[1] if form == "dxf" else svg_lines(text)
     lines = [

@@ -22,10 +22,10 @@ from artworks import EYE, face, squirrel
 from exported import Line, dxf_lines, svg_lines
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import ExportSettings, Scene, scenes, write_scene
-from orbiflow.tiles.exporting.drawings import burnt
+from orbiflow.tiles import ExportSettings, Scene, scenes, sheet_content
+from orbiflow.tiles.make.drawings import burnt
 from orbiflow.tiles.motifs import drawn_motif
-from orbiflow.tiles.scene import Curve, Motif, Part, Style, boundary, region_of
+from orbiflow.tiles.page import Curve, Motif, Part, Style, boundary, region_of
 
 Cut = Literal["none", "skeleton", "pieces"]
 PAGE: dict[str, Any] = {"purpose": "laser", "area": (90.0, 70.0), "tile_size": 40.0}
@@ -38,7 +38,7 @@ def exported(
     """The first sheet of an export with an eye, and its file."""
     chosen = ExportSettings(**{**PAGE, "format": form, "eyes": (EYE,), **settings})
     found, _ = scenes(squirrel(name), chosen, picture=picture)
-    return found[0], write_scene(found[0], chosen)
+    return found[0], sheet_content(found[0], chosen)
 
 
 def eyes(name: str, scene: Scene) -> np.ndarray:

@@ -17,8 +17,8 @@ from orbiflow.units import (
     LengthOrZero,
     PageSize,
     length,
+    length_or_none,
     page_size,
-    pixel_size,
     signed_length,
     size,
 )
@@ -112,8 +112,23 @@ def test_pages_that_nobody_knows(text: str) -> None:
 
 
 def test_posts_are_pixels_whatever_the_resolution() -> None:
-    assert pixel_size("square", 72) == pixel_size("Square", 600) == (1080, 1080)
-    assert pixel_size("A4", 254) == pytest.approx((2100, 2970))
+    for dpi in (72, 600):
+        assert page_size("Square", dpi) == pytest.approx((1080 * 25.4 / dpi, 1080 * 25.4 / dpi))
+    with pytest.raises(OrbiflowError, match="is not a page"):
+        page_size("square")
+
+
+@given(st.floats(0.01, 1e3), st.floats(1, 1e4))
+def test_pixels_have_a_size_where_their_number_in_an_inch_is_known(
+    number: float, dpi: float
+) -> None:
+    assert math.isclose(length(f"{number!r}px", dpi), number * 25.4 / dpi)
+    assert size(f"{number!r}x3px", dpi)[1] == pytest.approx(3 * 25.4 / dpi)
+    assert length_or_none("None", dpi) == 0
+    with pytest.raises(OrbiflowError, match="unknown unit 'px'; use one of mm, cm, in, pt"):
+        length(f"{number!r}px")
+    with pytest.raises(OrbiflowError, match=r"has no unit; write .*mm, .*cm, .*in or .*px"):
+        length(f"{number!r}", dpi)
 
 
 @given(st.floats(0.01, 1e3))

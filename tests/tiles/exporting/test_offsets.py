@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from exported import polygons, svg_lines, tile_of
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import ExportSettings, scenes, write_scene
-from orbiflow.tiles.exporting.layouts import offset_ring
+from orbiflow.tiles import ExportSettings, scenes, sheet_content
+from orbiflow.tiles.make.offsets import offset_ring
 
 HALF = [[0, 0], [4, 0], [4, 1.8], [6, 1.8], [6, 0], [10, 0]]
 DUMBBELL = np.array([*HALF, *([x, 4.0 - y] for x, y in reversed(HALF))])
@@ -70,7 +70,7 @@ def test_pieces_in_the_file(name: str, offset: float) -> None:
     options = {"cut": "pieces", "tile_size": 50, "area": (200, 150), "format": "svg"}
     chosen = ExportSettings(offset=offset, kerf=0.2, copies=2, **options)
     (scene,), _ = scenes(tile_of(name), chosen)
-    text = write_scene(scene, chosen)
+    text = sheet_content(scene, chosen)
     assert isinstance(text, str)
     lines = svg_lines(text)
     cuts = polygons([line for line in lines if line.layer == "cut"])

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from artworks import squirrel, upside_down
+from artworks import art_settings, squirrel, upside_down
 from orbiflow.drawing import palette, rgb
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles import (
@@ -20,15 +20,14 @@ from orbiflow.tiles import (
     ArtSettings,
     ExportSettings,
     Uses,
+    art_file,
     artwork,
     render_artwork,
     scenes,
-    write_artwork,
 )
-from orbiflow.tiles.art import Artwork, art_scene
+from orbiflow.tiles.make import Artwork, art_scene
 
-PAGE: dict[str, Any] = {"size": "211.7x148mm", "tile_size": "37mm"}
-CUT: dict[str, Any] = {"area": "211.7x148mm", "tile_size": "37mm"}
+PAGE: dict[str, Any] = {"area": "211.7x148mm", "tile_size": "37mm"}
 
 
 def painted_rings(art: Artwork) -> np.ndarray:
@@ -72,7 +71,7 @@ def test_art_and_export_put_tiles_in_the_same_places(
     tile = upside_down(squirrel(name)) if turned else squirrel(name)
     same: dict[str, Any] = {"rotate": rotate, "clip": clip}
     painted = painted_rings(artwork(tile, ArtSettings(**PAGE, **same)))
-    found = cut_rings(tile, **CUT, **same, cut=cut, purpose=purpose)
+    found = cut_rings(tile, **PAGE, **same, cut=cut, purpose=purpose)
     assert apart(found, painted) < 1e-6
     page = shapely.box(0, 0, 211.7, 148)
     shown = [page.intersects(one) for one in np.asarray(shapely.polygons(painted))]
@@ -81,9 +80,9 @@ def test_art_and_export_put_tiles_in_the_same_places(
 
 def test_a_length_stays_that_length() -> None:
     art = artwork(
-        squirrel("IH4"), ArtSettings(**{"size": "300x200.3mm", "tile_size": "80mm", "dpi": 97})
+        squirrel("IH4"), ArtSettings(**{"area": "300x200.3mm", "tile_size": "80mm", "dpi": 97})
     )
-    svg, png = str(write_artwork(art, ".svg")), write_artwork(art, ".png")
+    svg, png = str(art_file(art, "svg")), art_file(art, "png")
     assert 'width="300mm" height="200.3mm" viewBox="0 0 300 200.3"' in svg
     assert isinstance(png, bytes)
     image = Image.open(io.BytesIO(png))
@@ -96,7 +95,7 @@ def test_whole_tiles_alone_are_painted() -> None:
     rings = painted_rings(art)
     assert rings.min() > 0
     assert (rings < (211.7, 148)).all()
-    assert art.page.shown == len(rings)
+    assert art.shown == len(rings)
     # on the paper of the palette, nothing but these tiles
     pixels = np.asarray(render_artwork(art))[2::8, 2::8]
     rows, columns = np.indices(pixels.shape[:2]) * 8 + 2.5
@@ -113,4 +112,4 @@ def test_the_cell_that_repeats_is_neither_turned_nor_whole() -> None:
     settings: list[dict[str, Any]] = [{"rotate": 10.0}, {"clip": False}]
     for setting in settings:
         with pytest.raises(OrbiflowError, match="exclude each other"):
-            ArtSettings(repeat="basic", **setting)
+            art_settings(repeat="basic", **setting)

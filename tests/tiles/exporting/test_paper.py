@@ -9,16 +9,16 @@ import shapely
 from artworks import EYE, squirrel
 from exported import Line, polygons, svg_lines, tile_of
 from orbiflow.errors import OrbiflowError, SettingError
-from orbiflow.tiles import EscherTile, ExportSettings, Scene, scenes, write_scene
-from orbiflow.tiles.exporting.layouts import layout
-from orbiflow.tiles.exporting.placing import mark_corners
-from orbiflow.tiles.exporting.templates import numbered_edges
+from orbiflow.tiles import EscherTile, ExportSettings, Scene, as_tile, scenes, sheet_content
+from orbiflow.tiles.make.layouts import layout
+from orbiflow.tiles.make.templates import numbered_edges
+from orbiflow.tiles.page.placing import mark_corners
 
 
 def drawn(tile: str | EscherTile, **options) -> tuple[Scene, list[Line]]:
     chosen = ExportSettings(format="svg", **options)
     (scene,), _ = scenes(tile_of(tile) if isinstance(tile, str) else tile, chosen)
-    text = write_scene(scene, chosen)
+    text = sheet_content(scene, chosen)
     assert isinstance(text, str)
     return scene, svg_lines(text)
 
@@ -96,7 +96,7 @@ def is_arrow(points: np.ndarray) -> bool:
 
 def test_partners_are_images_of_each_other() -> None:
     """What carries an edge onto its partner carries its arrow, and the number stands at both."""
-    placed = layout(tile_of("IH5"), ExportSettings(purpose="template"), y_down=True)
+    placed = layout(as_tile(tile_of("IH5")), ExportSettings(purpose="template"))
     edges = list(numbered_edges(placed))
     assert [number for number, _ in edges[::2]] == [number for number, _ in edges[1::2]]
     for (_, first), (_, second) in zip(edges[::2], edges[1::2], strict=True):

@@ -11,9 +11,10 @@ from scipy.spatial.distance import pdist
 
 from exported import dxf_lines, polygons, svg_lines, tile_of, tiles
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import CLASSES, ExportSettings, Tile, scenes, write_scene
-from orbiflow.tiles.exporting.layouts import cut_ring, layout
-from orbiflow.tiles.exporting.nesting import Arrangement, on_sheet
+from orbiflow.tiles import CLASSES, ExportSettings, Tile, as_tile, scenes, sheet_content
+from orbiflow.tiles.make.layouts import layout
+from orbiflow.tiles.make.nesting import Arrangement, on_sheet
+from orbiflow.tiles.make.offsets import cut_ring
 
 
 def cut(tile: Tile, **options) -> list[list[shapely.Polygon]]:
@@ -21,7 +22,7 @@ def cut(tile: Tile, **options) -> list[list[shapely.Polygon]]:
     chosen = ExportSettings(cut="pieces", **options)
     found = []
     for scene in scenes(tile, chosen)[0]:
-        text = write_scene(scene, chosen)
+        text = sheet_content(scene, chosen)
         assert isinstance(text, str)
         assert "<use" not in text
         lines = dxf_lines(text)[1] if chosen.format == "dxf" else svg_lines(text)
@@ -40,7 +41,7 @@ def test_what_the_beam_leaves_is_the_piece(tile, kerf, clearance, form) -> None:
     options = {"tile_size": 50.0, "area": (120.0, 80.0), "spacing": 0.5}
     (sheet,) = cut(tile, kerf=kerf, clearance=clearance, format=form, **options)
     chosen = ExportSettings(cut="pieces", **options)
-    wanted = shapely.Polygon(layout(tile, chosen, y_down=False).tile.polygon)
+    wanted = shapely.Polygon(layout(as_tile(tile), chosen).page.ring)
     wanted = wanted.buffer(-clearance / 2) if clearance else wanted
     for polygon in sheet:
         left = polygon.buffer(-kerf / 2, quad_segs=32)  # the beam is round
@@ -91,9 +92,8 @@ def test_too_many_for_the_page() -> None:
 def test_a_single_piece_goes_in_whichever_way_it_fits() -> None:
     bar = np.array([[0, 0], [10, 0], [10, 1], [0, 1.0]])
     tile = Tile(bar, tile_of("IH1").group)
-    line = layout(
-        Tile(bar, tile.group), ExportSettings(cut="pieces", tile_size=100), y_down=True
-    ).tile.polygon
+    chosen = ExportSettings(cut="pieces", tile_size=100)
+    line = layout(as_tile(Tile(bar, tile.group)), chosen).page.ring
     one = Arrangement(300 * np.eye(2), np.eye(2)[None], np.zeros((1, 2)))
     assert len(on_sheet([one], line, 12, 101)) == 1
     assert len(on_sheet([one], line, 79, 79)) == 1  # along the diagonal

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from artworks import squirrel, write_run
+from artworks import art_settings, squirrel, write_run
 from orbiflow.errors import CertificationError, InputFileError, OrbiflowError, OutputError
 from orbiflow.tiles import (
     AnimationSettings,
@@ -24,8 +24,8 @@ from orbiflow.tiles import (
     SearchResult,
     Tile,
     animate,
+    art,
     artwork,
-    draw_art,
     escherize_class,
     export,
     read_result,
@@ -34,7 +34,7 @@ from orbiflow.tiles import (
 from orbiflow.tiles import write_run as write_folder
 from outlines import animal
 
-SMALL = ArtSettings(size=(90, 60), tile_size=40.0)
+SMALL = art_settings(area="90x60px", tile_size="40px")
 BARE = LikenessSearch(placements=20, held=4, finalists=1, rounds=4)
 
 
@@ -54,8 +54,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory, found: EscherTile) -> Path:
 
 
 def drawing(tile: Any, out: Path, settings: ArtSettings, **options: Any) -> Path:
-    """The file that `draw_art` writes."""
-    assert draw_art(tile, out, settings, **options).page.shown > 0
+    """The file that `art` writes."""
+    assert art(tile, out, settings, **options).shown > 0
     return out
 
 
@@ -109,7 +109,7 @@ def test_everything_that_holds_a_tile_is_exported_alike(
 def test_everything_with_a_map_is_drawn_alike(
     tmp_path: Path, folder: Path, found: EscherTile
 ) -> None:
-    settings = ArtSettings(size=(90, 60), tile_size=40.0, eyes=((210.0, 190.0),))
+    settings = art_settings(area="90x60px", tile_size="40px", eyes=((210.0, 190.0),))
     drawn = [
         drawing(source, tmp_path / f"{k}.png", settings).read_bytes()
         for k, source in enumerate(sources(folder, found))
@@ -133,10 +133,12 @@ def test_the_ending_decides_an_export_s_format(
 
 
 def test_the_ending_decides_an_animation_s_format(tmp_path: Path, found: EscherTile) -> None:
-    settings = AnimationSettings(seconds=0.5, size=64)
-    assert animate(found, tmp_path / "a.svg", settings).read_text().lstrip().startswith("<")
+    settings = AnimationSettings(**{"seconds": 0.5, "area": "96x64px"})
+    animate(found, tmp_path / "a.svg", settings)
+    assert (tmp_path / "a.svg").read_text().lstrip().startswith("<")
     settings = settings.replace(fps=4)
-    assert animate(found, tmp_path / "a.gif", settings).read_bytes().startswith(b"GIF")
+    animate(found, tmp_path / "a.gif", settings)
+    assert (tmp_path / "a.gif").read_bytes().startswith(b"GIF")
 
 
 def test_an_ending_of_no_format_is_refused_unless_settings_say_it(
@@ -145,7 +147,9 @@ def test_an_ending_of_no_format_is_refused_unless_settings_say_it(
     out = tmp_path / "a.xyz"
     with pytest.raises(OrbiflowError, match=r"out ends in \.xyz; give format.*\.svg, \.pdf"):
         export(found, out)
-    with pytest.raises(OrbiflowError, match=r"out ends in \.xyz; give format.*\.gif"):
+    with pytest.raises(
+        OrbiflowError, match=r"file that ends in \.gif, \.mp4 or \.svg, got 'a\.xyz'"
+    ):
         animate(found, out)
     assert not out.exists()
     assert export(found, out, ExportSettings(format="json")).files == (out,)
@@ -155,10 +159,10 @@ def test_a_tile_without_a_map_needs_the_target_for_pictures(tmp_path: Path) -> N
     target, tile = animal("squirrel.dat"), squirrel("IH4").tile
     plain = Tile(tile.polygon, tile.group, "IH4")
     assert drawing(plain, tmp_path / "plain.svg", SMALL).is_file()
-    seen = ArtSettings(size=(90, 60), eyes=((210.0, 190.0),))
+    seen = art_settings(area="90x60px", eyes=((210.0, 190.0),))
     with pytest.raises(OrbiflowError, match="give the search's target as well"):
-        draw_art(plain, tmp_path / "eye.png", seen)
-    assert drawing(plain, tmp_path / "eye.png", seen, target=target).is_file()
+        art(plain, tmp_path / "eye.png", seen)
+    assert drawing(with_map(plain, target), tmp_path / "eye.png", seen).is_file()
     assert with_map(plain, target).notes
 
 
@@ -172,7 +176,7 @@ def test_a_picture_goes_through_the_map(tmp_path: Path, found: EscherTile) -> No
     size = tuple(int(side) for side in np.rint(covered.high - covered.low))
     painted = tmp_path / "painted.png"
     Image.new("RGB", (size[0], size[1]), "#ff0000").save(painted)
-    settings = ArtSettings(size=(90, 60), tile_size=40.0, outline=0.0)
+    settings = art_settings(area="90x60px", tile_size="40px", outline=0.0)
     out = drawing(found, tmp_path / "red.png", settings, picture=painted)
     pixels = np.asarray(Image.open(out).convert("RGB"))
     assert (pixels == (255, 0, 0)).all()
@@ -180,15 +184,17 @@ def test_a_picture_goes_through_the_map(tmp_path: Path, found: EscherTile) -> No
 
 def test_mistakes_are_said_before_anything_is_written(tmp_path: Path, found: EscherTile) -> None:
     out = tmp_path / "a.gif"
-    with pytest.raises(OrbiflowError, match=r"written to a \.png or \.svg, got 'a\.gif'"):
-        draw_art(found, out)
+    with pytest.raises(
+        OrbiflowError, match=r"out must be a file that ends in \.png or \.svg, got 'a\.gif'"
+    ):
+        art(found, out)
     with pytest.raises(InputFileError, match="no such file or folder"):
         export(tmp_path / "none", tmp_path / "a.svg")
     with pytest.raises(InputFileError, match="no such file"):
-        draw_art(found, tmp_path / "a.png", SMALL, picture=tmp_path / "none.png")
+        art(found, tmp_path / "a.png", SMALL, picture=tmp_path / "none.png")
     bad = Tile(1.01 * found.tile.polygon, found.tile.group, "IH4")
     with pytest.raises(CertificationError):
-        draw_art(bad, tmp_path / "a.png", SMALL)
+        art(bad, tmp_path / "a.png", SMALL)
     assert not list(tmp_path.iterdir())
     assert drawing(bad, tmp_path / "a.png", SMALL, force=True).is_file()
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from exported import dxf_lines, tile_of
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import ExportSettings, scenes, write_scene
-from orbiflow.tiles.exporting.sheets import ARM, OVERLAP
+from orbiflow.tiles import ExportSettings, scenes, sheet_content
+from orbiflow.tiles.make.sheets import ARM, OVERLAP
 
 TILE = tile_of("IH7")
 
@@ -25,7 +25,7 @@ def sheets_of(area, bed, **options):
     for k, scene in enumerate(made):
         row, column = divmod(k, across)
         place = np.array([column * (scene.width - OVERLAP), row * (scene.height - OVERLAP)])
-        text = write_scene(scene, chosen)
+        text = sheet_content(scene, chosen)
         assert isinstance(text, str)
         lines = [line._replace(points=line.points + place) for line in dxf_lines(text)[1]]
         found.append((place, (scene.width, scene.height), lines))
@@ -72,7 +72,7 @@ def test_a_tiling_in_colours_on_sheets() -> None:
     chosen = ExportSettings(area=(400.0, 200.0), bed=(220.0, 200.0), clip=True)
     made, _ = scenes(TILE, chosen)
     assert len(made) == 2
-    texts = [str(write_scene(scene, chosen)) for scene in made]
+    texts = [str(sheet_content(scene, chosen)) for scene in made]
     assert all('clip-path="url(#window)"' in text and "<use" in text for text in texts)
     assert "Sheet 2 of 2" in texts[1]
     assert all(tile.neighbours for scene in made for tile in scene.tiles)

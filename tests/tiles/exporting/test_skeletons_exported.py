@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from exported import Line, dxf_lines, svg_lines, tile_of, tiles
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import wallpaper_group
-from orbiflow.tiles import CLASSES, ExportSettings, Scene, Tile, edges, scenes, write_scene
+from orbiflow.tiles import CLASSES, ExportSettings, Scene, Tile, edges, scenes, sheet_content
 
 AREA = (150.0, 110.0)
 # svgelements takes an inch for 25.39998 mm: 2e-4 in these tests
@@ -22,7 +22,7 @@ AREA = (150.0, 110.0)
 def lines_of(tile: Tile, **options) -> tuple[Scene, list[Line]]:
     chosen = ExportSettings(cut="skeleton", area=AREA, **options)
     (scene,), _ = scenes(tile, chosen)
-    text = write_scene(scene, chosen)
+    text = sheet_content(scene, chosen)
     assert isinstance(text, str)
     return scene, dxf_lines(text)[1] if chosen.format == "dxf" else svg_lines(text, 8)
 

@@ -10,10 +10,23 @@ import numpy as np
 import pytest
 
 from orbiflow.arrays import Array
+from orbiflow.drawing import Sheet
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import CLASSES, Tile, colouring, default_window, patch, tile_svg, tiling_svg
+from orbiflow.tiles import (
+    CLASSES,
+    Tile,
+    colouring,
+    default_window,
+    patch,
+    tile_picture,
+    tiling_picture,
+)
 
 SVG = "{http://www.w3.org/2000/svg}"
+
+
+def tiling_svg(tile: Tile, *window: Any) -> str:
+    return tiling_picture(tile, *window, sheet=Sheet.column(300.0)).svg()
 
 
 def paths(text: str) -> list[Array]:
@@ -84,13 +97,13 @@ def triangle(top: float) -> Tile:
 @pytest.mark.parametrize(("top", "y_down"), [(1.0, False), (-1.0, True)])
 def test_upright(top: float, y_down: bool) -> None:
     """A triangle that points up in its own coordinates points up on the page."""
-    (path,) = paths(tile_svg(triangle(top), y_down=y_down))
+    (path,) = paths(tile_picture(triangle(top), y_down=y_down).svg())
     assert path[2, 1] < path[0, 1]  # SVG's y points down
     assert path[0, 0] < path[1, 0]  # not mirrored
 
 
 def test_tile_alone_fits_its_page(bent_tile: Any) -> None:
-    text = tile_svg(bent_tile("IH28"), title="Cat & <mouse>")
+    text = tile_picture(bent_tile("IH28"), title="Cat & <mouse>").svg()
     width, height = page(text)
     (path,) = paths(text)
     assert (path.min(axis=0) > 0).all()

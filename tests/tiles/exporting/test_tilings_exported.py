@@ -15,8 +15,16 @@ from hypothesis import strategies as st
 
 from exported import dxf_lines, polygons, svg_lines, tile_of, tiles
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import CLASSES, EscherTile, ExportSettings, Tile, colouring, scenes, write_scene
-from orbiflow.tiles.exporting import longer_side
+from orbiflow.tiles import (
+    CLASSES,
+    EscherTile,
+    ExportSettings,
+    Tile,
+    colouring,
+    scenes,
+    sheet_content,
+)
+from orbiflow.tiles.page import longer_side
 
 INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
 SVG = "{http://www.w3.org/2000/svg}"
@@ -25,7 +33,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 def text_of(tile: Tile | EscherTile, **options) -> str:
     chosen = ExportSettings(**options)
     found, _ = scenes(tile, chosen)
-    content = write_scene(found[0], chosen)
+    content = sheet_content(found[0], chosen)
     assert isinstance(content, str)
     return content
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.tiles import Curve
-from orbiflow.tiles.exporting.skeletons import in_short_order, trails
+from orbiflow.tiles.make.skeletons import in_short_order, trails
 
 graphs = st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)), min_size=1, max_size=40)
 

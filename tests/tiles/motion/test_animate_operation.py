@@ -39,7 +39,7 @@ def animation(**given: object) -> Call:
 
 def small(folder: Path, out: Path | None, **given: object) -> Call:
     own = {} if out is None else {"out": out}
-    return animation(result=folder, seconds=1.0, size=96, **own, **given)
+    return animation(result=folder, seconds=1.0, area="96x64px", **own, **given)
 
 
 def test_a_file_is_written_and_told_of(folder: Path, tmp_path: Path) -> None:
@@ -79,7 +79,7 @@ def test_a_cancelled_one_writes_nothing(folder: Path, tmp_path: Path) -> None:
     ("fields", "message"),
     [
         ({"out": "a.webm"}, "out .*ends in .gif, .mp4 or .svg"),
-        ({"size": 65}, "size must be even"),
+        ({"area": "65x40px"}, "area is 65 x 40 pixels: choose sides from 64"),
         ({"seconds": 0.1}, "seconds must be .*from"),
         ({"fps": 100}, "fps must be .*from"),
         ({"seconds": 120, "fps": 60, "format": "gif"}, "seconds .*fps .*more than 2400"),

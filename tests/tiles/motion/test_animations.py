@@ -7,6 +7,7 @@ import itertools
 import re
 import stat
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -26,15 +27,17 @@ from orbiflow.tiles import (
     Tile,
     animate,
     animation,
+    as_tile,
     escherize_class,
 )
-from orbiflow.tiles.motion.kinds import BendingWay, eased, frames, morph
-from orbiflow.tiles.motion.writers import motion, picture
+from orbiflow.tiles.motion.kinds import BendingWay, eased, frames, motion
+from orbiflow.tiles.motion.writers import frame_scene
+from orbiflow.tiles.write import scene_image
 from swirled_tiles import is_sound, swirled, swirled_tile
 
 BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]
 SVG = "{http://www.w3.org/2000/svg}"
-SMALL = {"seconds": 1.0, "fps": 10.0, "size": 120}
+SMALL = {"seconds": 1.0, "fps": 10.0, "area": "120x80px"}
 
 
 @pytest.fixture(scope="module", name="bent")
@@ -46,14 +49,16 @@ def bent_fixture() -> EscherTile:
 
 
 @settings(max_examples=20)
-@given(swirled, st.floats(0, 1), st.booleans(), st.sampled_from([9 / 16, 1.0, 1.5]))
+@given(
+    swirled, st.floats(0, 1), st.booleans(), st.sampled_from(["90x160px", "150x150px", "150x100px"])
+)
 def test_every_picture_of_a_morph_is_full(
-    tile: Tile, share: float, steady: bool, aspect: float
+    tile: Tile, share: float, steady: bool, area: Any
 ) -> None:
     assume(is_sound(tile))
-    moving = morph(tile, 150, aspect=aspect, steady=steady)
+    moving = motion(as_tile(tile), AnimationSettings(area=area, format="svg" if steady else None))
     own = palette("lagoon")._replace(paper="#ff00ff")
-    image = np.asarray(picture(moving, own, share).image()).astype(int)
+    image = np.asarray(scene_image(frame_scene(moving, own, share))).astype(int)
     paper = np.abs(image - (255, 0, 255)).max(axis=-1) < 40
     assert paper.sum() == 0
     assert len(moving.colours) == len(moving.places(share).offset)
@@ -76,7 +81,8 @@ def test_the_way_back_is_the_way_there(time: float) -> None:
 
 @pytest.mark.parametrize("kind", ["morph", "bend", "grow"])
 def test_a_gif(bent: EscherTile, kind, tmp_path: Path) -> None:
-    out = animate(bent, tmp_path / "a.gif", AnimationSettings(kind=kind, **SMALL))
+    out = tmp_path / "a.gif"
+    animate(bent, out, AnimationSettings(kind=kind, **SMALL))
     with Image.open(out) as image:
         assert image.size == (120, 80)
         assert image.info["loop"] == 0
@@ -126,7 +132,8 @@ def test_an_svg(bent: EscherTile, kind) -> None:
 
 @pytest.mark.parametrize("name", ["IH1", "IH5", "IH21"])
 def test_colours_of_neighbours_differ_throughout(name: str) -> None:
-    moving = morph(swirled_tile(name, 3, 0.1), 200)
+    settings: dict[str, Any] = {"area": "200x134px"}
+    moving = motion(as_tile(swirled_tile(name, 3, 0.1)), AnimationSettings(**settings))
     for share in (0.0, 0.5, 1.0):
         shown = [(shapely.Polygon(ring), colour) for ring, colour, _ in moving.rings(share)]
         size = shown[0][0].area ** 0.5
@@ -140,11 +147,13 @@ def test_colours_of_neighbours_differ_throughout(name: str) -> None:
         assert beside > len(shown)
 
 
-@pytest.mark.parametrize(("shape", "height"), [("wide", 720), ("square", 1080), ("story", 1920)])
+@pytest.mark.parametrize(
+    ("area", "height"), [("1080x720px", 720), ("square", 1080), ("story", 1920)]
+)
 @pytest.mark.parametrize("kind", ["morph", "bend", "grow"])
-def test_shapes_of_clips(bent: EscherTile, shape, height: int, kind) -> None:
-    made = motion(bent, AnimationSettings(kind=kind, size=1080, shape=shape))
-    assert (made.page.width, made.page.height) == (1080, height)
+def test_shapes_of_clips(bent: EscherTile, area, height: int, kind) -> None:
+    made = motion(bent, AnimationSettings(kind=kind, area=area))
+    assert made.page.size == pytest.approx((1080, height))
     # about as many tiles, whatever the shape
     low, high = made.outline(1.0).min(axis=0), made.outline(1.0).max(axis=0)
     share = np.prod(high - low) / (1080 * height)
@@ -157,7 +166,7 @@ def test_a_silhouette_bends_from_rest_to_tile(bent: EscherTile) -> None:
     way = BendingWay(bending)
     assert np.abs(way.at(0.0) - bending.rest[way.ring]).max() < 1e-9
     assert np.abs(way.at(1.0) - bending.images[way.ring]).max() < 1e-9
-    whole = motion(bent, AnimationSettings(kind="bend", size=200))
+    whole = motion(bent, AnimationSettings(kind="bend", **{**SMALL, "area": "200x134px"}))
     ring = whole.outline(1.0) @ whole.places(1.0).linear[0].T + whole.places(1.0).offset[0]
     assert ring.min() > 0
     assert whole.grown(0.0).tolist()[0] == 1
@@ -174,7 +183,7 @@ def test_what_cannot_be_animated_says_why(bent: EscherTile, monkeypatch) -> None
     ):
         animation(EscherTile(bent.tile), AnimationSettings(kind="bend", **SMALL))
     crossed = Tile(0.9 * bent.tile.polygon, bent.tile.group, "IH4")
-    with pytest.raises(CertificationError, match=r"is not certified .* --force animates it"):
+    with pytest.raises(CertificationError, match=r"is not certified .* force animates it"):
         animation(crossed, AnimationSettings(**SMALL))
     monkeypatch.setenv("PATH", "")
     with pytest.raises(OrbiflowError, match="an MP4 needs ffmpeg, which is not installed"):
@@ -188,8 +197,10 @@ def test_what_cannot_be_animated_says_why(bent: EscherTile, monkeypatch) -> None
         ({"kind": "jump"}, "kind must be morph, bend or grow"),
         ({"seconds": 0}, "seconds"),
         ({"fps": 1000}, "fps"),
-        ({"size": 801}, "size must be even"),
-        ({"size": 1.5}, "size"),
+        ({"area": "801x534px", "format": "mp4"}, "area is 801 x 534 pixels: choose even sides"),
+        ({"area": "60x40px"}, "choose sides from 64 to 8000 pixels"),
+        ({"kind": "morph", "clip": False}, "clip applies only to kind bend or grow"),
+        ({"area": 1.5}, "area"),
         ({"palette": "mud"}, "unknown palette"),
         ({"format": "gif", "seconds": 120, "fps": 60}, "more than 2400"),
     ],

@@ -13,17 +13,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from orbiflow.drawing import PALETTES, rgb
+from orbiflow.drawing import PALETTES, Sheet, rgb
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import (
-    Tiling,
-    colouring,
-    copies_meeting,
-    tiling_picture,
-    tiling_raster,
-    tiling_svg,
-    tilings_png,
-)
+from orbiflow.tiles import Tiling, colouring, copies_meeting, tiling_picture, tilings_png
 from some_tilings import NAMED
 
 ROOT = Path(__file__).parents[3]
@@ -34,9 +26,7 @@ def test_each_tile_has_its_colour(name: str) -> None:
     """In the middle of each tile the picture has the colour that the colouring says."""
     tiling = NAMED[name][0]
     window = (-1.3, -1.1, 1.2, 0.9)
-    picture = Image.open(io.BytesIO(tiling_raster(tiling, window, width_px=500).png())).convert(
-        "RGB"
-    )
+    picture = tiling_picture(tiling, window).image(500)
     copies = copies_meeting(tiling, window)
     colours = colouring(tiling).colours(copies)
     seen = 0
@@ -50,9 +40,9 @@ def test_each_tile_has_its_colour(name: str) -> None:
 
 def test_in_print_and_as_drawing() -> None:
     tiling = NAMED["hexagons and triangles"][0]
-    assert tiling_picture(tiling).file().startswith(b"%PDF")
-    window = (-1.0, -1.0, 1.0, 1.0)
-    text = tiling_svg(tiling, window)
+    assert tiling_picture(tiling, sheet=Sheet.column()).file().startswith(b"%PDF")
+    window = (-1.03, -1.01, 1.02, 1.04)
+    text = tiling_picture(tiling, window).svg()
     paper, *paths = re.findall(r' d="([^"]*)"', text)
     assert len(paper.split(" ")) == 3
     assert len(paths) == len(copies_meeting(tiling, window))

@@ -20,7 +20,7 @@ from orbiflow.tiles import (
     edges,
     skeleton,
 )
-from orbiflow.tiles.exporting.outlines import outline
+from orbiflow.tiles.page.outlines import outline
 from some_tilings import NAMED, SQUARE, dirichlet_tilings, mirror_tiles, tilings
 
 

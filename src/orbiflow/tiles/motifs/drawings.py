@@ -21,18 +21,7 @@ from orbiflow.tiles.motifs.engraving import engraved, eye
 from orbiflow.tiles.motifs.raster import Grid, Paint
 from orbiflow.tiles.motifs.settings import MotifSettings
 from orbiflow.tiles.motifs.source import Picture, carried_picture, read_picture
-from orbiflow.tiles.scene import (
-    INK,
-    Curve,
-    Motif,
-    Part,
-    Raster,
-    Sheet,
-    Style,
-    boundary,
-    painted,
-    shape_of,
-)
+from orbiflow.tiles.page import INK, Curve, Motif, Part, Raster, Style, boundary
 from orbiflow.tiles.silhouette import (
     Drawing,
     DrawnShape,
@@ -45,6 +34,7 @@ from orbiflow.tiles.silhouette import (
     read_head,
 )
 from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.write import Sheet, painted, shape_of
 
 # Greatest distance of flattened curves from the drawing's, in sizes of the silhouette
 FLATNESS = 1 / 4000

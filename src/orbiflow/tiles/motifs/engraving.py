@@ -29,7 +29,7 @@ from orbiflow.tiles.geometry import (
 )
 from orbiflow.tiles.motifs.raster import Grid
 from orbiflow.tiles.motifs.settings import Strokes
-from orbiflow.tiles.scene import INK, Curve, Part, Style
+from orbiflow.tiles.page import INK, Curve, Part, Style
 from orbiflow.tiles.tile import EscherTile
 
 GRID_DENSITY = 420.0  # cells of the raster along the square root of the area

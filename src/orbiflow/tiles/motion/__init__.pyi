@@ -1,3 +1,2 @@
 from .settings import AnimationSettings as AnimationSettings
-from .writers import animate as animate
 from .writers import animation as animation

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -13,12 +13,15 @@ from scipy.sparse import coo_array, csc_array
 from scipy.sparse.linalg import splu
 
 from orbiflow.arrays import Array, Window
+from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import border, triangle_sides
 from orbiflow.tiles.motion.morph import Morph, OwnFrame
+from orbiflow.tiles.motion.settings import AnimationSettings
+from orbiflow.tiles.page import Page, Style, edge_margin, longer_side
 from orbiflow.tiles.silhouette import Bending
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tilings import ASPECT, Copies, Tile, colouring, copies_meeting, default_window
+from orbiflow.tiles.tilings import ASPECT, Copies, Tile, copies_meeting, default_window
 
 
 class Places(NamedTuple):
@@ -26,6 +29,9 @@ class Places(NamedTuple):
 
     linear: Array
     offset: Array
+
+
+NO_LINE = Style()
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +45,7 @@ class Motion:
     births: Array  # the progress (M, 2) in which each copy grows; below 0 if it is always there
     keys: tuple[float, ...]  # progress between which the outline moves in nearly straight lines
     what: str  # the motion in words, for titles
+    line: Style = NO_LINE  # of outlines
 
     def grown(self, progress: float) -> Array:
         """Return the size (M,) of each copy, 0 to 1."""
@@ -53,6 +60,7 @@ class Motion:
             yield size[k] * outline @ linear[k].T + offset[k], int(self.colours[k]), size[k] == 1
 
 
+OUTLINE = 0.0016  # width of outlines, as a share of the page's, where none is given
 ALWAYS = (-1.0, -0.5)  # the birth of copies that are there from the start
 
 
@@ -62,48 +70,56 @@ BEND = 0.45
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
-class Page:
-    """The tile's default window, or one of another shape but as large, on a picture in pixels.
-
-    `linear` maps the tile's coordinates to pixels; `center` and `middle` are its centre in either.
-    """
-
-    def __init__(self, tile: Tile, width: int, aspect: float, y_down: bool) -> None:
-        window = default_window(tile)
-        self.width, self.height = width, 2 * round(width / aspect / 2)
-        scale = width / (window[2] - window[0]) * math.sqrt(ASPECT / aspect)
-        self.linear = scale * np.diag([1.0, 1.0 if y_down else -1.0])
-        self.center = tile.center
-        self.middle = np.array([self.width, self.height]) / 2
-
-    def window(self, linear: Array) -> Window:
-        """Return the part of a plane that is seen if `linear` maps it to pixels about the middle."""
-        corners = self.middle * np.array([[1, 1], [-1, -1], [1, -1], [-1, 1]])
-        own = corners @ np.linalg.inv(linear).T
-        return (*own.min(axis=0).tolist(), *own.max(axis=0).tolist())
+def motion(given: EscherTile, settings: AnimationSettings) -> Motion:
+    """Return what moves, in pixels, before it is a file."""
+    settings = settings.in_pixels()
+    page, chosen = _page(given, settings), palette(settings.palette)
+    kinds: dict[str, Callable[[], Motion]] = {
+        "morph": lambda: morph(given.tile, page, steady=settings.format == "svg"),
+        "grow": lambda: grow(given.tile, page),
+        "bend": lambda: bend(given, page),
+    }
+    width = max(1.0, OUTLINE * page.size[0]) if settings.outline is None else settings.outline
+    line = Style(None, chosen.outline, width) if width else NO_LINE
+    return replace(kinds[settings.kind](), line=line)
 
 
-def morph(
-    tile: Tile, width: int, *, aspect: float = ASPECT, y_down: bool = False, steady: bool = False
-) -> Motion:
+def _page(given: EscherTile, settings: AnimationSettings) -> Page:
+    """Return the page, by default with the tile's default window or one that is as large."""
+    (width, height), window = settings.page, default_window(given.tile)
+    scale = math.sqrt(width * height * ASPECT) / (window[2] - window[0])
+    if settings.tile_size is not None:
+        scale = settings.tile_size / longer_side(given.tile.polygon)
+    whole = None if settings.clip else edge_margin(scale * longer_side(given.tile.polygon))
+    return Page.placed(given.tile, settings, scale, y_down=given.y_down, whole=whole)
+
+
+def _window(page: Page, linear: Array) -> Window:
+    """Return the part of a plane that is seen if `linear` maps it to the page about its middle."""
+    corners = np.array(page.size) / 2 * np.array([[1, 1], [-1, -1], [1, -1], [-1, 1]])
+    own = corners @ np.linalg.inv(linear).T
+    return (*own.min(axis=0).tolist(), *own.max(axis=0).tolist())
+
+
+def morph(tile: Tile, page: Page, *, steady: bool = False) -> Motion:
     """Return the tiling by the class's template, with straight edges, becoming the tile's.
 
     It is a tiling throughout; if `steady`, the tile's lattice is there from the start.
     """
-    way, page = Morph(OwnFrame.of(tile)), Page(tile, width, aspect, y_down)
+    way, middle = Morph(OwnFrame.of(tile)), np.array(page.size) / 2
     end = way.end
     group, own = end.kind.group(), Tile(end.points, end.kind.group(), end.kind.name)
-    center = np.linalg.solve(end.linear, page.center - end.offset)
+    center = np.linalg.solve(end.linear, tile.center - end.offset)
 
     def linear(progress: float) -> Array:
-        return page.linear @ (end.linear if steady else way.at(progress).linear)
+        return page.place.linear @ (end.linear if steady else way.at(progress).linear)
 
     def places(progress: float, copies: Copies) -> Places:
         by = linear(progress)
         turned = by @ group.linear_parts @ np.linalg.inv(by)
         moved = group.linear_parts @ center
         shifts = moved[copies.cosets] + copies.translations - center
-        return Places(turned[copies.cosets], shifts @ by.T + page.middle)
+        return Places(turned[copies.cosets], shifts @ by.T + middle)
 
     def outline(progress: float) -> Array:
         return (way.at(progress).points - center) @ linear(progress).T
@@ -114,18 +130,17 @@ def morph(
         page,
         outline,
         (lambda _: still) if steady else (lambda progress: places(progress, copies)),
-        colouring(own).colours(copies),
+        page.colours_of(copies, own.tiling),
         np.tile(ALWAYS, (len(copies), 1)),
         (0.0, 1.0) if way.weights is None and steady else tuple(np.linspace(0, 1, 17).tolist()),
         f"A tiling with straight edges becomes the tiling of {tile.isohedral_class}",
     )
 
 
-def grow(tile: Tile, width: int, *, aspect: float = ASPECT, y_down: bool = False) -> Motion:
+def grow(tile: Tile, page: Page) -> Motion:
     """Return one tile, and the tiling growing around it, nearest first."""
-    page = Page(tile, width, aspect, y_down)
-    outline = (tile.polygon - page.center) @ page.linear.T
-    places, colours = _still_places(tile, page)
+    outline = page.ring - page.tiling.center
+    places, colours = _still_places(page)
     return Motion(
         page,
         lambda _: outline,
@@ -137,20 +152,20 @@ def grow(tile: Tile, width: int, *, aspect: float = ASPECT, y_down: bool = False
     )
 
 
-def bend(given: EscherTile, width: int, *, aspect: float = ASPECT) -> Motion:
+def bend(given: EscherTile, page: Page) -> Motion:
     """Return the silhouette bending into the tile, and then the tiling growing around it."""
-    tile, bending, frame = given.tile, given.bending, given.frame
+    bending, frame = given.bending, given.frame
     if bending is None or frame is None:
         raise OrbiflowError(
             "this tile has no bent silhouette: only tiles of a search for likeness have one, in the "
             "model.safetensors of their folder; choose kind morph or grow"
         )
-    page, way = Page(tile, width, aspect, given.y_down), BendingWay(bending)
-    places, colours = _still_places(tile, page)
+    way = BendingWay(bending)
+    places, colours = _still_places(page)
 
     def outline(progress: float) -> Array:
         ring = frame.to_input(way.at(min(1.0, progress / BEND)))
-        return (ring - page.center) @ page.linear.T
+        return page.place(ring) - page.tiling.center
 
     return Motion(
         page,
@@ -159,20 +174,16 @@ def bend(given: EscherTile, width: int, *, aspect: float = ASPECT) -> Motion:
         colours,
         _births(places, BEND),
         (*np.linspace(0, BEND, 13).tolist(), 1.0),
-        f"The silhouette bends into a tile of {tile.isohedral_class}, and its tiling grows",
+        f"The silhouette bends into a tile of {given.isohedral_class}, and its tiling grows",
     )
 
 
-def _still_places(tile: Tile, page: Page) -> tuple[Places, Array]:
+def _still_places(page: Page) -> tuple[Places, Array]:
     """Return the places of all copies in the picture, the nearest first, and their colours."""
-    window = np.array(page.window(page.linear)) + np.tile(page.center, 2)
-    copies = copies_meeting(tile, window.tolist())
-    linear = page.linear @ tile.group.linear_parts @ np.linalg.inv(page.linear)
-    moved = (tile.group.linear_parts @ page.center)[copies.cosets] + copies.translations
-    offset = (moved - page.center) @ page.linear.T + page.middle
-    order = np.argsort(np.linalg.norm(offset - page.middle, axis=1), kind="stable")
-    places = Places(linear[copies.cosets[order]], offset[order])
-    colours = colouring(tile).colours(copies)[order]
+    uses, colours = page.uses(), page.colours
+    far = np.linalg.norm(uses.offsets - np.array(page.size) / 2, axis=1)
+    order = np.argsort(far, kind="stable")
+    places, colours = Places(uses.linear[uses.which[order]], uses.offsets[order]), colours[order]
     # the tile that is alone at first has the palette's second colour
     return places, np.where(colours == colours[0], 1, np.where(colours == 1, colours[0], colours))
 
@@ -195,7 +206,10 @@ def _seen(
     page: Page,
 ) -> Copies:
     """Return the copies that come into the picture at any time, those nearest to its middle first."""
-    boxes = np.array([page.window(linear(look)) for look in LOOKS])
+    boxes, middle = (
+        np.array([_window(page, linear(look)) for look in LOOKS]),
+        np.array(page.size) / 2,
+    )
     reach = own.radius
     low, high = center + boxes[:, :2].min(axis=0) - reach, center + boxes[:, 2:].max(axis=0) + reach
     copies = copies_meeting(own, (*low.tolist(), *high.tolist()))
@@ -206,9 +220,9 @@ def _seen(
         # copies that come in between two looks are near at one of them
         room = 0.1 * np.ptp(outline(look), axis=0).max()
         low, high = rings.min(axis=1) - room, rings.max(axis=1) + room
-        seen |= ((low <= 2 * page.middle) & (high >= 0)).all(axis=1)
+        seen |= ((low <= page.size) & (high >= 0)).all(axis=1)
     copies = copies.select(seen)
-    far = np.linalg.norm(places(1.0, copies).offset - page.middle, axis=1)
+    far = np.linalg.norm(places(1.0, copies).offset - middle, axis=1)
     return copies.select(np.argsort(far, kind="stable"))
 
 

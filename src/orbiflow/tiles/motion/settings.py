@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
-from orbiflow.drawing import DEFAULT_PALETTE, PaletteName
-from orbiflow.settings import FileSettings, Hidden, OnlyWith, Range, SettingError, Unit
-from orbiflow.units import POSTS
+from orbiflow.settings import DefaultText, Hidden, OnlyWith, Option, Range, SettingError, Unit
+from orbiflow.tiles.page import PageSettings
+from orbiflow.units import PageArea, PageLength
 
 MOST_FRAMES = 2400  # the largest number of pictures of a GIF or video
+SIDES = 64, 8000  # the least and the largest side of a picture in pixels
 
 
-class AnimationSettings(FileSettings, group="Animation"):
+class AnimationSettings(PageSettings, group="Animation"):
     """How a tile is animated.
 
-    >>> AnimationSettings(kind="grow", seconds=3).size
-    800
+    >>> AnimationSettings(kind="grow", area="square").page
+    (91.44, 91.44)
     """
 
     format: Annotated[Literal["gif", "mp4", "svg"] | None, Hidden()] = None
@@ -33,24 +35,29 @@ class AnimationSettings(FileSettings, group="Animation"):
     ] = 24.0
     """Pictures per second of a GIF or video."""
 
-    size: Annotated[int, Range(64, 4000), Unit("pixels")] = 800
-    """Width, an even number."""
+    area: Annotated[PageArea | None, DefaultText("800x534px")] = None
 
-    shape: Literal["wide", "square", "story"] = "wide"
-    """With wide, the height is two thirds of the width; square and story are 1:1 and 9:16."""
+    tile_size: Annotated[PageLength | None, DefaultText("four to five tiles across")] = None
 
-    palette: PaletteName = DEFAULT_PALETTE
-    """Colours of the tiles."""
+    clip: Annotated[
+        bool,
+        Option("--clip", off="--whole"),
+        OnlyWith(kind=("bend", "grow"), because="a morph fills the page"),
+    ] = True
 
-    @property
-    def aspect(self) -> float:
-        """The width over the height."""
-        width, height = POSTS.get(self.shape, (3, 2))
-        return width / height
+    def defaults(self) -> Mapping[str, Any]:
+        return {**super().defaults(), "area": "800x534px"}
 
     def check(self) -> None:
-        if self.size % 2:
-            raise SettingError(f"{{size}} must be even, which videos need, got {self.size}")
+        super().check()
+        sides = [round(side * self.pixels) for side in self.page]
+        what = f"{sides[0]} x {sides[1]} pixels"
+        if min(sides) < SIDES[0] or max(sides) > SIDES[1]:
+            raise SettingError(
+                f"{{area}} is {what}: choose sides from {SIDES[0]} to {SIDES[1]} pixels"
+            )
+        if self.format == "mp4" and any(side % 2 for side in sides):
+            raise SettingError(f"{{area}} is {what}: choose even sides, which videos need")
         if self.format not in ("svg", None) and self.seconds * self.fps > MOST_FRAMES:
             raise SettingError(
                 f"{{seconds}} {self.seconds:g} at {{fps}} {self.fps:g} make more than {MOST_FRAMES} "

@@ -16,11 +16,9 @@ from xml.sax.saxutils import escape
 import numpy as np
 from PIL import Image
 
-from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
-from orbiflow.drawing import Palette, Raster, limited, palette
+from orbiflow.drawing import Palette, limited, palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.runtime import Cancel, Note, Progress, Sink, ignore, write_atomic
 from orbiflow.tiles.motion.kinds import (
     MOVE,
     REST,
@@ -28,47 +26,18 @@ from orbiflow.tiles.motion.kinds import (
     Frame,
     Motion,
     Places,
-    bend,
     eased,
     frames,
-    grow,
-    morph,
+    motion,
 )
 from orbiflow.tiles.motion.settings import AnimationSettings
+from orbiflow.tiles.page import Curve, Layer, Part, Scene, Style, rectangle
 from orbiflow.tiles.result_file import as_tile
-from orbiflow.tiles.scene import Numbers
-from orbiflow.tiles.tile import EscherTile, TileSource
-from orbiflow.tiles.tilings import colouring
+from orbiflow.tiles.tile import TileSource
+from orbiflow.tiles.write import Numbers, scene_image
 
-
-def animate(
-    tile: TileSource,
-    out: str | Path,
-    settings: AnimationSettings | None = None,
-    *,
-    force: bool = False,
-    on_event: Sink = ignore,
-    cancel: Cancel | None = None,
-) -> Path:
-    """Write an animation of a tile.
-
-    Args:
-        out: The file. Its ending, .gif, .mp4 or .svg, decides the format, unless the settings give one.
-        on_event: Called with each `Note` and `Progress`.
-        tile, settings, force, cancel: As for `export`, which raises the same errors.
-    """
-    out, cancel = as_path(out, "the file to animate to"), cancel or Cancel()
-    settings, given = (settings or AnimationSettings()).for_file(out), as_tile(tile)
-
-    def told(share: float) -> None:
-        cancel.check()
-        on_event(Progress(share, "drawing"))
-
-    for note in palette(settings.palette).shortage(colouring(given.tile).count):
-        on_event(Note(note))
-    content = animation(given, settings, force=force, told=told)
-    cancel.check()
-    return write_atomic(out, content)
+ProgressCall = Callable[[float], None]
+"""What is called with the share of the work that is done."""
 
 
 def animation(
@@ -76,68 +45,41 @@ def animation(
     settings: AnimationSettings | None = None,
     *,
     force: bool = False,
-    told: Callable[[float], None] = lambda _: None,
+    told: ProgressCall = lambda _: None,
 ) -> bytes | str:
     """Return the content of the file; `told` hears the share of the work done. Raises as `animate`."""
-    settings = (settings or AnimationSettings()).for_file(None)
+    settings, given = (settings or AnimationSettings()).for_file(None), as_tile(tile)
     if settings.format == "mp4":
         require_ffmpeg()  # before the work
-    given, colours = as_tile(tile), palette(settings.palette)
-    given.require_certified(force=force, otherwise="so it is not animated; --force animates it")
+    given.require_certified(force=force, otherwise="so it is not animated; {force} animates it")
     made = motion(given, settings)
     told(0.0)
-    loop = frames(settings.seconds, settings.fps)
-    match settings.file_format:
-        case "svg":
-            title, name = f"{given.name}: {made.what}", f"{given.name}-{settings.kind}"
-            return write_motion_svg(made, colours, seconds=settings.seconds, name=name, title=title)
-        case "mp4":
-            return write_mp4(made, colours, loop, settings.fps, told)
-        case _:
-            return write_gif(made, colours, loop, told)
+    named = replace(made, what=f"{given.name}: {made.what}")
+    return WRITERS[settings.file_format](named, settings, told)
 
 
-def motion(tile: EscherTile, settings: AnimationSettings) -> Motion:
-    """Return what moves, before it is a file."""
-    width, aspect = settings.size, settings.aspect
-    match settings.kind:
-        case "morph":
-            steady = settings.format == "svg"
-            return morph(tile.tile, width, aspect=aspect, y_down=tile.y_down, steady=steady)
-        case "grow":
-            return grow(tile.tile, width, aspect=aspect, y_down=tile.y_down)
-        case "bend":
-            return bend(tile, width, aspect=aspect)
-
-
-OUTLINE = 0.0016  # width of outlines, as a share of the picture's
-
-ProgressCall = Callable[[float], None]  # called with the share of the work that is done
-
-
-def picture(motion: Motion, palette: Palette, progress: float) -> Raster:
-    """Draw one frame."""
+def frame_scene(motion: Motion, chosen: Palette, progress: float) -> Scene:
+    """Return one frame as a scene in pixels: growing tiles, and above them the whole ones."""
     page, rings = motion.page, list(motion.rings(progress))
-    window = (0.0, 0.0, float(page.width), float(page.height))
-    raster = Raster(window, page.width, y_down=True, paper=palette.paper)
-    width = max(1.0, OUTLINE * page.width)
-    growing = [[own] for own in rings if not own[2]]  # below whole tiles, whose lines are on top
+    parts = [Part((rectangle(page.box),), Style(chosen.paper))]
+    growing = [[own] for own in rings if not own[2]]
     for layer in (*growing, [own for own in rings if own[2]]):
-        for ring, colour, _ in layer:
-            raster.fill([ring], palette.fill(colour))
-        for ring, _, _ in layer:
-            raster.line(ring, palette.outline, width, closed=True)
-    return raster
+        curves = [Curve.polyline(ring, closed=True) for ring, _, _ in layer]
+        fills = (Style(chosen.fill(colour)) for _, colour, _ in layer)
+        parts += [Part((curve,), fill) for curve, fill in zip(curves, fills, strict=True)]
+        parts += [Part((curve,), motion.line) for curve in curves if motion.line.width]
+    return Scene(*page.size, (Layer("frame", "tiles", Style(), tuple(parts)),))
 
 
-def write_gif(motion: Motion, palette: Palette, frames: list[Frame], told: ProgressCall) -> bytes:
+def write_gif(motion: Motion, settings: AnimationSettings, told: ProgressCall) -> bytes:
     """Return a GIF that repeats for ever, with one palette for all frames."""
-    fills = [palette.fill(k) for k in range(int(motion.colours.max(initial=0)) + 1)]
-    colours = (palette.paper, *fills, palette.outline)
+    chosen, loop = palette(settings.palette), frames(settings.seconds, settings.fps)
+    fills = [chosen.fill(k) for k in range(int(motion.colours.max(initial=0)) + 1)]
+    colours = (chosen.paper, *fills, chosen.outline)
     # few mixed colours, each of which costs bytes in every frame
-    shown = list(_shown(motion, palette, frames, told, lambda image: limited(image, colours, 3)))
+    shown = list(_shown(motion, chosen, loop, told, lambda image: limited(image, colours, 3)))
     # a GIF counts in hundredths of a second
-    ends = [round(100 * end) for end in accumulate(frame.seconds for frame in frames)]
+    ends = [round(100 * end) for end in accumulate(frame.seconds for frame in loop)]
     lasting = np.maximum(np.diff([0, *ends]), 2) * 10
     buffer = io.BytesIO()
     how = {"duration": lasting.tolist(), "loop": 0, "disposal": 1, "optimize": False}
@@ -156,22 +98,21 @@ def require_ffmpeg() -> str:
     return found
 
 
-def write_mp4(
-    motion: Motion, palette: Palette, frames: list[Frame], fps: float, told: ProgressCall
-) -> bytes:
+def write_mp4(motion: Motion, settings: AnimationSettings, told: ProgressCall) -> bytes:
     """Return an MP4 (H.264) of one loop, which every player and browser shows."""
-    ffmpeg = require_ffmpeg()
+    ffmpeg, chosen, fps = require_ffmpeg(), palette(settings.palette), settings.fps
+    loop = frames(settings.seconds, fps)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "loop.mp4"
         command = [ffmpeg, "-loglevel", "error", "-nostdin", "-y", "-f", "rawvideo"]
-        size = f"{motion.page.width}x{motion.page.height}"
+        size = "{:.0f}x{:.0f}".format(*motion.page.size)
         command += ["-pix_fmt", "rgb24", "-s", size, "-r", f"{fps:g}"]
         command += ["-i", "-", "-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18"]
         command += ["-movflags", "+faststart", str(out)]
-        shown = _shown(motion, palette, frames, told, lambda image: image)
+        shown = _shown(motion, chosen, loop, told, lambda image: image)
         content = b"".join(
             image.tobytes() * max(1, round(frame.seconds * fps))
-            for image, frame in zip(shown, frames, strict=True)
+            for image, frame in zip(shown, loop, strict=True)
         )
         done = subprocess.run(command, input=content, capture_output=True, check=False)
         if done.returncode or not out.is_file():
@@ -182,17 +123,17 @@ def write_mp4(
 
 def _shown(
     motion: Motion,
-    palette: Palette,
-    frames: list[Frame],
+    chosen: Palette,
+    loop: list[Frame],
     told: ProgressCall,
     made: Callable[[Image.Image], Image.Image],
 ) -> Iterator[Image.Image]:
     """Yield the pictures of a loop, each of which is drawn once."""
     known: dict[float, Image.Image] = {}
-    count = len({frame.progress for frame in frames})
-    for frame in frames:
+    count = len({frame.progress for frame in loop})
+    for frame in loop:
         if frame.progress not in known:
-            known[frame.progress] = made(picture(motion, palette, frame.progress).image())
+            known[frame.progress] = made(scene_image(frame_scene(motion, chosen, frame.progress)))
             told(len(known) / count)
         yield known[frame.progress]
 
@@ -200,24 +141,24 @@ def _shown(
 _EASE, _EVEN = "0.42 0 0.58 1", "0 0 1 1"
 
 
-def write_motion_svg(
-    motion: Motion, palette: Palette, *, seconds: float, name: str, title: str
-) -> str:
+def write_motion_svg(motion: Motion, settings: AnimationSettings, _: ProgressCall) -> str:
     """Return an animated SVG; readers who prefer less motion see the tiling at rest."""
+    chosen, seconds = palette(settings.palette), settings.seconds
     # ids and classes begin with the key, so that a page can hold several animations
+    name = f"{motion.what.partition(':')[0]}-{settings.kind}"
     key = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "tile"
-    width, height = motion.page.width, motion.page.height
+    width, height = map(round, motion.page.size)
     still = motion.places(1.0)
     # growing tiles lie below whole ones
     order = range(len(motion.colours))[::-1]
-    moving = [_copy(motion, still, k, f"{key}-moving", palette, seconds) for k in order]
+    moving = [_copy(motion, still, k, f"{key}-moving", chosen, seconds) for k in order]
     grown = replace(motion, births=np.full_like(motion.births, -1.0))
-    fixed = [_copy(grown, still, k, f"{key}-still", palette, seconds) for k in reversed(order)]
-    stroke = f'stroke="{palette.outline}" stroke-width="{OUTLINE * width:.2f}"'
+    fixed = [_copy(grown, still, k, f"{key}-still", chosen, seconds) for k in reversed(order)]
+    stroke = f'stroke="{motion.line.stroke or "none"}" stroke-width="{motion.line.width:.2f}"'
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" \
 width="{width}" height="{height}" role="img" class="{key}">
-<title>{escape(title)}</title>
+<title>{escape(motion.what)}</title>
 <style>
 .{key} .still {{ display: none }}
 @media (prefers-reduced-motion: reduce) {{
@@ -231,7 +172,7 @@ width="{width}" height="{height}" role="img" class="{key}">
 <path id="{key}-moving" d="{_path(motion.outline(1.0))}">{_changing(motion, seconds)}</path>
 </defs>
 <g clip-path="url(#{key}-page)" {stroke} stroke-linejoin="round">
-<rect width="{width}" height="{height}" fill="{palette.paper}" stroke="none"/>
+<rect width="{width}" height="{height}" fill="{chosen.paper}" stroke="none"/>
 <g class="moving">
 {"".join(moving)}</g>
 <g class="still">
@@ -260,10 +201,10 @@ def _changing(motion: Motion, seconds: float) -> str:
 
 
 def _copy(
-    motion: Motion, places: Places, k: int, symbol: str, palette: Palette, seconds: float
+    motion: Motion, places: Places, k: int, symbol: str, chosen: Palette, seconds: float
 ) -> str:
     linear, (x, y) = places.linear[k], places.offset[k].tolist()
-    use = f'<use href="#{symbol}" fill="{palette.fill(int(motion.colours[k]))}"'
+    use = f'<use href="#{symbol}" fill="{chosen.fill(int(motion.colours[k]))}"'
     start, end = motion.births[k].tolist()
     if end <= 0:
         return f'{use} transform="matrix({_matrix(linear)},{_number(x)},{_number(y)})"/>\n'
@@ -304,3 +245,11 @@ def _time(progress: float) -> float:
     [0.0, 0.2, 0.5, 1.0]
     """
     return float(0.5 - np.sin(np.arcsin(1 - 2 * progress) / 3))
+
+
+WRITERS: dict[str, Callable[[Motion, AnimationSettings, ProgressCall], bytes | str]] = {
+    "gif": write_gif,
+    "mp4": write_mp4,
+    "svg": write_motion_svg,
+}
+"""What writes each format: to add one, name it here and in the settings' `format`."""

@@ -9,12 +9,12 @@ from pathlib import Path, PurePath
 import numpy as np
 from PIL import Image, ImageDraw
 from PIL.PngImagePlugin import PngInfo
-from shapely import MultiPolygon, Polygon, box
+from shapely import MultiPolygon, Polygon
 
 from orbiflow.arrays import Window
-from orbiflow.drawing import Raster, font, png_bytes, strip_middle, window_of
+from orbiflow.drawing import Sheet, font, png_bytes, window_of
 from orbiflow.tiles.likeness import MOST_STARS
-from orbiflow.tiles.pictures import comparison, tiling_raster
+from orbiflow.tiles.pictures import Sketch, comparison, tiling_picture
 from orbiflow.tiles.search import ClassFailure
 from orbiflow.tiles.silhouette import Target, holes_filled, open_image, parts_left_out
 from orbiflow.tiles.tile import EscherTile
@@ -37,18 +37,19 @@ def read_png(target: Target, source: Path) -> bytes:
     pixel = max(window[2] - window[0], window[3] - window[1]) / LONGER_SIDE
     width = round((window[2] - window[0]) / pixel)
 
-    def raster(paper: str) -> Raster:
-        return Raster(window, width, y_down=target.y_down, paper=paper, strip_px=STRIP)
+    def sketch(paper: str) -> Sketch:
+        sheet = Sheet.screen(width)
+        return Sketch(window, sheet, y_down=target.y_down, paper=paper, strip=STRIP / width)
 
-    base = raster("#ffffff")
+    base = sketch("#ffffff")
     if target.kind != "image":
-        base.fill_geometry(whole if target.seen is None else target.seen, DRAWING)
-    _mark(base, "read as the silhouette", OUTLINE, 12)
+        base.fill(whole if target.seen is None else target.seen, DRAWING)
+    _mark(base, "read as the silhouette", OUTLINE, 12 / width)
     if lost:
-        _mark(base, "left out", LEFT_OUT, 300)
+        _mark(base, "left out", LEFT_OUT, 300 / width)
     if holes:
-        _mark(base, "hole, filled", FILLED, 430)
-    page = base.image()
+        _mark(base, "hole, filled", FILLED, 430 / width)
+    page = base.picture().image(width)
     if target.size and target.kind == "image":
         page.paste(_source(source).resize([max(1, round(side / pixel)) for side in target.size]))
     for geometry, colour, opacity in (
@@ -57,9 +58,9 @@ def read_png(target: Target, source: Path) -> bytes:
         (whole.exterior.buffer(2 * LINE * pixel), "#ffffff", 1.0),
         (whole.exterior.buffer(LINE * pixel), OUTLINE, 1.0),
     ):
-        mask = raster("#000000")
-        mask.fill_geometry(geometry, "#" + 3 * f"{round(255 * opacity):02x}")
-        page.paste(colour, mask=mask.image().convert("L"))
+        mask = sketch("#000000")
+        mask.fill(geometry, "#" + 3 * f"{round(255 * opacity):02x}")
+        page.paste(colour, mask=mask.picture().image(width).convert("L"))
     about = PngInfo()
     about.add_text("Software", SOFTWARE)
     return png_bytes(page, pnginfo=about)
@@ -76,11 +77,11 @@ def _window(target: Target) -> Window:
     return xmin, ymin, max(xmax, xmin + LEAST_WIDTH / LONGER_SIDE * (ymax - ymin)), ymax
 
 
-def _mark(raster: Raster, text: str, colour: str, x: float) -> None:
-    y, half = strip_middle(raster), LETTERS / 2
-    square = box(x, y - half, x + LETTERS, y + half)
-    raster.fill_pixels(np.array(square.exterior.coords), colour)
-    raster.text(x + 1.3 * LETTERS, y, text, LETTERS)
+def _mark(sketch: Sketch, text: str, colour: str, x: float) -> None:
+    """Say in the strip what a colour means, at a share x of the width."""
+    size = LETTERS / (sketch.sheet.width * sketch.sheet.dpi)
+    sketch.swatch(x, x + size, size / 2, colour)
+    sketch.write(text, (x + 1.3 * size) * sketch.width, size * sketch.width)
 
 
 def _source(path: Path) -> Image.Image:
@@ -140,11 +141,9 @@ def overview_png(
         below = top + round(cell / 1.5) + 14
         _write_words(pen, result, left + _THUMB + 22, below, k + 1)
         own = colours[k] if colours else None
-        tiling = tiling_raster(
-            result.tile, width_px=cell, colours=own, outline_px=1.4, y_down=target.y_down
-        )
-        sheet.paste(tiling.image(), (left, top))
-        thumb = _small(result, target).image()
+        tiling = tiling_picture(result.tile, colours=own, outline=1.4 / cell, y_down=target.y_down)
+        sheet.paste(tiling.image(cell), (left, top))
+        thumb = _small(result, target)
         thumb.thumbnail((_THUMB, _THUMB))
         sheet.paste(thumb, (left + (_THUMB - thumb.width) // 2, below))
     return png_bytes(sheet, compress_level=4)
@@ -154,9 +153,10 @@ def _header(
     sheet: Image.Image, pen: ImageDraw.ImageDraw, target: Target, count: int, failed: list[str]
 ) -> None:
     window = window_of([target.outline])
-    small = Raster(window, _fitting(window), y_down=target.y_down)
-    small.fill([target.outline], INK)
-    picture = small.image()
+    width = _fitting(window)
+    small = Sketch(window, Sheet.screen(width), y_down=target.y_down)
+    small.fill(target.outline, INK)
+    picture = small.picture().image(width)
     picture.thumbnail((_THUMB, _THUMB))
     sheet.paste(picture, (_MARGIN, (_HEADER - picture.height) // 2))
     left, middle = _MARGIN + picture.width + 28, _HEADER // 2
@@ -199,11 +199,11 @@ def _draw_star(pen: ImageDraw.ImageDraw, left: float, middle: float, share: floa
         pen.polygon([(x[k], y[k]) for k in (0, 5, 6, 7, 8, 9)], STAR)
 
 
-def _small(result: EscherTile, target: Target) -> Raster:
+def _small(result: EscherTile, target: Target) -> Image.Image:
     """Draw a tile and its silhouette, without a legend."""
     bent = [] if result.bent is None or result.rest is None else [result.rest, result.bent]
     width = _fitting(window_of([result.tile.polygon, *(bent or [target.outline])]))
-    return comparison(result, target, width_px=width, thick=3.5)
+    return comparison(result, target, thick=3.5, sheet=Sheet.screen(width)).image(width)
 
 
 def _fitting(window: Window) -> int:

@@ -14,13 +14,14 @@ import numpy as np
 import shapely
 
 from orbiflow.arrays import Array
-from orbiflow.drawing import PALETTES, STRIP, rendered, window_of
+from orbiflow.drawing import PALETTES, rendered, window_of
+from orbiflow.tiles.page import Page
 from orbiflow.tiles.pages.overview import FILLED, LEFT_OUT, OUTLINE
-from orbiflow.tiles.pictures import RAMP
+from orbiflow.tiles.pictures import RAMP, STRIP
 from orbiflow.tiles.search import ClassFailure, rounded_for, why_poor
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile
-from orbiflow.tiles.tilings import Colouring, colouring, copies_meeting, default_window
+from orbiflow.tiles.tilings import Colouring, colouring, default_window
 
 # The files in every tile's folder
 TILE_FILES = ("tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors")
@@ -81,19 +82,18 @@ def _patch(tile: EscherTile, colours: Colouring) -> dict[str, Any]:
     """Return a small tiling as an SVG has it: a path, and where its copies of each colour are."""
     left, low, right, high = default_window(tile.tile)
     middle, half = tile.tile.center, np.array([right - left, high - low]) * 0.3
-    scale = np.array([1, 1 if tile.y_down else -1]) * PATCH / (2 * half[0])
-    copies = copies_meeting(tile.tile, (*(middle - half), *(middle + half)))
-    linear = copies.group.linear_parts[copies.cosets] * scale[:, None] / scale
-    places = (copies.images(middle[None])[:, 0] - middle) * scale
-    numbers = np.concatenate([linear.transpose(0, 2, 1).reshape(-1, 4), places], axis=1)
+    window = (*(middle - half).tolist(), *(middle + half).tolist())
+    page = Page.of_window(tile.tile, window, PATCH, y_down=tile.y_down, known=colours)
+    uses, (width, height) = page.uses(), page.size
+    columns = uses.linear[uses.which].transpose(0, 2, 1).reshape(-1, 4)
+    numbers = np.concatenate([columns, uses.offsets], axis=1)
     matrices = [" ".join(f"{x:.4g}" for x in row) for row in numbers]
-    ring = shapely.LinearRing((tile.tile.polygon - middle) * scale).simplify(0.2)
-    own = colours.colours(copies)
-    width, height = (2 * half * abs(scale)).tolist()
+    ring = shapely.LinearRing(page.ring - page.tiling.center).simplify(0.2)
+    own = page.colours
     return {
-        "box": f"{-width / 2:.1f} {-height / 2:.1f} {width:.1f} {height:.1f}",
+        "box": f"0 0 {width:.1f} {height:.1f}",
         "path": _path(shapely.get_coordinates(ring)[:-1]),
-        "copies": [[matrices[k] for k in np.flatnonzero(own == n)] for n in range(colours.count)],
+        "copies": [[matrices[k] for k in np.flatnonzero(own == n)] for n in range(page.count)],
     }
 
 

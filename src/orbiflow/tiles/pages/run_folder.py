@@ -23,16 +23,7 @@ from orbiflow.runtime import (
 )
 from orbiflow.tiles.pages.overview import is_read_png, overview_png
 from orbiflow.tiles.pages.page import TILE_FILES, index_page
-from orbiflow.tiles.pictures import (
-    PrintedPicture,
-    bending_picture,
-    comparison,
-    overlay_picture,
-    tile_svg,
-    tiling_picture,
-    tiling_raster,
-    tiling_svg,
-)
+from orbiflow.tiles.pictures import ScenePicture, comparison, tile_picture, tiling_picture
 from orbiflow.tiles.result_file import RESULT, folder_names
 from orbiflow.tiles.search import SearchResult, report
 from orbiflow.tiles.silhouette import Target, doubts
@@ -70,11 +61,6 @@ def write_tile_folder(
     if not result.certificate.valid:
         title += ", NOT CERTIFIED"
 
-    def overlay_for_print() -> PrintedPicture:
-        if result.bent is None or result.rest is None:
-            return overlay_picture(tile, target.outline, y_down=y_down)
-        return bending_picture(tile, result.rest, result.bent, y_down=y_down)
-
     def field(sheet: Sheet) -> bytes:
         normal = result.normal_tile
         # flows need torch, which the search for likeness does without
@@ -85,13 +71,18 @@ def write_tile_folder(
             placed_field(as_model(result)), normal.group, normal, sheet=sheet
         ).file()
 
+    printed = Sheet.column()
+
+    def tiling(sheet: Sheet | None = None) -> ScenePicture:
+        return tiling_picture(tile, y_down=y_down, title=title, colours=colours, sheet=sheet)
+
     contents: dict[str, Callable[[], str | bytes]] = {
-        "tile.svg": lambda: tile_svg(tile, y_down=y_down, title=title),
-        "tiling.svg": lambda: tiling_svg(tile, y_down=y_down, title=title, colours=colours),
-        "tiling.png": lambda: tiling_raster(tile, y_down=y_down, colours=colours).png(),
+        "tile.svg": lambda: tile_picture(tile, y_down=y_down, title=title).svg(),
+        "tiling.svg": lambda: tiling(Sheet.column(300.0)).svg(),
+        "tiling.png": lambda: tiling().png(),
         "overlay.png": lambda: comparison(result, target, label=label).png(),
-        "tiling.pdf": lambda: tiling_picture(tile, y_down=y_down, colours=colours).file(),
-        "overlay.pdf": lambda: overlay_for_print().file(),
+        "tiling.pdf": lambda: tiling(printed).file(),
+        "overlay.pdf": lambda: comparison(result, target, sheet=printed).file(),
         "field.png": lambda: field(Sheet.screen(1200)),
         "field.pdf": lambda: field(Sheet.column()),
         "model.safetensors": (result.map or TileMap()).to_bytes,

@@ -12,9 +12,9 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arguments import as_array
 from orbiflow.arrays import Array
-from orbiflow.drawing import Raster, Sheet, arrow, caption, captioned, dashes, rgb, strip_middle
+from orbiflow.drawing import Sheet, rgb
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.pictures.printed import PrintedPicture
+from orbiflow.tiles.pictures.sketch import ScenePicture, Sketch
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import Tile
@@ -23,69 +23,50 @@ from orbiflow.tiles.tilings import Tile
 COMMON, MISSING, ADDED = "#c9d3dc", "#d95f02", "#2b6cb0"
 
 
-def overlay_raster(
-    tile: Tile,
-    target: ArrayLike | BaseGeometry,
-    *,
-    width_px: int = 1200,
-    y_down: bool = False,
-    label: str | None = "",
-) -> Raster:
-    """Return a tile over its target, with what is missing and what is added in two colours.
-
-    Args:
-        tile: The tile.
-        target: The outline (M, 2), or a shapely polygon, in the tile's coordinates.
-        width_px: The width in pixels; the height follows.
-        y_down: Whether the y axis points down, as in images.
-        label: The words in front of the legend. Default: the class. Without words (None) there is
-            no legend.
-
-    Raises:
-        OrbiflowError: If the target is empty or not an outline.
-    """
-    shape, goal = _clean(shapely.Polygon(tile.polygon)), _target(target)
-    common, text = shapely.intersection(shape, goal), ""
-    if label is not None:
-        overlap = common.area / shapely.union(shape, goal).area
-        text = f"{label or tile.isohedral_class}  IoU {overlap:.3f}".strip()
-    bounds = np.array(goal.bounds).reshape(2, 2)
-    raster = captioned([tile.polygon, bounds], width_px, y_down=y_down, text=text)
-    raster.fill_geometry(common, COMMON)
-    raster.fill_geometry(shapely.difference(goal, shape), MISSING)
-    raster.fill_geometry(shapely.difference(shape, goal), ADDED)
-    raster.line(tile.polygon, "#1a1a1a", max(1.0, 0.0028 * width_px), closed=True)
-    if text:
-        _legend(raster)
-    return raster
-
-
 def overlay_picture(
     tile: Tile,
     target: ArrayLike | BaseGeometry,
     *,
     y_down: bool = False,
+    label: str | None = "",
     sheet: Sheet | None = None,
-) -> PrintedPicture:
-    """Return the picture of `overlay_raster` for print, in curves; the caption has its legend."""
-    raster = overlay_raster(tile, target, width_px=1600, y_down=y_down, label=None)
+) -> ScenePicture:
+    """Return a tile over its target, with what is missing and what is added in two colours.
+
+    Args:
+        tile: The tile.
+        target: The outline (M, 2), or a shapely polygon, in the tile's coordinates.
+        y_down: Whether the y axis points down, as in images.
+        label: The words in front of the legend. Default: the class. Without words (None) there is
+            no legend.
+        sheet: The sheet. Default: 1200 pixels. In print a caption says what the legend would.
+
+    Raises:
+        OrbiflowError: If the target is empty or not an outline.
+    """
+    sheet = sheet or Sheet.screen(1200)
+    shape, goal = _clean(shapely.Polygon(tile.polygon)), _target(target)
+    common, text = shapely.intersection(shape, goal), ""
+    if label is not None and not sheet.printed:
+        overlap = common.area / shapely.union(shape, goal).area
+        text = f"{label or tile.isohedral_class}  IoU {overlap:.3f}".strip()
+    bounds = np.array(goal.bounds).reshape(2, 2)
+    sketch = Sketch.around([tile.polygon, bounds], sheet, y_down=y_down, text=text)
+    sketch.fill(common, COMMON)
+    sketch.fill(shapely.difference(goal, shape), MISSING)
+    sketch.fill(shapely.difference(shape, goal), ADDED)
+    sketch.line(tile.polygon, "#1a1a1a", 0.0028 * sketch.width, closed=True)
+    if text:
+        for name, colour, x in (
+            ("in both", COMMON, 0.40),
+            ("missing", MISSING, 0.58),
+            ("added", ADDED, 0.76),
+        ):
+            sketch.swatch(x, x + 0.03, 0.014, colour)
+            sketch.caption(x + 0.04, name)
     title = f"Tile {tile.isohedral_class} over the silhouette".replace("  ", " ")
     caption = "Grey: in both. Orange: missing, in the silhouette alone. Blue: added."
-    return PrintedPicture.of(raster, sheet or Sheet.column(), title=title, caption=caption)
-
-
-def _legend(raster: Raster) -> None:
-    entries = [("in both", COMMON, 0.40), ("missing", MISSING, 0.58), ("added", ADDED, 0.76)]
-    for name, colour, x in entries:
-        _swatch(raster, x, x + 0.03, 0.014, colour)
-        caption(raster, x + 0.04, name)
-
-
-def _swatch(raster: Raster, left: float, right: float, high: float, colour: str) -> None:
-    """Fill a rectangle in the strip, in shares of the picture's width."""
-    y, ends = strip_middle(raster), np.array([left, right, right, left]) * raster.width
-    sides = y + np.array([-high, -high, high, high]) * raster.width
-    raster.fill_pixels(np.stack([ends, sides], axis=1), colour)
+    return sketch.picture(title, caption)
 
 
 def _target(target: ArrayLike | BaseGeometry) -> BaseGeometry:
@@ -112,16 +93,16 @@ _STEPS = 11
 _LINE, _GHOST = 0.0042, 0.0022  # widths of lines, as shares of the picture's
 
 
-def bending_raster(
+def bending_picture(
     tile: Tile,
     rest: Array,
     bent: Array,
     *,
-    width_px: int = 1200,
     y_down: bool = False,
     label: str | None = "",
     thick: float = 1.0,
-) -> Raster:
+    sheet: Sheet | None = None,
+) -> ScenePicture:
     """Return a tile with the bent silhouette's outline, coloured by how far points moved.
 
     The silhouette as it was is a faint dashed line; arrows lead from it to the tile where it bent.
@@ -129,59 +110,47 @@ def bending_raster(
     Args:
         tile: The tile in the input's coordinates, which is filled.
         rest, bent: The outlines (n, 2) of the silhouette as it was and bent, point by point.
-        width_px, y_down, label: As for `overlay_raster`.
+        y_down, label, sheet: As for `overlay_picture`.
         thick: How many times as wide lines are, for small pictures.
     """
-    text = "" if label is None else label or tile.isohedral_class or " "
-    raster = captioned([rest, bent, tile.polygon], width_px, y_down=y_down, text=text)
-    raster.fill([tile.polygon], TILE)
+    sheet = sheet or Sheet.screen(1200)
+    text = label or tile.isohedral_class or " " if label is not None and not sheet.printed else ""
+    sketch = Sketch.around([rest, bent, tile.polygon], sheet, y_down=y_down, text=text)
+    sketch.fill(tile.polygon, TILE)
     size = float(np.sqrt(abs(tile.signed_area)))
     moved = np.linalg.norm(bent - rest, axis=1) / size
-    unit = thick * width_px
-    closed = raster.to_pixels(np.concatenate([rest, rest[:1]]))
-    for piece in dashes(closed, 0.009 * unit, 0.006 * unit):
-        raster.line(piece, GHOST, _GHOST * unit, pixels=True)
-    _arrows(raster, rest, bent, moved, size, _GHOST * unit)
+    unit = thick * sketch.width
+    closed = sketch.on_page(np.concatenate([rest, rest[:1]]))
+    sketch.dashed(closed, GHOST, _GHOST * unit, unit)
+    _arrows(sketch, rest, bent, moved, size, _GHOST * unit)
     values = np.clip((moved + np.roll(moved, -1)) / 2 / FAR, 0, 1)
     steps = np.rint(values * (_STEPS - 1)).astype(int)
     for step, run in sorted(_runs(bent, steps), key=lambda item: item[0]):
-        raster.line(run, RAMP[step], _LINE * unit)
+        sketch.line(run, RAMP[step], _LINE * unit)
     if text:
-        _bending_legend(raster)
-    return raster
+        _bending_legend(sketch)
+    caption = (
+        "Dashed: the silhouette as it was, with arrows to where it went. The tile's outline is "
+        "coloured by how far each point moved, from blue, little, to red, far."
+    )
+    return sketch.picture(f"Silhouette bent into a tile {tile.isohedral_class}".strip(), caption)
 
 
 def comparison(
     result: EscherTile,
     target: Target,
     *,
-    width_px: int = 1200,
     label: str | None = None,
     thick: float = 1.0,
-) -> Raster:
+    sheet: Sheet | None = None,
+) -> ScenePicture:
     """Return how the silhouette bent into a tile, or the tile over it where it did not bend."""
     tile, y_down = result.tile, target.y_down
     if result.bent is None or result.rest is None:
-        outline = target.outline
-        return overlay_raster(tile, outline, width_px=width_px, y_down=y_down, label=label)
+        return overlay_picture(tile, target.outline, y_down=y_down, label=label, sheet=sheet)
     text = label and f"{label}  IoU {result.metrics.iou:.3f}"
     rest, bent = result.rest, result.bent
-    return bending_raster(
-        tile, rest, bent, width_px=width_px, y_down=y_down, label=text, thick=thick
-    )
-
-
-def bending_picture(
-    tile: Tile, rest: Array, bent: Array, *, y_down: bool = False, sheet: Sheet | None = None
-) -> PrintedPicture:
-    """Return the picture of `bending_raster` for print, in curves; the caption has its legend."""
-    raster = bending_raster(tile, rest, bent, width_px=1600, y_down=y_down, label=None)
-    title = f"Silhouette bent into a tile {tile.isohedral_class}".strip()
-    caption = (
-        "Dashed: the silhouette as it was, with arrows to where it went. The tile's outline is "
-        "coloured by how far each point moved, from blue, little, to red, far."
-    )
-    return PrintedPicture.of(raster, sheet or Sheet.column(), title=title, caption=caption)
+    return bending_picture(tile, rest, bent, y_down=y_down, label=text, thick=thick, sheet=sheet)
 
 
 def _ramp(stops: tuple[str, ...], count: int) -> tuple[str, ...]:
@@ -211,7 +180,7 @@ def _runs(ring: Array, steps: Array) -> Iterator[tuple[int, Array]]:
 
 
 def _arrows(
-    raster: Raster, rest: Array, bent: Array, moved: Array, size: float, width: float
+    sketch: Sketch, rest: Array, bent: Array, moved: Array, size: float, width: float
 ) -> None:
     """Draw arrows to where the outline went, at points some way apart that moved far."""
     taken: list[int] = []
@@ -222,17 +191,15 @@ def _arrows(
         if not any(near):
             taken.append(int(k))
     for k in taken:
-        arrow(raster, rest[k], bent[k], GHOST, width)
+        sketch.arrow(rest[k], bent[k], GHOST, width)
 
 
-def _bending_legend(raster: Raster) -> None:
-    y, wide = strip_middle(raster), raster.width
+def _bending_legend(sketch: Sketch) -> None:
+    y, wide = sketch.strip_middle, sketch.width
     sample = np.array([[0.47 * wide, y], [0.52 * wide, y]])
-    for piece in dashes(sample, 0.009 * wide, 0.006 * wide):
-        raster.line(piece, GHOST, _GHOST * wide, pixels=True)
-    caption(raster, 0.53, "as it was")
-    for (left, right), colour in zip(
-        pairwise(np.linspace(0.68, 0.78, _STEPS + 1)), RAMP, strict=True
-    ):
-        _swatch(raster, left, right, 0.009, colour)
-    caption(raster, 0.79, "moved, little to far")
+    sketch.dashed(sample, GHOST, _GHOST * wide, wide)
+    sketch.caption(0.53, "as it was")
+    edges = pairwise(np.linspace(0.68, 0.78, _STEPS + 1))
+    for (left, right), colour in zip(edges, RAMP, strict=True):
+        sketch.swatch(left, right, 0.009, colour)
+    sketch.caption(0.79, "moved, little to far")

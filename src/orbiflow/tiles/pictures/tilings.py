@@ -1,100 +1,85 @@
-"""Pictures of tilings, in pixels or for print, and of isohedral classes.
-
-The picture of the classes is computed from their table and groups; nothing is placed by hand.
-"""
+"""Pictures of a tile and of tilings, in pixels, for print, or as plain curves."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
-import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from orbiflow.arguments import as_whole
-from orbiflow.arrays import Array, Window, checked_window
-from orbiflow.drawing import (
-    CENTER_COLOURS,
-    DEFAULT_PALETTE,
-    LINE_COLOUR,
-    Raster,
-    Sheet,
-    cell_ring,
-    center_sign,
-    fill_rings,
-    font,
-    mark_symmetry,
-    outline_cell,
-    palette,
-    palette_png,
-    plane_axes,
-)
+from orbiflow.arrays import Window
+from orbiflow.drawing import DEFAULT_PALETTE, Sheet, font, palette, palette_png
 from orbiflow.errors import OrbiflowError
-from orbiflow.symmetry import identity
-from orbiflow.tiles.tilings import (
-    CLASSES,
-    Colouring,
-    EdgeClass,
-    IsohedralClass,
-    Tile,
-    Tiles,
-    as_tiling,
-    aspects,
-    colouring,
-    copies_meeting,
-    default_window,
-    patch,
-)
+from orbiflow.tiles.page import Curve, Layer, Page, Style
+from orbiflow.tiles.pictures.sketch import LEAST_LINE, ScenePicture
+from orbiflow.tiles.tilings import Colouring, Tile, Tiles, as_tiling, default_window
+from orbiflow.tiles.write import INCH, scene_image
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-OUTLINE_PX = 0.8 * 200 / 72  # the usual width of outlines: 0.8 points at 200 dots per inch
+OUTLINE_SHARE = 1 / 720  # width of the lines between tiles, as a share of the page's
+TILE_MARGIN = 0.04  # the margin around a single tile, as a share of its longer side
 
 
-def tiling_raster(
+def tile_picture(
+    tile: Tile, *, y_down: bool = False, sheet: Sheet | None = None, title: str = ""
+) -> ScenePicture:
+    """Return a picture of one tile with a small margin; arguments as for `tiling_picture`."""
+    low, high = tile.tiling.box
+    margin = TILE_MARGIN * float((high - low).max())
+    sheet, chosen = sheet or Sheet.column(100.0), palette(DEFAULT_PALETTE)
+    window = (*(low - margin).tolist(), *(high + margin).tolist())
+    page = Page.of_window(tile, window, sheet.width * INCH, y_down=y_down)
+    style = Style(chosen.fill(1), chosen.outline, 0.003 * page.size[0])
+    layers = (Layer("tile", "tiles", style, (Curve.polyline(page.ring, closed=True),)),)
+    note = "A tile of the plane, made with orbiflow"
+    return ScenePicture(page.empty(layers, title=title or _name(tile), notes=(note,)), sheet)
+
+
+def tiling_picture(
     tile: Tiles,
     window: Window | None = None,
     *,
-    width_px: int = 1600,
     colours: Colouring | None = None,
-    outline_px: float = OUTLINE_PX,
     y_down: bool = False,
-    strip_px: int = 0,
-) -> Raster:
-    """Return the tiles that meet a window, edge to edge, as a picture; its `png()` is a PNG.
+    sheet: Sheet | None = None,
+    outline: float = OUTLINE_SHARE,
+    title: str = "",
+) -> ScenePicture:
+    """Return the tiles that meet a window, edge to edge, clipped to it.
+
+    Every tile has an outline, so that no paper shines through between neighbours. For another size or
+    palette see `export`.
 
     Args:
         tile: A tile or a tiling.
         window: The window (xmin, ymin, xmax, ymax) in the tile's units. Default: `default_window`.
-        width_px: The width in pixels; the height follows from the window.
         colours: Which tile has which colour. Default: `colouring(tile)`.
-        outline_px: The outline's width in pixels; 0 for none.
         y_down: Whether the tile's y axis points down, as in images.
-        strip_px: The height of a strip below, for words.
+        sheet: The sheet. Default: 1600 pixels.
+        outline: The outline's width as a share of the page's.
+        title: The title. Default: the class and group.
 
     Raises:
         OrbiflowError: If the size is impossible, or the window is empty or holds too many tiles.
     """
-    chosen, tiling = palette(DEFAULT_PALETTE), as_tiling(tile)
-    colours = colours or colouring(tiling)
-    window = checked_window(window or default_window(tiling))
-    raster = Raster(window, width_px, y_down=y_down, paper=chosen.paper, strip_px=strip_px)
-    copies = copies_meeting(tiling, window)
-    rings, own = copies.rings(), colours.colours(copies)
-    for number in range(colours.count):
-        raster.fill([rings[k] for k in np.flatnonzero(own == number)], chosen.fill(number))
-    if outline_px > 0:
-        for ring in rings:
-            raster.line(ring, chosen.outline, outline_px, closed=True)
-    return raster
+    sheet, tiling, chosen = sheet or Sheet.screen(1600), as_tiling(tile), palette(DEFAULT_PALETTE)
+    window = window or default_window(tiling)
+    page = Page.of_window(tile, window, sheet.width * INCH, y_down=y_down, known=colours)
+    width = outline * page.size[0]
+    line = Style(None, chosen.outline, max(width, LEAST_LINE) if sheet.printed else width)
+    what = "An isohedral tiling" if len(tiling.prototiles) == 1 else "A tiling"
+    note = (
+        f"{what} of the plane ({_name(tile)}), made with orbiflow. "
+        "Each path is one tile; groups collect the tiles of one colour."
+    )
+    outlines = [Curve.polyline(own.polygon, closed=True) for own in page.tiling.prototiles]
+    named = {"title": title or f"Tiling {_name(tile)}", "notes": (note,)}
+    return ScenePicture(page.scene(outlines, chosen, line, clipped=True, **named), sheet)
 
 
 PANEL_ASPECT = 1.25  # width over height of the part of a tiling that a panel of `tilings_png` shows
 PANEL_TILES = 22  # the number of tiles that fit into it, by area
-_NAME, _GAP = 0.13, 0.05  # height of a panel's name, and the space around it, in panel widths
+NAME_SHARE, GAP_SHARE = 0.13, 0.05  # a panel's name, and the space around it, in panel widths
 
 
 def tilings_png(tilings: Mapping[str, Tiles], *, columns: int = 6, width_px: int = 1600) -> bytes:
@@ -111,169 +96,38 @@ def tilings_png(tilings: Mapping[str, Tiles], *, columns: int = 6, width_px: int
     columns = as_whole(columns, "columns", 1, 100)
     if not tilings:
         raise OrbiflowError("a sheet of tilings needs at least one")
-    side = width_px / columns
-    gap, name = round(_GAP * side), round(_NAME * side)
+    side, chosen = width_px / columns, palette(DEFAULT_PALETTE)
+    gap, name = round(GAP_SHARE * side), round(NAME_SHARE * side)
     panel = round(side) - 2 * gap
-    rasters = [_panel(tiling, panel, label, name) for label, tiling in tilings.items()]
-    step = rasters[0].height + gap
-    rows = math.ceil(len(rasters) / columns)
-    sheet = Image.new("RGB", (width_px, rows * step + gap), rasters[0].paper)
-    for number, raster in enumerate(rasters):
+    pictures = [_panel(tiling, panel) for tiling in tilings.values()]
+    step = pictures[0].height + name + gap
+    rows = math.ceil(len(pictures) / columns)
+    sheet = Image.new("RGB", (width_px, rows * step + gap), chosen.paper)
+    pen = ImageDraw.Draw(sheet)
+    for number, (label, picture) in enumerate(zip(tilings, pictures, strict=True)):
         row, column = divmod(number, columns)
-        sheet.paste(raster.image(), (round(column * side) + gap, row * step + gap))
-    return palette_png(sheet, list(dict.fromkeys(c for r in rasters for c in r.colours)))
+        left, top = round(column * side) + gap, row * step + gap
+        sheet.paste(picture, (left, top))
+        size = 0.62 * name
+        size *= min(1.0, panel / max(1.0, font(size).getlength(label)))
+        at = left + panel / 2, top + picture.height + name / 2
+        pen.text(at, label, "#1a1a1a", font(size), anchor="mm")
+    return palette_png(sheet, [chosen.paper, "#1a1a1a", chosen.outline, *chosen.colours])
 
 
-def _panel(tiles: Tiles, width_px: int, label: str, name_px: int) -> Raster:
+def _panel(tiles: Tiles, width_px: int) -> Image.Image:
+    """Return a small tiling whose prototiles have a thick outline."""
     tiling, chosen = as_tiling(tiles), palette(DEFAULT_PALETTE)
     half = math.sqrt(PANEL_TILES * tiling.tile_area * PANEL_ASPECT) / 2
     x, y = tiling.center.tolist()
-    window: Window = (x - half, y - half / PANEL_ASPECT, x + half, y + half / PANEL_ASPECT)
-    raster = tiling_raster(tiling, window, width_px=width_px, outline_px=1.0, strip_px=name_px)
-    for prototile in tiling.prototiles:
-        raster.line(prototile.polygon, chosen.outline, max(2.0, 0.013 * width_px), closed=True)
-    low, high = raster.plane_px, raster.height
-    strip = np.array([[0, low], [width_px, low], [width_px, high], [0, high]])
-    raster.fill_pixels(strip, chosen.paper)  # tiles at the window's edge reach into it
-    size = 0.62 * name_px
-    size *= min(1.0, width_px / max(1.0, font(size).getlength(label)))
-    raster.text(width_px / 2, (low + high) / 2, label, size, anchor="mm")
-    return raster
+    window = (x - half, y - half / PANEL_ASPECT, x + half, y + half / PANEL_ASPECT)
+    page = Page.of_window(tiling, window, float(width_px))
+    outlines = [Curve.polyline(own.polygon, closed=True) for own in page.tiling.prototiles]
+    scene = page.scene(outlines, chosen, Style(None, chosen.outline, 1.0), clipped=True)
+    thick = Style(None, chosen.outline, max(2.0, 0.013 * width_px))
+    return scene_image(scene.with_layers(Layer("prototiles", "tiles", thick, tuple(outlines))))
 
 
-EDGE_COLOURS = ("#1d4e79", "#d98a2b", "#2a9d8f", "#b0413e", "#6b4c9a")
-ASPECT_FILLS = ("#f4ecdc", "#c9dcec", "#f2cfa5", "#cfe3d4", "#e3d3ea", "#f5d5cf")
-_KEY_HEIGHT = 0.0369  # of the key to the marks, over the width
-_PANEL = (0.30, 0.68)  # shares of a panel's width for the template and for the tiling
-
-
-def classes_png(
-    kinds: Sequence[IsohedralClass] = tuple(CLASSES.values()), *, width_px: int = 2400
-) -> bytes:
-    """Return a PNG of classes, by default the nine (paper, figures of templates and symmetries).
-
-    On the left of each panel is the template: edges that are images of each other have one colour and
-    arrows that the group maps onto each other; an arrow with one barb belongs to a reflection. Straight
-    edges are hollow, and those with a mirror across have a bar. On the right is the tiling: a fill for
-    each aspect, the lattice cell, rotation centres, mirrors and glide lines.
-
-    Raises:
-        OrbiflowError: If the picture would be too large or too small.
-    """
-    columns = min(3, len(kinds)) if len(kinds) <= 12 else 6
-    rows = -(-len(kinds) // columns)
-    sheet = Sheet.screen(width_px)
-    panel = 0.783 / columns  # height over the picture's width
-    height = panel * rows + _KEY_HEIGHT
-    figure = sheet.figure(round(width_px * height) / sheet.dpi)
-    for number, kind in enumerate(kinds):
-        row, column = divmod(number, columns)
-        corner = column / columns, 1 - panel * (row + 1) / height
-        _class_panel(figure, kind, corner, (1 / columns, panel / height))
-    mirrors = any(own.straight for kind in kinds for own in kind.edge_classes)
-    mirrors |= any(len(kind.stabiliser) > 1 and kind.has_reflections for kind in kinds)
-    draw_key(figure, _KEY_HEIGHT / height, mirrors=mirrors)
-    return sheet.file(figure)
-
-
-def _class_panel(
-    figure: Figure, kind: IsohedralClass, corner: tuple[float, float], size: tuple[float, float]
-) -> None:
-    (left, bottom), (width, height) = corner, size
-    font = 3 * width * figure.get_figwidth()
-    figure.text(
-        left + 0.045 * width, bottom + 0.86 * height, kind.name, fontsize=1.5 * font, weight="bold"
-    )
-    what = (
-        kind.group_name
-        if len(kind.stabiliser) == 1
-        else f"{kind.group_name}, {kind.stabiliser_name}"
-    )
-    figure.text(left + 0.045 * width, bottom + 0.77 * height, what, fontsize=1.2 * font)
-    middle = (kind.template().min(axis=0) + kind.template().max(axis=0)) / 2
-    box = (left + 0.02 * width, bottom, _PANEL[0] * width, 0.8 * height)
-    reach = max(1.42, 0.55 * float(np.ptp(kind.template(), axis=0).max()))
-    draw_template(plane_axes(figure, _around(middle, reach, reach), box=box), kind)
-    box = (left + 0.33 * width, bottom + 0.04 * height, _PANEL[1] * width * 0.96, 0.92 * height)
-    aspect = box[2] * figure.get_figwidth() / (box[3] * figure.get_figheight())
-    middle = (middle + cell_ring(kind.group(), middle)[:4].mean(axis=0)) / 2
-    window = _around(middle, 4.25 * aspect, 4.25)
-    draw_tiling(plane_axes(figure, window, box=box), kind, window)
-
-
-def _around(middle: Array, half_width: float, half_height: float) -> Window:
-    (x, y), w, h = middle.tolist(), half_width, half_height
-    return x - w, y - h, x + w, y + h
-
-
-def draw_template(axes: Axes, kind: IsohedralClass) -> None:
-    """Draw a class's template: identified edges in one colour, with the arrows that are identified."""
-    vertices = kind.template()
-    fill_rings(axes, [vertices], ASPECT_FILLS[0], "none", 0)
-    for own, colour in zip(kind.edge_classes, EDGE_COLOURS, strict=False):
-        marks = [] if own.straight else [_arrow(kind, own)]
-        if own.turn and not own.straight and own.turn.isometry.determinant > 0:
-            marks.append(own.turn.isometry(marks[0]))
-        for edge in own.edges:
-            ends = vertices[[edge, (edge + 1) % len(vertices)]]
-            axes.plot(*ends.T, color=colour, linewidth=2.2, solid_capstyle="round")
-            if own.straight:
-                axes.plot(*ends.T, color="#ffffff", linewidth=0.8, zorder=3)
-            elif len(marks) > 1:
-                sign = ends.mean(axis=0) + center_sign(2, 0.09)
-                axes.fill(*sign.T, facecolor=colour, edgecolor="#ffffff", linewidth=0.8, zorder=4)
-        for element in (identity(2), *(image.isometry for image in own.images)):
-            for ring in map(element, marks):
-                axes.fill(*ring.T, facecolor=colour, edgecolor=colour, linewidth=0.5, zorder=3)
-    axes.plot(*vertices.T, "o", color="#1a1a1a", markersize=3, zorder=5)
-
-
-def _arrow(kind: IsohedralClass, own: EdgeClass) -> Array:
-    """Return an arrowhead on a class's first edge: in its middle, or further on for a half-turn.
-
-    Of an edge with a mirror across it is a bar.
-    """
-    vertices = kind.template()
-    start, end = vertices[own.edge], vertices[(own.edge + 1) % len(vertices)]
-    along = (end - start) / np.linalg.norm(end - start)
-    inward = np.array([-along[1], along[0]])  # templates are counter-clockwise
-    if own.turn and own.turn.isometry.determinant < 0:
-        middle, bar = (start + end) / 2, np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-        return middle + bar * (0.025, 0.12) @ np.stack([along, inward])
-    share = 0.8 if own.turn else 0.5
-    tip = start + share * (end - start) + 0.12 * along
-    back = tip - 0.26 * along
-    one_barb = any(image.isometry.determinant < 0 for image in own.images)
-    other = back if one_barb else back - 0.11 * inward
-    return np.stack([tip, back + (0.17 if one_barb else 0.11) * inward, other])
-
-
-def draw_tiling(axes: Axes, kind: IsohedralClass, window: Window) -> None:
-    """Draw the template's tiling: a fill for each aspect, the lattice cell, all centres and lines."""
-    tile = Tile(kind.template(), kind.group(), kind.name)
-    elements = patch(tile, window)
-    for element, aspect in zip(elements, aspects(tile, elements), strict=True):
-        fill_rings(
-            axes, [element(tile.polygon)], ASPECT_FILLS[aspect % len(ASPECT_FILLS)], "#7a7a7a", 0.6
-        )
-    fill_rings(axes, [tile.polygon], "none", "#1a1a1a", 1.6)
-    outline_cell(axes, kind.group(), tile.center)
-    mark_symmetry(axes, kind.group(), window, size=0.18)
-
-
-def draw_key(figure: Figure, height: float = 0.045, *, mirrors: bool = False) -> None:
-    """Draw what the marks of symmetry mean, in a strip at the bottom of a figure of this share."""
-    aspect = figure.get_figwidth() / (figure.get_figheight() * height)
-    axes = plane_axes(figure, (0.0, 0.0, aspect, 1.0), box=(0.0, 0.0, 1.0, height))
-    font, x = 0.95 * figure.get_figwidth(), 0.6
-    for order, colour in CENTER_COLOURS.items():
-        axes.fill(*(np.array([x, 0.5]) + center_sign(order, 0.24)).T, facecolor=colour)
-        axes.text(x + 0.45, 0.5, f"{order}-fold centre", va="center", fontsize=font)
-        x += 3.6
-    axes.plot([x, x + 1.2], [0.5, 0.5], color=LINE_COLOUR, linewidth=1.4, linestyle=(0, (5, 3)))
-    axes.text(x + 1.5, 0.5, "glide line", va="center", fontsize=font)
-    axes.plot([x + 4.2, x + 5.4], [0.5, 0.5], color="#111111", linewidth=1.8)
-    axes.text(x + 5.7, 0.5, "lattice cell", va="center", fontsize=font)
-    if mirrors:
-        axes.plot([x + 9, x + 10.2], [0.5, 0.5], color=LINE_COLOUR, linewidth=1.4)
-        axes.text(x + 10.5, 0.5, "mirror", va="center", fontsize=font)
+def _name(tile: Tiles) -> str:
+    kind = tile.isohedral_class if isinstance(tile, Tile) else ""
+    return " ".join(part for part in (kind, tile.group.name) if part) or "tile"

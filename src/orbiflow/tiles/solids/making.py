@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +16,14 @@ from orbiflow.arguments import as_choice
 from orbiflow.arrays import Array
 from orbiflow.drawing import rendered
 from orbiflow.errors import InputFileError
-from orbiflow.runtime import write_atomic
-from orbiflow.tiles.exporting import ExportSettings, dark_parts, laid_out, place_on
+from orbiflow.runtime import Outcome
 from orbiflow.tiles.likeness import narrowest_slit
+from orbiflow.tiles.make import ExportSettings, dark_parts, laid_out, place_on
+from orbiflow.tiles.page import Motif
 from orbiflow.tiles.result_file import as_tile
-from orbiflow.tiles.scene import Motif
 from orbiflow.tiles.solids.settings import SolidSettings
 from orbiflow.tiles.solids.shapes import Plan, shape
-from orbiflow.tiles.tile import TileSource
+from orbiflow.tiles.tile import EscherTile, TileSource
 
 STL_TRIANGLE = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
 
@@ -60,15 +60,19 @@ WRITERS = {"stl": write_stl, "3mf": write_3mf}
 DARK = 0.9  # share of the tile beyond which a drawing that is raised shows nothing
 
 
-@dataclass(frozen=True, eq=False)
-class Solid:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Solid(Outcome):
     """A solid in mm as it is printed: z up, from the corner of the bed.
 
+    - `kind`: What it is, such as "cutter".
+    - `tile`: The tile that it is made of.
     - `parts`: Closed bodies by name; a puzzle has a "tray" and "piece 1", ...
     - `title`: What a file says about it.
     - `notes`: What the user should know.
     """
 
+    kind: str
+    tile: EscherTile
     parts: dict[str, Manifold]
     title: str
     notes: tuple[str, ...] = ()
@@ -84,11 +88,23 @@ class Solid:
         boxes = np.array([body.bounding_box() for body in self.parts.values()])
         return boxes[:, 3:].max(axis=0) - boxes[:, :3].min(axis=0)
 
-    def write(self, out: str | Path, format: str | None = None) -> Path:
-        """Write a 3mf or binary stl, by its ending where no format is given."""
-        known = format or Path(out).suffix.lower().lstrip(".")
-        writer = as_choice(known, tuple(WRITERS), "the format")
-        return write_atomic(out, WRITERS[writer](self.parts, self.title))
+    def written(self, out: Path) -> Solid:
+        """Return what came of writing it to a file, with its facts as JSON has them."""
+        facts = {"file": str(out), "kind": self.kind, "class": self.tile.isohedral_class}
+        size = {"parts": len(self.parts), "size": self.size.tolist(), "volume": self.volume}
+        return replace(self, summary={**facts, **size})
+
+    @property
+    def words(self) -> str:
+        """What was written, in a sentence."""
+        size = " x ".join(f"{side:.1f}" for side in self.size)
+        what = f"{self.kind} of {self.tile.isohedral_class or 'a tile'}, {size} mm"
+        return f"written {self.summary['file']}: {what}, {self.volume / 1000:.1f} cm³"
+
+
+def solid_file(solid: Solid, format: str) -> bytes:
+    """Return the content of a solid's file, binary "stl" or "3mf"."""
+    return WRITERS[as_choice(format, tuple(WRITERS), "the format")](solid.parts, solid.title)
 
 
 def make_solid(
@@ -102,7 +118,7 @@ def make_solid(
 
     Args:
         tile, force: As for `export`; for a drawing the tile needs a map.
-        settings: What is made, and how.
+        settings: What is made, and how; `solid_file` then writes it.
         picture: An SVG drawing over the silhouette, for a stamp or mould.
 
     Raises:
@@ -113,7 +129,7 @@ def make_solid(
     settings, given = settings or SolidSettings(), as_tile(tile)
     settings.check_picture(picture)
     certificate = given.require_certified(
-        force=force, otherwise="so no solid is made of it; --force makes one, marked so"
+        force=force, otherwise="so no solid is made of it; {force} makes one, marked so"
     )
     title = f"{settings.kind} of {given.name} in mm, made with orbiflow {__version__}"
     if not certificate.valid:
@@ -123,7 +139,8 @@ def make_solid(
     if drawing.rasters:
         raise InputFileError(f"{picture}: a {settings.kind} needs lines: draw it as SVG")
     plan = Plan(settings, placed, dark_parts(drawing, settings.nozzle)[0])
-    return Solid(shape(plan), title, (*notes, *_gap_notes(plan), *_dark_notes(plan)))
+    notes = (*notes, *_gap_notes(plan), *_dark_notes(plan))
+    return Solid(kind=settings.kind, tile=given, parts=shape(plan), title=title, notes=notes)
 
 
 def _page(settings: SolidSettings) -> ExportSettings:

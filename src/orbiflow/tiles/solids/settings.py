@@ -75,7 +75,7 @@ class SolidSettings(MotifSettings, FileSettings, group="Solid"):
     copies: Annotated[int | None, Range(1), _PUZZLE, DefaultText("what the area holds")] = None
     """Number of pieces; those in the middle are taken."""
 
-    border: Annotated[Literal["straight", "following"], _PUZZLE] = "straight"
+    tray_border: Annotated[Literal["straight", "following"], _PUZZLE] = "straight"
     """With straight, the tray is a rectangle; with following, it follows the pieces."""
 
     assembled: Annotated[bool, _PUZZLE] = False

@@ -14,8 +14,8 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.exporting import Layout, chosen_copies, cut_ring
 from orbiflow.tiles.geometry import orient, polygons_in
+from orbiflow.tiles.make import Layout, cut_ring
 from orbiflow.tiles.solids.settings import SolidSettings
 
 FLATNESS = 0.01  # how far in mm straight sides may be from the tile's curves: no printer shows it
@@ -112,7 +112,7 @@ def _mould(plan: Plan) -> Manifold:
 
 def _puzzle(plan: Plan) -> dict[str, Manifold]:
     """Return a tray and its pieces, in it or beside it on the bed."""
-    settings, copies = plan.settings, chosen_copies(plan.layout)
+    settings, copies = plan.settings, plan.layout.page.copies
     fit = min(len(copies), MOST_PIECES)
     wanted = settings.copies or max(fit, 1)
     if wanted > fit:
@@ -138,7 +138,7 @@ def _tray(plan: Plan, rings: Array) -> Manifold:
     settings, gap = plan.settings, plan.settings.clearance / 2
     grown = shapely.buffer(shapely.polygons(rings), gap, join_style="mitre", mitre_limit=2)
     cavity = shapely.union_all(grown)
-    if settings.border == "straight":
+    if settings.tray_border == "straight":
         around = shapely.box(*cavity.bounds).buffer(settings.wall)
     else:
         parts = polygons_in(cavity.buffer(settings.wall))

@@ -35,6 +35,8 @@ const PLAIN = {
   warn_neck: "Tell me where it is thinner than",
 };
 
+const SHARED = { neighbour: "neighbours differ", aspect: "those that lie alike", one: "all" };
+
 const plain = (words) => ({ ...Object.fromEntries(Object.entries(PLAIN).map(([name, title]) => [name, { title }])), ...words });
 
 export const KINDS = {
@@ -62,19 +64,20 @@ export const KINDS = {
         title: "Colours",
         not: { purpose: ["laser", "plotter", "template", "colouring"], cut: ["skeleton", "jigsaw", "template"], filled: [false] },
       },
+      colour: { about: "", title: "Which tiles share a colour", options: SHARED },
       cut: { title: "What is drawn", about: "", options: { none: "every tile, filled", skeleton: "each line once", pieces: "tiles apart", jigsaw: "a jigsaw", template: "one tile, by hand" } },
     }),
   },
   art: {
     title: "Picture",
     image: "picture",
-    first: ["size", "tile_size", "palette", "colour"],
+    first: ["area", "tile_size", "palette", "colour"],
     words: plain({
-      tolerance: { title: "How much it may be stretched" },
-      size: { title: "Width x height", about: "Pixels such as 3000x2000, or lengths such as 300x200mm." },
+      stretch: { title: "How much it may be stretched" },
+      area: { title: "Width x height", about: "Pixels such as 3000x2000px, a size such as 300x200mm, or A4, square or story." },
       tile_size: { title: "How long is one tile?" },
       palette: { about: "", title: "Colours" },
-      colour: { about: "", title: "Which tiles share a colour", options: { neighbour: "neighbours differ", aspect: "those that lie alike", one: "all" } },
+      colour: { about: "", title: "Which tiles share a colour", options: SHARED },
     }),
   },
   solid: {
@@ -83,7 +86,7 @@ export const KINDS = {
     solid: true,
     first: ["kind", "tile_size", "height", "format"],
     words: plain({
-      border: { title: "Edge of the tray" },
+      tray_border: { title: "Edge of the tray" },
       kind: { about: "", title: "What kind of thing?", options: { tile: "Tile", cutter: "Cookie cutter", stamp: "Stamp", mould: "Mould", puzzle: "Puzzle in a tray" } },
       tile_size: { title: "How long is one tile?" },
       format: { about: "", title: "Kind of file", usual: "What suits it", options: { stl: "STL", "3mf": "3MF" } },
@@ -92,11 +95,13 @@ export const KINDS = {
   animate: {
     title: "Animation",
     image: "film",
-    first: ["kind", "seconds", "shape", "palette", "format"],
+    first: ["kind", "seconds", "area", "palette", "format"],
     words: plain({
       kind: { about: "", title: "What happens?", options: { morph: "a plain tiling becomes animals", bend: "the animal bends into the tile", grow: "the tiling grows" } },
       seconds: { title: "How long?" },
-      size: { title: "How wide?" },
+      area: { title: "Width x height", about: "Pixels such as 800x534px, or square or story, as posts and clips have it.", some: ["800x534px", "square", "story"] },
+      tile_size: { title: "How long is one tile?" },
+      colour: { about: "", title: "Which tiles share a colour", options: SHARED },
       palette: { about: "", title: "Colours" },
       format: { about: "", title: "Kind of file", usual: "What suits it", options: { gif: "GIF", mp4: "MP4", svg: "SVG" } },
     }),

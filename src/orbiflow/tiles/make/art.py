@@ -1,0 +1,213 @@
+"""Artwork: what lies on the tile and the page, as pixels or as curves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from orbiflow import __version__
+from orbiflow.drawing import palette, png_bytes
+from orbiflow.errors import OrbiflowError
+from orbiflow.runtime import Cancel, Outcome
+from orbiflow.tiles.make.art_settings import ArtSettings
+from orbiflow.tiles.make.pixels import render_page
+from orbiflow.tiles.make.repeats import repeating_page
+from orbiflow.tiles.motifs import (
+    Over,
+    Paint,
+    Picture,
+    carried_raster,
+    drawn_motif,
+    paint_motif,
+    picture_paint,
+    with_map,
+)
+from orbiflow.tiles.page import Curve, Motif, Page, Part, Scene, Style, edge_margin, longer_side
+from orbiflow.tiles.tile import EscherTile, TileSource
+from orbiflow.tiles.write import write_svg
+
+TEXELS_PER_PIXEL = 1.5  # texels of the tile's raster along a pixel of the page
+TILE_PER_OUTLINE = 120  # the tile's size over the outline's usual width
+USUAL_TILES = 25  # number of tiles on a page if no size of a tile is given
+SEAM = 0.3  # width in pixels of hairlines between filled tiles
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Artwork(Outcome):
+    """A picture of a tiling, and everything that it is made from.
+
+    - `tile`: The tile with its map.
+    - `settings`: The settings as they were given.
+    - `page`: The copies of the tile and where they are.
+    - `picture`: The picture over the silhouette, or None.
+    - `motif`: What is drawn over the picture, in the tile's units.
+    - `notes`: What the user should know.
+    """
+
+    tile: EscherTile
+    settings: ArtSettings
+    page: Page
+    picture: Picture | None
+    motif: Motif
+    notes: tuple[str, ...]
+
+    @property
+    def width(self) -> int:
+        """The number of pixels in a row."""
+        return round(self.page.size[0] * self.settings.pixels)
+
+    @property
+    def height(self) -> int:
+        """The number of rows."""
+        return round(self.page.size[1] * self.settings.pixels)
+
+    @property
+    def tile_size(self) -> float:
+        """The size of a tile in pixels."""
+        return self.page.tile_size * self.settings.pixels
+
+    @property
+    def shown(self) -> float:
+        """The number of tiles that the picture shows or, where it cuts some, has room for by area."""
+        if self.page.whole is not None:
+            return float(len(self.page.copies))
+        width, height = self.page.size
+        return width * height / self.page.tiling.tile_area
+
+    @property
+    def outline(self) -> float:
+        """The outline's width in mm."""
+        usual = max(1 / self.settings.pixels, self.page.tile_size / TILE_PER_OUTLINE)
+        return usual if self.settings.outline is None else self.settings.outline
+
+    @property
+    def density(self) -> float:
+        """The texels of the tile's raster along its unit."""
+        return TEXELS_PER_PIXEL * self.settings.pixels * self.page.place.scale
+
+    def written(self, out: Path) -> Artwork:
+        """Return what came of writing it to a file, with its facts as JSON has them."""
+        facts = {"file": str(out), "width": self.width, "height": self.height, "tiles": self.shown}
+        facts |= {"class": self.tile.isohedral_class, "tile_size": self.tile_size}
+        return replace(self, summary=facts)
+
+    @property
+    def words(self) -> str:
+        """What was written, in a sentence."""
+        name = self.tile.isohedral_class or "a tile"
+        return (
+            f"written {self.summary['file']}: {self.width} x {self.height} pixels, "
+            f"{self.shown:.0f} tiles of {name}, {self.tile_size:.0f} pixels each"
+        )
+
+    def _repr_png_(self) -> bytes:
+        """Return what a notebook shows."""
+        return png_of(render_artwork(self), self.settings.dpi)
+
+
+def artwork(
+    tile: TileSource, settings: ArtSettings | None = None, over: Over | None = None
+) -> Artwork:
+    """Prepare a picture of a tiling with something on its tiles.
+
+    Args:
+        tile: A tile in memory, or a run's folder; see `with_map`.
+        settings: How it is drawn.
+        over: What lies over the silhouette, as `read_over` returns it.
+
+    Raises:
+        OrbiflowError: If a picture or an eye is given but there is no map of the silhouette, an eye
+            lies outside it, there are too many tiles, or no rectangle repeats.
+    """
+    settings, tile, over = settings or ArtSettings(), with_map(tile), over or Over()
+    if over.picture is not None:
+        tile.require_map()
+    (page, told), chosen = _art_page(tile, settings), palette(settings.palette)
+    motif = drawn_motif(tile, settings, chosen, over.drawing)
+    said = (*tile.notes, *over.notes, *filter(None, [told]), *chosen.shortage(page.count))
+    return Artwork(
+        tile=tile, settings=settings, page=page, picture=over.picture, motif=motif, notes=said
+    )
+
+
+def _art_page(given: EscherTile, settings: ArtSettings) -> tuple[Page, str]:
+    """Return the page that is painted, and what the user should know of it."""
+    width, height = settings.page
+    scale = float(np.sqrt(width * height / USUAL_TILES / abs(given.tile.signed_area)))
+    if settings.tile_size is not None:
+        scale = settings.tile_size / longer_side(given.tile.polygon)
+    if settings.repeat is not None:
+        return repeating_page(given, settings, scale)
+    whole = None if settings.clip else edge_margin(scale * longer_side(given.tile.polygon))
+    page = Page.placed(
+        given.tile, settings, scale, y_down=given.y_down, whole=whole, centred=settings.clip
+    )
+    if not len(page.copies):
+        raise OrbiflowError(
+            f"no tile is whole on a page of {width * settings.pixels:.0f} x "
+            f"{height * settings.pixels:.0f} pixels; choose a larger area or smaller tiles"
+        )
+    return page, ""
+
+
+def render_artwork(art: Artwork, *, cancel: Cancel | None = None) -> np.ndarray:
+    """Render the picture (height, width, 3) in 8 bits, antialiased."""
+    chosen, samples, paint = palette(art.settings.palette), art.settings.samples, painted(art)
+    coloured = paint.coloured(chosen, art.page.count)
+    return render_page(
+        art.page,
+        art.settings.pixels,
+        paint.grid,
+        coloured,
+        chosen.paper,
+        samples=samples,
+        cancel=cancel,
+    )
+
+
+def painted(art: Artwork) -> Paint:
+    """Paint the tile's raster with all that is on the tile."""
+    polygon = art.tile.tile.polygon
+    paint = picture_paint(art.picture, art.tile, art.density, art.page.count)
+    if art.motif.parts:
+        paint_motif(paint, art.motif)
+        paint.bleed(paint.grid.inside(polygon))
+    if art.outline > 0:
+        # half of its width inside
+        colour, width = palette(art.settings.palette).outline, art.outline / art.page.place.scale
+        line = Part((Curve.polyline(polygon, closed=True),), Style(None, colour, width))
+        paint_motif(paint, Motif((line,)))
+    return paint
+
+
+def art_scene(art: Artwork) -> Scene:
+    """Return the page in millimetres, as `render_artwork` draws it, with pixels carried already."""
+    page, chosen, rasters = art.page, palette(art.settings.palette), ()
+    if art.picture is not None:
+        rasters = (carried_raster(art.picture, art.tile, art.density, page.count),)
+    name = art.tile.isohedral_class or "a tile"
+    return page.scene(
+        [Curve.polyline(page.ring, closed=True)],
+        chosen,
+        Style(None, chosen.outline, art.outline),
+        clipped=True,
+        seam=SEAM / art.settings.pixels,
+        motif=Motif(art.motif.parts, rasters).moved(*page.place),
+        title=art.tile.name,
+        notes=(f"Artwork of {name}, made with orbiflow {__version__}.",),
+    )
+
+
+def art_file(art: Artwork, format: str, *, cancel: Cancel | None = None) -> bytes | str:
+    """Return the content of a file in a format, svg, or png for pixels."""
+    if format == "svg":
+        return write_svg(art_scene(art))
+    return png_of(render_artwork(art, cancel=cancel), art.settings.dpi)
+
+
+def png_of(pixels: np.ndarray, dpi: float) -> bytes:
+    """Return pixels (height, width, 3) as a PNG that gives their resolution."""
+    return png_bytes(Image.fromarray(pixels), dpi=(dpi, dpi), compress_level=5)

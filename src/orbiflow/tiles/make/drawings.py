@@ -1,0 +1,131 @@
+"""What lies on the tiles of an export: to engrave and to score, or in colours."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from orbiflow.drawing import palette
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.make.layouts import BLACK, BLUE, Layout, line_style
+from orbiflow.tiles.motifs import Over, carried_raster, drawn_motif
+from orbiflow.tiles.page import (
+    USUAL_WIDTH,
+    Layer,
+    Motif,
+    Part,
+    Scene,
+    Style,
+    Uses,
+    boundary,
+    cut_off,
+    lines_of,
+    polylines,
+    region_of,
+)
+from orbiflow.tiles.silhouette import lightness
+from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.write import INCH
+
+EDGE = 0.6  # least distance in mm from the tile's edge of lines, which a drawing has there, too
+MOST_PIXELS = 1e8  # the largest number of pixels of pictures on a page
+
+
+def drawn_on(layout: Layout, given: EscherTile, over: Over) -> Motif:
+    """Return what the settings draw on a tile, at its place on the page in mm."""
+    settings, place = layout.settings, layout.page.place
+    chosen = palette(settings.palette if settings.coloured else "ink")
+    motif = drawn_motif(given, settings, chosen, over.drawing, hairlines=not settings.coloured)
+    rasters = motif.rasters
+    if over.picture is not None:
+        if settings.purpose == "plotter":
+            raise OrbiflowError(
+                "a pen draws lines, and the picture is made of pixels; give a drawing in SVG"
+            )
+        density = min(settings.dpi / INCH, float(np.sqrt(MOST_PIXELS / np.prod(settings.page))))
+        rasters = (carried_raster(over.picture, given, density * place.scale),)
+    return Motif(motif.parts, rasters).moved(*place)
+
+
+def with_drawing(scene: Scene, layout: Layout) -> Scene:
+    """Lay the layout's motif on each tile of a scene, in layers under the lines to cut."""
+    settings, area = layout.settings, shapely.Polygon(layout.outline.closed.flattened(0.01))
+    if layout.motif is None or scene.motifs or not scene.tiles:
+        return scene
+    if settings.coloured:
+        motifs = {"drawing": cut_off(layout.motif, area, whole_strokes=False)}
+        styles = {"drawing": Style()}
+    else:
+        line = line_style(layout)
+        styles = {"engrave": Style(BLACK), "score": line._replace(stroke=BLUE)}
+        if settings.purpose in ("plotter", "template", "colouring"):
+            width = min(line.width, USUAL_WIDTH)  # finer than what is thick for small hands
+            pen = line if settings.purpose == "plotter" else line._replace(width=width)
+            styles = dict.fromkeys(styles, pen)
+        edge = max(EDGE, settings.tile_size / 60) + line.width / 2
+        motifs = burnt(layout.motif, area, styles, edge)
+    linear = np.array([tile.linear for tile in scene.tiles])
+    offsets = np.array([tile.offset for tile in scene.tiles])
+    which, ink = np.arange(len(offsets)), palette(settings.palette).outline
+    ink, clip = ink if settings.coloured else None, settings.clip or settings.cut == "jigsaw"
+    layers = [
+        Layer(name, "drawing", styles[name], (Uses(name, linear, which, offsets),), clip, ink)
+        for name, motif in motifs.items()
+        if motif.parts or motif.rasters
+    ]
+    below = tuple(layer for layer in scene.layers if layer.role == "tiles")
+    above = tuple(layer for layer in scene.layers if layer.role != "tiles")
+    return replace(scene, layers=(*below, *layers, *above), motifs=motifs)
+
+
+def dark_parts(
+    motif: Motif, nozzle: float | None = None
+) -> tuple[BaseGeometry, list[BaseGeometry]]:
+    """Return the dark region of a motif, and its dark lines; they are of the region with a nozzle.
+
+    What is lighter than middle grey erases what lies under it, as on white; faint colours do nothing.
+    Lines are no thinner than the nozzle's, in mm.
+    """
+    dark: BaseGeometry = shapely.Polygon()
+    lines: list[BaseGeometry] = []
+    for part in (part for part in motif.parts if part.opacity >= 0.5):
+        fill, stroke, width = part.style
+        pen = max(width, nozzle or 0.0)
+        for colour, is_line in ((fill, False), (stroke, True)):
+            if colour is None:
+                continue
+            is_dark = lightness(colour) < 0.5
+            if is_line and is_dark and nozzle is None:
+                lines.append(lines_of(part))
+                continue
+            region = lines_of(part).buffer(pen / 2) if is_line else region_of(part)
+            dark = dark | region if is_dark else dark - region
+            lines = [line - region for line in lines]
+    return dark, lines
+
+
+def burnt(
+    motif: Motif, tile: shapely.Polygon, styles: dict[str, Style], edge: float = 0.0
+) -> dict[str, Motif]:
+    """Return the regions and pictures to engrave, and the lines to score.
+
+    Lines keep a distance in mm from the tile's `edge`, so that none is drawn twice; what that leaves
+    of a line, no longer than the distance, goes.
+    """
+    dark, lines = dark_parts(motif)
+    inner = tile.buffer(-edge)
+    if styles["engrave"].fill:
+        regions = boundary(dark & tile)
+    else:
+        regions = polylines((dark & tile).boundary & inner)
+    kept = (curve for line in lines for curve in polylines(line & inner))
+    scored = tuple(c for c in kept if c.closed or np.ptp(c.bounds(), axis=0).max() > edge)
+    pictures = cut_off(Motif(rasters=motif.rasters), tile).rasters
+    engraved = (Part(regions, styles["engrave"]),) if regions else ()
+    return {
+        "engrave": Motif(engraved, pictures),
+        "score": Motif((Part(scored, styles["score"]),) if scored else ()),
+    }

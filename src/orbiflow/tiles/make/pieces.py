@@ -1,0 +1,126 @@
+"""Pieces to cut, one beside the other, as dense as their shape allows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from orbiflow.arrays import Array
+from orbiflow.drawing import palette
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.make.layouts import BLUE, Layout, line_style
+from orbiflow.tiles.make.nesting import dense_arrangements, on_sheet
+from orbiflow.tiles.make.offsets import cut_ring
+from orbiflow.tiles.page import (
+    USUAL_WIDTH,
+    Box,
+    Curve,
+    Layer,
+    PlacedTile,
+    Scene,
+    Style,
+    Uses,
+    fitted,
+    mark_corners,
+    rectangle_sides,
+    turning,
+)
+
+STICKER_COLOURS = 3
+LEAST_GAP = 0.01  # the least distance in mm between cuts: pieces never touch
+LEAST_EDGE = 0.1  # twice the least distance in mm of cuts from the sheet's edge
+
+
+def pieces_scenes(layout: Layout) -> list[Scene]:
+    """Return a scene for each sheet, several where a bed does not hold all."""
+    settings, box, flat = layout.settings, layout.page.box, layout.fine
+    ring = cut_ring(layout.piece[0], settings.kerf, settings.clearance)
+    curve = _closed_fit(ring, flat)
+    line = curve.flattened(flat / 4)
+    gap = max(settings.spacing, LEAST_GAP)
+    if settings.coloured:  # colours that reach beyond the cut do not meet
+        gap += 2 * max(0.0, -settings.offset)
+    arrangements = dense_arrangements(layout.page.tiling, line, gap)
+    edge = max(gap, LEAST_EDGE) / 2
+    placed = on_sheet(arrangements, line, box.width - 2 * edge, box.height - 2 * edge)
+    corner = np.array([box.left + edge, box.top + edge])
+    placed = replace(placed, offsets=placed.offsets + corner)
+    if settings.marks:
+        hidden = [placed.near(line, corner) for corner in mark_corners(settings.page)]
+        placed = placed.select(~np.any(hidden, axis=0))
+    if not len(placed):
+        short, long = rectangle_sides(line)
+        raise OrbiflowError(
+            f"the page of {box.width:g} x {box.height:g} mm does not hold a single piece, which takes "
+            f"{long:.1f} x {short:.1f} mm; choose a larger area or bed, or a smaller tile size"
+        )
+    return [_scene(layout, part, curve, line, gap) for part in _shared_out(placed, layout, box)]
+
+
+def _shared_out(placed: Uses, layout: Layout, box: Box) -> list[Uses]:
+    settings, fit = layout.settings, len(placed)
+    wanted = settings.copies or fit
+    sheets = math.ceil(wanted / fit)
+    if sheets > 1 and settings.bed is None:
+        plural = "s" if fit > 1 else ""
+        raise OrbiflowError(
+            f"{wanted} pieces do not fit on the page of {box.width:g} x {box.height:g} mm: it holds "
+            f"{fit} piece{plural}, so that {sheets} sheets are needed; choose a larger area, or give "
+            f"the bed to have {sheets} files"
+        )
+    counts = [min(fit, wanted - k * fit) for k in range(sheets)]
+    return [placed.select(slice(n)) for n in counts]
+
+
+def _scene(layout: Layout, placed: Uses, curve: Curve, line: Array, gap: float) -> Scene:
+    _require_clear(placed.images(line), layout.page.box, gap)
+    pieces = [
+        PlacedTile(aspect, placed.linear[aspect], offset)
+        for aspect, offset in zip(placed.which.tolist(), placed.offsets, strict=True)
+    ]
+    layers = [Layer("cut", "cut", line_style(layout), _moved(curve, pieces))]
+    if layout.settings.purpose == "stickers":
+        layers = [*_coloured(layout, pieces), *layers]
+    elif layout.settings.offset > 0 and not layout.settings.coloured:
+        seams = _moved(layout.outline.closed, pieces)
+        layers.insert(0, Layer("seam", "mark", Style(None, BLUE, 0.1), seams))
+    return layout.scene(layers, tuple(pieces))
+
+
+def _coloured(layout: Layout, pieces: list[PlacedTile]) -> Iterator[Layer]:
+    """Yield a layer of tiles for each of a few colours, which pieces have in turn."""
+    chosen, count = palette(layout.settings.palette), min(STICKER_COLOURS, len(pieces))
+    for colour in range(count):
+        tiles = _moved(layout.outline.closed, pieces[colour::count])
+        style = Style(chosen.fill(colour), chosen.outline, USUAL_WIDTH)
+        yield Layer(f"colour {colour + 1}", "tiles", style, tiles)
+
+
+def _moved(curve: Curve, pieces: list[PlacedTile]) -> tuple[Curve, ...]:
+    return tuple(curve.moved(piece.linear, piece.offset) for piece in pieces)
+
+
+def _closed_fit(ring: Array, tolerance: float) -> Curve:
+    """Fit a smooth curve to a closed polygon; take the polygon where the curve would cross itself."""
+    closed = np.concatenate([ring[-1:], ring, ring[:1]])
+    first = int(np.argmax(np.abs(turning(closed))))  # a corner, where there is one
+    turned = np.roll(ring, -first, axis=0)
+    curve = fitted(np.concatenate([turned, turned[:1]]), tolerance)
+    curve = Curve(curve.pieces, curve.straight, closed=True)
+    if shapely.Polygon(curve.flattened(tolerance / 4)).is_valid:
+        return curve
+    return Curve.polyline(ring, closed=True)
+
+
+def _require_clear(rings: Array, box: Box, gap: float) -> None:
+    """Check that pieces keep their distance and lie on the sheet, as the arrangement promises."""
+    polygons = np.asarray(shapely.polygons(rings))
+    tree = shapely.STRtree(polygons)
+    first, second = tree.query(polygons, predicate="dwithin", distance=0.999 * gap)
+    low, high = rings.min(axis=(0, 1)), rings.max(axis=(0, 1))
+    if (first != second).any() or (low < box[:2]).any() or (high > box[2:]).any():
+        raise RuntimeError("the nesting broke its promise: pieces too close or off the sheet")

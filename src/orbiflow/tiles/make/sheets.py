@@ -1,0 +1,184 @@
+"""Pages too large for a machine's bed on several sheets that overlap, with marks to align them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.make.layouts import BLACK, BLUE, STRIP
+from orbiflow.tiles.page import (
+    Box,
+    Curve,
+    Layer,
+    PlacedTile,
+    Scene,
+    Style,
+    Uses,
+    clipped,
+    mark_corners,
+    rectangle,
+)
+
+OVERLAP = 12.0  # width in mm of the strip that two neighbouring sheets share; the crosses lie in it
+ARM = 4.0  # half the width of a cross, in mm
+
+MOST_SHEETS = 400
+
+MARK = Style(None, BLUE, 0.1)
+
+
+def split(scene: Scene, bed: tuple[float, float], tolerance: float) -> list[Scene]:
+    """Split a scene into sheets no larger than the bed, row by row, unless the bed holds it.
+
+    Neighbouring sheets overlap by `OVERLAP`. Lines go from one sheet to the next in the middle of
+    the strip, where both sheets have the same crosses; no line is on two sheets. Curves become
+    polygons within `tolerance` where sheets meet.
+    """
+    if scene.width <= bed[0] and scene.height <= bed[1]:
+        return [scene]
+    columns, rows = _parts(scene.width, bed[0]), _parts(scene.height, bed[1])
+    if len(columns) * len(rows) > MOST_SHEETS:
+        raise OrbiflowError(
+            f"the page of {scene.width:g} x {scene.height:g} mm needs {len(columns) * len(rows)} "
+            f"sheets of {bed[0]:g} x {bed[1]:g} mm; the most is {MOST_SHEETS}"
+        )
+    crosses = _crosses(columns, rows)
+    pages = [Box(left, top, right, bottom) for top, bottom in rows for left, right in columns]
+    return [
+        _sheet(scene, page, crosses, tolerance, f"{k} of {len(pages)}")
+        for k, page in enumerate(pages, 1)
+    ]
+
+
+def _parts(length: float, bed: float) -> list[tuple[float, float]]:
+    """Return overlapping intervals of one length, `bed` at most, that cover 0 to `length`."""
+    if length <= bed:
+        return [(0.0, length)]
+    if bed < 3 * OVERLAP:
+        raise OrbiflowError(
+            f"a bed of {bed:g} mm is too narrow for sheets that overlap by {OVERLAP:g} mm; give one "
+            f"of at least {3 * OVERLAP:g} mm"
+        )
+    count = math.ceil((length - OVERLAP) / (bed - OVERLAP))
+    part = (length + (count - 1) * OVERLAP) / count
+    return [(k * (part - OVERLAP), k * (part - OVERLAP) + part) for k in range(count)]
+
+
+def _crosses(
+    columns: list[tuple[float, float]], rows: list[tuple[float, float]]
+) -> list[tuple[float, float]]:
+    """Return two crosses for each stretch of seam between two sheets."""
+    x_seams, y_seams = (
+        [(end + start) / 2 for (_, end), (start, _) in pairwise(parts)] for parts in (columns, rows)
+    )
+    across, down = (
+        [start + share * (end - start) for start, end in parts for share in (0.2, 0.8)]
+        for parts in (columns, rows)
+    )
+    return [(x, y) for x in x_seams for y in down] + [(x, y) for y in y_seams for x in across]
+
+
+def _sheet(
+    scene: Scene, page: Box, crosses: list[tuple[float, float]], tolerance: float, number: str
+) -> Scene:
+    half = OVERLAP / 2
+    # each side that is not the scene's own border is a seam
+    seams = Box(
+        page.left + (half if page.left > 0 else 0.0),
+        page.top + (half if page.top > 0 else 0.0),
+        page.right - (half if page.right < scene.width - 1e-9 else 0.0),
+        page.bottom - (half if page.bottom < scene.height - 1e-9 else 0.0),
+    )
+    low, high = np.maximum(seams[:2], scene.clip[:2]), np.minimum(seams[2:], scene.clip[2:])
+    window = Box(*low.tolist(), *high.tolist())
+    back = -np.array([page.left, page.top])
+    layers = [_part(layer, scene, seams, window, back, tolerance) for layer in scene.layers]
+    marks = [
+        Curve.polyline(np.array([[x - dx, y - dy], [x + dx, y + dy]]) + back)
+        for x, y in crosses
+        if page.left + ARM < x < page.right - ARM and page.top + ARM < y < page.bottom - ARM
+        for dx, dy in ((ARM, 0.0), (0.0, ARM))
+    ]
+    layers.append(Layer("registration", "mark", MARK, tuple(marks)))
+    return replace(
+        scene,
+        width=page.width,
+        height=page.height,
+        layers=tuple(layers),
+        window=Box(*(np.array(window) + np.tile(back, 2)).tolist()),
+        tiles=_tiles(scene, seams, back),
+        notes=(*scene.notes, f"Sheet {number}; crosses are common to neighbouring sheets."),
+    )
+
+
+def _part(
+    layer: Layer, scene: Scene, seams: Box, window: Box, back: np.ndarray, tolerance: float
+) -> Layer:
+    """Return the part of a layer that a sheet shows, in the sheet's own coordinates."""
+    items: list[Curve | Uses] = []
+    for item in layer.items:
+        if isinstance(item, Uses):
+            near = item.select(item.near(scene.points(item.symbol), window))
+            items.append(replace(near, offsets=near.offsets + back))
+        elif not isinstance(item, Curve):
+            raise TypeError("motifs are flattened after a page is split")
+        else:
+            parts = clipped(item, seams, tolerance, filled=layer.role == "paper")
+            items += [part.moved(np.eye(2), back) for part in parts]
+    copies = any(isinstance(item, Uses) for item in items)
+    return replace(layer, items=tuple(items), clipped=layer.clipped or copies)
+
+
+def _tiles(scene: Scene, seams: Box, back: np.ndarray) -> tuple[PlacedTile, ...]:
+    if scene.prototile is None:
+        return ()
+    kept: dict[int, PlacedTile] = {}
+    for number, tile in enumerate(scene.tiles):
+        ring = scene.prototile @ tile.linear.T + tile.offset
+        low, high = ring.min(axis=0), ring.max(axis=0)
+        if (high > seams[:2]).all() and (low < seams[2:]).all():
+            whole = tile.whole and bool((low >= seams[:2]).all() and (high <= seams[2:]).all())
+            kept[number] = replace(tile, offset=tile.offset + back, whole=whole)
+    new = {number: k for k, number in enumerate(kept)}
+    return tuple(
+        replace(tile, neighbours=tuple(new[k] for k in tile.neighbours if k in new))
+        for tile in kept.values()
+    )
+
+
+def calibrated(scene: Scene) -> Scene:
+    """Add a mark exactly 100 mm long at the foot of the scene, on a layer of its own."""
+    if scene.width < 110:
+        raise OrbiflowError(
+            f"the calibration mark is 100 mm long and needs a page at least 110 mm wide, got "
+            f"{scene.width:g} mm"
+        )
+    y, left = scene.height - STRIP / 2, (scene.width - 100) / 2
+    lines = [[[left, y], [left + 100, y]]]
+    lines += [[[x, y - 2.5], [x, y + 2.5]] for x in (left, left + 50, left + 100)]
+    marks = tuple(Curve.polyline(line) for line in lines)
+    layer = Layer("calibration 100 mm", "mark", MARK, marks)
+    return scene.with_layers(layer)
+
+
+def registered(scene: Scene) -> Scene:
+    """Add the marks by which cutters of the brand Silhouette find what is printed.
+
+    They are a square of 5 mm and two angles of 20 mm, in lines of 0.3 mm, as its cameras expect them.
+    """
+    first, second, third = mark_corners((scene.width, scene.height))
+    left, top = first.left, first.top
+    square = rectangle(Box(left, top, left + 5, top + 5))
+    angles = (
+        Curve.polyline([[second.left, top], [second.right, top], [second.right, second.bottom]]),
+        Curve.polyline([[left, third.top], [left, third.bottom], [third.right, third.bottom]]),
+    )
+    layers = (
+        Layer("registration", "mark", Style(BLACK), (square,)),
+        Layer("registration angles", "mark", Style(None, BLACK, 0.3), angles),
+    )
+    return replace(scene, layers=(*layers, *scene.layers))

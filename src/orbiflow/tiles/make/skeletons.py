@@ -1,0 +1,194 @@
+"""The lines that tiles share, each cut or drawn once, joined into few long ones in a short order."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+from orbiflow.arrays import Array
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.make.layouts import Layout, line_style
+from orbiflow.tiles.page import Curve, Layer, Scene, clipped, rectangle
+from orbiflow.tiles.tilings import skeleton
+
+
+def shared_edges(layout: Layout) -> Iterator[tuple[Curve, tuple[int, int]]]:
+    """Yield the curve of each edge on the page once, and the numbers of the vertices at its ends."""
+    own, copies = layout.outline.edges, layout.page.copies
+    if own is None:
+        raise OrbiflowError(
+            "this tile's edges do not match its neighbours', so there are no shared edges to cut "
+            "once; choose cut none or cut pieces"
+        )
+    lines = skeleton(own, copies)
+    linear, translations = copies.group.linear_parts, copies.translations
+    for copy, edge, (start, end) in zip(
+        lines.copy.tolist(), lines.edge.tolist(), lines.ends.tolist(), strict=True
+    ):
+        curve = layout.outline.curves[edge]
+        yield curve.moved(linear[copies.cosets[copy]], translations[copy]), (start, end)
+
+
+def skeleton_scene(layout: Layout) -> Scene:
+    """Return a scene with each edge that tiles share once, in few long lines."""
+    settings, box = layout.settings, layout.page.box
+    arcs: list[Curve] = []
+    ends: list[tuple[int, int]] = []
+    free = -1
+    for curve, vertices in shared_edges(layout):
+        if not settings.clip:
+            arcs.append(curve)
+            ends.append(vertices)
+            continue
+        for part in clipped(curve, box, layout.fine, filled=False):
+            # a cut end is a vertex of its own
+            start, end = vertices
+            if not np.allclose(part.start, curve.start, 0, 1e-9):
+                start = free = free - 1
+            if not np.allclose(part.end, curve.end, 0, 1e-9):
+                end = free = free - 1
+            arcs.append(part)
+            ends.append((start, end))
+    style = line_style(layout)
+    layers = [Layer("cut", "cut", style, tuple(joined(arcs, ends)))]
+    if settings.border:
+        layers.append(Layer("border", "cut", style, (rectangle(box),)))
+    return layout.scene(layers, layout.placed_tiles)
+
+
+def joined(arcs: list[Curve], ends: list[tuple[int, int]]) -> list[Curve]:
+    """Join arcs that lead from vertex to vertex into few long curves, in a short order."""
+    long = []
+    for trail in trails(np.array(ends)) if arcs else ():
+        parts = [arcs[number] if forward else arcs[number].reversed() for number, forward in trail]
+        (first, along), (last, forward) = trail[0], trail[-1]
+        start, end = ends[first][0 if along else 1], ends[last][1 if forward else 0]
+        long.append(Curve.joined(parts, closed=start == end))
+    return in_short_order(long)
+
+
+Trail = list[tuple[int, bool]]
+"""Arcs end to end: the number of each, and whether it runs from its start to its end."""
+
+
+def trails(ends: NDArray[np.int64]) -> list[Trail]:
+    """Return the fewest trails that run every arc, with the ends (S, 2), once, by Hierholzer's method.
+
+    A connected part with 2k odd vertices, where an odd number of arcs meet, falls into k trails;
+    one without odd vertices is a single closed trail (Euler).
+
+    >>> trails(np.array([[0, 1], [1, 2], [2, 0]]))
+    [[(0, True), (1, True), (2, True)]]
+    """
+    # joining the odd vertices in pairs makes all even; the joints are taken out at the end
+    joints = _joints(ends)
+    both = np.concatenate([ends, joints]) if len(joints) else ends
+    arcs: dict[int, list[tuple[int, int, bool]]] = defaultdict(list)
+    for number, (start, end) in reversed(list(enumerate(both.tolist()))):
+        arcs[start].append((number, end, True))
+        arcs[end].append((number, start, False))
+    used = np.zeros(len(both), dtype=bool)
+    found: list[Trail] = []
+    for start in both[:, 0].tolist():
+        circuit = _circuit(start, arcs, used)
+        if circuit:
+            found += _without_joints(circuit, len(ends))
+    return found
+
+
+def _joints(ends: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return pairs (J, 2) of the odd vertices of each connected part."""
+    vertices, index, counts = np.unique(ends, return_inverse=True, return_counts=True)
+    arcs = (np.ones(len(ends)), tuple(index.reshape(-1, 2).T))
+    _, part_of = connected_components(coo_array(arcs, shape=(len(vertices), len(vertices))), False)
+    odd: dict[int, list[int]] = defaultdict(list)
+    for k in np.flatnonzero(counts % 2):
+        odd[int(part_of[k])].append(int(vertices[k]))
+    pairs = [part[k : k + 2] for part in odd.values() for k in range(0, len(part), 2)]
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def _circuit(
+    start: int, arcs: dict[int, list[tuple[int, int, bool]]], used: NDArray[np.bool_]
+) -> Trail:
+    """Return a closed trail through all unused arcs that are connected with `start`."""
+    path: list[tuple[int, int, bool]] = [(start, -1, True)]
+    circuit: Trail = []
+    while path:
+        vertex, arc, forward = path[-1]
+        near = arcs[vertex]
+        while near and used[near[-1][0]]:
+            near.pop()
+        if near:
+            number, other, along = near.pop()
+            used[number] = True
+            path.append((other, number, along))
+        else:
+            path.pop()
+            if arc >= 0:
+                circuit.append((arc, forward))
+    return circuit[::-1]
+
+
+def _without_joints(circuit: Trail, count: int) -> list[Trail]:
+    """Return the parts of a circuit between the joints, which are numbered from `count` on."""
+    breaks = [k for k, (arc, _) in enumerate(circuit) if arc >= count]
+    if not breaks:
+        return [circuit]
+    turned = circuit[breaks[0] + 1 :] + circuit[: breaks[0] + 1]
+    parts: list[Trail] = [[]]
+    for arc, forward in turned:
+        if arc >= count:
+            parts.append([])
+        else:
+            parts[-1].append((arc, forward))
+    return [part for part in parts if part]
+
+
+def in_short_order(curves: list[Curve]) -> list[Curve]:
+    """Return curves in the order and direction of a way from each to the nearest end that is left."""
+    if not curves:
+        return []
+    nearest = _Nearest(np.array([[curve.start, curve.end] for curve in curves]))
+    place, ordered = np.zeros(2), []
+    for _ in curves:
+        number, side = nearest.take(place)
+        ordered.append(curves[number].reversed() if side else curves[number])
+        place = nearest.ends[number, 1 - side]
+    return ordered
+
+
+class _Nearest:
+    """The ends (n, 2, 2) of curves, with a tree that finds the nearest of those that are left."""
+
+    def __init__(self, ends: Array) -> None:
+        self.ends = ends
+        self.left = np.ones(len(ends), dtype=bool)
+        self._build_tree()
+
+    def _build_tree(self) -> None:
+        self.numbers = np.flatnonzero(self.left)
+        self.tree = KDTree(self.ends[self.numbers].reshape(-1, 2))
+        self.taken = 0
+
+    def take(self, place: Array) -> tuple[int, int]:
+        """Take the curve with the end nearest to `place`; return its number and which end it is."""
+        if 2 * self.taken > len(self.numbers):
+            self._build_tree()
+        size = 2 * len(self.numbers)
+        count = min(8, size)
+        while True:
+            _, found = self.tree.query(place, k=count)
+            for hit in np.atleast_1d(found).tolist():
+                number, side = int(self.numbers[hit // 2]), hit % 2
+                if self.left[number]:
+                    self.left[number] = False
+                    self.taken += 1
+                    return number, side
+            count = min(4 * count, size)

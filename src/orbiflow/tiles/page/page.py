@@ -1,0 +1,270 @@
+"""A page of copies: tiles in their place in millimetres, which of them it shows, and their colours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from orbiflow.arrays import Array, Integers, Window, checked_window
+from orbiflow.drawing import Palette
+from orbiflow.tiles.page.placing import edge_margin, inset, longer_side, place_on_page
+from orbiflow.tiles.page.scene import (
+    Box,
+    Curve,
+    Layer,
+    Motif,
+    PlacedTile,
+    Scene,
+    Style,
+    Uses,
+    rectangle,
+)
+from orbiflow.tiles.page.settings import ColourRule, PageSettings
+from orbiflow.tiles.tilings import (
+    Colouring,
+    Copies,
+    Edges,
+    Tiles,
+    Tiling,
+    as_tiling,
+    colouring,
+    copies_inside,
+    copies_meeting,
+)
+
+MOTIF = "motif"
+"""The name of what lies on every tile, among a scene's motifs."""
+
+
+class Place(NamedTuple):
+    """The map p -> linear p + offset from a tile's own units to millimetres on a page, y down."""
+
+    linear: Array
+    offset: Array
+
+    def __call__(self, points: Array) -> Array:
+        return points @ self.linear.T + self.offset
+
+    @property
+    def scale(self) -> float:
+        """Millimetres per unit."""
+        return float(np.sqrt(abs(np.linalg.det(self.linear))))
+
+
+@dataclass(frozen=True, eq=False)
+class Page:
+    """A page of copies in mm, y down: what every cut, picture and motion is made from.
+
+    - `size`: Its width and height.
+    - `box`: The part of it that tiles may use.
+    - `tiling`: The tiles, in their place on the page.
+    - `place`: The map to the page from the tile's own units.
+    - `whole`: The distance that whole tiles keep from the box's edge. None shows all that meet the box.
+    - `colour`: Which tiles have the same colour.
+    - `known`: The colouring of the tiling, if it is known already.
+    - `stretch`: A linear map of all copies, near the identity, for cells that repeat.
+    """
+
+    size: tuple[float, float]
+    box: Box
+    tiling: Tiling
+    place: Place
+    whole: float | None = None
+    colour: ColourRule = "neighbour"
+    known: Colouring | None = None
+    stretch: Array = field(default_factory=lambda: np.eye(2))
+
+    @classmethod
+    def placed(
+        cls,
+        tile: Tiles,
+        settings: PageSettings,
+        scale: float,
+        *,
+        y_down: bool,
+        box: Box | None = None,
+        whole: float | None = None,
+        centred: bool = True,
+    ) -> Page:
+        """Return the page that settings describe, at so many mm per unit, with the tile in its middle.
+
+        Unless it is to be `centred`, the tile is moved nearby to where most are whole.
+        """
+        size = settings.page
+        box = box or Box(0.0, 0.0, *size)
+        tiling = as_tiling(tile)
+        longer = scale * longer_side(tiling.prototiles[0].polygon)
+        margin = None if centred else edge_margin(longer)
+        place = place_on_page(tiling, scale, box, y_down, rotate=settings.rotate, margin=margin)
+        moved = tiling.transformed(*place)
+        return cls(size, box, moved, Place(*place), whole, settings.colour)
+
+    @classmethod
+    def of_window(
+        cls,
+        tile: Tiles,
+        window: Window,
+        width: float,
+        *,
+        y_down: bool = False,
+        known: Colouring | None = None,
+    ) -> Page:
+        """Return a page of this width with a window (xmin, ymin, xmax, ymax) of the tile's units."""
+        tiling, (xmin, ymin, xmax, ymax) = as_tiling(tile), checked_window(window)
+        scale = width / (xmax - xmin)
+        linear = scale * np.diag([1.0, 1.0 if y_down else -1.0])
+        place = Place(linear, -linear @ (xmin, ymin if y_down else ymax))
+        size = width, scale * (ymax - ymin)
+        moved = tiling.transformed(*place)
+        return cls(size, Box(0.0, 0.0, *size), moved, place, known=known)
+
+    @property
+    def ring(self) -> Array:
+        """The polygon (N, 2) of the first prototile, in its place."""
+        return self.tiling.prototiles[0].polygon
+
+    @property
+    def tile_size(self) -> float:
+        """The longer side in mm of the smallest rectangle around the first prototile."""
+        return longer_side(self.ring)
+
+    @cached_property
+    def copies(self) -> Copies:
+        """The copies that the page shows."""
+        if self.whole is not None:
+            return copies_inside(self.tiling, inset(self.box, self.whole))
+        left, top, right, bottom = self.box
+        corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+        own = corners @ np.linalg.inv(self.stretch).T
+        return copies_meeting(self.tiling, (*own.min(axis=0), *own.max(axis=0)))
+
+    @cached_property
+    def _colouring(self) -> Colouring:
+        return self.known or colouring(self.tiling)
+
+    @property
+    def count(self) -> int:
+        """The number of colours."""
+        if self.colour == "aspect":
+            return self.tiling.group.order
+        return self._colouring.count if self.colour == "neighbour" else 1
+
+    @cached_property
+    def colours(self) -> Integers:
+        """The number (M,) of each copy's colour."""
+        return self.colours_of(self.copies, self.tiling)
+
+    def colours_of(self, copies: Copies, tiling: Tiling) -> Integers:
+        """Return the number (M,) of each copy's colour, for copies of this or a like tiling."""
+        if self.colour == "aspect":
+            return copies.cosets
+        if self.colour == "neighbour":
+            own = self._colouring if tiling is self.tiling else colouring(tiling)
+            return own.colours(copies)
+        return np.zeros(len(copies), dtype=np.int64)
+
+    def rings(self) -> list[Array]:
+        """Return the polygon (N, 2) of each copy."""
+        return [ring @ self.stretch.T for ring in self.copies.rings()]
+
+    def uses(self, prototile: int = 0) -> Uses:
+        """Return the copies of what lies about the middle of a prototile, which is its symbol's origin.
+
+        Relative to its own middle, the rounding of a transform moves no point by much.
+        """
+        copies, middle = self.copies, self.tiling.prototiles[prototile].center
+        if len(self.tiling.prototiles) > 1:
+            copies = copies.select(copies.prototiles == prototile)
+        parts = self.stretch @ copies.group.linear_parts @ np.linalg.inv(self.stretch)
+        turned = np.einsum("aij,j->ai", copies.group.linear_parts, middle)
+        offsets = (copies.translations + turned[copies.cosets]) @ self.stretch.T
+        return Uses(symbol_of(prototile), parts, copies.cosets, offsets)
+
+    def about_middle(self, prototile: int = 0) -> tuple[Array, Array]:
+        """Return the map, linear part and offset, from the page to a prototile's symbol."""
+        return self.stretch, -self.stretch @ self.tiling.prototiles[prototile].center
+
+    def scene(
+        self,
+        outlines: Sequence[Curve],
+        chosen: Palette | None,
+        line: Style,
+        *,
+        clipped: bool,
+        seam: float | None = None,
+        motif: Motif | None = None,
+        **more: Any,
+    ) -> Scene:
+        """Return the copies as a scene: symbols, a use of them for each copy, a layer for each colour.
+
+        Args:
+            outlines: The outline of each prototile, on the page.
+            chosen: The colours; None for lines alone.
+            line: The lines around tiles, drawn around each; or above all, if hairlines `seam` mm wide
+                close the seams that viewers leave between neighbours.
+            clipped: Whether tiles are cut off at the box.
+            motif: What lies on the first prototile, on the page.
+            more: Further fields of the scene.
+        """
+        symbols = {
+            symbol_of(k): curve.moved(*self.about_middle(k)) for k, curve in enumerate(outlines)
+        }
+        motifs = {}
+        if motif is not None and (motif.parts or motif.rasters):
+            own = motif.moved(*self.about_middle())
+            motifs = {MOTIF: Motif(own.parts, own.rasters, symbol_of(0))}
+        layers = []
+        if chosen is not None:
+            layers = [Layer("paper", "paper", Style(fill=chosen.paper), (rectangle(self.box),))]
+        layers += self._tile_layers(chosen, line, clipped, seam, drawn=bool(motifs))
+        return Scene(*self.size, tuple(layers), symbols, self.box, motifs=motifs, **more)
+
+    def empty(self, layers: Sequence[Layer], **more: Any) -> Scene:
+        """Return the page as a scene of other layers."""
+        return Scene(*self.size, tuple(layers), window=self.box, **more)
+
+    def _tile_layers(
+        self, chosen: Palette | None, line: Style, clipped: bool, seam: float | None, *, drawn: bool
+    ) -> list[Layer]:
+        kinds = range(len(self.tiling.prototiles))
+        every, numbers = [self.uses(k) for k in kinds], [self.copies.prototiles == k for k in kinds]
+        line = line if line.width > 0 else Style()
+        if chosen is None:
+            return [Layer("tiles", "tiles", line, tuple(every), clipped)]
+        layers = list[Layer]()
+        for colour in sorted(set(self.colours.tolist())):
+            own = [
+                uses.select(self.colours[mine] == colour)
+                for uses, mine in zip(every, numbers, strict=True)
+            ]
+            fill, name = chosen.fill(colour), f"colour {colour + 1}"
+            style = line._replace(fill=fill) if seam is None else Style(fill, fill, seam)
+            layers.append(Layer(name, "tiles", style, tuple(filter(len, own)), clipped))
+            if drawn:
+                on = (own[0].of(MOTIF),)
+                ink = chosen.ink(colour)
+                layers.append(Layer(f"drawing on {name}", "drawing", Style(), on, clipped, ink))
+        if seam is not None and line.width > 0:
+            layers.append(Layer("outlines", "tiles", line, tuple(every), clipped))
+        return layers
+
+    def listed(self, edges: Edges | None) -> tuple[PlacedTile, ...]:
+        """Return what a JSON file says of each copy of the first prototile, with its neighbours."""
+        copies, linear = self.copies, self.copies.group.linear_parts
+        beyond = [[]] * len(copies) if edges is None else copies.neighbours(edges.across).copy
+        low, high = copies.boxes()
+        whole = np.all((low >= self.box[:2]) & (high <= self.box[2:]), axis=1).tolist()
+        near = [
+            tuple(dict.fromkeys(k for k in row if k >= 0)) for row in np.asarray(beyond).tolist()
+        ]
+        placed = zip(copies.cosets.tolist(), copies.translations, near, whole, strict=True)
+        return tuple(PlacedTile(k, linear[k], at, ks, kept) for k, at, ks, kept in placed)
+
+
+def symbol_of(prototile: int) -> str:
+    """Return the name of a prototile's outline among a scene's symbols."""
+    return "tile" if prototile == 0 else f"tile-{prototile + 1}"

@@ -1,0 +1,15 @@
+from .dxf import write_dxf as write_dxf
+from .formats import LINES_ALONE as LINES_ALONE
+from .formats import WRITERS as WRITERS
+from .formats import SceneFormat as SceneFormat
+from .formats import write_scene as write_scene
+from .json import write_json as write_json
+from .pdf import write_pdf as write_pdf
+from .png import INCH as INCH
+from .png import Sheet as Sheet
+from .png import painted as painted
+from .png import scene_image as scene_image
+from .png import shape_of as shape_of
+from .png import write_png as write_png
+from .svg import Numbers as Numbers
+from .svg import write_svg as write_svg

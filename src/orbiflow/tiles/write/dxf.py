@@ -1,0 +1,61 @@
+"""A scene as DXF, for cutters and CAD."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+from orbiflow.tiles.page import Layer, Scene, clipped, flattened
+from orbiflow.tiles.write.formats import TOLERANCE
+
+
+def write_dxf(scene: Scene, *, tolerance: float = TOLERANCE) -> str:
+    """Return the scene as DXF (R2010), which cutters, CAD and Inkscape read.
+
+    Curves become polylines within `tolerance` (mm), which every reader takes. Tiles that the page
+    cuts are cut. DXF has y up, and the page's lower left corner is the origin.
+    """
+    from ezdxf import units
+    from ezdxf.colors import RGB
+    from ezdxf.filemanagement import new
+
+    scene = flattened(scene, tolerance)
+    document: Any = new("R2010", units=units.MM)
+    document.header["$MEASUREMENT"] = 1
+    space = document.modelspace()
+    extents = (0, 0, 0), (scene.width, scene.height, 0)
+    space.reset_extents(*extents)
+    # ezdxf takes a corner at the origin for a missing one
+    document.header["$EXTMIN"], document.header["$EXTMAX"] = extents
+    space.reset_limits((0, 0), (scene.width, scene.height))
+    for note in filter(None, (scene.title, *scene.notes)):
+        document.header.custom_vars.append("orbiflow", note[:250])
+    for layer in scene.layers:
+        if layer.role == "paper":
+            continue
+        entry = document.layers.add(layer.name, linetype="CONTINUOUS")
+        colour = layer.style.stroke or layer.style.fill or "#000000"
+        entry.color, entry.rgb = ACI.get(colour, 7), RGB.from_hex(colour)
+        for points, closed in _polylines(scene, layer, tolerance):
+            space.add_lwpolyline(points, close=closed, dxfattribs={"layer": layer.name})
+    text = io.StringIO()
+    document.write(text)
+    return text.getvalue()
+
+
+ACI = {"#ff0000": 1, "#0000ff": 5}
+"""AutoCAD's numbers of colours, for readers without true colours; 7 is black on a light ground."""
+
+
+def _polylines(
+    scene: Scene, layer: Layer, tolerance: float
+) -> list[tuple[list[tuple[float, float]], bool]]:
+    found = []
+    for curve in scene.curves(layer):
+        kept = [curve]
+        if layer.clipped:
+            kept = clipped(curve, scene.clip, tolerance, filled=curve.closed)
+        for part in kept:
+            points = part.flattened(tolerance)
+            found.append(([(x, scene.height - y) for x, y in points.tolist()], part.closed))
+    return found

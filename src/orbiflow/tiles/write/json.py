@@ -1,0 +1,69 @@
+"""A scene as JSON, for programs."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from orbiflow.tiles.page import Layer, PlacedTile, Scene, flattened
+from orbiflow.tiles.write.formats import TOLERANCE
+
+SCHEMA_VERSION = 1
+
+
+def write_json(scene: Scene, *, tolerance: float = TOLERANCE) -> str:
+    """Return the scene as JSON; all lengths in mm, y down from the page's upper left corner."""
+    scene, prototile = flattened(scene, tolerance), scene.prototile
+    document: dict[str, Any] = {
+        "schema_version": SCHEMA_VERSION,
+        "kind": "orbiflow-export",
+        "title": scene.title,
+        "notes": list(scene.notes),
+        "units": "mm",
+        "y": "down",
+        "page": {"width": scene.width, "height": scene.height, "window": list(scene.clip)},
+        **scene.facts,
+        "prototile": None if prototile is None else _rounded(prototile),
+        "tiles": [_tile(tile, number, prototile) for number, tile in enumerate(scene.tiles)],
+        "layers": [_layer(scene, layer, tolerance) for layer in scene.layers],
+    }
+    return json.dumps(document, allow_nan=False, separators=(",", ":"))
+
+
+def _tile(tile: PlacedTile, number: int, prototile: np.ndarray | None) -> dict[str, Any]:
+    placed = {}
+    if prototile is not None:
+        placed["polygon"] = _rounded(prototile @ tile.linear.T + tile.offset)
+    return {
+        "number": number,
+        "aspect": tile.aspect,
+        # as in SVG: a, b, c, d, e, f of x' = a x + c y + e, y' = b x + d y + f
+        "transform": [*np.round(tile.linear.T.ravel(), 9).tolist(), *_rounded(tile.offset, 6)],
+        "neighbours": list(tile.neighbours),
+        "whole": tile.whole,
+        **placed,
+    }
+
+
+def _layer(scene: Scene, layer: Layer, tolerance: float) -> dict[str, Any]:
+    paths: list[dict[str, Any]] = []
+    if layer.role not in ("paper", "tiles"):  # tiles are listed as such
+        paths = [
+            {"closed": curve.closed, "points": _rounded(curve.flattened(tolerance))}
+            for curve in scene.curves(layer)
+        ]
+    style = layer.style
+    return {
+        "name": layer.name,
+        "role": layer.role,
+        "fill": style.fill,
+        "stroke": style.stroke,
+        "stroke_width": style.width,
+        "paths": paths,
+    }
+
+
+def _rounded(values: np.ndarray, decimals: int = 4) -> list[Any]:
+    return (np.round(values, decimals) + 0.0).tolist()

@@ -1,0 +1,269 @@
+"""A scene as pixels: drawn several times finer by Pillow, then averaged."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from PIL import Image, ImageDraw
+from PIL.PngImagePlugin import PngInfo
+
+from orbiflow.arrays import Array
+from orbiflow.drawing import FINER, draw_line, fine_places, font, in_bands, limited, png_bytes, rgb
+from orbiflow.errors import OrbiflowError
+from orbiflow.tiles.geometry import signed_area
+from orbiflow.tiles.page import Box, Curve, Layer, Part, Raster, Scene, Style, Words, flattened
+
+INCH = 25.4
+"""An inch in mm."""
+
+MOST_PIXELS = 100_000_000
+"""Pixels of a page, at most."""
+
+LONGEST_SIDE = 2**16 - 1
+"""Pixels of a side, at most."""
+
+GROUND = "#ffffff"
+"""What a page's paper looks like where nothing is drawn."""
+
+MOST_COLOURS = 32
+"""Colours of a picture that is drawn with a palette, which is faster, at most."""
+
+FLATNESS = 0.1
+"""Distance in pixels of curves from the polygons that are drawn."""
+
+
+def write_png(scene: Scene, *, dpi: float = 300.0) -> bytes:
+    """Return the scene as a PNG that gives its resolution, so that it prints in real size.
+
+    Lines are at least a pixel wide.
+
+    Raises:
+        OrbiflowError: If the page would have too many pixels, or none.
+    """
+    width, height = (side * dpi / INCH for side in (scene.width, scene.height))
+    if width * height > MOST_PIXELS or max(width, height) > LONGEST_SIDE:
+        raise OrbiflowError(
+            f"at {dpi:g} dots per inch the page has {width:.0f} x {height:.0f} pixels; "
+            f"choose fewer dots or another format"
+        )
+    if min(width, height) < 1:
+        raise OrbiflowError(f"at {dpi:g} dots per inch the page has no pixel; choose more dots")
+    picture, colours = _drawn(scene, dpi / INCH)
+    info = PngInfo()
+    for key, text in (("Title", scene.title), ("Description", " ".join(scene.notes))):
+        info.add_text(key, text)
+    info.add_text("Software", "orbiflow")
+    picture = limited(picture, colours) if colours else picture
+    return png_bytes(picture, dpi=(dpi, dpi), pnginfo=info)
+
+
+def scene_image(scene: Scene, pixels: float = 1.0) -> Image.Image:
+    """Return the scene as a picture in RGB, with so many pixels in a mm."""
+    return _drawn(scene, pixels)[0]
+
+
+def _drawn(scene: Scene, pixels: float) -> tuple[Image.Image, list[str]]:
+    """Return a scene as a picture, and its colours if they are few and all is opaque."""
+    size = round(scene.width * pixels), round(scene.height * pixels)
+    scene = flattened(scene, FLATNESS / pixels)
+    sheets = [_sheet(scene, layer, pixels, size) for layer in scene.layers]
+    colours = _few_colours(sheets)
+    picture = painted(sheets, size, ground=GROUND, colours=colours).convert("RGB")
+    pen = ImageDraw.Draw(picture)
+    for words in (item for layer in scene.layers for item in layer.items):
+        if isinstance(words, Words):
+            at = pixels * words.place[0], pixels * words.place[1]
+            anchor = "mm" if words.centred else "lm"
+            pen.text(at, words.text, words.colour, font(pixels * words.size), anchor=anchor)
+    return picture, colours
+
+
+def _few_colours(sheets: Sequence[Sheet]) -> list[str]:
+    """Return the colours of layers without transparency and pictures, the ground's first; or none."""
+    shapes = [item for sheet in sheets for item in sheet.items]
+    if not all(isinstance(item, Shape) and item.opacity >= 1 for item in shapes):
+        return []
+    styles = [item.style for item in shapes if isinstance(item, Shape)]
+    used = (colour for style in styles for colour in style[:2] if colour)
+    colours = list(dict.fromkeys([GROUND, *used]))
+    return colours if len(colours) <= MOST_COLOURS else []
+
+
+class Shape(NamedTuple):
+    """Curves that are drawn as one, as polygons and lines in pixels."""
+
+    rings: tuple[Array, ...]  # to fill; holes run the other way
+    lines: tuple[Array, ...]  # to stroke
+    style: Style  # with the stroke's width in pixels
+    opacity: float
+    low: float  # with `high`: the least and the largest y of what is drawn
+    high: float
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """What is drawn of a layer, from the bottom up, and the window that it shows in, in pixels."""
+
+    items: tuple[Shape | Raster, ...]
+    window: Box | None = None
+
+
+def _sheet(scene: Scene, layer: Layer, scale: float, size: tuple[int, int]) -> Sheet:
+    """Return a layer of a scene, whose motifs are flattened, at `scale` pixels a mm."""
+    window = None
+    if layer.clipped:
+        left, top, right, bottom = (side * scale for side in scene.clip)
+        if left > 0 or top > 0 or right < size[0] or bottom < size[1]:
+            window = Box(left, top, right, bottom)
+    return Sheet(tuple(_items(scene, layer, scale)), window)
+
+
+def _items(scene: Scene, layer: Layer, scale: float) -> Iterator[Shape | Raster]:
+    for item in layer.items:
+        if isinstance(item, Words):
+            continue  # they are written last
+        if isinstance(item, Raster):
+            yield item.moved(scale * np.eye(2), np.zeros(2))
+        elif isinstance(item, Part):
+            yield shape_of(item.moved(scale * np.eye(2), np.zeros(2)), least_width=1.0)
+        else:
+            curves = [item] if isinstance(item, Curve) else item.curves(scene.symbols[item.symbol])
+            for curve in curves:
+                moved = Part((curve,), layer.style).moved(scale * np.eye(2), np.zeros(2))
+                yield shape_of(moved, least_width=1.0)
+
+
+def shape_of(part: Part, *, least_width: float = 0.0) -> Shape:
+    """Return curves in pixels as what is drawn, with strokes at least so many pixels wide."""
+    points = [curve.flattened(FLATNESS) for curve in part.curves]
+    closed = [curve.closed for curve in part.curves]
+    lines = [np.concatenate([p, p[:1]]) if c else p for p, c in zip(points, closed, strict=True)]
+    width = max(part.style.width, least_width) if part.style.stroke else 0.0
+    rings = tuple(ring for ring in points if len(ring) > 2) if part.style.fill else ()
+    heights = np.concatenate([line[:, 1] for line in lines])
+    reach = float(heights.min() - width), float(heights.max() + width)
+    return Shape(rings, tuple(lines), part.style._replace(width=width), part.opacity, *reach)
+
+
+def painted(
+    sheets: Sequence[Sheet],
+    size: tuple[int, int],
+    *,
+    ground: str | None = None,
+    colours: Sequence[str] = (),
+) -> Image.Image:
+    """Return layers, from the bottom up, as a picture in RGBA: on a ground, or on nothing.
+
+    If all its `colours` are known and nothing is transparent, the picture is drawn with a palette,
+    and in RGB.
+    """
+    table: dict[str, Colour] = {colour: number for number, colour in enumerate(colours)}
+    start = (0, 0, 0, 0) if ground is None else (*rgb(ground), 255)
+    pngs = {item.png for sheet in sheets for item in sheet.items if isinstance(item, Raster)}
+    pictures = {png: Image.open(io.BytesIO(png)).convert("RGBA").convert("RGBa") for png in pngs}
+
+    def draw(band: Image.Image, top: int, rows: int) -> None:
+        if colours:
+            band.putpalette([value for colour in colours for value in rgb(colour)])
+        for sheet in sheets:
+            _draw_sheet(band, sheet, top, rows, pictures, table)
+
+    return in_bands("P", size, 0, draw) if colours else in_bands("RGBA", size, start, draw)
+
+
+Colour = int | tuple[int, int, int, int]
+"""A colour as Pillow takes it: its number in a palette, or red, green, blue and opacity."""
+
+
+def _colour(colour: str, table: Mapping[str, Colour]) -> Colour:
+    return table[colour] if table else (*rgb(colour), 255)
+
+
+def _draw_sheet(
+    band: Image.Image,
+    sheet: Sheet,
+    top: int,
+    rows: int,
+    pictures: Mapping[bytes, Image.Image],
+    table: Mapping[str, Colour],
+) -> None:
+    """Draw a layer on a band, FINER times as fine, of so many rows of pixels from `top` on."""
+    below = None if sheet.window is None else band.copy()
+    for item in sheet.items:
+        if isinstance(item, Raster):
+            _draw_raster(band, item, pictures[item.png], top)
+            continue
+        if item.low <= top + rows and item.high >= top:
+            _draw_shape(band, item, top, table)
+    if sheet.window is not None and below is not None:
+        left, upper, right, lower = (
+            round(FINER * (side - shift))
+            for side, shift in zip(sheet.window, (0, top, 0, top), strict=True)
+        )
+        inside = Image.new("1", band.size)
+        ImageDraw.Draw(inside).rectangle([left, upper, right - 1, lower - 1], fill=1)
+        below.paste(band, (0, 0), inside)
+        band.paste(below, (0, 0))
+
+
+def _draw_shape(band: Image.Image, shape: Shape, top: int, table: Mapping[str, Colour]) -> None:
+    """Draw a shape on a band."""
+    rings = [fine_places(ring, top) for ring in shape.rings]
+    lines = [fine_places(line, top) for line in shape.lines]
+    opaque = shape.opacity >= 1
+    canvas = band if opaque else Image.new("RGBA", band.size)
+    pen = ImageDraw.Draw(canvas)
+    if shape.style.fill and rings:
+        _fill(canvas, pen, rings, _colour(shape.style.fill, table))
+    if shape.style.stroke:
+        colour = _colour(shape.style.stroke, table)
+        for line in lines:
+            draw_line(pen, line, shape.style.width * FINER, colour)
+    if not opaque:
+        canvas.putalpha(canvas.getchannel("A").point(lambda alpha: alpha * shape.opacity))
+        band.alpha_composite(canvas)
+
+
+def _fill(
+    canvas: Image.Image, pen: ImageDraw.ImageDraw, rings: Sequence[Array], colour: Colour
+) -> None:
+    """Fill rings as one; those that run the other way than the largest are holes."""
+    if len(rings) == 1:
+        pen.polygon(rings[0].ravel().tolist(), fill=colour)
+        return
+    areas = [signed_area(ring) for ring in rings]
+    order = np.argsort(-np.abs(areas), kind="stable")
+    every = np.concatenate(rings)
+    low = np.floor(every.min(axis=0)).astype(int).clip(0, canvas.size)
+    high = np.ceil(every.max(axis=0) + 1).astype(int).clip(0, canvas.size)
+    mask = Image.new("1", tuple((high - low).tolist()))
+    cut = ImageDraw.Draw(mask)
+    for k in order.tolist():
+        filled = areas[k] * areas[order[0]] > 0
+        cut.polygon((rings[k] - low).ravel().tolist(), fill=int(filled))
+    canvas.paste(colour, tuple(low.tolist()), mask)
+
+
+def _draw_raster(band: Image.Image, raster: Raster, picture: Image.Image, top: int) -> None:
+    """Draw a picture of pixels on a band, linear between its pixels."""
+    linear, offset = raster.linear * FINER, (raster.offset - (0.0, top)) * FINER
+    corners = raster._replace(linear=linear, offset=offset).corners
+    low = np.floor(corners.min(axis=0)).astype(int).clip(0, band.size)
+    high = np.ceil(corners.max(axis=0)).astype(int).clip(0, band.size)
+    width, height = (high - low).tolist()
+    if width < 1 or height < 1:
+        return
+    inverse = np.linalg.inv(linear)
+    start = inverse @ (low - offset)
+    (a, b), (c, d) = inverse.tolist()
+    own = picture.transform(
+        (width, height),
+        Image.Transform.AFFINE,
+        (a, b, float(start[0]), c, d, float(start[1])),
+        resample=Image.Resampling.BILINEAR,
+    )
+    band.alpha_composite(own.convert("RGBA"), tuple(low.tolist()))
