@@ -15,7 +15,8 @@ from PIL import Image
 
 from orbiflow.drawing import PALETTES, Sheet, rgb
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import Tiling, colouring, copies_meeting, tiling_picture, tilings_png
+from orbiflow.symmetry import rotation_matrix
+from orbiflow.tiles import Page, Tiling, colouring, copies_meeting, tiling_picture, tilings_png
 from some_tilings import NAMED
 
 ROOT = Path(__file__).parents[3]
@@ -36,6 +37,22 @@ def test_each_tile_has_its_colour(name: str) -> None:
             seen += 1
             assert picture.getpixel((int(x), int(y))) == rgb(PALETTES["delft"].fill(number))
     assert seen > 5
+
+
+@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("y_down", [False, True])
+def test_a_known_colouring_is_the_one_that_is_drawn(name: str, y_down: bool) -> None:
+    """Each tile has the colour that the colouring says, although the page has other cosets."""
+    tiling = NAMED[name][0].transformed(rotation_matrix(0.7), np.array([1.3, -4.1]))
+    known, window = colouring(tiling), (0.3, -5.0, 2.4, -3.1)
+    page = Page.of_window(tiling, window, 100.0, y_down=y_down, known=known)
+    elements = copies_meeting(tiling, window).elements()
+    middles = [page.place(e(tiling.prototiles[e.prototile].center)) for e in elements]
+    expected = {
+        tuple(np.round(m, 3)): known.colour(e) for m, e in zip(middles, elements, strict=True)
+    }
+    found = zip(np.round(page.copies.centers(), 3).tolist(), page.colours.tolist(), strict=True)
+    assert {tuple(middle): colour for middle, colour in found} == expected
 
 
 def test_in_print_and_as_drawing() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from orbiflow.arrays import Array, Integers, Window, checked_window
 from orbiflow.drawing import Palette
+from orbiflow.symmetry import Isometry
 from orbiflow.tiles.page.placing import edge_margin, inset, longer_side, place_on_page
 from orbiflow.tiles.page.scene import (
     Box,
@@ -65,7 +66,7 @@ class Page:
     - `place`: The map to the page from the tile's own units.
     - `whole`: The distance that whole tiles keep from the box's edge. None shows all that meet the box.
     - `colour`: Which tiles have the same colour.
-    - `known`: The colouring of the tiling, if it is known already.
+    - `known`: A colouring of the tiling in its own units. Default: the one with fewest colours.
     - `stretch`: A linear map of all copies, near the identity, for cells that repeat.
     """
 
@@ -162,10 +163,29 @@ class Page:
         """Return the number (M,) of each copy's colour, for copies of this or a like tiling."""
         if self.colour == "aspect":
             return copies.cosets
-        if self.colour == "neighbour":
-            own = self._colouring if tiling is self.tiling else colouring(tiling)
-            return own.colours(copies)
-        return np.zeros(len(copies), dtype=np.int64)
+        if self.colour == "one":
+            return np.zeros(len(copies), dtype=np.int64)
+        if tiling is not self.tiling:
+            return colouring(tiling).colours(copies)
+        return self._colouring.colours(copies if self.known is None else self._own(copies))
+
+    def _own(self, copies: Copies) -> Copies:
+        """Return the same copies of the known colouring's tiling, which is not on the page.
+
+        On the page the representative of a coset may lie in another cell.
+        """
+        tiling, (linear, offset) = self._colouring.tiling, self.place
+        table, back = tiling.aspects, np.linalg.inv(linear)
+        found = []
+        for coset, prototile in zip(
+            self.tiling.aspects.cosets, self.tiling.aspects.prototiles, strict=True
+        ):
+            element = self.tiling.group.cosets[int(coset)]
+            shift = element.linear @ offset + element.translation - offset
+            moved = Isometry(back @ element.linear @ linear, back @ shift)
+            found.append(table.find(tiling.group, moved, int(prototile))[:2])
+        aspects, cells = (np.array(part) for part in zip(*found, strict=True))
+        return Copies(tiling, aspects[copies.aspects], copies.cells + cells[copies.aspects])
 
     def rings(self) -> list[Array]:
         """Return the polygon (N, 2) of each copy."""

@@ -63,7 +63,7 @@ class ScenePicture:
         """Return it as PNG of so many pixels in width. Default: as the sheet says."""
         dpi = self.sheet.dpi if width is None else width * INCH / self.scene.width
         check_size(*(round(side * dpi / INCH) for side in (self.scene.width, self.scene.height)))
-        return write_png(self.scene, dpi=dpi)
+        return write_png(self.scene, dpi=dpi, small=True)
 
     def image(self, width: int) -> Image.Image:
         """Return it in RGB, so many pixels wide."""

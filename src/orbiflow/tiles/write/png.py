@@ -36,10 +36,11 @@ FLATNESS = 0.1
 """Distance in pixels of curves from the polygons that are drawn."""
 
 
-def write_png(scene: Scene, *, dpi: float = 300.0) -> bytes:
+def write_png(scene: Scene, *, dpi: float = 300.0, small: bool = False) -> bytes:
     """Return the scene as a PNG that gives its resolution, so that it prints in real size.
 
-    Lines are at least a pixel wide.
+    Lines are at least a pixel wide. If it is to be `small` and has few colours, it has a palette of
+    them and steps between any two: a quarter of the size, and a few levels off where they meet.
 
     Raises:
         OrbiflowError: If the page would have too many pixels, or none.
@@ -57,7 +58,7 @@ def write_png(scene: Scene, *, dpi: float = 300.0) -> bytes:
     for key, text in (("Title", scene.title), ("Description", " ".join(scene.notes))):
         info.add_text(key, text)
     info.add_text("Software", "orbiflow")
-    picture = limited(picture, colours) if colours else picture
+    picture = limited(picture, colours) if small and colours else picture
     return png_bytes(picture, dpi=(dpi, dpi), pnginfo=info)
 
 
