@@ -14,7 +14,7 @@ import pytest
 HOME = Path(__file__).parents[1] / "src" / "orbiflow"
 
 TILES = ["geometry", "tilings", "silhouette", "likeness", "tile", "result_file"]
-TILES += ["search", "scene", "pictures", "motifs", "exporting", "solids"]
+TILES += ["search", "flowing", "scene", "pictures", "motifs", "exporting", "solids"]
 TILES += ["art", "motion", "pages"]
 DENSITY = ["data", "spaces", "models", "inference", "fitting"]
 DENSITY += [
