@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -97,6 +98,10 @@ def _value(kind: str, word: str, size: _Size, css: bool) -> float:
     return value
 
 
+def _matrix(a: float, b: float, c: float, d: float, e: float, f: float) -> Array:
+    return np.array([[a, c, e], [b, d, f], [0.0, 0.0, 1.0]])
+
+
 def _scaled(x: float, y: float | None = None) -> Array:
     return np.diag([x, x if y is None else y, 1.0])
 
@@ -112,18 +117,18 @@ def _skewed(x: float, y: float = 0.0) -> Array:
 
 
 _RULES: dict[str, tuple[str, tuple[int, ...], Callable[..., Array]]] = {
-    "matrix": ("n" * 6, (6,), lambda a, b, c, d, e, f: np.array([[a, c, e], [b, d, f], [0, 0, 1]])),
+    "matrix": ("nnnnnn", (6,), _matrix),
     "translate": ("xy", (1, 2), shift),
     "translatex": ("x", (1,), shift),
-    "translatey": ("y", (1,), lambda y: shift(0.0, y)),
+    "translatey": ("y", (1,), partial(shift, 0.0)),
     "translate3d": ("xy", (3,), shift),
     "scale": ("nn", (1, 2), _scaled),
-    "scalex": ("n", (1,), lambda x: _scaled(x, 1.0)),
-    "scaley": ("n", (1,), lambda y: _scaled(1.0, y)),
+    "scalex": ("n", (1,), partial(_scaled, y=1.0)),
+    "scaley": ("n", (1,), partial(_scaled, 1.0)),
     "rotate": ("axy", (1, 3), _rotated),
     "rotatez": ("a", (1,), _rotated),
     "skew": ("aa", (1, 2), _skewed),
     "skewx": ("a", (1,), _skewed),
-    "skewy": ("a", (1,), lambda y: _skewed(0.0, y)),
+    "skewy": ("a", (1,), partial(_skewed, 0.0)),
 }
 """The kinds of each transform's arguments, how many it may have, and what makes its matrix of them."""
