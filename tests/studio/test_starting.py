@@ -19,7 +19,7 @@ from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.studio import Store, StudioSettings
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.operations import studio
-from orbiflow.studio.serving import PatientProtocol, Server
+from orbiflow.studio.app import PatientProtocol, Server
 
 
 def test_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
