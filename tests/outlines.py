@@ -27,9 +27,9 @@ from orbiflow.tiles import (
     plane_points,
     signed_area,
 )
+from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.search.bending import Bent, PlacedBent, bent_tiles, placed_best, prototile
 from orbiflow.tiles.search.co_deformation import Hand, hands
-from orbiflow.tiles.search.tile_model import extract_tile
 
 FOLDER = Path(__file__).parent.parent / "examples" / "silhouettes"
 ANIMALS = ("squirrel.dat", "nagata/spider_120.dat", "nagata/octpus_94.dat", "nagata/camel_60.dat")

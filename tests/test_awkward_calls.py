@@ -13,8 +13,8 @@ from awkward import NOT_SIMPLE, SQUARE, STRANGE, USELESS
 from orbiflow import tiles
 from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.symmetry import translation, wallpaper_group
-from orbiflow.tiles.search.starts import outline_starts, template_starts
-from orbiflow.tiles.search.tile_model import extract_tile
+from orbiflow.tiles.flowing.starts import outline_starts, template_starts
+from orbiflow.tiles.flowing.tile_model import extract_tile
 
 Call = Callable[..., object]
 

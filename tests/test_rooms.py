@@ -14,7 +14,7 @@ import pytest
 HOME = Path(__file__).parents[1] / "src" / "orbiflow"
 
 TILES = ["geometry", "tilings", "silhouette", "likeness", "tile", "result_file"]
-TILES += ["search", "page", "write", "pictures", "motifs", "make", "solids"]
+TILES += ["search", "flowing", "page", "write", "pictures", "motifs", "make", "solids"]
 TILES += ["motion", "pages"]
 DENSITY = ["data", "spaces", "models", "inference", "fitting"]
 DENSITY += [

@@ -11,6 +11,7 @@ from .loading import save as save
 from .symmetry.catalogue import wallpaper_group as wallpaper_group
 from .symmetry.equivariance import assert_equivariant as assert_equivariant
 from .symmetry.group import CrystallographicGroup as CrystallographicGroup
+from .tiles.flowing.overlap_search import OverlapSearch as OverlapSearch
 from .tiles.operations import animate as animate
 from .tiles.operations import art as art
 from .tiles.operations import export as export
@@ -20,7 +21,6 @@ from .tiles.search.escherizing import escherize as escherize
 from .tiles.search.escherizing import fit_tile as fit_tile
 from .tiles.search.finished_tiles import certified_tiles as certified_tiles
 from .tiles.search.likeness_search import LikenessSearch as LikenessSearch
-from .tiles.search.overlap_search import OverlapSearch as OverlapSearch
 from .tiles.silhouette.target import Target as Target
 from .tiles.tile import EscherTile as EscherTile
 from .tiles.tilings.certificate import certify as certify

@@ -31,11 +31,12 @@ from orbiflow.tiles import (
     silhouette,
     write_tile_folder,
 )
+from orbiflow.tiles.flowing import overlap_search
+from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.pages import run_folder
 from orbiflow.tiles.pages.run_folder import FIGURE_FILES
-from orbiflow.tiles.search import candidates, occupancy
+from orbiflow.tiles.search import candidates
 from orbiflow.tiles.search.finished_tiles import best_tiles
-from orbiflow.tiles.search.tile_model import extract_tile
 
 DOCS = Path(__file__).parents[2] / "docs"
 FILES = {"tile.svg", "tiling.svg", "tiling.png", "overlay.png", "model.safetensors"}
@@ -197,7 +198,7 @@ def test_stars_are_written_in_any_encoding(monkeypatch: pytest.MonkeyPatch) -> N
 def test_no_tile_is_status_one(tmp_path: Path, orbiflow, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "boot.json"
     path.write_text(json.dumps(BOOT))
-    monkeypatch.setattr(occupancy, "fit_occupancy", lambda *_, **__: crossed())
+    monkeypatch.setattr(overlap_search, "fit_occupancy", lambda *_, **__: crossed())
     for room in (silhouette, run_folder):
         monkeypatch.setattr(room, "doubts", lambda _: ["the silhouette is odd"])
     options = ["--classes", "IH21", "--workers", 1, *FEW]
@@ -283,7 +284,7 @@ def test_a_second_run_takes_the_place_of_the_first(
         "result.json",
     }
     before = (out / "result.json").read_bytes()
-    monkeypatch.setattr(occupancy, "fit_occupancy", lambda *_, **__: crossed())
+    monkeypatch.setattr(overlap_search, "fit_occupancy", lambda *_, **__: crossed())
     none = orbiflow(*run, "-o", out, "--classes", "IH21")
     assert none.status == 1
     assert f"{out} still holds the tiles of an earlier run" in none.err

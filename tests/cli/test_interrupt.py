@@ -24,13 +24,13 @@ ENDLESS = 10**6  # steps of a fit: hours
 # the first class to be fitted is done after one step, the others never; both workers say so
 FIRST_IS_SHORT = (
     "import dataclasses\n"
-    "from orbiflow.tiles.search import occupancy\n"
-    "whole = occupancy.fit_occupancy\n"
+    "from orbiflow.tiles.flowing import overlap_search\n"
+    "whole = overlap_search.fit_occupancy\n"
     "def fit(target, kind, settings, progress, **options):\n"
     "    steps = 1 if kind.name == 'IH1' else settings.iterations\n"
     "    own = dataclasses.replace(settings, iterations=steps)\n"
     "    return whole(target, kind, own, progress, **options)\n"
-    "occupancy.fit_occupancy = fit\n"
+    "overlap_search.fit_occupancy = fit\n"
 )
 # workers that hear nothing, and all the time in the world for them; each says so in one write, or
 # two who speak at once would make one line
@@ -39,11 +39,11 @@ DEAF = (
     "from orbiflow.cli import terminal\n"
     "terminal.EVERY = 1e9\n"  # no line of progress, however long the machine takes
     "from orbiflow.runtime import Cancel, processes\n"
-    "from orbiflow.tiles.search import occupancy\n"
+    "from orbiflow.tiles.flowing import overlap_search\n"
     "def fit(*_, **__):\n"
     "    os.write(1, b'deaf\\n')\n"
     "    time.sleep(1e6)\n"
-    "occupancy.fit_occupancy, processes.GRACE = fit, 1e6\n"
+    "overlap_search.fit_occupancy, processes.GRACE = fit, 1e6\n"
     "tell = Cancel.cancel\n"
     "def cancel(self):\n"
     "    tell(self)\n"

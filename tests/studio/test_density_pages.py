@@ -19,9 +19,9 @@ from hypothesis import strategies as st
 from density.blends import random_kernels
 from orbiflow.density import Mixture, Torus, density_to_bytes, guess, read_density, seen_column
 from orbiflow.density.tables import Table
-from orbiflow.studio import density_table, density_tasks
+from orbiflow.studio import density_tasks
 from orbiflow.studio.density_routes import EXAMPLES, TABLES
-from orbiflow.studio.density_table import table_view
+from orbiflow.studio.density_tasks import table_view
 from studio.served import Client, done, new_project, studio
 
 ROWS = 40
@@ -92,7 +92,7 @@ def test_a_table_is_looked_at(client: Client) -> None:
         ("phi", "degrees"),
         ("psi", "degrees"),
     ]
-    assert len(table["first"]) == density_table.FIRST
+    assert len(table["first"]) == density_tasks.FIRST
     assert table["guess"]["space"] == "torus"
     assert client.get(own).json()["name"] == "bends of a chain"
 
@@ -166,7 +166,7 @@ HOSTILE = {
 def test_hostile_tables_are_refused_in_words(
     client: Client, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(density_table, "MAX_ROWS", 50)
+    monkeypatch.setattr(density_tasks, "MAX_ROWS", 50)
     own, task = uploaded(client, HOSTILE[name], name)
     assert task["state"] == "failed"
     assert task["error"]

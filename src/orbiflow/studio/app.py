@@ -1,33 +1,35 @@
-"""The web application: its pages, what it tells about itself, and how it says what went wrong."""
+"""The web application and its server: pages, what it tells of itself, and what went wrong in words."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
+import socket
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import uvicorn
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse
 from starlette.routing import Mount
 from starlette.staticfiles import StaticFiles
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from orbiflow import __version__
 from orbiflow.drawing import PALETTES
 from orbiflow.errors import OrbiflowError
 from orbiflow.extras import MissingExtraError
 from orbiflow.runtime import find
-from orbiflow.studio import density_routes, picture_routes, project_routes, tile_routes
-from orbiflow.studio.animals import ANIMALS, animal_file
+from orbiflow.studio import density_routes, project_routes
 from orbiflow.studio.guard import Guard, Refused
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.kinds_of_work import KINDS, RefusedSetting, kind_of_work, own_schema, presets
-from orbiflow.studio.requests import Studio
-from orbiflow.studio.routes import Routes
+from orbiflow.studio.project_routes import ANIMALS, animal_file
+from orbiflow.studio.routes import Routes, Studio
 from orbiflow.studio.settings import Limits
 from orbiflow.studio.store import Missing, Store
 from orbiflow.studio.work_queue import WorkQueue
@@ -73,8 +75,7 @@ def create_app(
         await asyncio.to_thread(queue.close)
         store.close()
 
-    modules = (density_routes, project_routes, tile_routes, picture_routes)
-    every = [*routes, *(route for module in modules for route in module.routes)]
+    every = [*routes, *density_routes.routes, *project_routes.routes]
     pages = StaticFiles(directory=STATIC, html=True)
     kinds = (Refused, OrbiflowError, HTTPException, Exception)
     app = Starlette(
@@ -142,3 +143,49 @@ async def _told(_request: Request, error: Exception) -> JSONResponse:
         return JSONResponse({"error": text}, error.status_code)
     log.error("a request failed", exc_info=error)
     return JSONResponse({"error": "something went wrong in the studio; reload the page"}, 500)
+
+
+PATIENCE = 20.0  # seconds in which the first request of a connection must have a whole head
+CONNECTIONS = 400
+
+
+class PatientProtocol(H11Protocol):
+    """A connection that is closed if it opens and then sends no request."""
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Begin to wait."""
+        super().connection_made(transport)
+        self.loop.call_later(PATIENCE, self.hang_up)
+
+    def hang_up(self) -> None:
+        """Close the connection unless a request has come."""
+        if self.cycle is None:
+            self.transport.close()
+
+
+class Server(uvicorn.Server):
+    """A server whose streams end when it is told to stop; others it would wait for."""
+
+    def __init__(self, config: uvicorn.Config, streams: Hub) -> None:
+        super().__init__(config)
+        self._streams = streams
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End the streams, then everything else."""
+        self._streams.close()
+        await super().shutdown(sockets)
+
+
+def serve(app: Guard, own: socket.socket) -> None:
+    """Serve an application at a socket until the process is told to stop."""
+    config = uvicorn.Config(
+        app,
+        http=PatientProtocol,
+        log_level="warning",
+        server_header=False,
+        timeout_keep_alive=60,
+        timeout_graceful_shutdown=2,
+        limit_concurrency=CONNECTIONS,
+    )
+    state: Any = app.app
+    Server(config, state.state.studio.hub).run(sockets=[own])

@@ -16,7 +16,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.studio.density_files import (
+from orbiflow.studio.density_tasks import (
     ENDINGS,
     FIT,
     SURFACE,
@@ -27,8 +27,7 @@ from orbiflow.studio.density_files import (
     map_file,
 )
 from orbiflow.studio.guard import Refused
-from orbiflow.studio.requests import Studio, body_object, save_body
-from orbiflow.studio.routes import Routes
+from orbiflow.studio.routes import Routes, Studio, body_object, save_body
 from orbiflow.studio.words import NAMES, plain_name
 
 EXAMPLES = {

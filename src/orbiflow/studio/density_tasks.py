@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from orbiflow.errors import SettingError
+from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.runtime import (
     NEVER,
     Call,
@@ -24,18 +26,8 @@ from orbiflow.runtime import (
     write_json,
 )
 from orbiflow.settings import Count, OnlyWith, Range, Settings
-from orbiflow.studio.density_files import (
-    FIT,
-    MAX_SHOWN,
-    SURFACE,
-    TABLE,
-    VIEW,
-    fit_folder,
-    map_file,
-    table_file,
-)
 from orbiflow.studio.settings import Job
-from orbiflow.studio.takeaways import export_folder, files_of
+from orbiflow.studio.tasks import export_folder, files_of
 
 if TYPE_CHECKING:
     from orbiflow.density import Density
@@ -67,9 +59,6 @@ class FitChoice(Settings, group="Density"):
 def table(job: Job, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> Outcome:
     """Look at the table of a project."""
     on_event(Progress(0.1, "reading the table"))
-
-    from orbiflow.studio.density_table import table_view
-
     view = table_view(table_file(job.project))
     cancel.check()
     write_json(job.project / TABLE, view)
@@ -210,3 +199,84 @@ def _model(folder: Path) -> Density:
     from orbiflow.density import read_density
 
     return read_density(folder / FIT / "density.safetensors")[0]
+
+
+TABLE, FIT, VIEW, SURFACE = "table.json", "model", "view.json", "surface.json"
+ENDINGS = (".csv", ".tsv", ".txt", ".npy")
+MAX_SHOWN = 30
+"""Columns of a table that are shown, and of which a density may be."""
+
+
+def table_file(home: Path) -> Path:
+    """Return the table of a project, as it was uploaded."""
+    found = [path for ending in ENDINGS if (path := home / f"table{ending}").is_file()]
+    if not found:
+        raise OrbiflowError("there is no table in this project; upload one")
+    return found[0]
+
+
+def ending_of(name: str) -> str:
+    """Return the ending under which a table of this name is kept, or refuse it."""
+    ending = Path(name).suffix.lower()
+    if ending not in ENDINGS:
+        raise OrbiflowError(
+            f"a table's name ends in {', '.join(ENDINGS)}; save yours as CSV and give that"
+        )
+    return ending
+
+
+def fit_folder(project: Path, number: int | None = None) -> Path:
+    """Return the folder of a fit that is complete, the newest if there is no number.
+
+    Raises:
+        OrbiflowError: If there is none.
+    """
+    done = [int(view.parent.name) for view in project.glob(f"fits/[0-9]*/{VIEW}")]
+    if number is None and done:
+        number = max(done)
+    if number not in done:
+        raise OrbiflowError("there is no such density (any more); fit one first")
+    return project / "fits" / str(number)
+
+
+def map_file(fit: Path, axes: tuple[int, ...]) -> Path:
+    """Return the file of a fit with the density of two of its angles on a grid."""
+    return fit / f"map-{'-'.join(map(str, axes))}.json"
+
+
+MAX_ROWS, FIRST = 200_000, 6
+"""Rows that a table may have, and rows that are shown of it."""
+
+MAX_NAME = 200
+"""Letters of a column's name."""
+
+
+def table_view(path: Path) -> dict[str, Any]:
+    """Return what a page shows of a table before anything is fitted.
+
+    Raises:
+        OrbiflowError: If it is no table of numbers, or too large.
+    """
+    from orbiflow.density import TableError, code_notes, read_table, seen_columns
+
+    try:
+        table = read_table(path, columns=None, width=None, max_rows=MAX_ROWS, keep_missing=True)
+    except TableError as error:
+        cause = str(error).removeprefix(f"{path}: ").partition(";")[0]
+        raise OrbiflowError(
+            f"this table cannot be read: {cause}; save it again as CSV, with a row for each thing and "
+            "plain numbers in its columns: decimal points, and nothing between thousands"
+        ) from None
+    shown = table.columns[:MAX_SHOWN]
+    if max(map(len, shown)) > MAX_NAME:
+        raise OrbiflowError(f"the name of a column has over {MAX_NAME} letters; shorten it")
+    columns, guessed = seen_columns(table, MAX_SHOWN)
+    first = table.values[:FIRST, : len(shown)].tolist()
+    return {
+        "rows": len(table.values),
+        "columns": [asdict(column) for column in columns],
+        "more": len(table.columns) - len(shown),
+        "first": [[None if math.isnan(v) else float(f"{v:.6g}") for v in row] for row in first],
+        "notes": [*table.notes, *code_notes(table)],
+        "guess": asdict(guessed),
+    }

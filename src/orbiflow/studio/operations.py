@@ -57,8 +57,7 @@ def _serve(
     settings: StudioSettings, folder: Path, token: str, on_event: Sink, cancel: Cancel
 ) -> None:
     """Run the server until it is told to stop."""
-    from orbiflow.studio.app import create_app
-    from orbiflow.studio.serving import serve
+    from orbiflow.studio.app import create_app, serve
     from orbiflow.studio.store import Store
     from orbiflow.studio.work_queue import WorkQueue
 

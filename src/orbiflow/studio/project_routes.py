@@ -1,10 +1,13 @@
-"""What browsers ask of projects: make, change, save, watch, and give work."""
+"""What browsers ask of projects, of their pictures and of their tiles."""
 
 from __future__ import annotations
 
 import json
+import re
 import secrets
+import shutil
 from importlib import import_module
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from starlette.background import BackgroundTask
@@ -18,9 +21,12 @@ from orbiflow.runtime import is_object
 from orbiflow.studio.guard import Refused
 from orbiflow.studio.kinds_of_work import kind_of_work
 from orbiflow.studio.project_file import ENDING, MOST_VIEW, write_project
-from orbiflow.studio.requests import Studio, body_object, save_body
-from orbiflow.studio.routes import Routes
-from orbiflow.studio.words import NAMES, plain_name, shown_project, shown_summary, shown_task
+from orbiflow.studio.routes import Routes, Studio, body_object, save_body
+from orbiflow.studio.store import Missing
+from orbiflow.studio.tasks import PREVIEW, SPACE, export_folder
+from orbiflow.studio.tile_files import VIEW, best_stage, tile_number
+from orbiflow.studio.words import MASKS, NAMES, plain_name, shown_project, shown_summary, shown_task
+from orbiflow.tiles import ReadingSettings
 
 routes = Routes()
 
@@ -156,3 +162,199 @@ async def events(request: Request, project: str, here: Studio, after: int = 0) -
         media_type="text/event-stream",
         headers={"cache-control": "no-store"},
     )
+
+
+PNG = b"\x89PNG\r\n\x1a\n"
+PLAIN_ENDING = re.compile("[.][a-z0-9]{1,7}")
+
+
+@routes.put("/projects/{project}/input")
+async def upload(request: Request, project: str, here: Studio, name: str = "") -> dict[str, Any]:
+    """Take a picture or drawing of any kind, as raw bytes."""
+    here.store.project(project)
+    called = plain_name(name, "picture")
+    ending = PurePosixPath(called).suffix.lower()
+    file = here.store.home(project) / f"input{ending if PLAIN_ENDING.fullmatch(ending) else '.bin'}"
+    await save_body(request, file)
+    return await _new_input(here, project, called, file)
+
+
+@routes.post("/projects/{project}/animal")
+async def animal(request: Request, project: str, here: Studio) -> dict[str, Any]:
+    """Take one of the bundled animals."""
+    name = str((await body_object(request)).get("name"))
+    here.store.project(project)
+    content = animal_file(name).read_bytes()
+    file = here.store.home(project) / "input.png"
+    file.write_bytes(content)
+    return await _new_input(here, project, f"{ANIMALS[name]}.png", file)
+
+
+async def _new_input(here: Studio, project: str, name: str, file: Path) -> dict[str, Any]:
+    """Forget the picture before, what was painted over it, and the search for its tiles."""
+    await run_in_threadpool(here.queue.forget, project, "read", "search")
+    home = here.store.home(project)
+    for old in [*home.glob("input.*"), *(home / f"{mask}.png" for mask in MASKS)]:
+        if old != file:
+            old.unlink(missing_ok=True)
+    changes: dict[str, Any] = {"input": {"name": name, "type": file.suffix.lstrip(".")}}
+    if here.store.project(project)["name"] in NAMES.values():
+        changes["name"] = PurePosixPath(name).stem
+    here.store.change(project, "silhouette", silhouette=None, reading={}, **changes)
+    here.store.change(project)
+    return await _read_anew(here, project)
+
+
+async def _read_anew(here: Studio, project: str) -> dict[str, Any]:
+    whole = here.store.project(project)
+    if whole["input"] is None:
+        raise OrbiflowError("there is no picture yet; choose one first")
+    await run_in_threadpool(here.queue.replace_waiting, project, "read")
+    return await here.submit(
+        project, "read", {"called": whole["input"]["name"], **whole["reading"]}
+    )
+
+
+@routes.put("/projects/{project}/reading")
+async def reading(request: Request, project: str, here: Studio) -> dict[str, Any]:
+    """Read the picture anew, with other settings."""
+    given = {k: v for k, v in (await body_object(request)).items() if v is not None}
+    here.store.change(project, "silhouette", reading=ReadingSettings(**given).to_json())
+    return await _read_anew(here, project)
+
+
+@routes.put("/projects/{project}/{mask}")
+async def put_mask(request: Request, project: str, mask: str, here: Studio) -> dict[str, Any]:
+    """Take what was painted over the picture."""
+    file = _mask_file(here, project, mask)
+    fresh = file.with_suffix(".new")
+    await save_body(request, fresh)
+    with fresh.open("rb") as start:
+        if start.read(len(PNG)) != PNG:
+            raise OrbiflowError("what is painted must be a PNG")
+    fresh.replace(file)
+    return await _mask_changed(here, project, mask)
+
+
+@routes.delete("/projects/{project}/{mask}")
+async def delete_mask(project: str, mask: str, here: Studio) -> dict[str, Any]:
+    """Forget what was painted over the picture."""
+    _mask_file(here, project, mask).unlink(missing_ok=True)
+    return await _mask_changed(here, project, mask)
+
+
+def _mask_file(here: Studio, project: str, mask: str) -> Path:
+    if mask not in MASKS:
+        raise Refused(404, "there is nothing here; go back to the start page")
+    here.store.project(project)
+    return here.store.home(project) / f"{mask}.png"
+
+
+async def _mask_changed(here: Studio, project: str, mask: str) -> dict[str, Any]:
+    here.store.change(project, "silhouette")
+    return await _read_anew(here, project) if mask == "mend" else {}
+
+
+@routes.get("/projects/{project}/{picture}.png")
+async def get_picture(project: str, picture: str, here: Studio) -> FileResponse:
+    """Return the backdrop, or what was painted over it."""
+    here.store.project(project)
+    file = here.store.home(project) / f"{picture}.png"
+    if picture not in (*MASKS, "backdrop") or not file.exists():
+        raise Refused(404, "there is no such picture (any more)")
+    return FileResponse(file)
+
+
+SANDBOX = {"content-security-policy": "sandbox; default-src 'none'; style-src 'unsafe-inline'"}
+
+
+def stage_of(here: Studio, project: str, tile: int) -> Path:
+    """Return the folder of a tile's last stage."""
+    here.store.card(project, tile)
+    found = best_stage(here.store.home(project), tile)
+    if found is None:
+        raise Refused(404, "there is no such tile (any more); choose another one")
+    return found
+
+
+@routes.get("/projects/{project}/tiles/{tile}")
+async def view(project: str, tile: int, here: Studio) -> FileResponse:
+    """Return what the page of a tile shows."""
+    return FileResponse(stage_of(here, project, tile) / VIEW, media_type="application/json")
+
+
+@routes.delete("/projects/{project}/tiles/{tile}")
+async def delete_tile(project: str, tile: int, here: Studio) -> dict[str, Any]:
+    """Delete a tile."""
+    here.store.delete_tile(project, tile)
+    shutil.rmtree(here.store.home(project) / "tiles" / str(tile), ignore_errors=True)
+    return {}
+
+
+@routes.get("/projects/{project}/tiles/{tile}/space")
+async def space(project: str, tile: int, here: Studio) -> FileResponse:
+    """Return the space in which a tile is pulled."""
+    file = stage_of(here, project, tile) / SPACE
+    if not file.is_file():
+        task = await here.done(project, "space", {"tile": tile})
+        if task["state"] != "done":
+            raise OrbiflowError("the tile cannot be made ready to be pulled; reload the page")
+    return FileResponse(file, media_type="application/json")
+
+
+@routes.post("/projects/{project}/tiles/{tile}/pulled")
+async def pulled(request: Request, project: str, tile: int, here: Studio) -> dict[str, Any]:
+    """Make a tile of one that was pulled, and return its card."""
+    given = await body_object(request)
+    stage_of(here, project, tile)
+    task = await here.done(project, "pull", {**given, "tile": tile})
+    if task["state"] != "done":
+        raise OrbiflowError(task["error"] or "the change was cancelled; pull again")
+    return here.store.card(project, tile_number(task["id"], 0))
+
+
+def _made(here: Studio, task: int, name: str) -> Path:
+    """Return a file that a task has made."""
+    own = here.store.task(task)
+    result = own["result"] or {}
+    names = [file["name"] for file in result.get("files", ())]
+    names += [PREVIEW] * bool(result.get("preview"))
+    file = export_folder(here.store.home(own["project"]), task) / name
+    if name not in names or not file.is_file():
+        raise Refused(404, "there is no such file (any more); make it again")
+    return file
+
+
+@routes.get("/takeaways/{task}/files/{name}")
+async def download(task: int, name: str, here: Studio) -> FileResponse:
+    """Return a file to keep."""
+    return FileResponse(_made(here, task, name), filename=name, headers=SANDBOX)
+
+
+@routes.get("/takeaways/{task}/preview.png")
+async def preview(task: int, here: Studio) -> FileResponse:
+    """Return a picture of what a task has made."""
+    return FileResponse(_made(here, task, PREVIEW), headers=SANDBOX)
+
+
+FOLDER = Path(__file__).parent / "animals"
+ANIMALS = {
+    "turtle": "Turtle",
+    "gecko": "Gecko",
+    "frog": "Frog",
+    "barbet": "Bird",
+    "monkey": "Night monkey",
+    "crocodile": "Crocodile",
+    "potoroo": "Rat kangaroo",
+    "shark": "Shark",
+    "bat": "Bat",
+    "paca": "Paca",
+}
+"""What people call each animal."""
+
+
+def animal_file(name: str) -> Path:
+    """Return the picture of an animal."""
+    if name not in ANIMALS:
+        raise Missing(f"there is no such animal; there are {', '.join(ANIMALS)}")
+    return FOLDER / f"{name}.png"

@@ -1,13 +1,19 @@
-"""What the studio's workers do first: read a picture, and search for tiles."""
+"""What the studio's workers do for tiles: read a picture, search, pull, and write files to download."""
 
 from __future__ import annotations
 
+import json
+import shutil
 import tempfile
+import time
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import (
     NEVER,
+    Call,
     Cancel,
     Note,
     Outcome,
@@ -16,8 +22,11 @@ from orbiflow.runtime import (
     as_part,
     cores,
     ignore,
+    make_folder,
     operation,
+    write_json,
 )
+from orbiflow.studio.kinds_of_work import DRAWN, file_name, making_call
 from orbiflow.studio.settings import Job, SearchChoice
 from orbiflow.studio.tile_files import (
     PLACES,
@@ -178,3 +187,173 @@ def open_file(job: Job, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> O
         "input": picture and {"name": called, "type": picture.suffix.lstrip(".")},
     }
     return Outcome({"read": picture is not None, "opened": opened})
+
+
+SPACE = "space.json"
+PIXELS = (".png", ".jpg", ".jpeg", ".webp")  # of pictures on which lines can be drawn
+
+
+@operation("studio space")
+def space(job: Job, tile: int, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> Outcome:
+    """Write what a browser needs to pull a tile into the tile's folder.
+
+    Args:
+        tile: The number of the tile.
+    """
+    from orbiflow.studio.pulled_tiles import space_json
+    from orbiflow.tiles import read_result
+
+    del on_event
+    cancel.check()
+    own = tile_folder(job.project, tile)
+    told = space_json(read_result(own))
+    write_json(own.parent / SPACE, told)
+    return Outcome({"tile": tile})
+
+
+@operation("studio pull")
+def pull(
+    job: Job,
+    tile: int,
+    parameters: tuple[float, ...],
+    *,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Certify a tile that was pulled by hand, and write it as a tile of its own.
+
+    Args:
+        tile: The number of the tile that was pulled.
+        parameters: Where it was pulled to, in the space that `studio space` wrote.
+    """
+    from orbiflow.studio.pulled_tiles import pulled, space_json
+    from orbiflow.tiles import read_result
+
+    cancel.check()
+    found = pulled(read_result(tile_folder(job.project, tile)), parameters)
+    number, stage = tile_number(job.task, 0), STAGES[-1]
+    put_tile(job.project, number, stage, found, on_event, parent=tile)
+    if place := best_stage(job.project, number):  # at hand when it is pulled again
+        write_json(place / SPACE, space_json(found))
+    return Outcome({"tile": number})
+
+
+def with_drawing(
+    drawing: str, result: Path, files: dict[str, Any], settings: dict[str, Any], scratch: Path
+) -> tuple[Path, dict[str, Any], dict[str, Any]]:
+    """Return the result, files and settings of a take-away with a drawing on its tile.
+
+    Args:
+        drawing: What the project remembers as its drawing, as JSON; "" for nothing.
+        result: The tile's folder.
+        files: The files that the take-away is given; its `picture` goes below the drawing.
+        settings: The settings of `export` or `art`.
+        scratch: A folder for what is written on the way.
+    """
+    from orbiflow.studio.tile_drawing import drawing_settings, with_any_map
+    from orbiflow.tiles import read_result, save_tiles
+
+    try:
+        parts = json.loads(drawing or "{}")
+    except (ValueError, RecursionError):
+        raise OrbiflowError("the drawing is no JSON; reload the page") from None
+    if not parts or not (parts.get("strokes") or parts.get("eyes")):
+        return result, files, settings
+    given = read_result(result)
+    tile, scratch = with_any_map(given), make_folder(scratch)
+    if tile is not given:
+        result = save_tiles([tile], scratch / "tile")
+    under: Path | None = files.get("picture")
+    if under is not None and under.suffix not in PIXELS:
+        under = under.with_name("backdrop.png")
+    made = drawing_settings(parts, tile, scratch, under)
+    if made["picture"] is not None:
+        files = {**files, "picture": made["picture"]}
+    return result, files, {**settings, "eyes": made["eyes"]} if made["eyes"] else settings
+
+
+PREVIEW = "preview.png"
+SCRATCH = ".drawn"  # a folder for what is written on the way
+MOST_SEEN = 30_000_000  # bytes of a solid that is drawn
+SIDE = 1000.0  # pixels of a preview's longer side
+
+
+def export_folder(home: Path, task: int) -> Path:
+    """Return the folder of the files that a task of a project makes to be taken away."""
+    return home / "exports" / str(task)
+
+
+def files_of(folder: Path) -> list[dict[str, Any]]:
+    """Return the name and the size in bytes of each file in a folder, by name."""
+    files = sorted(file for file in folder.iterdir() if file.is_file())
+    return [{"name": file.name, "bytes": file.stat().st_size} for file in files]
+
+
+@operation("studio take")
+def take(
+    job: Job,
+    makes: str,
+    tile: int,
+    settings: str = "{}",
+    picture: bool = False,
+    drawing: str = "",
+    called: str = "",
+    *,
+    on_event: Sink = ignore,
+    cancel: Cancel = NEVER,
+) -> Outcome:
+    """Write what a user takes away of a tile.
+
+    Args:
+        makes: The operation that writes it: export, art, solid or animate.
+        tile: The number of the tile.
+        settings: Its settings, as JSON.
+        picture: Whether the picture that was uploaded goes onto the tile.
+        drawing: What was drawn on the tile, as JSON.
+        called: The name of the project, with which that of the file begins.
+    """
+    from orbiflow.studio.silhouette_file import input_file
+
+    folder = make_folder(export_folder(job.project, job.task))
+    files = {"picture": input_file(job.project)} if picture else {}
+    given, result = json.loads(settings), tile_folder(job.project, tile)
+    if drawing and makes in DRAWN:
+        result, files, given = with_drawing(drawing, result, files, given, folder / SCRATCH)
+    name = file_name(makes, given, result, called)
+    call = making_call(makes, given, result, out=folder / name, **files)
+    done = call.operation.function(**call.arguments, on_event=as_part(on_event), cancel=cancel)
+    written = files_of(folder)
+    preview = False
+    with suppress(OrbiflowError):  # what was asked for is there
+        preview = _preview(call, folder / written[0]["name"], folder, cancel)
+    facts = {name: value for name, value in done.summary.items() if name not in ("file", "files")}
+    return Outcome(
+        {
+            "takeaway": job.task,
+            "files": written,
+            "preview": preview,
+            "facts": facts,
+            "chosen": json.loads(settings),
+            "made": time.time(),
+        }
+    )
+
+
+def _preview(call: Call, first: Path, folder: Path, cancel: Cancel) -> bool:
+    """Write a picture of a take-away, if that can be had; return whether it was."""
+    if first.suffix == ".png":
+        shutil.copyfile(first, folder / PREVIEW)
+        return True
+    if call.operation.name == "solid" and first.stat().st_size < MOST_SEEN:
+        from orbiflow.tiles import read_solid, solid_picture
+
+        solid_picture(read_solid(first)).save(folder / PREVIEW)
+        return True
+    if call.operation.name != "export":
+        return False
+    settings = call.arguments["settings"]
+    small = settings.replace(format="png", dpi=min(300.0, 25.4 * SIDE / max(settings.page)))
+    call.operation.function(
+        **{**call.arguments, "settings": small, "out": folder / PREVIEW}, cancel=cancel
+    )
+    return (folder / PREVIEW).is_file()

@@ -39,7 +39,6 @@ READINGS = frozenset({"read", "density table"})
 WARM = (
     "orbiflow.studio.tasks",
     "orbiflow.studio.pulled_tiles",
-    "orbiflow.studio.closeup_tasks",
     "orbiflow.studio.silhouette_file",
     "orbiflow.studio.tile_view",
     "orbiflow.tiles.search.escherizing",

@@ -22,9 +22,9 @@ from orbiflow.tiles import (
     report,
     trainable,
 )
+from orbiflow.tiles.flowing.starts import template_starts
 from orbiflow.tiles.search import Goal, SearchMethod
 from orbiflow.tiles.search.candidates import OnProgress, StillTiles
-from orbiflow.tiles.search.starts import template_starts
 from orbiflow.tiles.tilings import IsohedralClass
 from outlines import searched
 

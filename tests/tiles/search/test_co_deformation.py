@@ -18,10 +18,10 @@ from orbiflow.tiles import (
     resampled,
     signed_area,
 )
+from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.likeness import Elastic
 from orbiflow.tiles.search.bending import bent_tiles
 from orbiflow.tiles.search.co_deformation import BODIES, drawn_to_tiles, hands, held_on_tiles
-from orbiflow.tiles.search.tile_model import extract_tile
 from orbiflow.tiles.search.tile_space import Placements, TileSpace, best_placements
 from outlines import SMALL, animal, bent_squirrel, flowless, squirrel_hands
 from strategies import seeds

@@ -23,8 +23,8 @@ from orbiflow.tiles import (
     escherize_class,
     isohedral_class,
 )
+from orbiflow.tiles.flowing import overlap_search
 from orbiflow.tiles.likeness import mutual_iou
-from orbiflow.tiles.search import occupancy
 from orbiflow.tiles.search.likeness_search import FAST, SKETCH
 from outlines import animal, searched
 
@@ -93,7 +93,7 @@ def test_a_fit_that_runs_away_is_a_failure(force: bool) -> None:
 
 
 def test_a_class_whose_finalists_all_fold(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(occupancy, "fit_occupancy", crossed)
+    monkeypatch.setattr(overlap_search, "fit_occupancy", crossed)
     events: list[Event] = []
     results, failures = searched(TARGET, ["IH21"], QUICK, on_event=events.append)
     assert results == []

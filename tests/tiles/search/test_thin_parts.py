@@ -31,6 +31,7 @@ from orbiflow.tiles import (
     read_result,
     save_tiles,
 )
+from orbiflow.tiles.flowing.starts import template_starts
 from orbiflow.tiles.geometry import polygons_in, resampled
 from orbiflow.tiles.likeness import fidelity_to_original
 from orbiflow.tiles.search import Goal, SearchMethod, rounded_for, why_poor
@@ -38,7 +39,6 @@ from orbiflow.tiles.search.candidates import OnProgress, StillTiles
 from orbiflow.tiles.search.likeness_search import ROUNDED_OFF
 from orbiflow.tiles.search.search_method import Sketches
 from orbiflow.tiles.search.search_record import best_of
-from orbiflow.tiles.search.starts import template_starts
 from orbiflow.tiles.tilings import IsohedralClass
 
 HAIR = Target.from_polygon(

@@ -65,7 +65,7 @@ def write_tile_folder(
         normal = result.normal_tile
         # flows need torch, which the search for likeness does without
         from orbiflow.drawing import field_picture
-        from orbiflow.tiles.search import as_model, placed_field
+        from orbiflow.tiles.flowing import as_model, placed_field
 
         return field_picture(
             placed_field(as_model(result)), normal.group, normal, sheet=sheet

@@ -1,4 +1,4 @@
-"""The search for tiles: placements, co-deformation, the descent, the occupancy method."""
+"""The search for tiles: what all methods share, and the search for likeness."""
 
 from orbiflow.extras import door
 

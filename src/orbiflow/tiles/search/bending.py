@@ -37,7 +37,7 @@ from orbiflow.tiles.search.co_deformation import (
     held_on_tiles,
     shifted,
 )
-from orbiflow.tiles.search.starts import template_symmetries
+from orbiflow.tiles.search.tile_orbits import template_symmetries
 from orbiflow.tiles.search.tile_space import NearestTiles, Placements, TileSpace, best_placements
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass

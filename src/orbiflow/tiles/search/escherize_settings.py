@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import fields
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -28,6 +29,13 @@ if TYPE_CHECKING:
 LIKENESS = Group("Search for likeness")
 OVERLAP = Group("Search for overlap")
 OCCUPANCY = Group("Occupancy method")
+
+METHODS = {
+    "likeness": ("orbiflow.tiles.search", "LikenessSearch"),
+    "overlap": ("orbiflow.tiles.flowing", "OverlapSearch"),
+    "occupancy": ("orbiflow.tiles.flowing", "OccupancySearch"),
+}
+"""Where each search method is, by objective or method: only the one that is used is imported."""
 
 
 def class_names(text: str) -> tuple[str, ...]:
@@ -97,20 +105,12 @@ class SearchSettings(Settings, group="Search"):
     @property
     def search_method(self) -> SearchMethod:
         """The method that is asked for: with what is set here, and otherwise its own defaults."""
-        from orbiflow.tiles.search.likeness_search import LikenessSearch
-        from orbiflow.tiles.search.overlap_search import OccupancySearch, OverlapSearch
-
-        if self.method == "occupancy":
-            return OccupancySearch(**self._shared(OccupancySearch))
-        if self.objective == "overlap":
-            return OverlapSearch.for_effort(self.effort, **self._shared(OverlapSearch))
-        return LikenessSearch.for_effort(self.effort, **self._shared(LikenessSearch))
-
-    def _shared(self, kind: type[Any]) -> dict[str, Any]:
-        """The settings that a method has, too."""
-        names = {entry.name for entry in fields(kind)} & {entry.name for entry in fields(self)}
-        values = {name: getattr(self, name) for name in names - {"method"}}
-        return {name: value for name, value in values.items() if value is not None}
+        module, name = METHODS[self.objective if self.method == "descent" else self.method]
+        kind: Any = getattr(import_module(module), name)
+        shared = {entry.name for entry in fields(kind)} & {entry.name for entry in fields(self)}
+        values = {name: getattr(self, name) for name in shared - {"method"}}
+        given = {name: value for name, value in values.items() if value is not None}
+        return kind.for_effort(self.effort, **given) if kind.efforts else kind(**given)
 
 
 class EscherizeSettings(SearchSettings, group="Search"):

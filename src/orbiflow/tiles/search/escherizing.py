@@ -249,7 +249,6 @@ def _task(goal: Goal, method: SearchMethod, per_class: int = 1, force: bool = Fa
         as_instance(goal.pins, Pins, "pins", "Pins.read and Pins.at make one")
         if not method.takes_pins:
             raise OrbiflowError("pins belong to the search for likeness, where silhouettes bend")
-    method.load()
     return _Task(goal, method, per_class, force)
 
 
@@ -278,7 +277,7 @@ def _search(
 ) -> None:
     """Do the task for each class, here or in processes."""
     # asked before torch is limited here: a limit makes no fork safe
-    preload = ("orbiflow.tiles.search.escherizing", *task.method.modules)
+    preload = ("orbiflow.tiles.search.escherizing", type(task.method).__module__)
     context = process_context(preload) if workers > 1 else None
     if record.on_tile is None:
         with one_thread(), one_blas_thread():

@@ -6,19 +6,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from math import lcm
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import NEVER, Cancel
 from orbiflow.settings import Count, Range, Seed, Settings
 from orbiflow.tiles.likeness import least_neck
+from orbiflow.tiles.search.bending import fit_bending
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
+from orbiflow.tiles.search.co_deformation import Hand, hands
 from orbiflow.tiles.search.search_method import Goal, SearchMethod, Sketches
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass
-
-if TYPE_CHECKING:
-    from orbiflow.tiles.search.co_deformation import Hand
 
 Body = Literal["soft", "firm", "stiff", "rigid"]
 ALL_BODIES: tuple[Body, ...] = ("soft", "firm", "stiff")
@@ -94,7 +93,6 @@ class LikenessSearch(Settings, SearchMethod):
     objective: ClassVar[str] = "likeness"
     takes_pins: ClassVar[bool] = True
     takes_symmetric: ClassVar[bool] = True
-    modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.bending",)
     efforts: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "fast": FAST,
         "normal": {"below": 1},
@@ -119,15 +117,11 @@ class LikenessSearch(Settings, SearchMethod):
         self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
     ) -> Fit:
         """Let the silhouette bend into tiles of the class."""
-        from orbiflow.tiles.search.bending import fit_bending
-
         both = self.hands(goal, kind.divisor)
         return fit_bending(goal.target, kind, self, both, per_class, progress, cancel)
 
     def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:
         """Let the silhouette bend in haste."""
-        from orbiflow.tiles.search.bending import fit_bending
-
         quick = replace(self, below=0, **SKETCH)
         both = self.hands(goal, kind.divisor)
         return fit_bending(goal.target, kind, quick, both, 1, silent, cancel)
@@ -145,8 +139,6 @@ class LikenessSearch(Settings, SearchMethod):
 
     def hands(self, goal: Goal, divisor: int = 1) -> tuple[Hand, Hand]:
         """Return the silhouette and its mirror image, with a multiple of `divisor` points."""
-        from orbiflow.tiles.search.co_deformation import hands
-
         step = lcm(divisor, 6)
         return hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins, step=step)
 

@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any, ClassVar, Self
 
 from orbiflow.arguments import as_choice
@@ -23,9 +22,6 @@ PREFERRED = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")
 # Classes whose tiles have a symmetry of their own, by that symmetry. They were chosen by looking at the
 # tiles of all 18 with a mirror: in the others many edges must be straight.
 SYMMETRIC = {"D1": ("IH13", "IH12", "IH69"), "C2": ("IH8", "IH9")}
-
-MAX_FREQUENCY = 60  # largest Omega that a fit takes on; time and memory grow with its square
-MAX_SEGMENTS = 2000  # of a flow; the descent adds one a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +44,6 @@ class SearchMethod(ABC):
     - `takes_pins`: Whether it minds parts of the silhouette that must not bend.
     - `takes_symmetric`: Whether classes of symmetric tiles are searched, too, for a silhouette that is
       near to symmetric, unless classes are named.
-    - `modules`: What `fit` needs and nothing has imported yet.
     - `efforts`: What each level of effort changes, for `for_effort`.
     - `seed`: What a user changes for other tiles.
     """
@@ -57,7 +52,6 @@ class SearchMethod(ABC):
     method_name: ClassVar[str] = "descent"
     takes_pins: ClassVar[bool] = False
     takes_symmetric: ClassVar[bool] = False
-    modules: ClassVar[tuple[str, ...]] = ()
     efforts: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
     seed: int = 0
 
@@ -115,11 +109,6 @@ class SearchMethod(ABC):
         off, and that share.
         """
         return [(0.0, goal)]
-
-    def load(self) -> None:
-        """Import what `fit` needs, before worker processes start."""
-        for name in self.modules:
-            import_module(name)
 
     def prepare(self, goal: Goal) -> None:  # noqa: B027 - nothing to prepare
         """Compute what the fits of all classes share, so that forked processes find it done."""

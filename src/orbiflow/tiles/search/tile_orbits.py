@@ -6,14 +6,14 @@ Points are complex numbers x + iy throughout.
 from __future__ import annotations
 
 from functools import lru_cache
-from itertools import combinations_with_replacement
+from itertools import combinations_with_replacement, pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array, Integers
-from orbiflow.symmetry import Isometry, identity
+from orbiflow.symmetry import CrystallographicGroup, Isometry, Line, identity, reflection, rotation
 from orbiflow.tiles.tilings import EdgeClass, EdgeImage, IsohedralClass
 
 
@@ -172,3 +172,32 @@ class Orbits:
 
 def _flips(fold: EdgeImage) -> bool:
     return fold.isometry.determinant < 0
+
+
+@lru_cache(maxsize=16)
+def template_symmetries(isohedral_class: IsohedralClass) -> tuple[int, bool]:
+    """Return how many rotations of the template keep its group, and whether a mirror does.
+
+    Two starts that differ by such a map give the same tiles: with a mirror, mirrored targets need
+    none, for the mirror image of a tile of the class is one under another placement.
+    """
+    vertices = isohedral_class.template()
+    group = isohedral_class.group()
+    center = vertices.mean(axis=0)
+    order = max(n for n in (1, 2, 3, 6) if _keeps(rotation(center, n), vertices, group))
+    spokes = [*vertices, *((a + b) / 2 for a, b in pairwise(vertices))]
+    mirrored = any(
+        _keeps(reflection(Line(center, spoke - center)), vertices, group) for spoke in spokes
+    )
+    return order, mirrored
+
+
+def _keeps(isometry: Isometry, vertices: Array, group: CrystallographicGroup) -> bool:
+    distance = abs(isometry(vertices)[:, None] - vertices[None]).max(axis=-1)
+    if distance.min(axis=1).max() > 1e-9:
+        return False
+    integral = group.inverse_lattice @ isometry.linear @ group.lattice
+    undo = isometry.inverse()
+    return bool(abs(integral - integral.round()).max() < 1e-9) and all(
+        group.contains(isometry @ g @ undo) for g in group.cosets
+    )

@@ -379,16 +379,3 @@ def _unturn(factor: Complex, flips: NDArray[np.bool_], z: Complex) -> Complex:
     return np.where(
         flips[..., None], factor[..., None] * np.conj(z), np.conj(factor)[..., None] * z
     )
-
-
-CHUNK = 4000  # placements worked on at a time: bounds the memory at some hundred MB
-
-
-def nearest_tiles(kind: IsohedralClass, outline: Complex, placements: Placements) -> NearestTiles:
-    """Project an outline (n,), counter-clockwise, onto the tiles of a class for every placement."""
-    found: list[NearestTiles] = []
-    pieces = max(1, -(-len(placements.starts) // CHUNK))
-    for index in np.array_split(np.arange(len(placements.starts)), pieces):
-        space = TileSpace(kind, placements.take(index))
-        found.append(space.nearest(np.broadcast_to(outline, (space.count, len(outline)))))
-    return NearestTiles(*(np.concatenate(parts) for parts in zip(*found, strict=True)))

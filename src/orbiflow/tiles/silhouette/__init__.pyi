@@ -31,8 +31,6 @@ from .readers.svg_regions import paints as paints
 from .readers.svg_shapes import DrawnShape as DrawnShape
 from .readers.svg_values import lightness as lightness
 from .settings import ReadingSettings as ReadingSettings
-from .soft_target import SoftTarget as SoftTarget
-from .soft_target import signed_distance as signed_distance
 from .target import Covered as Covered
 from .target import Frame as Frame
 from .target import Target as Target

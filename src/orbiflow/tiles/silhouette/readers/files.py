@@ -11,6 +11,7 @@ from orbiflow.arguments import as_path
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.silhouette.outlines import is_thread, outer_outline, outer_ring, simplified
+from orbiflow.tiles.silhouette.readers.image_files import image_kind
 from orbiflow.tiles.silhouette.readers.pictures import read_image
 from orbiflow.tiles.silhouette.readers.point_lists import read_points
 from orbiflow.tiles.silhouette.readers.polygon_json import read_json, read_wkt
@@ -28,10 +29,6 @@ from orbiflow.tiles.silhouette.readers.svg_drawing import MAX_BYTES
 _HEAD_BYTES = 65536
 GAP = 0.03  # of the drawing's size: such gaps in an outline are closed
 MOST = 0.8  # of the lines' area
-_IMAGE_MAGIC = (
-    *(b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"BM"),
-    *(b"GIF87a", b"GIF89a", b"II*\0", b"MM\0*"),
-)
 GZIP = b"\x1f\x8b"
 _SAVE_SVG = "open it in the program that made it, or in Inkscape, and save it as SVG or PNG"
 _CONVERTIBLE = {
@@ -119,7 +116,7 @@ def _bridged(reading: Reading) -> Reading:
 
 
 def _kind(path: Source, head: bytes) -> str:
-    if head.startswith(_IMAGE_MAGIC) or (head[:4] == b"RIFF" and head[8:12] == b"WEBP"):
+    if image_kind(head):
         return "image"
     text = _text(head)
     if text is not None and not head.startswith(tuple(_CONVERTIBLE)):

@@ -4,7 +4,7 @@ import io
 import re
 import warnings
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,14 @@ FULL_SCALES = (255.0, 1023.0, 4095.0, 16383.0, 65535.0)  # of 8, 10, 12, 14 and 
 STRIP = 256  # rows of the shrunk image that are made at once
 MIN_COLOURS = 10  # of 255: a palette whose colours differ less shows nothing
 _STARTS = {
-    **{"PNG": b"\x89PNG", "JPEG": b"\xff\xd8", "WebP": b"RIFF", "GIF": b"GIF", "BMP": b"BM"},
-    **{"TIFF": b"II*\0", "big-endian TIFF": b"MM\0*"},
+    **{
+        b"\x89PNG\r\n\x1a\n": "PNG",
+        b"\xff\xd8\xff": "JPEG",
+        b"BM": "BMP",
+        b"GIF87a": "GIF",
+        b"GIF89a": "GIF",
+    },
+    **{b"II*\0": "TIFF", b"MM\0*": "big-endian TIFF"},
 }
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
 # What Pillow raises on a damaged file depends on the format.
@@ -34,8 +40,25 @@ _DAMAGED = (
 _PNG_SCALES = {
     "L;2": 85,
     "L;4": 17,
-}  # Pillow scales these levels to 255, but not the transparent one
+}  # by which Pillow scales these levels, but not the transparent one
+# by EXIF orientation
+_TURNS = {
+    2: Image.Transpose.FLIP_LEFT_RIGHT,
+    3: Image.Transpose.ROTATE_180,
+    4: Image.Transpose.FLIP_TOP_BOTTOM,
+    5: Image.Transpose.TRANSPOSE,
+    6: Image.Transpose.ROTATE_270,
+    7: Image.Transpose.TRANSVERSE,
+    8: Image.Transpose.ROTATE_90,
+}
 Numbers = NDArray[np.integer[Any]]
+
+
+def image_kind(head: bytes) -> str:
+    """Return the kind of an image by its first 12 bytes, such as "PNG"; "" for anything else."""
+    if head[:4] == b"RIFF" and head[8:12] == b"WEBP":
+        return "WebP"
+    return next((kind for start, kind in _STARTS.items() if head.startswith(start)), "")
 
 
 @dataclass(frozen=True)
@@ -62,7 +85,7 @@ class DecodedImage:
 def open_image(path: Source, *, enough: int | None = None) -> tuple[Image.Image, list[str]]:
     """Return the picture of `decoded_image`, 8 bits deep, and its notes."""
     found = decoded_image(path, enough=enough)
-    return eight_bits(found.image), list(found.notes)
+    return _eight_bits(found.image), list(found.notes)
 
 
 def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
@@ -93,8 +116,9 @@ def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
     except UnidentifiedImageError as exc:
         raise InputFileError(f"{path}: {_unidentified(path)}") from exc
     except _DAMAGED as exc:
+        kind = image_kind(read_head(path, 12))
         raise InputFileError(
-            f"{path}: the {_named(path)} is damaged or cut short ({exc}); export or download it again"
+            f"{path}: the {kind} image is damaged or cut short ({exc}); export or download it again"
         ) from exc
 
 
@@ -103,22 +127,15 @@ def _stream(path: Source) -> io.BytesIO:
     return io.BytesIO(read_bytes(path, MAX_BYTES))
 
 
-def _named(path: Source) -> str:
-    """Return the kind of an image by its first bytes, such as "PNG image"."""
-    head = read_head(path, 12)
-    kinds = (k for k, starts in _STARTS.items() if head.startswith(starts))
-    return f"{next(kinds, '')} image".strip()
-
-
 def _unidentified(path: Source) -> str:
-    if "TIFF" in _named(path):
+    kind = image_kind(read_head(path, 12))
+    if "TIFF" in kind:
         return (
             "this kind of TIFF image (such as colours of floating-point numbers) is not read, or it is "
             "damaged; save it as PNG"
         )
-    return (
-        f"the {_named(path)} is damaged or cut short, or it is none; give a PNG, JPEG or WebP image"
-    )
+    named = f"{kind} image".strip()
+    return f"the {named} is damaged or cut short, or it is none; give a PNG, JPEG or WebP image"
 
 
 def check_size(path: Source, size: tuple[int, int], most: int = MAX_PIXELS_READ) -> None:
@@ -171,7 +188,9 @@ def _frame(path: Source, file: Any, enough: int | None, notes: list[str]) -> Dec
     check_size(path, file.size)
     width, height = size = file.size
     stored = str(file.tile[0][3]) if file.format == "PNG" and file.tile else ""
-    shrunk = _shrinking(width, height, is_jpeg)
+    shrunk = 1  # of a JPEG, which is decoded to a half, quarter or eighth, a power of two
+    while -(-width // shrunk) * -(-height // shrunk) > MAX_PIXELS:
+        shrunk += shrunk if is_jpeg else 1
     if shrunk > 1:
         megapixels = f"{width * height / 1e6:.0f} megapixels"
         notes.append(f"shrank the image of {megapixels}: {shrunk} x {shrunk} pixels became one")
@@ -179,163 +198,119 @@ def _frame(path: Source, file: Any, enough: int | None, notes: list[str]) -> Dec
         least = enough if enough is not None and shrunk == 1 else min(size) // shrunk
         file.draft("RGB", (least, least))
     orientation = file.getexif().get(0x0112, 1)
-    is_turned = orientation not in (0, 1)
-    if is_turned:
+    if orientation not in (0, 1):
         notes.append("turned the image as its EXIF orientation asks")
         # Pillow itself turns TIFFs, their size included
         size = (height, width) if orientation >= 5 and file.format != "TIFF" else size
-    raw = _Raw.of(path, file, stored)
+    raw = _loaded(path, file, stored)
     turn = None if file.format == "TIFF" else _TURNS.get(orientation)
+    levels = _levels(path, raw.image, notes) if raw.image.mode.startswith(("I", "F")) else None
+    factor = max(1, round(shrunk * file.width / width))
+    raw = raw if turn is None or factor > 1 else raw.turned(turn)
+    image = raw.shown(levels) if factor == 1 else _shrunk(raw, factor, levels)
+    if factor > 1 and turn is not None:
+        image = image.transpose(turn)
     if shrunk > 1:
-        image = _shrunk(path, raw, max(1, round(shrunk * file.width / width)), notes)
-        image = image if turn is None else image.transpose(turn)
         return DecodedImage(image, size, shrunk, None, tuple(notes))
-    raw = raw if turn is None else raw.turned(turn)
-    image = raw.normal(_scale(path, raw, notes))
-    palette = _palette(raw, image)
+    palette = None
+    if raw.image.mode == "P" and image.mode == "RGB":  # without transparent colours
+        palette = np.array(raw.image.getpalette() or [0, 0, 0], dtype=np.int64).reshape(-1, 3)
     are_labels = palette is not None and is_of_labels(palette)
     return DecodedImage(image, size, 1, _numbers(raw, image, palette), tuple(notes), are_labels)
 
 
-def _shrinking(width: int, height: int, is_jpeg: bool) -> int:
-    """Return how many pixels become one each way; JPEGs are decoded to halves, quarters or eighths."""
-    shrunk = 1
-    while -(-width // shrunk) * -(-height // shrunk) > MAX_PIXELS:
-        shrunk += shrunk if is_jpeg else 1
-    return shrunk
-
-
-@dataclass(frozen=True)
-class _Raw:
-    """What Pillow decodes, of any mode, and what it leaves to be done.
-
-    - `low`: Of colours of 16 bits, their lower bytes, where they decide what is transparent.
-    - `key`: The level or the colour, as in the pixels, that is transparent; None if none or many are.
-    """
+class _Raw(NamedTuple):
+    """What Pillow decodes, of any mode; and of a transparent level or colour where it is not, 255."""
 
     image: Image.Image
-    low: Image.Image | None = None
-    key: int | tuple[int, ...] | None = None
-
-    @classmethod
-    def of(cls, path: Source, file: Any, stored: str) -> "_Raw":
-        """Load the frame that an open file stands at; a PNG has pixels as `stored`, such as "L;2"."""
-        file.load()
-        key: Any = file.info.get("transparency")
-        if file.mode == "RGB" and isinstance(key, tuple):
-            if stored == "RGB;16B" and getattr(file, "n_frames", 1) > 1:
-                return cls(file, None, tuple(int(level) >> 8 for level in cast(Any, key)))
-            if stored != "RGB;16B":
-                return cls(file, None, tuple(int(level) & 255 for level in cast(Any, key)))
-            with Image.open(_stream(path), formats=_FORMATS) as again:
-                again.tile = [again.tile[0]._replace(args="RGB;16L")]  # the other byte of each
-                again.load()
-            return cls(file, again, tuple(map(int, cast(Any, key))))
-        if file.mode in ("L", "I;16", "I;16B") and isinstance(key, int):
-            bits = 16 if file.mode != "L" else int(stored.partition(";")[2] or 8)
-            return cls(file, None, (key & (2**bits - 1)) * _PNG_SCALES.get(stored, 1))
-        return cls(file)
+    opaque: Image.Image | None = None
 
     def turned(self, turn: Image.Transpose) -> "_Raw":
         """Return it turned or mirrored."""
-        low = None if self.low is None else self.low.transpose(turn)
-        return _Raw(self.image.transpose(turn), low, self.key)
+        return _Raw(self.image.transpose(turn), self.opaque and self.opaque.transpose(turn))
 
     def rows(self, top: int, bottom: int) -> "_Raw":
         """Return some of the rows."""
         box = (0, top, self.image.width, bottom)
-        low = None if self.low is None else self.low.crop(box)
-        return _Raw(self.image.crop(box), low, self.key)
+        return _Raw(self.image.crop(box), self.opaque and self.opaque.crop(box))
 
-    def normal(self, full_scale: "FullScale | None") -> Image.Image:
-        """Return the image as `DecodedImage` has it."""
+    def shown(self, levels: tuple[float, float] | None) -> Image.Image:
+        """Return the image as `DecodedImage` has it, given the levels of its black and white."""
         image = self.image
-        if full_scale is not None:
-            found = full_scale.applied(image)
-            if self.key is None:
-                return found
-            image = eight_bits(found)
-        elif self.key is None:
+        if levels is not None:
+            black, white = levels
+            values = np.asarray(image, dtype=np.float32) - np.float32(black)
+            image = Image.fromarray(values / np.float32(white - black))
+            if self.opaque is None:
+                return image
+            image = _eight_bits(image)
+        elif self.opaque is None:
             if image.has_transparency_data:
                 return image.convert("RGBA")
             return image.convert("L" if image.mode in ("1", "L") else "RGB")
-        values = np.asarray(self.image)
-        if self.low is not None:
-            values = values.astype(np.uint16) * 256 + np.asarray(self.low)
-        differs = values != np.asarray(self.key)
-        opaque = differs if differs.ndim == 2 else differs.any(axis=2)
         image = image.convert("RGB")
-        image.putalpha(Image.fromarray(np.where(opaque, 255, 0).astype(np.uint8)))
+        image.putalpha(self.opaque)
         return image
 
 
-# by EXIF orientation
-_TURNS = {
-    2: Image.Transpose.FLIP_LEFT_RIGHT,
-    3: Image.Transpose.ROTATE_180,
-    4: Image.Transpose.FLIP_TOP_BOTTOM,
-    5: Image.Transpose.TRANSPOSE,
-    6: Image.Transpose.ROTATE_270,
-    7: Image.Transpose.TRANSVERSE,
-    8: Image.Transpose.ROTATE_90,
-}
+def _loaded(path: Source, file: Any, stored: str) -> _Raw:
+    """Load the frame that an open file stands at; a PNG has pixels as `stored`, such as "L;2"."""
+    file.load()
+    key: Any = file.info.get("transparency")
+    values = np.asarray(file)
+    if file.mode == "RGB" and isinstance(key, tuple):
+        own = np.array(cast(Any, key), dtype=int)
+        if stored != "RGB;16B":
+            own &= 255
+        elif getattr(file, "n_frames", 1) > 1:
+            own >>= 8
+        else:
+            with Image.open(_stream(path), formats=_FORMATS) as again:
+                again.tile = [again.tile[0]._replace(args="RGB;16L")]  # the other byte of each
+                again.load()
+                values = values.astype(np.uint16) * 256 + np.asarray(again)
+        opaque = (values != own).any(axis=2)
+    elif file.mode in ("L", "I;16", "I;16B") and isinstance(key, int):
+        bits = 16 if file.mode != "L" else int(stored.partition(";")[2] or 8)
+        opaque = values != (key & (2**bits - 1)) * _PNG_SCALES.get(stored, 1)
+    else:
+        return _Raw(file)
+    return _Raw(file, Image.fromarray(np.where(opaque, 255, 0).astype(np.uint8)))
 
 
-@dataclass(frozen=True)
-class FullScale:
-    """The levels of black and white in an image of more than 8 bits."""
+def _levels(path: Source, image: Image.Image, notes: list[str]) -> tuple[float, float]:
+    """Return the levels of black and white in an image of more than 8 bits.
 
-    black: float
-    white: float
-
-    @classmethod
-    def of(cls, path: Source, image: Image.Image) -> tuple["FullScale", list[str]]:
-        """Return the least of `FULL_SCALES` for whole numbers, with a note if it is not of 16 bits.
-
-        Of other numbers none is known: the image's own range stands in for it.
-        """
-        values = np.asarray(image)
-        low, high = float(values.min()), float(values.max())
-        if not np.isfinite([low, high]).all():
-            raise InputFileError(
-                f"{path}: holds pixels that are not finite numbers; export it as PNG"
-            )
-        if image.mode == "F" or low < 0 or high > FULL_SCALES[-1]:
-            return cls(low, max(high, low + float(np.finfo(np.float32).tiny))), []
-        white = next(scale for scale in FULL_SCALES if high <= scale)
-        note = f"took {white:.0f} for white: the levels, of 16 bits or more, go up to {high:.0f}"
-        return cls(0.0, white), [note] * (DARKEST < high <= FULL_SCALES[-2])
-
-    def applied(self, image: Image.Image) -> Image.Image:
-        """Return the image as mode "F", 0 to 1."""
-        values = np.asarray(image, dtype=np.float32) - np.float32(self.black)
-        return Image.fromarray(values / np.float32(self.white - self.black))
+    White is the least of `FULL_SCALES` for whole numbers, with a note if that is not of 16 bits. Of
+    other numbers none is known: the image's own range stands in for it.
+    """
+    values = np.asarray(image)
+    low, high = float(values.min()), float(values.max())
+    if not np.isfinite([low, high]).all():
+        raise InputFileError(f"{path}: holds pixels that are not finite numbers; export it as PNG")
+    if image.mode == "F" or low < 0 or high > FULL_SCALES[-1]:
+        return low, max(high, low + float(np.finfo(np.float32).tiny))
+    white = next(scale for scale in FULL_SCALES if high <= scale)
+    if DARKEST < high <= FULL_SCALES[-2]:
+        notes.append(
+            f"took {white:.0f} for white: the levels, of 16 bits or more, go up to {high:.0f}"
+        )
+    return 0.0, white
 
 
-def eight_bits(image: Image.Image) -> Image.Image:
+def _eight_bits(image: Image.Image) -> Image.Image:
     """Return an image of mode "F", 0 to 1, as "L", and any other as it is."""
     if image.mode != "F":
         return image
     return Image.fromarray((np.asarray(image) * 255 + 0.5).astype(np.uint8))
 
 
-def _scale(path: Source, raw: _Raw, notes: list[str]) -> FullScale | None:
-    if not raw.image.mode.startswith(("I", "F")):
-        return None
-    found, more = FullScale.of(path, raw.image)
-    notes += more
-    return found
-
-
-def _shrunk(path: Source, raw: _Raw, factor: int, notes: list[str]) -> Image.Image:
+def _shrunk(raw: _Raw, factor: int, levels: tuple[float, float] | None) -> Image.Image:
     """Return the image with `factor` x `factor` pixels averaged into one, by strips: it is large."""
-    scale = _scale(path, raw, notes)
-    if factor == 1:
-        return raw.normal(scale)
     width, height = raw.image.size
     strips: list[tuple[int, Image.Image]] = []
     for top in range(0, height, STRIP * factor):
-        strip = raw.rows(top, min(top + STRIP * factor, height)).normal(scale)
+        strip = raw.rows(top, min(top + STRIP * factor, height)).shown(levels)
         strips.append((top // factor, strip.reduce(factor)))
     whole = Image.new(strips[0][1].mode, (-(-width // factor), -(-height // factor)))
     for top, strip in strips:
@@ -343,25 +318,19 @@ def _shrunk(path: Source, raw: _Raw, factor: int, notes: list[str]) -> Image.Ima
     return whole
 
 
-def _palette(raw: _Raw, normal: Image.Image) -> NDArray[np.int64] | None:
-    """Return the colours (N, 3) of a palette without transparent ones, or None."""
-    if raw.image.mode != "P" or normal.mode != "RGB":
-        return None
-    return np.array(raw.image.getpalette() or [0, 0, 0], dtype=np.int64).reshape(-1, 3)
-
-
-def _numbers(raw: _Raw, normal: Image.Image, palette: NDArray[np.int64] | None) -> Numbers | None:
+def _numbers(raw: _Raw, shown: Image.Image, palette: NDArray[np.int64] | None) -> Numbers | None:
     """Return the numbers of the pixels that may be labels: see `DecodedImage`."""
-    mode = raw.image.mode
-    if mode == "F" and raw.key is None:  # as ImageJ saves labels
-        values = np.asarray(raw.image)
-        is_whole = (
+    mode, values = raw.image.mode, np.asarray(raw.image)
+    if raw.opaque is not None:
+        return None
+    if mode == "F":  # as ImageJ saves labels
+        is_label = (
             np.isfinite(values).all() and abs(values).max() <= 65535 and not (values % 1).any()
         )
-        return values.astype(np.int32) if is_whole else None
+        return values.astype(np.int32) if is_label else None
     is_grey = mode == "L" or mode.startswith("I")
     if palette is not None:
-        extrema: Any = normal.getextrema()
+        extrema: Any = shown.getextrema()
         is_grey = all(high - low < MIN_COLOURS for low, high in extrema)
-        is_grey |= is_of_labels(palette) or may_be_labels(np.asarray(raw.image), palette)
-    return np.asarray(raw.image) if is_grey and raw.key is None else None
+        is_grey |= is_of_labels(palette) or may_be_labels(values, palette)
+    return values if is_grey else None

@@ -19,8 +19,7 @@ from orbiflow.tiles.silhouette.readers.frames import CARD_NOTE, without_card, wi
 from orbiflow.tiles.silhouette.readers.image_files import MAX_PIXELS, check_size, decoded_image
 from orbiflow.tiles.silhouette.readers.label_masks import label_mask
 from orbiflow.tiles.silhouette.readers.outline_drawings import outline_drawing
-from orbiflow.tiles.silhouette.readers.photographs import is_photograph, shape_in
-from orbiflow.tiles.silhouette.readers.pixels import threshold_of
+from orbiflow.tiles.silhouette.readers.photographs import is_photograph, shape_in, threshold_of
 from orbiflow.tiles.silhouette.readers.reading import FileContent, Reading, Source
 from orbiflow.tiles.silhouette.readers.tracing import Level, trace
 

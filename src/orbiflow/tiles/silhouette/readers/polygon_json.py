@@ -1,41 +1,31 @@
-"""Polygons in JSON, GeoJSON and WKT, with y up unless the file says otherwise."""
+"""Polygons in JSON, GeoJSON, annotations of COCO and labelme, and WKT."""
 
 import json
 import re
-from dataclasses import replace
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
-import numpy as np
 import shapely
 from shapely import Polygon
-from shapely.geometry.base import BaseGeometry
 
-from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 from orbiflow.runtime import is_list, is_object
-from orbiflow.tiles.silhouette.outlines import clean_ring
-from orbiflow.tiles.silhouette.readers.globe import at_date_line, may_be_joined, on_map, stretched
-from orbiflow.tiles.silhouette.readers.json_points import (
-    POLYGON_KEYS,
-    Annotation,
-    annotations,
-    check_pairs,
-    is_finite,
-    largest_annotation,
-    rings_of,
-)
 from orbiflow.tiles.silhouette.readers.reading import Reading, Source, quoted, read_bytes
-from orbiflow.tiles.silhouette.readers.ring_parts import largest_of
+from orbiflow.tiles.silhouette.readers.rings import read_rings
 
 MAX_BYTES = 16 * 2**20
-MAX_POLYGONS = 10_000
+MAX_RINGS = 10_000
+MAX_NESTED = 2  # lists of rings in one another, as of a MultiPolygon
+POLYGON_KEYS = ("polygon", "tile", "outline", "points", "vertices")
+"""What a list of vertices stands under; of several, the first is taken."""
+
 UP = 'took y to point up; if it points down, write {"outline": [...], "y_down": true}'
 _KEYS = ", ".join(f'"{key}"' for key in POLYGON_KEYS)
+_AXES = frozenset(("x", "y"))
 _CURVES = re.compile(r"CURVE|CIRCULARSTRING|MULTISURFACE", re.IGNORECASE)
-_OTHERS = {
-    "Topology": "is TopoJSON, which is not read; convert it to GeoJSON (mapshaper.org does)",
-    "esri": 'is JSON of Esri ("rings"), which is not read; export GeoJSON',
-}
+_TOPOJSON = "is TopoJSON, which is not read; convert it to GeoJSON (mapshaper.org does)"
+_ESRI = 'is JSON of Esri ("rings"), which is not read; export GeoJSON'
+_BELOW = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
 
 
 def read_json(path: Source) -> Reading:
@@ -46,70 +36,23 @@ def read_json(path: Source) -> Reading:
     GeoJSON; annotations of COCO and labelme, with y down. Of several polygons the largest is kept.
     """
     content = _content(path)
-    if is_object(content) and not any(key in content for key in POLYGON_KEYS):
-        if (found := annotations(path, content)) is not None:
-            return _annotated(path, *found)
-        if "type" in content and not content.keys() >= {"x", "y"}:
+    if is_object(content) and not content.keys() & {*POLYGON_KEYS}:
+        for key, annotated in (("annotations", _coco), ("shapes", _labelme)):
+            if is_list(marked := content.get(key)):
+                return _annotated(path, len(marked), list(annotated(content, marked)))
+        if "type" in content and not content.keys() >= _AXES:
             return _geojson(path, content)
     points, y_down, notes = _find_polygon(path, content)
-    way = [UP] if y_down is None else []
-    rings = rings_of(path, points)
-    found = _of_rings(path, rings, bool(y_down))
-    return replace(found, notes=(*notes, *found.notes, *way))
+    found = _read_pairs(path, _rings(path, points), bool(y_down), notes)
+    return found if y_down is not None else found.with_notes(UP)
 
 
-def _annotated(path: Source, found: list[Annotation], notes: list[str]) -> Reading:
-    for annotation in found:
-        for ring in annotation.rings:
-            check_pairs(path, ring)
-    best, more = largest_annotation(found)
-    reading = _of_rings(path, best.rings, True)
-    return replace(reading, notes=(*more, *notes, *reading.notes))
-
-
-def _of_rings(path: Source, rings: list[list[Any]], y_down: bool) -> Reading:
+def _read_pairs(path: Source, rings: list[Any], y_down: bool, notes: list[str]) -> Reading:
     """Return the largest of rings whose numbers nobody calls degrees."""
-    cleaned: list[Array] = []
-    notes: list[str] = []
-    for points in rings:
-        check_pairs(path, points)
-        if is_finite(points):
-            notes += may_be_joined(np.array(points, dtype=float).reshape(-1, 2))
-        outline, dropped = clean_ring(points, str(path), InputFileError)
-        cleaned.append(outline)
-        notes += dropped
-    if len(cleaned) == 1:
-        return Reading(cleaned[0], y_down, "json", None, tuple(notes))
-    outline, more, seen = largest_of(cleaned)
-    notes = [f"took the largest part of {len(cleaned)} rings of points", *notes, *more]
-    return Reading(outline, y_down, "json", None, tuple(dict.fromkeys(notes)), seen=seen)
-
-
-def read_wkt(path: Source) -> Reading:
-    """Read the largest polygon of a text such as POLYGON ((0 0, 1 0, 0 1)), with y up."""
-    text = read_bytes(path, MAX_BYTES).decode("utf-8-sig", errors="replace").strip()
-    if _CURVES.search(text):
-        raise InputFileError(
-            f"{path}: WKT of curved geometry, which is not read; convert it to a POLYGON of straight "
-            "sides (ST_CurveToLine does)"
-        )
-    try:
-        found = shapely.from_wkt(
-            text.partition(";")[2] if text.upper().startswith("SRID") else text
-        )
-    except shapely.errors.GEOSException as exc:
-        raise InputFileError(f"{path}: not valid WKT ({exc})") from exc
-    parts = shapely.get_parts([found])
-    if polygons := [part for part in parts if isinstance(part, Polygon) and not part.is_empty]:
-        rings = [[shapely.get_coordinates(ring).tolist() for ring in _rings(p)] for p in polygons]
-        return _reading(
-            path, rings, [], on_globe=bool(re.match(r"SRID=4326\s*;", text, re.IGNORECASE))
-        )
-    raise InputFileError(f"{path}: WKT of type {found.geom_type}; save a POLYGON or MULTIPOLYGON")
-
-
-def _rings(polygon: Polygon) -> list[BaseGeometry]:
-    return [polygon.exterior, *polygon.interiors]
+    for ring in rings:
+        _check_pairs(path, ring)
+    several = [f"took the largest part of {len(rings)} rings of points"] * (len(rings) > 1)
+    return read_rings(path, rings, "json", y_down=y_down, notes=[*notes, *several])
 
 
 def _content(path: Source) -> object:
@@ -135,11 +78,11 @@ def _find_polygon(path: Source, content: object) -> tuple[Any, bool | None, list
     y_down = content.get("y_down")
     if "y_down" in content and not isinstance(y_down, bool):
         raise InputFileError(f'{path}: "y_down" must be true or false')
-    if not keys and content.keys() >= {"x", "y"}:
+    if not keys and content.keys() >= _AXES:
         return content, y_down, []
     if not keys:
         if content.keys() & {"rings", "geometryType"} or is_object(content.get("geometry")):
-            raise InputFileError(f"{path}: {_OTHERS['esri']}")
+            raise InputFileError(f"{path}: {_ESRI}")
         found = ", ".join(quoted(str(key)) for key in list(content)[:8]) or "nothing"
         raise InputFileError(
             f"{path}: none of {_KEYS} is in it (it has {found}); put the list of vertices under one "
@@ -152,9 +95,97 @@ def _find_polygon(path: Source, content: object) -> tuple[Any, bool | None, list
     return points, y_down, notes
 
 
+def _rings(path: Source, value: Any, depth: int = MAX_NESTED) -> list[Any]:
+    """Return the rings in a value: of pairs, of objects with x and y, of two lists, or of rings."""
+    if is_object(value) and value.keys() >= _AXES:
+        xs, ys = value["x"], value["y"]
+        if not is_list(xs) or not is_list(ys) or len(xs) != len(ys):
+            raise InputFileError(f'{path}: "x" and "y" must be lists of numbers, as many in each')
+        return [[list(pair) for pair in zip(xs, ys, strict=True)]]
+    if not is_list(value) or not value:
+        return [value]
+    first: object = value[0]
+    if is_object(first) and first.keys() >= _AXES:
+        return [[[p["x"], p["y"]] if is_object(p) and p.keys() >= _AXES else p for p in value]]
+    nested = is_list(first) and first and (is_list(first[0]) or is_object(first[0]))
+    if not depth or not nested:
+        return [value]
+    found = [ring for part in value for ring in _rings(path, part, depth - 1)]
+    if len(found) > MAX_RINGS:
+        raise InputFileError(f"{path}: over {MAX_RINGS} rings; save the one that you mean")
+    return found
+
+
+def _check_pairs(path: Source, points: Any) -> None:
+    """Raise `InputFileError` for a list that is not one of pairs of numbers."""
+    if not is_list(points):
+        raise InputFileError(f"{path}: {quoted(json.dumps(points))} is no list of pairs [x, y]")
+    for i, pair in enumerate(points):
+        if not is_list(pair) or len(pair) != 2 or not all(type(n) in (int, float) for n in pair):
+            raise InputFileError(
+                f"{path}: vertex {i} (counted from 0) is {quoted(json.dumps(pair))}, not a pair of "
+                "numbers [x, y]"
+            )
+
+
+class _Annotation(NamedTuple):
+    """One object that was outlined in a picture, as rings of pairs, and its name."""
+
+    rings: list[Any]
+    name: str
+
+
+def _coco(content: dict[str, Any], marked: list[Any]) -> Iterator[_Annotation]:
+    listed = content.get("categories")
+    known = [kind for kind in listed if is_object(kind)] if is_list(listed) else []
+    names = {json.dumps(kind.get("id")): str(kind.get("name")) for kind in known}
+    for one in marked:
+        flat = one.get("segmentation") if is_object(one) else None
+        parts = flat if is_list(flat) else []
+        parts = [parts] if parts and not is_list(parts[0]) else parts
+        rings = [
+            # pairs, or x, y, x, y and so on; what is left over stands alone, to be refused
+            part if is_list(part[0]) else [part[i : i + 2] for i in range(0, len(part), 2)]
+            for part in parts
+            if is_list(part) and len(part) >= 6
+        ]
+        yield _Annotation(rings, names.get(json.dumps(one.get("category_id")), "") if rings else "")
+
+
+def _labelme(_content: dict[str, Any], marked: list[Any]) -> Iterator[_Annotation]:
+    for one in marked:
+        points = one.get("points") if is_object(one) else None
+        is_polygon = is_object(one) and one.get("shape_type") in (None, "polygon")
+        rings = [points] if is_polygon and is_list(points) and len(points) > 2 else []
+        yield _Annotation(rings, str(one.get("label") or "") if rings else "")
+
+
+def _annotated(path: Source, count: int, every: list[_Annotation]) -> Reading:
+    """Return the object whose outline encloses most."""
+    found = [annotation for annotation in every if annotation.rings]
+    if not found:
+        raise InputFileError(
+            f"{path}: none of its {count} annotations is a polygon (they may be masks, boxes, circles, "
+            "lines or points); give the mask as PNG, or outline the shape by a polygon"
+        )
+    for ring in (ring for annotation in found for ring in annotation.rings):
+        _check_pairs(path, ring)
+    best = max(found, key=lambda annotation: sum(map(_area, annotation.rings)))
+    left, name = count - len(found), f", {quoted(best.name)}" if best.name else ""
+    notes = [f"took the largest of {len(found)} annotated objects{name}"] * (len(found) > 1)
+    notes += [f"left {left} annotation{'s' * (left > 1)} that are no polygons unread"] * (left > 0)
+    return _read_pairs(path, best.rings, True, notes)
+
+
+def _area(ring: list[Any]) -> float:
+    """Return the area of a ring, 0 for what has none or is too large to be computed."""
+    is_finite = all(abs(n) < 1e300 for pair in ring for n in pair)
+    return float(Polygon(ring).area) if len(ring) > 2 and is_finite else 0.0
+
+
 def _geojson(path: Source, content: dict[str, Any]) -> Reading:
-    if content["type"] in _OTHERS:
-        raise InputFileError(f"{path}: {_OTHERS[content['type']]}")
+    if content["type"] == "Topology":
+        raise InputFileError(f"{path}: {_TOPOJSON}")
     polygons, others = _polygons(path, content)
     if not polygons:
         kinds = ", ".join(quoted(kind) for kind in dict.fromkeys(others)) or "nothing"
@@ -163,16 +194,15 @@ def _geojson(path: Source, content: dict[str, Any]) -> Reading:
             "save a Polygon or MultiPolygon, or a Feature with one"
         )
     notes = [f"left {', '.join(sorted({*others}))} unread"] if others else []
-    rings: list[list[list[Any]]] = []
     for polygon in polygons:
         if not is_list(polygon) or not polygon or not all(is_list(ring) for ring in polygon):
             raise InputFileError(f'{path}: the GeoJSON Polygon has no ring under "coordinates"')
-        if any(is_list(at) and len(at) > 2 for ring in polygon for at in ring):
-            notes = [note for note in notes if "altitudes" not in note] + [
-                "left the altitudes unread"
-            ]
-        rings.append([[at[:2] if is_list(at) else at for at in ring] for ring in polygon])
-    return _reading(path, rings, notes, on_globe=True)
+    places = (at for polygon in polygons for ring in polygon for at in ring if is_list(at))
+    notes += ["left the altitudes unread"] * any(len(at) > 2 for at in places)
+    flat = [
+        [[at[:2] if is_list(at) else at for at in ring] for ring in polygon] for polygon in polygons
+    ]
+    return _read_polygons(path, flat, notes, degrees=True)
 
 
 def _polygons(path: Source, content: dict[str, Any]) -> tuple[list[Any], list[str]]:
@@ -186,12 +216,10 @@ def _polygons(path: Source, content: dict[str, Any]) -> tuple[list[Any], list[st
         if not is_object(found) or not isinstance(kind, str):
             others.append("nothing" if found is None else "what is no geometry")
             continue
-        below = {"FeatureCollection": "features", "GeometryCollection": "geometries"}.get(kind)
-        coordinates = found.get("coordinates")
+        coordinates, inner = found.get("coordinates"), found.get(_BELOW.get(kind, ""))
         if kind == "Feature":
             waiting.append(found.get("geometry"))
-        elif below is not None:
-            inner = found.get(below)
+        elif kind in _BELOW:
             waiting += inner if is_list(inner) else [None]
         elif kind == "Polygon":
             polygons.append(coordinates)
@@ -201,50 +229,48 @@ def _polygons(path: Source, content: dict[str, Any]) -> tuple[list[Any], list[st
             polygons.append([coordinates])
         else:
             others.append(kind)
-        if len(polygons) + len(others) > MAX_POLYGONS:
-            raise InputFileError(
-                f"{path}: over {MAX_POLYGONS} geometries; save the one that you mean"
-            )
+        if len(polygons) + len(others) > MAX_RINGS:
+            raise InputFileError(f"{path}: over {MAX_RINGS} geometries; save the one that you mean")
     return polygons, others
 
 
-def _reading(
-    path: Source, polygons: list[list[list[Any]]], notes: list[str], *, on_globe: bool = False
-) -> Reading:
-    """Return the largest of polygons, given by their rings, of which the first is the outer one."""
-    rings: list[Array] = []
-    for first, *others in polygons:
-        outer, *holes = _outer_first(path, [first, *others])
-        if outer is not first:
-            notes = [*notes, "took the ring around the others for the outer one"]
-        if holes and len(polygons) == 1:
-            notes = [f"filled {len(holes)} hole{'s' * (len(holes) > 1)}", *notes]
-        points = np.array(outer, dtype=float) if is_finite(outer) else outer
-        if isinstance(points, np.ndarray):
-            points, more = on_map(path, points) if on_globe else (points, may_be_joined(points))
-            notes += [note for note in more if note not in notes]
-        ring, dropped = clean_ring(points, str(path), InputFileError)
-        rings.append(ring)
-        notes += dropped
-    if len(rings) == 1:
-        more = stretched(rings[0]) if on_globe else ()
-        return Reading(rings[0], False, "json", None, (*notes, *more))
-    rings, joined = at_date_line(rings) if on_globe else (rings, [])
-    ring, more, seen = largest_of(rings)
-    notes = [*notes, *joined, *more, *(stretched(ring) if on_globe else ())]
-    return Reading(ring, False, "json", None, tuple(notes), seen=seen)
-
-
-def _outer_first(path: Source, rings: list[list[Any]]) -> list[list[Any]]:
-    """Return the rings of a polygon, the outer one first: none has a larger box."""
-    check_pairs(path, rings[0])
-    if len(rings) == 1:
-        return rings
-    for ring in rings[1:]:
-        check_pairs(path, ring)
-    sizes = [
-        float(np.ptp(np.array(r, float), axis=0).prod()) if r and is_finite(r) else 0.0
-        for r in rings
+def read_wkt(path: Source) -> Reading:
+    """Read the largest polygon of a text such as POLYGON ((0 0, 1 0, 0 1)), with y up."""
+    text = read_bytes(path, MAX_BYTES).decode("utf-8-sig", errors="replace").strip()
+    if _CURVES.search(text):
+        raise InputFileError(
+            f"{path}: WKT of curved geometry, which is not read; convert it to a POLYGON of straight "
+            "sides (ST_CurveToLine does)"
+        )
+    srid = re.match(r"SRID=(\d+)\s*;", text, re.IGNORECASE)
+    try:
+        found = shapely.from_wkt(text[srid.end() :] if srid else text)
+    except shapely.errors.GEOSException as exc:
+        raise InputFileError(f"{path}: not valid WKT ({exc})") from exc
+    parts = shapely.get_parts([found])
+    polygons = [
+        [shapely.get_coordinates(ring).tolist() for ring in (part.exterior, *part.interiors)]
+        for part in parts
+        if isinstance(part, Polygon) and not part.is_empty
     ]
-    outer = int(np.argmax(sizes))
-    return [rings[outer], *rings[:outer], *rings[outer + 1 :]]
+    if not polygons:
+        raise InputFileError(
+            f"{path}: WKT of type {found.geom_type}; save a POLYGON or MULTIPOLYGON"
+        )
+    return _read_polygons(path, polygons, [], degrees=srid is not None and srid[1] == "4326")
+
+
+def _read_polygons(
+    path: Source, polygons: list[list[Any]], notes: list[str], *, degrees: bool
+) -> Reading:
+    """Return the largest of polygons, given by their rings, of which none is larger than the outer."""
+    outer: list[Any] = []
+    for rings in polygons:
+        for ring in rings:
+            _check_pairs(path, ring)
+        outer.append(max(rings, key=_area))
+        if outer[-1] is not rings[0]:
+            notes = [*notes, "took the ring around the others for the outer one"]
+    holes = len(polygons[0]) - 1 if len(polygons) == 1 else 0
+    filled = [f"filled {holes} hole{'s' * (holes > 1)}"] * (holes > 0)
+    return read_rings(path, outer, "json", degrees=degrees or None, notes=[*filled, *notes])

@@ -4,8 +4,9 @@ import gzip
 import io
 import stat
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
+from typing import Self
 
 from shapely.geometry.base import BaseGeometry
 
@@ -55,6 +56,10 @@ class Reading:
     notes: tuple[str, ...] = ()
     corner: tuple[float, float] = (0.0, 0.0)
     seen: BaseGeometry | None = None
+
+    def with_notes(self, *more: str) -> Self:
+        """Return the same with more notes."""
+        return replace(self, notes=(*self.notes, *more))
 
 
 def check_file(path: Source) -> int:

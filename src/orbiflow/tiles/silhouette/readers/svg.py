@@ -23,7 +23,6 @@ from orbiflow.tiles.silhouette.outlines import (
 from orbiflow.tiles.silhouette.readers.frames import CARD, CARD_NOTE, CARD_SIDES, LEAST_DRAWN
 from orbiflow.tiles.silhouette.readers.reading import Reading, Source
 from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
-from orbiflow.tiles.silhouette.readers.svg_frames import without_axes, without_grid
 from orbiflow.tiles.silhouette.readers.svg_overlays import (
     NOTEWORTHY,
     PAPER,
@@ -31,6 +30,8 @@ from orbiflow.tiles.silhouette.readers.svg_overlays import (
     alike,
     overlay,
     solid,
+    without_axes,
+    without_grid,
 )
 from orbiflow.tiles.silhouette.readers.svg_paths import MAX_POINTS, TooManyPoints, TooTangled
 from orbiflow.tiles.silhouette.readers.svg_regions import FAINT, Layer, Regions

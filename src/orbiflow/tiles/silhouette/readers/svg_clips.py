@@ -10,6 +10,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from orbiflow.arrays import Window
+from orbiflow.tiles.silhouette.readers.svg_css import Style
 from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
 from orbiflow.tiles.silhouette.readers.svg_shapes import (
     SHAPES,
@@ -21,7 +22,6 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
     shape_paths,
     unit_box_matrix,
 )
-from orbiflow.tiles.silhouette.readers.svg_style import Style
 from orbiflow.tiles.silhouette.readers.svg_transforms import origin_of, shift
 from orbiflow.tiles.silhouette.readers.svg_values import as_number, length
 from orbiflow.tiles.silhouette.readers.svg_xml import reference

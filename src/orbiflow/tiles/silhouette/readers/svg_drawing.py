@@ -11,6 +11,7 @@ from orbiflow.arrays import Array, Window
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.reading import Source, read_bytes
 from orbiflow.tiles.silhouette.readers.svg_clips import Clips, window_clip
+from orbiflow.tiles.silhouette.readers.svg_css import Style, Styles
 from orbiflow.tiles.silhouette.readers.svg_markers import Markers
 from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
 from orbiflow.tiles.silhouette.readers.svg_shapes import (
@@ -24,7 +25,6 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
     view_box,
     view_matrix,
 )
-from orbiflow.tiles.silhouette.readers.svg_style import Style, Styles
 from orbiflow.tiles.silhouette.readers.svg_transforms import (
     MAX_TRANSFORM,
     NotATransform,

@@ -8,24 +8,14 @@ from orbiflow.tiles.silhouette.readers.svg_values import NUMBER, colour_of, quan
 
 WIDE = {"inherit", "initial", "unset", "revert", "revert-layer"}  # values of every property
 MAX_VALUE = 20_000  # characters
-_LENGTHS = {"", "px", "pt", "pc", "in", "cm", "mm", "q", "em", "ex", "ch", "rem", "%"}
 REFERENCE = re.compile(r"""url\(\s*(?:"([^"]*)"|'([^']*)'|([^"')]*))\s*\)""", re.IGNORECASE)
 _PATH = re.compile(r"""path\(\s*(?:(?:nonzero|evenodd)\s*,\s*)?(["'])(.*)\1\s*\)""", re.DOTALL)
 _ICC = re.compile(r"\s*icc-color\([^)]*\)\s*$", re.IGNORECASE)
 _FUNCTION = re.compile(r"[a-z-]+\(.*\)", re.DOTALL | re.IGNORECASE)
-_WORDS = re.compile(r"[a-z][a-z0-9 -]*", re.IGNORECASE)
-_NUMBER = re.compile(rf"{NUMBER}%?", re.IGNORECASE)
-
-Check = Callable[[str, bool], str | None]
-"""Returns the value that a text stands for, or None if it is not valid; given whether it is of CSS."""
-
-
-def _keyword(*allowed: str) -> Check:
-    return lambda text, _: lower if (lower := text.lower()) in allowed else None
-
-
-def _words(text: str, _: bool) -> str | None:
-    return text.lower() if _WORDS.fullmatch(text) else None
+_UNIT = "(?:px|pt|pc|in|cm|mm|q|em|ex|ch|rem|%)"
+_LENGTH = f"{NUMBER}{_UNIT}?"
+_WIDTH = f"(?!-){_LENGTH}"
+_SHARE, _WORDS, _ANYTHING = f"{NUMBER}%?", "[a-z][a-z0-9 -]*", "(?s:.*)"
 
 
 def _paint(text: str, css: bool) -> str | None:
@@ -44,37 +34,21 @@ def _colour(text: str, _: bool) -> str | None:
     return text if colour_of(text) else None
 
 
-def _share(text: str, _: bool) -> str | None:
-    return text if _NUMBER.fullmatch(text) else None
-
-
 def _miter_limit(text: str, _: bool) -> str | None:
     found = quantity(text)
     return text if found and not found[1] and found[0] >= 1 else None
 
 
-def _length(text: str, _: bool) -> str | None:
-    found = quantity(text)
-    return text if found and found[1] in _LENGTHS else None
-
-
-def _width(text: str, css: bool) -> str | None:
-    return None if text.startswith("-") else _length(text, css)
-
-
-def _dashes(text: str, css: bool) -> str | None:
+def _dashes(text: str, _: bool) -> str | None:
     words = text.replace(",", " ").split()
-    if text.lower() == "none" or (words and all(_width(word, css) for word in words)):
-        return " ".join(words)
-    return None
+    are_widths = words and all(re.fullmatch(_WIDTH, word, re.IGNORECASE) for word in words)
+    return " ".join(words) if are_widths or text.lower() == "none" else None
 
 
 def _geometry(text: str, css: bool) -> str | None:
     """A length of a shape, which needs a unit in CSS; an attribute is checked where it is used."""
-    found = quantity(text)
-    if not css or (text.lower() == "auto"):
-        return text
-    return text if found and found[1] in _LENGTHS and (found[1] or not found[0]) else None
+    with_unit = re.fullmatch(f"auto|{NUMBER}{_UNIT}|[-+]?0*[.]?0+", text, re.IGNORECASE)
+    return text if with_unit or not css else None
 
 
 def _path_data(text: str, css: bool) -> str | None:
@@ -95,40 +69,33 @@ def _transform(text: str, css: bool) -> str | None:
     return text if text.lower() == "none" or can_transform(text, css=css) else None
 
 
-def _any(text: str, _: bool) -> str:
-    return text
-
-
-_CHECKS: dict[str, Check] = {
+_CHECKS: dict[str, str | Callable[[str, bool], str | None]] = {
     **dict.fromkeys(("fill", "stroke"), _paint),
-    **dict.fromkeys(("color", "stop-color"), _colour),
-    **dict.fromkeys(("opacity", "fill-opacity", "stroke-opacity", "stop-opacity"), _share),
-    **dict.fromkeys(("fill-rule", "clip-rule"), _keyword("nonzero", "evenodd")),
-    "stroke-width": _width,
-    "stroke-dashoffset": _length,
+    **dict.fromkeys(("color", "stop-color", "background-color"), _colour),
+    **dict.fromkeys(("opacity", "fill-opacity", "stroke-opacity", "stop-opacity"), _SHARE),
+    **dict.fromkeys(("fill-rule", "clip-rule"), "nonzero|evenodd"),
+    "stroke-width": _WIDTH,
+    "stroke-dashoffset": _LENGTH,
     "stroke-dasharray": _dashes,
     "stroke-miterlimit": _miter_limit,
-    "stroke-linecap": _keyword("butt", "round", "square"),
-    "stroke-linejoin": _keyword("miter", "round", "bevel", "miter-clip", "arcs"),
-    "visibility": _keyword("visible", "hidden", "collapse"),
-    "overflow": _words,
-    "display": _words,
-    "paint-order": _words,
-    "vector-effect": _words,
-    "color-interpolation": _words,
-    "mask-type": _keyword("luminance", "alpha"),
-    "mix-blend-mode": _words,
-    "transform-box": _keyword("view-box", "fill-box", "stroke-box", "content-box", "border-box"),
+    "stroke-linecap": "butt|round|square",
+    "stroke-linejoin": "miter|round|bevel|miter-clip|arcs",
+    "visibility": "visible|hidden|collapse",
+    **dict.fromkeys(("overflow", "display", "paint-order", "vector-effect"), _WORDS),
+    **dict.fromkeys(("color-interpolation", "mix-blend-mode"), _WORDS),
+    "mask-type": "luminance|alpha",
+    "transform-box": "view-box|fill-box|stroke-box|content-box|border-box",
     **dict.fromkeys(("x", "y", "cx", "cy", "r", "rx", "ry", "width", "height"), _geometry),
     "d": _path_data,
     **dict.fromkeys(("clip-path", "mask", "filter"), _reference),
     **dict.fromkeys(("marker-start", "marker-mid", "marker-end"), _reference),
     "transform": _transform,
-    **dict.fromkeys(("transform-origin", "translate", "rotate", "scale"), _any),
-    **dict.fromkeys(("offset-path", "animation", "animation-name", "mask-image"), _any),
-    "font-size": _any,
-    "background-color": _colour,
+    **dict.fromkeys(("transform-origin", "translate", "rotate", "scale", "font-size"), _ANYTHING),
+    **dict.fromkeys(("offset-path", "animation", "animation-name", "mask-image"), _ANYTHING),
 }
+"""What the value of each property must be: a pattern for the whole text, in any case; or a function
+that returns the value, or None for what is not valid, given whether it is of CSS."""
+
 INHERITED = frozenset(
     {
         *("fill", "fill-rule", "fill-opacity", "clip-rule", "color", "visibility", "paint-order"),
@@ -161,7 +128,13 @@ def checked(name: str, text: str, *, css: bool = True) -> str | None:
         return None
     if text.lower() in WIDE:
         return text.lower()
-    return text if css and "var(" in text.lower() else _CHECKS[name](text, css)
+    if css and "var(" in text.lower():
+        return text
+    check = _CHECKS[name]
+    if not isinstance(check, str):
+        return check(text, css)
+    found = re.fullmatch(check, text, re.IGNORECASE)
+    return found and (text if check is _ANYTHING else text.lower())
 
 
 def longhands(name: str, text: str) -> list[tuple[str, str]]:

@@ -11,8 +11,8 @@ import svgelements
 
 from orbiflow.arrays import Array, Window
 from orbiflow.tiles.silhouette.outlines import MAX_COORDINATE
+from orbiflow.tiles.silhouette.readers.svg_css import Style
 from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, sub_paths
-from orbiflow.tiles.silhouette.readers.svg_style import Style
 from orbiflow.tiles.silhouette.readers.svg_transforms import shift
 from orbiflow.tiles.silhouette.readers.svg_values import (
     FONT_SIZE,

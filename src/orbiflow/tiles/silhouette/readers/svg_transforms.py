@@ -2,11 +2,12 @@
 
 import re
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from orbiflow.arrays import Array
-from orbiflow.tiles.silhouette.readers.svg_values import NUMBER, angle, length, quantity
+from orbiflow.tiles.silhouette.readers.svg_values import FONT_UNITS, NUMBER, angle, length, quantity
 
 MAX_TRANSFORM = 2000  # characters
 _CALL = re.compile(r"\s*,?\s*([a-zA-Z0-9]+)\s*\(([^()]*)\)")
@@ -17,7 +18,6 @@ _ATTRIBUTE = re.compile(
 )
 _KEYWORDS = {"left": "0%", "top": "0%", "center": "50%", "right": "100%", "bottom": "100%"}
 _Size = tuple[float, float]  # what percentages refer to
-_Make = Callable[[list[str], _Size, bool], Array]
 
 
 class NotATransform(ValueError):
@@ -29,15 +29,18 @@ def transform_matrix(text: str, size: _Size, *, css: bool = False) -> Array:
 
     Percentages are those of `size`. With `css` units are needed, as in a style. Raises `NotATransform`.
     """
-    matrix, end = np.eye(3), 0
-    if len(text) > MAX_TRANSFORM:
+    if len(text) > MAX_TRANSFORM or _CALL.sub("", text).strip(" \t\r\n,"):
         raise NotATransform(text[:60])
-    while text[end:].strip(" \t\r\n,"):
-        found = _CALL.match(text, end)
-        if found is None:
+    matrix = np.eye(3)
+    for name, arguments in _CALL.findall(text):
+        if _ARGUMENT.sub("", arguments).strip():
             raise NotATransform(text)
-        end = found.end()
-        matrix = matrix @ _call(found[1].lower(), _arguments(found[2]), size, css)
+        words: list[str] = _ARGUMENT.findall(arguments)
+        kinds, counts, make = _RULES.get(name.lower(), ("", (), shift))
+        if len(words) not in counts or (css and kinds == "axy" and len(words) == 3):
+            raise NotATransform(name)
+        values = (_value(kind, word, size, css) for kind, word in zip(kinds, words, strict=False))
+        matrix = matrix @ make(*values)
     return matrix
 
 
@@ -67,117 +70,65 @@ def origin_of(text: str, size: _Size) -> _Size:
 
 def single_transforms(translate: str, rotate: str, scale: str, size: _Size) -> Array:
     """Return the matrix of the properties `translate`, `rotate` and `scale` of CSS; "none" is none."""
-    calls = ""
-    if translate != "none":
-        calls += f"translate({','.join(translate.split()[:2])})"
-    if rotate != "none":
-        calls += f"rotate({rotate})"
-    if scale != "none":
-        calls += f"scale({','.join(scale.split()[:2])})"
-    return transform_matrix(calls, size, css=True)
+    calls = {"translate": translate.split()[:2], "rotate": [rotate], "scale": scale.split()[:2]}
+    given = {name: ",".join(words) for name, words in calls.items() if words != ["none"]}
+    return transform_matrix(
+        "".join(f"{name}({text})" for name, text in given.items()), size, css=True
+    )
 
 
-def shift(x: float, y: float) -> Array:
+def shift(x: float, y: float = 0.0) -> Array:
     """Return the matrix that moves by (x, y)."""
     return np.array([[1.0, 0.0, x], [0.0, 1.0, y], [0.0, 0.0, 1.0]])
 
 
-def _arguments(text: str) -> list[str]:
-    found, end = list[str](), 0
-    while text[end:].strip():
-        match = _ARGUMENT.match(text, end)
-        if match is None:
-            raise NotATransform(text)
-        found.append(match[1])
-        end = match.end()
-    return found
-
-
-def _call(name: str, words: list[str], size: _Size, css: bool) -> Array:
-    """Return the matrix of one transform."""
-    rule = _RULES.get(name)
-    if rule is None or len(words) not in rule[1]:
-        raise NotATransform(name)
-    return rule[0](words, size, css)
-
-
-def _plain(word: str) -> float:
-    """A number without a unit; scales may be percentages."""
+def _value(kind: str, word: str, size: _Size, css: bool) -> float:
+    """Return an argument: a plain number or a share "n", an angle "a", or a length along "x" or "y"."""
     found = quantity(word)
-    if found is None or found[1] not in ("", "%"):
-        raise NotATransform(word)
-    return found[0] / 100 if found[1] else found[0]
-
-
-def _long(word: str, relative: float, css: bool) -> float:
-    value, found = length(word, relative), quantity(word)
-    if found and found[1] in ("em", "ex", "ch", "rem"):
-        return 0.0  # checked before the size of the font is known
-    if value is None or found is None or (css and not found[1] and found[0]):
-        raise NotATransform(word)
-    return value
-
-
-def _turn(word: str, css: bool) -> float:
-    value, found = angle(word), quantity(word)
-    if value is None or found is None or (css and not found[1] and found[0]):
+    number, unit = found or (0.0, "")
+    if kind == "n":
+        value = {"": number, "%": number / 100}.get(unit)
+    elif kind == "a":
+        value = angle(word)
+    else:
+        # in sizes of the font: checked before that is known
+        value = 0.0 if unit in FONT_UNITS else length(word, size[kind == "y"])
+    if found is None or value is None or (css and kind != "n" and not unit and number):
         raise NotATransform(word)
     return value
 
 
-def _matrix(words: list[str], size: _Size, css: bool) -> Array:  # noqa: ARG001
-    a, b, c, d, e, f = map(_plain, words)
+def _matrix(a: float, b: float, c: float, d: float, e: float, f: float) -> Array:
     return np.array([[a, c, e], [b, d, f], [0.0, 0.0, 1.0]])
 
 
-def _translate(words: list[str], size: _Size, css: bool) -> Array:
-    x, y = (_long(word, own, css) for word, own in zip([*words, "0"][:2], size, strict=True))
-    return shift(x, y)
+def _scaled(x: float, y: float | None = None) -> Array:
+    return np.diag([x, x if y is None else y, 1.0])
 
 
-def _scale(words: list[str], size: _Size, css: bool) -> Array:  # noqa: ARG001
-    x, y = map(_plain, (words * 2)[:2])
-    return np.diag([x, y, 1.0])
-
-
-def _rotate(words: list[str], size: _Size, css: bool) -> Array:
-    if css and len(words) == 3:
-        raise NotATransform("rotate")
-    turn = _turn(words[0], css)
+def _rotated(turn: float, x: float = 0.0, y: float = 0.0) -> Array:
     cos, sin = np.cos(turn), np.sin(turn)
     around = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    x, y = (
-        _long(word, own, css) for word, own in zip((words[1:] + ["0"] * 2)[:2], size, strict=True)
-    )
     return shift(x, y) @ around @ shift(-x, -y)
 
 
-def _skew(words: list[str], size: _Size, css: bool) -> Array:  # noqa: ARG001
-    x, y = (np.tan(_turn(word, css)) for word in [*words, "0"][:2])
-    return np.array([[1.0, x, 0.0], [y, 1.0, 0.0], [0.0, 0.0, 1.0]])
+def _skewed(x: float, y: float = 0.0) -> Array:
+    return np.array([[1.0, np.tan(x), 0.0], [np.tan(y), 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _along(make: _Make, first: bool, other: str) -> _Make:
-    """Return the rule of a transform along one axis, the `first` or second, such as `translateX`."""
-
-    def one(words: list[str], size: _Size, css: bool) -> Array:
-        return make([words[0], other] if first else [other, words[0]], size, css)
-
-    return one
-
-
-_RULES: dict[str, tuple[_Make, tuple[int, ...]]] = {  # and how many arguments there may be
-    "matrix": (_matrix, (6,)),
-    "translate": (_translate, (1, 2)),
-    "translatex": (_along(_translate, True, "0"), (1,)),
-    "translatey": (_along(_translate, False, "0"), (1,)),
-    "translate3d": (_translate, (3,)),
-    "scale": (_scale, (1, 2)),
-    "scalex": (_along(_scale, True, "1"), (1,)),
-    "scaley": (_along(_scale, False, "1"), (1,)),
-    "rotate": (_rotate, (1, 3)),
-    "rotatez": (_rotate, (1,)),
-    "skew": (_skew, (1, 2)),
-    "skewx": (_along(_skew, True, "0"), (1,)),
-    "skewy": (_along(_skew, False, "0"), (1,)),
+_RULES: dict[str, tuple[str, tuple[int, ...], Callable[..., Array]]] = {
+    "matrix": ("nnnnnn", (6,), _matrix),
+    "translate": ("xy", (1, 2), shift),
+    "translatex": ("x", (1,), shift),
+    "translatey": ("y", (1,), partial(shift, 0.0)),
+    "translate3d": ("xy", (3,), shift),
+    "scale": ("nn", (1, 2), _scaled),
+    "scalex": ("n", (1,), partial(_scaled, y=1.0)),
+    "scaley": ("n", (1,), partial(_scaled, 1.0)),
+    "rotate": ("axy", (1, 3), _rotated),
+    "rotatez": ("a", (1,), _rotated),
+    "skew": ("aa", (1, 2), _skewed),
+    "skewx": ("a", (1,), _skewed),
+    "skewy": ("a", (1,), partial(_skewed, 0.0)),
 }
+"""The kinds of each transform's arguments, how many it may have, and what makes its matrix of them."""

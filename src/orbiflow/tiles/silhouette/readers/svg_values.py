@@ -19,7 +19,7 @@ _PIXELS = {
     **{"cm": 96 / 2.54, "mm": 96 / 25.4, "q": 96 / 101.6},
 }
 _TURNS = {"": 1 / 360, "deg": 1 / 360, "grad": 1 / 400, "rad": 1 / math.tau, "turn": 1.0}
-_FONT_UNITS = {"em": 1.0, "ex": 0.5, "ch": 0.5, "rem": 1.0}  # sizes of the font
+FONT_UNITS = {"em": 1.0, "ex": 0.5, "ch": 0.5, "rem": 1.0}  # sizes of the font
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
 _QUANTITY = re.compile(rf"\s*({NUMBER})\s?([a-z]*|%)\s*", re.IGNORECASE)
 _IN_FONTS = re.compile(rf"(?<![\w.#-])({NUMBER})(em|ex|ch|rem)(?![\w-])", re.IGNORECASE)
@@ -89,7 +89,7 @@ def without_font_units(text: str, em: float, rem: float) -> str:
 
     def user_units(found: re.Match[str]) -> str:
         unit = found[2].lower()
-        value = float(found[1]) * _FONT_UNITS[unit] * (rem if unit == "rem" else em)
+        value = float(found[1]) * FONT_UNITS[unit] * (rem if unit == "rem" else em)
         return f"{value!r}px"
 
     return _IN_FONTS.sub(user_units, text)

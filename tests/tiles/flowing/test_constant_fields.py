@@ -18,7 +18,7 @@ from orbiflow.tiles import (
     escherize_class,
     load_model,
 )
-from orbiflow.tiles.search.tile_model import extract_tile
+from orbiflow.tiles.flowing.tile_model import extract_tile
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 TARGET = Target.from_polygon(BOOT)

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.tiles import CLASSES, TileModel, certify, subdivided
-from orbiflow.tiles.search.starts import template_starts
-from orbiflow.tiles.search.tile_model import extract_tile
+from orbiflow.tiles.flowing.starts import template_starts
+from orbiflow.tiles.flowing.tile_model import extract_tile
 from strategies import random_tensor, seeds
 
 CASTS = {

@@ -8,8 +8,9 @@ import torch
 
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles import CLASSES, TileModel
-from orbiflow.tiles.search.starts import initial_poses, template_symmetries
-from orbiflow.tiles.search.tile_model import extract_tile
+from orbiflow.tiles.flowing.starts import initial_poses
+from orbiflow.tiles.flowing.tile_model import extract_tile
+from orbiflow.tiles.search import template_symmetries
 
 # class: order of the rotations, whether there is a reflection
 SYMMETRIES = {

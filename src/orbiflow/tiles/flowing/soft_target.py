@@ -11,8 +11,7 @@ from torch import Tensor
 
 from orbiflow.arguments import as_instance, as_number, as_whole
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.silhouette.emphasis import Emphasis
-from orbiflow.tiles.silhouette.target import Target
+from orbiflow.tiles.silhouette import Emphasis, Target
 
 MARGIN = 0.5  # around the target's bounding box, in square roots of its area
 PIECES_PER_SIDE = 8  # the number of pieces of each side of a ring in integrals along it

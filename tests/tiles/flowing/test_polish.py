@@ -18,8 +18,8 @@ from orbiflow.tiles import (
     isohedral_class,
     trainable,
 )
-from orbiflow.tiles.search.descent import polish
-from orbiflow.tiles.search.tile_model import extract_tile
+from orbiflow.tiles.flowing.descent import polish
+from orbiflow.tiles.flowing.tile_model import extract_tile
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 TARGET = Target.from_polygon(BOOT)

@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
 from orbiflow.tiles import CLASSES, Target, Tile, TileModel, certify, resampled, subdivided
+from orbiflow.tiles.flowing.starts import nearest_tiles, outline_starts, template_starts
+from orbiflow.tiles.search import template_symmetries
 from orbiflow.tiles.search.candidates import Prototiles
-from orbiflow.tiles.search.starts import outline_starts, template_starts, template_symmetries
 from orbiflow.tiles.search.tile_space import (
     Placements,
     _compositions,
     _count,
     best_placements,
     edge_lengths,
-    nearest_tiles,
 )
 
 BOOT = np.array([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]])

@@ -16,17 +16,17 @@ from torch import Tensor
 
 from orbiflow.arguments import as_instance, as_whole
 from orbiflow.runtime import NEVER, Cancel
-from orbiflow.tiles.search.candidates import OnProgress, silent
-from orbiflow.tiles.search.descent import between
-from orbiflow.tiles.search.search_method import SearchMethod
-from orbiflow.tiles.search.starts import initial_poses, template_symmetries
-from orbiflow.tiles.search.tile_model import TileModel
-from orbiflow.tiles.silhouette import Target, signed_distance
+from orbiflow.tiles.flowing.descent import between
+from orbiflow.tiles.flowing.soft_target import signed_distance
+from orbiflow.tiles.flowing.starts import initial_poses
+from orbiflow.tiles.flowing.tile_model import TileModel
+from orbiflow.tiles.search import OnProgress, SearchMethod, silent, template_symmetries
+from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 from orbiflow.typed_torch import adam, linalg, listed
 
 if TYPE_CHECKING:
-    from orbiflow.tiles.search.overlap_search import OccupancySearch
+    from orbiflow.tiles.flowing.overlap_search import OccupancySearch
 
 # Factor of the squared displacement of a pentagon's free vertex: keeps the template simple
 SHAPE_PENALTY = 0.02

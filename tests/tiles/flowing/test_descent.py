@@ -25,12 +25,12 @@ from orbiflow.tiles import (
     isohedral_class,
     trainable,
 )
+from orbiflow.tiles.flowing.descent import CALM, Descent
+from orbiflow.tiles.flowing.starts import template_starts
+from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.likeness import boundary_iou
 from orbiflow.tiles.search.candidates import silent
-from orbiflow.tiles.search.descent import CALM, Descent
 from orbiflow.tiles.search.search_method import Goal
-from orbiflow.tiles.search.starts import template_starts
-from orbiflow.tiles.search.tile_model import extract_tile
 from outlines import searched
 
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]

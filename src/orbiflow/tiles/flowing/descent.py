@@ -26,17 +26,17 @@ from orbiflow.arrays import Array
 from orbiflow.fields import FourierField, group_factor, steepness
 from orbiflow.flows import METHODS, Flow
 from orbiflow.runtime import NEVER, Cancel, one_thread
+from orbiflow.tiles.flowing.soft_target import SoftTarget
+from orbiflow.tiles.flowing.starts import Starts, outline_starts, template_starts
+from orbiflow.tiles.flowing.tile_model import TileModel
 from orbiflow.tiles.likeness import Overlap, Recogniser, boundary_iou, prepared_region, rank_score
-from orbiflow.tiles.search.candidates import Fit, OnProgress, Prototiles, silent
-from orbiflow.tiles.search.search_method import SearchMethod
-from orbiflow.tiles.search.starts import Starts, outline_starts, template_starts
-from orbiflow.tiles.search.tile_model import TileModel
-from orbiflow.tiles.silhouette import Emphasis, SoftTarget, Target
+from orbiflow.tiles.search import Fit, OnProgress, Prototiles, SearchMethod, silent
+from orbiflow.tiles.silhouette import Emphasis, Target
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 from orbiflow.typed_torch import linalg
 
 if TYPE_CHECKING:
-    from orbiflow.tiles.search.overlap_search import OverlapSearch
+    from orbiflow.tiles.flowing.overlap_search import OverlapSearch
 
 CALM = 0.4  # step length times the field's steepness, at most; less where `calm` finds it too bold
 

@@ -22,9 +22,9 @@ from orbiflow.tiles import (
     fit_occupancy,
     occupancy_loss,
 )
+from orbiflow.tiles.flowing.occupancy import _distinct
+from orbiflow.tiles.flowing.tile_model import MAX_FREQUENCY
 from orbiflow.tiles.search.finished_tiles import best_tiles
-from orbiflow.tiles.search.occupancy import _distinct
-from orbiflow.tiles.search.search_method import MAX_FREQUENCY
 from strategies import seeds
 
 SQUIRREL = Path(__file__).parents[3] / "examples" / "silhouettes" / "squirrel.dat"

@@ -6,7 +6,6 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -17,43 +16,19 @@ from orbiflow.arguments import as_instance, as_whole
 from orbiflow.arrays import Array, Complex
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import NEVER, Cancel
-from orbiflow.symmetry import (
-    CrystallographicGroup,
-    Isometry,
-    Line,
-    reflection,
-    rotation,
-    rotation_matrix,
-)
+from orbiflow.symmetry import rotation_matrix
 from orbiflow.tiles.geometry import plane_points, resampled, reverse, subdivided
 from orbiflow.tiles.likeness import boundary_iou, prepared_region
-from orbiflow.tiles.search.candidates import Prototiles
-from orbiflow.tiles.search.tile_space import (
+from orbiflow.tiles.search import (
     NearestTiles,
     Placements,
+    Prototiles,
+    TileSpace,
     best_placements,
-    nearest_tiles,
+    template_symmetries,
 )
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
-
-
-@lru_cache(maxsize=16)
-def template_symmetries(isohedral_class: IsohedralClass) -> tuple[int, bool]:
-    """Return how many rotations of the template keep its group, and whether a mirror does.
-
-    Two starts that differ by such a map give the same tiles: with a mirror, mirrored targets need
-    none, for the mirror image of a tile of the class is one under another placement.
-    """
-    vertices = isohedral_class.template()
-    group = isohedral_class.group()
-    center = vertices.mean(axis=0)
-    order = max(n for n in (1, 2, 3, 6) if _keeps(rotation(center, n), vertices, group))
-    spokes = [*vertices, *((a + b) / 2 for a, b in itertools.pairwise(vertices))]
-    mirrored = any(
-        _keeps(reflection(Line(center, spoke - center)), vertices, group) for spoke in spokes
-    )
-    return order, mirrored
 
 
 def initial_poses(isohedral_class: IsohedralClass, turns: int) -> tuple[Array, NDArray[np.bool_]]:
@@ -63,17 +38,6 @@ def initial_poses(isohedral_class: IsohedralClass, turns: int) -> tuple[Array, N
     if symmetric:
         return angles, np.zeros(turns, dtype=np.bool_)
     return np.tile(angles, 2), np.arange(2 * turns) >= turns
-
-
-def _keeps(isometry: Isometry, vertices: Array, group: CrystallographicGroup) -> bool:
-    distance = abs(isometry(vertices)[:, None] - vertices[None]).max(axis=-1)
-    if distance.min(axis=1).max() > 1e-9:
-        return False
-    integral = group.inverse_lattice @ isometry.linear @ group.lattice
-    undo = isometry.inverse()
-    return bool(abs(integral - integral.round()).max() < 1e-9) and all(
-        group.contains(isometry @ g @ undo) for g in group.cosets
-    )
 
 
 # Starts differ by this share of the outline in where some corner sits, or they are twins
@@ -216,3 +180,16 @@ def _apart(scores: Array, places: Array, mirrored: NDArray[np.bool_], count: int
         if len(chosen) == count:
             break
     return chosen
+
+
+CHUNK = 4000  # placements worked on at a time: bounds the memory at some hundred MB
+
+
+def nearest_tiles(kind: IsohedralClass, outline: Complex, placements: Placements) -> NearestTiles:
+    """Project an outline (n,), counter-clockwise, onto the tiles of a class for every placement."""
+    found: list[NearestTiles] = []
+    pieces = max(1, -(-len(placements.starts) // CHUNK))
+    for index in np.array_split(np.arange(len(placements.starts)), pieces):
+        space = TileSpace(kind, placements.take(index))
+        found.append(space.nearest(np.broadcast_to(outline, (space.count, len(outline)))))
+    return NearestTiles(*(np.concatenate(parts) for parts in zip(*found, strict=True)))

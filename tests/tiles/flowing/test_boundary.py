@@ -8,9 +8,9 @@ import torch
 
 from orbiflow.errors import CertificationError
 from orbiflow.tiles import CLASSES, TileModel, certify, subdivided
-from orbiflow.tiles.search import tile_model
+from orbiflow.tiles.flowing import tile_model
+from orbiflow.tiles.flowing.tile_model import converge, extract_tile
 from orbiflow.tiles.search.candidates import DENSE, TOLERANCES
-from orbiflow.tiles.search.tile_model import converge, extract_tile
 from strategies import error_estimate
 
 

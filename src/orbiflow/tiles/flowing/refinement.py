@@ -19,7 +19,7 @@ from orbiflow.runtime import NEVER, Cancel, one_blas_thread, one_thread
 from orbiflow.tiles.geometry import signed_area
 from orbiflow.tiles.likeness import narrowest_neck
 from orbiflow.tiles.result_file import as_tile
-from orbiflow.tiles.search.tile_variations import MAX_POINTS, TileVariations, divided_tile
+from orbiflow.tiles.search import MAX_POINTS, TileVariations, divided_tile
 from orbiflow.tiles.tile import EscherTile, TileSource
 from orbiflow.tiles.tilings import certify
 

@@ -8,10 +8,14 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from orbiflow.arguments import refusal
 from orbiflow.errors import CertificationError
+from orbiflow.flows import method
 from orbiflow.runtime import NEVER, Cancel, one_thread
 from orbiflow.settings import Count, Range, Seed, Settings
-from orbiflow.tiles.search.candidates import Fit, OnProgress, StillTiles
-from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS, Goal, SearchMethod
+from orbiflow.tiles.flowing.descent import fit_descent, shared_soft_target
+from orbiflow.tiles.flowing.occupancy import fit_occupancy
+from orbiflow.tiles.flowing.starts import initial_poses, outline_starts
+from orbiflow.tiles.flowing.tile_model import MAX_FREQUENCY, MAX_SEGMENTS
+from orbiflow.tiles.search import Fit, Goal, OnProgress, SearchMethod, StillTiles
 from orbiflow.tiles.tilings import CLASSES, ISOHEDRAL_TYPES, IsohedralClass
 
 NotNegative = Annotated[float, Range(0)]
@@ -75,7 +79,6 @@ class OverlapSearch(Settings, SearchMethod):
     - `seed`: moves the starts.
     """
 
-    modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.descent",)
     efforts: ClassVar[Mapping[str, Mapping[str, Any]]] = EFFORTS
 
     max_frequency: Annotated[int, Range(0, MAX_FREQUENCY)] = 10
@@ -116,8 +119,6 @@ class OverlapSearch(Settings, SearchMethod):
         self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
     ) -> Fit:
         """Let flows carry near tiles closer to the silhouette."""
-        from orbiflow.tiles.search.descent import fit_descent
-
         stages = tuple((steps, max(kept, 2 * per_class)) for steps, kept in self.stages)
         own = replace(self, stages=stages)
         with one_thread():
@@ -128,8 +129,6 @@ class OverlapSearch(Settings, SearchMethod):
 
     def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:
         """Return the tiles nearest to the outline."""
-        from orbiflow.tiles.search.starts import outline_starts
-
         if self.starts != "outline":
             return super().sketch(goal, kind, cancel)
         few: dict[str, Any] = {
@@ -145,8 +144,6 @@ class OverlapSearch(Settings, SearchMethod):
 
     def prepare(self, goal: Goal) -> None:
         """Draw the silhouette's soft edge."""
-        from orbiflow.tiles.search.descent import shared_soft_target
-
         shared_soft_target(goal.target, goal.emphasis)
 
     def least_neck(self, goal: Goal) -> float:  # noqa: ARG002
@@ -187,7 +184,6 @@ class OccupancySearch(Settings, SearchMethod):
     """
 
     method_name: ClassVar[str] = "occupancy"
-    modules: ClassVar[tuple[str, ...]] = ("orbiflow.tiles.search.occupancy",)
 
     max_frequency: Annotated[int, Range(0, MAX_FREQUENCY)] = 10
     turns: Count = 12
@@ -205,8 +201,6 @@ class OccupancySearch(Settings, SearchMethod):
     seed: Seed = 0
 
     def check(self) -> None:
-        from orbiflow.flows import method
-
         method(self.method)
 
     def fit(
@@ -214,9 +208,6 @@ class OccupancySearch(Settings, SearchMethod):
     ) -> Fit:
         """Let flows carry templates onto the silhouette; each class has a seed of its own."""
         del per_class  # all survivors are given
-        from orbiflow.tiles.search.occupancy import fit_occupancy
-        from orbiflow.tiles.search.starts import initial_poses
-
         number = list(dict.fromkeys((*CLASSES, *ISOHEDRAL_TYPES))).index(kind.name)
         own = replace(self, seed=(self.seed * 1009 + number) % 2**32)
         with one_thread():

@@ -12,7 +12,7 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles import CLASSES, IsohedralClass, Tile, TileModel, certify, subdivided
-from orbiflow.tiles.search.tile_model import extract_tile
+from orbiflow.tiles.flowing.tile_model import extract_tile
 from strategies import largest, random_field, random_points, random_tensor, seeds
 
 GLIDES = ["IH2", "IH3", "IH5", "IH6"]

@@ -181,7 +181,7 @@ def test_every_group_has_a_space() -> None:
 
 def test_touching_is_blamed_only_where_it_ends_the_descent(monkeypatch) -> None:
     """Near a minimum the longest step may touch, and shorter ones not lower the loss."""
-    from orbiflow.tiles.search import refinement
+    from orbiflow.tiles.flowing import refinement
 
     def steep(polygon: Tensor) -> Tensor:
         first.append(polygon.detach().clone())

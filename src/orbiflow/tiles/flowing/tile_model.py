@@ -21,13 +21,15 @@ from orbiflow.errors import CertificationError, InputFileError, OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
-from orbiflow.tiles.search.candidates import Candidates, Prototiles, StillTiles, simplest_tile
-from orbiflow.tiles.search.search_method import MAX_FREQUENCY, MAX_SEGMENTS
+from orbiflow.tiles.search import Candidates, Prototiles, StillTiles, simplest_tile
 from orbiflow.tiles.silhouette import Bending, Frame
 from orbiflow.tiles.tile import EscherTile, TileMap, naming_file
 from orbiflow.tiles.tilings import IsohedralClass, Tile
 from orbiflow.tiles.tilings import isohedral_class as class_of
 from orbiflow.typed_torch import linalg, listed
+
+MAX_FREQUENCY = 60  # largest Omega that a fit takes on; time and memory grow with its square
+MAX_SEGMENTS = 2000  # of a flow; the descent adds one a step
 
 # Names under which the arrays of a map hold the start tile, if it is not the template
 VERTICES, CORNERS = "prototile.outline", "prototile.corners"

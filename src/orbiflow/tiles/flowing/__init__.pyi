@@ -1,0 +1,15 @@
+from .descent import fit_descent as fit_descent
+from .occupancy import OccupancySamples as OccupancySamples
+from .occupancy import fit_occupancy as fit_occupancy
+from .occupancy import occupancy_loss as occupancy_loss
+from .overlap_search import OccupancySearch as OccupancySearch
+from .overlap_search import OverlapSearch as OverlapSearch
+from .refinement import refine as refine
+from .soft_target import SoftTarget as SoftTarget
+from .soft_target import signed_distance as signed_distance
+from .tile_model import TileModel as TileModel
+from .tile_model import as_map as as_map
+from .tile_model import as_model as as_model
+from .tile_model import load_model as load_model
+from .tile_model import placed_field as placed_field
+from .tile_model import trainable as trainable
