@@ -5,9 +5,6 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from docutils import nodes
-from docutils.parsers.rst import Directive
-
 import orbiflow
 
 if TYPE_CHECKING:
@@ -38,19 +35,6 @@ napoleon_use_rtype = False
 myst_heading_anchors = 4
 # links to files of the repository that are no pages are left as they are
 suppress_warnings = ["myst.xref_missing", "myst.header"]
-
-
-class PackageNames(Directive):
-    """The names of `orbiflow`, each with the room that it comes from."""
-
-    def run(self) -> list[nodes.Node]:
-        items = []
-        for name in orbiflow.__all__:
-            room = getattr(orbiflow, name).__module__.split(".")[1]
-            text = nodes.paragraph("", "", nodes.literal(text=name))
-            text += nodes.Text(f", of the room {room}")
-            items.append(nodes.list_item("", text))
-        return [nodes.bullet_list("", *items)]
 
 
 def plain_prose(
@@ -84,7 +68,6 @@ def plain_types(
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    app.add_directive("package-names", PackageNames)
     app.connect("autodoc-process-docstring", plain_prose, priority=400)  # before napoleon
     app.connect("autodoc-process-signature", plain_types)
     return {"parallel_read_safe": True}

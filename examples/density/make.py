@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import scipy.io
 
-from orbiflow.density import to_klein
+from orbiflow import to_klein
 
 HERE = Path(__file__).parent
 RESIDUES = 20_000

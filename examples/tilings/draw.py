@@ -11,9 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from orbiflow.runtime import write_atomic
-from orbiflow.symmetry import WALLPAPER_GROUPS, wallpaper_group
-from orbiflow.tiles import (
+from orbiflow import (
+    WALLPAPER_GROUPS,
     Tile,
     Tiling,
     certify,
@@ -21,7 +20,9 @@ from orbiflow.tiles import (
     dirichlet_tiling,
     isohedral_class,
     tilings_png,
+    wallpaper_group,
 )
+from orbiflow.runtime import write_atomic
 
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 

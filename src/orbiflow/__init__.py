@@ -1,7 +1,8 @@
 """Diffeomorphisms that commute with a crystallographic group.
 
-What most people want is named here; each room names the rest of its own. Importing this package alone
-loads no numerical library: a name is looked up when it is first used.
+The names here are public: documented on one page (docs/reference/names.md) and stable. All others
+are internal and may change. Importing this package alone loads no numerical library: a name is looked
+up when it is first used.
 
 >>> import orbiflow
 >>> orbiflow.isohedral_class("IH4").group_name
