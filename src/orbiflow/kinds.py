@@ -55,6 +55,16 @@ class Repeated:
     """
 
 
+@dataclass(frozen=True, eq=False)
+class OneOf:
+    """A text that is one of the names in a table, which may have grown by the time it is looked up.
+
+    - `names`: The table.
+    """
+
+    names: Mapping[str, Any]
+
+
 @dataclass(frozen=True)
 class InMemory:
     """A path to something that was saved, or in Python the thing itself, annotated `Any`.
@@ -305,6 +315,9 @@ def kind_of(annotation: Any) -> Kind:
     allowed = next((entry for entry in metadata if isinstance(entry, Range)), ANY)
     repeated = any(isinstance(entry, Repeated) for entry in metadata)
     saved = next((entry for entry in metadata if isinstance(entry, InMemory)), None)
+    table = next((entry for entry in metadata if isinstance(entry, OneOf)), None)
+    if table is not None:
+        return ChoiceKind(tuple(table.names))
     kind = SavedKind(saved.wanted) if saved else _plain_kind(annotation, allowed, unit, repeated)
     parsed = next((entry for entry in metadata if isinstance(entry, Parsed)), None)
     return kind if parsed is None else ParsedKind(parsed, kind)

@@ -52,6 +52,7 @@ from orbiflow.arguments import described, meant, one_of, placeholder, refusal
 from orbiflow.errors import SettingError, literal
 from orbiflow.kinds import FlagKind, Kind, OptionalKind, Refused, kind_of
 from orbiflow.kinds import InMemory as InMemory
+from orbiflow.kinds import OneOf as OneOf
 from orbiflow.kinds import Parsed as Parsed
 from orbiflow.kinds import Repeated as Repeated
 from orbiflow.kinds import Unit as Unit

@@ -2,40 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from orbiflow.arguments import as_choice
+from orbiflow.settings import OneOf
 
 if TYPE_CHECKING:
     from orbiflow.tiles.page import Scene
 
 TOLERANCE = 0.01  # usual distance in mm of polylines from a scene's curves
 
-SceneFormat = Literal["svg", "pdf", "dxf", "png", "json"]
-"""The formats, which are endings of files."""
-
-WRITERS: Mapping[str, str] = {
-    "svg": "svg:write_svg",
-    "pdf": "pdf:write_pdf",
-    "dxf": "dxf:write_dxf",
-    "png": "png:write_png",
-    "json": "json:write_json",
+WRITERS: dict[str, str] = {
+    "svg": "orbiflow.tiles.write.svg:write_svg",
+    "pdf": "orbiflow.tiles.write.pdf:write_pdf",
+    "dxf": "orbiflow.tiles.write.dxf:write_dxf",
+    "png": "orbiflow.tiles.write.png:write_png",
+    "json": "orbiflow.tiles.write.json:write_json",
 }
-"""The file and function that write a scene in each format.
+"""The module and function that write a scene in each format, which is the ending of its files.
 
 A writer takes the scene, and by name `tolerance` in mm, of curves, and `dpi`, of pixels, as far as it
 has a use for them. It returns the file's content.
 """
 
-LINES_ALONE: frozenset[SceneFormat] = frozenset({"dxf", "json"})
+SceneFormat = Annotated[str, OneOf(WRITERS)]
+"""The name of a format."""
+
+LINES_ALONE = frozenset({"dxf", "json"})
 """The formats that hold no pictures of pixels."""
 
 
 def write_scene(scene: Scene, format: str, **detail: Any) -> str | bytes:
     """Return the content of a scene's file; `detail` is what the format's writer takes."""
-    file, name = WRITERS[as_choice(format, tuple(WRITERS), "the format")].split(":")
-    writer = getattr(import_module(f"{__package__}.{file}"), name)
+    module, name = WRITERS[as_choice(format, tuple(WRITERS), "the format")].split(":")
+    writer = getattr(import_module(module), name)
     known = writer.__kwdefaults__ or {}
     return writer(scene, **{key: value for key, value in detail.items() if key in known})
