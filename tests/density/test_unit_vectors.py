@@ -280,7 +280,7 @@ def test_hostile_files_are_refused(
     options: dict[str, object], message: str, tmp_path: Path
 ) -> None:
     header = {
-        "format": "orbiflow-density/5",
+        "format": "orbiflow-density/6",
         "space": options,
         "group": None,
         "density": {"kind": "kernels", "kernels": 1},

@@ -14,17 +14,11 @@ from torch import Tensor
 from orbiflow.arguments import as_instance, is_a
 from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.evaluation import midpoints
-from orbiflow.density.models.files import (
-    density_from,
-    density_parts,
-    series_from_header,
-    series_parts,
-    within,
-)
+from orbiflow.density.models.files import density_from, density_parts, within
 from orbiflow.density.models.tensors import in_blocks
 from orbiflow.density.spaces import Space, Torus, rectangle
 from orbiflow.errors import OrbiflowError
-from orbiflow.flows import Flow
+from orbiflow.flows import Flow, flow_from, flow_parts
 from orbiflow.runtime import one_thread
 from orbiflow.symmetry import cast_like
 from orbiflow.typed_torch import linalg, special
@@ -186,19 +180,19 @@ class FlowDensity(Density, kind="flow"):
 
     def header(self) -> dict[str, Any]:
         return {
-            "flow": series_parts(self.flow, self.space)[0],
+            "flow": flow_parts(self.flow, with_own=False)[0],
             "base": density_parts(self.base, "base", space=self.space)[0],
         }
 
     def tensors(self) -> dict[str, Tensor]:
-        own = series_parts(self.flow, self.space)[1]
+        own = {f"flow.{name}": tensor for name, tensor in self.flow.state_dict().items()}
         return own | density_parts(self.base, "base", "base.")[1]
 
     @classmethod
     def from_header(
         cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
     ) -> Self:
-        flow = series_from_header(header["flow"], tensors, space)
+        flow = flow_from(header["flow"], within(tensors, "flow."), {})
         return cls(space, flow, density_from(space, header["base"], within(tensors, "base.")))
 
     def _like(self) -> Tensor:
