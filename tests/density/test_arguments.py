@@ -19,14 +19,13 @@ from orbiflow.density import (
     UniformDensity,
     VonMisesChains,
     VonMisesDensity,
-    clear_rotation,
     density_to_bytes,
     fit_density,
-    kl_by_quadrature,
     make_space,
-    midpoints,
     read_density,
 )
+from orbiflow.density.models import kl_by_quadrature, midpoints
+from orbiflow.density.spaces import clear_rotation
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow

@@ -19,9 +19,8 @@ from orbiflow.density import (
     Torus,
     UniformDensity,
     VonMisesDensity,
-    kl_by_quadrature,
-    midpoints,
 )
+from orbiflow.density.models import kl_by_quadrature, midpoints
 from orbiflow.density.models.tensors import neighbourhoods
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField

@@ -27,16 +27,16 @@ from orbiflow.density import (
     Space,
     UniformDensity,
     VonMisesDensity,
-    density_thumbnail,
     density_to_bytes,
     log_density_gradient,
     make_space,
     marginal,
-    midpoints,
     outlines,
     plot_density,
     read_density,
 )
+from orbiflow.density.models import midpoints
+from orbiflow.density.pictures import density_thumbnail
 from orbiflow.density.pictures.cell import Cell
 from orbiflow.errors import GroupError, OrbiflowError
 from orbiflow.fields import FourierField, SplineField, has_even_grid

@@ -16,7 +16,6 @@ from orbiflow.density import (
     VonMisesChains,
     fit_automatic,
     make_space,
-    midpoints,
 )
 from orbiflow.density.fitting import group_numbers
 from orbiflow.density.fitting.folds import FOLDS, folds_of
@@ -30,6 +29,7 @@ from orbiflow.density.fitting.stacking import (
     stacking_weights,
     supported_weights,
 )
+from orbiflow.density.models import midpoints
 from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")

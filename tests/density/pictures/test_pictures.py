@@ -21,15 +21,13 @@ from orbiflow.density import (
     Torus,
     UniformDensity,
     corner_picture,
-    density_on_grid,
     density_page,
     density_picture,
-    edge_pairs,
     flow_picture,
     samples_picture,
     to_vectors,
 )
-from orbiflow.density.pictures import grounds
+from orbiflow.density.pictures import density_on_grid, edge_pairs, grounds
 from orbiflow.density.pictures.colours import (
     chosen_scale,
     density_at,
