@@ -26,7 +26,6 @@ from orbiflow.density import (
     QuotientSpace,
     Space,
     UniformDensity,
-    VonMisesDensity,
     density_to_bytes,
     log_density_gradient,
     make_space,
@@ -80,7 +79,7 @@ def test_densities_integrate_to_one(name: str) -> None:
     space = QuotientSpace(name)
     assert space.group.cell_volume == pytest.approx(space.group.order)
     grid = midpoints(space, 64 if space.dim == 2 else 16)
-    for density in (some_kernels(space), VonMisesDensity(space), UniformDensity(space)):
+    for density in (some_kernels(space), UniformDensity(space)):
         assert float(density.log_prob(grid).exp().mean()) == pytest.approx(1, abs=1e-6)
 
 

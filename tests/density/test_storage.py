@@ -11,7 +11,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from density.blends import blended
+from density.blends import blended, bump
 from orbiflow.density import (
     AdaptiveKernels,
     Density,
@@ -20,7 +20,6 @@ from orbiflow.density import (
     Sphere,
     Torus,
     UniformDensity,
-    VonMisesDensity,
     density_to_bytes,
     make_space,
     read_density,
@@ -70,7 +69,7 @@ def test_what_is_read_is_what_was_saved(
         filled(kind(space.group, frequency, smoothness=smoothness), seed + k)
         for k, (kind, frequency, smoothness) in enumerate(segments)
     ]
-    base = VonMisesDensity(space, 1.5) if von_mises else None
+    base = bump(space, 1.5) if von_mises else None
     density = plain(*fields, space=space, base=base)
     at = space.uniform(20, torch.Generator().manual_seed(seed))
     again = back(density, tmp_path_factory.mktemp("saved"))
@@ -144,7 +143,7 @@ def test_extras_that_would_not_be_read_again(extra) -> None:
 
 FORMS = {
     "flow": lambda: plain(filled(FourierField(torus.group, 2), 1)),
-    "base": lambda: plain(filled(SplineField(torus.group, 2), 1), base=VonMisesDensity(torus, 2.0)),
+    "base": lambda: plain(filled(SplineField(torus.group, 2), 1), base=bump(torus, 2.0)),
     "kernels": lambda: AdaptiveKernels(
         torus, torch.rand(5, 2).double(), 9 * torch.ones(5, 2).double(), torch.ones(5).double() / 5
     ),

@@ -30,7 +30,6 @@ from orbiflow.density import (
     Space,
     Sphere,
     Torus,
-    VonMisesDensity,
     density_picture,
     density_to_bytes,
     make_space,
@@ -361,7 +360,6 @@ REFUSED = {
     "max_frequency would have no effect on the hypersphere": lambda: DensityEstimator(
         space3, max_frequency=3
     ).fit(np.eye(4)),
-    "no crystallographic group": lambda: VonMisesDensity(space3).entropy(),
     "a picture needs two dimensions, this hypersphere has 2, but no": lambda: density_picture(
         kernels(Hypersphere(2), 0)
     ),

@@ -29,7 +29,6 @@ from .models.files import density_to_bytes as density_to_bytes
 from .models.files import read_density as read_density
 from .models.flow import FlowDensity as FlowDensity
 from .models.flow import UniformDensity as UniformDensity
-from .models.flow import VonMisesDensity as VonMisesDensity
 from .models.kernels import AdaptiveKernels as AdaptiveKernels
 from .models.mixture import Mixture as Mixture
 from .models.network import VonMisesNetwork as VonMisesNetwork

@@ -19,7 +19,6 @@ from .files import read_density as read_density
 from .flow import MOST_DIM as MOST_DIM
 from .flow import FlowDensity as FlowDensity
 from .flow import UniformDensity as UniformDensity
-from .flow import VonMisesDensity as VonMisesDensity
 from .flow import flow_obstacle as flow_obstacle
 from .kernels import SHARPEST as SHARPEST
 from .kernels import AdaptiveKernels as AdaptiveKernels

@@ -7,21 +7,19 @@ import math
 from collections.abc import Mapping
 from typing import Any, Self
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, is_a
+from orbiflow.arguments import as_instance
 from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.evaluation import midpoints
 from orbiflow.density.models.files import density_from, density_parts, within
 from orbiflow.density.models.tensors import in_blocks
-from orbiflow.density.spaces import Space, Torus, rectangle
+from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.flows import Flow, flow_from, flow_parts
 from orbiflow.runtime import one_thread
-from orbiflow.symmetry import cast_like
-from orbiflow.typed_torch import linalg, special
+from orbiflow.typed_torch import linalg
 
 MOST_DIM = 3
 """The most dimensions of a flow of splines, whose grid would be too large beyond."""
@@ -237,49 +235,3 @@ class UniformDensity(Density, kind="uniform"):
     def restricted(self, split: Split, space: Torus) -> Restriction:
         del split
         return Restriction([(0.0, UniformDensity(space))], [])
-
-
-class VonMisesDensity(Density, kind="von-mises"):
-    """The paper's base: a product of von Mises densities about the point (1/2, ..., 1/2) of the chart.
-
-    It is made invariant by summing over the group: with the periods of the space's frame, the sum over
-    coset representatives integrates to 1 over the space.
-
-    Args:
-        space: Any space.
-        concentration: The concentration kappa > 0 of each factor.
-    """
-
-    def __init__(self, space: Space, concentration: float = 1.0) -> None:
-        super().__init__(space)
-        real = is_a(concentration, int | float)
-        if not real or not concentration > 0 or not math.isfinite(concentration):
-            raise OrbiflowError(f"concentration must be positive, got {concentration!r}")
-        self.concentration = float(concentration)
-
-    def log_chart(self, points: Tensor) -> Tensor:
-        frame = self.space.frame.group
-        images = frame.images(points)
-        periods = rectangle(self.space).to(points)
-        angle = 2 * math.pi * ((images - 0.5) @ cast_like(frame.inverse_lattice, points).T)
-        kappa = self.concentration
-        log_normal = torch.log(special.i0e(torch.tensor(kappa, dtype=torch.float64))) + kappa
-        terms = kappa * angle.cos() - log_normal.to(points) - periods.log()
-        return terms.sum(dim=-1).logsumexp(dim=0)
-
-    def draw(self, count: int, generator: torch.Generator) -> Tensor:
-        seed = int(torch.randint(2**31, (), generator=generator))
-        angle = np.random.default_rng(seed).vonmises(
-            0.0, self.concentration, (count, self.space.dim)
-        )
-        return self.space.project(0.5 + self.space.from_turns(torch.tensor(angle) / (2 * math.pi)))
-
-    def header(self) -> dict[str, Any]:
-        return {"concentration": self.concentration}
-
-    @classmethod
-    def from_header(
-        cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
-    ) -> Self:
-        del tensors
-        return cls(space, float(header["concentration"]))
