@@ -185,7 +185,7 @@ def test_large_batches_are_the_same_in_blocks(monkeypatch) -> None:
     density, points = make(KleinBottle()), square(0, 60).reshape(3, 20, 2)
     with torch.no_grad():
         whole = density.log_prob(points)
-        monkeypatch.setattr("orbiflow.density.models.flow.BLOCK", 7)
+        monkeypatch.setattr("orbiflow.density.models.flow.BLOCK_POINTS", 7)
         assert torch.allclose(density.log_prob(points), whole)
         draws = [density.sample((4, 5), torch.Generator().manual_seed(3)) for _ in range(2)]
     assert torch.equal(*draws)
@@ -205,7 +205,7 @@ def test_many_points_are_the_same_on_any_number_of_cores(count: int, monkeypatch
     density, points = make(KleinBottle()), square(0, 60).reshape(3, 20, 2)
     with torch.no_grad():
         whole = density.log_prob(points, measure="natural")
-        monkeypatch.setattr("orbiflow.density.models.density.BLOCK", 7)
+        monkeypatch.setattr("orbiflow.density.models.density.BLOCK_POINTS", 7)
         monkeypatch.setattr("orbiflow.runtime.side_by_side.cores", lambda: count)
         found = density.log_prob(points, measure="natural")
     torch.testing.assert_close(found, whole, rtol=0, atol=1e-12)

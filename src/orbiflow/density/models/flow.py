@@ -32,10 +32,10 @@ def flow_obstacle(space: Space) -> str | None:
     return f"a flow has {MOST_DIM} dimensions at most, this {space.name} has {space.dimensions}"
 
 
-BLOCK = 65536
+BLOCK_POINTS = 65536
 """Points integrated at a time where no gradient is asked for: bounds the memory."""
 
-CARRIED = 4096
+CARRIED_POINTS = 4096
 """Points carried at a time together with the Jacobian of the carrying."""
 
 FIRST_NODES, MOST_NODES = {1: 64, 2: 16}, {1: 512, 2: 64}
@@ -44,7 +44,7 @@ FIRST_NODES, MOST_NODES = {1: 64, 2: 16}, {1: 512, 2: 64}
 FLOW_TERMS = 50
 """Terms of other densities that take as long as a flow at a point."""
 
-SETTLED = 1e-7
+SETTLED_NATS = 1e-7
 """Mean change, in nats, by twice as many nodes, below which there are enough."""
 
 
@@ -83,9 +83,9 @@ class FlowDensity(Density, kind="flow"):
 
     def log_chart(self, points: Tensor) -> Tensor:
         # flow, base and area are invariant: no need to project
-        if torch.is_grad_enabled() or points[..., 0].numel() <= BLOCK:
+        if torch.is_grad_enabled() or points[..., 0].numel() <= BLOCK_POINTS:
             return self._carried_back(points)
-        return in_blocks(self._carried_back, points, BLOCK)
+        return in_blocks(self._carried_back, points, BLOCK_POINTS)
 
     def _carried_back(self, points: Tensor) -> Tensor:
         start, log_det = self.flow.inverse_and_log_det(points)
@@ -96,7 +96,7 @@ class FlowDensity(Density, kind="flow"):
         if torch.is_grad_enabled():
             end = self.flow(start)
         else:
-            end = torch.cat([self.flow(block) for block in torch.split(start, BLOCK)])
+            end = torch.cat([self.flow(block) for block in torch.split(start, BLOCK_POINTS)])
         return self.space.project(end)
 
     @one_thread()
@@ -110,7 +110,7 @@ class FlowDensity(Density, kind="flow"):
         integrator's error: a plain grid of 512^2 misses 1 % of a density in sharp clusters.
         """
         grid = midpoints(self.space, resolution).to(self._like())
-        parts = [self._carried_mass(block) for block in torch.split(grid, CARRIED)]
+        parts = [self._carried_mass(block) for block in torch.split(grid, CARRIED_POINTS)]
         return float(torch.cat(parts).mean())
 
     def _carried_mass(self, start: Tensor) -> Tensor:
@@ -153,7 +153,7 @@ class FlowDensity(Density, kind="flow"):
             total = self._at_nodes(points, axes, hidden, fresh).logsumexp(dim=1)
             sums = total if sums is None else torch.logaddexp(sums, total)
             last, now = now, sums - len(hidden) * math.log(count)
-            settled = last is not None and float((now - last).abs().mean()) < SETTLED
+            settled = last is not None and float((now - last).abs().mean()) < SETTLED_NATS
             if settled or count >= MOST_NODES[len(hidden)]:
                 return now
             count *= 2
@@ -168,7 +168,7 @@ class FlowDensity(Density, kind="flow"):
     ) -> Tensor:
         """Return log densities (N, Q) of all angles, each point at each node."""
         parts: list[Tensor] = []
-        for block in torch.split(points.double(), max(1, BLOCK // len(nodes))):
+        for block in torch.split(points.double(), max(1, BLOCK_POINTS // len(nodes))):
             whole = block.new_empty(len(block), len(nodes), self.space.dim)
             whole[:, :, observed] = block[:, None]
             whole[:, :, hidden] = nodes

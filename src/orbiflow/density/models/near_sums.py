@@ -25,8 +25,9 @@ FEW_POINTS, FEW_PAIRS = 256, 5_000_000
 FEWEST_PAIRS = 20_000
 """Fewer points times terms are summed one by one at once: looking for tiles would take longer."""
 
-LESS, IDLE = 0.9, 3
-"""A tile is divided at most `IDLE` times in a row while more than the share `LESS` of terms stays."""
+LESS_SHARE, MAX_IDLE_HALVINGS = 0.9, 3
+"""A tile is divided at most `MAX_IDLE_HALVINGS` times in a row while more than the share `LESS_SHARE`
+of the terms stays."""
 
 
 def near_log_sum(terms: Terms, features: Tensor, floor: float = -math.inf) -> Tensor:
@@ -137,8 +138,8 @@ class _Walk:
         if far is not None:
             left = left._replace(terms=left.terms.only(~far), lost=lost)
         terms = left.terms
-        left = left._replace(idle=0 if terms.size < LESS * given else left.idle + 1)
-        if count > FEW_POINTS and count * terms.size > FEW_PAIRS and left.idle <= IDLE:
+        left = left._replace(idle=0 if terms.size < LESS_SHARE * given else left.idle + 1)
+        if count > FEW_POINTS and count * terms.size > FEW_PAIRS and left.idle <= MAX_IDLE_HALVINGS:
             for half in _halves(features, tile):
                 self._add(at[half], _gathered(features, half), left)
             return

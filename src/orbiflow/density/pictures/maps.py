@@ -13,7 +13,7 @@ from orbiflow.arrays import Array
 from orbiflow.density.models import Density
 from orbiflow.density.pictures import frames
 from orbiflow.density.pictures.colours import round_pixel
-from orbiflow.density.pictures.frames import INK, LETTER, chart_points, degrees_text
+from orbiflow.density.pictures.frames import INK, LETTER_EMS, chart_points, degrees_text
 from orbiflow.density.pictures.grounds import Ground, Pixels
 from orbiflow.density.pictures.overlays import LIGHT
 from orbiflow.density.pictures.projections import Azimuthal, Mollweide, Projection, WorldMap
@@ -82,7 +82,7 @@ class Map(Ground):
 
     def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> frames.Room:
         above = 0.8 if sheet.printed else 3.2
-        if self.is_disc and (not sheet.printed or sheet.width >= frames.NARROW):
+        if self.is_disc and (not sheet.printed or sheet.width >= frames.NARROW_INCHES):
             beside = frames.Room(3.6, 1.8, 0.0, above + 1.2, 4.4, 1.2)
             return frames.room_for_bar_beside(sheet, beside, label, ticks)
         left, right, top = (3.4, 3.4, 1.2) if self.is_disc else (3.6, 1.8, 0.0)
@@ -261,7 +261,7 @@ class _Labels:
         middle, at = projection.center[1], 0.0 if inside else -90.0
         ends = projection.forward(np.array([[at, middle], [at, middle + 60.0]]))
         room = self.size * float(np.ptp(ends[:, 0]))
-        letters = 7.5 * LETTER * self.sheet.small  # texts must not touch
+        letters = 7.5 * LETTER_EMS * self.sheet.small  # texts must not touch
         step = next((s for s in (60.0, 90.0, 120.0) if room * s / 60 > letters), 180.0)
         turns = sorted(((lon - middle + 180) % 360 - 180) for lon in lons if lon % step == 0)
         turns = [*turns, 180.0] if turns[0] == -180 else turns
@@ -335,7 +335,7 @@ class _Labels:
 
     def _free(self, text: str, at: Array, ha: str, va: str) -> bool:
         """Return whether there is no text yet, and reserve the place."""
-        size = np.array([(len(text) + 0.8) * LETTER, 1.3]) * self.sheet.small
+        size = np.array([(len(text) + 0.8) * LETTER_EMS, 1.3]) * self.sheet.small
         left = {"left": 0.0, "center": 0.5, "right": 1.0}[ha]
         low = {"bottom": 0.0, "center": 0.5, "top": 1.0}[va]
         corner = np.asarray(at) - size * (left, low)

@@ -74,7 +74,10 @@ class Square(Ground):
 
     def panels_room(self, sheet: Sheet) -> tuple[frames.Room, bool]:
         edges = (5.4, 4.2, 1.6, 2.4, 4.2) if self._has_ticks else (1.0, 1.0, 1.0, 2.4, 1.6)
-        room, stacked = frames.Room(*edges, 0.0), sheet.printed and sheet.width < frames.NARROW
+        room, stacked = (
+            frames.Room(*edges, 0.0),
+            sheet.printed and sheet.width < frames.NARROW_INCHES,
+        )
         return (room._replace(gap=room.below + 2.0) if stacked else room), stacked
 
     def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: frames.Panel) -> None:
