@@ -17,8 +17,8 @@ import sys
 import numpy as np
 import torch
 
-from orbiflow.density import make_space, mmd_test
-from orbiflow.density.comparing import resampling
+from orbiflow.density import make_space
+from orbiflow.density.comparing import mmd_test, resampling
 from orbiflow.density.comparing.resampling import Groups
 
 LEVEL, SHIFT = 0.05, 0.6

@@ -18,8 +18,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from orbiflow.density import AdaptiveKernels, Mixture, RoundSpace, VonMisesChains, midpoints
-from orbiflow.density.models import SCALES, waves
+from orbiflow.density import AdaptiveKernels, Mixture, RoundSpace, VonMisesChains
+from orbiflow.density.models import SCALES, midpoints, waves
 
 GRID = 256
 """Points a side of the whole space's grid."""

@@ -29,10 +29,9 @@ from orbiflow.density import (
     FlowSettings,
     fit_automatic,
     fit_density,
-    kl_by_quadrature,
     make_space,
-    midpoints,
 )
+from orbiflow.density.models import kl_by_quadrature, midpoints
 from reproduction.densities import FIT_SETTINGS, KL, TargetMeasure, drawn, weighted
 
 BARS = {"4-gaussian": 0.01, "6-gaussian": 0.02, "checkerboard": 0.08}

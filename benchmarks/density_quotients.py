@@ -23,9 +23,9 @@ from orbiflow.density import (
     QuotientSpace,
     UniformDensity,
     density_to_bytes,
-    midpoints,
     read_density,
 )
+from orbiflow.density.models import midpoints
 from orbiflow.symmetry import FLAT_MANIFOLDS, WALLPAPER_GROUPS
 
 KERNELS, FRESH = 6, 5_000

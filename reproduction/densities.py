@@ -25,18 +25,14 @@ from orbiflow.density import (
     FlowSettings,
     PlotSettings,
     Space,
-    density_on_grid,
     density_page,
     density_to_bytes,
-    draw_cells,
     fit_density,
-    kl_by_quadrature,
     make_space,
-    mean_field,
-    midpoints,
     read_density,
-    viewpoint,
 )
+from orbiflow.density.models import kl_by_quadrature, midpoints
+from orbiflow.density.pictures import density_on_grid, draw_cells, mean_field, viewpoint
 from orbiflow.drawing import draw_flow, draw_magnitude, plane_axes
 from reproduction.drawing import (
     INK,

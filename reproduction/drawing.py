@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from PIL import Image
 
 from orbiflow.arrays import Array, Window
-from orbiflow.density import Space, immersion
+from orbiflow.density import Space
+from orbiflow.density.pictures import immersion
 from orbiflow.drawing import PALETTES, Sheet, fill_rings, plane_axes
 from orbiflow.runtime import write_atomic
 from orbiflow.symmetry import CrystallographicGroup

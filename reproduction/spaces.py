@@ -9,7 +9,8 @@ import shapely
 import torch
 
 from orbiflow.arrays import Array, Window
-from orbiflow.density import SPACES, Space, edge_pairs, make_space
+from orbiflow.density import SPACES, Space, make_space
+from orbiflow.density.pictures import edge_pairs
 from orbiflow.drawing import fill_rings, mark_symmetry, plane_axes, rgb
 from orbiflow.fields import FourierField, VectorField, symmetrize
 from orbiflow.flows import Flow

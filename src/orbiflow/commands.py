@@ -41,7 +41,7 @@ SUMMARIES = {
     "density plot": "Draw a density: density, flow, samples as PNG, PDF or SVG, and surface.html, to turn in 3-D.",
     "density compare": "Which model suits held-out rows better, or do two data sets differ? With its uncertainty.",
     "density region": "Find the smallest regions that hold a mass: threshold, size, and boundary as closed polygons.",
-    "density cv": "Cross-validate: how well does a density foretell rows that its fit has not seen?",
+    "density cv": "Cross-validate: how well does a density predict rows that its fit has not seen?",
     "density patches": "Turn image patches into theta,phi on the Klein bottle, for `fit --space klein-bottle`.",
     "density batch": "Fit a density to every table of a folder, here or on a Dask cluster.",
     "studio": "Make tiles and densities in a browser: a web page that this very machine serves.",

@@ -73,7 +73,7 @@ def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
         # returns once the last process that holds the pipes has ended
         rest, said = process.communicate()
     assert process.returncode == 130, rest + said
-    assert "interrupted with 3 still to do; the same command goes on from here" in said
+    assert "interrupted with 3 still to do: run the same command again to resume" in said
     assert rows(tmp_path / "out") == {}
     assert not (tmp_path / "out" / "one").exists()
 

@@ -53,7 +53,7 @@ def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
         rest, said = process.communicate()
     assert process.returncode == 130, rest + said
     left = 20 - len(lines_of(tmp_path / "out" / "cv.csv"))
-    assert f"interrupted with {left} still to do; the same command goes on from here" in said
+    assert f"interrupted with {left} still to do: run the same command again to resume" in said
     assert not list(tmp_path.glob("out/**/*.tmp"))
 
 

@@ -22,6 +22,13 @@ from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 
 
+def bump(space: Space, kappa: float = 1.0) -> AdaptiveKernels:
+    """One kernel about the middle of the chart."""
+    middle = torch.full((1, space.chart_dim), 0.5, dtype=torch.float64)
+    width = 1 if space.is_round else space.dim
+    return AdaptiveKernels(space, middle, torch.full((1, width), kappa), torch.ones(1))
+
+
 def identity_flow(space: Space) -> Flow:
     """A flow on the space that is the identity, since a new field is zero."""
     return Flow([SplineField(space.group, 1)], steps=1, warn=False)

@@ -7,7 +7,7 @@ import pytest
 
 def few_kernels(patch: pytest.MonkeyPatch) -> None:
     """Try fewer widths of kernels."""
-    patch.setattr("orbiflow.density.fitting.kernels.LADDER", 9)
+    patch.setattr("orbiflow.density.fitting.kernels.LADDER_RUNGS", 9)
     patch.setattr("orbiflow.density.fitting.kernels.SCALES", (0.4, 1.6))
 
 

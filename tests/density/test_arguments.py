@@ -18,15 +18,13 @@ from orbiflow.density import (
     Torus,
     UniformDensity,
     VonMisesChains,
-    VonMisesDensity,
-    clear_rotation,
     density_to_bytes,
     fit_density,
-    kl_by_quadrature,
     make_space,
-    midpoints,
     read_density,
 )
+from orbiflow.density.models import kl_by_quadrature, midpoints
+from orbiflow.density.spaces import clear_rotation
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
@@ -73,7 +71,6 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "midpoints": (lambda: midpoints(torus, 2.5), "resolution must be a whole number"),  # type: ignore[arg-type]
     "kl": (lambda: kl_by_quadrature(torch.ones(3), torch.ones(4)), r"\(3,\) and \(4,\)"),
     "a base's space": (lambda: UniformDensity("sphere"), "space must be an? Space"),  # type: ignore[arg-type]
-    "concentration": (lambda: VonMisesDensity(torus, "1"), "concentration must be positive"),  # type: ignore[arg-type]
     "kernels": (
         lambda: AdaptiveKernels(torus, "a", torch.ones(1), torch.ones(1)),  # type: ignore[arg-type]
         "centers must be real numbers",

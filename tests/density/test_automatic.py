@@ -20,11 +20,11 @@ from orbiflow.density import (
     density_to_bytes,
     fit_automatic,
     make_space,
-    midpoints,
     read_density,
 )
 from orbiflow.density.fitting import COMPONENTS
 from orbiflow.density.fitting.settings import Component
+from orbiflow.density.models import midpoints
 from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.density import FlowDensity, FlowSettings, fit_density, make_space
-from orbiflow.density.fitting.likelihood import EVERY, Budget, Spent, refine
+from orbiflow.density.fitting.likelihood import ITERATIONS_PER_SCORE, Budget, Spent, refine
 from orbiflow.density.fitting.rows import Rows
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
@@ -116,7 +116,7 @@ def test_every_last_iterate_is_scored(iterations: int) -> None:
     density = FlowDensity(space, Flow(fields, steps=2, warn=False))
     before = fields[0].parameters_.detach().clone()
     done = refine(density, Rows(points), Rows(points), iterations=iterations)
-    assert len(done.validation) == 1 + math.ceil(iterations / EVERY)
+    assert len(done.validation) == 1 + math.ceil(iterations / ITERATIONS_PER_SCORE)
     # train and validation are the same points: every iterate is better than the one before
     assert done.best == len(done.validation) - 1
     assert done.validation[-1] < done.validation[0] - 0.05

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbiflow.density import TableError, append_columns, read_table
+from orbiflow.density import TableError, read_table
+from orbiflow.density.tables import append_columns
 from orbiflow.errors import InputFileError
 from table_files import write
 

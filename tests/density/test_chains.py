@@ -10,10 +10,10 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orbiflow.density import Torus, VonMisesChains, midpoints
+from orbiflow.density import Torus, VonMisesChains
 from orbiflow.density.fitting.chains import concentration, fit_chain_mixture, spread_chains
 from orbiflow.density.fitting.rows import Rows
-from orbiflow.density.models import SCALES, chained
+from orbiflow.density.models import SCALES, chained, midpoints
 from orbiflow.errors import OrbiflowError
 
 seeds = st.integers(0, 2**31 - 1)

@@ -22,7 +22,7 @@ from orbiflow.density import (
     summarize_directions,
 )
 from orbiflow.density.fitting.kernels import NARROWEST, narrowest_for
-from orbiflow.density.models import SHARPEST
+from orbiflow.density.models import MAX_CONCENTRATION
 from orbiflow.density.models.near_sums import near_log_sum
 from orbiflow.errors import DataWarning
 
@@ -90,7 +90,7 @@ def test_close_angles_lose_nothing(wide: float) -> None:
 
 
 @pytest.mark.parametrize("name", ["torus", "sphere", "klein-bottle", "hypersphere"])
-@pytest.mark.parametrize("kappa", [1e9, 1e12, SHARPEST])
+@pytest.mark.parametrize("kappa", [1e9, 1e12, MAX_CONCENTRATION])
 def test_sharp_kernels_are_exact(name: str, kappa: float) -> None:
     """Sums by tiles are those term by term; samples are as far from the centres as they should be."""
     space = make_space(name, **({"dim": 3} if name == "hypersphere" else {}))

@@ -9,6 +9,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from density.blends import bump
 from orbiflow.density import (
     MEASURES,
     Density,
@@ -18,10 +19,8 @@ from orbiflow.density import (
     Sphere,
     Torus,
     UniformDensity,
-    VonMisesDensity,
-    kl_by_quadrature,
-    midpoints,
 )
+from orbiflow.density.models import kl_by_quadrature, midpoints
 from orbiflow.density.models.tensors import neighbourhoods
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
@@ -55,7 +54,7 @@ def on_a_plain_grid(density: Density, side: int = 64) -> float:
 
 
 @every
-@pytest.mark.parametrize("base", [UniformDensity, VonMisesDensity])
+@pytest.mark.parametrize("base", [UniformDensity, bump])
 @settings(max_examples=5)
 @given(seed=seeds)
 def test_it_integrates_to_one(space, base, seed: int) -> None:
@@ -113,7 +112,7 @@ def test_the_flow_and_back(space, seed: int) -> None:
 
 
 @every
-@pytest.mark.parametrize("base", [UniformDensity, VonMisesDensity])
+@pytest.mark.parametrize("base", [UniformDensity, bump])
 def test_samples_follow_the_density(space, base) -> None:
     density = make(space, 7, base=base, strength=0.12)
     count, cells = 40_000, 8
@@ -127,24 +126,6 @@ def test_samples_follow_the_density(space, base) -> None:
     expected *= count / expected.sum()
     assert scipy.stats.chisquare(observed, expected).pvalue > 1e-4
     assert expected.max() > 1.5 * expected.min()  # a test that an even density would fail
-
-
-@every
-@settings(max_examples=5)
-@given(seed=seeds, concentration=st.floats(0.1, 8.0))
-def test_the_von_mises_base_is_symmetric_and_normalised(space, seed, concentration) -> None:
-    base, points = VonMisesDensity(space, concentration), square(seed)
-    images = space.group.images(points)
-    assert torch.allclose(base.log_prob(images), base.log_prob(points).expand(len(images), -1))
-    mass = base.log_prob(midpoints(space, 80)).exp().mean()
-    assert float(mass) == pytest.approx(1.0, abs=1e-6)
-
-
-def test_of_the_torus_the_von_mises_base_is_the_papers() -> None:
-    points = square(0)
-    expected = scipy.stats.vonmises.logpdf(2 * math.pi * (points.numpy() - 0.5), 1.0).sum(axis=1)
-    found = VonMisesDensity(Torus(2)).log_prob(points).numpy()
-    assert np.allclose(found, expected + 2 * math.log(2 * math.pi))
 
 
 def test_gradients_reach_the_parameters() -> None:
@@ -204,7 +185,7 @@ def test_large_batches_are_the_same_in_blocks(monkeypatch) -> None:
     density, points = make(KleinBottle()), square(0, 60).reshape(3, 20, 2)
     with torch.no_grad():
         whole = density.log_prob(points)
-        monkeypatch.setattr("orbiflow.density.models.flow.BLOCK", 7)
+        monkeypatch.setattr("orbiflow.density.models.flow.BLOCK_POINTS", 7)
         assert torch.allclose(density.log_prob(points), whole)
         draws = [density.sample((4, 5), torch.Generator().manual_seed(3)) for _ in range(2)]
     assert torch.equal(*draws)
@@ -224,7 +205,7 @@ def test_many_points_are_the_same_on_any_number_of_cores(count: int, monkeypatch
     density, points = make(KleinBottle()), square(0, 60).reshape(3, 20, 2)
     with torch.no_grad():
         whole = density.log_prob(points, measure="natural")
-        monkeypatch.setattr("orbiflow.density.models.density.BLOCK", 7)
+        monkeypatch.setattr("orbiflow.density.models.density.BLOCK_POINTS", 7)
         monkeypatch.setattr("orbiflow.runtime.side_by_side.cores", lambda: count)
         found = density.log_prob(points, measure="natural")
     torch.testing.assert_close(found, whole, rtol=0, atol=1e-12)
@@ -237,6 +218,3 @@ def test_what_is_refused() -> None:
         make(Torus(2)).log_prob(torch.zeros(5, 3))
     with pytest.raises(OrbiflowError, match="a resolution of 21 at most"):
         FlowDensity(Torus(6), Flow(lambda x: 0 * x)).mass()
-    for wrong in (0.0, -1.0, math.nan, math.inf):
-        with pytest.raises(OrbiflowError, match="concentration must be positive"):
-            VonMisesDensity(Torus(2), wrong)

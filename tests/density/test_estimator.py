@@ -10,7 +10,8 @@ from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV
 
 from density.quick_fits import quick_search
-from orbiflow.density import DensityEstimator, Sphere, midpoints
+from orbiflow.density import DensityEstimator, Sphere
+from orbiflow.density.models import midpoints
 from orbiflow.errors import OrbiflowError
 
 

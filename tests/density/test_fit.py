@@ -20,7 +20,7 @@ from orbiflow.density import (
     make_space,
 )
 from orbiflow.density.fitting.flow import conjugate_gradients, coupled, match_flow
-from orbiflow.density.fitting.likelihood import LEVELS, Objective, merged
+from orbiflow.density.fitting.likelihood import MAX_HALVINGS, Objective, merged
 from orbiflow.density.fitting.report import sides
 from orbiflow.density.fitting.rows import Rows
 from orbiflow.errors import OrbiflowError
@@ -159,7 +159,7 @@ def test_merging_keeps_mean_and_mass(seed: int, cells: int, crowd: int, dim: int
     assert weights is not None
     assert float(weights.sum()) == pytest.approx(1)
     assert torch.allclose(weights @ few, points.mean(dim=0))
-    finest = (points * (cells << LEVELS)).floor()
+    finest = (points * (cells << MAX_HALVINGS)).floor()
     fullest = int(finest.unique(dim=0, return_counts=True)[1].max())
     assert float(weights.max()) <= max(crowd, fullest) / 200 + 1e-9
     # every point is as near to its cell's mean as cells are wide

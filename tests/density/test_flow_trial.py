@@ -21,7 +21,13 @@ from orbiflow.density.fitting import COMPONENTS
 from orbiflow.density.fitting.automatic import BEFORE_END
 from orbiflow.density.fitting.evidence import Candidates, Course, candidates_of, judged
 from orbiflow.density.fitting.families import KernelFamily
-from orbiflow.density.fitting.flow_trial import FIRST, Rivals, TriedFlow, flow_beside, try_flow
+from orbiflow.density.fitting.flow_trial import (
+    FIRST_TENTH_SHARE,
+    Rivals,
+    TriedFlow,
+    flow_beside,
+    try_flow,
+)
 from orbiflow.density.fitting.folds import Folds, folds_of
 from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence
@@ -82,8 +88,10 @@ def test_progress_goes_on_from_one_tenth_to_the_next(
     tried(*evidence(), told=lambda done, what: said.append((done, what)))
     shares = [done for done, _ in said]
     assert shares == sorted(shares)
-    assert [done for done, what in said if what == "flow: matching"] == [0, FIRST][:tenths]
-    assert max(shares) <= (FIRST, 1)[tenths - 1]
+    assert [done for done, what in said if what == "flow: matching"] == [0, FIRST_TENTH_SHARE][
+        :tenths
+    ]
+    assert max(shares) <= (FIRST_TENTH_SHARE, 1)[tenths - 1]
 
 
 @pytest.mark.parametrize("parts", [COMPONENTS, COMPONENTS[1:], ("kernels",)])

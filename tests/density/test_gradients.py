@@ -5,7 +5,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from density.blends import blended, flow_of
+from density.blends import blended, bump, flow_of
 from orbiflow.density import (
     MEASURES,
     AdaptiveKernels,
@@ -13,7 +13,6 @@ from orbiflow.density import (
     FlowDensity,
     Space,
     UniformDensity,
-    VonMisesDensity,
     make_space,
 )
 from orbiflow.fields import FourierField
@@ -27,7 +26,7 @@ KINDS = ("uniform", "von-mises", "blended")
 def density_of(kind: str, space: Space, seed: int) -> Density:
     torch.manual_seed(seed % 2**31)
     flow = Flow(random_field(space.group, 2, seed, rms=0.05), steps=4, warn=False)
-    base = VonMisesDensity(space) if kind == "von-mises" else UniformDensity(space)
+    base = bump(space) if kind == "von-mises" else UniformDensity(space)
     if kind != "blended":
         return FlowDensity(space, flow, base)
     width = 1 if space.is_round else 2

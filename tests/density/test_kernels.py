@@ -7,7 +7,8 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orbiflow.density import AdaptiveKernels, Mixture, UniformDensity, make_space, midpoints
+from orbiflow.density import AdaptiveKernels, Mixture, UniformDensity, make_space
+from orbiflow.density.models import midpoints
 from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")

@@ -16,13 +16,12 @@ from orbiflow.density import (
     DensityEstimator,
     DensitySettings,
     Torus,
-    at_observed,
     density_to_bytes,
     fit_automatic,
-    log_prob_observed,
 )
 from orbiflow.density.fitting.kernels import fit_mixture
 from orbiflow.density.fitting.rows import Rows, with_incomplete
+from orbiflow.density.inference import at_observed, log_prob_observed
 from orbiflow.errors import OrbiflowError
 
 seeds = st.integers(0, 2**31)

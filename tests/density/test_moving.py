@@ -12,7 +12,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from density.blends import blended, flow_of, random_blend
+from density.blends import blended, bump, flow_of, random_blend
 from elsewhere import DEVICE, a_device
 from orbiflow.density import (
     AdaptiveKernels,
@@ -21,7 +21,6 @@ from orbiflow.density import (
     Mixture,
     Space,
     UniformDensity,
-    VonMisesDensity,
     density_to_bytes,
     make_space,
     read_density,
@@ -61,7 +60,7 @@ def others(seed: int) -> list[Density]:
     """Of the other parts."""
     rng, bottle = np.random.default_rng(seed), make_space("klein-bottle")
     return [
-        FlowDensity(bottle, spline_flow(bottle, rng), VonMisesDensity(bottle)),
+        FlowDensity(bottle, spline_flow(bottle, rng), bump(bottle)),
         random_blend(seed, 4),
         random_blend(seed, 3, network=True),
         random_blend(seed, 2, flow=True),

@@ -21,14 +21,14 @@ from orbiflow.density import (
     Torus,
     UniformDensity,
     conditional,
-    density_on_grid,
     density_to_bytes,
     highest_density_region,
     log_density_gradient,
-    log_prob_observed,
     marginal,
     read_density,
 )
+from orbiflow.density.inference import log_prob_observed
+from orbiflow.density.pictures import density_on_grid
 from orbiflow.errors import InputFileError, OrbiflowError
 from sealed import sealed
 

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density import TableError, append_columns, read_table
+from orbiflow.density import TableError, read_table
+from orbiflow.density.tables import append_columns
 from orbiflow.density.tables.numerals import Mark
 from orbiflow.errors import InputFileError
 from table_files import PROPERTY, write

@@ -20,11 +20,11 @@ from orbiflow.density import (
     Torus,
     conditional,
     density_to_bytes,
-    log_prob_observed,
     make_space,
     marginal,
     read_density,
 )
+from orbiflow.density.inference import log_prob_observed
 from orbiflow.errors import OrbiflowError
 
 seeds = st.integers(0, 2**31)

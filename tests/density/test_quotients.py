@@ -26,17 +26,16 @@ from orbiflow.density import (
     QuotientSpace,
     Space,
     UniformDensity,
-    VonMisesDensity,
-    density_thumbnail,
     density_to_bytes,
     log_density_gradient,
     make_space,
     marginal,
-    midpoints,
     outlines,
     plot_density,
     read_density,
 )
+from orbiflow.density.models import midpoints
+from orbiflow.density.pictures import density_thumbnail
 from orbiflow.density.pictures.cell import Cell
 from orbiflow.errors import GroupError, OrbiflowError
 from orbiflow.fields import FourierField, SplineField, has_even_grid
@@ -80,7 +79,7 @@ def test_densities_integrate_to_one(name: str) -> None:
     space = QuotientSpace(name)
     assert space.group.cell_volume == pytest.approx(space.group.order)
     grid = midpoints(space, 64 if space.dim == 2 else 16)
-    for density in (some_kernels(space), VonMisesDensity(space), UniformDensity(space)):
+    for density in (some_kernels(space), UniformDensity(space)):
         assert float(density.log_prob(grid).exp().mean()) == pytest.approx(1, abs=1e-6)
 
 

@@ -17,8 +17,8 @@ from orbiflow.density import (
     highest_density_region,
     make_space,
     resolvable_masses,
-    samples_for,
 )
+from orbiflow.density.regions import samples_for
 from orbiflow.density.regions.settings import (
     GOOD_EXPECTED,
     MAX_DEFAULT_SAMPLES,

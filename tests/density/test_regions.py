@@ -21,9 +21,8 @@ from orbiflow.density import (
     highest_density_region,
     make_space,
     outlines,
-    to_geojson,
 )
-from orbiflow.density.regions import boundaries
+from orbiflow.density.regions import boundaries, to_geojson
 from orbiflow.density.regions import levels as region_levels
 from orbiflow.density.regions.grid import Block, LevelGrid, filled
 from orbiflow.errors import OrbiflowError

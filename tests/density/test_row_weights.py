@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from density.blends import flow_of
 from density.quick_fits import few_kernels
-from orbiflow.density import DensityEstimator, density_to_bytes, make_space, mean_of, weighed
+from orbiflow.density import DensityEstimator, density_to_bytes, make_space, weighed
+from orbiflow.density.fitting import mean_of
 from orbiflow.density.fitting.chains import fit_chain_mixture, spread_chains
 from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
 from orbiflow.density.fitting.likelihood import Objective, merged

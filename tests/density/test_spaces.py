@@ -14,11 +14,11 @@ from orbiflow.density import (
     ProjectivePlane,
     Sphere,
     Torus,
-    clear_rotation,
     make_space,
     to_latlon,
     to_vectors,
 )
+from orbiflow.density.spaces import clear_rotation
 from orbiflow.errors import OrbiflowError
 
 TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]

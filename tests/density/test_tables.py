@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density import append_columns, read_table, to_csv
-from orbiflow.density.tables import files, text
+from orbiflow.density import read_table
+from orbiflow.density.tables import append_columns, files, text, to_csv
 from orbiflow.errors import InputFileError, OrbiflowError
 from table_files import PROPERTY, refuse, write
 

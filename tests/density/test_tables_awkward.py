@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbiflow.density import append_columns, read_table
+from orbiflow.density import read_table
 from orbiflow.density.data import is_identifier
+from orbiflow.density.tables import append_columns
 from orbiflow.errors import InputFileError
 from table_files import write
 

@@ -12,7 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density import append_columns, read_table
+from orbiflow.density import read_table
+from orbiflow.density.tables import append_columns
 from orbiflow.errors import InputFileError, OrbiflowError
 from table_files import PROPERTY, refuse, write
 

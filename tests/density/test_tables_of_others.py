@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbiflow.density import append_columns, read_table
-from orbiflow.density.tables import with_minus
+from orbiflow.density import read_table
+from orbiflow.density.tables import append_columns, with_minus
 from orbiflow.errors import InputFileError
 from table_files import write
 

@@ -11,14 +11,8 @@ import pytest
 import torch
 from scipy.stats import binom, vonmises
 
-from orbiflow.density import (
-    ComparisonSettings,
-    RowSketch,
-    Sphere,
-    compare_samples,
-    make_space,
-    mmd_test,
-)
+from orbiflow.density import ComparisonSettings, Sphere, compare_samples, make_space
+from orbiflow.density.comparing import RowSketch, mmd_test
 from orbiflow.density.comparing.resampling import Groups, chosen_rows
 from orbiflow.errors import OrbiflowError
 

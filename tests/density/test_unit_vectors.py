@@ -30,7 +30,6 @@ from orbiflow.density import (
     Space,
     Sphere,
     Torus,
-    VonMisesDensity,
     density_picture,
     density_to_bytes,
     make_space,
@@ -280,7 +279,7 @@ def test_hostile_files_are_refused(
     options: dict[str, object], message: str, tmp_path: Path
 ) -> None:
     header = {
-        "format": "orbiflow-density/5",
+        "format": "orbiflow-density/6",
         "space": options,
         "group": None,
         "density": {"kind": "kernels", "kernels": 1},
@@ -361,7 +360,6 @@ REFUSED = {
     "max_frequency would have no effect on the hypersphere": lambda: DensityEstimator(
         space3, max_frequency=3
     ).fit(np.eye(4)),
-    "no crystallographic group": lambda: VonMisesDensity(space3).entropy(),
     "a picture needs two dimensions, this hypersphere has 2, but no": lambda: density_picture(
         kernels(Hypersphere(2), 0)
     ),

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import torch
 
-from orbiflow.density import SPACES, FlowDensity, kl_by_quadrature, make_space, midpoints
+from orbiflow.density import SPACES, FlowDensity, make_space
+from orbiflow.density.models import kl_by_quadrature, midpoints
 from orbiflow.drawing import Sheet
 from orbiflow.fields import symmetrize
 from orbiflow.symmetry import identification_group, rotation_matrix

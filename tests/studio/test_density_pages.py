@@ -17,8 +17,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from density.blends import random_kernels
-from orbiflow.density import Mixture, Torus, density_to_bytes, guess, read_density, seen_column
-from orbiflow.density.tables import Table
+from orbiflow.density import Mixture, Torus, density_to_bytes, guess, read_density
+from orbiflow.density.tables import Table, seen_column
 from orbiflow.studio import density_tasks
 from orbiflow.studio.density_routes import EXAMPLES, TABLES
 from orbiflow.studio.density_tasks import table_view

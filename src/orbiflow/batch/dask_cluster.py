@@ -28,13 +28,13 @@ Client: TypeAlias = Any
 Future: TypeAlias = Any
 """Classes of `distributed`, which has no types and is not always installed."""
 
-POLL = 0.05
+POLL_SECONDS = 0.05
 """Seconds between looks at the token while no answer comes."""
 
-LOOK = 2.0
+SECONDS_BETWEEN_LOOKS = 2.0
 """Seconds between looks at who works."""
 
-PATIENCE = 300.0
+MAX_SECONDS_WITHOUT_WORKERS = 300.0
 """Seconds without any worker after which the batch ends."""
 
 TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
@@ -126,8 +126,8 @@ class DaskCluster(Executor):
             return died if alone else None
         except (OSError, concurrent.futures.CancelledError) as error:
             raise OrbiflowError(
-                f"the scheduler at {self.address} has gone or dropped the work; the same command goes "
-                "on from here once it is back"
+                f"the scheduler at {self.address} has gone or dropped the work: run the same command "
+                "again to resume once it is back"
             ) from error
         except Exception as error:
             raise OrbiflowError(
@@ -190,16 +190,16 @@ class _Out:
     def room(self) -> int:
         """Return how many parcels may be here at a time; raise an error if it was none for long."""
         now = time.monotonic()
-        if now - self.looked >= LOOK:
+        if now - self.looked >= SECONDS_BETWEEN_LOOKS:
             before, self.threads, self.looked = self.threads, _threads(self.client), now
             if before and not self.threads:
                 self.tell(Note(f"no worker is left at {self.address}; waiting for one"))
         if self.threads:
             self.seen = now
-        elif now - self.seen > PATIENCE:
+        elif now - self.seen > MAX_SECONDS_WITHOUT_WORKERS:
             raise OrbiflowError(
-                f"no worker has been at {self.address} for {PATIENCE:.0f} s; the same command goes on "
-                "from here once there is one"
+                f"no worker has been at {self.address} for {MAX_SECONDS_WITHOUT_WORKERS:.0f} s: run "
+                "the same command again to resume once there is one"
             )
         return self.threads
 
@@ -220,7 +220,7 @@ class _Out:
         came = [one for one in self.sent if one.result.done()]
         self.sent = [one for one in self.sent if one not in came]
         if not came:
-            time.sleep(POLL)
+            time.sleep(POLL_SECONDS)
         return came
 
     def recall(self) -> None:
@@ -230,7 +230,7 @@ class _Out:
             if left:
                 self.client.cancel([one.future for one in left], force=True)
         # that ends them; if they were cancelled first, asyncio would print a traceback of each
-        concurrent.futures.wait([one.result for one in left], LOOK)
+        concurrent.futures.wait([one.result for one in left], SECONDS_BETWEEN_LOOKS)
         for one in left:
             one.result.cancel()
 

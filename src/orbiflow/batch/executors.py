@@ -13,7 +13,7 @@ from orbiflow.errors import SettingError
 from orbiflow.runtime import Cancel, Note, Sink, process_context, work
 from orbiflow.settings import DefaultText, NotWith, Range, Settings
 
-TRIES = 3
+MAX_DEATHS = 3
 """The number of processes that may die of one parcel."""
 
 
@@ -66,12 +66,16 @@ class LocalProcesses(Executor):
         if context.get_start_method() == "fork":
             for name in self.preload:
                 import_module(name)
-        pool = work(_serve, orders(), self.workers, context=context, cancel=cancel, tries=TRIES)
+        pool = work(
+            _serve, orders(), self.workers, context=context, cancel=cancel, tries=MAX_DEATHS
+        )
         with closing(pool) as all_news:
             for news in all_news:
                 if news.died:
-                    tell(Note(f"{TRIES} processes died of {keys[news.index]}; the others go on"))
-                    yield Answer.died(keys[news.index], TRIES)
+                    tell(
+                        Note(f"{MAX_DEATHS} processes died of {keys[news.index]}; the others go on")
+                    )
+                    yield Answer.died(keys[news.index], MAX_DEATHS)
                 elif news.done:
                     yield Answer.from_worker(keys[news.index], *news.value)
 

@@ -37,9 +37,9 @@ RESERVED = (ContactSheet.journal, TABLE, PAGE, THUMBNAILS, LOCK)
 THUMBNAIL = (360, 240)
 """Width and height in pixels: half as many again as the page shows."""
 
-PAUSE, REST = 1.0, 20.0
-"""The overview is written again after at least `PAUSE` seconds and `REST` times the seconds that it
-took, so that most of the time is for the work, however many results there are."""
+MIN_PAUSE_SECONDS, PAUSE_PER_SECOND_OF_WRITING = 1.0, 20.0
+"""The least pause before the overview is written again, and how many times the seconds that writing it
+took: most of the time is for the work, however many results there are."""
 
 
 MOST_JOURNAL_BYTES = 2**30
@@ -100,7 +100,7 @@ class BatchFolder:
         self.journal.add(entry)
         self.current.add(entry.file)
         now = time.monotonic()
-        if now - self._written > max(PAUSE, REST * self._cost):
+        if now - self._written > max(MIN_PAUSE_SECONDS, PAUSE_PER_SECOND_OF_WRITING * self._cost):
             self.write_all()
 
     def write_all(self, *, last: bool = False) -> None:

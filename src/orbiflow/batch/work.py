@@ -195,7 +195,7 @@ class Counts:
         tell(Note(f"{done}, in {summary['seconds']:.0f} s; look at {page}, or {table}"))
         without = self.failed + self.nothing
         if self.left:
-            text = f"interrupted with {self.left} still to do; the same command goes on from here"
+            text = f"interrupted with {self.left} still to do: run the same command again to resume"
             tell(Note(text, warning=True))
         elif without:
             text = f"{without} without a result, for the reasons in {table}"

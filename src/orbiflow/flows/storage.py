@@ -31,10 +31,14 @@ DTYPES = {
 
 
 class Writer:
-    """A writer of fields as JSON; `groups` holds the headers of the groups that they share."""
+    """A writer of fields as JSON; `groups` holds the headers of the groups that they share.
 
-    def __init__(self) -> None:
+    It refuses fields of the user's own unless whoever reads them can be given functions that make them.
+    """
+
+    def __init__(self, *, with_own: bool) -> None:
         self.groups: list[dict[str, Any]] = []
+        self._with_own = with_own
 
     def header(self, field: Any, place: str) -> dict[str, Any]:
         """Return the field at `place` in the flow, ready for JSON."""
@@ -56,6 +60,11 @@ class Writer:
                 "sizes": [layer.out_features for layer in linear],
                 "dtype": _dtype(linear[0].weight),
             }
+        if not self._with_own:
+            raise OrbiflowError(
+                f"{place} of the flow is a {kind.__name__}, a field of your own, which only "
+                "orbiflow.flows.save_flow saves"
+            )
         return {"kind": "own", "name": _own_name(field, place)}
 
     def _series(self, field: FourierField | SplineField) -> dict[str, Any]:
@@ -204,7 +213,12 @@ def save_flow(flow: Flow, path: str | Path) -> Path:
         OutputError: if the file cannot be written.
     """
     path = as_path(path, "the flow's file")
-    as_instance(flow, Flow, "the flow")
+    header, tensors = flow_parts(as_instance(flow, Flow, "the flow"))
+    return write_atomic(path, tensor_bytes({"format": FORMAT, **header}, tensors, "a flow"))
+
+
+def flow_parts(flow: Flow, *, with_own: bool = True) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """Return a header ready for JSON and the tensors, of which `flow_from` makes the flow again."""
     if type(flow) is not Flow:
         raise OrbiflowError(
             f"the flow is a {type(flow).__name__}; where that adds nothing to the map, save "
@@ -218,17 +232,17 @@ def save_flow(flow: Flow, path: str | Path) -> Path:
         )
     tensors = flow.state_dict()
     _check_finite(tensors)
-    writer = Writer()
+    writer = Writer(with_own=with_own)
     segments: list[dict[str, Any]] = []
     for index, field in enumerate(fields):
         first = next(i for i, other in enumerate(fields) if other is field)
         same = {"kind": "same", "segment": first}
         segments.append(same if first < index else writer.header(field, f"segments.{index}"))
-    header = {"format": FORMAT, "groups": writer.groups, "segments": segments, "warn": flow.warns}
+    header = {"groups": writer.groups, "segments": segments, "warn": flow.warns}
     header |= {name: getattr(flow, name) for name in ("steps", "method", "duration")}
     if flow.bijective:
         header["bijective"] = True
-    return write_atomic(path, tensor_bytes(header, tensors, "a flow"))
+    return header, tensors
 
 
 def load_flow(path: str | Path, *, modules: FieldFactories | None = None) -> Flow:
@@ -256,14 +270,15 @@ def load_flow(path: str | Path, *, modules: FieldFactories | None = None) -> Flo
         if header["format"] != FORMAT:
             raise OrbiflowError(f"format {header['format']!r}")
         with torch.inference_mode(False):  # otherwise it could never be differentiated
-            return _restored(header, tensors, modules or {})
+            return flow_from(header, tensors, modules or {})
     except (OrbiflowError, ValueError, KeyError, TypeError, RecursionError, RuntimeError) as error:
         raise InputFileError(f"{path}: cannot be read as a flow: {error}") from error
 
 
-def _restored(
+def flow_from(
     header: Mapping[str, Any], tensors: dict[str, Tensor], makers: FieldFactories
 ) -> Flow:
+    """Return the flow of `flow_parts`; `makers` are as for `load_flow`."""
     _check_finite(tensors)
     segments = header["segments"]
     if not is_list(segments) or not 1 <= len(segments) <= MAX_SEGMENTS:

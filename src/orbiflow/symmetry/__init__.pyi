@@ -7,7 +7,6 @@ from .cells import cell_lattice as cell_lattice
 from .cells import cell_parameters as cell_parameters
 from .elements import DirichletDomain as DirichletDomain
 from .elements import RotationCenter as RotationCenter
-from .elements import central_site as central_site
 from .elements import lattice_along as lattice_along
 from .elements import symmetry_elements as symmetry_elements
 from .equivariance import EquivarianceError as EquivarianceError
@@ -29,7 +28,6 @@ from .isometry import rotation as rotation
 from .isometry import rotation_matrix as rotation_matrix
 from .isometry import transflection as transflection
 from .isometry import translation as translation
-from .manifolds import ALIASES as ALIASES
 from .manifolds import FLAT_MANIFOLDS as FLAT_MANIFOLDS
 from .manifolds import flat_manifold as flat_manifold
 from .manifolds import group_by_name as group_by_name

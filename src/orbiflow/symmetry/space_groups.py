@@ -3,6 +3,7 @@
 import importlib
 import re
 import warnings
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +30,6 @@ from orbiflow.symmetry.group_symbols import (
     settings_named,
     settings_numbered,
 )
-from orbiflow.symmetry.group_types import element_counts, number_about_any_origin
 from orbiflow.symmetry.triplets import group_from_operators, operators, parse_operator
 
 MAX_CIF_BYTES = 64 * 2**20
@@ -205,9 +205,8 @@ def _check_type(
 ) -> None:
     """Raise `GroupError` where operators in a setting that no table has are not of a named type.
 
-    They are compared about every origin; along axes that no table has, only the rotations and screws,
-    reflections and glides, by their counts. The operators may imply no translations but those listed
-    or of the names' own centring.
+    Only rotations and screws, reflections and glides are compared, by their counts. The operators may
+    imply no translations but those listed or of the names' own centring.
     """
     known = [row for rows in settings.values() for row in rows]
     most = max((len(row.operations().cen_ops) for row in known), default=np.inf)
@@ -217,19 +216,47 @@ def _check_type(
             f"it contradicts itself: its operators imply {implied} translations within its cell and "
             f"its name {most:.0f}; one of them may be mistyped, or rounded too coarsely"
         )
-    number = number_about_any_origin(_gemmi(), group, basis)
-    own = element_counts(group) if number is None else None
-    named = "" if number is None else f"number {number}, "
+    own = element_counts(group)
     for what, rows in settings.items():
-        if number is None:
-            agrees = own == element_counts(space_group(f"Hall: {rows[0].hall}"))
-        else:
-            agrees = number in {row.number for row in rows}
-        if not agrees:
+        if own != element_counts(space_group(f"{_SAID}{rows[0].hall}")):
             raise GroupError(
-                f"it contradicts itself: its {len(listed)} operators are of another type of group, "
-                f"{named}of order {group.order}, than {what}; correct it, or remove what is wrong"
+                f"it contradicts itself: its {len(listed)} operators are of another type of group, of "
+                f"order {group.order}, than {what}; correct it, or remove what is wrong"
             )
+
+
+def element_counts(group: CrystallographicGroup) -> Counter[tuple[int, int, int, float]]:
+    """Return how many cosets have a determinant, a trace, a screw or glide of an order, and a pitch.
+
+    The order is how often the element is repeated until it equals one without a shift along itself.
+    All four are the same in every right-handed basis and for every origin; only the pitch tells
+    enantiomorphs apart.
+    """
+    counts: Counter[tuple[int, int, int, float]] = Counter()
+    shifts = group.translations @ group.inverse_lattice.T
+    nearby = np.stack(np.meshgrid(*[np.arange(-3, 4)] * 3), axis=-1).reshape(-1, 3)
+    elements = zip(group.integral_parts, group.linear_parts, shifts, strict=True)
+    for linear, turn, shift in elements:
+        along = np.mean([np.linalg.matrix_power(linear, k) for k in range(12)], axis=0)
+        apart = [abs((nearby - n * shift % 1) @ along.T).max(axis=1).min() for n in range(1, 7)]
+        orders = (n for n, distance in enumerate(apart, start=1) if distance < 1e-6)
+        pitch = _pitch(turn, group.lattice @ along @ shift, group.lattice @ along @ nearby.T)
+        counts[round(np.linalg.det(linear)), round(np.trace(linear)), next(orders, 0), pitch] += 1
+    return counts
+
+
+def _pitch(turn: Array, shift: Array, steps: Array) -> float:
+    """Return how far a rotation goes along its axis, as a share of the lattice's step there.
+
+    The axis points to where the rotation is counter-clockwise. It is 0 for what has no such axis.
+    """
+    around = turn - turn.T
+    axis = np.array([around[2, 1], around[0, 2], around[1, 0]])
+    if np.linalg.det(turn) < 0 or np.linalg.norm(axis) < 1e-6:
+        return 0.0
+    heights = abs(axis @ steps)
+    share = float(axis @ shift / heights[heights > 1e-6 * heights.max()].min())
+    return round(share, 3) % 1
 
 
 def _translations_in(group: CrystallographicGroup, basis: Array) -> int:

@@ -6,7 +6,8 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orbiflow.density import KleinBottle, ProjectivePlane, Sphere, Torus, immersion, viewpoint
+from orbiflow.density import KleinBottle, ProjectivePlane, Sphere, Torus
+from orbiflow.density.pictures import immersion, viewpoint
 from orbiflow.density.pictures.surfaces import EYE, boy_surface, mesh, normals
 from orbiflow.errors import OrbiflowError
 from strategies import random_orthogonal, seeds

@@ -30,10 +30,11 @@ from orbiflow.density import (
     UniformDensity,
     density_picture,
     samples_picture,
+    to_latlon,
     to_vectors,
 )
 from orbiflow.density.pictures.colours import chosen_scale, density_at, density_over, round_pixel
-from orbiflow.density.pictures.maps import Map, pixels_of
+from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.projections import EqualEarth, Lambert, PlateCarree
 from orbiflow.drawing import Sheet, pdf_pages
 from orbiflow.drawing.sheet import NARROWEST
@@ -85,11 +86,14 @@ def points(count: int) -> torch.Tensor:
 def test_a_map_has_the_peak_where_it_is_and_all_the_mass(space: RoundSpace, kappa: float) -> None:
     at = (37.0, -120.0)
     projection = EqualEarth((0.0, 100.0)) if space.name == "sphere" else Lambert((60.0, 0.0))
-    drawn = Map(space, projection).colouring(peaked(space, at, kappa), PlotSettings(scale="linear"))
-    pixels = pixels_of(projection)
+    ground = Map(space, projection)
+    drawn = ground.colouring(peaked(space, at, kappa), PlotSettings(scale="linear"), 3000)
+    pixels = ground.pixels(3000)
     values, within = drawn.places[pixels.shown] * drawn.shade.high, pixels.within
-    assert values[within].sum() * pixels.angle**2 == pytest.approx(1.0, abs=0.05)
-    best = pixels.latlon[within][values[within].argmax()]
+    assert values[within].sum() * float(pixels.side(pixels.points)) ** 2 == pytest.approx(
+        1.0, abs=0.05
+    )
+    best = to_latlon(space.vectors(pixels.points))[within][values[within].argmax()]
     cosine = float(np.prod(to_vectors([at, best]), axis=0).sum())
     assert (cosine if space.name == "sphere" else abs(cosine)) > math.cos(0.1)
 

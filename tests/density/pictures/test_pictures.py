@@ -21,15 +21,13 @@ from orbiflow.density import (
     Torus,
     UniformDensity,
     corner_picture,
-    density_on_grid,
     density_page,
     density_picture,
-    edge_pairs,
     flow_picture,
     samples_picture,
     to_vectors,
 )
-from orbiflow.density.pictures import square as density_square
+from orbiflow.density.pictures import density_on_grid, edge_pairs, grounds
 from orbiflow.density.pictures.colours import (
     chosen_scale,
     density_at,
@@ -203,11 +201,12 @@ def test_scales_are_chosen_and_checked():
 def test_the_centre_moves_the_picture_but_not_its_colours(monkeypatch):
     density, drawn = peaked(SPACES[0], 30.0, at=(0.1, 0.8)), []
     shades = lambda values, *_, **__: drawn.append(values) or shading(values)  # noqa: E731
-    monkeypatch.setattr(density_square, "shading", shades)
+    monkeypatch.setattr(grounds, "shading", shades)
     for center in ((0, 0), (180, 180)):
         assert density_png(density, center=center, width_px=200)
-    np.testing.assert_allclose(np.roll(drawn[0], 15, axis=(0, 1)), drawn[1], rtol=1e-6)
-    peak = np.unravel_index(drawn[0].argmax(), drawn[0].shape)
+    one, other = (values.reshape(30, 30).T for values in drawn)
+    np.testing.assert_allclose(np.roll(one, 15, axis=(0, 1)), other, rtol=1e-6)
+    peak = np.unravel_index(one.argmax(), one.shape)
     np.testing.assert_allclose((np.array(peak) + 0.5) / 30, (0.6, 0.3), atol=0.04)
     assert samples_png(density, points(9), points(9), center=(180, 180), width_px=300) != (
         samples_png(density, points(9), points(9), width_px=300)

@@ -10,6 +10,7 @@ import pypdfium2
 import pytest
 import torch
 
+from density.blends import bump
 from orbiflow.density import (
     PICTURES,
     Density,
@@ -20,7 +21,6 @@ from orbiflow.density import (
     Sphere,
     Torus,
     UniformDensity,
-    VonMisesDensity,
     density_to_bytes,
     plot_density,
 )
@@ -87,7 +87,7 @@ def test_one_pdf_has_a_page_a_figure(tmp_path: Path) -> None:
 def test_a_folder_may_be_called_like_a_pdf(tmp_path: Path) -> None:
     out = tmp_path / "plots.pdf"
     out.mkdir()
-    plot_density(VonMisesDensity(Torus(2)), out)
+    plot_density(bump(Torus(2)), out)
     assert "density.png" in names(out)
 
 

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.density import PlotSettings, ProjectivePlane, Sphere, Torus, to_vectors
-from orbiflow.density.pictures.maps import Map, meridian, parallel, pixels_of
+from orbiflow.density.pictures.maps import Map, meridian, parallel
 from orbiflow.density.pictures.projections import (
     Azimuthal,
     EqualEarth,
@@ -170,8 +170,8 @@ def test_both_ends_of_an_axis_are_drawn_at_one_place(seed: int, center: Any) -> 
 @given(maps)
 @settings(max_examples=15)
 def test_pixels_cover_the_map_and_measure_the_sphere(projection: Projection) -> None:
-    pixels = pixels_of(projection, 4000)
-    assert pixels.within.sum() <= len(pixels.latlon) == pixels.shown.sum()
+    pixels = Map(Sphere(), projection).pixels(4000)
+    assert pixels.within.sum() <= len(pixels.points) == pixels.shown.sum()
     ring = projection.outline()
     left, right, below, above = pixels.extent
     assert left < ring[:, 0].min() < ring[:, 0].max() < right
@@ -179,7 +179,7 @@ def test_pixels_cover_the_map_and_measure_the_sphere(projection: Projection) -> 
     whole = 4 * math.pi
     if isinstance(projection, Azimuthal):
         whole = 2 * math.pi * (1 - math.cos(math.radians(projection.radius)))
-    found = pixels.areas[pixels.within].sum() * pixels.angle**2
+    found = pixels.areas[pixels.within].sum() * float(pixels.side(pixels.points)) ** 2
     assert found == pytest.approx(whole, rel=0.02)
 
 

@@ -114,8 +114,7 @@ def test_logarithms_are_for_lines_alone(name: str, monkeypatch: pytest.MonkeyPat
         return np.log(values)
 
     pictures = "orbiflow.density.pictures"
-    for ground in ("square", "maps"):
-        monkeypatch.setattr(f"{pictures}.{ground}.log_natural", counted)
+    monkeypatch.setattr(f"{pictures}.grounds.log_natural", counted)
     monkeypatch.setattr(f"{pictures}.square._FINE_GRID", 30)
     monkeypatch.setattr(f"{pictures}.maps._PIXELS", 2000)
     density = broad(name)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from orbiflow.density import DensityEstimator, density_thumbnail
+from orbiflow.density import DensityEstimator
+from orbiflow.density.pictures import density_thumbnail
 from orbiflow.density.pictures.thumbnail import SIZE
 
 SPACES = {

@@ -1,6 +1,5 @@
 from .data_sets import DataComparison as DataComparison
 from .data_sets import Divergence as Divergence
-from .data_sets import Estimate as Estimate
 from .data_sets import compare_samples as compare_samples
 from .known_rows import RowSketch as RowSketch
 from .paired import Difference as Difference
@@ -11,7 +10,6 @@ from .paired import compare_scores as compare_scores
 from .paired import density_of as density_of
 from .paired import require_one_space as require_one_space
 from .paired import scores_of as scores_of
-from .resampling import TestResult as TestResult
 from .resampling import cross_validation_folds as cross_validation_folds
 from .resampling import mmd_test as mmd_test
 from .settings import ComparisonSettings as ComparisonSettings

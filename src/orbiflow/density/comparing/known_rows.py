@@ -14,10 +14,10 @@ from orbiflow.errors import OrbiflowError
 MAX_HASHES = 2048
 """Hashes in a sketch at most."""
 
-CELLS = 1e7
+CELLS_PER_TURN = 1e7
 """Cells in a turn, or in the sphere's radius, within which points are the same."""
 
-BITS = 53
+HASH_BITS = 53
 """Bits of a hash: such whole numbers are exact for every reader of JSON."""
 
 
@@ -81,16 +81,16 @@ def row_hashes(space: Space, data: ArrayLike) -> NDArray[np.uint64]:
     """
     points = space.to_chart(data)
     images = space.features(points) if space.is_round else points[None]
-    cells = np.rint(images[0].numpy() * CELLS).astype(np.int64)
+    cells = np.rint(images[0].numpy() * CELLS_PER_TURN).astype(np.int64)
     if not space.is_round:
-        cells %= int(CELLS)
+        cells %= int(CELLS_PER_TURN)
     elif len(images) > 1:  # an axis has two ends
         first = np.argmax(cells != 0, axis=1)
         cells *= np.sign(cells[np.arange(len(cells)), first])[:, None]
     found = np.zeros(len(cells), dtype=np.uint64)
     for column in cells.T:
         found = _mixed(found + np.uint64(0x9E3779B97F4A7C15) + column.astype(np.uint64))
-    return found >> np.uint64(64 - BITS)
+    return found >> np.uint64(64 - HASH_BITS)
 
 
 def _mixed(x: NDArray[np.uint64]) -> NDArray[np.uint64]:

@@ -20,7 +20,7 @@ from orbiflow.density.models import Density
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError
 
-BLOCK = 65_536
+BLOCK_ROWS = 65_536
 """Rows scored between two looks at whether to stop."""
 
 
@@ -310,7 +310,9 @@ def scores_of(
     points = density.space.to_chart(data)
     found: list[Sequence[float] | np.ndarray] = []
     with torch.no_grad():
-        for start in range(0, len(points), BLOCK):
+        for start in range(0, len(points), BLOCK_ROWS):
             told(start / len(points))
-            found.append(density.log_prob(points[start : start + BLOCK], measure="natural").numpy())
+            found.append(
+                density.log_prob(points[start : start + BLOCK_ROWS], measure="natural").numpy()
+            )
     return np.concatenate(found) if found else np.zeros(0)

@@ -136,14 +136,14 @@ def cross_validation_folds(
 MAX_ROWS = 3_000
 """Rows of both data sets together at most: the test looks at all their pairs."""
 
-QUANTILES = (0.005, 0.05, 0.4, 1.0)
+DISTANCE_QUANTILES = (0.005, 0.05, 0.4, 1.0)
 """Quantiles of the squared distances of pairs at which kernels have fallen to 1/e. Narrow kernels see
 clusters, the widest a shift."""
 
 PAIRS, MIN_SCALE = 500_000, 1e-9
 """Pairs drawn for the quantiles, and the least half of a kernel's squared width."""
 
-MOVED = 250
+BLOCK_LABELS = 250
 """Random labels computed at a time."""
 
 
@@ -299,7 +299,7 @@ def _scales(distances: Tensor, apart: Tensor, rng: np.random.Generator) -> list[
     """Return quantiles of half the squared distances of pairs that are not of one group."""
     pairs = torch.as_tensor(rng.integers(len(distances), size=(2, PAIRS)))
     found = distances[pairs[0], pairs[1]][apart[pairs[0], pairs[1]]]
-    quantiles = torch.tensor(QUANTILES, dtype=found.dtype)
+    quantiles = torch.tensor(DISTANCE_QUANTILES, dtype=found.dtype)
     return listed(torch.quantile(found, quantiles).clamp_min(MIN_SCALE))
 
 
@@ -338,7 +338,7 @@ def _flipped(first: Array, groups: Groups, permutations: int, rng: np.random.Gen
 
 def _squares(kernel: Tensor, weights: Tensor) -> Array:
     """Return the squared lengths (1 + P,) of sums of features with weights (N, 1 + P)."""
-    blocks = torch.split(weights, MOVED, dim=1)
+    blocks = torch.split(weights, BLOCK_LABELS, dim=1)
     return torch.cat([(block * (kernel @ block)).sum(dim=0) for block in blocks]).numpy()
 
 
@@ -347,7 +347,7 @@ def _pair_sums(kernel: Tensor, labels: Tensor) -> Array:
     rows = kernel.sum(dim=1)
     parts = [
         torch.stack([(block * (kernel @ block)).sum(dim=0), rows @ block])
-        for block in torch.split(labels, MOVED, dim=1)
+        for block in torch.split(labels, BLOCK_LABELS, dim=1)
     ]
     within, touching = torch.cat(parts, dim=1).numpy()
     between = touching - within

@@ -1,4 +1,4 @@
-"""Cross-validation: how well a density foretells rows that its fit has not seen."""
+"""Cross-validation: how well a density predicts rows that its fit has not seen."""
 
 from orbiflow.extras import door
 

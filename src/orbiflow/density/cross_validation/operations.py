@@ -40,7 +40,7 @@ def cross_validate(
     on_event: runtime.Sink = runtime.ignore,
     cancel: runtime.Cancel = runtime.Cancel(),
 ) -> runtime.Outcome:
-    """Cross-validate: how well does a density foretell rows that its fit has not seen?
+    """Cross-validate: how well does a density predict rows that its fit has not seen?
 
     Fits to all folds but one, for each in turn, here or on a Dask cluster, and scores the one held out,
     beside other settings at the same folds. Writes cv.csv, a line for each fold; rows.csv, the table

@@ -331,7 +331,7 @@ def _pictures(
 WIDTH, NAMES, MARGIN, STEP = 720, 300, 36, 34
 """Pixels: of the picture, of names at its left at most, of the free right margin, of a strip."""
 
-LETTER = 7.6
+LETTER_PX = 7.6
 """Largest width of a letter of a name, in pixels."""
 
 
@@ -343,8 +343,8 @@ def strips(lines: Sequence[Strip], label: str, *, zero: bool = False) -> dict[st
         return None
     ticks = _ticks(min(values), max(values))
     low, high = min(ticks[0], *values), max(ticks[-1], *values)
-    names = min(NAMES, 30 + LETTER * max(len(name) for name, *_ in lines))
-    room = int((names - 20) / LETTER)
+    names = min(NAMES, 30 + LETTER_PX * max(len(name) for name, *_ in lines))
+    room = int((names - 20) / LETTER_PX)
     decimals = max(0, -math.floor(math.log10(ticks[1] - ticks[0]) + 1e-9))
 
     def place(value: float) -> float:

@@ -1,10 +1,8 @@
 from .codes import CODES as CODES
 from .codes import codes_among as codes_among
 from .codes import refuse_codes as refuse_codes
-from .columns import ANGULAR as ANGULAR
 from .columns import DIRECTIONS as DIRECTIONS
 from .columns import ROTATIONS as ROTATIONS
-from .columns import VECTORS as VECTORS
 from .columns import Arrangement as Arrangement
 from .columns import arrangements as arrangements
 from .columns import check_columns as check_columns

@@ -23,7 +23,7 @@ CODES = frozenset({
 # fmt: on
 """Numbers, or their opposites, that tables have in the place of missing values; -1 is one as well."""
 
-HUGE = 1e15
+MAX_ANGLE = 1e15
 """What is larger is no angle: netCDF fills gaps with 9.97e36."""
 
 CODE_GAP = 1 / 36
@@ -54,7 +54,7 @@ def codes_among(column: Array, turn: float) -> list[float]:
     """
     distinct, counts = np.unique(column[np.isfinite(column)], return_counts=True)
     sizes = np.abs(distinct)
-    named = np.isin(sizes, list(CODES)) | (sizes > HUGE) | (distinct == -1)
+    named = np.isin(sizes, list(CODES)) | (sizes > MAX_ANGLE) | (distinct == -1)
     rest, often = distinct[~named], counts[~named] > 1
     beyond = np.abs(rest) > turn * (1 + TURN_TOLERANCE)
     if 2 * int(beyond.sum()) > len(rest):  # angles that go on turning
@@ -158,6 +158,6 @@ def refuse_no_places(values: Array, names: Sequence[str], cure: str) -> None:
         known = np.unique(
             column[np.isfinite(column) & (np.abs(column) > most * (1 + TURN_TOLERANCE))]
         )
-        codes = [v for v in known.tolist() if abs(v) in CODES or abs(v) > HUGE]
+        codes = [v for v in known.tolist() if abs(v) in CODES or abs(v) > MAX_ANGLE]
         if codes and len(codes) == len(known):
             raise SettingError(literal(f"column {name!r} has {_counted(codes, column)}: ") + cure)

@@ -22,7 +22,7 @@ CURES = {
 }
 """What to do with angles in other units than those that are read."""
 
-DAY = 24.0
+HOURS_PER_DAY = 24.0
 
 
 def refuse_foreign_units(names: Sequence[str], values: Array, unit: str | None) -> None:
@@ -52,7 +52,7 @@ def _unit_to_convert(name: str, least: float, most: float, unit: str | None) -> 
         return "gon"
     if _says_hours(words):
         converted = unit in ("radians", "turns") and most <= TURNS[unit] * (1 + TURN_TOLERANCE)
-        return "hours" if least >= 0 and most <= DAY and not converted else None
+        return "hours" if least >= 0 and most <= HOURS_PER_DAY and not converted else None
     found = foreign_unit(name)
     return None if found == "cycles" and unit == "turns" else found
 

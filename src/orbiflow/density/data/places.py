@@ -16,7 +16,7 @@ from orbiflow.errors import SettingError, literal
 FAR_FROM_NULL = 1.0
 """Degrees from latitude 0, longitude 0 within which there are no other places where these are a gap."""
 
-FULL = 0.75
+FULL_SHARE_OF_TURN = 0.75
 """Share of a turn of radians that values fill where they seem to be radians."""
 
 
@@ -28,7 +28,7 @@ def place_doubts(space: str, values: Array, names: Sequence[str], unit: str | No
     lat, lon = known.T
     doubts = _null_island(known, names) if space == "sphere" else []
     small = unit is None and _is_small(lat, lon)
-    if small and float(np.ptp(lon)) > FULL * 2 * math.pi:
+    if small and float(np.ptp(lon)) > FULL_SHARE_OF_TURN * 2 * math.pi:
         raise SettingError(
             literal(
                 f"latitudes ({names[0]}) are within pi/2 and longitudes ({names[1]}) fill 2 pi: they "

@@ -17,7 +17,7 @@ from orbiflow.errors import DataWarning
 DIP_DIRECTION = "dip_direction"
 """What the column of a strike is called once it holds directions of dip."""
 
-TURN = 360.0
+TURN_DEGREES = 360.0
 
 
 def strike_beside_dip(names: Sequence[str]) -> int | None:
@@ -55,7 +55,9 @@ def dip_directions(strikes: Array) -> Array:
     >>> dip_directions(np.array([0.0, 300.0, 999.0])).tolist()
     [90.0, 30.0, 999.0]
     """
-    return np.where(abs(strikes) > TURN, strikes, (strikes + TURN / 4) % TURN)
+    return np.where(
+        abs(strikes) > TURN_DEGREES, strikes, (strikes + TURN_DEGREES / 4) % TURN_DEGREES
+    )
 
 
 def strike_note(name: str) -> str:

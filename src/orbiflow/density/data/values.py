@@ -24,7 +24,7 @@ from orbiflow.density.data.names import (
     unit_named,
     words_of,
 )
-from orbiflow.density.data.places import FULL, place_doubts
+from orbiflow.density.data.places import FULL_SHARE_OF_TURN, place_doubts
 from orbiflow.density.data.units import TURN_TOLERANCE, TURNS, Unit, check_unit, is_angular
 from orbiflow.errors import DataWarning, SettingError, literal
 
@@ -186,7 +186,7 @@ def _other_unit(values: Array, unit: str) -> str | None:
     if (
         unit == "degrees"
         and most <= 2 * math.pi * (1 + TURN_TOLERANCE)
-        and wide > FULL * 2 * math.pi
+        and wide > FULL_SHARE_OF_TURN * 2 * math.pi
     ):
         return "all values are within 2 pi and fill it: if they are radians, give the unit radians"
     is_large = 90 < most <= 360 * (1 + TURN_TOLERANCE)
@@ -232,6 +232,6 @@ def fraction_doubts(values: Array, lengths: Sequence[float]) -> list[Doubt]:
         return []
     text = (
         "all coordinates lie in [0, 1), in the unit of the cell: if they are fractions of the cell, "
-        "say so (fractional)"
+        "give that option (fractional)"
     )
     return [Doubt(text, True)]

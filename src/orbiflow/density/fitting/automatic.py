@@ -75,10 +75,10 @@ from orbiflow.runtime import SideBySide
 LEAST_FLOW_ROWS = 300
 """With fewer, a flow is not tried: none has gained anything."""
 
-MEMBERS = 12
+CHAINS_PER_SIZE = 12
 """Chains of one size on tori of four or more angles, all folds together."""
 
-SCORED = 2_000
+MAX_SCORED_ROWS = 2_000
 """Rows over which the report's mean log density is taken: each costs all kernels."""
 
 FLOW_WORK = 4.0
@@ -242,7 +242,7 @@ def _rows(
 def _families(
     space: Space, folds: Folds, settings: DensitySettings, together: bool, narrowest: float
 ) -> list[Family]:
-    starts = max(1, round(MEMBERS / folds.used)) if space.dim > MOST_DIM else 1
+    starts = max(1, round(CHAINS_PER_SIZE / folds.used)) if space.dim > MOST_DIM else 1
     families: list[Family] = [
         KernelFamily(space, narrowest, repeats=not together),
         MixtureFamily(space, settings.seed, narrowest),
@@ -304,7 +304,7 @@ def _report(
         f"{held - uniform:.4f} nats above uniform",
         *map(str, parts),
     ]
-    some = folds.rows[:SCORED]
+    some = folds.rows[:MAX_SCORED_ROWS]
     mass = None
     if density.space.dim == 2:
         mass = 1.0

@@ -24,19 +24,19 @@ from orbiflow.density.models import (
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.typed_torch import linalg, special
 
-PRIOR, PRIOR_RESULTANT = 0.05, 0.9
+PRIOR_POINTS, PRIOR_RESULTANT = 0.05, 0.9
 """Prior points of each component and their mean cosine, so that none shrinks to a point."""
 
-SHARED = 5.0
+SCALE_PRIOR_POINTS = 5.0
 """Prior points that pull a component's weights of the scales to those of all."""
 
-RIDGE = 10.0
+SLOPE_PRECISION = 10.0
 """Prior precision of the slopes of the regressions."""
 
-STRAIGHT = 5
+STRAIGHT_ITERATIONS = 5
 """First iterations of EM, without regressions."""
 
-EVERY, IDLE = 5, 1e-3
+ITERATIONS_PER_LOOK, MIN_GAIN_NATS = 5, 1e-3
 """Iterations between looks at the held-out points, and nats between two of them that are too few."""
 
 
@@ -57,13 +57,13 @@ def fit_chain_mixture(
     mixture = best = start
     least = _nll(start, held)
     for iteration in range(1, iterations + 1):
-        mixture = step(mixture, bent=iteration > STRAIGHT)
-        if iteration % EVERY == 0 or iteration == iterations:
+        mixture = step(mixture, bent=iteration > STRAIGHT_ITERATIONS)
+        if iteration % ITERATIONS_PER_LOOK == 0 or iteration == iterations:
             score = _nll(mixture, held)
             gain = least - score
             if gain > 0:
                 best, least = mixture, score
-            if not gain > IDLE:
+            if not gain > MIN_GAIN_NATS:
                 break
     return best
 
@@ -153,9 +153,9 @@ class _Maximization:
         means[1:, :, 0] = center
         if bent:
             means[1:] = self._regressed(mixture, sums, center)
-        spread = self._spread(means, sums, precise)[1:] + PRIOR * (1 - PRIOR_RESULTANT)
+        spread = self._spread(means, sums, precise)[1:] + PRIOR_POINTS * (1 - PRIOR_RESULTANT)
         concentrations = mixture.concentrations.clone()
-        concentrations[1:] = concentration(1 - spread / (weight[:, None] + PRIOR))
+        concentrations[1:] = concentration(1 - spread / (weight[:, None] + PRIOR_POINTS))
         return VonMisesChains(
             mixture.space, self._weights(sums.counts), means, concentrations, mixture.order
         )
@@ -190,7 +190,9 @@ class _Maximization:
     def _weights(self, count: Tensor) -> Tensor:
         count = count.mT
         pooled = count[1:].sum(dim=0)
-        drawn = (count + SHARED * pooled / pooled.sum()) / (count.sum(1, keepdim=True) + SHARED)
+        drawn = (count + SCALE_PRIOR_POINTS * pooled / pooled.sum()) / (
+            count.sum(1, keepdim=True) + SCALE_PRIOR_POINTS
+        )
         drawn[0] = 1 / len(SCALES)
         total = count.sum(dim=1, keepdim=True) + 0.1
         return (drawn * total / total.sum()).log()
@@ -210,7 +212,7 @@ class _Maximization:
         found = torch.zeros_like(slopes)
         for i, used in enumerate(self.allowed):
             at = used.nonzero()[:, 0]
-            ridge = RIDGE / kappa[:, i, None] * torch.ones(len(at)).to(kappa)
+            ridge = SLOPE_PRECISION / kappa[:, i, None] * torch.ones(len(at)).to(kappa)
             ridge[:, 0] = 1e-6
             now = slopes[:, i, at]
             # the constant is free
@@ -286,28 +288,28 @@ def concentration(resultant: Tensor) -> Tensor:
 MOST_PARENTS = 3
 """The most parents of an angle."""
 
-PROPOSED = 2
+MAX_PROPOSED_PARENTS = 2
 """Number of angles that are tried as a further parent."""
 
 SIZES = (4, 8, 16, 32, 64, 128)
 """Numbers of components of a factor."""
 
-FIRST = 16
+FIRST_COMPONENTS = 16
 """Components with which parents are chosen, if there are rows for as many."""
 
-PER_COMPONENT = 20
+ROWS_PER_COMPONENT = 20
 """Rows that each component must have on average."""
 
-WORTHWHILE = 0.005
+WORTHWHILE_NATS = 0.005
 """Nats that a parent, or twice as many components, must gain."""
 
-SEARCHED = 4_000
+MAX_SEARCHED_ROWS = 4_000
 """The most rows by which the arrows are chosen."""
 
-ITERATIONS = 40
+MAX_ITERATIONS = 40
 """Maximum iterations of EM."""
 
-HARMONICS, NOISE = 4, 1e-3
+HARMONICS, ADDED_VARIANCE = 4, 1e-3
 """Waves of each angle by which dependence is screened, and what is added to their variances."""
 
 
@@ -324,7 +326,7 @@ def network_shapes(rows: Rows, held: Rows, generator: torch.Generator) -> Iterat
     The order is that of Prim's algorithm on the angles' dependence (as Chow and Liu, 1968), parents
     are taken one by one as long as they gain.
     """
-    rows = rows[:SEARCHED]
+    rows = rows[:MAX_SEARCHED_ROWS]
     seen = Screen(rows.points)
     order = seen.order()
     for place, axis in enumerate(order):
@@ -343,8 +345,8 @@ def fit_network(
 def _factor_shape(
     axis: int, before: list[int], seen: Screen, rows: Rows, held: Rows, generator: torch.Generator
 ) -> Shape:
-    most = max(SIZES[0], len(rows) // PER_COMPONENT)
-    first = max(size for size in SIZES if size <= min(FIRST, most))
+    most = max(SIZES[0], len(rows) // ROWS_PER_COMPONENT)
+    first = max(size for size in SIZES if size <= min(FIRST_COMPONENTS, most))
 
     def score(axes: tuple[int, ...], size: int) -> Tensor:
         chains = _fitted(rows, held, axes, size, generator)
@@ -354,17 +356,17 @@ def _factor_shape(
     parents: tuple[int, ...] = ()
     best = score((axis,), first)
     while len(parents) < min(MOST_PARENTS, len(before)):
-        proposed = seen.parents(axis, parents, before)[:PROPOSED]
+        proposed = seen.parents(axis, parents, before)[:MAX_PROPOSED_PARENTS]
         scores = {parent: score((*parents, parent, axis), first) for parent in proposed}
         parent = max(scores, key=lambda one: held.mean(scores[one]))
         gain = gain_of(scores[parent], best, held.weights)
-        if gain.nats <= max(WORTHWHILE, gain.error):
+        if gain.nats <= max(WORTHWHILE_NATS, gain.error):
             break
         parents, best = (*parents, parent), scores[parent]
     size, axes = first, (*parents, axis)
     while 2 * size <= min(SIZES[-1], most):
         value = score(axes, 2 * size)
-        if gain_of(value, best, held.weights).nats < WORTHWHILE:
+        if gain_of(value, best, held.weights).nats < WORTHWHILE_NATS:
             break
         size, best = 2 * size, value
     return Shape(axes, size)
@@ -375,7 +377,7 @@ def _fitted(
 ) -> VonMisesChains:
     own, beside = (Rows(part.points[:, list(axes)], part.weights) for part in (rows, held))
     start = spread_chains(Torus(len(axes)), own, size, torch.arange(len(axes)), generator)
-    return fit_chain_mixture(start, own, beside, ITERATIONS)
+    return fit_chain_mixture(start, own, beside, MAX_ITERATIONS)
 
 
 class Screen:
@@ -390,7 +392,7 @@ class Screen:
         seen = torch.cat([angle.cos(), angle.sin()], dim=2).flatten(1)
         self.dim = points.shape[1]
         self.covariance = torch.cov(seen.mT)
-        self.covariance += NOISE * torch.eye(len(self.covariance)).to(points)
+        self.covariance += ADDED_VARIANCE * torch.eye(len(self.covariance)).to(points)
 
     def order(self) -> list[int]:
         """Return the angle that says most about all, then those about which the ones before do."""

@@ -23,7 +23,7 @@ from orbiflow.density.spaces import Space
 from orbiflow.runtime import SideBySide, Tell
 from orbiflow.typed_torch import listed
 
-STEP = 0.85
+SHARE_LEFT_PER_TRY = 0.85
 """The share of a fold's work that is left after each thing that is tried."""
 
 FLOOR = "uniform"
@@ -73,7 +73,7 @@ class Course:
         self._done: list[float] = []
 
     def part(self, weight: float) -> Progress:
-        """Return what is told the share that is done of one more thing, and what is being done."""
+        """Return a function to call with the share that is done of one more thing, and what it is."""
         number = len(self._done)
         self._done.append(0.0)
 
@@ -91,13 +91,13 @@ class Fitted(NamedTuple):
     logs: dict[str, Tensor]
 
 
-FIRST_FOLD = 2.0
+FIRST_FOLD_WORK = 2.0
 """Work of a family in the first fold, which tries more, in that of another fold."""
 
 
 def work_of(families: int, used: int) -> float:
     """Return the weight of all fits of families to the folds in a `Course`."""
-    return families * (FIRST_FOLD + used - 1)
+    return families * (FIRST_FOLD_WORK + used - 1)
 
 
 def candidates_of(
@@ -119,7 +119,7 @@ def candidates_of(
         return [
             beside.begin(
                 partial(_fitted, family, folds, number, budget),
-                course.part(1.0 if number else FIRST_FOLD),
+                course.part(1.0 if number else FIRST_FOLD_WORK),
             )
             for family in reversed(families)  # the longest first
         ][::-1]
@@ -158,7 +158,7 @@ def _fitted(family: Family, folds: Folds, number: int, budget: Budget, say: Tell
 
     def tell(what: str, share: float | None = None) -> None:
         # how much there is to try is not known beforehand
-        done = 1 - STEP ** next(tried) if share is None else share
+        done = 1 - SHARE_LEFT_PER_TRY ** next(tried) if share is None else share
         say(done, f"held-out part {number + 1} of {folds.used}: {what}")
 
     held = folds.held(number)

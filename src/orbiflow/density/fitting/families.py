@@ -37,17 +37,17 @@ SMALLEST_CHAINS = 4
 MOST_MIXED, MOST_CHAINED = 20_000, 12_000
 """Rows that mixtures and chains are fitted to at most."""
 
-TELLING = 500
+MIN_TELLING_ROWS = 500
 """Rows held out by which kernels without a weight, and without a neighbour of any, are left out; in
 more than `MOST_DIM` dimensions all are of use."""
 
-DEAR, PROMISING = 20_000, 1e-4
+MANY_ROWS, PROMISING_WEIGHT = 20_000, 1e-4
 """Rows from which kernels are judged by all rows held out only if some of these give them a weight."""
 
-CLEARLY = 2.0
+CLEARLY_WORSE_ERRORS = 2.0
 """Standard errors by which a larger mixture must be worse to be the last that is tried."""
 
-ITERATIONS = 60
+MAX_ITERATIONS = 60
 """Maximum iterations of EM."""
 
 Say = Callable[[str], None]
@@ -98,10 +98,10 @@ class KernelFamily(Family):
     def fitted(self, number: int, train: Rows, held: Rows, say: Say) -> dict[str, Density]:
         say("kernels")
         found = self._estimates(train, self._names)
-        if number == 0 and len(held) >= TELLING and self.space.dim <= MOST_DIM:
+        if number == 0 and len(held) >= MIN_TELLING_ROWS and self.space.dim <= MOST_DIM:
             self._names = list(found)
-            if len(train) >= DEAR and len(held) >= 2 * TELLING:
-                self.keep(self._promising(found, held[:TELLING]))
+            if len(train) >= MANY_ROWS and len(held) >= 2 * MIN_TELLING_ROWS:
+                self.keep(self._promising(found, held[:MIN_TELLING_ROWS]))
                 found = {name: found[name] for name in self._names}
         return found
 
@@ -113,7 +113,7 @@ class KernelFamily(Family):
         weights = stacking_weights(torch.stack([own[name] for name in names]), held.weights)
         best = max(found, key=lambda name: held.mean(own[name]))
         kept = zip(names, weights, strict=True)
-        return {best, *(name for name, weight in kept if name and weight >= PROMISING)}
+        return {best, *(name for name, weight in kept if name and weight >= PROMISING_WEIGHT)}
 
     def final(self, rows: Rows, folds: list[dict[str, Density]], names: list[str]) -> list[Density]:
         del folds
@@ -205,7 +205,7 @@ class ChainFamily(SizedFamily):
             turned = number + turn > 0
             order = torch.randperm(self.space.dim, generator=generator) if turned else natural
             start = spread_chains(self.space, train, size, order, generator)
-            return fit_chain_mixture(start, train, held, ITERATIONS)
+            return fit_chain_mixture(start, train, held, MAX_ITERATIONS)
 
         if self.sizes is None:
             sizes = [k for k in SIZES if k >= SMALLEST_CHAINS and CHAIN_ROWS * k <= len(train)]
@@ -256,7 +256,7 @@ def _grown(fit: Callable[[int], Density], sizes: Iterable[int], held: Rows) -> d
             score = at_observed(part, held.points)
         if best is not None:
             gain = gain_of(score, best, held.weights)
-            if gain.nats < -CLEARLY * gain.error:
+            if gain.nats < -CLEARLY_WORSE_ERRORS * gain.error:
                 break
         if best is None or held.mean(score) > held.mean(best):
             best = score

@@ -58,7 +58,7 @@ MOST_HELD = 4096
 CELLS, LEAST_CELLS = 8, 64
 """Cells a wave, and a side at least, in which points are merged; where they crowd in smaller ones."""
 
-MERGED, CROWD = 4096, 2
+MERGED_POINTS, CROWDED_SHARES = 4096, 2
 """Into how many points the data are merged, roughly; and of how many fair shares a cell is too full."""
 
 
@@ -148,7 +148,7 @@ def _stage(
 def _refined_on(train: Rows, validation: Rows, max_frequency: int) -> tuple[Rows, Rows]:
     """Return the merged rows that refinement trains on, and those that it is scored on."""
     cells = max(LEAST_CELLS, CELLS * max_frequency)
-    train = merged(train, cells, crowd=math.ceil(CROWD * len(train) / MERGED))
+    train = merged(train, cells, crowd=math.ceil(CROWDED_SHARES * len(train) / MERGED_POINTS))
     # never merged: means of cells would call overfitting to means of cells good
     held = validation[:MOST_HELD]
     if held.weights is not None:
@@ -267,21 +267,21 @@ def _matched(train: Rows, generator: torch.Generator) -> Tensor:
     return train.points[rows[torch.randperm(count, generator=generator)]]
 
 
-ORDER = 3
+RIDGE_ORDER = 3
 """Of the derivatives that the ridge holds small: the displacements are smooth, their noise is not."""
 
-RIDGE = 1e-4
+RIDGE_WEIGHT = 1e-4
 """Weight of E|V|^2 + E|grad^3 V|^2, lengths in wavelengths, beside the data's 1."""
 
-REPEATS = 2
+TIMES_PER_GEODESIC = 2
 """Times at each geodesic and segment."""
 
-GROUP = 400
+MATCHED_AT_ONCE = 400
 """Points matched optimally at a time: the cost of an assignment grows with the cube."""
 
 
 def coupled(
-    space: Space, start: Tensor, end: Tensor, *, group: int = GROUP
+    space: Space, start: Tensor, end: Tensor, *, group: int = MATCHED_AT_ONCE
 ) -> tuple[Tensor, Tensor]:
     """Pair base points with data points so that their geodesics are short.
 
@@ -305,7 +305,7 @@ def match_flow(
     start: Tensor,
     move: Tensor,
     *,
-    ridge: float = RIDGE,
+    ridge: float = RIDGE_WEIGHT,
     iterations: int = 15,
     generator: torch.Generator | None = None,
 ) -> None:
@@ -313,15 +313,15 @@ def match_flow(
 
     Segment k of K regresses the displacements at points on the geodesics at times in [k / K, (k + 1) /
     K] (Lipman et al., Flow Matching for Generative Modeling, 2023). A segment of duration 1 carries
-    what takes time 1 / K, hence the factor. At each geodesic and segment there are `REPEATS` times.
-    `iterations` are those of conjugate gradients at most.
+    what takes time 1 / K, hence the factor. At each geodesic and segment there are
+    `TIMES_PER_GEODESIC` times. `iterations` are those of conjugate gradients at most.
     """
     count = len(fields)
     for k, field in enumerate(fields):
-        shape = (REPEATS, len(start), 1)
+        shape = (TIMES_PER_GEODESIC, len(start), 1)
         time = torch.rand(shape, dtype=start.dtype, generator=generator)
         points = (start + (k + time) / count * move).reshape(-1, space.dim)
-        values = (move / count).expand(REPEATS, -1, -1).reshape(-1, space.dim)
+        values = (move / count).expand(TIMES_PER_GEODESIC, -1, -1).reshape(-1, space.dim)
         field.parameters_.copy_(_least_squares(field, points, values, ridge, iterations))
 
 
@@ -330,7 +330,7 @@ def _least_squares(
 ) -> Tensor:
     size = len(points)
     magnitude = torch.as_tensor(field.basis.magnitude).to(points)
-    weight = ridge * (1 + magnitude ** (2 * ORDER)) * field.scale**2
+    weight = ridge * (1 + magnitude ** (2 * RIDGE_ORDER)) * field.scale**2
 
     def normal(c: Tensor) -> Tensor:
         field.parameters_.copy_(c)

@@ -27,11 +27,11 @@ from orbiflow.runtime import Tell
 FEW_ROWS, MANY_ROWS = 5_000, 20_000
 """With fewer a flow is fitted in one stage; from the latter on it may be finer."""
 
-LIKELY = 1.5
+LIKELY_ERRORS = 1.5
 """Standard errors that a flow must gain over two tenths where one tenth is not sure of it."""
 
 
-FIRST = 2 / 3
+FIRST_TENTH_SHARE = 2 / 3
 """Of the work told, for the first tenth: there is seldom a second."""
 
 
@@ -60,7 +60,7 @@ def flow_beside(
     if budget.is_spent:
         return None
     train = folds.train(number)
-    begin, end = ((0.0, FIRST), (FIRST, 1.0))[number]
+    begin, end = ((0.0, FIRST_TENTH_SHARE), (FIRST_TENTH_SHARE, 1.0))[number]
     return fit_density(
         space,
         train.points,
@@ -129,7 +129,7 @@ def try_flow(
     sure = Gain(worth.gain, worth.error).is_sure
     if kept and not sure and folds.used > 1 and (second := fitted(1)) is not None:
         worth = worth_of(second[0], 1)
-        kept = _is_worth_it(worth) and worth.gain >= LIKELY * worth.error
+        kept = _is_worth_it(worth) and worth.gain >= LIKELY_ERRORS * worth.error
     if not kept:
         worth = replace(worth, share=0.0, gain=0.0, error=0.0)
     return TriedFlow(density if kept else None, worth.share, (worth,), report)

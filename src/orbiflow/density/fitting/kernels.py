@@ -13,11 +13,17 @@ from scipy.spatial import KDTree
 from scipy.special import ive
 from torch import Tensor
 
-from orbiflow.density.fitting.chains import PRIOR, PRIOR_RESULTANT, concentration, far_apart
+from orbiflow.density.fitting.chains import PRIOR_POINTS, PRIOR_RESULTANT, concentration, far_apart
 from orbiflow.density.fitting.likelihood import training
 from orbiflow.density.fitting.repeats import places
 from orbiflow.density.fitting.rows import Rows, is_whole
-from orbiflow.density.models import FAINT, LOG2_E, SHARPEST, AdaptiveKernels, kernel_rows
+from orbiflow.density.models import (
+    FAINT_LOG,
+    LOG2_E,
+    MAX_CONCENTRATION,
+    AdaptiveKernels,
+    kernel_rows,
+)
 from orbiflow.density.spaces import Space
 from orbiflow.typed_torch import linalg, special
 
@@ -28,7 +34,7 @@ NARROWEST, WIDEST = 1e7, 0.5
 """The largest and the least concentration: a deviation of 0.02 degrees, or nearly uniform. Rows that
 crowd more ask for narrower kernels, see `narrowest_for`."""
 
-CROWDED, EVEN = 0.1, 0.1
+CROWDED_SHARE, CROWDED_RATIO = 0.1, 0.1
 """The share of the rows that ask for narrower kernels, and how much nearer than in an even spread of
 all rows their neighbours must be."""
 
@@ -40,7 +46,8 @@ def narrowest_for(space: Space, points: Tensor) -> tuple[float, bool]:
     """Return the concentration of the narrowest kernels that points (N, d) ask for.
 
     It is `NARROWEST`, which blurs 2 km on earth, or more where many rows have neighbours that such
-    kernels could not tell apart; `SHARPEST` at most. Second comes whether most rows ask for more.
+    kernels could not tell apart; `MAX_CONCENTRATION` at most. Second comes whether most rows ask for
+    more.
     """
     counts, place = places(points)
     first = torch.empty_like(counts).scatter_(0, place, torch.arange(len(points)))
@@ -50,13 +57,15 @@ def narrowest_for(space: Space, points: Tensor) -> tuple[float, bool]:
     if near < 1:
         return NARROWEST, False
     away2 = spreads(space, some, [near], MOST_LOOKED_AT)[0].mean(dim=1).sort().values
-    crowded = float(away2[int(CROWDED * (len(away2) - 1))])
+    crowded = float(away2[int(CROWDED_SHARE * (len(away2) - 1))])
     # the mean side of a cell that has one of the rows
     even = 2 * math.pi * len(some) ** (-1 / space.dim)
-    if crowded * SCALES[0] * NARROWEST > 1 or crowded > (EVEN * even) ** 2:
+    if crowded * SCALES[0] * NARROWEST > 1 or crowded > (CROWDED_RATIO * even) ** 2:
         return NARROWEST, False
-    nearest, median = (float(away2[int(p * (len(away2) - 1))]) for p in (CROWDED**2, 0.5))
-    return min(SHARPEST, 1 / (SCALES[0] * nearest)), 1 / (SCALES[1] * median) > SHARPEST
+    nearest, median = (float(away2[int(p * (len(away2) - 1))]) for p in (CROWDED_SHARE**2, 0.5))
+    return min(MAX_CONCENTRATION, 1 / (SCALES[0] * nearest)), 1 / (
+        SCALES[1] * median
+    ) > MAX_CONCENTRATION
 
 
 def _near_concentrations(
@@ -76,7 +85,7 @@ def limit_notes(space: Space, crowded: bool) -> list[str]:
     """Return what to say where most rows are closer together than kernels can be narrow."""
     if not crowded:
         return []
-    least = SHARPEST**-0.5
+    least = MAX_CONCENTRATION**-0.5
     return [
         f"most rows lie closer together than {least:.0e} radians ({least / space.step_angle(1.0):.1g} "
         "in the unit of the data), and the density cannot tell them apart"
@@ -100,21 +109,21 @@ def spreads(
         square = square.sum(dim=-1, keepdim=True) / space.dim
     else:  # a chord's square is nearly the angle's
         square = square[..., : space.dim] + square[..., space.dim :]
-    return [square[:, :m].mean(dim=1) + 1 / SHARPEST for m in neighbours]
+    return [square[:, :m].mean(dim=1) + 1 / MAX_CONCENTRATION for m in neighbours]
 
 
 MOST_CENTERS, MOST_IMAGES = 20_000, 40_000
 """The most rows that have a kernel in an estimate, and the most kernels: one for each of its images."""
 
-LADDER = 27
+LADDER_RUNGS = 27
 """Number of widths from `WIDEST` to `NARROWEST`; neighbours differ by a factor of 1.4."""
 
 
 def ladder(narrowest: float) -> list[float]:
     """Return concentrations from `WIDEST` to `narrowest`; beyond `NARROWEST` there are more of them."""
-    rungs: list[float] = np.geomspace(WIDEST, min(NARROWEST, narrowest), LADDER).tolist()
+    rungs: list[float] = np.geomspace(WIDEST, min(NARROWEST, narrowest), LADDER_RUNGS).tolist()
     if narrowest > NARROWEST:
-        more = math.ceil((LADDER - 1) * math.log(narrowest / NARROWEST, NARROWEST / WIDEST))
+        more = math.ceil((LADDER_RUNGS - 1) * math.log(narrowest / NARROWEST, NARROWEST / WIDEST))
         rungs += np.geomspace(NARROWEST, narrowest, more + 1)[1:].tolist()
     return rungs
 
@@ -168,7 +177,7 @@ def even_kernels(space: Space, centers: Tensor, kappa: float, weights: Tensor) -
     return AdaptiveKernels(space, centers, centers.new_full((len(centers), width), kappa), weights)
 
 
-ITERATIONS, CONVERGED = 60, 1e-4
+MAX_ITERATIONS, MIN_GAIN_NATS = 60, 1e-4
 """The most iterations of EM, and nats that each must gain."""
 
 BLOCK, BLOCK_ENTRIES = 4_096, 2**18
@@ -183,7 +192,7 @@ def fit_mixture(
     train: Rows,
     components: int,
     *,
-    iterations: int = ITERATIONS,
+    iterations: int = MAX_ITERATIONS,
     narrowest: float = NARROWEST,
     generator: torch.Generator,
 ) -> AdaptiveKernels:
@@ -225,9 +234,9 @@ def fit_mixture(
         count, known, total, score = _expectation(space, every, mean, kappa, weights)
         weights = (count + 0.01) / (count + 0.01).sum()
         mean, length = _directions(space, total)
-        resultant = (length + PRIOR * PRIOR_RESULTANT) / (known + PRIOR)
+        resultant = (length + PRIOR_POINTS * PRIOR_RESULTANT) / (known + PRIOR_POINTS)
         kappa = of_mean(resultant).clamp(WIDEST / 100, narrowest)
-        if score - last < CONVERGED * len(train):
+        if score - last < MIN_GAIN_NATS * len(train):
             break
         last = score
     return AdaptiveKernels(space, space.from_features(mean), kappa, weights)
@@ -256,7 +265,7 @@ def _expectation(
             share += (absent @ (special.i0e(kappa).log() + kappa).mT)[:, None]
         flat = share.flatten(1)
         top = flat.amax(dim=1)
-        flat.sub_(top[:, None]).clamp_min_(FAINT).mul_(LOG2_E).exp2_()
+        flat.sub_(top[:, None]).clamp_min_(FAINT_LOG).mul_(LOG2_E).exp2_()
         every = flat.sum(dim=1)
         likelihood, row = every.log() + top, every.reciprocal()
         if own is not None:

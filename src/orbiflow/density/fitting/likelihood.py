@@ -23,13 +23,13 @@ from orbiflow.fields import InvariantField
 from orbiflow.runtime import one_thread
 from orbiflow.typed_torch import unique
 
-ORDER = 3
+ROUGHNESS_ORDER = 3
 """Order of the derivatives whose energy is the roughness, so that smooth displacements cost little."""
 
-EVERY = 3
+ITERATIONS_PER_SCORE = 3
 """Iterations between scores of the validation points."""
 
-PATIENCE = 12
+MAX_IDLE_ITERATIONS = 12
 """Iterations without a better validation score after which refinement ends."""
 
 MOST_EVALUATIONS = 10**9
@@ -41,7 +41,7 @@ Watch = Callable[[int, float, float], None]
 HopelessAt = Callable[[float], bool]
 """Whether to end a descent that may still gain so many nats."""
 
-HOPES = {0.25: 4.0, 0.5: 2.0}
+HOPED_GAINS = {0.25: 4.0, 0.5: 2.0}
 """What a descent may still gain after these shares of its iterations, in gains of the second half of
 those so far: with each doubling of the iterations the gains become smaller."""
 
@@ -51,7 +51,7 @@ class Refinement:
     """The course of a stage of refinement.
 
     - `train`, `validation`: Mean negative log densities with respect to the square, at the start, every
-      `EVERY` iterations and at the end.
+      `ITERATIONS_PER_SCORE` iterations and at the end.
     - `best`: The entry whose parameters were kept.
     - `stopped`: What ended it: "iterations", "validation", "converged", "outdone", "evaluations" or
       "time".
@@ -89,7 +89,7 @@ class Objective:
         self._weights: list[Tensor] = []
         for field in self.fields:  # of each coefficient's square, (P,)
             magnitude = torch.as_tensor(field.basis.magnitude).to(field.parameters_)
-            self._weights.append(roughness * magnitude ** (2 * ORDER))
+            self._weights.append(roughness * magnitude ** (2 * ROUGHNESS_ORDER))
         self.last = math.inf
 
     def get(self) -> Array:
@@ -147,9 +147,9 @@ def refine(
     """Descend on the negative log-likelihood, and leave the flow's parameters best on `held`.
 
     Canonical points (N, d) are in the parameters' dtype; weights, if there are any, have the sum 1. It
-    ends after `iterations`, or `PATIENCE` of them that do not improve the held-out score, or when the
-    `budget` is spent, or where `HOPES` ask if it is `hopeless`, which may look at the density. `watch`
-    is told every score.
+    ends after `iterations`, or `MAX_IDLE_ITERATIONS` of them that do not improve the held-out score, or
+    when the `budget` is spent, or where `HOPED_GAINS` ask if it is `hopeless`, which may look at the
+    density. `watch` is called with every score.
     """
     budget = budget or Budget()
     began = time.monotonic()
@@ -188,7 +188,7 @@ def refine(
 
 
 class _Descent:
-    """The iterates of a descent: every `EVERY`-th is scored, and so is the last."""
+    """The iterates of a descent: every `ITERATIONS_PER_SCORE`-th is scored, and so is the last."""
 
     def __init__(
         self,
@@ -199,7 +199,7 @@ class _Descent:
         hopeless: HopelessAt | None,
     ) -> None:
         self.objective, self.held, self.watch = objective, held, watch
-        self.hopes = {share * iterations: hope for share, hope in HOPES.items()}
+        self.hopes = {share * iterations: hope for share, hope in HOPED_GAINS.items()}
         self.hopeless = hopeless
         self.done, self.best = 0, 0
         self.latest = self.kept = objective.get()
@@ -211,19 +211,19 @@ class _Descent:
         """Take an iterate."""
         self.done += 1
         self.latest, self.nll = np.array(xk), self.objective.last
-        if self.done % EVERY == 0:
+        if self.done % ITERATIONS_PER_SCORE == 0:
             self._look()
-            if EVERY * (len(self.scores) - 1 - self.best) >= PATIENCE:
+            if ITERATIONS_PER_SCORE * (len(self.scores) - 1 - self.best) >= MAX_IDLE_ITERATIONS:
                 raise Stop("validation")
             for asked, hope in self.hopes.items():
-                if self.hopeless and self.done - EVERY < asked <= self.done:
+                if self.hopeless and self.done - ITERATIONS_PER_SCORE < asked <= self.done:
                     halfway = self.scores[min(len(self.scores) // 2, len(self.scores) - 2)]
                     if self.hopeless(hope * (halfway - self.scores[-1])):
                         raise Stop("outdone")
 
     def finish(self) -> None:
         """Leave the best iterate in place."""
-        if self.done % EVERY:
+        if self.done % ITERATIONS_PER_SCORE:
             self._look()
         self.objective.set(self.kept)
 
@@ -243,7 +243,7 @@ class _Descent:
         return float(_nll(density.with_steps(2 * density.flow.steps), self.held))
 
 
-LEVELS = 5
+MAX_HALVINGS = 5
 """Halvings of the cells at most: a point is then known to 1/32 of a cell."""
 
 
@@ -267,12 +267,12 @@ def merged(rows: Rows, cells: int, crowd: int) -> Rows:
     cells = cells * int(high)
     group = torch.zeros(len(points), dtype=torch.long)
     left, groups = torch.arange(len(points)), 0
-    for level in range(LEVELS + 1):
+    for level in range(MAX_HALVINGS + 1):
         side = cells << level
         cell = ((points[left] - low) / high * side).floor().clamp(0, side - 1).long()
         label = (cell * side ** torch.arange(points.shape[1]).flip(0)).sum(dim=1)
         _, where, counts = unique(label, return_inverse=True, return_counts=True)
-        settled = (counts[where] <= crowd) | (level == LEVELS)
+        settled = (counts[where] <= crowd) | (level == MAX_HALVINGS)
         group[left[settled]] = groups + where[settled]
         left, groups = left[~settled], groups + len(counts)
         if not len(left):
@@ -297,7 +297,7 @@ class Budget:
     """Counts evaluations of an objective, and looks at the clock between them.
 
     A fit that ends by its evaluations is the same on a busy machine; one that ends by time is not, so
-    it has to say so: `notes`.
+    its report says it: `notes`.
 
     >>> budget = Budget(evaluations=1)
     >>> budget.spend()

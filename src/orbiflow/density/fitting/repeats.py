@@ -10,10 +10,10 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.fitting.rounding import (
-    FEW,
+    FEW_REPEATS_SHARE,
     FEWEST_OF_STEPS,
     FEWEST_VALUES,
-    MANY,
+    MAX_REPEATS_RATIO,
     Heap,
     are_parts_of,
     coarser_step,
@@ -25,14 +25,14 @@ from orbiflow.density.fitting.rounding import (
 )
 from orbiflow.density.spaces import Space, Torus, whole_turn
 
-SAME = 1e-13
+SAME_PLACE = 1e-13
 """Difference of chart coordinates within which points are the same: far below what kernels resolve."""
 
 
 def places(points: Tensor) -> tuple[Tensor, Tensor]:
     """Return the number of points (N, d) at each different place (M,), and the place (N,) of each."""
     # rounding keeps together what differs by the projection's last digits
-    table = (points.detach().cpu() / SAME).round().numpy()
+    table = (points.detach().cpu() / SAME_PLACE).round().numpy()
     order = np.lexsort(table.T[::-1])
     ordered = table[order]
     begins = np.ones(len(table), dtype=bool)
@@ -43,7 +43,7 @@ def places(points: Tensor) -> tuple[Tensor, Tensor]:
     return torch.as_tensor(np.bincount(number)), torch.as_tensor(place)
 
 
-POLAR = 1e-6
+POLE_DEGREES = 1e-6
 """Degrees from a pole within which the longitude is not looked at."""
 
 
@@ -73,7 +73,7 @@ class Repeats:
     @property
     def is_rounding(self) -> bool:
         """Whether rounding explains the repeats."""
-        return self.explained is not None and self.explained * MANY >= 1
+        return self.explained is not None and self.explained * MAX_REPEATS_RATIO >= 1
 
     @property
     def can_be_undone(self) -> bool:
@@ -172,7 +172,7 @@ def repeats_of(space: Space, points: Tensor) -> Repeats:
     if rows and all(step or not moves for step, moves in zip(steps, moving, strict=True)):
         explained = share_explained(data, steps, turns, moving)
         found = replace(found, step=max(step or 0.0 for step in steps), explained=explained)
-    if found.step is not None and not found.is_rounding and rows > FEW * len(points):
+    if found.step is not None and not found.is_rounding and rows > FEW_REPEATS_SHARE * len(points):
         coarse = [
             coarser_step(own, step, max(turns)) for own, step in zip(data.T, steps, strict=True)
         ]
@@ -180,7 +180,7 @@ def repeats_of(space: Space, points: Tensor) -> Repeats:
         twice = replace(found, step=max(step or 0.0 for step in coarse), explained=again)
         if twice.is_rounding:
             found, steps = twice, coarse
-    if rows <= FEW * len(points):
+    if rows <= FEW_REPEATS_SHARE * len(points):
         spread = [spread_of(own, step) for own, step in zip(data.T, steps, strict=True)]
     elif found.is_rounding:
         spread = [known_step(step, turn) for step, turn in zip(steps, turns, strict=True)]
@@ -218,7 +218,7 @@ def _heaps(
     if any(moves and not step for step, moves in zip(coarse, moving, strict=True)):
         return heaps  # a column that is not rounded: whole rows do not repeat by rounding
     explained = share_explained(some, coarse, turns, moving)
-    return heaps if explained is None or explained * MANY >= 1 else None
+    return heaps if explained is None or explained * MAX_REPEATS_RATIO >= 1 else None
 
 
 def spread_evenly(
@@ -249,7 +249,7 @@ def _coordinates(space: Space, points: Tensor) -> Array | None:
     if not space.has_chart or data.shape[1] != space.dim:
         return None
     if space.is_round:  # at a pole any longitude is as good
-        data[abs(data[:, 0]) > 90 - POLAR, 1] = 0.0
+        data[abs(data[:, 0]) > 90 - POLE_DEGREES, 1] = 0.0
     return data
 
 

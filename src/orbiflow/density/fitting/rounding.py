@@ -15,17 +15,36 @@ STEPS = tuple(m * 10.0**e for e in range(2, -9, -1) for m in (5, 2, 1))
 OFF, MOST_OFF = 1e-11, 1e-3
 """Rounding errors of values, relative to the largest, and the largest share of a step they may be."""
 
-MANY = 2.0
+MAX_REPEATS_RATIO = 2.0
 """If there are more than so many times the repeats that rounding explains, they are real."""
 
-PARTS = (16, 24, 32, 36, 48, 64, 72, 120, 144, 180, 240, 360, 720, 1440, 2160, 4320, 10_800, 21_600)
+PARTS_OF_TURN = (
+    16,
+    24,
+    32,
+    36,
+    48,
+    64,
+    72,
+    120,
+    144,
+    180,
+    240,
+    360,
+    720,
+    1440,
+    2160,
+    4320,
+    10_800,
+    21_600,
+)
 """Parts of a turn to which directions are rounded before they are rounded again: points of the compass,
 hours, degrees, minutes of time and of arc."""
 
-DEGREES = 360.0
+TURN_DEGREES = 360.0
 """The turn of degrees, of which the steps of a heap are whole parts."""
 
-COARSER = 3.0
+MIN_COARSENING = 3.0
 """How many times as large as the step of all values such a step is at least."""
 
 FEWEST_VALUES = 8
@@ -38,7 +57,7 @@ ROWS_PER_VALUE = 8
 """Rows for each different value from which a column is rounded coarsely, though no rows repeat."""
 
 
-FEW = 0.01
+FEW_REPEATS_SHARE = 0.01
 """The share of rows that repeat another up to which it does not matter why they do."""
 
 
@@ -74,8 +93,8 @@ def coarser_step(column: Array, step: float | None, turn: float) -> float | None
     if step is None:
         return None
     values = np.unique(column)
-    for coarse in sorted({turn / parts for parts in PARTS} - {0.0}, reverse=True):
-        if coarse < COARSER * step:
+    for coarse in sorted({turn / parts for parts in PARTS_OF_TURN} - {0.0}, reverse=True):
+        if coarse < MIN_COARSENING * step:
             break
         if _are_multiples(values, coarse, 0.0, 0.51 * step):
             return coarse
@@ -109,7 +128,7 @@ def known_step(step: float | None, turn: float) -> float:
 
 def are_parts_of(column: Array, step: float, turn: float) -> bool:
     """Return whether values (N,) are multiples of a step that is a usual part of a turn."""
-    is_usual = _is_whole(turn / step) and round(turn / step) in (8, 12, *PARTS)
+    is_usual = _is_whole(turn / step) and round(turn / step) in (8, 12, *PARTS_OF_TURN)
     return is_usual and _are_multiples(column, step, turn, _off(column))
 
 
@@ -122,7 +141,7 @@ def spread_of(column: Array, step: float | None) -> float:
     if values < FEWEST_VALUES or len(column) < ROWS_PER_VALUE * values:
         return 0.0
     explained = _explained(cells[:, None])
-    return step if explained is not None and explained * MANY >= 1 else 0.0
+    return step if explained is not None and explained * MAX_REPEATS_RATIO >= 1 else 0.0
 
 
 def share_explained(
@@ -221,9 +240,9 @@ def _count_at(values: Array, counts: NDArray[np.int64], step: float, turn: float
 def _heap_steps(step: float | None, turn: float, values: Array) -> list[float]:
     """Return steps, the largest first, of which those of a heap may be multiples of a finer one."""
     finer, width = step or _off(values) / MOST_OFF, float(np.ptp(values))
-    steps = {*STEPS, *(turn / parts for parts in (8, 12, *PARTS))} - {0.0}
+    steps = {*STEPS, *(turn / parts for parts in (8, 12, *PARTS_OF_TURN))} - {0.0}
     fit = [s for s in steps if 2 * finer <= s * (1 + OFF) and s * (FEWEST_VALUES - 1) <= width]
-    if turn == DEGREES:
+    if turn == TURN_DEGREES:
         fit = [s for s in fit if _is_whole(turn / s)]
     return sorted((s for s in fit if step is None or _is_whole(s / step)), reverse=True)
 
@@ -241,13 +260,13 @@ def _is_heap(
     if len(coarse) < FEWEST_VALUES:
         return False
     heaped = _explained(coarse, counts[inside] * heap.of_multiples)
-    if heaped is None or heaped * MANY < 1:
+    if heaped is None or heaped * MAX_REPEATS_RATIO < 1:
         return False
     rest = counts * (1 - inside * heap.of_multiples)
-    if step is None or rest.sum() < len(values) * (1 + FEW):
+    if step is None or rest.sum() < len(values) * (1 + FEW_REPEATS_SHARE):
         return True
     explained = _explained(cells_of(values, step)[:, None], rest)
-    return explained is None or explained * MANY >= 1
+    return explained is None or explained * MAX_REPEATS_RATIO >= 1
 
 
 def _off(values: Array) -> float:

@@ -69,7 +69,7 @@ def effective_rows(weights: Tensor) -> float:
     return float(weights.sum() ** 2 / weights.square().sum())
 
 
-SURE = 2.0
+SURE_ERRORS = 2.0
 """Standard errors by which a gain must exceed 0 to be no accident."""
 
 
@@ -82,7 +82,7 @@ class Gain(NamedTuple):
     @property
     def is_sure(self) -> bool:
         """Whether it is no accident of few rows."""
-        return self.nats >= SURE * self.error
+        return self.nats >= SURE_ERRORS * self.error
 
 
 def gain_of(better: Tensor, worse: Tensor, row_weights: Tensor | None = None) -> Gain:

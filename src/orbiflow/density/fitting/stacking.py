@@ -7,13 +7,13 @@ from torch import Tensor
 
 from orbiflow.density.fitting.rows import gain_of, mean_of
 
-TOLERANCE = 1e-4
+TOLERANCE_NATS = 1e-4
 """Nats by which the weights may be worse than the best ones."""
 
-ITERATIONS, EVERY = 3_000, 25
+MAX_ITERATIONS, ITERATIONS_PER_CHECK = 3_000, 25
 """Maximum iterations of EM, and iterations between checks of convergence."""
 
-NEGLIGIBLE = 3e-3
+MIN_WEIGHT = 3e-3
 """Weights below this are dropped."""
 
 
@@ -37,9 +37,9 @@ def stacking_weights(table: Tensor, row_weights: Tensor | None = None) -> Tensor
     weights = torch.full_like(table[:, 0], 1 / len(table))
     own = torch.ones_like(table[0]) if row_weights is None else row_weights.to(table)
     shares = own / own.sum()
-    for iteration in range(ITERATIONS):
+    for iteration in range(MAX_ITERATIONS):
         ratio = relative @ (shares / (weights @ relative))
-        if iteration % EVERY == 0 and float(ratio.max()) - 1 < TOLERANCE:
+        if iteration % ITERATIONS_PER_CHECK == 0 and float(ratio.max()) - 1 < TOLERANCE_NATS:
             break
         weights = weights * ratio
         weights = weights / weights.sum()
@@ -66,13 +66,13 @@ def supported_weights(table: Tensor, always: Tensor, row_weights: Tensor | None 
 
 
 def sparse_weights(table: Tensor, always: Tensor, row_weights: Tensor | None = None) -> Tensor:
-    """Return weights as `stacking_weights` does, without `NEGLIGIBLE` ones; `always` (P,) has some.
+    """Return weights as `stacking_weights` does, without `MIN_WEIGHT` ones; `always` (P,) has some.
 
     The least weight of what must be there is half a row's: nothing is impossible that as many rows
     could not rule out.
     """
     weights = stacking_weights(table, row_weights)
-    kept = (weights >= NEGLIGIBLE) | always
+    kept = (weights >= MIN_WEIGHT) | always
     found = torch.zeros_like(weights)
     found[kept] = stacking_weights(table[kept], row_weights)
     least = 0.5 / (table.shape[1] + 1)

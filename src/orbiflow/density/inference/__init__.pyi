@@ -9,6 +9,5 @@ from .observed import chart_of_observed as chart_of_observed
 from .observed import chart_of_rows as chart_of_rows
 from .observed import log_prob_observed as log_prob_observed
 from .observed import observed_rows as observed_rows
-from .partial import ACCURACY as ACCURACY
 from .partial import conditional as conditional
 from .partial import marginal as marginal

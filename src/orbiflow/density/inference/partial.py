@@ -72,7 +72,7 @@ def marginal(
     Args:
         density: A density of two angles or more.
         axes: The numbers of the angles to keep, from 0, in the order that is wanted.
-        accuracy: The error that is asked for, in nats. If it cannot be had, `error` says so.
+        accuracy: The error that is asked for, in nats. If it is not reached, `error` is larger.
         progress: Hears the share of the work that is done, and what is being done.
 
     Raises:
@@ -107,7 +107,7 @@ def conditional(
         density: A density of two angles or more.
         given: The values of known angles in turns (points of the chart), by their numbers from 0.
         axes: The numbers of the other angles to keep; default: all.
-        accuracy: The error that is asked for, in nats. If it cannot be had, `error` says so.
+        accuracy: The error that is asked for, in nats. If it is not reached, `error` is larger.
         progress: Hears the share of the work that is done, and what is being done.
 
     Raises:
@@ -207,7 +207,7 @@ class _Left:
     error: Error = field(default_factory=lambda: Error(math.inf, math.inf))
 
     def terms(self) -> int | None:
-        """Return how many terms its exact density takes at a point, None if it cannot be had."""
+        """Return how many terms its exact density takes at a point, None if there is none."""
         return self.density.terms_at(list(self.split.observed))
 
     def exact(self, points: Tensor) -> Tensor:
@@ -276,7 +276,7 @@ def _refined(
 
 
 def _compared(whole: Mixture, closed: list[Weighted], left: list[_Left]) -> Error | None:
-    """Return the error by exact densities, None where these cannot be had or would take too long.
+    """Return the error by exact densities, None where there are none or they would take too long.
 
     The largest is looked for about the worst points.
     """

@@ -19,9 +19,8 @@ from .files import read_density as read_density
 from .flow import MOST_DIM as MOST_DIM
 from .flow import FlowDensity as FlowDensity
 from .flow import UniformDensity as UniformDensity
-from .flow import VonMisesDensity as VonMisesDensity
 from .flow import flow_obstacle as flow_obstacle
-from .kernels import SHARPEST as SHARPEST
+from .kernels import MAX_CONCENTRATION as MAX_CONCENTRATION
 from .kernels import AdaptiveKernels as AdaptiveKernels
 from .kernels import kernel_rows as kernel_rows
 from .lattice import kernels_for as kernels_for
@@ -31,7 +30,7 @@ from .network import VonMisesNetwork as VonMisesNetwork
 from .network import averaged_networks as averaged_networks
 from .network import log_conditional as log_conditional
 from .part import PartialDensity as PartialDensity
-from .terms import FAINT as FAINT
+from .terms import FAINT_LOG as FAINT_LOG
 from .terms import LOG2_E as LOG2_E
 from .terms import log_sum_exp as log_sum_exp
 from .terms import shares_of as shares_of

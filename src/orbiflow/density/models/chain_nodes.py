@@ -10,20 +10,20 @@ from torch import Tensor
 
 from orbiflow.typed_torch import listed, unique
 
-REACH = 7.0
+REACH_DEVIATIONS = 7.0
 """Deviations from its mean beyond which an angle has no nodes."""
 
-STEP = 0.9
-"""Deviations between nodes, with which the trapezoidal rule is off by exp(-2 pi^2 / STEP^2)."""
+STEP_DEVIATIONS = 0.9
+"""Deviations between nodes: the trapezoidal rule is then off by exp(-2 pi^2 / 0.9^2)."""
 
-FEWEST = 12
+MIN_NODES = 12
 """The fewest nodes of an angle."""
 
-MOST, MOST_ALONE = 1024, 16_384
+MAX_NODES, MAX_NODES_ALONE = 1024, 16_384
 """The most nodes of several hidden angles of a chain together, and of one. Where several need more,
 the nodes are quasi-random."""
 
-TABLE = 2048
+TABLE_POINTS = 2048
 """Points of the distribution function whose inverse gives quasi-random nodes."""
 
 
@@ -46,8 +46,8 @@ def nodes_of(
     wanted, number = unique(sizes, dim=0, return_inverse=True)
     for k, size in enumerate(listed(wanted)):
         chosen = torch.nonzero(number == k)[:, 0]
-        size = [min(int(s), MOST_ALONE) for s in size]
-        fits = len(size) == 1 or math.prod(size) <= MOST
+        size = [min(int(s), MAX_NODES_ALONE) for s in size]
+        fits = len(size) == 1 or math.prod(size) <= MAX_NODES
         own = kappa[chosen][:, hidden]
         rule = _trapezoidal(own, reach[chosen], size) if fits else _sobol(own, seed)
         yield chosen, rule[0], dict(zip(hidden, rule[1], strict=True))
@@ -62,9 +62,9 @@ def node_counts(
     slope = means[:, after][:, :, [1 + axis for axis in hidden]].square()
     slope += means[:, after][:, :, [1 + d + axis for axis in hidden]].square()
     sharp = kappa[:, hidden] + (kappa[:, after, None] * slope).sum(dim=1)
-    reach = (REACH / kappa[:, hidden].clamp_min(1e-12).sqrt()).clamp_max(math.pi)
-    sizes = (2 * reach * sharp.sqrt() / STEP).ceil().clamp_min(FEWEST)
-    return reach, FEWEST * torch.exp2((sizes / FEWEST).log2().ceil())  # few different ones
+    reach = (REACH_DEVIATIONS / kappa[:, hidden].clamp_min(1e-12).sqrt()).clamp_max(math.pi)
+    sizes = (2 * reach * sharp.sqrt() / STEP_DEVIATIONS).ceil().clamp_min(MIN_NODES)
+    return reach, MIN_NODES * torch.exp2((sizes / MIN_NODES).log2().ceil())  # few different ones
 
 
 def _trapezoidal(kappa: Tensor, reach: Tensor, sizes: list[int]) -> tuple[Tensor, list[Tensor]]:
@@ -88,23 +88,23 @@ def _trapezoidal(kappa: Tensor, reach: Tensor, sizes: list[int]) -> tuple[Tensor
 
 
 def _sobol(kappa: Tensor, seed: int) -> tuple[Tensor, list[Tensor]]:
-    """Return `MOST` quasi-random nodes of equal weights, by von Mises quantiles."""
+    """Return `MAX_NODES` quasi-random nodes of equal weights, by von Mises quantiles."""
     count, axes = kappa.shape
     engine = torch.quasirandom.SobolEngine(axes, scramble=True, seed=seed)
-    even = engine.draw(MOST, dtype=torch.float64)
-    logs = kappa.new_full((count, MOST), -math.log(MOST))
+    even = engine.draw(MAX_NODES, dtype=torch.float64)
+    logs = kappa.new_full((count, MAX_NODES), -math.log(MAX_NODES))
     return logs, [quantiles(kappa[:, i], even[:, i]) for i in range(axes)]
 
 
 def quantiles(kappa: Tensor, even: Tensor) -> Tensor:
     """Return von Mises quantiles (C, Q) of probabilities (Q,), by interpolation of a table."""
-    reach = (REACH / kappa.clamp_min(1e-12).sqrt()).clamp_max(math.pi)[:, None]
-    edge = torch.linspace(-1, 1, TABLE + 1, dtype=kappa.dtype) * reach
+    reach = (REACH_DEVIATIONS / kappa.clamp_min(1e-12).sqrt()).clamp_max(math.pi)[:, None]
+    edge = torch.linspace(-1, 1, TABLE_POINTS + 1, dtype=kappa.dtype) * reach
     middle = (edge[:, 1:] + edge[:, :-1]) / 2
     mass = torch.softmax(kappa[:, None] * (middle.cos() - 1), dim=1)
     below = torch.cat([torch.zeros_like(mass[:, :1]), mass.cumsum(dim=1)], dim=1)
     at = torch.searchsorted(below, even.expand(len(kappa), -1).contiguous(), right=True)
-    at = at.clamp(1, TABLE)
+    at = at.clamp(1, TABLE_POINTS)
     low = below.gather(1, at - 1)
     part = ((even - low) / (below.gather(1, at) - low).clamp_min(1e-300)).clamp(0, 1)
     start = edge.gather(1, at - 1)

@@ -15,10 +15,10 @@ SCALES = (1.0, 4.0, 16.0)
 Each is 4 times the one before: `at_scales` takes powers, which are cheaper than exponentials.
 """
 
-FAINTEST = {torch.float64: -170.0, torch.float32: -20.0}
+FAINTEST_LOG = {torch.float64: -170.0, torch.float32: -20.0}
 """Logarithm of the least exponential: its 4th power does not underflow, which would be slow."""
 
-FELT = 40.0
+FELT_LOG_RATIO = 40.0
 """Logarithm of how much larger sums must be, for such exponentials not to be felt."""
 
 
@@ -75,9 +75,9 @@ def seen_angles(angle: Tensor) -> Tensor:
 def at_scales(fit: Tensor) -> list[Tensor]:
     """Return exponentials (N, K) of fits (N, K) over 16, 4 and 1, none of which underflows.
 
-    Those below `FAINTEST` are raised to it, and those of sharper scales to its 4th power.
+    Those below `FAINTEST_LOG` are raised to it, and those of sharper scales to its 4th power.
     """
-    faintest = FAINTEST[fit.dtype]
+    faintest = FAINTEST_LOG[fit.dtype]
     wide = fit.mul(LOG2_E / SCALES[-1]).clamp_min_(faintest * LOG2_E).exp2()
     middle = wide.square().square_()
     return [wide, middle, middle.clamp_min(math.exp(faintest)).square_().square_()]
@@ -101,7 +101,7 @@ class ChainSum:
         fit, _ = self._fits.at(seen_angles(2 * math.pi * points))
         wide, middle, narrow = at_scales(fit)
         total = wide @ self._peaks[0] + middle @ self._peaks[1] + narrow @ self._peaks[2]
-        least = math.exp(FAINTEST[total.dtype] + FELT) * self._peaks.sum()
+        least = math.exp(FAINTEST_LOG[total.dtype] + FELT_LOG_RATIO) * self._peaks.sum()
         found = total.clamp_min(least).log() + self._top
         faint = (total <= least).nonzero()[:, 0]
         if len(faint):

@@ -14,40 +14,40 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.chain_nodes import REACH, quantiles
+from orbiflow.density.models.chain_nodes import REACH_DEVIATIONS, quantiles
 from orbiflow.density.models.chain_sums import SCALES
 from orbiflow.density.models.density import Split
 from orbiflow.density.models.lattice import KERNEL_STEP, sharpest_on
-from orbiflow.density.models.terms import FAINT, LOG2_E
+from orbiflow.density.models.terms import FAINT_LOG, LOG2_E
 from orbiflow.typed_torch import broadcast, listed, special, unique
 
 if TYPE_CHECKING:
     from orbiflow.density.models.chains import VonMisesChains
 
-SIZES = (24, 48, 96, 192, 384, 768, 1536, 3072)
+GRID_SIZES = (24, 48, 96, 192, 384, 768, 1536, 3072)
 """Numbers of points of a grid along an angle."""
 
-FINEST = {1: 3072, 2: 768}
+MAX_GRID_SIZES = {1: 3072, 2: 768}
 """The most of them, by the number of angles kept."""
 
-FAINTEST = 25.0
+FAINTEST_LOG = 25.0
 """Components whose logarithm is further than this below that of the largest are left out."""
 
-ALONE, SEVERAL = 24, (2, 8, 32, 128, 512, 2048)
+NODES_ALONE, NODES_OF_SEVERAL = 24, (2, 8, 32, 128, 512, 2048)
 """The fewest nodes of an angle that is the only one hidden, and those of several: for light and wide
 components, for others, and for heavy and narrow ones, each level beginning with the next number."""
 
-LEFT, GENTLE = (0.9, 0.7, 0.3, 0.1, 0.05), 20.0
+NOISE_LEFT, GENTLE_CONCENTRATION = (0.9, 0.7, 0.3, 0.1, 0.05), 20.0
 """Share of hidden noise that is left about quasi-random nodes, level by level and for more nodes as
 one level later, and the concentration below which it is less."""
 
 SHARPNESS = 1.2 ** torch.arange(-30, 116, dtype=torch.float64)
 """Concentrations by which quasi-random nodes are spread."""
 
-AT_ONCE = 2**18
+BLOCK_ENTRIES = 2**18
 """Entries worked on at a time: few enough for the cache."""
 
-WIDE = 8.0
+WIDE_CONCENTRATION = 8.0
 """Concentration below which a given angle does not tell how likely a component is."""
 
 
@@ -86,7 +86,7 @@ def _more_nodes(walks: list[_Walk], top: float) -> list[Tensor]:
     """
     weight = torch.cat([walk.likely for walk in walks]) - top
     work = torch.cat([walk.widths.prod(dim=1) for walk in walks]).double()
-    counts = weight > -FAINTEST
+    counts = weight > -FAINTEST_LOG
     wanted = (weight.exp() / work).sqrt() * counts
     wanted *= (work * counts).sum() / (wanted * work).sum()
     steps = (wanted.log2() / 2).round().clamp(-1, 1).masked_fill_(~counts, 2)
@@ -126,10 +126,16 @@ class _Walk:
                 noise[:, axis] += slope[:, None] * noise[:, j]
                 curved = slope.abs() * bend[:, j] + most * (self.reach[:, j] / 2) ** 2 / 2
                 bend[:, axis] += torch.minimum(curved, 2 * most)
-            self.reach[:, axis] = REACH * noise[:, axis].square().sum(dim=1).sqrt() + bend[:, axis]
+            self.reach[:, axis] = (
+                REACH_DEVIATIONS * noise[:, axis].square().sum(dim=1).sqrt() + bend[:, axis]
+            )
             if axis in given:
                 at = torch.tensor(2 * math.pi * given[axis], dtype=torch.float64)
-                rough = noise[:, axis].square().sum(dim=1) + bend[:, axis].square() + 1 / WIDE**2
+                rough = (
+                    noise[:, axis].square().sum(dim=1)
+                    + bend[:, axis].square()
+                    + 1 / WIDE_CONCENTRATION**2
+                )
                 self.likely += ((at - self.middle[:, axis]).cos() - 1) / rough - rough.log() / 2
                 self.middle[:, axis] = at
                 noise[:, axis], bend[:, axis], self.reach[:, axis] = 0, 0, 0
@@ -146,7 +152,9 @@ class _Walk:
         slanted = joint / both if apart.shape[1] > 1 else 0 * joint
         apart = apart * (1 + slanted.clamp_max(1))[:, None]
         count = 2 * math.pi / KERNEL_STEP * apart.sqrt()
-        sizes = torch.tensor([size for size in SIZES if size <= FINEST[len(split.kept)]])
+        sizes = torch.tensor(
+            [size for size in GRID_SIZES if size <= MAX_GRID_SIZES[len(split.kept)]]
+        )
         self.wanted = sizes[torch.searchsorted(sizes, count).clamp_max(len(sizes) - 1)]
         reach = (self.reach[:, list(split.kept)] / (2 * math.pi) * self.wanted).ceil().long() + 1
         self.widths = torch.minimum(2 * reach + 1, self.wanted)
@@ -175,7 +183,7 @@ class _Walk:
         middle = (middle * sizes).round().long()
         chosen = chosen[self.widths[chosen].prod(dim=1).argsort()]
         while len(chosen):
-            block = max(1, AT_ONCE // (rule.count * int(self.widths[chosen[-1]].prod())))
+            block = max(1, BLOCK_ENTRIES // (rule.count * int(self.widths[chosen[-1]].prod())))
             some, chosen = chosen[-block:], chosen[:-block]
             at, widths = middle[some], self.widths[some].amax(dim=0)
             places = [
@@ -206,7 +214,7 @@ class _Walk:
             kappa = self.kappa[rows, axis, None, None, None]
             mean, lean = self._mean(rows, axis, seen, near)
             if axis in self.hidden:
-                number, left = self.hidden.index(axis), rule.left / (kappa + GENTLE)
+                number, left = self.hidden.index(axis), rule.left / (kappa + GENTLE_CONCENTRATION)
                 offset, logs = rule.nodes(number, (kappa / (1 - kappa * left))[:, :, 0, 0])
                 at, total = mean + offset[:, :, None, None], total + logs[:, :, None, None]
                 if rule.left:
@@ -235,7 +243,7 @@ class _Walk:
             else:
                 total = total + kappa * ((at - mean).cos() - 1) - special.i0e(kappa).log()
             seen[axis] = at.sin(), at.cos()
-        values = total.clamp_min_(FAINT).mul_(LOG2_E).exp2_().sum(dim=1)
+        values = total.clamp_min_(FAINT_LOG).mul_(LOG2_E).exp2_().sum(dim=1)
         if len(kept) == 1:
             return values[:, 0]
         return values if first_last[0] == kept[0] else values.mT
@@ -286,8 +294,8 @@ class _Rule:
     def __init__(self, hidden: int, level: int, step: int, *, early: bool) -> None:
         own = 1 + level + step
         # of angles after those kept, it would have to be known at each point of the grid
-        self.left = LEFT[level + max(step, 0)] if early and hidden > 1 else 0.0
-        self.count = (1, ALONE * 2**level, SEVERAL[own])[min(hidden, 2)]
+        self.left = NOISE_LEFT[level + max(step, 0)] if early and hidden > 1 else 0.0
+        self.count = (1, NODES_ALONE * 2**level, NODES_OF_SEVERAL[own])[min(hidden, 2)]
         self.tables = _quasi_random(hidden, self.count, level) if hidden > 1 else []
 
     def nodes(self, number: int, kappa: Tensor) -> tuple[Tensor, Tensor]:
@@ -302,7 +310,7 @@ class _Rule:
             offset = torch.lerp(self.tables[number][row], self.tables[number][row + 1], part)
             weight = -math.log(self.count) if number == 0 else 0.0
             return offset / kappa.sqrt(), kappa.new_tensor([[weight]])
-        reach = (REACH / kappa.clamp_min(1e-12).sqrt()).clamp_max(math.pi)
+        reach = (REACH_DEVIATIONS / kappa.clamp_min(1e-12).sqrt()).clamp_max(math.pi)
         offset = reach * ((2 * torch.arange(self.count) + 1) / self.count - 1)
         return offset, torch.log_softmax(kappa * (offset.cos() - 1), dim=1)
 

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_tensor
-from orbiflow.density.models.chain_nodes import MOST, MOST_ALONE, node_counts, nodes_of
+from orbiflow.density.models.chain_nodes import MAX_NODES, MAX_NODES_ALONE, node_counts, nodes_of
 from orbiflow.density.models.chain_sums import SCALES, ChainFits, ChainSum
 from orbiflow.density.models.chain_tables import chain_tables
 from orbiflow.density.models.density import Density, Restriction, Split, Weighted
@@ -25,15 +25,15 @@ from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed, special, unique
 
-PILOTS, SPARED = 64, 1e-3
+PILOT_DRAWS, SHARE_BY_WEIGHT = 64, 1e-3
 """Draws of each component by which it is judged where angles are given, and the share of draws that
 goes by weight alone."""
 
-SHIFT = (math.sqrt(5) - 1) / 2
+SHIFT_PER_LEVEL = (math.sqrt(5) - 1) / 2
 """How far the grids of a level are shifted from those of the one before, in turns: the change tells
 what the grids miss."""
 
-BLOCK, SUMMED = 256, 1024
+BLOCK_POINTS = 1024
 """Points at a time: few enough for the cache, and so many that little is left to do between sums."""
 
 
@@ -98,7 +98,7 @@ class VonMisesChains(Density, kind="chains"):
         scaled = self.concentrations / self.concentrations.new_tensor(SCALES)[:, None, None]
         peaks = self.log_weights.mT - special.i0e(scaled).log().sum(dim=-1)
         own = ChainSum(ChainFits(means, kappa, self.order), peaks.to(points))
-        return in_blocks(own.log, points, SUMMED)
+        return in_blocks(own.log, points, BLOCK_POINTS)
 
     def residuals(self, points: Tensor) -> Tensor:
         """Return angles less their regressions, in radians (N, K, d), for points (N, d)."""
@@ -119,10 +119,12 @@ class VonMisesChains(Density, kind="chains"):
         """Choose components by what they make of the given angles in a few draws each."""
         own = self.to("cpu")
         logs = own.log_weights.flatten()
-        every = torch.arange(len(logs)).repeat_interleave(PILOTS)
-        pilots = own._walk(every, given, generator)[1].reshape(-1, PILOTS)
-        likely = logs + log_sum_exp(pilots) - math.log(PILOTS)
-        proposed = shares_of(torch.logaddexp(likely, logs + log_sum_exp(likely) + math.log(SPARED)))
+        every = torch.arange(len(logs)).repeat_interleave(PILOT_DRAWS)
+        pilots = own._walk(every, given, generator)[1].reshape(-1, PILOT_DRAWS)
+        likely = logs + log_sum_exp(pilots) - math.log(PILOT_DRAWS)
+        proposed = shares_of(
+            torch.logaddexp(likely, logs + log_sum_exp(likely) + math.log(SHARE_BY_WEIGHT))
+        )
         chosen = torch.multinomial(proposed, count, replacement=True, generator=generator)
         points, weights = own._walk(chosen, given, generator)
         return self.space.project(points), weights + (logs - proposed.log())[chosen]
@@ -171,7 +173,7 @@ class VonMisesChains(Density, kind="chains"):
                 count += len(kappa)
                 continue
             sizes = node_counts(means, kappa, hidden, seen)[1].prod(dim=1)
-            if float(sizes.max()) > (MOST_ALONE if len(hidden) == 1 else MOST):
+            if float(sizes.max()) > (MAX_NODES_ALONE if len(hidden) == 1 else MAX_NODES):
                 return None
             count += int(sizes.sum())
         return count
@@ -197,7 +199,7 @@ class VonMisesChains(Density, kind="chains"):
     def approximated(
         self, split: Split, space: Torus, level: int, tick: Callable[[], None]
     ) -> list[Weighted]:
-        start = level * SHIFT % 1
+        start = level * SHIFT_PER_LEVEL % 1
         log_scale, tables = chain_tables(self, split, level, start, tick)
         found = (lattice_kernels(table, space, start) for table in tables)
         return [(log_scale + log, kernels) for log, kernels in found]

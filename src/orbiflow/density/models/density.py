@@ -22,7 +22,7 @@ from orbiflow.runtime import SideBySide, Tell, one_thread
 LEVELS = 4
 """Levels of accuracy of kernels that stand for a density; each has a quarter of the error or less."""
 
-BLOCK = 2**17
+BLOCK_POINTS = 2**17
 """Points evaluated by a thread at a time where no gradient is asked for: bounds the memory."""
 
 Pixel = Callable[[Tensor], Tensor]
@@ -271,7 +271,7 @@ class Density(Distribution):
         """
         points = self._here(value)
         own = points.to(self.dtype)
-        if torch.is_grad_enabled() or own[..., 0].numel() <= BLOCK:
+        if torch.is_grad_enabled() or own[..., 0].numel() <= BLOCK_POINTS:
             return self._log_prob(own, measure).to(points.dtype)
         flat = own.reshape(-1, own.shape[-1])
         values = own.new_empty(len(flat))
@@ -282,7 +282,7 @@ class Density(Distribution):
 
         with SideBySide() as beside:
             for result in [
-                beside.begin(partial(evaluate, at)) for at in neighbourhoods(flat, BLOCK)
+                beside.begin(partial(evaluate, at)) for at in neighbourhoods(flat, BLOCK_POINTS)
             ]:
                 result()
         return values.reshape(own.shape[:-1]).to(points.dtype)

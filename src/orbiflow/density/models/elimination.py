@@ -16,28 +16,28 @@ from orbiflow.density.models.chain_sums import SCALES
 from orbiflow.density.models.chains import Factor, VonMisesChains, waves
 from orbiflow.density.models.density import Split
 from orbiflow.density.models.lattice import KERNEL_STEP, sharpest_on
-from orbiflow.density.models.terms import FAINT, LOG2_E, log_sum_exp
+from orbiflow.density.models.terms import FAINT_LOG, LOG2_E, log_sum_exp
 from orbiflow.typed_torch import special
 
-STEP = 0.9
+STEP_DEVIATIONS = 0.9
 """Deviations of the sharpest bumps between two points of a grid."""
 
-SHARPEST = 0.999
+SHARP_SHARE = 0.999
 """Share of a factor's weight that is of bumps up to this sharpness; the rest are as sharp as that."""
 
-FINER = (0.85, 1.0, 1.15, 1.4)
+GRID_FINENESS = (0.85, 1.0, 1.15, 1.4)
 """How much finer grids are than factors need, level by level."""
 
 MOST_ENTRIES = 2**24
 """The most entries of a table on the way."""
 
-PAIRED = 64
+MAX_PAIRED_RATIO = 64
 """How many times more terms a product of two tables may have, which is one of matrices."""
 
 FAINT_SHARE = 1e-6
 """The least share of a component, given the parents, that is seen."""
 
-AT_ONCE, ROWS = 2**18, 2**10
+BLOCK_ENTRIES, BLOCK_ROWS = 2**18, 2**10
 """Entries of a table, and rows of parents, worked on at a time."""
 
 Grids = Mapping[int, Tensor]
@@ -57,8 +57,8 @@ def grids_for(factors: Sequence[Factor], split: Split, level: int) -> Grids | No
             wanted[axis] = max(wanted[axis], _quantile(kappa[:, k], chains.log_weights.exp()))
     sizes: dict[int, int] = {}
     for axis, kappa in wanted.items():
-        step = KERNEL_STEP if axis in split.kept else STEP
-        fine = FINER[level] * 2 * math.pi * math.sqrt(kappa) / step
+        step = KERNEL_STEP if axis in split.kept else STEP_DEVIATIONS
+        fine = GRID_FINENESS[level] * 2 * math.pi * math.sqrt(kappa) / step
         sizes[axis] = 1 if axis in given else 2 * math.ceil(fine / 2)
     tables = [tuple(axis for axis in axes if sizes[axis] > 1) for axes, _ in factors]
     if elimination_order(tables, sizes, split.kept)[1] > MOST_ENTRIES:
@@ -72,10 +72,10 @@ def grids_for(factors: Sequence[Factor], split: Split, level: int) -> Grids | No
 
 
 def _quantile(kappa: Tensor, weights: Tensor) -> float:
-    """Return what a share `SHARPEST` of the weights is not above."""
+    """Return what a share `SHARP_SHARE` of the weights is not above."""
     ordered, order = kappa.flatten().sort()
     below = weights.flatten()[order].cumsum(0)
-    return float(ordered[int((below < SHARPEST * below[-1]).sum())])
+    return float(ordered[int((below < SHARP_SHARE * below[-1]).sum())])
 
 
 def eliminated(
@@ -90,7 +90,7 @@ def eliminated(
     sizes = {axis: len(grid) for axis, grid in grids.items() if len(grid) > 1}
     left: list[tuple[tuple[int, ...], Tensor]] = []
     for axes, chains in factors:
-        step = KERNEL_STEP if axes[-1] in kept else STEP
+        step = KERNEL_STEP if axes[-1] in kept else STEP_DEVIATIONS
         sharpest = sharpest_on(sizes[axes[-1]], step) if axes[-1] in sizes else math.inf
         log, table = conditional_table(chains, [grids[axis] for axis in axes], sharpest, tick)
         own = tuple(axis for axis in axes if axis in sizes)
@@ -122,7 +122,7 @@ def elimination_order(
         axis = min(sorted(hidden), key=lambda one: _entries(cliques[one], sizes))
         terms, result = (_entries(own, sizes) for own in (cliques[axis], cliques[axis] - {axis}))
         paired = sum(axis in table for table in left) < 3
-        most = max(most, result, terms // PAIRED if paired else terms)
+        most = max(most, result, terms // MAX_PAIRED_RATIO if paired else terms)
         left = [t for t in left if axis not in t] + [cliques[axis] - {axis}]
         hidden.remove(axis)
         order.append(axis)
@@ -163,9 +163,9 @@ def conditional_table(
     images = torch.stack([own.cos(), own.sin(), torch.ones_like(own)])
     found = own.new_zeros(len(rows), len(own))
     log_scale = float(peaks.max())
-    for start in range(0, len(rows), ROWS):
+    for start in range(0, len(rows), BLOCK_ROWS):
         tick()
-        logs, mean = _given_parents(chains, rows[start : start + ROWS])
+        logs, mean = _given_parents(chains, rows[start : start + BLOCK_ROWS])
         logs -= log_sum_exp(logs)[:, None]
         seen = logs > math.log(FAINT_SHARE)
         logs -= torch.where(seen, logs.exp(), 0.0).sum(dim=1, keepdim=True).log()
@@ -173,8 +173,8 @@ def conditional_table(
         top = logs[row, part] + peaks[part] - log_scale - kappa[part]
         angle, sharp = mean[row, part // len(SCALES)], kappa[part]
         bumps = torch.stack([sharp * angle.cos(), sharp * angle.sin(), top], dim=1) * LOG2_E
-        for some in torch.split(torch.arange(len(row)), max(1, AT_ONCE // len(own))):
-            values = (bumps[some] @ images).clamp_min_(FAINT * LOG2_E).exp2_()
+        for some in torch.split(torch.arange(len(row)), max(1, BLOCK_ENTRIES // len(own))):
+            values = (bumps[some] @ images).clamp_min_(FAINT_LOG * LOG2_E).exp2_()
             found.index_add_(0, start + row[some], values)
     return log_scale, found
 

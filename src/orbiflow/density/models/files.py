@@ -5,30 +5,28 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, as_number, as_whole
+from orbiflow.arguments import as_instance, as_number
 from orbiflow.density.models.density import KINDS, Density
 from orbiflow.density.spaces import Space, make_space
 from orbiflow.errors import InputFileError, OrbiflowError
-from orbiflow.fields import FourierField, InvariantField, SplineField
-from orbiflow.flows import Flow
-from orbiflow.runtime import is_list, read_tensors, tensor_bytes
+from orbiflow.runtime import read_tensors, tensor_bytes
 from orbiflow.symmetry import CrystallographicGroup, group_header
 
-FORMAT = "orbiflow-density/5"
+FORMAT = "orbiflow-density/6"
 
 
 def density_to_bytes(density: Density, **extra: Any) -> bytes:
     """Return a density as bytes that `read_density` makes the same again.
 
     Saved are densities whose class has a `kind`, on spaces that `make_space` makes again, and flows of
-    Fourier and spline fields on the space's own group; anything else is refused by the name of the
-    part. Parameters are written in float64. `extra` are further values for the reader, for JSON.
+    fields that orbiflow has; anything else is refused by the name of the part. `extra` are further
+    values for the reader, for JSON.
     """
     header, tensors = density_parts(as_instance(density, Density, "density"), "density")
     space = _checked_space(density.space)
@@ -62,7 +60,7 @@ def _checked_space(space: Space) -> Space:
 
 
 def read_density(path: str | Path) -> tuple[Density, dict[str, Any]]:
-    """Return a saved density, float64, and what was saved with it.
+    """Return a saved density and what was saved with it.
 
     Raises `InputFileError` for a file that is missing, no density, or damaged: no bit may have changed.
     """
@@ -72,7 +70,7 @@ def read_density(path: str | Path) -> tuple[Density, dict[str, Any]]:
             raise ValueError(f"format {header['format']!r}")
         with torch.inference_mode(False):  # what is made in it could never be differentiated
             return _restored(header, tensors), header["extra"]
-    except (OrbiflowError, ValueError, KeyError, TypeError, RecursionError) as error:
+    except (OrbiflowError, ValueError, KeyError, TypeError, RecursionError, RuntimeError) as error:
         raise InputFileError(
             f"{path}: not a density saved by orbiflow, or damaged ({error})"
         ) from error
@@ -164,100 +162,3 @@ def check_group(header: Any, group: CrystallographicGroup) -> None:
         same = False
     if not same:
         raise OrbiflowError(f"its group is not {group!r}, which its space has here")
-
-
-MAX_SEGMENTS, MAX_FREQUENCY, MAX_STEPS, MAX_DIM = 256, 128, 4096, 3
-FIELDS: dict[str, type[FourierField | SplineField]] = {
-    "fourier": FourierField,
-    "spline": SplineField,
-}
-FIELD_NAMES = {kind: name for name, kind in FIELDS.items()}
-
-
-def series_parts(flow: Flow, space: Space) -> tuple[dict[str, Any], dict[str, Tensor]]:
-    """Return a header ready for JSON and a float64 tensor "flow.k" for each segment of a flow."""
-    if type(flow) is not Flow:
-        raise OrbiflowError(
-            f"the flow is a {type(flow).__name__}: only flows of Fourier and spline fields are "
-            "saved in a density; save it with orbiflow.flows.save_flow"
-        )
-    if len(flow.segments) > MAX_SEGMENTS or flow.steps > MAX_STEPS or space.dim > MAX_DIM:
-        raise OrbiflowError(
-            f"the flow has {len(flow.segments)} segments of {flow.steps} steps in {space.dim} "
-            f"dimensions; saved are {MAX_SEGMENTS}, {MAX_STEPS} and {MAX_DIM} at most"
-        )
-    segments: list[dict[str, Any]] = []
-    tensors: dict[str, Tensor] = {}
-    for number, field in enumerate(flow.segments):
-        segments.append(_segment(number, field, space))
-        parameters = cast(InvariantField, field).parameters_
-        tensors[f"flow.{number}"] = parameters.detach().double().cpu()
-    header = {
-        "kind": "series",
-        "segments": segments,
-        "steps": flow.steps,
-        "method": flow.method,
-        "duration": flow.duration,
-    }
-    return header, tensors
-
-
-def _segment(number: int, field: Any, space: Space) -> dict[str, Any]:
-    name = f"segment {number + 1} of the flow"
-    if type(field) not in FIELD_NAMES:
-        raise OrbiflowError(
-            f"{name} is a {type(field).__name__}: only flows of Fourier and spline fields are saved "
-            "in a density; save it with orbiflow.flows.save_flow"
-        )
-    if field.parameters_.dim() != 1:
-        raise OrbiflowError(
-            f"{name} is a stack of {len(field.parameters_)} fields: a density has one field a segment"
-        )
-    if not is_same_group(field.group, space.group):
-        raise OrbiflowError(
-            f"{name} has the {field.group!r}, its space the {space.group!r}: parameters depend on "
-            "the basis of the lattice; make the field with the space's own group"
-        )
-    if field.max_frequency > MAX_FREQUENCY or not bool(torch.isfinite(field.parameters_).all()):
-        raise OrbiflowError(
-            f"{name} has the frequency {field.max_frequency}, saved are {MAX_FREQUENCY} at most, or "
-            "parameters that are not finite"
-        )
-    return {
-        "kind": FIELD_NAMES[type(field)],
-        "max_frequency": field.max_frequency,
-        "smoothness": float(field.smoothness),
-    }
-
-
-def series_from_header(
-    header: Mapping[str, Any], tensors: Mapping[str, Tensor], space: Space
-) -> Flow:
-    """Make the flow of `series_parts` again."""
-    if space.dim > MAX_DIM:
-        raise ValueError(f"a flow of Fourier or spline fields has {MAX_DIM} dimensions at most")
-    if header["kind"] != "series":
-        raise ValueError(f"a flow of kind {header['kind']!r}")
-    segments = header["segments"]
-    if not is_list(segments) or not 1 <= len(segments) <= MAX_SEGMENTS:
-        raise ValueError("no segments, or too many")
-    return Flow(
-        [_field(part, tensors[f"flow.{k}"], space) for k, part in enumerate(segments)],
-        steps=as_whole(header["steps"], "steps", 0, MAX_STEPS),
-        method=str(header["method"]),
-        duration=as_number(header["duration"], "duration"),
-        warn=False,  # the fit has settled them and said if it could not
-    )
-
-
-def _field(header: Mapping[str, Any], row: Tensor, space: Space) -> InvariantField:
-    frequency = as_whole(header["max_frequency"], "max_frequency", 0, MAX_FREQUENCY)
-    smoothness = as_number(header["smoothness"], "smoothness")
-    if not bool(torch.isfinite(row).all()):
-        raise ValueError("parameters that are not finite")
-    field = FIELDS[header["kind"]](space.group, frequency, smoothness=smoothness)
-    if field.parameters_.shape != row.shape:
-        raise ValueError(f"parameters of shape {tuple(row.shape)} where {field.size} belong")
-    with torch.no_grad():
-        field.parameters_.copy_(row)
-    return field

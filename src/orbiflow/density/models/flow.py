@@ -7,27 +7,19 @@ import math
 from collections.abc import Mapping
 from typing import Any, Self
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arguments import as_instance, is_a
+from orbiflow.arguments import as_instance
 from orbiflow.density.models.density import Density, Restriction, Split
 from orbiflow.density.models.evaluation import midpoints
-from orbiflow.density.models.files import (
-    density_from,
-    density_parts,
-    series_from_header,
-    series_parts,
-    within,
-)
+from orbiflow.density.models.files import density_from, density_parts, within
 from orbiflow.density.models.tensors import in_blocks
-from orbiflow.density.spaces import Space, Torus, rectangle
+from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
-from orbiflow.flows import Flow
+from orbiflow.flows import Flow, flow_from, flow_parts
 from orbiflow.runtime import one_thread
-from orbiflow.symmetry import cast_like
-from orbiflow.typed_torch import linalg, special
+from orbiflow.typed_torch import linalg
 
 MOST_DIM = 3
 """The most dimensions of a flow of splines, whose grid would be too large beyond."""
@@ -40,10 +32,10 @@ def flow_obstacle(space: Space) -> str | None:
     return f"a flow has {MOST_DIM} dimensions at most, this {space.name} has {space.dimensions}"
 
 
-BLOCK = 65536
+BLOCK_POINTS = 65536
 """Points integrated at a time where no gradient is asked for: bounds the memory."""
 
-CARRIED = 4096
+CARRIED_POINTS = 4096
 """Points carried at a time together with the Jacobian of the carrying."""
 
 FIRST_NODES, MOST_NODES = {1: 64, 2: 16}, {1: 512, 2: 64}
@@ -52,7 +44,7 @@ FIRST_NODES, MOST_NODES = {1: 64, 2: 16}, {1: 512, 2: 64}
 FLOW_TERMS = 50
 """Terms of other densities that take as long as a flow at a point."""
 
-SETTLED = 1e-7
+SETTLED_NATS = 1e-7
 """Mean change, in nats, by twice as many nodes, below which there are enough."""
 
 
@@ -91,9 +83,9 @@ class FlowDensity(Density, kind="flow"):
 
     def log_chart(self, points: Tensor) -> Tensor:
         # flow, base and area are invariant: no need to project
-        if torch.is_grad_enabled() or points[..., 0].numel() <= BLOCK:
+        if torch.is_grad_enabled() or points[..., 0].numel() <= BLOCK_POINTS:
             return self._carried_back(points)
-        return in_blocks(self._carried_back, points, BLOCK)
+        return in_blocks(self._carried_back, points, BLOCK_POINTS)
 
     def _carried_back(self, points: Tensor) -> Tensor:
         start, log_det = self.flow.inverse_and_log_det(points)
@@ -104,7 +96,7 @@ class FlowDensity(Density, kind="flow"):
         if torch.is_grad_enabled():
             end = self.flow(start)
         else:
-            end = torch.cat([self.flow(block) for block in torch.split(start, BLOCK)])
+            end = torch.cat([self.flow(block) for block in torch.split(start, BLOCK_POINTS)])
         return self.space.project(end)
 
     @one_thread()
@@ -118,7 +110,7 @@ class FlowDensity(Density, kind="flow"):
         integrator's error: a plain grid of 512^2 misses 1 % of a density in sharp clusters.
         """
         grid = midpoints(self.space, resolution).to(self._like())
-        parts = [self._carried_mass(block) for block in torch.split(grid, CARRIED)]
+        parts = [self._carried_mass(block) for block in torch.split(grid, CARRIED_POINTS)]
         return float(torch.cat(parts).mean())
 
     def _carried_mass(self, start: Tensor) -> Tensor:
@@ -161,7 +153,7 @@ class FlowDensity(Density, kind="flow"):
             total = self._at_nodes(points, axes, hidden, fresh).logsumexp(dim=1)
             sums = total if sums is None else torch.logaddexp(sums, total)
             last, now = now, sums - len(hidden) * math.log(count)
-            settled = last is not None and float((now - last).abs().mean()) < SETTLED
+            settled = last is not None and float((now - last).abs().mean()) < SETTLED_NATS
             if settled or count >= MOST_NODES[len(hidden)]:
                 return now
             count *= 2
@@ -176,7 +168,7 @@ class FlowDensity(Density, kind="flow"):
     ) -> Tensor:
         """Return log densities (N, Q) of all angles, each point at each node."""
         parts: list[Tensor] = []
-        for block in torch.split(points.double(), max(1, BLOCK // len(nodes))):
+        for block in torch.split(points.double(), max(1, BLOCK_POINTS // len(nodes))):
             whole = block.new_empty(len(block), len(nodes), self.space.dim)
             whole[:, :, observed] = block[:, None]
             whole[:, :, hidden] = nodes
@@ -186,19 +178,19 @@ class FlowDensity(Density, kind="flow"):
 
     def header(self) -> dict[str, Any]:
         return {
-            "flow": series_parts(self.flow, self.space)[0],
+            "flow": flow_parts(self.flow, with_own=False)[0],
             "base": density_parts(self.base, "base", space=self.space)[0],
         }
 
     def tensors(self) -> dict[str, Tensor]:
-        own = series_parts(self.flow, self.space)[1]
+        own = {f"flow.{name}": tensor for name, tensor in self.flow.state_dict().items()}
         return own | density_parts(self.base, "base", "base.")[1]
 
     @classmethod
     def from_header(
         cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
     ) -> Self:
-        flow = series_from_header(header["flow"], tensors, space)
+        flow = flow_from(header["flow"], within(tensors, "flow."), {})
         return cls(space, flow, density_from(space, header["base"], within(tensors, "base.")))
 
     def _like(self) -> Tensor:
@@ -243,49 +235,3 @@ class UniformDensity(Density, kind="uniform"):
     def restricted(self, split: Split, space: Torus) -> Restriction:
         del split
         return Restriction([(0.0, UniformDensity(space))], [])
-
-
-class VonMisesDensity(Density, kind="von-mises"):
-    """The paper's base: a product of von Mises densities about the point (1/2, ..., 1/2) of the chart.
-
-    It is made invariant by summing over the group: with the periods of the space's frame, the sum over
-    coset representatives integrates to 1 over the space.
-
-    Args:
-        space: Any space.
-        concentration: The concentration kappa > 0 of each factor.
-    """
-
-    def __init__(self, space: Space, concentration: float = 1.0) -> None:
-        super().__init__(space)
-        real = is_a(concentration, int | float)
-        if not real or not concentration > 0 or not math.isfinite(concentration):
-            raise OrbiflowError(f"concentration must be positive, got {concentration!r}")
-        self.concentration = float(concentration)
-
-    def log_chart(self, points: Tensor) -> Tensor:
-        frame = self.space.frame.group
-        images = frame.images(points)
-        periods = rectangle(self.space).to(points)
-        angle = 2 * math.pi * ((images - 0.5) @ cast_like(frame.inverse_lattice, points).T)
-        kappa = self.concentration
-        log_normal = torch.log(special.i0e(torch.tensor(kappa, dtype=torch.float64))) + kappa
-        terms = kappa * angle.cos() - log_normal.to(points) - periods.log()
-        return terms.sum(dim=-1).logsumexp(dim=0)
-
-    def draw(self, count: int, generator: torch.Generator) -> Tensor:
-        seed = int(torch.randint(2**31, (), generator=generator))
-        angle = np.random.default_rng(seed).vonmises(
-            0.0, self.concentration, (count, self.space.dim)
-        )
-        return self.space.project(0.5 + self.space.from_turns(torch.tensor(angle) / (2 * math.pi)))
-
-    def header(self) -> dict[str, Any]:
-        return {"concentration": self.concentration}
-
-    @classmethod
-    def from_header(
-        cls, space: Space, header: Mapping[str, Any], tensors: Mapping[str, Tensor]
-    ) -> Self:
-        del tensors
-        return cls(space, float(header["concentration"]))

@@ -27,11 +27,11 @@ MOST_KERNELS = 1_000_000
 BLOCK_ENTRIES = 250_000
 """Entries of the table of points against kernels worked on at a time."""
 
-SHARPEST = 1e16
+MAX_CONCENTRATION = 1e16
 """The largest concentration whose kernels keep seven digits: a deviation of 1e-8 radians, 6 cm on the
 earth."""
 
-ASYMPTOTIC = 1e8
+ASYMPTOTIC_CONCENTRATION = 1e8
 """Concentration from which Bessel functions are their asymptotic series."""
 
 
@@ -208,8 +208,12 @@ def _log_ive(order: float, kappa: Tensor) -> Tensor:
     first = (1 - 4 * order**2) / (8 * kappa)  # DLMF 10.40.1
     large = torch.log1p(first * (1 + (9 - 4 * order**2) / (16 * kappa)))
     large -= (2 * math.pi * kappa).log() / 2
-    small = as_tensor(ive(order, kappa.clamp_max(ASYMPTOTIC).cpu().numpy()), "ive").to(kappa).log()
-    return torch.where(kappa < ASYMPTOTIC, small, large)
+    small = (
+        as_tensor(ive(order, kappa.clamp_max(ASYMPTOTIC_CONCENTRATION).cpu().numpy()), "ive")
+        .to(kappa)
+        .log()
+    )
+    return torch.where(kappa < ASYMPTOTIC_CONCENTRATION, small, large)
 
 
 def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, Tensor]:

@@ -16,7 +16,7 @@ from orbiflow.typed_torch import fft, special
 KERNEL_STEP = 0.65
 """Deviations of the sharpest bumps of a function between two points of a grid that resolves it."""
 
-DROPPED = 1e-7
+DROPPED_WEIGHT = 1e-7
 """The weight that the lightest kernels may have together, to be left out."""
 
 FIRST_GRID, GRID_BLOCK = {1: 256, 2: 48}, 2**12
@@ -73,7 +73,7 @@ def lattice_kernels(
     weights = fft.ifftn(spectrum).real.flatten().clamp_min(0)
     weights = weights / weights.sum()
     ordered, order = weights.sort()
-    kept = order[ordered.cumsum(0) >= DROPPED].sort().values
+    kept = order[ordered.cumsum(0) >= DROPPED_WEIGHT].sort().values
     grid = torch.cartesian_prod(*lines).reshape(-1, space.dim)[kept]
     concentrations = torch.tensor(kappas, dtype=torch.float64).expand(len(kept), -1)
     own = AdaptiveKernels(

@@ -29,10 +29,11 @@ class Mixture(Density, kind="mixture"):
         components: The densities: of any kind, also mixtures.
         weights: Their weights (P,): positive, of sum 1; kept on the CPU.
 
-    >>> from orbiflow.density import UniformDensity, VonMisesDensity, make_space
-    >>> space = make_space("torus")
-    >>> Mixture([VonMisesDensity(space), UniformDensity(space)], [0.75, 0.25])
-    Mixture(Torus(dim=2, unit='radians'), von-mises 75.0%, uniform 25.0%)
+    >>> from orbiflow.density import AdaptiveKernels, UniformDensity, make_space
+    >>> space, one = make_space("torus"), torch.ones(1)
+    >>> kernel = AdaptiveKernels(space, torch.tensor([[0.5, 0.5]]), torch.tensor([[4.0, 9.0]]), one)
+    >>> Mixture([kernel, UniformDensity(space)], [0.75, 0.25])
+    Mixture(Torus(dim=2, unit='radians'), kernels 75.0%, uniform 25.0%)
     """
 
     def __init__(self, components: Sequence[Density], weights: Any) -> None:

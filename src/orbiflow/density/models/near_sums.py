@@ -1,7 +1,4 @@
-"""Sums of many kernels at many points: tile by tile, without what is too far to count.
-
-Sums of kernels that are smooth across a tile are read off few places.
-"""
+"""Sums of many kernels at many points: tile by tile, without what is too far to count."""
 
 from __future__ import annotations
 
@@ -13,13 +10,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.charts import Chart, Tile
-from orbiflow.density.models.smooth_sums import Patch, gathered
-from orbiflow.density.models.terms import LOG2_E, Terms
+from orbiflow.density.models.terms import LOG2_E, Terms, lengths2
 from orbiflow.typed_torch import applied
 
 LOG_TOLERANCE = math.log(1e-12)
-"""Logarithm of the share of a sum that may be left out, and that interpolation may miss."""
+"""Logarithm of the share of a sum that may be left out."""
+
+ROUNDING = 1e-15
+"""Rounding error of squared distances between unit vectors, which bounds allow for."""
 
 FEW_POINTS, FEW_PAIRS = 256, 5_000_000
 """Tiles with fewer points, or fewer points times terms, are not divided further."""
@@ -27,20 +25,9 @@ FEW_POINTS, FEW_PAIRS = 256, 5_000_000
 FEWEST_PAIRS = 20_000
 """Fewer points times terms are summed one by one at once: looking for tiles would take longer."""
 
-WORTH = 2_500
-"""The fewest points of a tile for which smooth terms are interpolated."""
-
-WORTH_TERMS = 200
-"""The fewest terms for which they are."""
-
-LESS, IDLE = 0.9, 3
-"""A tile is divided at most `IDLE` times in a row while more than the share `LESS` of terms stays."""
-
-SMOOTH_AT_MOST = 100.0
-"""Concentration times squared radius of a tile above which terms are never smooth across it."""
-
-STEEPEST = 600.0
-"""Change of a term's logarithm across a tile above which its factors might overflow."""
+LESS_SHARE, MAX_IDLE_HALVINGS = 0.9, 3
+"""A tile is divided at most `MAX_IDLE_HALVINGS` times in a row while more than the share `LESS_SHARE`
+of the terms stays."""
 
 
 def near_log_sum(terms: Terms, features: Tensor, floor: float = -math.inf) -> Tensor:
@@ -49,9 +36,9 @@ def near_log_sum(terms: Terms, features: Tensor, floor: float = -math.inf) -> Te
     It is exact within `LOG_TOLERANCE` and rounding.
 
     Points are divided into tiles. Terms whose largest values in a tile are negligible beside the least
-    sum there are left out; those that are smooth across the tile are summed at few places and
-    interpolated; the rest is summed point by point, once tiles are small. `floor` is the logarithm of
-    what the caller adds to the sum, to which errors are relative as well; it is not in the result.
+    sum there are left out; the rest is summed point by point, once tiles are small. `floor` is the
+    logarithm of what the caller adds to the sum, to which errors are relative as well; it is not in the
+    result.
 
     Differentiable in the features: the gradient in closed form, as fast as the sum; higher
     derivatives by autograd through all terms.
@@ -83,19 +70,50 @@ class _NearLogSum(torch.autograd.Function):
         return found, None, None
 
 
+class Tile:
+    """A box around features (m, N), N > 0."""
+
+    def __init__(self, features: Tensor, factors: int) -> None:
+        low, high = torch.aminmax(features, dim=1)
+        self.factors = factors
+        self.middle, self.sides = (low + high) / 2, high - low
+        self.radius = lengths2(features - self.middle[:, None], factors).amax(dim=1).sqrt()
+
+    def bounds(self, terms: Terms) -> tuple[Tensor, Tensor]:
+        """Return the least and largest logarithms (K,) of the terms in the tile.
+
+        They are bounds by the triangle inequality.
+        """
+        square, radius = self._away2(terms), self.radius[:, None]
+        nearest = (square - ROUNDING).clamp_min_(0).sqrt_().sub_(radius).clamp_min_(0).square_()
+        farthest = square.clamp_min_(0).add_(ROUNDING).sqrt_().add_(radius).square_()
+        least = largest = terms.peaks
+        for kappa, near, far in zip(terms.kappa, nearest, farthest, strict=True):
+            least = torch.addcmul(least, kappa, far, value=-0.5)
+            largest = torch.addcmul(largest, kappa, near, value=-0.5)
+        return least, largest
+
+    def _away2(self, terms: Terms) -> Tensor:
+        """Return squared distances (F, K) of centers from the middle, within `ROUNDING`."""
+        rows = torch.zeros(self.factors, len(self.middle), dtype=self.middle.dtype)
+        rows[torch.arange(len(self.middle)) % self.factors, torch.arange(len(self.middle))] = (
+            -2 * self.middle
+        )
+        # centers are unit vectors
+        square = 1 + lengths2(self.middle[:, None], self.factors)
+        return torch.addmm(square, rows, terms.centers)
+
+
 class _Left(NamedTuple):
     """What is left to sum in a tile.
 
-    - `terms`: The terms; those beside them sum to exp(`beside`) at least.
-    - `lost`: The logarithm of what has been left out at most, and by how much interpolation is off.
-    - `patch`: The sum of the terms that were smooth across a larger tile.
+    - `terms`: The terms.
+    - `lost`: The logarithm of what has been left out at most.
     - `idle`: How many times in a row nothing has been left out.
     """
 
     terms: Terms
-    beside: float
     lost: float = -math.inf
-    patch: Patch | None = None
     idle: int = 0
 
 
@@ -105,34 +123,27 @@ class _Walk:
     def __init__(
         self, features: Tensor, terms: Terms, floor: float, *, slope: bool = False
     ) -> None:
-        # the number of points of a tile from which on interpolation may pay
-        self.worth = WORTH if terms.factors < 3 else math.inf
-        features = features.detach()
+        features, self.floor = features.detach(), floor
         self.log_sum = torch.full_like(features[0], -math.inf)
         self.slope = torch.zeros_like(features) if slope else None
         if len(self.log_sum):
-            self._add(torch.arange(len(self.log_sum)), features, _Left(terms, floor))
+            self._add(torch.arange(len(self.log_sum)), features, _Left(terms))
 
     def _add(self, at: Tensor, features: Tensor, left: _Left) -> None:
         """Sum terms at points, by their numbers (N,) and features (m, N), or in both halves of them."""
         tile, count, given = Tile(features, left.terms.factors), len(at), left.terms.size
         least, largest = tile.bounds(left.terms)
-        bottom = log_add(left.beside, least)
+        bottom = log_add(self.floor, least)
         far, lost = _negligible(largest, left.lost, bottom + LOG_TOLERANCE)
         if far is not None:
-            near = ~far
-            left = left._replace(terms=left.terms.only(near), lost=lost)
-            least, largest = least[near], largest[near]
-        left = self._interpolated(features, tile, left, least, largest, bottom)
-        terms, patch = left.terms, left.patch
-        idle = 0 if terms.size < LESS * given or count > self.worth else left.idle + 1
-        if count > FEW_POINTS and count * terms.size > FEW_PAIRS and idle <= IDLE:
+            left = left._replace(terms=left.terms.only(~far), lost=lost)
+        terms = left.terms
+        left = left._replace(idle=0 if terms.size < LESS_SHARE * given else left.idle + 1)
+        if count > FEW_POINTS and count * terms.size > FEW_PAIRS and left.idle <= MAX_IDLE_HALVINGS:
             for half in _halves(features, tile):
-                own = left._replace(patch=patch and patch.only(half), idle=idle)
-                self._add(at[half], gathered(features, half), own)
+                self._add(at[half], _gathered(features, half), left)
             return
-        slope = self.slope is not None
-        parts = [patch.log_sum(features, slope=slope)] if patch else []
+        slope, parts = self.slope is not None, list[tuple[Tensor, Tensor | None]]()
         sharp = terms.sharp(tile.radius)
         if bool(sharp.any()):
             parts.append(terms.only(sharp).sharp_log_sum(features, slope=slope))
@@ -153,42 +164,6 @@ class _Walk:
             for log, slope in parts:
                 assert slope is not None
                 self.slope[:, at] += slope * (log - total).exp().nan_to_num_(0.0)
-
-    def _interpolated(
-        self,
-        features: Tensor,
-        tile: Tile,
-        left: _Left,
-        least: Tensor,
-        largest: Tensor,
-        bottom: float,
-    ) -> _Left:
-        """Return what is left when terms that are smooth across the tile are in the patch.
-
-        Terms are between exp(`least`) and exp(`largest`), (K,); with what is beside they sum to
-        exp(`bottom`) at least.
-        """
-        terms, patch, lost = left.terms, left.patch, left.lost
-        if features.shape[1] < self.worth or terms.size < WORTH_TERMS or not tile.has_chart:
-            return left
-        wide = (terms.kappa * tile.radius[:, None] ** 2).amax(dim=0) < SMOOTH_AT_MOST
-        wide &= largest - least < STEEPEST
-        if int(wide.sum()) < WORTH_TERMS:
-            return left
-        chart = patch.chart if patch else Chart(tile)
-        own = Patch(chart, patch.u if patch else chart.coordinates(features))
-        some, top = terms.only(wide), largest[wide]
-        errors = own.errors(some, top, tile)
-        smooth, lost = _negligible(errors, lost, bottom + LOG_TOLERANCE)
-        if smooth is None or int(smooth.sum()) < WORTH_TERMS:
-            return left
-        if patch:
-            own.take(patch)
-        own.add(some.only(smooth), float(top[smooth].max()))
-        wide[wide.clone()] = smooth
-        return left._replace(
-            terms=terms.only(~wide), beside=log_add(left.beside, least[wide]), lost=lost, patch=own
-        )
 
 
 def _negligible(logs: Tensor, lost: float, most: float) -> tuple[Tensor | None, float]:
@@ -223,3 +198,8 @@ def _halves(features: Tensor, tile: Tile) -> tuple[Tensor, Tensor]:
     along = features[int(tile.sides.argmax())].numpy()
     order = torch.as_tensor(np.argpartition(along, len(along) // 2))
     return order[: len(along) // 2], order[len(along) // 2 :]
+
+
+def _gathered(table: Tensor, which: Tensor) -> Tensor:
+    """Return columns of a table (m, N) by their numbers (n,), four times as fast as by an index."""
+    return table.gather(1, which.expand(len(table), -1))

@@ -14,7 +14,7 @@ from torch import Tensor
 from orbiflow.arguments import as_instance
 from orbiflow.density.models.chain_nodes import quantiles
 from orbiflow.density.models.chain_sums import SCALES
-from orbiflow.density.models.chains import BLOCK, Factor, VonMisesChains, waves
+from orbiflow.density.models.chains import Factor, VonMisesChains, waves
 from orbiflow.density.models.density import Density, Split, Weighted
 from orbiflow.density.models.elimination import eliminated, grids_for
 from orbiflow.density.models.files import within
@@ -33,13 +33,16 @@ DRAWS = 4096
 BANDWIDTH = 0.25
 """Deviation of kernels about draws, relative to the noise of an angle on which others depend."""
 
-FLATTEST = 1e-6
+MIN_CONCENTRATION = 1e-6
 """The least concentration of a kernel: an angle may be even, of concentration 0."""
 
 AT_ONCE = 2**17
 """Points times draws worked on at a time."""
 
-ROWS, ENTRIES = 256, 2**18
+BLOCK_POINTS = 256
+"""Points evaluated at a time: few enough for the cache."""
+
+BLOCK_ROWS, BLOCK_ENTRIES = 256, 2**18
 """Rows of angles, and terms of a sum, at a time: few enough for the cache."""
 
 
@@ -84,7 +87,7 @@ class VonMisesNetwork(Density, kind="network"):
         self.factors = tuple(factors)
 
     def log_chart(self, points: Tensor) -> Tensor:
-        return in_blocks(self._log_product, points, BLOCK)
+        return in_blocks(self._log_product, points, BLOCK_POINTS)
 
     def _log_product(self, points: Tensor) -> Tensor:
         angles = points.unbind(dim=1)
@@ -112,11 +115,11 @@ class VonMisesNetwork(Density, kind="network"):
             own = chains.to("cpu")
             if axes[-1] in given:
                 points[:, axes[-1]] = given[axes[-1]]
-                logs += in_blocks(partial(log_conditional, own), points[:, list(axes)], BLOCK)
+                logs += in_blocks(partial(log_conditional, own), points[:, list(axes)], BLOCK_POINTS)
                 continue
             angle = 2 * math.pi * points[:, list(axes)]
             chosen = [angle.new_zeros(0).long()]
-            for block in torch.split(points[:, list(axes)], BLOCK):
+            for block in torch.split(points[:, list(axes)], BLOCK_POINTS):
                 shares = shares_of(_log_parents(own, block))
                 chosen.append(torch.multinomial(shares, 1, generator=generator)[:, 0])
             part = torch.cat(chosen)
@@ -167,7 +170,7 @@ class VonMisesNetwork(Density, kind="network"):
         points, means, sharp = (own[:, list(split.kept)] for own in drawn[:3])
         noise = (points - means + 0.5) % 1 - 0.5
         centers = means + (1 - share**2).sqrt() * noise
-        sharp = sharp.clamp_min(FLATTEST) / share**2
+        sharp = sharp.clamp_min(MIN_CONCENTRATION) / share**2
         own = AdaptiveKernels(space, centers % 1, sharp, shares_of(drawn.logs))
         return float(log_sum_exp(drawn.logs)) - math.log(len(points)), own
 
@@ -325,7 +328,7 @@ def _given_parents(
 
     def log_prob(angle: Tensor) -> Tensor:
         own, place = unique(angle[:, 0], return_inverse=True)  # equal ones are evaluated once
-        rows = torch.split(2 * math.pi * own[:, None, None], max(1, ENTRIES // logs.numel()))
+        rows = torch.split(2 * math.pi * own[:, None, None], max(1, BLOCK_ENTRIES // logs.numel()))
         found = [log_sum_exp((r - means).cos_().sub_(1).mul_(kappa).add_(logs)) for r in rows]
         return torch.cat(found)[place]
 
@@ -367,7 +370,7 @@ def _along(
     """Return a function of points (R, len(axes)) at angles whose shapes broadcast, in their shape."""
     own = broadcast(*[at[axis] for axis in axes])
     rows = torch.stack(own, dim=-1).flatten(0, 1)
-    value = torch.cat([function(block) for block in torch.split(rows, ROWS)])
+    value = torch.cat([function(block) for block in torch.split(rows, BLOCK_ROWS)])
     return value.reshape(*own[0].shape, *value.shape[1:])
 
 

@@ -18,13 +18,13 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list
 from orbiflow.typed_torch import listed
 
-POOL, MOST_POOL = 2**14, 2**20
+MIN_DRAWS, MAX_DRAWS = 2**14, 2**20
 """The fewest and the most weighed draws of which samples are chosen."""
 
-DRAWS_EACH = 32
+DRAWS_PER_SAMPLE = 32
 """Weighed draws for each sample."""
 
-BLOCK = 2**10
+BLOCK_POINTS = 2**10
 """Points evaluated at a time."""
 
 
@@ -57,7 +57,9 @@ class PartialDensity(Density, kind="partial"):
         return self.whole.device
 
     def log_chart(self, points: Tensor) -> Tensor:
-        return in_blocks(lambda p: self.log_marginal(p, list(range(p.shape[1]))), points, BLOCK)
+        return in_blocks(
+            lambda p: self.log_marginal(p, list(range(p.shape[1]))), points, BLOCK_POINTS
+        )
 
     def log_marginal(self, points: Tensor, axes: list[int], seed: int = 0) -> Tensor:
         given = points.new_tensor(self.split.values).expand(len(points), -1)
@@ -69,7 +71,7 @@ class PartialDensity(Density, kind="partial"):
         kept = list(self.split.kept)
         if not self.split.given:
             return self.whole.draw(count, generator)[:, kept]
-        size = min(MOST_POOL, max(POOL, DRAWS_EACH * count))
+        size = min(MAX_DRAWS, max(MIN_DRAWS, DRAWS_PER_SAMPLE * count))
         points, weights = self._pool(size, generator)
         # the points are split evenly: none comes more often than its weight makes it
         at = (torch.arange(count) + torch.rand(1, generator=generator)) / count
@@ -79,8 +81,8 @@ class PartialDensity(Density, kind="partial"):
     def effective_share(self) -> float:
         if not self.split.given:
             return 1.0
-        weights = self._pool(POOL, torch.Generator().manual_seed(0))[1]
-        return 1 / float(weights.square().sum()) / POOL
+        weights = self._pool(MIN_DRAWS, torch.Generator().manual_seed(0))[1]
+        return 1 / float(weights.square().sum()) / MIN_DRAWS
 
     def _pool(self, size: int, generator: torch.Generator) -> tuple[Tensor, Tensor]:
         """Return draws (size, d) of all angles, and weights (size,) of sum 1."""

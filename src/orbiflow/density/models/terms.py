@@ -14,22 +14,22 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-FAINT = -80.0
+FAINT_LOG = -80.0
 """Logarithm, relative to the largest, of terms that no sum in double precision can feel."""
 
 
 LOG2_E = math.log2(math.e)
 """Powers of 2 are twice as fast as exponentials, and no slower where they underflow."""
 
-TINY = 1e-300
+MIN_SUM = 1e-300
 """The least sum of terms that is not taken for 0."""
 
 
 def log_sum_exp(table: Tensor) -> Tensor:
     """Return `torch.logsumexp` over the last dimension, ten times as fast if most terms are faint.
 
-    Exponentials that underflow take a slow path of the processor. Each is raised to `FAINT` instead,
-    which changes nothing: the largest term counts 1. Of logarithms (..., n), n > 0, return (...); where
+    Exponentials that underflow take a slow path of the processor. Each is raised to `FAINT_LOG`, which
+    changes nothing: the largest term counts 1. Of logarithms (..., n), n > 0, return (...); where
     all terms are 0, the lowest number of the dtype rather than -inf.
 
     >>> log_sum_exp(torch.tensor([[0.0, 0.0], [-1e9, 3.0]]))
@@ -49,10 +49,10 @@ def _terms(table: Tensor) -> tuple[Tensor, Tensor]:
     """Return exponentials (..., n) relative to the largest, and its logarithm (..., 1)."""
     top = table.amax(dim=-1, keepdim=True).clamp_min(torch.finfo(table.dtype).min)
     # in place: at this size, fresh memory costs more than the arithmetic
-    return (table - top).clamp_min_(FAINT).mul_(LOG2_E).exp2_(), top
+    return (table - top).clamp_min_(FAINT_LOG).mul_(LOG2_E).exp2_(), top
 
 
-WIDE = 600.0
+WIDE_LOG_RATIO = 600.0
 """Logarithm of the largest ratio that exponentials can hold without rescaling."""
 
 PLAIN_ENTRIES = 2**24
@@ -61,7 +61,7 @@ PLAIN_ENTRIES = 2**24
 BLOCK_ENTRIES = 250_000
 """Entries of the table of points against terms worked on at a time: few enough for the cache."""
 
-SHARP = 1e8
+SHARP_EXPONENT = 1e8
 """Concentration times squared distance from the middle above which exponents are taken term by term: a
 sum about the middle would lose more than 8 digits of 16."""
 
@@ -115,10 +115,10 @@ class Terms(NamedTuple):
             table = space[: part.shape[1]]
             torch.addmm(bias, part.mT, binary, out=table)
             high: Tensor | float = 0.0
-            if spread > WIDE:
+            if spread > WIDE_LOG_RATIO:
                 high = table.amax(dim=1)
                 table.sub_(high[:, None])
-            total = table.exp2_().sum(dim=1).clamp_min_(TINY)
+            total = table.exp2_().sum(dim=1).clamp_min_(MIN_SUM)
             values.append(total.log2() + high)
             if slope:
                 slopes.append(rows @ table.mT / total)
@@ -131,7 +131,7 @@ class Terms(NamedTuple):
 
     def sharp(self, radius: Tensor) -> Tensor:
         """Return which terms (K,) are too sharp for `log_sum` at this distance (F,) from its middle."""
-        return (self.kappa * radius[:, None].square()).amax(dim=0) > SHARP
+        return (self.kappa * radius[:, None].square()).amax(dim=0) > SHARP_EXPONENT
 
     def sharp_log_sum(self, features: Tensor, *, slope: bool) -> tuple[Tensor, Tensor | None]:
         """Return what `log_sum` does, from the differences of features: nothing cancels."""
@@ -145,7 +145,7 @@ class Terms(NamedTuple):
                 off = x[:, None] - center
                 table.addcmul_(off * half[k % self.factors], off, value=-1)
             high = table.amax(dim=1, keepdim=True)
-            table.sub_(high).clamp_min_(FAINT).mul_(LOG2_E).exp2_()
+            table.sub_(high).clamp_min_(FAINT_LOG).mul_(LOG2_E).exp2_()
             total = table.sum(dim=1)
             values.append(total.log() + high[:, 0])
             if slope:

@@ -1,5 +1,4 @@
 from .fitting import check_marginalised as check_marginalised
 from .fitting import fit_rows as fit_rows
 from .queries import SampleSettings as SampleSettings
-from .queries import ScoreSettings as ScoreSettings
 from .queries import mean_of_whole as mean_of_whole

@@ -94,7 +94,7 @@ def score(
 BLOCK, BLOCK_GRADIENT = 2**18, 2**16
 """Rows at a time: many cost less each, few leave room and tell how far it is."""
 
-SCORED = 0.3
+SCORED_SHARE = 0.3
 """Share of the work that is done when gradients are still to be found."""
 
 
@@ -143,7 +143,7 @@ def _log_densities(
     from orbiflow.density import inference
 
     found: list[Array] = []
-    end = SCORED if settings.gradient else 1.0
+    end = SCORED_SHARE if settings.gradient else 1.0
     for start in range(0, len(points), BLOCK):
         with torch.no_grad():
             block = points[start : start + BLOCK]
@@ -165,7 +165,7 @@ def _gradients(
         part = values[start : start + BLOCK_GRADIENT]
         found.append(models.log_density_gradient(density, part)[1])
         share = (start + len(part)) / len(values)
-        progress(SCORED + (1 - SCORED) * share, "finding gradients")
+        progress(SCORED_SHARE + (1 - SCORED_SHARE) * share, "finding gradients")
     names = [f"log_prob_by_{name}" for name in rows.table.columns]
     return dict(zip(names, np.concatenate(found).T, strict=True))
 

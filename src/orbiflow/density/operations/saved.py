@@ -52,8 +52,8 @@ def with_columns_of(
 ) -> TableSettings:
     """Return the settings with the columns of the fit, where none were chosen.
 
-    A file that names its columns must have those of the fit; of one without names all are taken, which
-    is told.
+    A file that names its columns must have those of the fit. All columns of a file without names are
+    taken, and the user is told.
     """
     names: tuple[str, ...] = tuple(extra.get("columns") or ())
     unnamed = all(re.fullmatch(r"column\d+", name) for name in names)
@@ -111,13 +111,13 @@ def check_fits(
 
 PICTURE = "density.png"
 
-ROWS = {1: 720, 2: 120}
+TABLE_ROWS = {1: 720, 2: 120}
 """Rows of the table along an angle, by the number of angles."""
 
-BEFORE_FILES = 0.7
+SHARE_BEFORE_FILES = 0.7
 """Share of the work that is done when a density is found, and its files are to be made."""
 
-DRAWN = 20_000
+HISTOGRAM_SAMPLES = 20_000
 """Samples in the picture of one angle."""
 
 
@@ -125,7 +125,7 @@ def axes_of(wanted: Sequence[str], names: Sequence[str], tell: Sink = ignore) ->
     """Return the numbers, from 0, of angles given by name, or else by number from 1.
 
     Columns without a name have the numbers of their table, of which the model may have some alone. Of
-    those with names it is told which one a number means.
+    those with names, the user is told which one a number means.
 
     >>> axes_of(["psi", "1"], ["phi", "psi"]), axes_of(["3"], ["column2", "column3"])
     ([1, 0], [1])
@@ -153,7 +153,7 @@ def condition_of(
 ) -> tuple[dict[str, float], dict[int, float], list[int]]:
     """Return the known angles by name in the torus' unit and by number in turns, and which to keep.
 
-    All others are kept, or those of `columns`. A warning is told of angles that seem to be in another
+    All others are kept, or those of `columns`. The user is warned of angles that seem to be in another
     unit.
     """
     axes = axes_of([name for name, _ in pairs], names, tell)
@@ -183,7 +183,7 @@ def evidence_of(density: Density, given: dict[int, float]) -> float:
 
 def in_first_part(progress: InProgress) -> InProgress:
     """Return a function that tells the same progress, as that of the work before files are made."""
-    return lambda share, what: progress(BEFORE_FILES * share, what)
+    return lambda share, what: progress(SHARE_BEFORE_FILES * share, what)
 
 
 def write_derived(
@@ -207,12 +207,12 @@ def write_derived(
         pictures.REPORT: json.dumps(document, allow_nan=False, indent=1),
     }
     if settings.sample is not None:
-        progress(BEFORE_FILES, "drawing samples")
+        progress(SHARE_BEFORE_FILES, "drawing samples")
         drawn = density.sample((settings.sample,), torch.Generator().manual_seed(settings.seed))
         files[SAMPLES] = to_csv(names, space.from_chart(drawn))
         for text in _sample_notes(density):
             tell(Note(text))
-    if space.dim in ROWS:
+    if space.dim in TABLE_ROWS:
         progress(0.8, "drawing")
         files[pictures.TABLE] = to_csv((*names, "density"), _table(density))
         progress(0.9, "drawing")
@@ -220,7 +220,11 @@ def write_derived(
     progress(1.0, "writing")
     write_files(folder, files, tell)
     if density.error > settings.accuracy:
-        tell(Note(f"WARNING: an error of {settings.accuracy:g} nats cannot be had here"))
+        tell(
+            Note(
+                f"WARNING: the density cannot be approximated to within {settings.accuracy:g} nats"
+            )
+        )
     tell(Note(_words(density, names, folder.path)))
     summary = {"folder": str(folder.path), "files": list(files), "columns": names}
     return Outcome({**summary, **errors})
@@ -256,7 +260,7 @@ def _table(density: Density) -> Array:
     space = density.space
     if not isinstance(space, Torus):
         raise OrbiflowError(f"a table of angles needs a torus, not the {space.name}")
-    line = (np.arange(ROWS[space.dim]) / ROWS[space.dim] - 0.5) * space.period
+    line = (np.arange(TABLE_ROWS[space.dim]) / TABLE_ROWS[space.dim] - 0.5) * space.period
     data = np.stack(np.meshgrid(*[line] * space.dim, indexing="ij"), axis=-1).reshape(-1, space.dim)
     with torch.no_grad():
         logs = density.log_prob(space.to_chart(data), measure="natural")
@@ -267,5 +271,5 @@ def _picture(density: Density, names: list[str]) -> bytes:
     settings = pictures.PlotSettings(names=tuple(names))
     if density.space.dim == 2:
         return pictures.density_picture(density, settings=settings).file()
-    drawn = density.sample((DRAWN,), torch.Generator().manual_seed(0))
+    drawn = density.sample((HISTOGRAM_SAMPLES,), torch.Generator().manual_seed(0))
     return pictures.corner_picture(density, None, drawn, settings).file()

@@ -12,14 +12,8 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
 from orbiflow.density.pictures import frames
-from orbiflow.density.pictures.colours import (
-    chosen_scale,
-    density_over,
-    is_sharp,
-    shading,
-    square_pixel,
-)
-from orbiflow.density.pictures.overlays import Colouring, log_natural
+from orbiflow.density.pictures.colours import square_pixel
+from orbiflow.density.pictures.grounds import Ground, Pixels
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.pictures.square import Square
 from orbiflow.density.spaces import QuotientSpace, Space
@@ -63,34 +57,26 @@ class Cell(Square):
         self.aspect = self.width / height
 
     def places(self, points: Tensor) -> Array:
-        """Return where points of the domain lie, in the data's coordinates."""
         data = self.space.from_chart(frames.chart_points(self.space, points))
         return self.domain.project(data)
 
-    def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
-        """Return the colours of a density."""
-        step = max(self.high - self.low) / PIXELS
+    def pixels_for(self, density: Density) -> int:  # noqa: ARG002
+        return PIXELS
+
+    def pixels(self, count: int) -> Pixels:
+        step = max(self.high - self.low) / count
         x, y = (
             low + (high - low) * (np.arange(n) + 0.5) / n
             for low, high in zip(self.low, self.high, strict=True)
             for n in [round((high - low) / step)]
         )
         points = self.space.cover(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2))
-        pixel = square_pixel(self.space, float(step) / self.space.volume**0.5)
-        values = density_over(density, points, settings.measure, pixel)
-        log, reason = chosen_scale(density, settings.measure, settings.scale)
-        shade, shape = shading(values, log=log), (len(y), len(x))
-        logs = None
-        if settings.regions:
-            logs = log_natural(density, values, points, settings.measure).reshape(shape)
-        note = ""
-        if is_sharp(density, pixel):
-            note = f"peaks narrower than 1/{PIXELS} of the longer side are averaged over it"
+        side = square_pixel(self.space, float(step) / self.space.volume**0.5)
         extent = (self.low[0], self.high[0], self.low[1], self.high[1])
-        return Colouring(shade.places(values).reshape(shape), extent, shade, reason, note, logs)
+        size, every = f"1/{count} of the longer side", np.ones((len(y), len(x)), bool)
+        return Pixels(points, every, every.ravel(), None, side, size, extent)
 
     def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> frames.Room:
-        """Return the room around a single picture and its colour bar."""
         if sheet.printed:
             return super().room(sheet, label, ticks)
         return frames.Room(6.67, 3.6, 11.52, 4.2, 3.33, 1.52)
@@ -128,7 +114,6 @@ class Cell(Square):
             axes.set_ylabel(frames.shortened(second, side, sheet), **style)
 
     def caption(self, notes: Sequence[str], dots: tuple[int, int] | None) -> str:
-        """Return what is seen, and `notes`, as sentences."""
         parts = [
             "Yellow outlines the fundamental domain, which holds each point of the space once",
             "black outlines a cell of the lattice",
@@ -137,14 +122,4 @@ class Cell(Square):
         parts += ["Dots are points, in the domain"] if dots else []
         return frames.sentences([*parts, *notes])
 
-    def write_on_screen(
-        self,
-        frame: frames.Frame,
-        sheet: Sheet,
-        title: str,
-        notes: Sequence[str],
-        dots: tuple[int, int] | None,
-    ) -> None:
-        """Write the title and the caption."""
-        frame.axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
-        frames.write_caption(frame.figure, self.caption(notes, dots), sheet)
+    write_on_screen = Ground.write_on_screen  # no legend

@@ -25,14 +25,17 @@ MAX_BYTES = 32_000_000
 MAX_POINTS = 1_000_000
 """Limits of a file: Natural Earth's finest coastline has 18 MB and 400,000 points."""
 
-_MAX_DEPTH = 20
-"""Depth of collections within collections."""
-
-_SHAPES = {"LineString": 1, "MultiLineString": 2, "Polygon": 2, "MultiPolygon": 3}
-"""Depth of the lists of positions in each kind of geometry that has lines."""
+_SHAPES = ("LineString", "MultiLineString", "Polygon", "MultiPolygon")
+"""Kinds of geometry that have lines."""
 
 _POINTS = ("Point", "MultiPoint")
-_COLLECTIONS = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
+_PARTS = {
+    "FeatureCollection": "features",
+    "GeometryCollection": "geometries",
+    "Feature": "geometry",
+}
+"""Where the geometries are in what has some."""
+
 _EDGE = 1e-4
 """Degrees from a pole or longitude 180 within which a polygon's edge is where the globe was cut."""
 
@@ -109,61 +112,46 @@ def _parted(values: Array) -> list[Array]:
 
 def _geojson(path: Path) -> list[Array]:
     try:
-        content = json.loads(path.read_bytes())
-        return list(_lines(path, content, 0))
-    except (ValueError, RecursionError) as error:  # ValueError: neither JSON nor UTF-8
+        lines = list(_lines(json.loads(path.read_bytes())))
+    # ValueError: also what is neither JSON nor UTF-8
+    except (ValueError, RecursionError, TypeError, LookupError, OverflowError) as error:
         raise InputFileError(f"{path} is not GeoJSON: {error}"[:300]) from error
+    return [_checked(path, line) for line in lines]
 
 
-def _lines(path: Path, item: Any, depth: int) -> Iterator[Array]:
+def _lines(item: Any) -> Iterator[Array]:
     """Yield the lines (M, 2), M > 1, of a feature, a geometry or a collection of them."""
     kind = item.get("type") if isinstance(item, dict) else None
     kind = kind if isinstance(kind, str) else None
     if kind == "Topology":
-        raise InputFileError(
-            f"{path} is TopoJSON: make GeoJSON of it, with ogr2ogr -f GeoJSON lines.geojson {path.name}"
-        )
-    if depth > _MAX_DEPTH:
-        raise InputFileError(f"{path} has collections more than {_MAX_DEPTH} deep")
-    if kind in _COLLECTIONS:
-        inner = item.get(_COLLECTIONS[kind])
-        if not isinstance(inner, list):
-            raise InputFileError(f"{path}: a {kind} without a list of them is not GeoJSON")
-        for part in inner:
-            yield from _lines(path, part, depth + 1)
-    elif kind == "Feature":
-        if item.get("geometry") is not None:
-            yield from _lines(path, item["geometry"], depth + 1)
+        raise ValueError("it is TopoJSON; make GeoJSON of it, with ogr2ogr -f GeoJSON")
+    if kind in _PARTS:
+        inner = item[_PARTS[kind]]
+        for part in inner if isinstance(inner, list) else [inner] * (inner is not None):
+            yield from _lines(part)
     elif kind in _SHAPES:
-        for line in _positions(path, kind, item.get("coordinates"), _SHAPES[kind]):
+        for line in _positions(item["coordinates"]):
             parts = without_cuts(line) if kind.endswith("Polygon") else [line]
             yield from (part for part in parts if len(part) > 1)
     elif kind not in _POINTS:
-        raise InputFileError(
-            f"{path} is not GeoJSON: expected a feature or a geometry, got {described(kind)}"
-        )
+        raise ValueError(f"expected a feature or a geometry, got {described(kind)}")
 
 
-def _positions(path: Path, kind: str, items: Any, depth: int) -> list[Array]:
-    """Return latitudes and longitudes (M, 2) of positions in lists `depth` deep, without heights."""
-    if not isinstance(items, list):
-        raise InputFileError(f"{path}: the coordinates of a {kind} must be lists {depth} deep")
-    if depth > 1:
-        return [line for item in items for line in _positions(path, kind, item, depth - 1)]
-    try:
-        # a position is longitude, latitude
+def _positions(items: Any) -> Iterator[Array]:
+    """Yield latitudes and longitudes (M, 2) of the positions in lists of lists, without heights."""
+    if items and isinstance(items[0][0], list):
+        for item in items:
+            yield from _positions(item)
+        return
+    try:  # a position is longitude, latitude
         line = np.array([(p[1], p[0]) for p in items], dtype=float).reshape(-1, 2)
-    except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
-        raise InputFileError(
-            f"{path}: a {kind} has a position that is not longitude, latitude"
-        ) from error
-    line = _checked(path, line)
-    line[:, 0] = np.clip(line[:, 0], -90, 90)
-    return [line]
+    except (TypeError, ValueError, LookupError) as error:
+        raise ValueError("a position is not longitude, latitude") from error
+    yield line
 
 
 def _checked(path: Path, line: Array) -> Array:
-    """Return a line (M, 2) whose latitudes and longitudes are degrees."""
+    """Return a line (M, 2) whose latitudes and longitudes are degrees, if but for rounding."""
     wrong = ~((abs(line[:, 0]) <= 90 + _ROUNDING) & (abs(line[:, 1]) <= 360))  # NaN, too
     if wrong.any():
         lat, lon = line[wrong.argmax()]
@@ -171,7 +159,7 @@ def _checked(path: Path, line: Array) -> Array:
             f"{path}: latitude {lat:g}, longitude {lon:g} is beyond the globe: give degrees (WGS 84), "
             "in GeoJSON the longitude first"
         )
-    return line
+    return np.stack([np.clip(line[:, 0], -90, 90), line[:, 1]], axis=-1)
 
 
 def without_cuts(ring: Array) -> list[Array]:

@@ -151,7 +151,7 @@ class _Panels:
         y = (self.below + dim * self.side + 0.6 * sheet.em) / height
         size = sheet.text * (1.0 if sheet.printed else 1.05)
         reach = dim * self.side / width
-        widths = [(len(text) + 1.5) * frames.LETTER * size / 72 / width for text, _ in heads]
+        widths = [(len(text) + 1.5) * frames.LETTER_EMS * size / 72 / width for text, _ in heads]
         step = max(reach * (0.53 if dim > 1 else 0.36), max(widths[:-1], default=0.0))
         x = self.left / width
         if x + step * (len(heads) - 1) + widths[-1] > 1:  # a narrow figure

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import torch
@@ -17,6 +17,7 @@ from orbiflow.density.pictures.cell import Cell
 from orbiflow.density.pictures.coastlines import coastlines_for
 from orbiflow.density.pictures.colours import bar_label, bar_ticks
 from orbiflow.density.pictures.frames import INK, chart_points, require_plane, space_title, view_of
+from orbiflow.density.pictures.grounds import Ground
 from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.projections import chosen_map
 from orbiflow.density.pictures.settings import PlotSettings
@@ -28,9 +29,6 @@ from orbiflow.symmetry import CrystallographicGroup
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Ground: TypeAlias = Square | Map  # a `Cell` is a square
-"""What densities and points of a space are drawn on."""
 
 GroundName = Literal["square", "map"]
 
@@ -46,7 +44,7 @@ def _ground(
     """Return the ground of a name; a map is the one that suits the points (N, 2)."""
     if ground == "square":
         return plane_ground(space, settings)
-    if ground != "map":
+    if isinstance(ground, Ground):
         return ground
     about = chart_points(space, torch.empty(0, 2) if points is None else points)
     return Map(space, chosen_map(space, about, settings), coastlines_for(space, settings))

@@ -28,7 +28,7 @@ INK = "#1a1a1a"
 MAX_NAME = 40
 """Letters of a column's name that are shown."""
 
-LETTER = 0.56
+LETTER_EMS = 0.56
 """Mean width of a letter, in ems."""
 
 
@@ -121,7 +121,7 @@ def symbol(name: str) -> str:
     """
     found = re.fullmatch(r"([a-z]+?)_?(\d*)", name.strip().casefold())
     try:
-        letter = unicodedata.lookup(f"GREEK SMALL LETTER {found[1]}") if found else ""
+        letter = unicodedata.lookup(f"GREEK SMALL LETTER_EMS {found[1]}") if found else ""
     except KeyError:
         return name
     return f"{letter}{found[2].translate(SUBSCRIPTS)}" if found else name
@@ -138,7 +138,7 @@ def shortened(label: str, side: float, sheet: Sheet) -> str:
     >>> shortened("a name that goes on and on (degrees)", 1.5, Sheet.column())
     'a name that g… (degrees)'
     """
-    room = int(side / (LETTER * sheet.em))
+    room = int(side / (LETTER_EMS * sheet.em))
     if not sheet.printed or len(label) <= room:
         return label
     name, opening, unit = label.rpartition(" (")
@@ -148,7 +148,7 @@ def shortened(label: str, side: float, sheet: Sheet) -> str:
 
 def legible(at: list[float], texts: list[str], side: float, size: float) -> list[str]:
     """Return texts of `size` points along `side` inches, every second one left out if they touch."""
-    widest = max(map(len, texts)) * LETTER * size / 72
+    widest = max(map(len, texts)) * LETTER_EMS * size / 72
     if len(at) < 3 or 1.3 * widest < (at[1] - at[0]) * side:
         return texts
     return [text if k % 2 == 0 else "" for k, text in enumerate(texts)]
@@ -196,10 +196,10 @@ def degrees_text(value: float, letters: str) -> str:
     return f"{abs(value):g}°{letter}"
 
 
-NARROW = 70 / 25.4
+NARROW_INCHES = 70 / 25.4
 """Inches of a printed figure below which there is no room beside the axes."""
 
-DIGIT = 0.66
+DIGIT_EMS = 0.66
 """Width of a digit in ems: digits are wider than the mean of letters."""
 
 
@@ -283,7 +283,7 @@ def printed_room(
     sheet: Sheet, left: float, below: float, above: float, label: str, ticks: Sequence[str]
 ) -> Room:
     """Return room in print for a bar: below the axes where the sheet is narrow, else beside them."""
-    if sheet.width < NARROW:
+    if sheet.width < NARROW_INCHES:
         return room_for_bar_below(sheet, Room(left, below, 1.4, above, below, 1.0), label)
     return room_for_bar_beside(sheet, Room(left, below, 0.0, above, 1.4, 1.1), label, ticks)
 
@@ -297,7 +297,7 @@ def room_for_bar_below(sheet: Sheet, room: Room, label: str) -> Room:
 
 def room_for_bar_beside(sheet: Sheet, room: Room, label: str, ticks: Sequence[str]) -> Room:
     """Add room for a bar, its ticks and its label at the right of the axes."""
-    widest = max(map(len, ticks), default=0) * LETTER * sheet.small / sheet.text
+    widest = max(map(len, ticks), default=0) * LETTER_EMS * sheet.small / sheet.text
     right = room.gap + room.bar + 1.4 + widest
     made = room
     for lines in range(1, 6):  # each takes room from the axes, and so from the lines
@@ -310,7 +310,7 @@ def room_for_bar_beside(sheet: Sheet, room: Room, label: str, ticks: Sequence[st
 
 def label_lines(sheet: Sheet, label: str, side: float) -> list[str]:
     """Break a bar's label into lines of about equal length, none longer than `side` inches."""
-    most = max(12, int(side / (LETTER * sheet.em)))
+    most = max(12, int(side / (LETTER_EMS * sheet.em)))
     lines = -(-len(label) // most)
     return textwrap.wrap(label, min(most, len(label) // max(lines, 1) + 6)) or [""]
 
@@ -322,7 +322,7 @@ def sentences(parts: Sequence[str]) -> str:
 
 def caption_lines(words: str, sheet: Sheet) -> list[str]:
     """Break a caption into lines as wide as a picture for a screen."""
-    return textwrap.wrap(words, int(0.94 * 72 * sheet.width / (0.9 * LETTER * sheet.small)))
+    return textwrap.wrap(words, int(0.94 * 72 * sheet.width / (0.9 * LETTER_EMS * sheet.small)))
 
 
 def write_caption(figure: Figure, words: str, sheet: Sheet) -> None:
@@ -359,7 +359,7 @@ def colour_bar(
         set_ticks(at, without_overlap(at, texts, frame.side, sheet) if frame.under else texts)
         set_ticks(minor_places(shade), minor=True)
     elif frame.under:  # a few even steps
-        bar.locator = MaxNLocator(max(2, int(frame.side / (8 * LETTER * sheet.em))))
+        bar.locator = MaxNLocator(max(2, int(frame.side / (8 * LETTER_EMS * sheet.em))))
         bar.update_ticks()
 
 
@@ -371,7 +371,7 @@ def without_overlap(
     >>> without_overlap([0.0, 0.1, 0.9], ["0.00", "0.10", "0.90"], 1.5, Sheet.column())
     ['0.00', '', '0.90']
     """
-    letter, end, kept = DIGIT * sheet.small / 72, -1.0, []
+    letter, end, kept = DIGIT_EMS * sheet.small / 72, -1.0, []
     for place, text in zip(at, texts, strict=True):
         half = letter * (len(text) + 1) / 2
         free = place * side - half > end

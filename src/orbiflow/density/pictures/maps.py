@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from torch import Tensor
@@ -12,17 +12,11 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
 from orbiflow.density.pictures import frames
-from orbiflow.density.pictures.colours import (
-    chosen_scale,
-    density_over,
-    is_sharp,
-    round_pixel,
-    shading,
-)
-from orbiflow.density.pictures.frames import INK, LETTER, chart_points, degrees_text
-from orbiflow.density.pictures.overlays import LIGHT, Colouring, log_natural
+from orbiflow.density.pictures.colours import round_pixel
+from orbiflow.density.pictures.frames import INK, LETTER_EMS, chart_points, degrees_text
+from orbiflow.density.pictures.grounds import Ground, Pixels
+from orbiflow.density.pictures.overlays import LIGHT
 from orbiflow.density.pictures.projections import Azimuthal, Mollweide, Projection, WorldMap
-from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors
 from orbiflow.drawing import Sheet
 
@@ -39,10 +33,10 @@ _BESIDE = 120 / 25.4
 """Inches of a printed figure below which discs are above each other, for room round their rims."""
 
 
-class Map:
+class Map(Ground):
     """A map of the sphere or the projective plane, with coastlines (N, 2) in degrees."""
 
-    caption_below = True
+    outline: Array
 
     def __init__(
         self, space: Space, projection: Projection, coastlines: Sequence[Array] = ()
@@ -63,26 +57,32 @@ class Map:
         latlon = to_latlon(vectors)
         return projection.forward(latlon[projection.contains(latlon)])
 
-    def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
-        pixels = pixels_of(self.projection)
-        points = cast(RoundSpace, self.space).vectors_to_chart(to_vectors(pixels.latlon))
-        pixel = round_pixel(pixels.angle)
-        values = density_over(density, points, settings.measure, pixel)
-        log, reason = chosen_scale(density, settings.measure, settings.scale)
-        shade = shading(values[pixels.within], pixels.areas[pixels.within], log=log)
-        logs = None
-        if settings.regions:
-            logs = pixels.table(log_natural(density, values, points, settings.measure), math.nan)
-        note = ""
-        if is_sharp(density, pixel):
-            size = f"{math.degrees(pixels.angle):.2g}°"
-            note = f"peaks narrower than {size} are averaged over it"
-        places = pixels.table(shade.places(values), 0.0)
-        return Colouring(places, pixels.extent, shade, reason, note, logs, self.outline)
+    def pixels_for(self, density: Density) -> int:  # noqa: ARG002
+        return _PIXELS
+
+    def pixels(self, count: int) -> Pixels:
+        from matplotlib.path import Path
+        from scipy.ndimage import binary_dilation
+
+        ring, projection = self.outline, self.projection
+        low, high = ring.min(axis=0), ring.max(axis=0)
+        step = math.sqrt(float(np.prod(high - low)) / count)
+        counts = np.ceil((high - low) / step).astype(int) + 2 * _MARGIN
+        first = (low + high) / 2 - step * counts / 2
+        x, y = (first[k] + step * (np.arange(counts[k]) + 0.5) for k in (0, 1))
+        places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        within = Path(ring).contains_points(places)
+        shown = binary_dilation(within.reshape(counts[::-1]), iterations=_MARGIN)
+        kept, last = shown.ravel(), first + step * counts
+        latlon = projection.inverse(places[kept])
+        points = cast(RoundSpace, self.space).vectors_to_chart(to_vectors(latlon))
+        extent = (float(first[0]), float(last[0]), float(first[1]), float(last[1]))
+        areas, size = projection.areas(latlon), f"{math.degrees(step):.2g}°"
+        return Pixels(points, shown, within[kept], areas, round_pixel(step), size, extent)
 
     def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> frames.Room:
         above = 0.8 if sheet.printed else 3.2
-        if self.is_disc and (not sheet.printed or sheet.width >= frames.NARROW):
+        if self.is_disc and (not sheet.printed or sheet.width >= frames.NARROW_INCHES):
             beside = frames.Room(3.6, 1.8, 0.0, above + 1.2, 4.4, 1.2)
             return frames.room_for_bar_beside(sheet, beside, label, ticks)
         left, right, top = (3.4, 3.4, 1.2) if self.is_disc else (3.6, 1.8, 0.0)
@@ -195,67 +195,12 @@ class Map:
     def samples_caption(self, notes: Sequence[str]) -> str:
         return self.caption(notes or ["dots are points"], None)
 
-    def write_on_screen(
-        self,
-        frame: frames.Frame,
-        sheet: Sheet,
-        title: str,
-        notes: Sequence[str],
-        dots: tuple[int, int] | None,
-    ) -> None:
+    def write_title(self, frame: frames.Frame, sheet: Sheet, title: str) -> None:
         top = 1 - 1.6 * sheet.em / frame.figure.get_size_inches()[1]
         frame.figure.text(
             0.5, top, f"{title}: {self._subtitle}", ha="center", va="center",
             fontsize=1.15 * sheet.text,
         )  # fmt: skip
-        frames.write_caption(frame.figure, self.caption(notes, dots), sheet)
-
-
-class Pixels(NamedTuple):
-    """The pixels of a map that are drawn, in a rectangle whose lowest row is the first.
-
-    - `shown`: Which pixels are on the map or next to it, (rows, columns) of bool.
-    - `latlon`: Directions (N, 2) of these.
-    - `within`: Which of these are on the map, (N,) of bool.
-    - `areas`: Their areas (N,) on the sphere, up to a factor.
-    - `angle`: A pixel's side on the sphere in radians, where it is largest.
-    - `extent`: Left, right, bottom and top of the rectangle on the map.
-    """
-
-    shown: Array
-    latlon: Array
-    within: Array
-    areas: Array
-    angle: float
-    extent: tuple[float, float, float, float]
-
-    def table(self, values: Array, elsewhere: float) -> Array:
-        """Return values (N,) in the rectangle, (rows, columns), with another value elsewhere."""
-        table = np.full(self.shown.shape, elsewhere)
-        table[self.shown] = values
-        return table
-
-
-def pixels_of(projection: Projection, count: int | None = None) -> Pixels:
-    """Return about `count` pixels of a map, by default `_PIXELS`."""
-    from matplotlib.path import Path
-    from scipy.ndimage import binary_dilation
-
-    ring = projection.outline()
-    low, high = ring.min(axis=0), ring.max(axis=0)
-    step = math.sqrt(float(np.prod(high - low)) / (count or _PIXELS))
-    counts = np.ceil((high - low) / step).astype(int) + 2 * _MARGIN
-    first = (low + high) / 2 - step * counts / 2
-    x, y = (first[k] + step * (np.arange(counts[k]) + 0.5) for k in (0, 1))
-    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    within = Path(ring).contains_points(places)
-    shown = within.reshape(counts[::-1])
-    shown = binary_dilation(shown, iterations=_MARGIN)
-    kept = shown.ravel()
-    latlon = projection.inverse(places[kept])
-    last = first + step * counts
-    extent = (float(first[0]), float(last[0]), float(first[1]), float(last[1]))
-    return Pixels(shown, latlon, within[kept], projection.areas(latlon), step, extent)
 
 
 COAST = "#ffffff"
@@ -316,7 +261,7 @@ class _Labels:
         middle, at = projection.center[1], 0.0 if inside else -90.0
         ends = projection.forward(np.array([[at, middle], [at, middle + 60.0]]))
         room = self.size * float(np.ptp(ends[:, 0]))
-        letters = 7.5 * LETTER * self.sheet.small  # texts must not touch
+        letters = 7.5 * LETTER_EMS * self.sheet.small  # texts must not touch
         step = next((s for s in (60.0, 90.0, 120.0) if room * s / 60 > letters), 180.0)
         turns = sorted(((lon - middle + 180) % 360 - 180) for lon in lons if lon % step == 0)
         turns = [*turns, 180.0] if turns[0] == -180 else turns
@@ -390,7 +335,7 @@ class _Labels:
 
     def _free(self, text: str, at: Array, ha: str, va: str) -> bool:
         """Return whether there is no text yet, and reserve the place."""
-        size = np.array([(len(text) + 0.8) * LETTER, 1.3]) * self.sheet.small
+        size = np.array([(len(text) + 0.8) * LETTER_EMS, 1.3]) * self.sheet.small
         left = {"left": 0.0, "center": 0.5, "right": 1.0}[ha]
         low = {"bottom": 0.0, "center": 0.5, "top": 1.0}[va]
         corner = np.asarray(at) - size * (left, low)

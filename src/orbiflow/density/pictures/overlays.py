@@ -1,28 +1,22 @@
-"""What pictures show: a density's colours, dots that leave it readable, lines around regions."""
+"""What pictures show over a density: dots that leave it readable, lines around regions."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
-from orbiflow.density.pictures.colours import COLOURS, Shade
 from orbiflow.density.pictures.frames import INK
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.regions import DensityLevels, DensityRegion, samples_for
-from orbiflow.drawing import Sheet
 from orbiflow.errors import SettingError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.image import AxesImage
-    from matplotlib.patches import Polygon
 
 DOT, LIGHT = "#3b528b", "#f4f4f1"
 """Colours of dots without a density, and of the ground beneath them."""
@@ -122,72 +116,6 @@ STYLES = ("solid", "dashed", "dotted", "dashdot")
 """Styles of the lines, beginning with the smallest mass."""
 
 
-HALO, LINE = "#16202a", "#ffffff"
-"""Colours of lines around regions: their rim, and the line."""
-
-
-@dataclass(frozen=True, eq=False)
-class Colouring:
-    """The colours of a density on a ground.
-
-    - `places`: Place of each pixel on the colour bar, (rows, columns), the lowest row first.
-    - `extent`: Left, right, bottom and top of the pixels on the axes.
-    - `shade`: The scale of the colours. `reason`: Why it is linear or logarithmic.
-    - `averaging`: A note on peaks narrower than a pixel, "" if there are none.
-    - `logs`: Logarithms of the density in natural measure, shaped as `places`, NaN where there is none;
-      None if there are no lines around regions.
-    - `outline`: Ring (N, 2) beyond which nothing is drawn, None for the whole rectangle.
-    """
-
-    places: Array
-    extent: tuple[float, float, float, float]
-    shade: Shade
-    reason: str
-    averaging: str
-    logs: Array | None
-    outline: Array | None = None
-
-    def draw(self, axes: Axes) -> AxesImage:
-        """Draw the colours as one image, cut along the outline, without seams or steps at its rim."""
-        image = axes.imshow(
-            self.places, extent=self.extent, origin="lower", cmap=COLOURS,
-            interpolation="bicubic", vmin=0, vmax=1, aspect="auto", zorder=1,
-        )  # fmt: skip
-        if self.outline is not None:
-            image.set_clip_path(self._clip(axes))
-        return image
-
-    def draw_regions(self, axes: Axes, lines: Sequence[DensityRegion], sheet: Sheet) -> None:
-        """Draw lines where the density is that of each region's edge, cut along the outline."""
-        if self.logs is None:
-            return
-        from matplotlib.patheffects import Stroke
-
-        logs, (left, right, below, above) = self.logs, self.extent
-        rows, columns = logs.shape
-        x = left + (right - left) * (np.arange(columns) + 0.5) / columns
-        y = below + (above - below) * (np.arange(rows) + 0.5) / rows
-        width, clip = 0.11 * sheet.text, self._clip(axes)
-        for line, style in zip(lines, STYLES, strict=False):
-            if not np.nanmin(logs) < line.log_prob < np.nanmax(logs):
-                continue
-            drawn = axes.contour(
-                x, y, logs, levels=[line.log_prob], colors=LINE, linestyles=style,
-                linewidths=width, zorder=4,
-            )  # fmt: skip
-            halo = Stroke(linewidth=1.9 * width, foreground=HALO, alpha=0.55)
-            if clip is not None:
-                drawn.set_clip_path(clip)
-            drawn.set_path_effects([halo, Stroke(linewidth=width, foreground=LINE)])
-
-    def _clip(self, axes: Axes) -> Polygon | None:
-        from matplotlib.patches import Polygon
-
-        if self.outline is None:
-            return None
-        return Polygon(self.outline.tolist(), closed=True, transform=axes.transData)
-
-
 def region_lines(density: Density, settings: PlotSettings) -> tuple[DensityRegion, ...]:
     """Return the settings' `regions`, around which lines are drawn, the smallest mass first."""
     if not settings.regions:
@@ -213,13 +141,3 @@ def region_note(masses: Sequence[float]) -> str:
         return f"the line is about the smallest region that holds {100 * masses[0]:.10g} %"
     parts = [f"{100 * mass:.10g} % ({style})" for mass, style in zip(masses, STYLES, strict=False)]
     return f"lines are about the smallest regions that hold {', '.join(parts[:-1])} and {parts[-1]}"
-
-
-def log_natural(density: Density, values: Array, points: Tensor, measure: str) -> Array:
-    """Return logarithms (N,) in natural measure of values (N,) in another one at points (N, d)."""
-    own = np.log(np.maximum(values, 1e-300))
-    if measure == "natural":
-        return own
-    factor = density.space.log_density_factor
-    shift = factor(points, "natural") - factor(points, measure)
-    return own + shift.double().cpu().numpy()

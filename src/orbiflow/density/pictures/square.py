@@ -10,16 +10,10 @@ import torch
 from torch import Tensor
 
 from orbiflow.arrays import Array
-from orbiflow.density.models import Density, midpoints
+from orbiflow.density.models import Density
 from orbiflow.density.pictures import frames
-from orbiflow.density.pictures.colours import (
-    chosen_scale,
-    density_on_grid,
-    is_sharp,
-    shading,
-    square_pixel,
-)
-from orbiflow.density.pictures.overlays import LIGHT, Colouring, log_natural
+from orbiflow.density.pictures.colours import square_pixel
+from orbiflow.density.pictures.grounds import Ground, Pixels
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import CENTER_COLOURS, Sheet, center_sign
@@ -47,16 +41,9 @@ TURNS, SIGNS = {2: "half", 4: "quarter"}, {2: "Lenses", 4: "Squares"}
 CROWDED = "dots crowd where the square shrinks areas"
 
 
-class Square:
-    """The canonical square of a two-dimensional space.
+class Square(Ground):
+    """The canonical square of a two-dimensional space."""
 
-    - `width`, `aspect`: Its width in units of the axes, and its width over its height.
-    - `title_gap`: Distance of a panel's title, in sizes of the text.
-    - `caption_below`: Whether the caption of a single picture is below it on a screen.
-    """
-
-    width = aspect = 1.0
-    title_gap = 0.7
     caption_below = False
 
     def __init__(self, space: Space, settings: PlotSettings) -> None:
@@ -65,42 +52,33 @@ class Square:
         self.view = frames.view_of(space, settings.names, settings.center)
 
     def places(self, points: Tensor) -> Array:
-        """Return where chart points (N, 2) lie on the axes."""
         return self.view.places(points)
 
-    def colouring(self, density: Density, settings: PlotSettings) -> Colouring:
-        """Return the colours of a density."""
-        count = _FINE_GRID if density.has_fine_detail else _GRID
+    def pixels_for(self, density: Density) -> int:
+        return _FINE_GRID if density.has_fine_detail else _GRID
+
+    def pixels(self, count: int) -> Pixels:
         middles = (torch.arange(count, dtype=torch.float64) + 0.5) / count
         x, y = (middles + low for low in self.view.low)
-        values = density_on_grid(density, x, y, settings.measure)
-        areas = self.space.log_area(midpoints(self.space, count)).exp().numpy()
-        log, reason = chosen_scale(density, settings.measure, settings.scale)
-        shade = shading(values, areas.reshape(count, count), log=log)
-        logs = None
-        if settings.regions:
-            points = torch.stack(torch.meshgrid(x, y, indexing="ij"), dim=-1).reshape(-1, 2)
-            logs = log_natural(density, values.ravel(), points, settings.measure)
-            logs = logs.reshape(count, count).T
-        note = average_note(count) if is_sharp(density, square_pixel(self.space, 1 / count)) else ""
-        return Colouring(shade.places(values).T, (0, 1, 0, 1), shade, reason, note, logs)
+        points = torch.stack(torch.meshgrid(x, y, indexing="xy"), dim=-1).reshape(-1, 2)
+        areas = self.space.log_area(points).exp().numpy()
+        side, every = square_pixel(self.space, float(x[1] - x[0])), np.ones((count, count), bool)
+        size = f"1/{count} of a side"
+        return Pixels(points, every, every.ravel(), areas, side, size, (0, 1, 0, 1))
 
     def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> frames.Room:
-        """Return the room around a single picture and its colour bar."""
         if not sheet.printed:
             return SCREEN
         edges = (5.4, 3.8, 0.8) if self._has_ticks else (1.0, 2.8, 2.8)
         return frames.printed_room(sheet, *edges, label, ticks)
 
     def panels_room(self, sheet: Sheet) -> tuple[frames.Room, bool]:
-        """Return the room around two panels, and whether one is above the other."""
         edges = (5.4, 4.2, 1.6, 2.4, 4.2) if self._has_ticks else (1.0, 1.0, 1.0, 2.4, 1.6)
-        room, stacked = frames.Room(*edges, 0.0), sheet.printed and sheet.width < frames.NARROW
+        room, stacked = (
+            frames.Room(*edges, 0.0),
+            sheet.printed and sheet.width < frames.NARROW_INCHES,
+        )
         return (room._replace(gap=room.below + 2.0) if stacked else room), stacked
-
-    def fill(self, axes: Axes) -> None:
-        """Fill the ground with one light colour."""
-        axes.set_facecolor(LIGHT)
 
     def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: frames.Panel) -> None:
         """Draw ticks, edges with their arrows, and cone points with their places in the data."""
@@ -125,7 +103,6 @@ class Square:
                 self._write_place(axes, corner, sheet)
 
     def caption(self, notes: Sequence[str], dots: tuple[int, int] | None) -> str:
-        """Return what is seen, and `notes`, as sentences."""
         parts = ["The edges with one arrow head are one edge, and so are those with two"]
         parts += [
             f"{SIGNS[order]} are cone points of a {TURNS[order]} turn, which no flow moves"
@@ -133,10 +110,6 @@ class Square:
         ]
         parts += ["Dots are points"] if dots else []
         return frames.sentences([*parts, *self._notes(notes, bool(dots))])
-
-    def samples_caption(self, notes: Sequence[str]) -> str:
-        """Return the caption of points on two grounds."""
-        return self.caption(notes, (0, 0))
 
     def write_on_screen(
         self,
@@ -147,7 +120,7 @@ class Square:
         dots: tuple[int, int] | None,
     ) -> None:
         """Write the title, and a legend with notes."""
-        frame.axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
+        self.write_title(frame, sheet, title)
         words = frames.sentences(self._notes(notes, bool(dots)))
         self._draw_legend(frame.figure, sheet, words, bool(dots))
 
@@ -220,11 +193,6 @@ class Square:
             handles=entries, loc="lower left", bbox_to_anchor=(0.02, up), ncols=2, frameon=False,
             fontsize=sheet.small, borderaxespad=0.3,
         )  # fmt: skip
-
-
-def average_note(count: int) -> str:
-    """Return what a picture with `count` pixels along a side says of narrower peaks."""
-    return f"peaks narrower than 1/{count} of a side are averaged over it"
 
 
 def edge_pairs(group: CrystallographicGroup) -> list[tuple[Array, Array]]:

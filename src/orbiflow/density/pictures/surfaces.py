@@ -23,7 +23,6 @@ from orbiflow.density.models import Density
 from orbiflow.density.pictures import colours, frames
 from orbiflow.density.pictures.overlays import SMALLER, thinned, uncrowded
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.density.pictures.square import average_note
 from orbiflow.density.spaces import RoundSpace, Space, to_vectors
 from orbiflow.drawing import rendered
 from orbiflow.errors import OrbiflowError
@@ -259,7 +258,7 @@ def surface_data(
         data |= {"samples": packed(places, "<f4"), "widths": packed(widths, "<f4")}
         notes.append(SMALLER)
     if colours.is_sharp(density, colours.square_pixel(density.space, _SOFT / cells)):
-        notes.append(average_note(round(cells / _SOFT)))
+        notes.append(f"peaks narrower than 1/{round(cells / _SOFT)} of a side are averaged over it")
     words = CAPTIONS[space.name].format(*(frames.axis_label(view, k) for k in (0, 1)))
     return {**data, "caption": f"{words} {frames.sentences(notes)}".strip()}
 

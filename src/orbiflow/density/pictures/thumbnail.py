@@ -17,20 +17,13 @@ from numpy.typing import ArrayLike
 from PIL import Image, ImageDraw
 
 from orbiflow.arrays import Array
-from orbiflow.density.models import Density, midpoints
-from orbiflow.density.pictures.cell import Cell
-from orbiflow.density.pictures.colours import (
-    COLOURS,
-    density_on_grid,
-    density_over,
-    round_pixel,
-    shading,
-)
+from orbiflow.density.models import Density
+from orbiflow.density.pictures.colours import COLOURS
+from orbiflow.density.pictures.figures import plane_ground
 from orbiflow.density.pictures.frames import view_of
-from orbiflow.density.pictures.maps import pixels_of
+from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.projections import chosen_map
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.density.spaces import RoundSpace, to_vectors
 
 SIZE = (360, 240)
 """Width and height in pixels, half as many again as a page shows."""
@@ -61,10 +54,8 @@ def density_thumbnail(density: Density, data: ArrayLike) -> bytes:
         picture = (
             _pairs((drawn + 1) / 2) if len(drawn[0]) <= MAX_PAIRS else _stripes((drawn + 1) / 2)
         )
-    elif space.is_round:
-        picture = _map(density, whole)
     elif space.dim == 2:
-        picture = _square(density) if space.has_square else _cell(density)
+        picture = _plane(density, whole)
     elif space.dim == 1 and space.has_square:
         picture = _histogram(density, whole)
     else:
@@ -88,36 +79,22 @@ def _coloured(places: Array) -> Image.Image:
     return Image.fromarray((255 * shades + 0.5).astype(np.uint8), "RGB")
 
 
-def _square(density: Density) -> Image.Image:
-    space, view = density.space, view_of(density.space)
-    middles = (torch.arange(COARSE, dtype=torch.float64) + 0.5) / COARSE
-    values = density_on_grid(density, middles + view.low[0], middles + view.low[1], "natural")
-    areas = space.log_area(midpoints(space, COARSE)).exp().numpy().reshape(COARSE, COARSE)
-    picture = _coloured(shading(values, areas, log=None).places(values).T[::-1])
-    return picture.resize((SIZE[1], SIZE[1]), Image.Resampling.BICUBIC)
-
-
-def _cell(density: Density) -> Image.Image:
-    ground = Cell(density.space, PlotSettings())
-    picture = _coloured(ground.colouring(density, PlotSettings()).places[::-1])
-    picture.thumbnail(SIZE)
-    return picture
-
-
-def _map(density: Density, data: Array) -> Image.Image:
-    space = density.space
-    assert isinstance(space, RoundSpace)
-    projection = chosen_map(space, space.to_chart(data))
-    pixels = pixels_of(projection, MAP_PLACES)
-    points = space.vectors_to_chart(to_vectors(pixels.latlon))
-    values = density_over(density, points, "natural", round_pixel(pixels.angle))
-    shade = shading(values[pixels.within], pixels.areas[pixels.within], log=None)
-    places = pixels.table(shade.places(values), 0.0)
-    left, right, below, above = pixels.extent
+def _plane(density: Density, data: Array) -> Image.Image:
+    """Draw the canonical square, a lattice's cell, or a map that suits data (N, k)."""
+    space, settings = density.space, PlotSettings()
+    if space.is_round:
+        ground = Map(space, chosen_map(space, space.to_chart(data)))
+        colours = ground.colouring(density, settings, MAP_PLACES)
+    else:
+        ground = plane_ground(space, settings)
+        colours = ground.colouring(density, settings, COARSE)
+    left, right, below, above = colours.extent
     scale = min((SIZE[0] - MARGIN) / (right - left), (SIZE[1] - MARGIN) / (above - below))
     size = (round(scale * (right - left)), round(scale * (above - below)))
-    picture = _coloured(places[::-1]).resize(size, Image.Resampling.BICUBIC)
-    ring = (projection.outline() - (left, above)) * (scale, -scale)
+    picture = _coloured(colours.places[::-1]).resize(size, Image.Resampling.BICUBIC)
+    if ground.outline is None:
+        return picture
+    ring = (ground.outline - (left, above)) * (scale, -scale)
     # four times finer, so that the outline is a curve
     mask = Image.new("L", (4 * size[0], 4 * size[1]))
     ImageDraw.Draw(mask).polygon([tuple(place) for place in (4 * ring).tolist()], fill=255)

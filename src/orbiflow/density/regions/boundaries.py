@@ -36,7 +36,7 @@ CHECKED = 100_000
 """Number of new samples with which the mass inside the polygons is measured."""
 
 TOLERANCE = 0.005
-"""Error of that mass beyond what samples leave open; the user is told of a larger one."""
+"""Error of that mass beyond what samples leave open; a larger one is a note."""
 
 MAX_SIDE = 4.0
 """Degrees of a side on the globe, so that it hardly matters which lines a program draws."""

@@ -2,8 +2,6 @@ from .flat import KleinBottle as KleinBottle
 from .flat import Torus as Torus
 from .flat import whole_turn as whole_turn
 from .frame import Frame as Frame
-from .frame import frame_of as frame_of
-from .patches import KleinCoordinates as KleinCoordinates
 from .patches import to_klein as to_klein
 from .quotient import QuotientSpace as QuotientSpace
 from .round import ProjectivePlane as ProjectivePlane
@@ -17,11 +15,9 @@ from .space import MEASURES as MEASURES
 from .space import SPACES as SPACES
 from .space import Space as Space
 from .space import check_measure as check_measure
-from .space import checked_table as checked_table
 from .space import make_space as make_space
 from .space import rectangle as rectangle
 from .space import row_count as row_count
-from .space import space_class as space_class
 from .space import space_for as space_for
 from .unit_vectors import CubicOrientations as CubicOrientations
 from .unit_vectors import HexagonalOrientations as HexagonalOrientations

@@ -1,11 +1,9 @@
 from .files import append_columns as append_columns
 from .files import column_names as column_names
-from .files import read_labels as read_labels
 from .files import read_table as read_table
 from .files import renamed_columns as renamed_columns
 from .files import to_csv as to_csv
 from .guesses import Column as Column
-from .guesses import Guess as Guess
 from .guesses import code_notes as code_notes
 from .guesses import guess as guess
 from .guesses import seen_column as seen_column
@@ -19,11 +17,9 @@ from .rows import read_rows as read_rows
 from .settings import CountedRowSettings as CountedRowSettings
 from .settings import GroupedRowSettings as GroupedRowSettings
 from .settings import RowSettings as RowSettings
-from .settings import SpaceName as SpaceName
 from .settings import SpaceSettings as SpaceSettings
 from .settings import TableSettings as TableSettings
 from .settings import check_table_name as check_table_name
-from .table import MissingCellsError as MissingCellsError
 from .table import Table as Table
 from .table import TableError as TableError
 from .table import find as find

@@ -354,7 +354,7 @@ def _name(path: Path, column: str, header: bool | None) -> str:
 def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
     """Return the unit of angles, and tell what one may doubt of a space's data.
 
-    A cell that was not given is told, too: data of another size would be folded into it.
+    The user is also told of a cell that was not given: data of another size would be folded into it.
     """
     space = where.space
     if space not in SPACES and where.cell is None:

@@ -1,0 +1,221 @@
+"""What densities and points are drawn on: pixels and their colours, axes, room, words."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from torch import Tensor
+
+from orbiflow.arrays import Array
+from orbiflow.density.models import Density, Pixel
+from orbiflow.density.pictures import frames
+from orbiflow.density.pictures.colours import (
+    COLOURS,
+    Shade,
+    chosen_scale,
+    density_over,
+    is_sharp,
+    shading,
+)
+from orbiflow.density.pictures.overlays import LIGHT, STYLES
+from orbiflow.density.pictures.settings import PlotSettings
+from orbiflow.density.regions import DensityRegion
+from orbiflow.density.spaces import Space
+from orbiflow.drawing import Sheet
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.image import AxesImage
+    from matplotlib.patches import Polygon
+
+HALO, LINE = "#16202a", "#ffffff"
+"""Colours of lines around regions: their rim, and the line."""
+
+
+class Pixels(NamedTuple):
+    """The pixels of a ground, in a rectangle whose lowest row is the first.
+
+    - `points`: Chart points (N, 2) of those that are drawn.
+    - `shown`: Which pixels are drawn, (rows, columns) of bool.
+    - `within`: Which of these the scale of the colours is made for, (N,) of bool.
+    - `areas`: Their natural areas (N,), up to a factor; None if all are the same.
+    - `side`: How wide a pixel is. `size`: The same in words.
+    - `extent`: Left, right, bottom and top of the rectangle on the axes.
+    """
+
+    points: Tensor
+    shown: Array
+    within: Array
+    areas: Array | None
+    side: Pixel
+    size: str
+    extent: tuple[float, float, float, float]
+
+    def table(self, values: Array, elsewhere: float) -> Array:
+        """Return values (N,) in the rectangle, (rows, columns), with another value elsewhere."""
+        table = np.full(self.shown.shape, elsewhere)
+        table[self.shown] = values
+        return table
+
+
+@dataclass(frozen=True, eq=False)
+class Colouring:
+    """The colours of a density on a ground.
+
+    - `places`: Place of each pixel on the colour bar, (rows, columns), the lowest row first.
+    - `extent`: Left, right, bottom and top of the pixels on the axes.
+    - `shade`: The scale of the colours. `reason`: Why it is linear or logarithmic.
+    - `averaging`: A note on peaks narrower than a pixel, "" if there are none.
+    - `logs`: Logarithms of the density in natural measure, shaped as `places`, NaN where there is none;
+      None if there are no lines around regions.
+    - `outline`: Ring (N, 2) beyond which nothing is drawn, None for the whole rectangle.
+    """
+
+    places: Array
+    extent: tuple[float, float, float, float]
+    shade: Shade
+    reason: str
+    averaging: str
+    logs: Array | None
+    outline: Array | None = None
+
+    def draw(self, axes: Axes) -> AxesImage:
+        """Draw the colours as one image, cut along the outline, without seams or steps at its rim."""
+        image = axes.imshow(
+            self.places, extent=self.extent, origin="lower", cmap=COLOURS,
+            interpolation="bicubic", vmin=0, vmax=1, aspect="auto", zorder=1,
+        )  # fmt: skip
+        if self.outline is not None:
+            image.set_clip_path(self._clip(axes))
+        return image
+
+    def draw_regions(self, axes: Axes, lines: Sequence[DensityRegion], sheet: Sheet) -> None:
+        """Draw lines where the density is that of each region's edge, cut along the outline."""
+        if self.logs is None:
+            return
+        from matplotlib.patheffects import Stroke
+
+        logs, (left, right, below, above) = self.logs, self.extent
+        rows, columns = logs.shape
+        x = left + (right - left) * (np.arange(columns) + 0.5) / columns
+        y = below + (above - below) * (np.arange(rows) + 0.5) / rows
+        width, clip = 0.11 * sheet.text, self._clip(axes)
+        for line, style in zip(lines, STYLES, strict=False):
+            if not np.nanmin(logs) < line.log_prob < np.nanmax(logs):
+                continue
+            drawn = axes.contour(
+                x, y, logs, levels=[line.log_prob], colors=LINE, linestyles=style,
+                linewidths=width, zorder=4,
+            )  # fmt: skip
+            halo = Stroke(linewidth=1.9 * width, foreground=HALO, alpha=0.55)
+            if clip is not None:
+                drawn.set_clip_path(clip)
+            drawn.set_path_effects([halo, Stroke(linewidth=width, foreground=LINE)])
+
+    def _clip(self, axes: Axes) -> Polygon | None:
+        from matplotlib.patches import Polygon
+
+        if self.outline is None:
+            return None
+        return Polygon(self.outline.tolist(), closed=True, transform=axes.transData)
+
+
+class Ground(ABC):
+    """A window of a space of two dimensions, seen from above.
+
+    - `width`, `aspect`: Its width in units of the axes, and its width over its height.
+    - `title_gap`: Distance of a panel's title, in sizes of the text.
+    - `caption_below`: Whether the caption of a single picture is below it on a screen.
+    """
+
+    space: Space
+    width = aspect = 1.0
+    title_gap = 0.7
+    caption_below = True
+    outline: Array | None = None
+
+    @abstractmethod
+    def places(self, points: Tensor) -> Array:
+        """Return where chart points (N, 2) lie on the axes."""
+
+    @abstractmethod
+    def pixels(self, count: int) -> Pixels:
+        """Return so many pixels: along the longer side, or of a map in all."""
+
+    @abstractmethod
+    def pixels_for(self, density: Density) -> int:
+        """Return how many pixels a density needs."""
+
+    @abstractmethod
+    def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> frames.Room:
+        """Return the room around a single picture and its colour bar."""
+
+    @abstractmethod
+    def panels_room(self, sheet: Sheet) -> tuple[frames.Room, bool]:
+        """Return the room around two panels, and whether one is above the other."""
+
+    @abstractmethod
+    def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: frames.Panel) -> None:
+        """Draw what surrounds the picture, and the marks on it."""
+
+    @abstractmethod
+    def caption(self, notes: Sequence[str], dots: tuple[int, int] | None) -> str:
+        """Return what is seen, and `notes`, as sentences; of `dots`, how many are shown of how many."""
+
+    def samples_caption(self, notes: Sequence[str]) -> str:
+        """Return the caption of points on two grounds."""
+        return self.caption(notes, (0, 0))
+
+    def colouring(
+        self, density: Density, settings: PlotSettings, count: int | None = None
+    ) -> Colouring:
+        """Return the colours of a density, on as many `pixels` as it needs or on a `count` of them."""
+        pixels = self.pixels(count or self.pixels_for(density))
+        values = density_over(density, pixels.points, settings.measure, pixels.side)
+        log, reason = chosen_scale(density, settings.measure, settings.scale)
+        areas = None if pixels.areas is None else pixels.areas[pixels.within]
+        shade = shading(values[pixels.within], areas, log=log)
+        logs = None
+        if settings.regions:
+            own = log_natural(density, values, pixels.points, settings.measure)
+            logs = pixels.table(own, math.nan)
+        note = ""
+        if is_sharp(density, pixels.side):
+            note = f"peaks narrower than {pixels.size} are averaged over it"
+        places = pixels.table(shade.places(values), 0.0)
+        return Colouring(places, pixels.extent, shade, reason, note, logs, self.outline)
+
+    def fill(self, axes: Axes) -> None:
+        """Fill the ground with one light colour."""
+        axes.set_facecolor(LIGHT)
+
+    def write_on_screen(
+        self,
+        frame: frames.Frame,
+        sheet: Sheet,
+        title: str,
+        notes: Sequence[str],
+        dots: tuple[int, int] | None,
+    ) -> None:
+        """Write the title and the caption."""
+        self.write_title(frame, sheet, title)
+        frames.write_caption(frame.figure, self.caption(notes, dots), sheet)
+
+    def write_title(self, frame: frames.Frame, sheet: Sheet, title: str) -> None:
+        """Write the title above the picture."""
+        frame.axes.set_title(title, fontsize=1.15 * sheet.text, pad=14)
+
+
+def log_natural(density: Density, values: Array, points: Tensor, measure: str) -> Array:
+    """Return logarithms (N,) in natural measure of values (N,) in another one at points (N, d)."""
+    own = np.log(np.maximum(values, 1e-300))
+    if measure == "natural":
+        return own
+    factor = density.space.log_density_factor
+    shift = factor(points, "natural") - factor(points, measure)
+    return own + shift.double().cpu().numpy()
