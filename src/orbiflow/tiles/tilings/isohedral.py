@@ -26,11 +26,13 @@ from orbiflow.symmetry import (
 )
 from orbiflow.tiles.tilings.class_table import (
     CLASS_TABLE,
+    TYPE_TABLE,
     ClassRow,
     Coefficients,
     OperatorRow,
     RotationRow,
     TemplateKind,
+    TypeRow,
 )
 from orbiflow.tiles.tilings.incidence import IncidenceSymbol
 from orbiflow.tiles.tilings.lattice_freedom import array_functions, commutant, stretch_matrix
@@ -43,7 +45,6 @@ from orbiflow.tiles.tilings.tile_edges import (
     edges,
 )
 from orbiflow.tiles.tilings.tiling import Tile
-from orbiflow.tiles.tilings.type_table import TYPE_TABLE, TypeRow
 
 
 class PentagonGauge(NamedTuple):
