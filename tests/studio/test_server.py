@@ -222,7 +222,7 @@ def test_forms_come_from_settings(client: Client, name: str) -> None:
 def test_forms_know_what_a_choice_changes(client: Client) -> None:
     told = client.get("/api/operations/export/schema").json()["x-presets"]["purpose"]
     assert told["print"] == told["web"] == {"clip": True}
-    assert told["laser"] == {"cut": "skeleton", "warn_neck": 1.5}
+    assert told["laser"] == {"cut": "skeleton", "outline": 0.01, "warn_neck": 1.5}
     stickers = {"cut": "pieces", "area": [210, 297], "margin": 10.0, "marks": True, "offset": 2.0}
     assert told["stickers"] == stickers
 

@@ -36,6 +36,9 @@ SURFACE_CELLS = 120
 FITTED = 0.9
 """Share of the work that is done when a density is fitted, and its pictures are to be made."""
 
+MAX_SHOWN = 30
+"""Columns of a table that are shown, and of which a density may be."""
+
 
 class FitChoice(Settings, group="Density"):
     """What a density is fitted to."""
@@ -203,8 +206,6 @@ def _model(folder: Path) -> Density:
 
 TABLE, FIT, VIEW, SURFACE = "table.json", "model", "view.json", "surface.json"
 ENDINGS = (".csv", ".tsv", ".txt", ".npy")
-MAX_SHOWN = 30
-"""Columns of a table that are shown, and of which a density may be."""
 
 
 def table_file(home: Path) -> Path:
