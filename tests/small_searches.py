@@ -9,9 +9,11 @@ from typing import Any
 import pytest
 
 from orbiflow.tiles import LikenessSearch
+from orbiflow.tiles.search.likeness_search import SKETCH
 
 FEW: dict[str, Any] = {
-    "placements": 10, "held": 3, "starts": 2, "finalists": 1, "rounds": 2, "bodies": ("firm",),
+    "placements": 10, "held": 3, "starts": 2, "finalists": 1, "rounds": 2, "carved": 0,
+    "bodies": ("firm",), "multiples": (2,),
 }  # fmt: skip
 
 
@@ -20,6 +22,8 @@ def small_searches() -> Iterator[None]:
     """Search for likeness at the effort "fast" from few places, in this process and its forks."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(LikenessSearch.efforts, "fast", FEW)  # pyright: ignore[reportArgumentType]
+        for name, value in {"placements": 10, "held": 3, "finalists": 1, "rounds": 2}.items():
+            patch.setitem(SKETCH, name, value)
         yield
 
 

@@ -9,7 +9,7 @@ from orbiflow.density import read_table
 from orbiflow.errors import InputFileError
 
 PROPERTY = settings(
-    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from batch.small_batches import QUICK, Here, rows, run_call, write_boot
-from orbiflow.batch import dask_cluster, work
+from batch.small_batches import QUICK, Here, rows, run_call, small_locally, write_boot
+from density.quick_fits import quick_fits
+from orbiflow.batch import dask_cluster, executors, work
 from orbiflow.batch import folder as folder_module
 from orbiflow.errors import OrbiflowError, OutputError, SettingError
 from orbiflow.runtime import Call, Cancel, Finished, ItemDone, Note, find
@@ -189,8 +190,13 @@ def test_two_batches_do_not_share_a_folder(here: Here, call: Call) -> None:
     assert len(here.done) == 3
 
 
-def test_local_processes(call: Call) -> None:
-    summary, _ = run_call(changed(call, workers=2))
+def test_local_processes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(executors, "_serve", small_locally)
+    write_boot(tmp_path / "in" / "boot.json")
+    write_boot(tmp_path / "in" / "sub" / "boot.json")
+    (tmp_path / "in" / "broken.svg").write_text("<svg")
+    given = {"folder": tmp_path / "in", "out": tmp_path / "out", "classes": ["IH4"]}
+    summary, _ = run_call(find("batch").call({**given, "effort": "fast", "workers": 2}))
     assert (summary["done"], summary["failed"]) == (2, 1)
 
 
@@ -217,7 +223,8 @@ def test_what_belongs_to_one_silhouette_is_no_setting_of_a_batch(name: str) -> N
 
 
 @pytest.mark.usefixtures("here")
-def test_a_batch_fits_as_fit_does(tmp_path: Path) -> None:
+def test_a_batch_fits_as_fit_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    quick_fits(monkeypatch)
     rng = np.random.default_rng(0)
     rows_of = np.column_stack(
         [rng.vonmises(0, 3, (40, 2)), rng.uniform(1, 2, 40), np.arange(40) // 4]

@@ -21,6 +21,8 @@ from batch.small_batches import (
     deadly,
     deadly_locally,
     endless,
+    small,
+    small_locally,
     state_of,
     without_seconds,
 )
@@ -38,7 +40,9 @@ from orbiflow.batch.dask_cluster import DaskCluster
 from orbiflow.batch.parcels import carry_out
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import Cancel, Event, Failed, Finished, Note, Polled, find
+from small_searches import small_searches
 
+pytestmark = pytest.mark.usefixtures("small_searches")
 DEADLY = find("escherize").call({"image": "any.png"})
 
 
@@ -72,26 +76,31 @@ def answers(
 
 @pytest.fixture(name="expected", scope="module")
 def expected_fixture() -> dict[str, Any]:
-    (answer,) = answers(Here(), boot_parcels(1)).values()
+    with small_searches():
+        (answer,) = answers(Here(), boot_parcels(1)).values()
     assert state_of(answer) == "done"
     return without_seconds(dict(answer.files))
 
 
-def test_local_processes_give_the_same(expected: dict[str, Any]) -> None:
-    found = answers(LocalProcesses(2, ("orbiflow.tiles.search",)), boot_parcels(3))
-    assert sorted(found) == ["boot 0", "boot 1", "boot 2"]
+def test_local_processes_give_the_same(
+    expected: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(executors, "_serve", small_locally)
+    found = answers(LocalProcesses(2, ("orbiflow.tiles.search",)), boot_parcels(2))
+    assert sorted(found) == ["boot 0", "boot 1"]
     for answer in found.values():
         assert without_seconds(dict(answer.files)) == expected
 
 
 def test_a_cluster_gives_the_same_though_a_worker_is_killed(
-    expected: dict[str, Any], cluster: Any
+    expected: dict[str, Any], cluster: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(dask_cluster, "_serve", small)
     executor, killed = DaskCluster(cluster.scheduler_address), []
     with executor:
         assert executor.place.startswith("2 workers of tcp://127.0.0.1:")
         found = {}
-        for answer in executor.answers(boot_parcels(4), [].append, Cancel()):
+        for answer in executor.answers(boot_parcels(3), [].append, Cancel()):
             found[answer.key] = answer
             if not killed:
                 workers = list(cluster.scheduler.workers.values())
@@ -102,7 +111,7 @@ def test_a_cluster_gives_the_same_though_a_worker_is_killed(
                     if nanny.worker_address == at_work[0].address
                 ]
                 os.kill(killed[0].pid, signal.SIGKILL)
-    assert sorted(found) == [f"boot {k}" for k in range(4)]
+    assert sorted(found) == [f"boot {k}" for k in range(3)]
     for answer in found.values():
         assert without_seconds(dict(answer.files)) == expected
 

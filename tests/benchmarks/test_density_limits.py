@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from density.quick_fits import quick_search
+from density.quick_fits import quick_fits
 from orbiflow.density import DensityEstimator, Mixture
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
@@ -113,7 +113,7 @@ def test_the_published_evaluation_is_off_and_less_so_with_steps(module) -> None:
 
 @pytest.mark.parametrize("dim", [2, 4])
 def test_the_integral_is_seen_from_values(module, dim: int, monkeypatch) -> None:
-    quick_search(monkeypatch)
+    quick_fits(monkeypatch)
     monkeypatch.setattr(module("density_integral"), "GRID", 128)
     monkeypatch.setattr(module("density_integral"), "LOOKED_AT", 20)
     integral = module("density_integral").integral

@@ -16,22 +16,12 @@ from PIL import Image
 from batch.small_batches import rows, write_boot
 from cli.conftest import LAUNCH
 from orbiflow.runtime import find
-from runtime.searches import ENDLESS
 
-QUICK = [
-    "--classes",
-    "IH4",
-    "--method",
-    "occupancy",
-    "--turns",
-    "1",
-    "--iterations",
-    "2",
-    "--max-frequency",
-    "1",
-]
+QUICK = ["--classes", "IH4", "--effort", "fast"]
+TESTS = str(Path(__file__).parents[1])
 
 
+@pytest.mark.usefixtures("small_searches")
 def test_a_folder_twice(tmp_path: Path, orbiflow) -> None:
     write_boot(tmp_path / "in" / "boot.json")
     command = ("batch", tmp_path / "in", "--out", tmp_path / "out", "--workers", 1, *QUICK)
@@ -56,9 +46,9 @@ def test_a_folder_twice(tmp_path: Path, orbiflow) -> None:
 def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
     for name in ("one", "two", "three"):
         write_boot(tmp_path / "in" / f"{name}.json")
-    command = [sys.executable, "-u", "-c", LAUNCH, "batch", tmp_path / "in"]
-    endless = [str(ENDLESS) if word == "2" else word for word in QUICK]
-    command += ["--out", tmp_path / "out", "--workers", "2", *endless]
+    endless = f"import sys; sys.path.append({TESTS!r})\nimport runtime.endless_process\n"
+    command = [sys.executable, "-u", "-c", endless + LAUNCH, "batch", tmp_path / "in"]
+    command += ["--out", tmp_path / "out", "--workers", "2", *QUICK]
     with subprocess.Popen(
         [str(part) for part in command],
         stdout=subprocess.PIPE,

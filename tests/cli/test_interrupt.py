@@ -19,31 +19,22 @@ from orbiflow.runtime import Cancel
 
 BOOT = [[60, 20], [210, 20], [230, 80], [170, 95], [160, 190], [100, 145], [45, 80]]
 NAMES = ["IH7", "IH1", "IH2", "IH4"]
-ENDLESS = 10**6  # steps of a fit: hours
+TESTS = str(Path(__file__).parents[1])
 
-# the first class to be fitted is done after one step, the others never; both workers say so
-FIRST_IS_SHORT = (
-    "import dataclasses\n"
-    "from orbiflow.tiles.flowing import overlap_search\n"
-    "whole = overlap_search.fit_occupancy\n"
-    "def fit(target, kind, settings, progress, **options):\n"
-    "    steps = 1 if kind.name == 'IH1' else settings.iterations\n"
-    "    own = dataclasses.replace(settings, iterations=steps)\n"
-    "    return whole(target, kind, own, progress, **options)\n"
-    "overlap_search.fit_occupancy = fit\n"
-)
+# one class is done soon, the others never
+FIRST_IS_SHORT = f"import sys; sys.path.append({TESTS!r})\nimport runtime.endless_process\n"
 # workers that hear nothing, and all the time in the world for them; each says so in one write, or
 # two who speak at once would make one line
-DEAF = (
+DEAF = FIRST_IS_SHORT + (
     "import os, time\n"
     "from orbiflow.cli import terminal\n"
     "terminal.EVERY = 1e9\n"  # no line of progress, however long the machine takes
     "from orbiflow.runtime import Cancel, processes\n"
-    "from orbiflow.tiles.flowing import overlap_search\n"
+    "from runtime import endless_process\n"
     "def fit(*_, **__):\n"
     "    os.write(1, b'deaf\\n')\n"
     "    time.sleep(1e6)\n"
-    "overlap_search.fit_occupancy, processes.GRACE = fit, 1e6\n"
+    "endless_process.LikenessSearch.fit, processes.GRACE = fit, 1e6\n"
     "tell = Cancel.cancel\n"
     "def cancel(self):\n"
     "    tell(self)\n"
@@ -59,8 +50,7 @@ def running(tmp_path: Path, *, before: str = "") -> Iterator[subprocess.Popen[st
     path.write_text(json.dumps(BOOT))
     command = [sys.executable, "-u", "-c", before + LAUNCH, "escherize", str(path)]
     command += ["--out", str(tmp_path / "out"), "--classes", ",".join(NAMES), "--workers", "2"]
-    command += ["--method", "occupancy", "--turns", "1", "--max-frequency", "3"]
-    command += ["--iterations", str(ENDLESS)]
+    command += ["--effort", "fast"]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:

@@ -157,7 +157,6 @@ def test_dtypes_mix(name: str, flow_dtype: torch.dtype) -> None:
         assert torch.equal(density.log_prob(whole), density.log_prob(whole.double()))
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_arrays_of_every_kind_are_fitted() -> None:
     for points in (POINTS.numpy(), POINTS.tolist(), POINTS.float()):
         density, _ = fit_density(torus, points, FlowSettings(**QUICK))  # type: ignore[arg-type]

@@ -9,7 +9,6 @@ import pytest
 import torch
 
 from density.blends import kernels_of
-from density.quick_fits import few_kernels, quick_search
 from orbiflow.density import (
     Density,
     DensityEstimator,
@@ -27,7 +26,6 @@ from orbiflow.density.fitting.settings import Component
 from orbiflow.density.models import midpoints
 from orbiflow.errors import OrbiflowError
 
-SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 QUICK: dict[str, Any] = {
     "max_frequency": 2, "segments": 2, "iterations": 5, "roughness": (1e-3,)
 }  # fmt: skip
@@ -40,10 +38,9 @@ def smooth(name: str, count: int = 400, seed: int = 0) -> torch.Tensor:
     return make_space(name).project(torch.tensor(centers + 0.1 * rng.normal(size=(count, 2))))
 
 
-@pytest.mark.parametrize("name", SPACES)
-def test_a_fit_by_evidence(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if name != "torus":
-        few_kernels(monkeypatch)
+@pytest.mark.usefixtures("whole_fits")
+@pytest.mark.parametrize("name", ["torus", "projective-plane"])
+def test_a_fit_by_evidence(name: str, tmp_path: Path) -> None:
     space, said = make_space(name), []
     settings = DensitySettings(**QUICK)
     density, report = fit_automatic(
@@ -77,7 +74,6 @@ def test_a_fit_by_evidence(name: str, tmp_path: Path, monkeypatch: pytest.Monkey
     assert torch.equal(*draws)
 
 
-@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("name", ["torus", "projective-plane"])
 def test_it_is_invariant_and_has_gradients(name: str) -> None:
     space = make_space(name)
@@ -89,7 +85,6 @@ def test_it_is_invariant_and_has_gradients(name: str) -> None:
     assert torch.autograd.gradcheck(density.log_prob, (points[:3].requires_grad_(),), atol=1e-4)
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_the_same_seed_gives_the_same_density() -> None:
     space, at = make_space("sphere"), smooth("sphere", 50, 9)
     settings = [DensitySettings(**QUICK, seed=seed) for seed in (1, 1, 2)]
@@ -101,7 +96,6 @@ def test_the_same_seed_gives_the_same_density() -> None:
     assert not torch.equal(one, other)
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_repeated_places_are_mass_unless_said_otherwise() -> None:
     rng = np.random.default_rng(0)
     space, points = make_space("torus"), smooth("torus", 300)
@@ -118,10 +112,7 @@ def test_repeated_places_are_mass_unless_said_otherwise() -> None:
 
 
 @pytest.mark.parametrize(("close", "spiky"), [(2, False), (60, True)])
-def test_spikes_are_of_places_and_not_of_accidents(
-    close: int, spiky: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    few_kernels(monkeypatch)
+def test_spikes_are_of_places_and_not_of_accidents(close: int, spiky: bool) -> None:
     rng, space = np.random.default_rng(7), make_space("klein-bottle")
     rows = np.stack([rng.vonmises(0.3, 4.0, 400), rng.vonmises(1.0, 3.0, 400)], axis=1)
     rows[1:close:2] = rows[0:close:2] + 1e-4
@@ -131,7 +122,6 @@ def test_spikes_are_of_places_and_not_of_accidents(
     assert (int(narrow.sum()) > 20) == spiky  # some follow the distance to the nearest row
 
 
-@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("part", COMPONENTS[1:])
 def test_each_part_alone(part: str) -> None:
     estimator = DensityEstimator("torus", components=part)
@@ -151,9 +141,7 @@ def test_a_flow_alone_is_a_flow() -> None:
 
 @pytest.fixture(scope="module", name="of_the_torus")
 def of_the_torus_fixture() -> Density:
-    with pytest.MonkeyPatch.context() as patch:
-        quick_search(patch)
-        return fit_automatic(Torus(2), smooth("torus", 120))[0]
+    return fit_automatic(Torus(2), smooth("torus", 120))[0]
 
 
 @pytest.mark.parametrize("count", [0, 1, 3, 100])
@@ -165,7 +153,6 @@ def test_any_number_of_samples(count: int, of_the_torus: Density) -> None:
     assert bool(((drawn >= 0) & (drawn <= 1)).all())
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_many_angles_have_chains_beside_kernels(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     angles = rng.vonmises(0, 4, (100, 5))
@@ -180,9 +167,9 @@ def test_many_angles_have_chains_beside_kernels(tmp_path: Path) -> None:
         assert torch.equal(back.log_prob(at), estimator.density_.log_prob(at))
 
 
-@pytest.mark.parametrize("count", [10, 15, 30])
-def test_few_points(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    few_kernels(monkeypatch)
+@pytest.mark.usefixtures("whole_fits")
+@pytest.mark.parametrize("count", [10, 15])
+def test_few_points(count: int) -> None:
     points = smooth("torus", count)
     density, report = fit_automatic(Torus(2), points)
     assert report.validation == count
@@ -211,7 +198,6 @@ def test_the_settings_know_the_same_components() -> None:
     assert get_args(Component) == COMPONENTS
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_parts_for_new_groups() -> None:
     """Rows of a group lie within a degree: narrow kernels are right for its rows, not for others."""
     rng, space = np.random.default_rng(3), make_space("torus")

@@ -15,8 +15,7 @@ from orbiflow.density.fitting.rows import Rows
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow
 
-SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
-SMALL: dict[str, Any] = {"max_frequency": 2, "segments": 2}
+SMALL: dict[str, Any] = {"max_frequency": 2, "segments": 2, "roughness": (1e-3,)}
 
 
 class Clock:
@@ -70,8 +69,10 @@ def test_without_a_limit_no_clock_is_asked(striking_after) -> None:
     assert clock.asked <= 5  # when budgets begin
 
 
-@pytest.mark.parametrize("looks", [1, 20, 60])
-@pytest.mark.parametrize("name", SPACES)
+@pytest.mark.parametrize(
+    ("name", "looks"),
+    [("torus", 1), ("torus", 60), ("sphere", 20), ("klein-bottle", 60), ("projective-plane", 20)],
+)
 def test_the_integral_does_not_depend_on_the_clock(name: str, looks: int, striking_after) -> None:
     clock = striking_after(looks)
     settings = FlowSettings(**SMALL, seconds=1.0)
@@ -83,9 +84,8 @@ def test_the_integral_does_not_depend_on_the_clock(name: str, looks: int, striki
     assert report.notes == ("stopped by the limit of 1 s: another run may differ",) * struck
 
 
-@pytest.mark.parametrize("name", ["torus", "sphere"])
-def test_the_same_evaluations_give_the_same_density(name: str, striking_after) -> None:
-    space, points, values = make_space(name), cluster(name), []
+def test_the_same_evaluations_give_the_same_density(striking_after) -> None:
+    space, points, values = make_space("sphere"), cluster("sphere"), []
     for _ in range(2):
         clock = striking_after(10**6)  # never, however many looks
         settings = FlowSettings(**SMALL, evaluations=25, seconds=1e6)
@@ -98,14 +98,10 @@ def test_the_same_evaluations_give_the_same_density(name: str, striking_after) -
 
 
 def test_the_default_budget_leaves_the_defaults_alone() -> None:
-    smallest: dict[str, Any] = {"max_frequency": 1, "segments": 1}
-    settings, points = FlowSettings(**smallest), cluster("sphere", 100)
-    few, many = (
-        fit_density(make_space("sphere"), points, FlowSettings(**smallest, evaluations=count))
-        for count in (settings.evaluations, 10**9)
-    )
-    assert few[1].validation_nll == many[1].validation_nll
-    assert few[1].notes == ()
+    settings = FlowSettings(max_frequency=1, segments=1)
+    _, report = fit_density(make_space("sphere"), cluster("sphere", 60), settings)
+    assert len(report.stages) == 3
+    assert report.notes == ()
 
 
 @pytest.mark.parametrize("iterations", [1, 2, 4, 5])

@@ -80,7 +80,7 @@ def test_concentration_inverts_the_bessel_ratio(resultants: list[float]) -> None
     assert torch.allclose(torch.special.i1e(kappa) / torch.special.i0e(kappa), r, atol=1e-6)
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(dims, seeds)
 def test_log_prob_is_periodic(dim: int, seed: int) -> None:
     mixture, at = random_mixture(dim, seed), points(7, dim, seed)
@@ -88,7 +88,7 @@ def test_log_prob_is_periodic(dim: int, seed: int) -> None:
     assert torch.allclose(mixture.log_prob(at + shift), mixture.log_prob(at), atol=1e-9)
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(st.integers(1, 2), seeds)
 def test_density_integrates_to_one(dim: int, seed: int) -> None:
     mixture = random_mixture(dim, seed)
@@ -97,7 +97,7 @@ def test_density_integrates_to_one(dim: int, seed: int) -> None:
     assert float(mixture.log_prob(grid).exp().mean()) == pytest.approx(1.0, abs=2e-3)
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(dims, seeds)
 def test_storage_is_bit_equal(dim: int, seed: int) -> None:
     mixture, at = random_mixture(dim, seed), points(9, dim, seed)

@@ -12,7 +12,6 @@ from orbiflow.commands import OPERATIONS
 TEXT = (Path(__file__).parents[2] / "docs" / "comparing.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_the_snippet(capsys: pytest.CaptureFixture[str]) -> None:
     first, *_ = re.findall(r"```python\n(.*?)```", TEXT, flags=re.DOTALL)
     exec(compile(first, "comparing.md", "exec"), {})

@@ -55,7 +55,7 @@ def on_a_plain_grid(density: Density, side: int = 64) -> float:
 
 @every
 @pytest.mark.parametrize("base", [UniformDensity, bump])
-@settings(max_examples=5)
+@settings(max_examples=2)
 @given(seed=seeds)
 def test_it_integrates_to_one(space, base, seed: int) -> None:
     density = make(space, seed, base=base)
@@ -64,16 +64,16 @@ def test_it_integrates_to_one(space, base, seed: int) -> None:
 
 
 @every
-@settings(max_examples=5)
+@settings(max_examples=2)
 @given(seed=seeds)
 def test_the_mass_tells_what_the_integrator_lost(space, seed: int) -> None:
     density = make(space, seed, strength=0.2).with_steps(1)
-    plain = on_a_plain_grid(density, 160)
-    assert density.mass(128) == pytest.approx(plain, abs=1e-4 + 0.1 * abs(plain - 1))
+    plain = on_a_plain_grid(density, 128)
+    assert density.mass(96) == pytest.approx(plain, abs=1e-4 + 0.1 * abs(plain - 1))
 
 
 @every
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(seed=seeds)
 def test_log_prob_is_invariant_under_the_group(space, seed: int) -> None:
     density, points = make(space, seed), square(seed)
@@ -87,7 +87,7 @@ def test_log_prob_is_invariant_under_the_group(space, seed: int) -> None:
 
 
 @every
-@settings(max_examples=10)
+@settings(max_examples=4)
 @given(seed=seeds, side=st.integers(0, 3), t=st.floats(0.02, 0.98))
 def test_it_is_continuous_over_every_edge(space, seed: int, side: int, t: float) -> None:
     edge = [(t, 0.0), (t, 1.0), (0.0, t), (1.0, t)][side]
@@ -101,7 +101,7 @@ def test_it_is_continuous_over_every_edge(space, seed: int, side: int, t: float)
 
 
 @every
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(seed=seeds)
 def test_the_flow_and_back(space, seed: int) -> None:
     density = make(space, seed)
@@ -115,7 +115,7 @@ def test_the_flow_and_back(space, seed: int) -> None:
 @pytest.mark.parametrize("base", [UniformDensity, bump])
 def test_samples_follow_the_density(space, base) -> None:
     density = make(space, 7, base=base, strength=0.12)
-    count, cells = 40_000, 8
+    count, cells = 12_000, 6
     points = density.sample((count,), torch.Generator().manual_seed(1))
     assert bool(((points >= 0) & (points <= 1)).all())
     edges = torch.linspace(0, 1, cells + 1).double()
@@ -151,8 +151,10 @@ def test_any_network_serves_as_a_field() -> None:
     assert torch.allclose(space.project(density.flow(start)).detach(), points, atol=1e-4)
 
 
-@every
-@pytest.mark.parametrize("measure", [None, *MEASURES])
+@pytest.mark.parametrize(
+    ("space", "measure"),
+    [*((space, None) for space in SPACES), *zip(SPACES, MEASURES, strict=False)],
+)
 def test_entropy_is_the_mean_of_minus_log_prob(space, measure: str | None) -> None:
     density, named = make(space, 1), {} if measure is None else {"measure": measure}
     found = density.entropy(200, generator=torch.Generator().manual_seed(5), **named)
@@ -162,7 +164,7 @@ def test_entropy_is_the_mean_of_minus_log_prob(space, measure: str | None) -> No
         grid = midpoints(space, 64)
         square, same = density.log_prob(grid), density.log_prob(grid, **named)
     exact = -float((square.exp() * same).mean())
-    many = density.entropy(5_000, generator=torch.Generator().manual_seed(6), **named)
+    many = density.entropy(3_000, generator=torch.Generator().manual_seed(6), **named)
     assert float(many) == pytest.approx(exact, abs=0.05)
 
 
@@ -175,7 +177,7 @@ def test_entropy_and_divergence() -> None:
     grid = midpoints(Torus(2), 64)
     with torch.no_grad():
         exact = kl_by_quadrature(one.log_prob(grid).exp(), other.log_prob(grid))
-        points = one.sample(40_000, generator)
+        points = one.sample(20_000, generator)
         drawn = float((one.log_prob(points) - other.log_prob(points)).mean())
     assert exact > 0.01
     assert drawn == pytest.approx(exact, rel=0.1)

@@ -9,7 +9,6 @@ import torch
 from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV
 
-from density.quick_fits import quick_search
 from orbiflow.density import DensityEstimator, Sphere
 from orbiflow.density.models import midpoints
 from orbiflow.errors import OrbiflowError
@@ -33,7 +32,6 @@ DATA = {
 }
 
 
-@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("space", DATA)
 def test_the_estimator(space: str) -> None:
     estimator = DensityEstimator(space, max_frequency=2, segments=2, iterations=8)
@@ -53,7 +51,6 @@ def test_the_estimator(space: str) -> None:
     assert estimator.score(draws) == pytest.approx(-entropy(estimator), abs=0.3)
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_units_change_the_density_by_their_ratio() -> None:
     small: dict[str, Any] = {"max_frequency": 2, "segments": 2, "iterations": 5}
     radians = DensityEstimator("torus", **small).fit(DATA["torus"])
@@ -73,7 +70,6 @@ def test_parameters_of_the_estimator() -> None:
         DensityEstimator("moebius").fit(DATA["torus"])
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_a_grid_search() -> None:
     search = GridSearchCV(
         DensityEstimator("torus", segments=2, iterations=3), {"max_frequency": [1, 2]}, cv=2
@@ -84,10 +80,8 @@ def test_a_grid_search() -> None:
 
 @pytest.fixture(name="fitted", scope="module")
 def fitted_fixture() -> DensityEstimator:
-    with pytest.MonkeyPatch.context() as patch:
-        quick_search(patch)
-        estimator = DensityEstimator("torus", max_frequency=1, segments=1, iterations=0)
-        return estimator.fit(DATA["torus"])
+    estimator = DensityEstimator("torus", max_frequency=1, segments=1, iterations=0)
+    return estimator.fit(DATA["torus"])
 
 
 def test_samples_are_new_at_every_call(fitted: DensityEstimator) -> None:

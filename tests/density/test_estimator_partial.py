@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from density.quick_fits import quick_search
 from orbiflow.density import DensityEstimator
 from orbiflow.errors import OrbiflowError
 
@@ -25,11 +24,9 @@ def fitted() -> DensityEstimator:
     rng = np.random.default_rng(0)
     first = rng.vonmises(0.5, 3.0, 150)
     angles = np.degrees(np.stack([first, first + rng.vonmises(0, 9.0, 150)], axis=1))
-    with pytest.MonkeyPatch.context() as patch:
-        quick_search(patch)
-        return DensityEstimator("torus", unit="degrees", components="kernels,chains").fit(
-            Frame(angles, ["phi", "psi"])
-        )
+    return DensityEstimator("torus", unit="degrees", components="kernels,chains").fit(
+        Frame(angles, ["phi", "psi"])
+    )
 
 
 def test_conditional_times_marginal_is_joint_per_degree(fitted: DensityEstimator) -> None:
@@ -54,7 +51,6 @@ def test_columns_by_name_number_or_case(fitted: DensityEstimator) -> None:
     )
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_mistakes_are_named(fitted: DensityEstimator) -> None:
     with pytest.raises(OrbiflowError, match="no column 'chi'; there are phi, psi"):
         fitted.marginal("chi")

@@ -30,7 +30,7 @@ from orbiflow.flows import Flow
 SPACES = (Torus(2), Sphere(), KleinBottle(), ProjectivePlane())
 every = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
 seeds = st.integers(0, 2**31 - 1)
-QUICK = FlowSettings(max_frequency=3, segments=2, iterations=8)
+QUICK = FlowSettings(max_frequency=3, segments=2, iterations=8, roughness=(1e-3,))
 
 
 def blob(space, count: int = 600, seed: int = 0) -> torch.Tensor:
@@ -41,7 +41,7 @@ def blob(space, count: int = 600, seed: int = 0) -> torch.Tensor:
 
 
 @every
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(seed=seeds)
 def test_coupling_is_a_pairing_with_short_geodesics(space, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -105,13 +105,12 @@ def test_a_fit_is_no_worse_than_its_start_and_normalised(space) -> None:
     assert nll == pytest.approx(report.validation_nll, abs=0.3)
 
 
-@pytest.mark.parametrize("name", ["torus", "klein-bottle"])
-def test_what_only_the_integrators_error_gained_is_undone(name: str) -> None:
+def test_what_only_the_integrators_error_gained_is_undone() -> None:
     rng = np.random.default_rng(0)
-    space = make_space(name, unit="degrees")
+    space = make_space("klein-bottle", unit="degrees")
     points = space.to_chart(rng.normal([20.0, 60.0], 15.0, (200, 2)).clip(-89, 89))
     _, report = fit_density(space, points, FlowSettings(max_frequency=2, segments=2))
-    # with one step a segment, refinement tore the Klein bottle's flow: 3.7 nats worse than its start
+    # with one step a segment, refinement tore the flow: 3.7 nats worse than its start
     assert report.validation_nll < report.start_nll + 0.01
     assert report.train_nll < -2.5
     assert report.mass == pytest.approx(1.0, abs=5e-4)
@@ -122,7 +121,7 @@ def test_the_same_seed_gives_the_same_density() -> None:
     points = blob(Torus(2), 100)
     one, other, another = (
         fit_density(
-            Torus(2), points, FlowSettings(max_frequency=1, segments=2, iterations=2, seed=seed)
+            Torus(2), points, FlowSettings(max_frequency=1, segments=1, iterations=2, seed=seed)
         )[0]
         for seed in (1, 1, 2)
     )
@@ -169,7 +168,8 @@ def test_merging_keeps_mean_and_mass(seed: int, cells: int, crowd: int, dim: int
 def test_held_out_scores_are_of_the_points_themselves() -> None:
     rng = np.random.default_rng(3)
     sharp = np.where(rng.random((1500, 1)) < 0.5, 0.3, 0.7) + 0.01 * rng.normal(size=(1500, 2))
-    _, report = fit_density(Torus(2), torch.tensor(sharp), QUICK)
+    settings = FlowSettings(max_frequency=3, segments=2, iterations=8)
+    _, report = fit_density(Torus(2), torch.tensor(sharp), settings)
     stage = report.stages[-1]
     assert stage.validation[stage.best] == pytest.approx(report.validation_nll, abs=0.01)
 

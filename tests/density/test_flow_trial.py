@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import torch
 
-from density.quick_fits import few_kernels
 from orbiflow.density import (
     DensitySettings,
     FlowDensity,
@@ -46,15 +45,14 @@ SPACE = Torus(2)
 
 
 def evidence(weights: np.ndarray | None = None) -> tuple[Folds, Candidates, torch.Tensor]:
-    """Kernels of two broad clusters, judged by half of 700 rows."""
+    """Kernels of two broad clusters, judged by a fifth of 700 rows."""
     rng = np.random.default_rng(0)
     points = torch.tensor(np.where(rng.random((700, 1)) < 0.7, [[0.3, 0.6]], [[0.8, 0.15]]))
     points = SPACE.project(points + 0.1 * torch.tensor(rng.normal(size=(700, 2))))
     folds = folds_of(
         weighed(points, weights), together=False, generator=torch.Generator().manual_seed(0)
     )
-    with pytest.MonkeyPatch.context() as patch, one_core():
-        few_kernels(patch)
+    with one_core():
         course = Course(lambda *_: None, 1.0)
         candidates = candidates_of(
             SPACE, [KernelFamily(SPACE)], folds, course, Budget(), SideBySide(), Rivals().meet
@@ -94,13 +92,11 @@ def test_progress_goes_on_from_one_tenth_to_the_next(
     assert max(shares) <= (FIRST_TENTH_SHARE, 1)[tenths - 1]
 
 
-@pytest.mark.parametrize("parts", [COMPONENTS, COMPONENTS[1:], ("kernels",)])
-def test_no_step_of_a_fit_is_half_of_it(
-    parts: tuple[Component, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    few_kernels(monkeypatch)
+@pytest.mark.usefixtures("whole_fits")
+@pytest.mark.parametrize("parts", [COMPONENTS, ("kernels",)])
+def test_no_step_of_a_fit_is_half_of_it(parts: tuple[Component, ...]) -> None:
     rng, shares = np.random.default_rng(0), [0.0]
-    points = SPACE.project(torch.tensor(0.1 * rng.normal(size=(700, 2))))
+    points = SPACE.project(torch.tensor(0.1 * rng.normal(size=(300, 2))))
     settings = DensitySettings(components=parts, **(QUICK if "flow" in parts else {}))
     fit_automatic(SPACE, points, settings, progress=lambda done, _: shares.append(done))
     assert shares == sorted(shares)
@@ -116,8 +112,7 @@ def test_a_flow_that_has_no_time_is_none() -> None:
     assert try_flow(folds, candidates, weights, lambda _: none) == TriedFlow()
 
 
-@pytest.mark.parametrize("weighted", [False, True])
-@pytest.mark.parametrize("tenths", [1, 2])
+@pytest.mark.parametrize(("tenths", "weighted"), [(1, False), (2, True)])
 def test_a_flow_is_compared_at_the_rows_that_it_was_tried_on(
     tenths: int, weighted: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -136,7 +131,7 @@ def test_a_flow_is_compared_at_the_rows_that_it_was_tried_on(
     assert ComponentEvidence(**asdict(flow)) == flow
     (kernels,) = judged(candidates, weights)
     assert kernels.others is None
-    assert kernels.rows == 350
+    assert kernels.rows == 140
 
 
 def test_it_is_said_of_which_rows_a_figure_is() -> None:
@@ -166,7 +161,7 @@ def test_a_flow_is_outdone_that_gains_nothing_and_cannot_catch_up(
 
 def test_an_outdone_flow_is_refined_no_further() -> None:
     points = SPACE.project(0.1 * torch.randn(300, 2, generator=torch.Generator().manual_seed(0)))
-    settings = FlowSettings(**QUICK | {"iterations": 12, "roughness": (1e-3, 1e-4)})
+    settings = FlowSettings(**QUICK | {"iterations": 8, "roughness": (1e-3, 1e-4)})
 
     def fitted(outdone) -> list[tuple[str, int]]:
         stages = fit_density(SPACE, points.double(), settings, outdone=outdone)[1].stages

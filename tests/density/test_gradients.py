@@ -41,7 +41,7 @@ def density_of(kind: str, space: Space, seed: int) -> Density:
 
 @pytest.mark.parametrize("name", SPACES)
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=5)
+@settings(max_examples=2)
 @given(seed=seeds, measure=st.sampled_from(MEASURES))
 def test_gradients_in_the_points(kind: str, name: str, seed: int, measure: str) -> None:
     space = make_space(name)

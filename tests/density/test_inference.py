@@ -62,7 +62,7 @@ def off(found: Density, density: Density, kept: list[int], known: dict[int, floa
 
 
 @given(seeds, st.sampled_from(["chains", "network"]), st.integers(0, 1), st.data())
-@settings(deadline=None, max_examples=12)
+@settings(deadline=None, max_examples=6)
 def test_tables_are_the_integral_at_every_level(
     seed: int, kind: str, known: int, data: st.DataObject
 ) -> None:
@@ -132,7 +132,7 @@ def test_few_nodes_do_where_hidden_angles_move_others_far(
 
 
 @given(seeds, st.data())
-@settings(deadline=None, max_examples=6)
+@settings(deadline=None, max_examples=4)
 def test_an_error_is_at_least_the_true_one(seed: int, data: st.DataObject) -> None:
     """Also that of a density which is derived from a derived one, where both are asked for roughly."""
     kind, dim = data.draw(st.sampled_from([("chains", 4), ("chains", 4), ("network", 3)]))

@@ -38,7 +38,7 @@ def clustered(name: str, count: int = 600) -> torch.Tensor:
 
 
 @given(names, seeds)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_kernels_integrate_to_one_and_are_invariant(name: str, seed: int) -> None:
     found = kernels(name, seed)
     grid = midpoints(found.space, 200)

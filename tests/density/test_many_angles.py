@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 
-from density.quick_fits import few_kernels
 from orbiflow.density import DensityEstimator, Mixture, Torus, density_to_bytes, read_density
 from orbiflow.errors import InputFileError, OrbiflowError
 
@@ -19,8 +18,7 @@ def data(count: int = 400) -> np.ndarray:
     return np.degrees(x)
 
 
-def test_five_angles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    few_kernels(monkeypatch)
+def test_five_angles(tmp_path: Path) -> None:
     points = data()
     estimator = DensityEstimator("torus", unit="degrees").fit(points[:200])
     assert isinstance(estimator.density_, Mixture)

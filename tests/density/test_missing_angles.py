@@ -36,7 +36,7 @@ def two_clusters(seed: int, count: int, share: float = 0.5) -> Array:
 
 
 @given(seeds)
-@settings(deadline=None, max_examples=10)
+@settings(deadline=None, max_examples=5)
 def test_em_climbs_on_the_likelihood_of_what_is_there(seed: int) -> None:
     rng = np.random.default_rng(seed)
     space = Torus(3)
@@ -58,7 +58,7 @@ def test_em_climbs_on_the_likelihood_of_what_is_there(seed: int) -> None:
 
 
 @given(seeds)
-@settings(deadline=None, max_examples=10)
+@settings(deadline=None, max_examples=5)
 def test_kernels_take_over_what_incomplete_rows_say(seed: int) -> None:
     rng = np.random.default_rng(seed)
     kernels = random_kernels(rng, Torus(2))
@@ -70,7 +70,6 @@ def test_kernels_take_over_what_incomplete_rows_say(seed: int) -> None:
     assert float(after.mean()) >= float(before.mean()) - 0.05
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_rows_that_lack_angles_tell_how_common_places_are() -> None:
     """Whole rows have one cluster too rarely; rows that know the first angle alone make up for it."""
     whole, rest = two_clusters(0, 200, 0.1), two_clusters(1, 600, 0.6)
@@ -86,7 +85,6 @@ def test_rows_that_lack_angles_tell_how_common_places_are() -> None:
     assert any("600 of 800 rows lack some angles" in note for note in density.report_.notes)
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_whole_rows_are_fitted_as_ever() -> None:
     angles = two_clusters(2, 120)
     one, other = (
@@ -96,7 +94,6 @@ def test_whole_rows_are_fitted_as_ever() -> None:
     assert density_to_bytes(one.density_) == density_to_bytes(other.density_)
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_weights_and_rows_without_any_angle() -> None:
     angles = two_clusters(3, 90)
     angles[:30, 1] = np.nan
@@ -117,7 +114,6 @@ def test_weights_and_rows_without_any_angle() -> None:
     assert any("1 row lacks all angles" in note for note in report.notes)
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_scores_are_of_the_angles_that_are_there() -> None:
     fit = DensityEstimator("torus", components="kernels", missing="marginalise").fit(
         two_clusters(4, 60)

@@ -24,9 +24,9 @@ from orbiflow.flows import Flow
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
 DATA = np.random.default_rng(0).normal([20.0, 40.0], 10.0, (60, 2))
-QUICK: dict[str, Any] = {"unit": "degrees", "max_frequency": 1, "segments": 1, "iterations": 3}
-
-pytestmark = pytest.mark.usefixtures("quick_fits")
+QUICK: dict[str, Any] = {
+    "unit": "degrees", "max_frequency": 1, "segments": 1, "iterations": 2, "roughness": (1e-3,)
+}  # fmt: skip
 
 
 @pytest.fixture(name="three_threads")
@@ -90,8 +90,15 @@ def fitted_without_a_mode(name: str) -> DensityEstimator:
     return DensityEstimator(name, components=("flow",), **QUICK).fit(DATA)
 
 
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("name", SPACES)
+@pytest.mark.parametrize(
+    ("name", "mode"),
+    [
+        ("torus", "inference"),
+        ("sphere", "no_grad"),
+        ("klein-bottle", "plain"),
+        ("projective-plane", "inference"),
+    ],
+)
 def test_fits_do_not_depend_on_the_callers_mode(name: str, mode: str) -> None:
     estimator = DensityEstimator(name, components=("flow",), **QUICK)
     with MODES[mode]():
@@ -118,7 +125,7 @@ def test_no_cache_is_poisoned_when_it_is_first_filled_under_inference(name: str,
             space.displacement(at, at.flip(0))
     fresh = make_space(name)
     points = fresh.uniform(60, torch.Generator().manual_seed(0))
-    found, _ = fit_density(fresh, points, FlowSettings(max_frequency=3, segments=1, iterations=2))
+    found, _ = fit_density(fresh, points, FlowSettings(max_frequency=1, segments=1, iterations=1))
     found.log_prob(points.requires_grad_()).sum().backward()
     assert points.grad is not None
     points.grad = None

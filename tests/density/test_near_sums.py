@@ -71,7 +71,7 @@ def by_all(terms: Terms, features: torch.Tensor) -> torch.Tensor:
 @given(shapes, seeds, st.booleans())
 @example("two angles", 840533841, False)  # one narrow term in a tile of 14 points, 0.7 wide
 @settings(
-    max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=7, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 def test_the_sum_is_that_of_all_terms(shape: str, seed: int, floored: bool) -> None:
     terms, features = drawn(shape, seed, 500, 900)
@@ -113,7 +113,7 @@ def test_smooth_terms_are_summed_to_rounding(shape: str, kappa: float) -> None:
 
 @given(shapes, seeds)
 @settings(
-    max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 def test_the_gradient_is_that_of_all_terms(shape: str, seed: int) -> None:
     terms, features = drawn(shape, seed, 400, 600)

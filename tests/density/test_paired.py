@@ -30,7 +30,7 @@ def scores(rng: np.random.Generator, rows: int, *shifts: float) -> dict[str, np.
 
 
 @given(seeds, st.integers(5, 60))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_the_standard_error_is_that_of_the_paired_differences(seed: int, rows: int) -> None:
     table = scores(np.random.default_rng(seed), rows, 0.0, 0.3)
     found = compare_scores(table, settings=ComparisonSettings(bootstrap=100))
@@ -44,7 +44,7 @@ def test_the_standard_error_is_that_of_the_paired_differences(seed: int, rows: i
 
 
 @given(seeds, st.integers(5, 40), st.integers(2, 6))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_copies_of_rows_in_one_group_add_no_evidence(seed: int, rows: int, copies: int) -> None:
     table = scores(np.random.default_rng(seed), rows, 0.0, 0.3)
     labels = [f"group {k}" for k in range(rows)] * copies
@@ -124,7 +124,6 @@ def test_notes_on_groups_that_are_few_unequal_or_of_single_rows() -> None:
     assert not compare_scores(table, ComparisonSettings(bootstrap=100)).notes
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_a_fit_says_that_groups_are_of_single_rows() -> None:
     data = np.random.default_rng(8).vonmises(0, 1, (60, 2))
     fits = {
@@ -216,7 +215,6 @@ def test_mistakes(call: Any, message: str) -> None:
         call()
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_models_are_compared_in_one_measure() -> None:
     rng = np.random.default_rng(6)
     angles = rng.vonmises([0.0, 1.0], 4.0, (160, 2))

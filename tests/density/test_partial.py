@@ -28,7 +28,7 @@ from orbiflow.density.inference import log_prob_observed
 from orbiflow.errors import OrbiflowError
 
 seeds = st.integers(0, 2**31)
-few = settings(deadline=None, max_examples=12)
+few = settings(deadline=None, max_examples=6)
 GRID = {2: 256, 3: 64}
 """Points an angle that resolve what `random_blend` makes."""
 
@@ -93,7 +93,7 @@ def check_product(seed: int, dim: int, known: list[int]) -> None:
 
 
 @given(seeds)
-@settings(deadline=None, max_examples=2)
+@settings(deadline=None, max_examples=1)
 def test_flows_are_integrated(seed: int) -> None:
     density = random_blend(seed, 2, flow=True)
     points = even_grid(17, 1)

@@ -84,7 +84,7 @@ def test_densities_integrate_to_one(name: str) -> None:
 
 
 @given(name=names, seed=seeds)
-@settings(max_examples=8)
+@settings(max_examples=4)
 def test_densities_are_functions_of_orbits(name: str, seed: int) -> None:
     space = QuotientSpace(name)
     points, rng = points_of(space, seed, 8), np.random.default_rng(seed)
@@ -98,7 +98,7 @@ def test_densities_are_functions_of_orbits(name: str, seed: int) -> None:
 
 
 @given(name=names, seed=seeds)
-@settings(max_examples=8)
+@settings(max_examples=4)
 def test_distances_are_the_least_over_many_images(name: str, seed: int) -> None:
     space = QuotientSpace(name)
     start, end = points_of(space, seed), points_of(space, seed + 1)
@@ -110,7 +110,7 @@ def test_distances_are_the_least_over_many_images(name: str, seed: int) -> None:
 
 
 @given(name=names, seed=seeds)
-@settings(max_examples=8)
+@settings(max_examples=4)
 def test_the_domain_holds_the_nearest_of_each_orbit(name: str, seed: int) -> None:
     space = QuotientSpace(name)
     rng = np.random.default_rng(seed)

@@ -32,7 +32,7 @@ NO_SEEDS = (np.zeros((0, 2)), np.zeros(0))
 
 
 @given(st.floats(0.2, 0.8), st.floats(0.2, 0.8), st.floats(0.05, 0.19), st.floats(-1.0, 1.0))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_a_disc_on_the_grid_is_a_disc(x: float, y: float, radius: float, level: float) -> None:
     def function(points: np.ndarray) -> np.ndarray:
         return level + 4 * (radius - np.hypot(*(points - [x, y]).T))
@@ -245,7 +245,6 @@ def test_regions_of_a_smoothed_density_hold_the_mass_of_the_density(name: str) -
     assert region.contains(specks)[np.hypot(*(specks - middle).T) < 3].all()
 
 
-@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("dim", [1, 2, 4])
 def test_thresholds_in_any_dimension(dim: int) -> None:
     rng = np.random.default_rng(dim)
@@ -259,7 +258,7 @@ def test_thresholds_in_any_dimension(dim: int) -> None:
         assert region.held == pytest.approx(mass, abs=1e-3)
         assert region.contains(fresh).mean() == pytest.approx(mass, abs=5 * region.error + 0.02)
         assert region.log_prob_low <= region.log_prob <= region.log_prob_high
-        assert (region.contains(fresh) == (levels.hdr(fresh) < mass)).mean() > 0.999
+        assert (region.contains(fresh) == (levels.hdr(fresh) < mass)).mean() > 0.998
         again = levels.above(region.log_prob)
         assert again.held == region.held
         assert again.mass is None

@@ -28,16 +28,24 @@ def rounded(values: Rows, step: float) -> Rows:
     return np.round(values / step) * step
 
 
-@pytest.mark.parametrize("step", [1.0, 5.0, 10.0])
-def test_rounded_weather_has_no_spikes(step: float) -> None:
-    rng = np.random.default_rng(0)
-    rows, new = weather(rng, 1200), weather(rng, 1000)
-    how = {"unit": "degrees", "components": ("kernels", "chains"), "seed": 0}
-    plain = DensityEstimator("torus", **how).fit(rows)
+@pytest.fixture(scope="module", name="plain")
+def plain_fixture() -> tuple[Rows, DensityEstimator]:
+    """Weather that was not rounded, and its density."""
+    rows = weather(np.random.default_rng(0), 600)
+    return rows, DensityEstimator("torus", **HOW).fit(rows)
+
+
+HOW = {"unit": "degrees", "components": ("kernels", "chains"), "seed": 0}
+
+
+@pytest.mark.parametrize("step", [1.0, 10.0])
+def test_rounded_weather_has_no_spikes(plain: tuple[Rows, DensityEstimator], step: float) -> None:
+    rows, density = plain
+    new = weather(np.random.default_rng(1), 600)
     with pytest.warns(DataWarning, match=f"rounding to {step:g} brings about"):
-        found = DensityEstimator("torus", **how).fit(rounded(rows, step))
+        found = DensityEstimator("torus", **HOW).fit(rounded(rows, step))
     # what rounding loses, and not 3 nats of spikes
-    assert float((plain.score_samples(new) - found.score_samples(new)).mean()) < 0.01 * step
+    assert float((density.score_samples(new) - found.score_samples(new)).mean()) < 0.01 * step
     on, off = found.marginal(1).score_samples([[10.0], [10.0 + step / 2]])
     assert abs(on - off) < 0.1 + 0.02 * step
     given = found.conditional({1: 10.0}).score_samples([[270.0], [270.0 + step / 2]])
@@ -45,7 +53,7 @@ def test_rounded_weather_has_no_spikes(step: float) -> None:
 
 
 def test_what_is_asked_for_is_done_without_a_warning() -> None:
-    rows = rounded(weather(np.random.default_rng(1), 600), 5.0)
+    rows = rounded(weather(np.random.default_rng(1), 300), 5.0)
     how = {"unit": "degrees", "components": ("kernels",)}
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -160,6 +168,8 @@ def test_directions_that_were_rounded_twice(parts: int, unit: str, digits: int) 
     found = repeats_of(space, space.to_chart(rows[:, None]))
     assert found.is_rounding
     assert found.spread == pytest.approx([turn / parts])
+    if (parts, digits) not in [(16, 2), (2160, 4)]:
+        return
     estimator = DensityEstimator("torus", unit=unit, components=("kernels",))
     with pytest.warns(DataWarning, match="brings about"):
         estimator.fit(rows[:, None])
@@ -185,8 +195,9 @@ def mixed(rng: np.random.Generator, values: Rows, coarse: float, fine: float, sh
 MIXTURES = [(10.0, 1.0, 0.5), (5.0, 0.01, 0.9), (10.0, 0.0, 0.5), (5.0, 1.0, 0.3), (30.0, 1.0, 0.3)]
 
 
-@pytest.mark.parametrize(("coarse", "fine", "share"), MIXTURES)
-@pytest.mark.parametrize("dim", [1, 2])
+@pytest.mark.parametrize(
+    ("coarse", "fine", "share", "dim"), [*((*own, 1) for own in MIXTURES), (*MIXTURES[0], 2)]
+)
 def test_some_values_rounded_more_coarsely_have_no_spikes(
     coarse: float, fine: float, share: float, dim: int
 ) -> None:

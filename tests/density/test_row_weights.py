@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from density.blends import flow_of
-from density.quick_fits import few_kernels
 from orbiflow.density import DensityEstimator, density_to_bytes, make_space, weighed
 from orbiflow.density.fitting import mean_of
 from orbiflow.density.fitting.chains import fit_chain_mixture, spread_chains
@@ -23,7 +22,7 @@ from orbiflow.errors import OrbiflowError
 
 seeds = st.integers(0, 2**31)
 PLACES = [[0.3, 0.3], [0.7, 0.7]]
-few = settings(deadline=None, max_examples=15)
+few = settings(deadline=None, max_examples=7)
 
 
 def repeated(seed: int, count: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
@@ -39,10 +38,8 @@ def repeated(seed: int, count: int) -> tuple[torch.Tensor, torch.Tensor, torch.T
 def test_kernels_of_weighted_rows_are_those_of_repeated_ones(seed: int) -> None:
     points, weights, rows = repeated(seed, 40)
     space = make_space("torus")
-    with pytest.MonkeyPatch.context() as patch:
-        few_kernels(patch)
-        found = kernel_estimates(space, Rows(points, weights), repeats=False)
-        expected = kernel_estimates(space, Rows(rows), repeats=False)
+    found = kernel_estimates(space, Rows(points, weights), repeats=False)
+    expected = kernel_estimates(space, Rows(rows), repeats=False)
     at = space.uniform(30, torch.Generator().manual_seed(seed))
     assert found.keys() == expected.keys()
     for name, part in found.items():
@@ -141,7 +138,6 @@ def test_a_flow_descends_on_the_weighted_likelihood() -> None:
     assert slope == pytest.approx(also, abs=1e-9)
 
 
-@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("options", [{}, {"components": "flow"}])
 def test_equal_weights_are_none(options: dict[str, object]) -> None:
     angles = np.random.default_rng(0).vonmises([0.0, 1.0], 4.0, (310, 2))
@@ -154,7 +150,6 @@ def test_equal_weights_are_none(options: dict[str, object]) -> None:
     assert first.report_.effective is second.report_.effective is None
 
 
-@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("space", ["torus", "sphere", "klein-bottle", "projective-plane"])
 def test_a_fit_follows_its_weights(space: str) -> None:
     """Of two clusters, one weighs nine times the other; and rows of weight 0 are not there."""

@@ -83,7 +83,7 @@ def log_density(density: Density, data: np.ndarray) -> np.ndarray:
 
 
 @given(st.sampled_from(sorted(SPACES)), st.integers(0, 2**31), st.sampled_from([0.0, 0.4]))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=7, deadline=None)
 def test_the_gradient_is_the_numerical_one(name: str, seed: int, share: float) -> None:
     space = SPACES[name]
     density, data = density_on(space, seed, share), data_on(space, seed)

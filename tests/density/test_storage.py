@@ -167,7 +167,6 @@ def test_every_flipped_bit_is_found(form: str, tmp_path: Path) -> None:
 DATA = np.random.default_rng(1).normal(20, 10, (100, 2))
 
 
-@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("space", SPACES)
 def test_saved_and_read(space: str, tmp_path) -> None:
     flow: dict[str, Any] = {"max_frequency": 2, "segments": 2, "iterations": 3}

@@ -116,7 +116,7 @@ def test_axes() -> None:
     assert crowd.bingham_p == pytest.approx(stats.chi2.sf(shape, 5))
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(st.lists(st.floats(-10, 10), min_size=2, max_size=40), st.floats(-3, 3))
 def test_against_scipy_and_turned(angles: list[float], turn: float) -> None:
     (one,), _ = summarize_angles(angles, unit="radians")

@@ -149,7 +149,6 @@ def test_whole_groups_are_drawn() -> None:
     assert chosen_rows(labels < 15, groups, 5000).tolist() == list(range(1000))
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_divergences_are_near_those_of_the_densities() -> None:
     rng = np.random.default_rng(0)
     kappa, shift, rows = 3.0, 1.2, 700
@@ -172,7 +171,6 @@ def test_divergences_are_near_those_of_the_densities() -> None:
         assert estimate.low < estimate.value < estimate.high
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_data_far_apart_and_few_rows() -> None:
     rng = np.random.default_rng(1)
     far = compare_samples(

@@ -159,7 +159,7 @@ def test_pages_of_one_pdf() -> None:
 
 
 @given(st.floats(40, 1000), st.sampled_from(["png", "pdf", "svg"]))
-@settings(max_examples=20)
+@settings(max_examples=10)
 def test_every_width_is_kept(width: float, form: Any) -> None:
     sheet = Sheet.column(width, form)
     assert sheet.width * 25.4 == pytest.approx(width)

@@ -81,14 +81,14 @@ def test_equivariance_holds_to_rounding_for_every_class_and_space(name, max_freq
         assert equivariance_error(field, group, random_tensor(seed, 20, 2)) < 1e-11
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(wallpaper_groups(), st.sampled_from((1, 5, 10)), seeds)
 def test_equivariance_holds_to_rounding_on_any_lattice(group, max_frequency, seed):
     field = random_field(group, max_frequency, seed)
     assert equivariance_error(field, group, random_tensor(seed, 20, 2)) < 1e-11
 
 
-@settings(max_examples=15)
+@settings(max_examples=7)
 @given(space_groups(SMALL_SPACE_GROUPS), seeds)
 def test_equivariance_holds_to_rounding_in_space(group, seed):
     field = random_field(group, 2, seed)
@@ -121,7 +121,7 @@ def test_frequency_zero_leaves_the_invariant_translations(name, size):
     assert float(field.lipschitz_bound()) == 0.0
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(groups, st.integers(0, 3))
 def test_the_number_of_parameters_is_the_trace_of_the_projector(group, max_frequency):
     max_frequency = min(max_frequency, 2) if group.dim == 3 else max_frequency
@@ -137,7 +137,7 @@ def test_the_basis_is_orthonormal(field):
     np.testing.assert_allclose(dense.T @ dense, np.eye(basis.size), atol=1e-13)
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(small_fields, seeds)
 def test_symmetrizing_leaves_the_field_unchanged(field, seed):
     points = random_tensor(seed, 5, field.group.dim)
@@ -145,7 +145,7 @@ def test_symmetrizing_leaves_the_field_unchanged(field, seed):
     torch.testing.assert_close(again, field(points), rtol=0, atol=1e-12)
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(plane_groups, seeds)
 def test_every_symmetrized_trigonometric_field_is_one_of_these(group, seed):
     bare = CrystallographicGroup.generate(group.lattice)
@@ -178,7 +178,7 @@ def test_values_are_right_to_the_last_digits(name):
             assert max(abs(v - e) for v, e in zip(value, exact, strict=True)) < 1e-12
 
 
-@settings(max_examples=15)
+@settings(max_examples=7)
 @given(st.builds(random_field, groups, st.integers(0, 2), seeds, rms=st.floats(0.1, 10)))
 def test_the_norm_of_the_parameters_is_the_root_mean_square_of_the_field(field):
     group = field.group
@@ -230,7 +230,7 @@ def test_far_away_points_are_as_accurate_as_near_ones(dtype, away):
     assert error < 20 * torch.finfo(dtype).eps
 
 
-@settings(max_examples=15)
+@settings(max_examples=7)
 @given(wallpaper_groups(), st.floats(0.5, 4), seeds)
 def test_smoothness_scales_the_parameter_of_each_frequency(group, smoothness, seed):
     smooth = random_field(group, 3, seed, smoothness=smoothness)

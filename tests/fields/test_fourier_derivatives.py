@@ -19,7 +19,7 @@ from strategies import (
 )
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(small_fields, seeds)
 def test_the_jacobian_agrees_with_autograd(field, seed):
     points = random_tensor(seed, 4, field.group.dim)
@@ -27,7 +27,7 @@ def test_the_jacobian_agrees_with_autograd(field, seed):
     torch.testing.assert_close(field.jacobian(points), by_autograd, rtol=1e-11, atol=1e-10)
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(small_fields, seeds)
 def test_the_jacobian_agrees_with_finite_differences(field, seed):
     points = random_tensor(seed, 4, field.group.dim)
@@ -51,7 +51,7 @@ def test_bound_forms_give_the_same_values(field, seed):
     torch.testing.assert_close(divergence, field.divergence(points), rtol=1e-13, atol=1e-12)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(wallpaper_groups(), seeds)
 def test_gradients_of_parameters_and_points_pass_gradcheck(group, seed):
     field = random_field(group, 2, seed, smoothness=1.0)
@@ -95,7 +95,7 @@ def test_a_batch_has_one_lipschitz_bound_a_field():
         assert float(single.lipschitz_bound()) == pytest.approx(float(bounds[s]), rel=1e-14)
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(plane_fields, seeds)
 def test_no_sampled_jacobian_exceeds_the_lipschitz_bound(field, seed):
     norms = torch.linalg.matrix_norm(field.jacobian(random_tensor(seed, 100, 2)), ord=2)

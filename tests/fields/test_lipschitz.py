@@ -32,7 +32,7 @@ def steepest(field: FourierField, seed: int, count: int = 100) -> float:
     return float(torch.linalg.matrix_norm(slopes, ord=2).max())
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(groups, st.integers(1, 3), seeds)
 def test_no_sampled_slope_exceeds_the_groups_factor_times_the_steepness(
     group: CrystallographicGroup, max_frequency: int, seed: int
@@ -43,7 +43,7 @@ def test_no_sampled_slope_exceeds_the_groups_factor_times_the_steepness(
     assert found <= factor(field) * steep(field)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(st.sampled_from(sorted(WALLPAPER_GROUPS)), seeds)
 def test_no_wave_exceeds_the_groups_factor(name: str, seed: int) -> None:
     # single parameters come closest

@@ -21,7 +21,7 @@ def disturbed(field, seed):
     return field
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(groups, st.integers(0, 1000))
 def test_equivariance_holds_to_rounding(group, seed):
     field = disturbed(neural_field(group, hidden=(8,), seed=seed), seed)

@@ -65,7 +65,7 @@ def test_the_table_counts_the_terms_of_the_papers_sums(name):
 
 
 @pytest.mark.parametrize("name", TERMS)
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(seed=seeds, max_frequency=st.integers(1, 4))
 def test_nested_sums_are_the_mean_over_cosets_times_their_number_of_terms(
     name, seed, max_frequency

@@ -39,7 +39,7 @@ def pair(
 
 
 @given(names, seeds)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_it_commutes_with_the_group(name: str, seed: int) -> None:
     spline, _, points = pair(name, seed)
     with torch.no_grad():
@@ -49,7 +49,7 @@ def test_it_commutes_with_the_group(name: str, seed: int) -> None:
 
 
 @given(names, seeds)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_it_meets_the_fourier_field_at_the_grid(name: str, seed: int) -> None:
     spline, fourier, _ = pair(name, seed)
     sides = torch.tensor(spline.sides, dtype=torch.float64)
@@ -60,7 +60,7 @@ def test_it_meets_the_fourier_field_at_the_grid(name: str, seed: int) -> None:
 
 
 @given(names, seeds)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=5, deadline=None)
 def test_its_divergence_is_the_trace_of_its_jacobian(name: str, seed: int) -> None:
     spline, _, points = pair(name, seed)
     trace = jacobian(spline, points).diagonal(dim1=-2, dim2=-1).sum(dim=-1)
@@ -68,7 +68,7 @@ def test_its_divergence_is_the_trace_of_its_jacobian(name: str, seed: int) -> No
 
 
 @given(names, seeds)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=5, deadline=None)
 def test_the_adjoint_is_the_transpose(name: str, seed: int) -> None:
     spline, _, points = pair(name, seed)
     forces = torch.randn_like(points)
@@ -104,7 +104,7 @@ def test_second_derivatives_of_the_sum_against_numerical_ones(dim: int) -> None:
 
 
 @given(names, seeds)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=5, deadline=None)
 def test_a_jacobian_can_be_penalised(name: str, seed: int) -> None:
     spline, _, points = pair(name, seed)
     slopes = jacobian(spline, points)
@@ -137,7 +137,7 @@ def test_a_log_density_of_splines_has_its_hessian() -> None:
 
 
 @given(seeds)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_weights_are_a_partition_of_unity(seed: int) -> None:
     torch.manual_seed(seed)
     weights = cubic_weights(torch.rand(2, 50, dtype=torch.float64), 3).sum(dim=2)
@@ -171,7 +171,7 @@ def test_points_of_another_dimension_are_refused() -> None:
 
 
 @given(names, seeds)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_no_sampled_slope_exceeds_its_lipschitz_bound(name: str, seed: int) -> None:
     spline, _, _ = pair(name, seed)
     with torch.no_grad():

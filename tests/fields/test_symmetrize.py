@@ -39,7 +39,7 @@ def perceptron(dim, seed=0):
     return layers
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(groups, seeds)
 def test_any_function_becomes_equivariant_and_periodic(group, seed):
     points = random_tensor(seed, 8, group.dim)
@@ -161,7 +161,7 @@ def test_single_precision_stays_single_and_close():
     assert largest(single - field(points)) < 2e-5
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(groups, seeds, st.booleans())
 def test_the_divergence_is_the_trace_of_the_jacobian(group, seed, closed):
     inner = random_field(group, 1, seed) if closed else torch.tanh

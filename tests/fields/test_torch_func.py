@@ -23,7 +23,7 @@ pytestmark = pytest.mark.filterwarnings(
 )
 
 Field = Callable[[Tensor], Tensor]
-few = settings(max_examples=15)
+few = settings(max_examples=7)
 
 
 def spline(group: CrystallographicGroup, seed: int) -> SplineField:

@@ -23,7 +23,7 @@ from strategies import (
 SQUARE = wallpaper_group("p1", [[1.0, 0.0], [0.0, 1.0]])
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(plane_groups, seeds)
 def test_every_context_has_the_symmetry(group: CrystallographicGroup, seed: int) -> None:
     field = FourierField(group, 2)

@@ -47,7 +47,7 @@ def true_log_det(function, points: Tensor) -> Tensor:
     return determinants.log()
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(few_groups, methods, seeds)
 def test_the_log_determinant_is_that_of_the_map(
     group: CrystallographicGroup, method: str, seed: int
@@ -72,7 +72,7 @@ def test_an_integrated_log_determinant_is_not() -> None:
     assert largest(integrated - own) > 0.5
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(methods, seeds, st.floats(0.5, 2.0))
 def test_the_density_integrates_to_one(method: str, seed: int, slope: float) -> None:
     flow = steep_flow(SQUARE, seed, slope, method=method, bijective=True)
@@ -82,7 +82,7 @@ def test_the_density_integrates_to_one(method: str, seed: int, slope: float) -> 
     assert float(density.mean()) == pytest.approx(1.0, abs=0.01)
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(few_groups, methods, seeds)
 def test_each_step_is_undone_by_iteration(
     group: CrystallographicGroup, method: str, seed: int

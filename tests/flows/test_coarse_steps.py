@@ -96,7 +96,7 @@ def test_training_is_looked_at_ever_more_rarely():
     assert calls == 16 * 100 + 48 * 7
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(groups, seeds)
 def test_gentle_flows_are_silent(group, seed):
     # warnings are errors here

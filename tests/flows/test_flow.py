@@ -64,7 +64,7 @@ def test_the_flow_agrees_with_an_adaptive_integrator(name):
     np.testing.assert_allclose(moved.numpy().ravel(), solution.y[:, -1], rtol=0, atol=1e-10)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(groups, seeds, st.sampled_from([("rk4", 64), ("rk5", 24)]))
 def test_the_inverse_undoes_the_flow(group, seed, scheme):
     method, steps = scheme
@@ -99,7 +99,7 @@ def test_segments_follow_one_another():
     assert torch.equal(Flow(fields, steps=8).inverse(points), backwards)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(wallpaper_groups(), seeds)
 def test_the_inverse_undoes_several_segments(group, seed):
     flow = Flow(several(group, seed), steps=24, method="rk5")
@@ -143,7 +143,7 @@ def test_a_linear_field_gives_the_truncated_exponential(name, steps):
     torch.testing.assert_close(moved, expected, rtol=1e-13, atol=1e-13)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(groups, seeds)
 def test_the_log_determinant_is_that_of_the_jacobian_of_the_flow(group, seed):
     flow = Flow(gentle_field(group, 1, seed), steps=32, method="rk5")
@@ -171,7 +171,7 @@ def test_a_constant_field_translates_and_keeps_volume():
     assert log_det.tolist() == [0.0] * 4
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(plane_groups, seeds, st.integers(1, 3))
 def test_log_determinants_forth_and_back_cancel(group, seed, segments):
     flow = Flow(several(group, seed, segments), steps=24, method="rk5")

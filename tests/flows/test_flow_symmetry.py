@@ -30,7 +30,7 @@ def test_equivariance_holds_to_rounding_at_any_step_count(name, method, steps):
     assert map_equivariance_error(flow.inverse, group, random_tensor(1, 20, 2)) < 1e-11
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(groups, seeds, st.sampled_from(sorted(METHODS)), st.integers(1, 4))
 def test_equivariance_holds_to_rounding_for_any_group(group, seed, method, steps):
     flow = Flow(random_field(group, 1, seed), method=method, steps=steps, duration=0.1, warn=False)
@@ -50,7 +50,7 @@ def test_the_log_determinant_is_invariant():
 
 @pytest.mark.parametrize("name", ["IH2", "IH3", "IH5", "IH6", "IH21"])
 @given(angle=st.floats(-3, 3), scale=st.floats(0.3, 3), seed=seeds)
-@settings(max_examples=8)
+@settings(max_examples=4)
 def test_a_similarity_composed_with_a_flow_commutes_with_the_conjugate_group(
     name, angle, scale, seed
 ):

@@ -24,7 +24,7 @@ from sealed import sealed
 from strategies import groups, neural_field, random_tensor, seeds, space_group
 
 one_folder = settings(
-    max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None
+    max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None
 )
 
 
@@ -290,7 +290,7 @@ def test_files_that_are_no_flow(tmp_path: Path) -> None:
         load_flow(path)
 
 
-@settings(one_folder, max_examples=60)
+@settings(one_folder, max_examples=30)
 @given(st.integers(0, 10**6), st.integers(0, 255))
 def test_a_file_with_a_changed_byte_is_refused(tmp_path: Path, place: int, byte: int) -> None:
     group = wallpaper_group("p4")

@@ -60,7 +60,7 @@ FLOWS = {
 every_kind = pytest.mark.parametrize("kind", FLOWS)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(groups, seeds)
 def test_jacobians_are_those_of_finite_differences(group, seed):
     flow = Flow(gentle_field(group, 2, seed), steps=4, warn=False)

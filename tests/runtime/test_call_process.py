@@ -20,14 +20,14 @@ from orbiflow.runtime import (
     TileFound,
     find,
 )
-from runtime.searches import ENDLESS, boot_call, check_order, likeness_call
+from runtime.searches import check_order, likeness_call
 
-SMALL = "runtime.small_process"
+SMALL, ENDLESS = "runtime.small_process", "runtime.endless_process"
 
 
 @pytest.fixture(name="small", autouse=True)
 def small_fixture(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let processes find the module that makes their searches small."""
+    """Let processes find the modules that make their searches small or endless."""
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[1]), prepend=os.pathsep)
 
 
@@ -42,12 +42,11 @@ def test_a_search_in_a_process(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "overview.png").is_file()
 
 
-def test_two_calls_are_started_from_threads(tmp_path: Path) -> None:
+def test_two_calls_are_started_from_threads() -> None:
     found: dict[str, list[Event]] = {}
 
     def work(name: str) -> None:
-        (tmp_path / name).mkdir()
-        with CallProcess(likeness_call(tmp_path / name, name), modules=[SMALL]) as process:
+        with CallProcess(find("classes").call({"classes": [name]})) as process:
             found[name] = list(process.events())
 
     threads = [threading.Thread(target=work, args=(name,)) for name in ("IH3", "IH7")]
@@ -56,15 +55,16 @@ def test_two_calls_are_started_from_threads(tmp_path: Path) -> None:
     for thread in threads:
         thread.join()
     for name in ("IH3", "IH7"):
-        check_order(found[name], name)
-        assert isinstance(found[name][-1], Finished)
+        last = found[name][-1]
+        assert isinstance(last, Finished)
+        assert [own["class"] for own in last.summary["classes"]] == [name]
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_cancelling_keeps_the_order_and_ends_the_process(workers: int, tmp_path: Path) -> None:
-    call = boot_call(tmp_path, "IH4", "IH6", iterations=ENDLESS, workers=workers)
+    call = likeness_call(tmp_path, "IH4", "IH6", workers=workers)
     events = []
-    with CallProcess(call) as process:
+    with CallProcess(call, modules=[ENDLESS]) as process:
         for event in process.events():
             events.append(event)
             if isinstance(event, Progress) and event.class_name:
@@ -94,7 +94,7 @@ def test_a_mistake_is_the_last_event(tmp_path: Path) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_a_process_that_dies_is_the_last_event(tmp_path: Path) -> None:
     events = []
-    with CallProcess(boot_call(tmp_path, "IH4", iterations=ENDLESS)) as process:
+    with CallProcess(likeness_call(tmp_path, "IH4"), modules=[ENDLESS]) as process:
         for event in process.events():
             events.append(event)
             if isinstance(event, Progress):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from density.quick_fits import few_kernels
+from density.quick_fits import quick_fits
 from orbiflow.density import DensitySettings, Torus, fit_automatic
 from orbiflow.runtime import Cancelled, SideBySide, Tell, cores, one_core, process_context
 from orbiflow.runtime import side_by_side as module_of
@@ -100,7 +100,7 @@ def test_a_worker_process_has_one_core() -> None:
 
 
 def test_a_fit_is_the_same_on_any_number_of_cores(monkeypatch: pytest.MonkeyPatch) -> None:
-    few_kernels(monkeypatch)
+    quick_fits(monkeypatch)
     space, rng = Torus(2), np.random.default_rng(0)
     points = space.project(torch.tensor(0.1 * rng.normal(size=(320, 2))))
     settings = DensitySettings(

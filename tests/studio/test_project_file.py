@@ -157,7 +157,7 @@ def test_a_tile_that_does_not_tile_is_refused(saved: bytes, tmp_path: Path) -> N
         opened(tmp_path, changed(saved, **{name: json.dumps(document).encode()}))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), min_size=1, max_size=5))
 def test_damage_is_an_error_of_ours_or_does_no_harm(
     saved: bytes, tmp_path_factory: pytest.TempPathFactory, damage: list[tuple[int, int]]

@@ -134,7 +134,7 @@ def test_refusals_are_plain() -> None:
             pulled(tile, wrong)
 
 
-@settings(max_examples=12)
+@settings(max_examples=6)
 @given(wallpaper_groups())
 def test_elements_are_one_of_each_and_belong_to_the_group(group) -> None:
     told = elements_json(group, np.zeros(2))

@@ -427,7 +427,7 @@ ACTIONS = st.lists(
 )
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(ACTIONS)
 def test_whatever_happens_slots_are_kept_and_all_tasks_end(
     tmp_path_factory: pytest.TempPathFactory, actions: list[tuple[str, int]]

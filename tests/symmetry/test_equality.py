@@ -123,7 +123,7 @@ def test_the_largest_space_group_equals_its_primitive_form():
     assert hash(primitive) == hash(group)
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(wallpaper_groups(), seeds)
 def test_fields_of_equal_groups_keep_to_their_own_basis(group, seed):
     random_field(group, 2, seed)  # what it works out is kept

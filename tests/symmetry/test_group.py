@@ -142,7 +142,7 @@ def test_images_are_those_of_the_coset_representatives(group, seed):
     np.testing.assert_allclose(group.images(torch.tensor(p)).numpy(), expected, atol=1e-13)
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(plane_groups, seeds, st.floats(0.0, 3.0))
 def test_elements_near_are_those_of_a_brute_force_search(group, seed, radius):
     center, source = random_points(seed, 2, 2)

@@ -105,7 +105,7 @@ def test_every_full_symbol_is_of_its_number(typesetting: str) -> None:
             assert found.number == number, symbol
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(st.integers(1, 230))
 def test_numbers(number: int) -> None:
     row = gemmi.find_spacegroup_by_number(number)

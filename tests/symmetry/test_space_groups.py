@@ -37,7 +37,7 @@ from orbiflow.symmetry.space_groups import element_counts
 SETTINGS = {row.xhm(): row for row in gemmi.spacegroup_table()}
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(st.sampled_from(sorted(SETTINGS)))
 def test_every_setting_is_the_group_of_the_tables_on_its_primitive_lattice(name):
     group, listed = space_group(name), SETTINGS[name].operations()
@@ -87,7 +87,7 @@ def test_the_hall_symbol_is_meant_only_if_it_is_said():
     assert space_group("-P 2ybc", cell) == space_group("P 21/c", cell)
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(st.sampled_from(sorted(SETTINGS)))
 def test_the_cure_of_a_wrong_cell_is_one(name):
     # without symmetry, so that only triclinic groups fit
@@ -343,7 +343,7 @@ def test_cifs_that_contradict_themselves_are_refused(tmp_path, cell, listed, sym
         group_from_cif(path)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(st.sampled_from(sorted(SETTINGS)), own.seeds)
 def test_groups_in_settings_of_no_table_agree_with_their_numbers(tmp_path_factory, name, seed):
     group, rng = space_group(name), np.random.default_rng(seed)

@@ -68,7 +68,7 @@ def wild(points):
 names = st.sampled_from([(along, name) for along, names in KINDS.items() for name in names])
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(names)
 def test_a_layer_or_rod_group_is_a_space_group_without_some_translations(drawn):
     along, name = drawn

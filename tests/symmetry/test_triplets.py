@@ -25,7 +25,7 @@ from strategies import groups, random_orthogonal, seeds
 near = [generated(np.eye(1), [Isometry(-np.eye(1), np.array([x]))]) for x in (2.4e-7, 1.003e-9)]
 
 
-@settings(max_examples=15)
+@settings(max_examples=7)
 @given(groups, seeds)
 @example(near[0], 0)
 def test_any_group_is_that_of_its_operators(group, seed):
@@ -36,7 +36,7 @@ def test_any_group_is_that_of_its_operators(group, seed):
         assert group_from_operators(operators(there), there.lattice) == there
 
 
-@settings(max_examples=15)
+@settings(max_examples=7)
 @given(groups)
 @example(near[1])
 def test_operators_of_a_coarser_cell_have_the_centring(group):

@@ -84,8 +84,11 @@ def pixels(picture: Picture) -> np.ndarray:
     ]
 
 
-@pytest.mark.parametrize("count", [100, 2000, 20_000])
-@pytest.mark.parametrize("name", SPACES)
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("torus", 100), ("torus", 20_000), ("klein-bottle", 2000), ("sphere", 2000), ("sphere", 20_000),
+     ("projective-plane", 100)],
+)  # fmt: skip
 def test_a_peak_is_seen_through_its_dots(
     name: str, count: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

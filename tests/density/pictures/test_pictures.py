@@ -283,8 +283,8 @@ def test_densities_with_kernels_are_drawn_and_say_what_is_averaged(space):
 
 def test_a_flow_in_few_colours_is_small(monkeypatch):
     monkeypatch.setattr("orbiflow.drawing.canvas._STEPS", 12)  # lines of the whole length
-    png = few_colours(flow_png(example(SPACES[0])))
-    assert len(png) < 600_000
+    png = few_colours(flow_png(example(SPACES[0]), width_px=800))
+    assert len(png) < 300_000
     image = Image.open(io.BytesIO(png))
     assert image.mode == "P"
 

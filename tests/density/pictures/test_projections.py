@@ -157,7 +157,7 @@ def test_nets_run_clockwise_from_the_top_and_globes_are_seen_from_outside() -> N
 
 
 @given(st.integers(0, 99), centers)
-@settings(max_examples=20)
+@settings(max_examples=10)
 def test_both_ends_of_an_axis_are_drawn_at_one_place(seed: int, center: Any) -> None:
     space, points = ProjectivePlane(), directions(50, seed)
     opposite = np.stack([-points[:, 0], (points[:, 1] + 360) % 360 - 180], axis=-1)
@@ -168,7 +168,7 @@ def test_both_ends_of_an_axis_are_drawn_at_one_place(seed: int, center: Any) -> 
 
 
 @given(maps)
-@settings(max_examples=15)
+@settings(max_examples=7)
 def test_pixels_cover_the_map_and_measure_the_sphere(projection: Projection) -> None:
     pixels = Map(Sphere(), projection).pixels(4000)
     assert pixels.within.sum() <= len(pixels.points) == pixels.shown.sum()

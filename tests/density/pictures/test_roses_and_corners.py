@@ -24,13 +24,20 @@ def torus(dim: int):
     return kernels_about(Torus(dim, unit="degrees"), [[60.0] * dim], [4.0], [1.0])
 
 
-@pytest.mark.parametrize("sheet", SHEETS.values(), ids=SHEETS)
-@pytest.mark.parametrize("dim", [2, 3, 5])
-@pytest.mark.parametrize("middle", [0.0, 100.0])
-def test_ticks_of_corner_plots_do_not_touch(dim: int, middle: float, sheet: Sheet) -> None:
+@pytest.mark.parametrize(
+    ("dim", "middle", "name"),
+    [
+        (2, 0.0, "screen"),
+        (2, 100.0, "column"),
+        (3, 0.0, "column"),
+        (5, 0.0, "screen"),
+        (5, 100.0, "column"),
+    ],
+)
+def test_ticks_of_corner_plots_do_not_touch(dim: int, middle: float, name: str) -> None:
     density, few = torus(dim), torch.zeros(2, dim)
     settings = PlotSettings(names=("phi",) * dim, center=(middle,) * dim)
-    figure = corner_picture(density, few, few, settings, sheet=sheet).figure
+    figure = corner_picture(density, few, few, settings, sheet=SHEETS[name]).figure
     texts = [
         label
         for axes in figure.axes

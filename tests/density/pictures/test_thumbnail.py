@@ -33,7 +33,6 @@ def pixels(png: bytes) -> np.ndarray:
         return np.asarray(image.convert("RGB")).astype(int)
 
 
-@pytest.mark.usefixtures("quick_fits")
 @pytest.mark.parametrize("name", SPACES)
 def test_every_space_has_one_that_is_the_same_every_time(name: str) -> None:
     space, count = SPACES[name]
@@ -47,7 +46,6 @@ def test_every_space_has_one_that_is_the_same_every_time(name: str) -> None:
     assert len(np.unique(found.reshape(-1, 3), axis=0)) > 20
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_the_brightest_place_of_the_square_is_the_peak() -> None:
     data = np.degrees(np.random.default_rng(0).vonmises([1.2, -0.8], 40.0, (80, 2)))
     density = DensityEstimator(unit="degrees", components="kernels").fit(data).density_
@@ -59,7 +57,6 @@ def test_the_brightest_place_of_the_square_is_the_peak() -> None:
     assert 1 - (row + 0.5) / 240 == pytest.approx(0.5 - 0.8 / (2 * np.pi), abs=0.04)
 
 
-@pytest.mark.usefixtures("quick_fits")
 def test_rows_that_lack_angles_are_left_out() -> None:
     data = data_of(1)
     density = DensityEstimator(components="kernels").fit(data).density_

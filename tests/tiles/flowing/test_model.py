@@ -46,7 +46,7 @@ def same_isometries(a: CrystallographicGroup, b: CrystallographicGroup) -> bool:
     return a.order == b.order and all(b.contains(g) for g in a.cosets)
 
 
-@settings(max_examples=12)
+@settings(max_examples=6)
 @given(kinds, seeds, st.integers(1, 2))
 def test_inverse_undoes_forward(kind: IsohedralClass, seed: int, segments: int) -> None:
     model = random_model(kind, seed, 2, segments=segments, steps=32)
@@ -55,7 +55,7 @@ def test_inverse_undoes_forward(kind: IsohedralClass, seed: int, segments: int) 
     assert largest(model.unplace(model.place(points)) - points) < 1e-13
 
 
-@settings(max_examples=15)
+@settings(max_examples=7)
 @given(kinds, seeds)
 def test_place_is_a_stretch_then_a_similarity(kind: IsohedralClass, seed: int) -> None:
     model = random_model(kind, seed, 3)
@@ -78,7 +78,7 @@ def test_starts_from_the_centred_template_of_area_one(name: str) -> None:
     assert largest(area - torch.tensor([1.0, -1.0, 1.0])) < 1e-13
 
 
-@settings(max_examples=18)
+@settings(max_examples=9)
 @given(kinds, seeds)
 def test_tiles_of_any_parameters_are_certified(kind: IsohedralClass, seed: int) -> None:
     model = random_model(kind, seed)
@@ -100,7 +100,7 @@ def test_tiles_of_any_parameters_are_certified(kind: IsohedralClass, seed: int) 
         assert np.abs(left - pushed - offset).max() < 1e-10
 
 
-@settings(max_examples=12)
+@settings(max_examples=6)
 @given(kinds, seeds)
 def test_identified_edges_match(kind: IsohedralClass, seed: int) -> None:
     model = random_model(kind, seed)
@@ -118,7 +118,7 @@ def test_identified_edges_match(kind: IsohedralClass, seed: int) -> None:
         assert np.abs(image - partner).max() < 1e-11
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(kinds, seeds)
 def test_single_precision_models_are_certified_in_double(kind: IsohedralClass, seed: int) -> None:
     model = random_model(kind, seed, dtype=torch.float32)
@@ -132,7 +132,7 @@ def test_single_precision_models_are_certified_in_double(kind: IsohedralClass, s
     assert certificate.valid, certificate.reasons
 
 
-@settings(max_examples=15)
+@settings(max_examples=7)
 @given(kinds, seeds)
 def test_take_keeps_the_values(kind: IsohedralClass, seed: int) -> None:
     model = random_model(kind, seed, 4, segments=2, smoothness=1.5, steps=3, method="rk3")

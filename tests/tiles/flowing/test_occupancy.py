@@ -52,7 +52,7 @@ def stack(name: str, seed: int, size: int) -> TileModel:
     return model
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(seeds, st.booleans())
 def test_samples_know_what_is_inside(seed: int, y_down: bool) -> None:
     target = Target.from_polygon(BOOT, y_down=y_down)

@@ -85,7 +85,7 @@ def test_a_tile_is_found_as_one(name: str) -> None:
     assert np.allclose(own.vertices[0], outline, atol=1e-7)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(st.sampled_from(list(CLASSES)), st.floats(0.1, 6), st.floats(0.2, 5), st.integers(0, 59))
 def test_gains_do_not_depend_on_the_pose(name: str, turn: float, scale: float, roll: int) -> None:
     moved = np.roll(OUTLINE, roll) * scale * np.exp(1j * turn) + 3
@@ -113,7 +113,7 @@ def test_nearest_tiles_tile(name: str) -> None:
     assert checked > 5
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=7, deadline=None)
 @given(st.sampled_from(list(CLASSES)), st.integers(0, 10**6))
 def test_no_tile_of_the_placement_is_nearer(name: str, seed: int) -> None:
     kind = CLASSES[name]

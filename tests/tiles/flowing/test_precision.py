@@ -38,7 +38,7 @@ def started(name: str, seed: int, *, from_template: bool) -> TileModel:
     return model
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(st.sampled_from(list(CLASSES)), casts, seeds, st.booleans())
 def test_no_cast_loses_the_certificate(
     name: str, steps: list[str], seed: int, from_template: bool

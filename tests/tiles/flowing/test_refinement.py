@@ -50,7 +50,7 @@ def test_every_simple_polygon_of_the_space_tiles(group: CrystallographicGroup, s
     assert found.signed_area == pytest.approx(tile.signed_area, rel=1e-12)
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(wallpaper_groups(), seeds, st.floats(-3, 3))
 def test_no_loss_makes_a_fold(group: CrystallographicGroup, seed: int, size: float) -> None:
     tile = any_cell(group, seed)

@@ -50,7 +50,7 @@ def assert_same(one: TileModel, other: TileModel) -> None:
     assert all(torch.equal(mine[name], theirs[name]) for name in mine)
 
 
-@settings(max_examples=15)
+@settings(max_examples=7)
 @given(st.sampled_from(list(CLASSES)), seeds, st.integers(1, 3))
 def test_round_trip(name: str, seed: int, segments: int) -> None:
     model = candidate(name, seed, segments)
@@ -286,7 +286,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         load_model(large)
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(data=st.data())
 def test_a_damaged_file_never_gives_anything_but_an_error(
     data: st.DataObject, tmp_path_factory: pytest.TempPathFactory

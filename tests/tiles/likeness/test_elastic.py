@@ -68,7 +68,7 @@ def test_it_does_not_matter_where_and_how_a_shape_lies(
 
 
 @pytest.mark.parametrize("stiffness", STIFFNESSES)
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(name=names, seed=seeds)
 def test_the_rotations_are_the_best(name: str, seed: int, stiffness: Stiffness) -> None:
     own = body(name, stiffness)
@@ -82,7 +82,7 @@ def test_the_rotations_are_the_best(name: str, seed: int, stiffness: Stiffness) 
 
 
 @pytest.mark.parametrize("stiffness", STIFFNESSES)
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(name=names, seed=seeds)
 def test_the_system_is_half_the_derivative(name: str, seed: int, stiffness: Stiffness) -> None:
     """At fixed rotations and pose, which are the best: so of the energies themselves, too."""
@@ -101,7 +101,7 @@ def test_the_system_is_half_the_derivative(name: str, seed: int, stiffness: Stif
     assert 2 * np.vdot(half, way).real == pytest.approx(slope, rel=1e-5, abs=1e-5 * total(0))
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(names, seeds)
 def test_the_matrix_is_symmetric_and_definite(name: str, seed: int) -> None:
     own = body(name)
@@ -111,7 +111,7 @@ def test_the_matrix_is_symmetric_and_definite(name: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize("stiffness", STIFFNESSES)
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(name=names, seed=seeds)
 def test_forgiving_costs_less(name: str, seed: int, stiffness: Stiffness) -> None:
     own = body(name, stiffness)
@@ -122,7 +122,7 @@ def test_forgiving_costs_less(name: str, seed: int, stiffness: Stiffness) -> Non
     assert own.forgiving_energy(gentle) == pytest.approx(own.energy(gentle), rel=1e-3)
 
 
-@settings(max_examples=15)
+@settings(max_examples=7)
 @given(names, seeds, st.floats(0.001, 0.3))
 def test_the_lenient_energy_lies_between(name: str, seed: int, size: float) -> None:
     own = body(name)
@@ -132,7 +132,7 @@ def test_the_lenient_energy_lies_between(name: str, seed: int, size: float) -> N
     assert (lenient <= own.energy(z) * (1 + 1e-9)).all()
 
 
-@settings(max_examples=15)
+@settings(max_examples=7)
 @given(names, seeds, st.floats(0.001, 0.03))  # beyond, rotations have several minima
 def test_the_forgiving_body_touches_from_above(name: str, seed: int, size: float) -> None:
     """Its energy, less what it has too much at the shape, bounds the forgiving energy."""
@@ -148,7 +148,7 @@ def test_the_forgiving_body_touches_from_above(name: str, seed: int, size: float
         assert (own.forgiving_energy(other) <= bound * (1 + 1e-9) + 1e-12).all()
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(names, seeds)
 def test_the_forgiving_body_has_the_same_slope(name: str, seed: int) -> None:
     own = body(name)
@@ -166,7 +166,7 @@ def test_the_forgiving_body_has_the_same_slope(name: str, seed: int) -> None:
     assert slope(touching.energy) == pytest.approx(expected, rel=1e-3, abs=1e-4)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(names, seeds)
 def test_the_condensed_system_solves_the_same(name: str, seed: int) -> None:
     own = body(name)
@@ -186,7 +186,7 @@ def test_the_condensed_system_solves_the_same(name: str, seed: int) -> None:
     assert condensed.whole(outline, forces) == pytest.approx(expected, abs=1e-9)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(names, seeds, st.floats(0.1, 3000.0))
 def test_springs_pull_downhill(name: str, seed: int, strength: float) -> None:
     own = body(name)

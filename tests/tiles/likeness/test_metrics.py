@@ -47,7 +47,7 @@ def test_rigid_motions_change_nothing(
 
 
 @given(star_shapes(), star_shapes())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 def test_hausdorff_is_that_of_the_curves(a: np.ndarray, b: np.ndarray) -> None:
     value = hausdorff(a, b)
     assert value == pytest.approx(hausdorff(b, a), abs=4e-6)

@@ -27,7 +27,7 @@ from outlines import ANIMALS, SHAPES, animal, bar, comb, disc, dumbbell, slit_sq
 widths = st.floats(0.005, 0.2)
 
 
-@settings(max_examples=12)
+@settings(max_examples=6)
 @given(st.floats(0.01, 1.0), st.floats(1.0, 30.0))
 def test_a_bar_is_as_thin_as_it_is_wide(width: float, aspect: float) -> None:
     found = narrowest_neck(bar(aspect * width, width))
@@ -37,7 +37,7 @@ def test_a_bar_is_as_thin_as_it_is_wide(width: float, aspect: float) -> None:
     assert narrowest_slit(bar(aspect * width, width)) is None
 
 
-@settings(max_examples=15)
+@settings(max_examples=7)
 @given(widths, st.floats(0.001, 2.0))
 def test_a_dumbbell_is_as_thin_as_its_neck(neck: float, length: float) -> None:
     found = narrowest_neck(dumbbell(neck, length))
@@ -47,7 +47,7 @@ def test_a_dumbbell_is_as_thin_as_its_neck(neck: float, length: float) -> None:
     assert y == pytest.approx(0.5)
 
 
-@settings(max_examples=12)
+@settings(max_examples=6)
 @given(widths, widths, st.floats(1.2, 2.0))
 def test_a_comb_has_necks_and_slits(width: float, gap: float, length: float) -> None:
     ring = comb(5, width, gap, length, back=0.3)
@@ -57,7 +57,7 @@ def test_a_comb_has_necks_and_slits(width: float, gap: float, length: float) -> 
     assert slit.width == pytest.approx(gap, rel=1e-9)
 
 
-@settings(max_examples=15)
+@settings(max_examples=7)
 @given(st.floats(0.001, 0.1))
 def test_a_slit_is_seen_from_outside(width: float) -> None:
     ring = slit_square(width, 0.8)
@@ -102,7 +102,7 @@ def test_similar_shapes_are_alike(name: str, turn: float, scale: float, x: float
         assert share(moved, 0.03 * scale) == pytest.approx(share(ring, 0.03), abs=1e-3)
 
 
-@settings(max_examples=15)
+@settings(max_examples=7)
 @given(st.floats(0.002, 0.009), st.floats(0.1, 1.5))
 def test_hairs_are_counted_by_length(width: float, length: float) -> None:
     assume(abs(2 * length + 0.3 - 5 * 0.31) > 0.02)  # the least length of a slit

@@ -51,7 +51,7 @@ def star_shapes(draw: st.DrawFn) -> Ring:
 
 
 @given(star_shapes(), star_shapes())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 def test_range_and_identity(a: Ring, b: Ring) -> None:
     values = recognisability(a, b)
     assert all(0 <= value <= 1 for value in values.as_dict().values())
@@ -66,7 +66,7 @@ def test_range_and_identity(a: Ring, b: Ring) -> None:
     star_shapes(), star_shapes(), st.floats(0, 6.3), st.floats(0.01, 100), st.floats(-9, 9),
     st.booleans(),
 )  # fmt: skip
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 def test_similarities_of_both_change_nothing(
     a: Ring, b: Ring, angle: float, scale: float, shift: float, mirror: bool
 ) -> None:
@@ -78,7 +78,7 @@ def test_similarities_of_both_change_nothing(
 
 
 @given(star_shapes(), star_shapes(), st.integers(0, 19), st.floats(0.01, 0.5))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 def test_the_list_of_vertices_does_not_matter(a: Ring, b: Ring, by: int, step: float) -> None:
     def other(ring: Ring) -> Polygon:
         return shapely.segmentize(Polygon(np.roll(ring, by, axis=0)[::-1]), step)
@@ -99,7 +99,7 @@ def test_resampled_outlines_score_alike(tile: Polygon, count: int) -> None:
 
 
 @given(st.sampled_from(sorted(LIMBS)), st.floats(0.12, 0.24))
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 def test_cutting_a_limb_costs_more_and_more(angle: float, width: float) -> None:
     target = creature(LIMBS, width)
     recognise = Recogniser(target)
@@ -115,7 +115,7 @@ def test_cutting_a_limb_costs_more_and_more(angle: float, width: float) -> None:
 
 
 @given(st.sampled_from(sorted(LIMBS)))
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)
 def test_a_spurious_limb_costs_as_a_lost_one_does(angle: float) -> None:
     without = creature({at: length for at, length in LIMBS.items() if at != angle})
     grown, lost = recognisability(SPIDER, without), recognisability(without, SPIDER)

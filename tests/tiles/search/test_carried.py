@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles import CLASSES, Bending, EscherTile, Frame, TileMap, signed_area
+from orbiflow.tiles import Bending, EscherTile, Frame, TileMap, signed_area
 from orbiflow.tiles.search.bent_map import map_of_bent, onto_polygon
 from orbiflow.tiles.silhouette import triangulate, unfolded
 from orbiflow.tiles.silhouette.bending import MAX_POINTS
 from outlines import BentTile, animal, bent_squirrel, disc
 from strategies import seeds
 
-CASES = [*((name, False) for name in CLASSES), ("IH4", True), ("IH21", True)]
+CASES = [("IH4", False), ("IH5", False), ("IH21", False), ("IH4", True), ("IH21", True)]
 
 
 def bending(name: str, mirrored: bool = False) -> tuple[BentTile, Bending]:
@@ -52,11 +52,7 @@ def test_the_outline_lands_on_the_certified_polygon(name: str, mirrored: bool) -
     pieces = np.asarray(shapely.polygons(carried.images[carried.triangles]))
     assert abs(shapely.area(pieces).sum() - tile.area) < 1e-12
     assert abs(shapely.union_all(pieces).symmetric_difference(tile).area) < 1e-9
-
-
-@pytest.mark.parametrize(("name", "mirrored"), CASES)
-def test_round_trip(name: str, mirrored: bool) -> None:
-    case, carried = bending(name, mirrored)
+    # there and back
     points = points_in(outline(case), 2000)
     assert abs(carried.inverse(carried.forward(points)) - points).max() < 1e-9
     images = points_in(case.tile.polygon, 2000)

@@ -21,7 +21,7 @@ from outlines import SMALL, animal, squirrel_hands
 
 PLAIN = replace(SMALL, carved=0)
 SPIDER = replace(SMALL, finalists=2)
-NAMES = (*CLASSES, "IH8", "IH12", "IH69")  # with a half-turn and mirrors of their own
+NAMES = ("IH2", "IH4", "IH5", "IH7", "IH28", "IH8", "IH69")  # the last two: a half-turn, a mirror
 
 
 def bend(name: str) -> tuple[Elastic, TileSpace, BentTiles]:
@@ -39,8 +39,18 @@ def carve(name: str, room: float = 0.0) -> tuple[Elastic, TileSpace, Complex, Ca
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_what_is_carved_is_a_tile_of_its_placement(name: str) -> None:
+def test_what_is_carved_is_a_better_tile_of_its_placement(name: str) -> None:
     body, space, before, found = carve(name)
+    check_tile(body, space, before, found)
+    check_points(body, space, found)
+    # and it is no rougher than the points on it
+    points, ring, bent = (_turning(z) for z in (found.outline, found.ring, before))
+    assert ring < 1.15 * points
+    assert ring < 1.5 * bent
+
+
+def check_tile(body: Elastic, space: TileSpace, before: Complex, found: Carved) -> None:
+    """Check that a carved tile belongs to its space and has a higher mark than before."""
     nearest = space.nearest(found.ring[None])
     assert abs(space.in_order(nearest.vertices)[0] - found.ring).max() < 1e-6
     assert nearest.linear[0] == pytest.approx(found.linear, abs=1e-5)
@@ -53,9 +63,8 @@ def test_what_is_carved_is_a_tile_of_its_placement(name: str) -> None:
     assert signed_area(plane_points(found.ring)) > 0.2
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_points_slide_in_order_and_meet_the_corners(name: str) -> None:
-    body, space, _, found = carve(name)
+def check_points(body: Elastic, space: TileSpace, found: Carved) -> None:
+    """Check that points slide in order and meet the corners."""
     n, own = body.size, space.placements
     steps = np.diff(np.append(found.places, found.places[0] + n))
     assert steps.min() > 0.05
@@ -68,14 +77,6 @@ def test_points_slide_in_order_and_meet_the_corners(name: str) -> None:
     assert apart.max() < 1e-12
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_the_tile_is_no_rougher_than_the_points_on_it(name: str) -> None:
-    _, _, before, found = carve(name)
-    points, ring, bent = (_turning(z) for z in (found.outline, found.ring, before))
-    assert ring < 1.15 * points
-    assert ring < 1.5 * bent
-
-
 def _turning(z: Complex) -> float:
     steps = np.roll(z, -1) - z
     return float(abs(np.angle(steps * np.conj(np.roll(steps, 1)))).sum())
@@ -83,7 +84,7 @@ def _turning(z: Complex) -> float:
 
 def test_points_that_slide_have_higher_marks(monkeypatch: pytest.MonkeyPatch) -> None:
     def marks() -> float:
-        found = [carve(name) for name in CLASSES]
+        found = [carve(name) for name in ("IH2", "IH4", "IH21")]
         return float(np.mean([kept_of(own[0].measures, own[3].outline, 0.0).mark for own in found]))
 
     slid = marks()
@@ -128,14 +129,13 @@ def test_tiles_that_cross_themselves_are_carved_apart(monkeypatch: pytest.Monkey
         assert shapely.Polygon(plane_points(bent.ring)).is_valid
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH4", "IH6"])
-def test_a_search_that_carves_has_better_tiles(name: str) -> None:
+def test_a_search_that_carves_has_better_tiles() -> None:
     plain, best = (
-        bent_tiles(squirrel_hands()[:1], CLASSES[name], settings)[0] for settings in (PLAIN, SMALL)
+        bent_tiles(squirrel_hands()[:1], CLASSES["IH4"], settings)[0] for settings in (PLAIN, SMALL)
     )
     assert best[0].score >= plain[0].score
     assert best[0].fidelity.mark > plain[0].fidelity.mark + 0.1
-    again = bent_tiles(squirrel_hands()[:1], CLASSES[name], SMALL)[0]
+    again = bent_tiles(squirrel_hands()[:1], CLASSES["IH4"], SMALL)[0]
     assert np.array_equal(again[0].points, best[0].points)
 
 

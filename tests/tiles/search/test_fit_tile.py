@@ -25,7 +25,7 @@ from outlines import searched
 BOOT = [[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]]
 TARGET = Target.from_polygon(BOOT)
 SETTINGS = {
-    "bending": LikenessSearch(placements=20, held=4, finalists=1, rounds=2),
+    "bending": LikenessSearch(placements=20, held=4, finalists=1, rounds=2, multiples=(2,)),
     "descent": OverlapSearch.for_effort("fast", stages=((2, 2), (2, 1)), polish=0),
     "occupancy": OccupancySearch(
         max_frequency=3, turns=3, finalists=2, iterations=15, affine_iterations=20, points=200

@@ -262,13 +262,10 @@ def test_settings_of_no_method_are_refused(wrong: object) -> None:
     ids=["likeness", "overlap"],
 )
 def test_several_of_a_class_differ(settings: LikenessSearch | OverlapSearch) -> None:
-    results, _ = searched(SQUIRREL, ["IH5", "IH7"], settings, per_class=3)
-    for name in ("IH5", "IH7"):
-        own = [r for r in results if r.name == name]
-        assert 1 <= len(own) <= 3
-        alike = mutual_iou([r.normal_tile.polygon for r in own])
-        assert all(alike(i, j) < 0.9 for i in range(len(own)) for j in range(i))
-    assert len(results) > 2
+    own, _ = searched(SQUIRREL, ["IH5"], settings, per_class=3)
+    assert 2 <= len(own) <= 3
+    alike = mutual_iou([r.normal_tile.polygon for r in own])
+    assert all(alike(i, j) < 0.9 for i in range(len(own)) for j in range(i))
 
 
 def test_more_effort_never_scores_less(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -276,7 +273,7 @@ def test_more_effort_never_scores_less(monkeypatch: pytest.MonkeyPatch) -> None:
 
     What a level adds to the one below is next to nothing here, and scores less alone.
     """
-    least = {"placements": 40, "held": 8, "starts": 4, "finalists": 1, "rounds": 6}
+    least = {"placements": 20, "held": 4, "starts": 2, "finalists": 1, "rounds": 4}
     for name, value in least.items():
         monkeypatch.setitem(FAST, name, value)
     fast = replace(LikenessSearch.for_effort("fast"), multiples=(2,))

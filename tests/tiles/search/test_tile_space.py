@@ -90,7 +90,7 @@ def test_nearest_is_the_projection_by_the_matrices(name: str, seed: int, turn: f
 
 
 @pytest.mark.parametrize("name", CLASSES)
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(seed=seeds, turn=angles)
 def test_every_point_of_the_space_is_a_tile(name: str, seed: int, turn: float) -> None:
     own = space(name, 4)
@@ -145,7 +145,7 @@ def test_in_order_undoes_the_placements(seed: int) -> None:
 
 
 @pytest.mark.parametrize("name", TURNING)
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(seed=seeds, turn=angles)
 def test_best_turns_go_with_the_outline(name: str, seed: int, turn: float) -> None:
     own = space(name)

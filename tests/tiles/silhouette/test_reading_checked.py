@@ -61,7 +61,7 @@ def test_smoothing_does_the_same_to_pictures_drawings_and_polygons(tmp_path: Pat
     assert abs(smooth.area / rough.area - 1) < 0.05
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(st.floats(0.005, 0.1), st.floats(0, 8))
 def test_smoothed_outlines_are_simple_and_smooth_to_their_width(
     share: float, ripple: float

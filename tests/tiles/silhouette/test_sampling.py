@@ -35,7 +35,7 @@ def spacing(ring: Array, count: int) -> float:
 
 
 @pytest.mark.parametrize("name", THICK)
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(phase=phases)
 def test_coarse_and_fine_points_go_together(name: str, phase: float) -> None:
     ring = RINGS[name]
@@ -52,7 +52,7 @@ def test_coarse_and_fine_points_go_together(name: str, phase: float) -> None:
 
 
 @pytest.mark.parametrize("name", THICK)
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(phase=phases)
 def test_corners_stay_where_they_are(name: str, phase: float) -> None:
     ring = RINGS[name]

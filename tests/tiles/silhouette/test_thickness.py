@@ -22,7 +22,7 @@ def test_a_disc_is_as_thick_everywhere() -> None:
     assert found == pytest.approx(np.pi**-0.5, rel=0.01)
 
 
-@settings(max_examples=12)
+@settings(max_examples=6)
 @given(st.floats(0.1, 0.5), st.floats(-3, 3))
 def test_a_bar_has_half_its_width(width: float, turn: float) -> None:
     ring = bar(1 / width, width)

@@ -40,7 +40,7 @@ def shuffled(mesh: Mesh, seed: int, share: float) -> Array:
 
 
 @pytest.mark.parametrize("name", MESHES)
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(seed=seeds, share=st.floats(0.05, 1.0))
 def test_any_placing_of_the_inner_points_is_untangled(name: str, seed: int, share: float) -> None:
     mesh = MESHES[name]

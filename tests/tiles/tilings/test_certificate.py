@@ -86,7 +86,7 @@ def test_clockwise_and_y_down(kind: IsohedralClass, make_tile: Any) -> None:
     assert certify(tile.transformed(flip, np.array([3.0, 40.0]))).valid
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(
     exponent=st.floats(-3, 5),
     angle=st.floats(-3.2, 3.2),

@@ -67,7 +67,7 @@ def test_foreign_isometry() -> None:
         colouring(Tile(kind.template(), kind.group())).colour(translation((0.2, 0.0)))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.integers(1, 12), st.integers(0, 2**32 - 1))
 def test_graph_colouring_is_proper(size: int, seed: int) -> None:
     pairs = np.triu(np.random.default_rng(seed).random((size, size)) < 0.4, 1)

@@ -23,7 +23,7 @@ shifts = st.tuples(st.floats(-5, 5), st.floats(-5, 5))
 sizes = st.tuples(st.floats(0.05, 4), st.floats(0.05, 4))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(tiles, shifts, sizes)
 def test_those_that_meet_a_window_are_its_patch(tile, shift, size) -> None:
     window = window_of(tile, shift, size)
@@ -33,7 +33,7 @@ def test_those_that_meet_a_window_are_its_patch(tile, shift, size) -> None:
     assert len(ours) == len(found)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(tiles, shifts, sizes)
 def test_those_inside_are_those_of_the_patch_that_are_whole(tile, shift, size) -> None:
     window = window_of(tile, shift, size)

@@ -69,7 +69,7 @@ def test_rows_moved_by_a_thousandth_of_a_brick() -> None:
     assert colouring(tile).count == 3
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(
     st.floats(0.3, 4.0),
     st.floats(-6.0, -0.5),

@@ -13,7 +13,7 @@ from exported import tiles
 from orbiflow.tiles import copies_meeting, edges, skeleton
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(tiles, st.integers(0, 2**32 - 1))
 def test_every_edge_once(tile, seed: int) -> None:
     half = 4 * tile.radius
@@ -41,7 +41,7 @@ def test_every_edge_once(tile, seed: int) -> None:
     assert np.isclose(total + on_others, shapely.length(rings).sum())
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(tiles)
 def test_ends_with_one_number_are_one_point(tile) -> None:
     half = 3 * tile.radius

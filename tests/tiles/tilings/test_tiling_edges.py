@@ -24,7 +24,7 @@ from orbiflow.tiles.page.outlines import outline
 from some_tilings import NAMED, SQUARE, dirichlet_tilings, mirror_tiles, tilings
 
 
-@settings(max_examples=24, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(tilings)
 def test_an_edge_is_its_partners_image(tiling: Tiling) -> None:
     own = edges(tiling)
@@ -48,7 +48,7 @@ def test_an_edge_is_its_partners_image(tiling: Tiling) -> None:
             np.testing.assert_allclose(pair.isometry(points), points, atol=1e-9 * size)
 
 
-@settings(max_examples=24, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(tilings)
 def test_one_edge_of_each_class_says_them_all(tiling: Tiling) -> None:
     own = edges(tiling)
@@ -67,7 +67,7 @@ def test_one_edge_of_each_class_says_them_all(tiling: Tiling) -> None:
         assert len(kind.folds) in (0, 1, 3)
 
 
-@settings(max_examples=16, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(tilings, st.integers(0, 2**32 - 1))
 def test_the_skeleton_has_every_edge_once(tiling: Tiling, seed: int) -> None:
     half = 3 * tiling.radius
@@ -118,7 +118,7 @@ def test_a_whole_patch_has_each_inner_vertex_once() -> None:
     assert len(set(found.ends.ravel().tolist())) == 9
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(st.one_of(mirror_tiles(), dirichlet_tilings(most=1)))
 def test_outlines_of_symmetric_tiles_tile(tiling: Tiling) -> None:
     """Curves for cutters, made of one fit an edge class, flattened: certified as polygons are."""
@@ -164,7 +164,7 @@ def test_vertices_that_break_the_symmetry_are_given_to_all() -> None:
     assert len(edges(whole)) == 4
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(tilings)
 def test_what_is_edge_to_edge_stays_so(tiling: Tiling) -> None:
     for before, after in zip(tiling.prototiles, edge_to_edge(tiling).prototiles, strict=True):

@@ -61,7 +61,7 @@ def test_named_tilings_and_their_stabilisers(name: str) -> None:
     assert tuple(own.order for own in tiling.stabilisers) == orders
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(tilings)
 def test_certified(tiling: Tiling) -> None:
     certificate = certify(tiling)
@@ -72,7 +72,7 @@ def test_certified(tiling: Tiling) -> None:
     assert certificate.uncovered < 1e-11
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(tilings, seeds)
 def test_a_vertex_moved_by_a_millionth_is_refused(tiling: Tiling, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -93,7 +93,7 @@ def test_a_vertex_moved_by_a_millionth_is_refused(tiling: Tiling, seed: int) -> 
     assert max(found.area_error, found.edge_mismatch, found.total_overlap, found.uncovered) > 2e-8
 
 
-@settings(max_examples=16, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(tilings, st.sampled_from([0.97, 1.02]))
 def test_a_prototile_of_another_size_is_refused(tiling: Tiling, scale: float) -> None:
     first, *others = tiling.prototiles
@@ -105,7 +105,7 @@ def test_a_prototile_of_another_size_is_refused(tiling: Tiling, scale: float) ->
     assert gap if scale < 1 else overlap
 
 
-@settings(max_examples=16, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(tilings)
 def test_a_patch_covers_its_window_once(tiling: Tiling) -> None:
     """By shapely alone: areas of the pieces in a window add up to its own, as that of their union."""
@@ -131,7 +131,7 @@ def test_a_patch_covers_its_window_once(tiling: Tiling) -> None:
     assert len(inside) == sum(bool(box.contains(shape)) for shape in shapes)
 
 
-@settings(max_examples=16, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(tilings)
 def test_neighbours_and_colours_are_those_that_shapely_measures(tiling: Tiling) -> None:
     size = np.sqrt(tiling.tile_area)
@@ -154,7 +154,7 @@ def _is(element: Placed, prototile: int) -> bool:
     return element.prototile == prototile and element.is_close(identity(2), 1e-6)
 
 
-@settings(max_examples=24, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(st.data())
 def test_dirichlet_cells_have_the_stabiliser_of_their_point(data: st.DataObject) -> None:
     group = data.draw(wallpaper_groups())
@@ -168,7 +168,7 @@ def test_dirichlet_cells_have_the_stabiliser_of_their_point(data: st.DataObject)
     assert np.isclose(tile.signed_area * group.order, len(near) * group.cell_volume)
 
 
-@settings(max_examples=24, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(wallpaper_groups(), seeds, st.floats(-12.0, -7.0))
 def test_a_site_beside_a_centre_or_mirror_counts_as_on_it(
     group: CrystallographicGroup, seed: int, power: float
@@ -192,7 +192,7 @@ def test_a_site_beside_a_centre_or_mirror_counts_as_on_it(
 
 
 @pytest.mark.parametrize("name", WALLPAPER_GROUPS)
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=2, deadline=None)
 @given(data=st.data())
 def test_every_group_has_several_prototiles(name: str, data: st.DataObject) -> None:
     tiling = data.draw(dirichlet_tilings(names=(name,)))
@@ -203,7 +203,7 @@ def test_every_group_has_several_prototiles(name: str, data: st.DataObject) -> N
     assert np.isclose(total, tiling.group.cell_volume, rtol=1e-12)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(mirror_tiles())
 def test_mirror_tiles_have_their_mirror(tiling: Tiling) -> None:
     (own,) = tiling.stabilisers
