@@ -15,7 +15,7 @@ HOME = Path(__file__).parents[1] / "src" / "orbiflow"
 
 TILES = ["geometry", "tilings", "silhouette", "likeness", "tile", "result_file"]
 TILES += ["search", "flowing", "page", "write", "pictures", "motifs", "make", "solids"]
-TILES += ["motion", "pages"]
+TILES += ["motion", "run_folder"]
 DENSITY = ["data", "spaces", "models", "inference", "fitting"]
 DENSITY += [
     "estimator",

@@ -83,8 +83,8 @@ from .tiles.flowing.tile_model import trainable as trainable
 from .tiles.make.art import artwork as artwork
 from .tiles.make.art import render_artwork as render_artwork
 from .tiles.make.art_settings import ArtSettings as ArtSettings
+from .tiles.make.export_settings import ExportSettings as ExportSettings
 from .tiles.make.exporting import scenes as scenes
-from .tiles.make.settings import ExportSettings as ExportSettings
 from .tiles.motifs.drawings import read_over as read_over
 from .tiles.motifs.source import with_map as with_map
 from .tiles.motion.settings import AnimationSettings as AnimationSettings
@@ -93,13 +93,13 @@ from .tiles.operations import art as art
 from .tiles.operations import export as export
 from .tiles.operations import solid as solid
 from .tiles.page.scene import Scene as Scene
-from .tiles.pages.run_folder import write_run as write_run
 from .tiles.pictures.overlays import bending_picture as bending_picture
 from .tiles.pictures.overlays import overlay_picture as overlay_picture
 from .tiles.pictures.tilings import tile_picture as tile_picture
 from .tiles.pictures.tilings import tiling_picture as tiling_picture
 from .tiles.pictures.tilings import tilings_png as tilings_png
 from .tiles.result_file import read_result as read_result
+from .tiles.run_folder.writing import write_run as write_run
 from .tiles.search.escherize_settings import EscherizeSettings as EscherizeSettings
 from .tiles.search.escherizing import SearchResult as SearchResult
 from .tiles.search.escherizing import escherize as escherize

@@ -33,8 +33,8 @@ from orbiflow.tiles import (
 )
 from orbiflow.tiles.flowing import overlap_search
 from orbiflow.tiles.flowing.tile_model import extract_tile
-from orbiflow.tiles.pages import run_folder
-from orbiflow.tiles.pages.run_folder import FIGURE_FILES
+from orbiflow.tiles.run_folder import writing
+from orbiflow.tiles.run_folder.writing import FIGURE_FILES
 from orbiflow.tiles.search import candidates
 from orbiflow.tiles.search.finished_tiles import best_tiles
 
@@ -199,7 +199,7 @@ def test_no_tile_is_status_one(tmp_path: Path, orbiflow, monkeypatch: pytest.Mon
     path = tmp_path / "boot.json"
     path.write_text(json.dumps(BOOT))
     monkeypatch.setattr(overlap_search, "fit_occupancy", lambda *_, **__: crossed())
-    for room in (silhouette, run_folder):
+    for room in (silhouette, writing):
         monkeypatch.setattr(room, "doubts", lambda _: ["the silhouette is odd"])
     options = ["--classes", "IH21", "--workers", 1, *FEW]
     for _ in range(2):  # the second time there is a run without a tile to replace

@@ -23,7 +23,7 @@ from orbiflow.runtime import (
     Written,
     find,
 )
-from orbiflow.tiles.pages.run_folder import TILE_FILES
+from orbiflow.tiles.run_folder.writing import TILE_FILES
 from runtime.searches import BOOT, ENDLESS, boot_call, check_order, run
 
 SHEETS = ("index.html", "overview.png", "read.png", "result.json")

@@ -68,7 +68,7 @@ def _tiling(summary: Summary) -> str | None:
 
 
 def _written(folder: Path) -> set[str]:
-    from orbiflow.tiles.pages import written_files
+    from orbiflow.tiles.run_folder import written_files
 
     return written_files(folder)
 
@@ -80,7 +80,7 @@ TILES = Kind(
     most_bytes=64 * 2**20,
     reads="image",
     writes="out",
-    modules=("orbiflow.tiles.pages.run_folder", "orbiflow.tiles.search.escherizing"),
+    modules=("orbiflow.tiles.run_folder.writing", "orbiflow.tiles.search.escherizing"),
     columns=(
         Column("class", "class"),
         Column("word", "likeness"),

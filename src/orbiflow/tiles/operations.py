@@ -75,19 +75,19 @@ def escherize(
         called: What the results call the silhouette. Default: its path.
         shown_out: What the page's commands call the folder. Default: its path.
     """
-    from orbiflow.tiles import pages, search
+    from orbiflow.tiles import run_folder, search
 
     begin = time.perf_counter()
     target = reading.read(image, called)
-    pages.result_folder(out)
+    run_folder.result_folder(out)
     check_output_folder(out, image, settings.emphasis, *map(Path, settings.pin or ()))
-    picture = pages.read_png(target, image)
-    show = functools.partial(pages.show_reading, target, picture, out, on_event)
+    picture = run_folder.read_png(target, image)
+    show = functools.partial(run_folder.show_reading, target, picture, out, on_event)
     settings = settings.replace(workers=settings.workers or os.cpu_count() or 1)
     result = search.escherize(target, settings, on_checked=show, on_event=on_event, cancel=cancel)
     for text in _remarks(result):
         on_event(Note(text))
-    written = pages.write_run(
+    written = run_folder.write_run(
         result, out, picture, figures=figures, shown_out=shown_out, on_event=on_event
     )
     tiles = result.tiles if written else ()

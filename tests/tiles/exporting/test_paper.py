@@ -10,7 +10,7 @@ from artworks import EYE, squirrel
 from exported import Line, polygons, svg_lines, tile_of
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.tiles import EscherTile, ExportSettings, Scene, as_tile, scenes, sheet_content
-from orbiflow.tiles.make.layouts import layout
+from orbiflow.tiles.make.layout import layout
 from orbiflow.tiles.make.templates import numbered_edges
 from orbiflow.tiles.page.placing import mark_corners
 

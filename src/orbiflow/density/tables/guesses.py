@@ -22,6 +22,7 @@ from orbiflow.density.data import (
     is_identifier,
     is_other_quantity,
     pairs_of,
+    unit_named,
     words_of,
 )
 from orbiflow.density.tables.table import Table
@@ -66,16 +67,18 @@ def seen_columns(table: Table, most: int) -> tuple[list[Column], Guess]:
 
 
 def seen_column(name: str, values: Array) -> Column:
-    """Return what a column (N,) seems to be.
+    """Return what a column (N,) seems to be; a unit in its name goes before its values.
 
     >>> seen_column("psi", np.array([-170.0, 12.5, 90.0])).seems
+    'degrees'
+    >>> seen_column("phi_deg", np.array([-5.0, 2.5, 6.0])).seems
     'degrees'
     >>> seen_column("distance", np.array([0.1, 0.2, 0.15])).seems
     'number'
     """
     known = values[~np.isnan(values)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
-    words = set(words_of(name))
+    words, unit = set(words_of(name)), unit_named(name)
     most, named = max(-low, high), is_angle_named(name)
     seems: Seems = "number"
     if len(known) and is_identifier(name, known):
@@ -86,6 +89,8 @@ def seen_column(name: str, values: Array) -> Column:
         seems = "latitude"
     elif words & LONGITUDES and most <= 360 * (1 + TURN_TOLERANCE):
         seems = "longitude"
+    elif len(known) and unit in ("degrees", "radians"):
+        seems = "degrees" if unit == "degrees" else "radians"
     elif most <= 2 * math.pi * (1 + TURN_TOLERANCE) and (named or high - low > math.pi):
         seems = "radians"
     elif 2 * math.pi < most <= 360 * (1 + TURN_TOLERANCE) and (named or high - low > 90):

@@ -1,4 +1,4 @@
-"""A page in millimetres before it is a file, and the files that it becomes."""
+"""What is made of a page of copies: kinds of cut, exports in real size, artwork, cells that repeat."""
 
 from orbiflow.extras import door
 

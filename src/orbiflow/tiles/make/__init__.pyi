@@ -4,14 +4,14 @@ from .art import art_scene as art_scene
 from .art import artwork as artwork
 from .art import render_artwork as render_artwork
 from .art_settings import ArtSettings as ArtSettings
+from .cuts import MAKERS as MAKERS
 from .drawings import dark_parts as dark_parts
-from .exporting import MAKERS as MAKERS
+from .export_settings import ExportSettings as ExportSettings
 from .exporting import Exported as Exported
 from .exporting import laid_out as laid_out
 from .exporting import scenes as scenes
 from .exporting import sheet_content as sheet_content
 from .exporting import sheet_names as sheet_names
-from .layouts import Layout as Layout
+from .layout import Layout as Layout
 from .offsets import cut_ring as cut_ring
 from .offsets import place_on as place_on
-from .settings import ExportSettings as ExportSettings

@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.make.layouts import BLACK, BLUE, Layout, line_style
+from orbiflow.tiles.make.layout import BLACK, BLUE, Layout, line_style
 from orbiflow.tiles.motifs import Over, carried_raster, drawn_motif
 from orbiflow.tiles.page import (
     USUAL_WIDTH,

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.make.layouts import Layout, line_style
+from orbiflow.tiles.make.layout import Layout, line_style
 from orbiflow.tiles.make.skeletons import joined, shared_edges
 from orbiflow.tiles.page import Box, Curve, Layer, Scene, fitted, inset, rectangle
 from orbiflow.tiles.silhouette import DISC_OVERREACH, opened

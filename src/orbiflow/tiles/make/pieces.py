@@ -12,7 +12,7 @@ import shapely
 from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.make.layouts import BLUE, Layout, line_style
+from orbiflow.tiles.make.layout import BLUE, Layout, line_style
 from orbiflow.tiles.make.nesting import dense_arrangements, on_sheet
 from orbiflow.tiles.make.offsets import cut_ring
 from orbiflow.tiles.page import (

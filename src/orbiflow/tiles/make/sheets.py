@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.make.layouts import BLACK, BLUE, STRIP
+from orbiflow.tiles.make.layout import BLACK, BLUE, STRIP
 from orbiflow.tiles.page import (
     Box,
     Curve,

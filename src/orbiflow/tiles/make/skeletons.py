@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.make.layouts import Layout, line_style
+from orbiflow.tiles.make.layout import Layout, line_style
 from orbiflow.tiles.page import Curve, Layer, Scene, clipped, rectangle
 from orbiflow.tiles.tilings import skeleton
 

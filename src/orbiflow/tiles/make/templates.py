@@ -10,7 +10,7 @@ import shapely
 from shapely.ops import substring
 
 from orbiflow.arrays import Array
-from orbiflow.tiles.make.layouts import Layout, line_style
+from orbiflow.tiles.make.layout import Layout, line_style
 from orbiflow.tiles.page import Curve, Layer, PlacedTile, Scene, Style
 
 FAINT = "#e4e4e4"

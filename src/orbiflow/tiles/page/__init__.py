@@ -1,4 +1,4 @@
-"""A page in millimetres before it is a file, and the files that it becomes."""
+"""Pages of copies in millimetres: which tiles, where, in which colours; and scenes of them."""
 
 from orbiflow.extras import door
 

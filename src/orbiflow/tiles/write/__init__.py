@@ -1,4 +1,4 @@
-"""A page in millimetres before it is a file, and the files that it becomes."""
+"""The formats of files that a scene becomes."""
 
 from orbiflow.extras import door
 

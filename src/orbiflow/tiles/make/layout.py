@@ -13,8 +13,8 @@ from orbiflow.arrays import Array
 from orbiflow.drawing import palette
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import rotation_matrix
+from orbiflow.tiles.make.export_settings import ExportSettings
 from orbiflow.tiles.make.offsets import offset_ring
-from orbiflow.tiles.make.settings import ExportSettings
 from orbiflow.tiles.page import (
     USUAL_WIDTH,
     Box,

@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw
 from orbiflow.errors import OutputError
 from orbiflow.runtime import Event, Note
 from orbiflow.tiles import operations
-from orbiflow.tiles.pages import read_png, result_folder, show_reading
+from orbiflow.tiles.run_folder import read_png, result_folder, show_reading
 from orbiflow.tiles.silhouette import Target
 
 MAGENTA, ORANGE, BLUE = (230, 0, 126), (255, 140, 0), (0, 120, 255)

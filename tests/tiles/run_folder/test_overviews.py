@@ -30,7 +30,7 @@ from orbiflow.tiles import (
     write_gallery,
     written_files,
 )
-from orbiflow.tiles.pages.page import TRIED
+from orbiflow.tiles.run_folder.html_page import TRIED
 from shell_lines import call_by_orbiflow
 
 BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]

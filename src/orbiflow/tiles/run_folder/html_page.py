@@ -16,8 +16,8 @@ import shapely
 from orbiflow.arrays import Array
 from orbiflow.drawing import PALETTES, rendered, window_of
 from orbiflow.tiles.page import Page
-from orbiflow.tiles.pages.overview import FILLED, LEFT_OUT, OUTLINE
 from orbiflow.tiles.pictures import RAMP, STRIP
+from orbiflow.tiles.run_folder.overview import FILLED, LEFT_OUT, OUTLINE
 from orbiflow.tiles.search import ClassFailure, rounded_for, why_poor
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tile import EscherTile
@@ -55,7 +55,7 @@ def index_page(
         for tile, folder, more, own in zip(results, folders, extra, known, strict=True)
     ]
     return rendered(
-        "orbiflow.tiles.pages",
+        "orbiflow.tiles.run_folder",
         "index_page.html",
         title=f"Tiles that look like {name}",
         name=name,

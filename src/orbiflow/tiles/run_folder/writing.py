@@ -21,10 +21,10 @@ from orbiflow.runtime import (
     write_atomic,
     write_json,
 )
-from orbiflow.tiles.pages.overview import is_read_png, overview_png
-from orbiflow.tiles.pages.page import TILE_FILES, index_page
 from orbiflow.tiles.pictures import ScenePicture, comparison, tile_picture, tiling_picture
 from orbiflow.tiles.result_file import RESULT, folder_names
+from orbiflow.tiles.run_folder.html_page import TILE_FILES, index_page
+from orbiflow.tiles.run_folder.overview import is_read_png, overview_png
 from orbiflow.tiles.search import SearchResult, report
 from orbiflow.tiles.silhouette import Target, doubts
 from orbiflow.tiles.tile import EscherTile, TileMap
