@@ -28,7 +28,7 @@ def test_a_folder_twice(tmp_path: Path, orbiflow) -> None:
     first = orbiflow(*command)
     assert first.status == 0, first.err
     assert "1 silhouettes for one process" in first.out
-    assert "boot: IH4, poor, stars 1, score" in first.out
+    assert "boot: IH4, excellent, stars 5, score" in first.out
     assert f"look at {tmp_path / 'out' / 'index.html'}" in first.out
     second = orbiflow(*command)
     assert second.status == 0
