@@ -16,7 +16,6 @@ from orbiflow.batch import parcels as parcels_module
 from orbiflow.batch.parcels import carry_out
 from orbiflow.runtime import Call, Cancel, Event, Failed, Finished, Sink, find
 from runtime.searches import BOOT, run
-from small_searches import small_searches
 
 on_cluster, locally = dask_cluster._serve, executors._serve
 
@@ -113,12 +112,16 @@ def without_seconds(files: dict[str, bytes]) -> dict[str, Any]:
 
 def small(header: str, data: bytes) -> tuple[str, dict[str, bytes]]:
     """Carry out a parcel on a cluster by a small search."""
+    from small_searches import small_searches  # not in processes that only die
+
     with small_searches():
         return on_cluster(header, data)
 
 
 def small_locally(*order: Any) -> Any:
     """Carry out a parcel in a local process by a small search."""
+    from small_searches import small_searches
+
     with small_searches():
         return locally(*order)
 

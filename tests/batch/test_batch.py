@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from batch.small_batches import QUICK, Here, rows, run_call, small_locally, write_boot
-from density.quick_fits import quick_fits
 from orbiflow.batch import dask_cluster, executors, work
 from orbiflow.batch import folder as folder_module
 from orbiflow.errors import OrbiflowError, OutputError, SettingError
@@ -223,8 +222,7 @@ def test_what_belongs_to_one_silhouette_is_no_setting_of_a_batch(name: str) -> N
 
 
 @pytest.mark.usefixtures("here")
-def test_a_batch_fits_as_fit_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    quick_fits(monkeypatch)
+def test_a_batch_fits_as_fit_does(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     rows_of = np.column_stack(
         [rng.vonmises(0, 3, (40, 2)), rng.uniform(1, 2, 40), np.arange(40) // 4]

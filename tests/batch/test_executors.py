@@ -100,7 +100,7 @@ def test_a_cluster_gives_the_same_though_a_worker_is_killed(
     with executor:
         assert executor.place.startswith("2 workers of tcp://127.0.0.1:")
         found = {}
-        for answer in executor.answers(boot_parcels(3), [].append, Cancel()):
+        for answer in executor.answers(boot_parcels(2), [].append, Cancel()):
             found[answer.key] = answer
             if not killed:
                 workers = list(cluster.scheduler.workers.values())
@@ -111,7 +111,7 @@ def test_a_cluster_gives_the_same_though_a_worker_is_killed(
                     if nanny.worker_address == at_work[0].address
                 ]
                 os.kill(killed[0].pid, signal.SIGKILL)
-    assert sorted(found) == [f"boot {k}" for k in range(3)]
+    assert sorted(found) == ["boot 0", "boot 1"]
     for answer in found.values():
         assert without_seconds(dict(answer.files)) == expected
 

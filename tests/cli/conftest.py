@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import pytest
 
+from density.quick_fits import quick_fits_fixture, whole_fits_fixture  # noqa: F401
+
 
 @dataclass(frozen=True)
 class Outcome:

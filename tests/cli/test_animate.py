@@ -7,16 +7,15 @@ from pathlib import Path
 import pytest
 
 from orbiflow.runtime import find
-
-BOOT = "[[60, 20], [210, 20], [230, 80], [170, 95], [160, 190], [100, 145], [45, 80]]"
+from runtime.searches import boot_call
+from small_searches import small_searches
 
 
 @pytest.fixture(scope="module", name="folder")
 def folder_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
-    (folder / "boot.json").write_text(BOOT)
-    given = {"classes": ["IH4"], "effort": "fast", "workers": 1}
-    find("escherize").call({"image": folder / "boot.json", "out": folder / "out", **given}).run()
+    with small_searches():
+        boot_call(folder, "IH4").run()
     return folder / "out"
 
 

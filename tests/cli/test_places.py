@@ -14,6 +14,7 @@ import pytest
 
 from cli.conftest import Run, call_main
 from runtime.searches import boot_call
+from small_searches import small_searches
 
 QUICK = ("--components", "mixture", "--space", "torus", "--unit", "degrees")
 KEPT = "would replace what is read: choose another --out"
@@ -31,7 +32,8 @@ def made_fixture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     marginal = ("density", "marginal", "-m", folder / "m", "--columns", "psi")
     for words in (fit, (*marginal, "--out", folder / "psi")):
         assert call_main(lambda: ("", ""), *words).status == 0
-    boot_call(folder, "IH4").run()
+    with small_searches():
+        boot_call(folder, "IH4").run()
     (folder / "out").rename(folder / "r")
     return folder
 

@@ -152,6 +152,7 @@ def test_binned_angles_get_a_hint(orbiflow: Callable[..., Any]) -> None:
     assert "--counts count" in done.out
 
 
+@pytest.mark.usefixtures("whole_fits")
 def test_towns_are_told_apart_and_close_rows_are_not_called_the_same(
     orbiflow: Callable[..., Any], tmp_path: Path
 ) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 
 FITTING = "orbiflow.density.fitting"
@@ -13,3 +15,19 @@ def quick_fits(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(f"{FITTING}.kernels.SCALES", (0.4, 1.6))
     patch.setattr(f"{FITTING}.families.SIZES", (1, 4, 16))
     patch.setattr(f"{FITTING}.folds.USED", ())
+
+
+@pytest.fixture(name="_quick_fits", scope="module", autouse=True)
+def quick_fits_fixture() -> Iterator[pytest.MonkeyPatch]:
+    """Fits of all tests in the folder try less, but for those that ask for `whole_fits`."""
+    with pytest.MonkeyPatch.context() as patch:
+        quick_fits(patch)
+        yield patch
+
+
+@pytest.fixture(name="whole_fits")
+def whole_fits_fixture(_quick_fits: pytest.MonkeyPatch) -> Iterator[None]:
+    """Fits within the test try all that they do for users."""
+    _quick_fits.undo()
+    yield
+    quick_fits(_quick_fits)

@@ -28,30 +28,10 @@ from orbiflow.runtime import (
 )
 
 BOOT = [(60, 20), (210, 20), (230, 80), (170, 95), (160, 190), (100, 145), (45, 80)]
-ENDLESS = 10**6  # steps of a fit: hours
 
 
 def boot_call(folder: Path, *classes: str, **more: Any) -> Call:
-    """A search of less than a second a class."""
-    path = folder / "boot.json"
-    path.write_text(json.dumps(BOOT))
-    return find("escherize").call(
-        {
-            "image": path,
-            "out": folder / "out",
-            "classes": classes,
-            "method": "occupancy",
-            "turns": 1,
-            "iterations": 4,
-            "max_frequency": 2,
-            "workers": 1,
-            **more,
-        }
-    )
-
-
-def likeness_call(folder: Path, *classes: str, **more: Any) -> Call:
-    """A search for likeness, which imports no torch: the cheapest in a new process."""
+    """Search for likeness, which imports no torch; small with `small_searches`."""
     path = folder / "boot.json"
     path.write_text(json.dumps(BOOT))
     given = {"image": path, "out": folder / "out", "classes": classes, "effort": "fast"}

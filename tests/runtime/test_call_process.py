@@ -20,7 +20,7 @@ from orbiflow.runtime import (
     TileFound,
     find,
 )
-from runtime.searches import check_order, likeness_call
+from runtime.searches import boot_call, check_order
 
 SMALL, ENDLESS = "runtime.small_process", "runtime.endless_process"
 
@@ -32,7 +32,7 @@ def small_fixture(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_search_in_a_process(tmp_path: Path) -> None:
-    call = likeness_call(tmp_path, "IH3", "IH7", workers=2)
+    call = boot_call(tmp_path, "IH3", "IH7", workers=2)
     with CallProcess(call, modules=[SMALL]) as process:
         events = list(process.events())
         assert process.wait() == 0
@@ -62,7 +62,7 @@ def test_two_calls_are_started_from_threads() -> None:
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_cancelling_keeps_the_order_and_ends_the_process(workers: int, tmp_path: Path) -> None:
-    call = likeness_call(tmp_path, "IH4", "IH6", workers=workers)
+    call = boot_call(tmp_path, "IH4", "IH6", workers=workers)
     events = []
     with CallProcess(call, modules=[ENDLESS]) as process:
         for event in process.events():
@@ -81,7 +81,7 @@ def test_cancelling_keeps_the_order_and_ends_the_process(workers: int, tmp_path:
 
 
 def test_a_mistake_is_the_last_event(tmp_path: Path) -> None:
-    call = likeness_call(tmp_path, "IH94")
+    call = boot_call(tmp_path, "IH94")
     with CallProcess(call) as process:
         events = list(process.events())
         assert process.wait() == 1
@@ -94,7 +94,7 @@ def test_a_mistake_is_the_last_event(tmp_path: Path) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_a_process_that_dies_is_the_last_event(tmp_path: Path) -> None:
     events = []
-    with CallProcess(likeness_call(tmp_path, "IH4"), modules=[ENDLESS]) as process:
+    with CallProcess(boot_call(tmp_path, "IH4"), modules=[ENDLESS]) as process:
         for event in process.events():
             events.append(event)
             if isinstance(event, Progress):

@@ -24,8 +24,9 @@ from orbiflow.runtime import (
     find,
 )
 from orbiflow.tiles.run_folder.writing import TILE_FILES
-from runtime.searches import BOOT, ENDLESS, boot_call, check_order, run
+from runtime.searches import boot_call, check_order, run
 
+pytestmark = pytest.mark.usefixtures("small_searches")
 SHEETS = ("index.html", "overview.png", "read.png", "result.json")
 
 
@@ -74,7 +75,7 @@ def test_a_folder_of_the_run_is_refused_before_any_work(tmp_path: Path) -> None:
     (tmp_path / "out" / "notes.txt").write_text("mine")
     events: list[Event] = []
     with pytest.raises(OrbiflowError, match=r"holds notes\.txt"):
-        run(boot_call(tmp_path, "IH4", iterations=ENDLESS), events.append)
+        run(boot_call(tmp_path, "IH4"), events.append)
     assert [type(event) for event in events[1:]] == [Failed]
     assert (tmp_path / "out" / "notes.txt").read_text() == "mine"
 
@@ -90,7 +91,7 @@ def test_a_search_cancelled_with_nothing_found_leaves_the_earlier_run(tmp_path: 
         if isinstance(event, Progress):
             cancel.cancel()
 
-    finished = run(boot_call(tmp_path, "IH6", iterations=ENDLESS), sink, cancel)
+    finished = run(boot_call(tmp_path, "IH6"), sink, cancel)
     assert finished.state == "cancelled"
     assert finished.summary["written"] is False
     check_order(events, "IH6")
@@ -106,21 +107,16 @@ def test_a_search_cancelled_on_the_way_keeps_what_was_found(tmp_path: Path) -> N
         if isinstance(event, TileFound):
             cancel.cancel()
 
-    finished = run(boot_call(tmp_path, "IH4", "IH6"), sink, cancel)
+    finished = run(boot_call(tmp_path, "IH6", "IH4"), sink, cancel)
     assert finished.state == "cancelled"
-    check_order(events, "IH4", "IH6")
+    check_order(events, "IH6", "IH4")
     document = json.loads((tmp_path / "out" / "result.json").read_text())
-    assert [tile["class"] for tile in document["tiles"]] == ["IH4"]
-    assert document["failed"] == [{"class": "IH6", "reason": "interrupted"}]
-    assert (tmp_path / "out" / "IH4" / "tile.svg").is_file()
+    assert [tile["class"] for tile in document["tiles"]] == ["IH6"]
+    assert document["failed"] == [{"class": "IH4", "reason": "interrupted"}]
+    assert (tmp_path / "out" / "IH6" / "tile.svg").is_file()
 
 
-@pytest.mark.usefixtures("small_searches")
 def test_a_first_look_alone_is_kept_unless_there_is_more(tmp_path: Path) -> None:
-    path = tmp_path / "boot.json"
-    path.write_text(json.dumps(BOOT))
-    given = {"image": path, "out": tmp_path / "out", "effort": "fast", "workers": 1}
-
     def cancelled() -> Finished:
         cancel, events = Cancel(), []
 
@@ -129,8 +125,7 @@ def test_a_first_look_alone_is_kept_unless_there_is_more(tmp_path: Path) -> None
             if isinstance(event, Preview):
                 cancel.cancel()
 
-        call = find("escherize").call({**given, "classes": ["IH4", "IH6"]})
-        finished = run(call, sink, cancel)
+        finished = run(boot_call(tmp_path, "IH4", "IH6"), sink, cancel)
         check_order(events, "IH4", "IH6")
         assert finished.state == "cancelled"
         texts = [event.text for event in events if isinstance(event, Note)]
@@ -144,7 +139,7 @@ def test_a_first_look_alone_is_kept_unless_there_is_more(tmp_path: Path) -> None
     document = json.loads((out / "result.json").read_text())
     assert [entry["class"] for entry in document["tiles"] + document["failed"]] == ["IH6", "IH4"]
     assert {p.name for p in out.iterdir()} == {"IH6", *SHEETS}
-    assert run(find("escherize").call({**given, "classes": ["IH4"]})).state == "done"
+    assert run(boot_call(tmp_path, "IH4")).state == "done"
     finished = cancelled()
     assert not finished.summary["written"]
     assert finished.summary["tiles"] == []
