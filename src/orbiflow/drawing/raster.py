@@ -120,7 +120,13 @@ class Raster:
                 self.shapes.append(Filled(outer, tuple(holes), self._number(colour)))
 
     def line(
-        self, points: Array, colour: str, width_px: float, *, closed: bool = False, pixels=False
+        self,
+        points: Array,
+        colour: str,
+        width_px: float,
+        *,
+        closed: bool = False,
+        pixels: bool = False,
     ) -> None:
         """Draw a line with round ends along points (N, 2) of the plane, or of the picture."""
         path = points if pixels else self.to_pixels(points)

@@ -115,7 +115,9 @@ class VonMisesNetwork(Density, kind="network"):
             own = chains.to("cpu")
             if axes[-1] in given:
                 points[:, axes[-1]] = given[axes[-1]]
-                logs += in_blocks(partial(log_conditional, own), points[:, list(axes)], BLOCK_POINTS)
+                logs += in_blocks(
+                    partial(log_conditional, own), points[:, list(axes)], BLOCK_POINTS
+                )
                 continue
             angle = 2 * math.pi * points[:, list(axes)]
             chosen = [angle.new_zeros(0).long()]
