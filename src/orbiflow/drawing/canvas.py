@@ -1,5 +1,8 @@
 """Pictures of vector fields and the marks of symmetry, on Matplotlib axes without margins."""
 
+# matplotlib types no keyword arguments
+# pyright: reportUnknownMemberType=false
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -124,7 +127,9 @@ def symmetric_seeds(group: CrystallographicGroup, spacing: float, *, tries: int 
     A random orbit is kept if all its points are `spacing` away from those kept before.
     """
     darts = np.random.default_rng(0).random((tries, 2)) @ group.lattice.T
-    shifts = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2) @ group.lattice.T
+    shifts: Array = (
+        np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2) @ group.lattice.T
+    )
     kept = np.empty((0, 2))
     for dart in darts:
         orbit = group.wrap(np.stack([g(dart) for g in group.cosets]))
@@ -252,16 +257,20 @@ def draw_flow(
     along = 0.009 * scale * along / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
     across = 0.4 * along[:, ::-1] * (-1.0, 1.0)
     seeds = lines[:, middle]
-    heads = list(np.stack([seeds + along, seeds + across, seeds - across], axis=1))
-    axes.add_collection(PolyCollection(heads, facecolors="#ffffff", edgecolors="none", zorder=3))
+    heads: Array = np.stack([seeds + along, seeds + across, seeds - across], axis=1)
+    axes.add_collection(
+        PolyCollection(list(heads), facecolors="#ffffff", edgecolors="none", zorder=3)
+    )
 
 
 def _in_window(seeds: Array, group: CrystallographicGroup, window: Window, margin: float) -> Array:
     """Return all translates of the seeds by lattice vectors that lie in the window or near it."""
     low, high = np.array(window[:2]) - margin, np.array(window[2:]) + margin
     corners = np.array([low, high, (low[0], high[1]), (high[0], low[1])]) @ group.inverse_lattice.T
-    ranges = [np.arange(np.floor(c.min()) - 1, np.ceil(c.max()) + 1) for c in corners.T]
-    shifts = np.stack(np.meshgrid(*ranges), axis=-1).reshape(-1, 1, 2) @ group.lattice.T
+    ranges: list[Array] = [
+        np.arange(np.floor(c.min()) - 1, np.ceil(c.max()) + 1) for c in corners.T
+    ]
+    shifts: Array = np.stack(np.meshgrid(*ranges), axis=-1).reshape(-1, 1, 2) @ group.lattice.T
     points = (seeds + shifts).reshape(-1, 2)
     return points[((points >= low) & (points <= high)).all(axis=1)]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Annotated, NamedTuple
 
+from orbiflow.arguments import is_a
 from orbiflow.errors import OrbiflowError
 from orbiflow.kinds import Parsed
 
@@ -95,9 +96,8 @@ def palette(name: str | Palette) -> Palette:
     """
     if isinstance(name, Palette):
         return name
-    given: object = name
-    if not isinstance(given, str):
-        raise OrbiflowError(f"a palette must be a str, got {given!r}; a name or colours")
+    if not is_a(name, str):
+        raise OrbiflowError(f"a palette must be a str, got {name!r}; a name or colours")
     if name in PALETTES:
         return PALETTES[name]
     if "," in name or "=" in name or _HEX.fullmatch(name):

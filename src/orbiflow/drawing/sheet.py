@@ -1,9 +1,12 @@
 """Sheets that figures are made for, a screen or a journal's column, and figures as files."""
 
+# matplotlib types no keyword arguments
+# pyright: reportUnknownMemberType=false
+
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from threading import Lock
@@ -166,12 +169,12 @@ def _metadata(form: FigureFormat, title: str, caption: str) -> dict[str, Any]:
 
 
 @contextmanager
-def _plain_texts() -> Iterator[None]:
+def _plain_texts() -> Generator[None]:
     """Keep texts as texts, with whole fonts in a PDF and no outlines in an SVG, and names the same.
 
     Matplotlib has only global settings for this, so one figure is written at a time.
     """
-    from matplotlib import rc_context
+    from matplotlib import rc_context  # pyright: ignore[reportUnknownVariableType]
 
     fonts: dict[Any, Any] = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "orbiflow"}
     with _LOCK, rc_context(fonts):

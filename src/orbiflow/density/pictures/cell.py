@@ -1,5 +1,8 @@
 """Pictures on the plane of a plane group, whose fundamental domain is outlined."""
 
+# matplotlib types no keyword arguments
+# pyright: reportUnknownMemberType=false
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -64,16 +67,15 @@ class Cell(Square):
         return PIXELS
 
     def pixels(self, count: int) -> Pixels:
-        step = max(self.high - self.low) / count
-        x, y = (
-            low + (high - low) * (np.arange(n) + 0.5) / n
-            for low, high in zip(self.low, self.high, strict=True)
-            for n in [round((high - low) / step)]
-        )
+        sides = self.high - self.low
+        step = float(max(sides)) / count
+        columns, rows = (round(float(side) / step) for side in sides)
+        x: Array = self.low[0] + sides[0] * (np.arange(columns) + 0.5) / columns
+        y: Array = self.low[1] + sides[1] * (np.arange(rows) + 0.5) / rows
         points = self.space.cover(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2))
-        side = square_pixel(self.space, float(step) / self.space.volume**0.5)
+        side = square_pixel(self.space, step / self.space.volume**0.5)
         extent = (self.low[0], self.high[0], self.low[1], self.high[1])
-        size, every = f"1/{count} of the longer side", np.ones((len(y), len(x)), bool)
+        size, every = f"1/{count} of the longer side", np.ones((rows, columns), bool)
         return Pixels(points, every, every.ravel(), None, side, size, extent)
 
     def room(self, sheet: Sheet, label: str, ticks: Sequence[str]) -> frames.Room:

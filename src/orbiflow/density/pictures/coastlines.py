@@ -20,6 +20,7 @@ from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import Space
 from orbiflow.density.tables import read_table
 from orbiflow.errors import InputFileError, SettingError, system_errors
+from orbiflow.runtime import is_list, is_object
 
 MAX_BYTES = 32_000_000
 MAX_POINTS = 1_000_000
@@ -121,13 +122,13 @@ def _geojson(path: Path) -> list[Array]:
 
 def _lines(item: Any) -> Iterator[Array]:
     """Yield the lines (M, 2), M > 1, of a feature, a geometry or a collection of them."""
-    kind = item.get("type") if isinstance(item, dict) else None
+    kind: Any = item.get("type") if is_object(item) else None
     kind = kind if isinstance(kind, str) else None
     if kind == "Topology":
         raise ValueError("it is TopoJSON; make GeoJSON of it, with ogr2ogr -f GeoJSON")
     if kind in _PARTS:
-        inner = item[_PARTS[kind]]
-        for part in inner if isinstance(inner, list) else [inner] * (inner is not None):
+        inner: Any = item[_PARTS[kind]]
+        for part in inner if is_list(inner) else [inner] * (inner is not None):
             yield from _lines(part)
     elif kind in _SHAPES:
         for line in _positions(item["coordinates"]):

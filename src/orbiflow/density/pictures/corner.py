@@ -1,5 +1,8 @@
 """Pictures of data and samples on a torus of any dimension: every pair of angles."""
 
+# matplotlib types no keyword arguments
+# pyright: reportUnknownMemberType=false
+
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any

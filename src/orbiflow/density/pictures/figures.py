@@ -1,8 +1,12 @@
 """Figures of a density, of points beside it, and of its flow: on the canonical square or on a map."""
 
+# matplotlib types no keyword arguments
+# pyright: reportUnknownMemberType=false
+
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -244,7 +248,7 @@ def draw_cells(
 ) -> None:
     """Draw the images of the canonical square in a window, a letter F in each, the square outlined."""
     thin = pen(0.7)
-    for t in np.arange(np.floor(window[0]), np.ceil(window[2]) + 1):
+    for t in range(math.floor(window[0]), math.ceil(window[2]) + 1):
         axes.axvline(t, color="#ffffff", linewidth=thin, alpha=0.7, zorder=4)
         axes.axhline(t, color="#ffffff", linewidth=thin, alpha=0.7, zorder=4)
     square = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])

@@ -1,5 +1,8 @@
 """The window and texts of flat pictures, and their figures: room, panels, captions and colour bars."""
 
+# matplotlib types no keyword arguments
+# pyright: reportUnknownMemberType=false
+
 from __future__ import annotations
 
 import math
@@ -121,7 +124,7 @@ def symbol(name: str) -> str:
     """
     found = re.fullmatch(r"([a-z]+?)_?(\d*)", name.strip().casefold())
     try:
-        letter = unicodedata.lookup(f"GREEK SMALL LETTER_EMS {found[1]}") if found else ""
+        letter = unicodedata.lookup(f"GREEK SMALL LETTER {found[1]}") if found else ""
     except KeyError:
         return name
     return f"{letter}{found[2].translate(SUBSCRIPTS)}" if found else name
@@ -355,9 +358,9 @@ def colour_bar(
     bar.outline.set_visible(False)
     if shade is not None:
         at, texts = zip(*bar_ticks(shade), strict=True)
-        set_ticks = frame.bar.set_xticks if frame.under else frame.bar.set_yticks
-        set_ticks(at, without_overlap(at, texts, frame.side, sheet) if frame.under else texts)
-        set_ticks(minor_places(shade), minor=True)
+        axis = frame.bar.xaxis if frame.under else frame.bar.yaxis
+        axis.set_ticks(at, without_overlap(at, texts, frame.side, sheet) if frame.under else texts)
+        axis.set_ticks(minor_places(shade), minor=True)
     elif frame.under:  # a few even steps
         bar.locator = MaxNLocator(max(2, int(frame.side / (8 * LETTER_EMS * sheet.em))))
         bar.update_ticks()
@@ -371,7 +374,7 @@ def without_overlap(
     >>> without_overlap([0.0, 0.1, 0.9], ["0.00", "0.10", "0.90"], 1.5, Sheet.column())
     ['0.00', '', '0.90']
     """
-    letter, end, kept = DIGIT_EMS * sheet.small / 72, -1.0, []
+    letter, end, kept = DIGIT_EMS * sheet.small / 72, -1.0, list[str]()
     for place, text in zip(at, texts, strict=True):
         half = letter * (len(text) + 1) / 2
         free = place * side - half > end

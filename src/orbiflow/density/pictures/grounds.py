@@ -1,5 +1,8 @@
 """What densities and points are drawn on: pixels and their colours, axes, room, words."""
 
+# matplotlib types no keyword arguments
+# pyright: reportUnknownMemberType=false
+
 from __future__ import annotations
 
 import math
@@ -102,8 +105,8 @@ class Colouring:
 
         logs, (left, right, below, above) = self.logs, self.extent
         rows, columns = logs.shape
-        x = left + (right - left) * (np.arange(columns) + 0.5) / columns
-        y = below + (above - below) * (np.arange(rows) + 0.5) / rows
+        x = left + (right - left) * (np.arange(int(columns)) + 0.5) / columns
+        y = below + (above - below) * (np.arange(int(rows)) + 0.5) / rows
         width, clip = 0.11 * sheet.text, self._clip(axes)
         for line, style in zip(lines, STYLES, strict=False):
             if not np.nanmin(logs) < line.log_prob < np.nanmax(logs):

@@ -1,5 +1,8 @@
 """Pictures of densities of directions or axes on maps, with graticule, degrees and coastlines."""
 
+# matplotlib types no keyword arguments
+# pyright: reportUnknownMemberType=false
+
 from __future__ import annotations
 
 import math
@@ -36,14 +39,12 @@ _BESIDE = 120 / 25.4
 class Map(Ground):
     """A map of the sphere or the projective plane, with coastlines (N, 2) in degrees."""
 
-    outline: Array
-
     def __init__(
         self, space: Space, projection: Projection, coastlines: Sequence[Array] = ()
     ) -> None:
         self.space, self.projection, self.coastlines = space, projection, coastlines
-        self.outline = projection.outline()
-        width, height = np.ptp(self.outline, axis=0)
+        self.outline = self.ring = projection.outline()
+        width, height = np.ptp(self.ring, axis=0)
         self.width, self.aspect = float(width), float(width / height)
         self.is_disc = isinstance(projection, Azimuthal)
         self.title_gap = 2.2 if self.is_disc else 0.6
@@ -64,13 +65,13 @@ class Map(Ground):
         from matplotlib.path import Path
         from scipy.ndimage import binary_dilation
 
-        ring, projection = self.outline, self.projection
+        ring, projection = self.ring, self.projection
         low, high = ring.min(axis=0), ring.max(axis=0)
-        step = math.sqrt(float(np.prod(high - low)) / count)
+        step = math.sqrt(float((high - low).prod()) / count)
         counts = np.ceil((high - low) / step).astype(int) + 2 * _MARGIN
         first = (low + high) / 2 - step * counts / 2
-        x, y = (first[k] + step * (np.arange(counts[k]) + 0.5) for k in (0, 1))
-        places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        axes: list[Array] = [first[k] + step * (np.arange(int(counts[k])) + 0.5) for k in (0, 1)]
+        places: Array = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
         within = Path(ring).contains_points(places)
         shown = binary_dilation(within.reshape(counts[::-1]), iterations=_MARGIN)
         kept, last = shown.ravel(), first + step * counts
@@ -96,11 +97,11 @@ class Map(Ground):
         return frames.Room(3.6, 1.8, 3.6, 3.8, 5.6 if stacked else 7.4, 0.0), stacked
 
     def fill(self, axes: Axes) -> None:
-        axes.fill(*self.outline.T, color=LIGHT, linewidth=0, zorder=0)
+        axes.fill(*self.ring.T, color=LIGHT, linewidth=0, zorder=0)
 
     def draw_axes(self, axes: Axes, sheet: Sheet, side: float, panel: frames.Panel) -> None:
         """Draw the outline, the graticule with its degrees, and coastlines, without a frame."""
-        projection, ring = self.projection, self.outline
+        projection, ring = self.projection, self.ring
         axes.set_axis_off()
         axes.set_xticks([])
         axes.set_yticks([])

@@ -1,5 +1,8 @@
 """What pictures show over a density: dots that leave it readable, lines around regions."""
 
+# matplotlib types no keyword arguments
+# pyright: reportUnknownMemberType=false
+
 from __future__ import annotations
 
 import math

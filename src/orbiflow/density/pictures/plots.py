@@ -62,7 +62,7 @@ def plot_density(
     settings: PlotSettings | None = None,
     *,
     data: ArrayLike | None = None,
-    told: Callable[[float, str], None] = lambda *_: None,
+    told: Callable[[float, str], None] = lambda _share, _what: None,
 ) -> Plotted:
     """Draw a density, its flow, samples beside the data, and the surface to turn.
 

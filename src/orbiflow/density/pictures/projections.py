@@ -54,7 +54,7 @@ def refined(latlon: Array) -> Array:
     steps = np.maximum(abs(np.diff(latlon[:, 0])), abs(np.diff(lon)))
     counts = np.maximum(np.ceil(steps / FINEST - 1e-9), 1).astype(int)
     knots = np.concatenate([[0], np.cumsum(counts)])
-    at = np.arange(knots[-1] + 1)
+    at = np.arange(int(knots[-1]) + 1)
     lat, lon = (np.interp(at, knots, values) for values in (latlon[:, 0], lon))
     return np.stack([lat, wrapped(lon)], axis=-1)
 

@@ -1,5 +1,8 @@
 """Rose diagrams: circular histograms whose areas are shares, with a density's curve or a mean."""
 
+# matplotlib types no keyword arguments
+# pyright: reportUnknownMemberType=false
+
 from __future__ import annotations
 
 import math

@@ -1,5 +1,8 @@
 """Pictures on the canonical square, whose edges are marked where they are the same edge."""
 
+# matplotlib types no keyword arguments
+# pyright: reportUnknownMemberType=false
+
 from __future__ import annotations
 
 from collections.abc import Sequence

@@ -177,8 +177,10 @@ def viewpoint(space: Space, place: Tensor) -> Viewpoint:
         pitch = np.linspace(-1.2, 1.2, 17)
     else:  # rings are recognised from above or below
         pitch = np.concatenate([s * np.linspace(0.4, 1.2, 9) for s in (1, -1)])
-    yaw = np.arctan2(spot[1], spot[0]) + np.linspace(0, 2 * np.pi, 36, endpoint=False)
-    angles = np.stack(np.meshgrid(yaw, pitch, indexing="ij"), axis=-1).reshape(-1, 2)
+    yaw: Array = np.arctan2(spot[1], spot[0]) + np.linspace(0, 2 * np.pi, 36, endpoint=False)
+    angles: Array = np.stack(np.meshgrid(yaw, pitch, indexing="ij"), axis=-1).reshape(-1, 2)
+    yaws: Array
+    pitches: Array
     yaws, pitches = angles.T
     toward = [np.cos(pitches) * np.cos(yaws), np.cos(pitches) * np.sin(yaws), np.sin(pitches)]
     toward = np.stack(toward, axis=-1)
@@ -232,7 +234,7 @@ def surface_data(
     log, _ = colours.chosen_scale(density, settings.measure, settings.scale)
     shade = colours.shading(values, areas, log=log)
     lines = (*_coordinate_lines(space), (1.6, _on_surface(space, coastlines)))
-    notes = []
+    notes: list[str] = []
     data = {
         **_surface(space, grid.points, int(values.argmax())),
         "round": space.name == "sphere",  # the near side hides the far one

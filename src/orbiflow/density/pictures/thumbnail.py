@@ -117,7 +117,7 @@ def _histogram(density: Density, data: Array) -> Image.Image:
     edges = np.linspace(0, width, bins + 1)
     for (left, right), bar in zip(pairwise(edges.tolist()), bars.tolist(), strict=True):
         draw.rectangle((left + fine / 2, height * (1 - bar / top), right - fine / 2, height), BARS)
-    heights = (height * (1 - np.minimum(line / top, 1.0))).tolist()
+    heights: list[float] = (height * (1 - np.minimum(line / top, 1.0))).tolist()
     draw.line(list(enumerate(heights)), INK, width=2 * fine)
     return picture.resize((width // fine, height // fine), Image.Resampling.BOX)
 
