@@ -37,13 +37,13 @@ FIRST_IS_SHORT = (
 DEAF = (
     "import os, time\n"
     "from orbiflow.cli import terminal\n"
-    "terminal.EVERY = 1e9\n"  # no line of progress, however long the machine takes
+    "terminal.PROGRESS_SECONDS = 1e9\n"  # no line of progress, however long the machine takes
     "from orbiflow.runtime import Cancel, processes\n"
     "from orbiflow.tiles.flowing import overlap_search\n"
     "def fit(*_, **__):\n"
     "    os.write(1, b'deaf\\n')\n"
     "    time.sleep(1e6)\n"
-    "overlap_search.fit_occupancy, processes.GRACE = fit, 1e6\n"
+    "overlap_search.fit_occupancy, processes.GRACE_SECONDS = fit, 1e6\n"
     "tell = Cancel.cancel\n"
     "def cancel(self):\n"
     "    tell(self)\n"

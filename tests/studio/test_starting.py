@@ -17,9 +17,9 @@ from uvicorn.server import ServerState
 
 from orbiflow.errors import OrbiflowError, SettingError
 from orbiflow.studio import Store, StudioSettings
+from orbiflow.studio.app import PatientProtocol, Server
 from orbiflow.studio.hub import Hub
 from orbiflow.studio.operations import studio
-from orbiflow.studio.app import PatientProtocol, Server
 
 
 def test_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
