@@ -27,7 +27,7 @@ from scipy.optimize import nnls
 from scipy.stats import spearmanr
 
 from orbiflow.tiles import Fidelity, Rating
-from orbiflow.tiles.likeness.ranking import WORDS
+from orbiflow.tiles.likeness.ranking import STAR_WORDS
 
 GOOD = 6.5
 """The least mark that is good."""
@@ -140,7 +140,7 @@ def print_words(found: list[Marked]) -> None:
 
 def places(ratings: list[Rating]) -> NDArray[np.int64]:
     """The number of each rating's word."""
-    return np.array([list(WORDS.values()).index(own.word) for own in ratings])
+    return np.array([list(STAR_WORDS.values()).index(own.word) for own in ratings])
 
 
 class Ranked:

@@ -29,7 +29,7 @@ from orbiflow.tiles import (
 )
 from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.search.bending import Bent, PlacedBent, bent_tiles, placed_best, prototile
-from orbiflow.tiles.search.co_deformation import Hand, hands
+from orbiflow.tiles.search.co_deformation import Orientation, orientations
 
 FOLDER = Path(__file__).parent.parent / "examples" / "silhouettes"
 ANIMALS = ("squirrel.dat", "nagata/spider_120.dat", "nagata/octpus_94.dat", "nagata/camel_60.dat")
@@ -143,9 +143,9 @@ SMALL = LikenessSearch(placements=40, held=8, starts=4, finalists=1, rounds=8, m
 
 
 @lru_cache(maxsize=1)
-def squirrel_hands() -> tuple[Hand, Hand]:
+def squirrel_orientations() -> tuple[Orientation, Orientation]:
     """The bundled squirrel and its mirror image, ready to be bent."""
-    return hands(animal("squirrel.dat"), SMALL)
+    return orientations(animal("squirrel.dat"), SMALL)
 
 
 class BentTile(NamedTuple):
@@ -160,16 +160,16 @@ class BentTile(NamedTuple):
     def images(self) -> Array:
         """(N, 2) where the body's points are placed, in the target's normal form."""
         points = plane_points(self.factor * self.bent.points + self.shift)
-        return points * (1.0, -1.0) if self.bent.hand.mirrored else points
+        return points * (1.0, -1.0) if self.bent.orientation.mirrored else points
 
 
 @lru_cache(maxsize=32)
 def bent_squirrel(name: str, mirrored: bool = False) -> BentTile:
     """A small search's best tile of a class, from one hand of the squirrel."""
     kind = CLASSES[name]
-    hand = squirrel_hands()[mirrored]
-    bent = bent_tiles([hand], kind, SMALL)[0][0]
-    _, factor, shift = placed_best(bent, Overlap(np.asarray(hand.samples.fine)))
+    side = squirrel_orientations()[mirrored]
+    bent = bent_tiles([side], kind, SMALL)[0][0]
+    _, factor, shift = placed_best(bent, Overlap(np.asarray(side.samples.fine)))
     tile, _ = extract_tile(flowless(name, bent, factor, shift))
     return BentTile(bent, factor, shift, tile)
 

@@ -80,7 +80,7 @@ def test_what_orbiflow_did_not_write_is_refused_by_its_name(name: str, tmp_path:
     else:
         fill(out, name)
     before = files(tmp_path)
-    message = "which is of no earlier run: choose another --out or move it"
+    message = "which is of no earlier run: choose another folder or move it"
     with pytest.raises(OutputError, match=message) as caught:
         folder_at(out)
     assert str(out) in str(caught.value)

@@ -7,12 +7,39 @@ Every message says what is wrong, where, and what to do. All are kinds of `Orbif
 import re
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from typing import Self
 
 NAME_IN_BRACES = re.compile(r"(?<!\{)\{(\w+)\}(?!\})")
 
 
 class OrbiflowError(ValueError):
     """An argument, a file or a setting that cannot be used: the base of all other errors."""
+
+
+def with_names(template: str, named: Callable[[str], str]) -> str:
+    """Return a text with each name in single braces called what a function returns for it."""
+    text = NAME_IN_BRACES.sub(lambda found: named(found[1]), template)
+    return text.replace("{{", "{").replace("}}", "}")
+
+
+class Advice(str):
+    """A text that names settings: by their own names, or what a command or a page calls them.
+
+    >>> advice = Advice("try another {threshold}")
+    >>> advice, advice.named(lambda name: "--" + name)
+    ('try another threshold', 'try another --threshold')
+    """
+
+    template: str
+
+    def __new__(cls, template: str) -> Self:
+        made = super().__new__(cls, with_names(template, str))
+        made.template = template
+        return made
+
+    def named(self, name: Callable[[str], str]) -> str:
+        """Return the text with each setting called what `name` returns for it."""
+        return with_names(self.template, name)
 
 
 class SettingError(OrbiflowError):
@@ -34,7 +61,7 @@ class SettingError(OrbiflowError):
         self.template = template
 
     def __str__(self) -> str:
-        return self.named(lambda name: name)
+        return self.named(str)
 
     @property
     def about(self) -> str:
@@ -44,8 +71,7 @@ class SettingError(OrbiflowError):
 
     def named(self, name: Callable[[str], str]) -> str:
         """Return the message, with each setting called what `name` returns for it."""
-        text = NAME_IN_BRACES.sub(lambda found: name(found[1]), self.template)
-        return text.replace("{{", "{").replace("}}", "}")
+        return with_names(self.template, name)
 
 
 def literal(text: str) -> str:

@@ -211,7 +211,7 @@ def test_the_model_is_not_replaced(
     given = folder / ("." if place == "link" else place)
     done = orbiflow("density", *words.split(), "--model", given, "--out", out)
     assert done.status == 2
-    assert "would replace the model that it reads: choose another --out" in done.err
+    assert "would replace the model that it reads: choose another folder" in done.err
     inside = orbiflow("density", *words.split(), "--model", given, "--out", folder / "psi")
     assert inside.status == 2
     assert "holds the files of one run alone" in inside.err

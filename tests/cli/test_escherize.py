@@ -300,7 +300,7 @@ def test_a_folder_with_something_else_is_refused(tmp_path: Path, orbiflow) -> No
     refused = orbiflow("escherize", path, "-o", tmp_path, "--classes", "IH4", *FEW)
     assert refused.status == 2
     assert (
-        f"{tmp_path} holds boot.json, which is of no earlier run: choose another --out or move it"
+        f"{tmp_path} holds boot.json, which is of no earlier run: choose another folder or move it"
         in refused.err
     )
     assert "fitting" not in refused.out

@@ -28,13 +28,13 @@ FIRST_IS_SHORT = f"import sys; sys.path.append({TESTS!r})\nimport runtime.endles
 DEAF = FIRST_IS_SHORT + (
     "import os, time\n"
     "from orbiflow.cli import terminal\n"
-    "terminal.EVERY = 1e9\n"  # no line of progress, however long the machine takes
+    "terminal.PROGRESS_SECONDS = 1e9\n"  # no line of progress, however long the machine takes
     "from orbiflow.runtime import Cancel, processes\n"
     "from runtime import endless_process\n"
     "def fit(*_, **__):\n"
     "    os.write(1, b'deaf\\n')\n"
     "    time.sleep(1e6)\n"
-    "endless_process.LikenessSearch.fit, processes.GRACE = fit, 1e6\n"
+    "endless_process.LikenessSearch.fit, processes.GRACE_SECONDS = fit, 1e6\n"
     "tell = Cancel.cancel\n"
     "def cancel(self):\n"
     "    tell(self)\n"

@@ -191,7 +191,7 @@ def test_a_file_in_the_way_of_the_folder(below: str, tmp_path: Path, orbiflow) -
     outcome = orbiflow("escherize", disc(tmp_path), "--out", wall / below, "--classes", "IH4")
     assert outcome.status == 2
     assert f"cannot write into {wall / below}" in outcome.err
-    assert "choose another --out" in outcome.err
+    assert "choose another" in outcome.err
     assert "Traceback" not in outcome.err
     assert wall.read_text() == "keep me"
 

@@ -27,7 +27,7 @@ class Clock:
 
 def test_a_line_every_ten_seconds(capsys: pytest.CaptureFixture[str]) -> None:
     clock = Clock()
-    with Terminal(clock) as shown:
+    with Terminal(clock=clock) as shown:
         for second in range(31):
             clock.now = 100.0 + second
             shown(Progress(second / 40, "fitting", "IH4", second / 30))
@@ -45,7 +45,7 @@ def test_a_line_every_ten_seconds(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_what_was_done_before_does_not_count_as_speed(capsys: pytest.CaptureFixture[str]) -> None:
     clock = Clock()
-    shown = Terminal(clock)
+    shown = Terminal(clock=clock)
     clock.now += 20
     shown(Progress(0.8, "8 of 10"))
     clock.now += 200
@@ -65,7 +65,7 @@ def test_a_terminal_has_its_bar_alone(
     screen = Console(file=io.StringIO(), force_terminal=True)
     monkeypatch.setattr(terminal, "output", screen)
     clock = Clock()
-    with Terminal(clock) as shown:
+    with Terminal(clock=clock) as shown:
         shown(Progress(0.0, "fitting"))
         clock.now += 60
         shown(Progress(0.5, "fitting"))
@@ -77,7 +77,7 @@ def test_work_that_says_nothing_is_told_of_too(
 ) -> None:
     """Whoever works looks at the token: a step may take minutes without an event."""
     clock = Clock()
-    monkeypatch.setattr(terminal, "Terminal", lambda: Terminal(clock))
+    monkeypatch.setattr(terminal, "Terminal", lambda named: Terminal(named, clock))
 
     def run(_call: Call, on_event: Sink, cancel: Cancel) -> Outcome:
         on_event(Progress(0.0, "fitting"))

@@ -69,7 +69,7 @@ def test_thin_legs_are_said_and_grown_by_a_button(page, studio: RunningStudio) -
     own = studio.with_picture(f"{head}{drawing}</svg>".encode(), "spider.svg")
     page.goto(f"/#/p/{own}/picture")
     before = studio.project(own)["silhouette"]
-    assert "let them grow (Thin parts)" in before["doubts"][0]
+    assert "let them grow (Thin parts) by" in before["doubts"][0]
     page.get_by_role("button", name="Make thin parts thicker").click()
     studio.until(lambda: studio.project(own)["reading"].get("thicken") == 0.04)
     studio.until(lambda: not (studio.project(own)["silhouette"] or before)["doubts"])

@@ -92,7 +92,7 @@ def test_a_table_is_looked_at(client: Client) -> None:
         ("phi", "degrees"),
         ("psi", "degrees"),
     ]
-    assert len(table["first"]) == density_tasks.FIRST
+    assert len(table["first"]) == density_tasks.FIRST_ROWS
     assert table["guess"]["space"] == "torus"
     assert client.get(own).json()["name"] == "bends of a chain"
 

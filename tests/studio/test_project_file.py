@@ -137,13 +137,13 @@ def test_entries_lead_nowhere(saved: bytes, tmp_path: Path) -> None:
 def test_a_bomb_is_not_unpacked(
     saved: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(project_file, "MOST_OF_ONE", 20_000)
+    monkeypatch.setattr(project_file, "MAX_ENTRY_BYTES", 20_000)
     data = io.BytesIO(saved)
     with zipfile.ZipFile(data, "a", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("mend.png", b"\0" * 1_000_000)
     with pytest.raises(InputFileError, match="too large"):
         opened(tmp_path, data.getvalue())
-    monkeypatch.setattr(project_file, "MOST_ENTRIES", 2)
+    monkeypatch.setattr(project_file, "MAX_ENTRIES", 2)
     with pytest.raises(InputFileError, match="files"):
         opened(tmp_path, saved)
 

@@ -143,7 +143,7 @@ def test_doubts_are_said_once_in_the_words_of_the_page(client: Client) -> None:
     done(client, client.put(f"{address}/input?name=a.png", content=painted(picture)))
     own = client.get(address).json()["silhouette"]
     apart, hole = own["doubts"]
-    assert "more smoothing may join them, or try another edge (Where it ends)" in apart
+    assert "by a larger smoothing, or try another edge (Where it ends)" in apart
     assert hole.endswith("try another edge (Where it ends) or another side (The animal is)")
     assert len(own["left_out"]) == 1
     said = " ".join([*own["notes"], apart, hole])

@@ -208,7 +208,7 @@ def _do(operation: Operation, given: dict[str, Any]) -> int:
     from orbiflow.cli.terminal import Terminal, stopped_by_interrupt
 
     use_one_thread()
-    with Terminal() as terminal:
+    with Terminal(_namer(operation)) as terminal:
         cancel = Polled(terminal.watch)
         # only what keeps a part has something to stop for
         with stopped_by_interrupt(cancel) if operation.keeps_partial else nullcontext():

@@ -14,6 +14,7 @@ from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsed
 from rich.progress import Progress as Bar
 from rich.table import Table as TextTable
 
+from orbiflow.errors import Advice
 from orbiflow.runtime import (
     Cancel,
     ClassFailed,
@@ -31,14 +32,16 @@ from orbiflow.runtime import (
 
 output, errors = Console(emoji=False), Console(stderr=True, emoji=False)
 
-EVERY = 10.0  # seconds between lines of progress on the standard error where there can be no bar
+PROGRESS_SECONDS = 10.0  # between lines of progress where there can be no bar
 
 
 class Terminal:
     """A sink of events. Use it in a `with` block: the bar must not outlive an error."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self.clock, self.told = clock, clock()
+    def __init__(
+        self, named: Callable[[str], str] = str, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self.named, self.clock, self.told = named, clock, clock()
         self.first: tuple[float, float] | None = None  # the time and share of the first progress
         self.last = Progress(1.0, "")
         self.forks = False
@@ -60,7 +63,10 @@ class Terminal:
                 self.watch()
             case Note():
                 self._end_bar()  # notes come before the work and after it
-                _say(event.text, errors if event.warning else output)
+                text = (
+                    event.text.named(self.named) if isinstance(event.text, Advice) else event.text
+                )
+                _say(text, errors if event.warning else output)
             case Table():
                 self._end_bar()
                 output.print(_aligned(event))
@@ -86,7 +92,7 @@ class Terminal:
         The work calls it where it looks whether it is to stop: no thread may run beside it.
         """
         now = self.clock()
-        if now - self.told >= EVERY and self.last.share < 1 and not output.is_terminal:
+        if now - self.told >= PROGRESS_SECONDS and self.last.share < 1 and not output.is_terminal:
             self.told = now
             _say(self._line(now), errors)
         return False

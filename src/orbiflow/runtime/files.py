@@ -53,7 +53,7 @@ def _check_replaceable(path: Path) -> None:
         raise OutputError(f"cannot write {path}: there is no folder {path.parent}; create it first")
 
 
-def make_folder(path: Path, cure: str = "choose another --out") -> Path:
+def make_folder(path: Path, cure: str = "choose another folder") -> Path:
     """Create a folder (and its parents) that can be written to, or raise an `OutputError`."""
     with system_errors(OutputError, f"cannot write into {path}", cure):
         path.mkdir(parents=True, exist_ok=True)
@@ -158,7 +158,7 @@ class ResultFolder:
             if name not in (above if folder else known):
                 raise OutputError(
                     f"{self.path} holds {name}, which is of no earlier run: choose another "
-                    "--out or move it"
+                    "folder or move it"
                 )
             if folder:
                 entries += [p for p in path.iterdir() if not _is_litter(p.name)]
@@ -205,7 +205,7 @@ class ResultFolder:
         if isinstance(error, OutputError):
             return error
         why = getattr(error, "strerror", None) or error
-        return OutputError(f"cannot write into {self.path}: {why}; choose another --out")
+        return OutputError(f"cannot write into {self.path}: {why}; choose another folder")
 
 
 def _temporary() -> str:
@@ -238,7 +238,7 @@ def _exchange_files(staged: Path, folder: Path) -> None:
     staged.rmdir()
 
 
-MOST_JSON_BYTES = 256 * 2**20
+MAX_JSON_BYTES = 256 * 2**20
 """The largest file of JSON that is read."""
 
 
@@ -254,7 +254,7 @@ def read_json(file: Path, what: str) -> dict[str, Any]:
         InputFileError: If the file cannot be read, is too large, or holds none.
     """
     with system_errors(InputFileError, f"{file}: cannot be read"):
-        if file.stat().st_size > MOST_JSON_BYTES:
+        if file.stat().st_size > MAX_JSON_BYTES:
             raise InputFileError(f"{file}: too large for {what}")
         text = file.read_bytes()
     try:
@@ -295,7 +295,7 @@ def check_output_folder(out: Path, *reads: Path | None, what: str = "file") -> N
         if _real(read).is_relative_to(_real(out)):
             raise OutputError(
                 f"cannot write into {out}: it would replace the {what} that it reads: choose another "
-                "--out"
+                "folder"
             )
     check_outside_runs(out, *reads)
 
@@ -308,7 +308,7 @@ def check_inputs_kept(out: Path, *reads: Path | None) -> None:
         files = [read / name for name in RUN_FOLDERS] if read.is_dir() else [read]
         if any(_same(out, file) for file in files):
             raise OutputError(
-                f"cannot write {out}: it would replace what is read: choose another --out"
+                f"cannot write {out}: it would replace what is read: choose another file"
             )
 
 
@@ -327,12 +327,12 @@ def check_outside_runs(out: Path, *reads: Path | None) -> None:
         if name in known:
             raise OutputError(
                 f"cannot write {out}: {name} is a file of the run in {folder}, which is read: choose "
-                "another --out"
+                "another place"
             )
         if _holds_one_run(folder, known):
             raise OutputError(
                 f"cannot write {out}: {folder}, which is read, holds the files of one run alone, and "
-                "the next run there would refuse others: choose another --out"
+                "the next run there would refuse others: choose another place"
             )
 
 

@@ -57,7 +57,7 @@ from orbiflow.settings import Field, Settings, check_names, check_rules, fields_
 
 SCHEMA_VERSION = 2
 SCHEMA = "https://json-schema.org/draft/2020-12/schema"
-OWN = ("on_event", "cancel")
+OWN_PARAMETERS = ("on_event", "cancel")
 """Parameters that every operation may have and no user sets by name."""
 
 Sink = Callable[[Event], None]
@@ -120,7 +120,7 @@ class Operation:
         hints = typing.get_type_hints(self.function, include_extras=True)
         parts: dict[str, Field | type[Settings]] = {}
         for name, parameter in inspect.signature(self.function).parameters.items():
-            if name in OWN:
+            if name in OWN_PARAMETERS:
                 continue
             hint = hints[name]
             if isinstance(hint, type) and issubclass(hint, Settings):

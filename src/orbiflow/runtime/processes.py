@@ -23,10 +23,10 @@ from orbiflow.runtime.threads import imported_torch, use_one_thread
 Function = Callable[[Any, Callable[[Any], None], Cancel], Any]
 """What a worker does with an item, a function that takes its news, and a token that stops it."""
 
-POLL = 0.05
+POLL_SECONDS = 0.05
 """Seconds between looks at the token while no worker says anything."""
 
-GRACE = 2.0
+GRACE_SECONDS = 2.0
 """Seconds that workers have to end by themselves when they are told to stop."""
 
 
@@ -132,7 +132,7 @@ class _Pool:
 
     def news(self) -> Iterator[News]:
         while self._go_on():
-            for channel in wait(list(self.workers), POLL):
+            for channel in wait(list(self.workers), POLL_SECONDS):
                 assert isinstance(channel, Connection)
                 order = self.workers[channel].order
                 assert order is not None
@@ -191,7 +191,7 @@ class _Pool:
     def _listen(self) -> None:
         """Tell the workers to stop, once, if this process was told to."""
         if self.cancel.cancelled and self.stop_by is None:
-            self.stop_by = time.monotonic() + GRACE
+            self.stop_by = time.monotonic() + GRACE_SECONDS
             for channel, worker in self.workers.items():
                 if worker.order is not None:
                     _send(channel, None)

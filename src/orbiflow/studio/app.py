@@ -35,7 +35,7 @@ from orbiflow.studio.store import Missing, Store
 from orbiflow.studio.work_queue import WorkQueue
 
 STATIC = Path(__file__).parent / "static"
-SETTLED_EVERY = 20.0  # seconds
+SETTLE_SECONDS = 20.0  # seconds
 MAX_PIXELS = 128_000_000  # of a picture that is read
 log = logging.getLogger("orbiflow.studio")
 
@@ -90,7 +90,7 @@ def create_app(
 async def _settle(store: Store) -> None:
     """Let the store settle now and then."""
     while True:
-        await asyncio.sleep(SETTLED_EVERY)
+        await asyncio.sleep(SETTLE_SECONDS)
         await asyncio.to_thread(store.settle)
 
 
@@ -145,8 +145,8 @@ async def _told(_request: Request, error: Exception) -> JSONResponse:
     return JSONResponse({"error": "something went wrong in the studio; reload the page"}, 500)
 
 
-PATIENCE = 20.0  # seconds in which the first request of a connection must have a whole head
-CONNECTIONS = 400
+MAX_HEAD_SECONDS = 20.0  # seconds in which the first request of a connection must have a whole head
+MAX_CONNECTIONS = 400
 
 
 class PatientProtocol(H11Protocol):
@@ -155,7 +155,7 @@ class PatientProtocol(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Begin to wait."""
         super().connection_made(transport)
-        self.loop.call_later(PATIENCE, self.hang_up)
+        self.loop.call_later(MAX_HEAD_SECONDS, self.hang_up)
 
     def hang_up(self) -> None:
         """Close the connection unless a request has come."""
@@ -185,7 +185,7 @@ def serve(app: Guard, own: socket.socket) -> None:
         server_header=False,
         timeout_keep_alive=60,
         timeout_graceful_shutdown=2,
-        limit_concurrency=CONNECTIONS,
+        limit_concurrency=MAX_CONNECTIONS,
     )
     state: Any = app.app
     Server(config, state.state.studio.hub).run(sockets=[own])

@@ -40,9 +40,9 @@ EXAMPLES = {
 
 TABLES = Path(__file__).parent / "tables"
 SCRIPT = Path(__file__).parents[1] / "density" / "pictures" / "surface.js"
-MOST_AXES = 64
+MAX_AXES = 64
 TASKS = ("density table", "density fit", "density map", "density take")
-UNNAMED = (NAMES["density"], "My table")
+USUAL_NAMES = (NAMES["density"], "My table")
 
 routes = Routes()
 
@@ -97,7 +97,7 @@ async def surface(project: str, fit: int, here: Studio) -> Response:
 async def flat(project: str, fit: int, here: Studio, axes: str = "0") -> Response:
     """Give the density on a grid, of one angle or of two."""
     chosen = axes.split("-")
-    if len(chosen) > 2 or not all(a.isdecimal() and int(a) < MOST_AXES for a in chosen):
+    if len(chosen) > 2 or not all(a.isdecimal() and int(a) < MAX_AXES for a in chosen):
         raise Refused(404, "a map is of one or two angles, such as 0-1")
     return _document(map_file(fit_folder(_home(here, project), fit), tuple(map(int, chosen))))
 
@@ -118,7 +118,7 @@ async def _new_table(here: Studio, project: str, file: Path, name: str) -> dict[
     shutil.rmtree(home / "fits", ignore_errors=True)
     changes: dict[str, Any] = {"input": {"name": name, "type": file.suffix.lstrip(".")}}
     before = Path(own["input"]["name"]).stem if own["input"] else name
-    if own["name"] in (*UNNAMED, before):
+    if own["name"] in (*USUAL_NAMES, before):
         changes["name"] = Path(name).stem
     here.store.change(project, **changes)
     return await here.submit(project, "density table", {})

@@ -32,12 +32,20 @@ from orbiflow.studio.tasks import export_folder, files_of
 if TYPE_CHECKING:
     from orbiflow.density import Density
 
-SURFACE_CELLS = 120
-FITTED = 0.9
-"""Share of the work that is done when a density is fitted, and its pictures are to be made."""
-
+TABLE, FIT, VIEW, SURFACE = "table.json", "model", "view.json", "surface.json"
+ENDINGS = (".csv", ".tsv", ".txt", ".npy")
 MAX_SHOWN = 30
 """Columns of a table that are shown, and of which a density may be."""
+
+MAX_ROWS, FIRST_ROWS = 200_000, 6
+"""Rows that a table may have, and rows that are shown of it."""
+
+MAX_NAME_LETTERS = 200
+"""Letters of a column's name."""
+
+SURFACE_CELLS = 120
+FIT_SHARE = 0.9
+"""Share of the work that is done when a density is fitted, and its pictures are to be made."""
 
 
 class FitChoice(Settings, group="Density"):
@@ -79,10 +87,10 @@ def density(
     data = table_file(job.project)
     asked = {"data": data, "out": folder / FIT, "drop_missing": True, **choice.to_json()}
     call = find("density fit").call(asked)
-    told = as_part(on_event, 0.0, FITTED)
+    told = as_part(on_event, 0.0, FIT_SHARE)
     call.operation.function(**call.arguments, on_event=told, cancel=cancel)
     cancel.check()
-    view = _view(folder, data, choice, as_part(on_event, FITTED, 1.0))
+    view = _view(folder, data, choice, as_part(on_event, FIT_SHARE, 1.0))
     cancel.check()
     write_json(folder / VIEW, view)
     for other in folder.parent.iterdir():
@@ -204,10 +212,6 @@ def _model(folder: Path) -> Density:
     return read_density(folder / FIT / "density.safetensors")[0]
 
 
-TABLE, FIT, VIEW, SURFACE = "table.json", "model", "view.json", "surface.json"
-ENDINGS = (".csv", ".tsv", ".txt", ".npy")
-
-
 def table_file(home: Path) -> Path:
     """Return the table of a project, as it was uploaded."""
     found = [path for ending in ENDINGS if (path := home / f"table{ending}").is_file()]
@@ -245,13 +249,6 @@ def map_file(fit: Path, axes: tuple[int, ...]) -> Path:
     return fit / f"map-{'-'.join(map(str, axes))}.json"
 
 
-MAX_ROWS, FIRST = 200_000, 6
-"""Rows that a table may have, and rows that are shown of it."""
-
-MAX_NAME = 200
-"""Letters of a column's name."""
-
-
 def table_view(path: Path) -> dict[str, Any]:
     """Return what a page shows of a table before anything is fitted.
 
@@ -269,10 +266,10 @@ def table_view(path: Path) -> dict[str, Any]:
             "plain numbers in its columns: decimal points, and nothing between thousands"
         ) from None
     shown = table.columns[:MAX_SHOWN]
-    if max(map(len, shown)) > MAX_NAME:
-        raise OrbiflowError(f"the name of a column has over {MAX_NAME} letters; shorten it")
+    if max(map(len, shown)) > MAX_NAME_LETTERS:
+        raise OrbiflowError(f"the name of a column has over {MAX_NAME_LETTERS} letters; shorten it")
     columns, guessed = seen_columns(table, MAX_SHOWN)
-    first = table.values[:FIRST, : len(shown)].tolist()
+    first = table.values[:FIRST_ROWS, : len(shown)].tolist()
     return {
         "rows": len(table.values),
         "columns": [asdict(column) for column in columns],

@@ -12,8 +12,8 @@ from orbiflow.studio.words import shown_project, shown_task
 
 KEEPALIVE_COMMENT = b": still here\n\n"
 
-PAUSE = 15.0  # seconds after which a stream without news says that it is still there
-BREATH = 0.02  # seconds in which changes are collected
+KEEPALIVE_SECONDS = 15.0  # seconds after which a stream without news says that it is still there
+COLLECT_SECONDS = 0.02  # seconds in which changes are collected
 
 
 class Hub:
@@ -55,12 +55,12 @@ class Hub:
             yield True
             while not self._closed:
                 try:
-                    async with asyncio.timeout(PAUSE):
+                    async with asyncio.timeout(KEEPALIVE_SECONDS):
                         await wake.wait()
                 except TimeoutError:
                     yield False
                     continue
-                await asyncio.sleep(BREATH)
+                await asyncio.sleep(COLLECT_SECONDS)
                 wake.clear()
                 yield True
         finally:

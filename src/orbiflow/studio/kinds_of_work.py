@@ -15,7 +15,7 @@ from orbiflow.runtime import Call, Operation, find
 from orbiflow.settings import Field, Hidden, OnlyWith
 from orbiflow.studio.words import LABELS, plain_letters
 
-OWN = ("project", "task", "force", "workers", "tile", "picture")
+SERVER_SET = ("project", "task", "force", "workers", "tile", "picture")
 """Parameters of operations that the server sets, or nobody."""
 
 
@@ -43,7 +43,7 @@ class Kind:
             if taken := [name for name in place if name in settings]:
                 raise SettingError(f"the studio itself sets {taken[0]}; leave it out")
             return find(self.work).call({**place, **settings})
-        own = {name: settings[name] for name in OF_TAKING if name in settings}
+        own = {name: settings[name] for name in TAKE_SETTINGS if name in settings}
         rest = {name: value for name, value in settings.items() if name not in own}
         making_call(self.makes, rest, Path("tile"))
         return find(self.work).call(
@@ -51,10 +51,10 @@ class Kind:
         )
 
 
-OF_TAKING = ("tile", "picture", "drawing", "called")
+TAKE_SETTINGS = ("tile", "picture", "drawing", "called")
 """What is said of a take-away, besides the settings of its operation."""
 
-DRAWN = ("export", "art")
+WITH_DRAWING = ("export", "art")
 """What shows the drawing on a tile."""
 
 KINDS = {
@@ -87,7 +87,7 @@ def own_fields(operation: Operation) -> list[Field]:
         entry
         for entry in operation.fields
         if entry.name == "format"
-        or not (entry.is_of(PathKind) or entry.of_class(Hidden) or entry.name in OWN)
+        or not (entry.is_of(PathKind) or entry.of_class(Hidden) or entry.name in SERVER_SET)
     ]
 
 

@@ -31,11 +31,11 @@ FORMAT = "orbiflow-project/1"
 PROJECT, ENDING = "project.json", ".orbiflow"
 INPUT = re.compile(r"input\.[a-z0-9]{1,7}")
 TILE = re.compile(r"tiles/([1-9][0-9]{0,14})/(result\.json|[A-Za-z0-9-]{1,20}/model\.safetensors)")
-MOST_VIEW = 200_000  # characters of what pages remember of a project
-MOST_ENTRIES = 3 * PLACES
-MOST_BYTES = 512 * 2**20  # of all entries, unpacked
-MOST_OF_ONE = 64 * 2**20
-DAMAGED = (zlib.error, EOFError, struct.error, KeyError, IndexError, TypeError, OverflowError)
+MAX_VIEW = 200_000  # characters of what pages remember of a project
+MAX_ENTRIES = 3 * PLACES
+MAX_BYTES = 512 * 2**20  # of all entries, unpacked
+MAX_ENTRY_BYTES = 64 * 2**20
+DAMAGE_ERRORS = (zlib.error, EOFError, struct.error, KeyError, IndexError, TypeError, OverflowError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ def unpack(path: Path, home: Path) -> dict[str, Any]:
             if not path.exists():
                 raise
             raise InputFileError(f"{path.name}: not a project of the studio; {cure}") from error
-        except (*DAMAGED, ValueError, RuntimeError) as error:
+        except (*DAMAGE_ERRORS, ValueError, RuntimeError) as error:
             if isinstance(error, OrbiflowError):
                 raise
             raise InputFileError(f"{path.name}: its contents are damaged; {cure}") from error
@@ -132,9 +132,9 @@ def unpack(path: Path, home: Path) -> dict[str, Any]:
 
 def _unpack_entries(archive: zipfile.ZipFile, home: Path) -> None:
     entries = archive.infolist()
-    if len(entries) > MOST_ENTRIES:
-        raise InputFileError(f"the project has {len(entries)} files; {MOST_ENTRIES} can be read")
-    left = MOST_BYTES
+    if len(entries) > MAX_ENTRIES:
+        raise InputFileError(f"the project has {len(entries)} files; {MAX_ENTRIES} can be read")
+    left = MAX_BYTES
     for entry in entries:
         name = entry.filename
         own = name == PROJECT or name in {f"{mask}.png" for mask in MASKS}
@@ -142,9 +142,9 @@ def _unpack_entries(archive: zipfile.ZipFile, home: Path) -> None:
             continue  # of a later version, or of somebody else
         # what an entry says of its size may be a lie: no more is read
         with archive.open(entry) as source:
-            content = source.read(min(left, MOST_OF_ONE) + 1)
+            content = source.read(min(left, MAX_ENTRY_BYTES) + 1)
         left -= len(content)
-        if len(content) > MOST_OF_ONE or left < 0:
+        if len(content) > MAX_ENTRY_BYTES or left < 0:
             raise InputFileError(f"the project is too large: {name} or all of it, unpacked")
         place = home / name
         place.parent.mkdir(parents=True, exist_ok=True)
@@ -158,7 +158,7 @@ def _checked(document: object, path: Path) -> dict[str, Any]:
     for name, kind in plain.items():
         if not isinstance(document.setdefault(name, kind()), kind):
             raise InputFileError(f"{path.name}: {name} in {PROJECT} is damaged")
-    if len(json.dumps(document["view"])) > MOST_VIEW:
+    if len(json.dumps(document["view"])) > MAX_VIEW:
         raise InputFileError(f"{path.name}: its view is too large; save it again with less drawing")
     return document
 

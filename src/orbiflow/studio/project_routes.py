@@ -20,7 +20,7 @@ from orbiflow.extras import naming_extras
 from orbiflow.runtime import is_object
 from orbiflow.studio.guard import Refused
 from orbiflow.studio.kinds_of_work import kind_of_work
-from orbiflow.studio.project_file import ENDING, MOST_VIEW, write_project
+from orbiflow.studio.project_file import ENDING, MAX_VIEW, write_project
 from orbiflow.studio.routes import Routes, Studio, body_object, save_body
 from orbiflow.studio.store import Missing
 from orbiflow.studio.tasks import PREVIEW, SPACE, export_folder
@@ -106,7 +106,7 @@ async def patch(request: Request, project: str, here: Studio) -> dict[str, Any]:
         if not is_object(given["view"]):
             raise OrbiflowError("view must be a JSON object")
         changes["view"] = {**own["view"], **given["view"]}
-        if len(json.dumps(changes["view"])) > MOST_VIEW:
+        if len(json.dumps(changes["view"])) > MAX_VIEW:
             raise Refused(413, "this project remembers too much already; undo some drawing")
     here.store.change(project, **changes)
     return shown_project(here.store, here.store.project(project))

@@ -33,10 +33,10 @@ from orbiflow.tiles import (
 POINTS = 240
 """About how many points of the outline can be pulled: longer sides are divided."""
 
-COMPARED = 240  # points at which a pulled outline is compared with its silhouette
-COARSE = 2.5  # distance of points inside the body, in mean sides of the outline
-NEGLIGIBLE = 1e-12  # entry of the space's matrix that is nothing but rounding
-SIZES = (0.05, 20.0)  # area of a pulled tile, and of its lattice's cell, in those of before
+COMPARED_POINTS = 240  # points at which a pulled outline is compared with its silhouette
+BODY_SPACING = 2.5  # distance of points inside the body, in mean sides of the outline
+NEGLIGIBLE_ENTRY = 1e-12  # entry of the space's matrix that is nothing but rounding
+AREA_BOUNDS = (0.05, 20.0)  # area of a pulled tile, and of its lattice's cell, in those of before
 CROSSED = "the outline crosses itself there, so tiles would overlap: pull it less far"
 OTHER_SIZE = "the tile has become much too small or too large: pull it less far"
 
@@ -62,7 +62,7 @@ def space_json(tile: EscherTile) -> dict[str, Any]:
     """
     space = variations(tile)
     ring = space.first.polygon
-    spacing = COARSE * ring_length(ring) / len(ring)
+    spacing = BODY_SPACING * ring_length(ring) / len(ring)
     body, count = triangulate(orient(ring, counter_clockwise=True), spacing), len(ring)
     number, sides, shares = np.arange(len(body.points)), body.sides, body.shares
     if space.first.signed_area < 0:  # the vertices are there in reverse, from the same first one
@@ -83,7 +83,7 @@ def space_json(tile: EscherTile) -> dict[str, Any]:
 
 
 def _sparse(matrix: Array) -> dict[str, Any]:
-    rows, columns = np.nonzero(abs(matrix) > NEGLIGIBLE)
+    rows, columns = np.nonzero(abs(matrix) > NEGLIGIBLE_ENTRY)
     counts = np.bincount(rows, minlength=len(matrix))
     return {
         "rows": matrix.shape[0],
@@ -133,7 +133,7 @@ def _check(space: TileVariations, parameters: Array) -> None:
     outline = shapely.Polygon(space.polygon(parameters))
     linear = np.tensordot(parameters[-2 - len(space.maps) : -2], space.maps, 1)
     areas = (outline.area / abs(space.first.signed_area), float(np.linalg.det(linear)))
-    if not all(SIZES[0] < area < SIZES[1] for area in areas):
+    if not all(AREA_BOUNDS[0] < area < AREA_BOUNDS[1] for area in areas):
         raise CertificationError(OTHER_SIZE)
     if not outline.is_valid:
         raise CertificationError(CROSSED)
@@ -166,5 +166,5 @@ def _outlines(bending: Bending) -> tuple[Array, Array]:
     """Return the silhouette's outline at evenly spaced points, and where they go."""
     ring = bending.rest[border(bending.triangles)]
     lengths = arc_lengths(ring)
-    rest = points_along(ring, np.arange(COMPARED) / COMPARED * lengths[-1])
+    rest = points_along(ring, np.arange(COMPARED_POINTS) / COMPARED_POINTS * lengths[-1])
     return rest, bending.forward(rest)

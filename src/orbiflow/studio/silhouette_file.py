@@ -26,8 +26,8 @@ from orbiflow.tiles import (
 )
 
 SILHOUETTE, BACKDROP, MEND = "silhouette.json", "backdrop.png", "mend.png"
-SIDE = 1200  # pixels of the backdrop's longer side
-SAMPLES = 3  # along each side of a pixel of what is drawn
+BACKDROP_SIDE_PIXELS = 1200  # pixels of the backdrop's longer side
+SUPERSAMPLING = 3  # along each side of a pixel of what is drawn
 PAPER, INK = (255, 255, 255), (70, 78, 92)
 
 
@@ -84,18 +84,20 @@ def _from_backdrop(target: Target, pixels: Array, size: tuple[int, int]) -> Arra
 def _picture(target: Target, content: FileContent) -> Image.Image:
     """Return the picture that the user is shown below the silhouette."""
     if target.kind == "image":
-        picture, _ = open_image(content, enough=SIDE)
+        picture, _ = open_image(content, enough=BACKDROP_SIDE_PIXELS)
         picture = picture.convert("RGBA" if picture.mode == "RGBA" else "RGB")
-        picture.thumbnail((SIDE, SIDE))
+        picture.thumbnail((BACKDROP_SIDE_PIXELS, BACKDROP_SIDE_PIXELS))
         return picture
     extent = target.covered.high - target.covered.low
-    width, height = np.maximum(1, np.round(extent * SIDE / extent.max())).astype(int).tolist()
+    width, height = (
+        np.maximum(1, np.round(extent * BACKDROP_SIDE_PIXELS / extent.max())).astype(int).tolist()
+    )
     return _drawn(target, (width, height), "RGB", INK, PAPER)
 
 
 def _drawn(target: Target, size: tuple[int, int], mode: str, ink: Any, paper: Any) -> Image.Image:
     """Return what was read as shape, filled."""
-    width, height = finer = size[0] * SAMPLES, size[1] * SAMPLES
+    width, height = finer = size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING
     picture = Image.new(mode, (width, height), paper)
     draw = ImageDraw.Draw(picture)
 
@@ -109,7 +111,7 @@ def _drawn(target: Target, size: tuple[int, int], mode: str, ink: Any, paper: An
             draw.polygon(points(hole.coords), fill=paper)
     if target.seen is None:
         draw.polygon(points(target.outline), fill=ink)
-    return picture.reduce(SAMPLES)
+    return picture.reduce(SUPERSAMPLING)
 
 
 def _mended(target: Target, home: Path, size: tuple[int, int]) -> Target:

@@ -26,7 +26,7 @@ from orbiflow.runtime import (
     operation,
     write_json,
 )
-from orbiflow.studio.kinds_of_work import DRAWN, file_name, making_call
+from orbiflow.studio.kinds_of_work import WITH_DRAWING, file_name, making_call
 from orbiflow.studio.settings import Job, SearchChoice
 from orbiflow.studio.tile_files import (
     PLACES,
@@ -43,8 +43,8 @@ if TYPE_CHECKING:
     from orbiflow.tiles import EscherizeSettings, EscherTile
 
 PER_CLASS = 50  # numbers that a class has for its tiles
-MORE = 4  # tiles of a class, for "more like this one"
-LONGER = {"fast": "normal", "normal": "best", "best": "best"}
+MORE_TILES = 4  # tiles of a class, for "more like this one"
+LONGER_EFFORT = {"fast": "normal", "normal": "best", "best": "best"}
 
 
 @operation("studio read")
@@ -128,8 +128,8 @@ def _search_settings(project: Path, choice: SearchChoice) -> EscherizeSettings:
         return settings.replace(classes=choice.classes) if choice.classes else settings
     return settings.replace(
         classes=_classes_like(project, choice.like),
-        effort=LONGER[choice.effort],
-        per_class=MORE,
+        effort=LONGER_EFFORT[choice.effort],
+        per_class=MORE_TILES,
         seed=choice.seed + 1,
     )
 
@@ -190,7 +190,7 @@ def open_file(job: Job, *, on_event: Sink = ignore, cancel: Cancel = NEVER) -> O
 
 
 SPACE = "space.json"
-PIXELS = (".png", ".jpg", ".jpeg", ".webp")  # of pictures on which lines can be drawn
+PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".webp")  # of pictures on which lines can be drawn
 
 
 @operation("studio space")
@@ -264,7 +264,7 @@ def with_drawing(
     if tile is not given:
         result = save_tiles([tile], scratch / "tile")
     under: Path | None = files.get("picture")
-    if under is not None and under.suffix not in PIXELS:
+    if under is not None and under.suffix not in PICTURE_ENDINGS:
         under = under.with_name("backdrop.png")
     made = drawing_settings(parts, tile, scratch, under)
     if made["picture"] is not None:
@@ -274,8 +274,8 @@ def with_drawing(
 
 PREVIEW = "preview.png"
 SCRATCH = ".drawn"  # a folder for what is written on the way
-MOST_SEEN = 30_000_000  # bytes of a solid that is drawn
-SIDE = 1000.0  # pixels of a preview's longer side
+MAX_DRAWN_BYTES = 30_000_000  # bytes of a solid that is drawn
+PREVIEW_SIDE_PIXELS = 1000.0  # pixels of a preview's longer side
 
 
 def export_folder(home: Path, task: int) -> Path:
@@ -317,7 +317,7 @@ def take(
     folder = make_folder(export_folder(job.project, job.task))
     files = {"picture": input_file(job.project)} if picture else {}
     given, result = json.loads(settings), tile_folder(job.project, tile)
-    if drawing and makes in DRAWN:
+    if drawing and makes in WITH_DRAWING:
         result, files, given = with_drawing(drawing, result, files, given, folder / SCRATCH)
     name = file_name(makes, given, result, called)
     call = making_call(makes, given, result, out=folder / name, **files)
@@ -344,7 +344,7 @@ def _preview(call: Call, first: Path, folder: Path, cancel: Cancel) -> bool:
     if first.suffix == ".png":
         shutil.copyfile(first, folder / PREVIEW)
         return True
-    if call.operation.name == "solid" and first.stat().st_size < MOST_SEEN:
+    if call.operation.name == "solid" and first.stat().st_size < MAX_DRAWN_BYTES:
         from orbiflow.tiles import read_solid, solid_picture
 
         solid_picture(read_solid(first)).save(folder / PREVIEW)
@@ -352,7 +352,9 @@ def _preview(call: Call, first: Path, folder: Path, cancel: Cancel) -> bool:
     if call.operation.name != "export":
         return False
     settings = call.arguments["settings"]
-    small = settings.replace(format="png", dpi=min(300.0, 25.4 * SIDE / max(settings.page)))
+    small = settings.replace(
+        format="png", dpi=min(300.0, 25.4 * PREVIEW_SIDE_PIXELS / max(settings.page))
+    )
     call.operation.function(
         **{**call.arguments, "settings": small, "out": folder / PREVIEW}, cancel=cancel
     )

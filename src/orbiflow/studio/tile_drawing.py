@@ -16,8 +16,8 @@ from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list, is_object, write_atomic
 from orbiflow.tiles import Bending, EscherTile, Frame, TileMap, open_image, orient, triangulate
 
-MOST_STROKES, MOST_POINTS, MOST_EYES = 2000, 100_000, 60
-FINER = 2  # pixels, across, of which one pixel of a picture with lines is the mean
+MAX_STROKES, MAX_POINTS, MAX_EYES = 2000, 100_000, 60
+SUPERSAMPLING = 2  # pixels, across, of which one pixel of a picture with lines is the mean
 COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 
 
@@ -73,12 +73,12 @@ def read_drawing(drawing: Any) -> tuple[list[Stroke], tuple[tuple[float, ...], .
     strokes, eyes = parts.get("strokes", []), parts.get("eyes", [])
     if not is_list(strokes) or not is_list(eyes):
         raise OrbiflowError("a drawing has a list of strokes and a list of eyes")
-    found = [_stroke(one) for one in strokes[: MOST_STROKES + 1]]
+    found = [_stroke(one) for one in strokes[: MAX_STROKES + 1]]
     count = sum(len(one.points) for one in found)
-    if len(found) > MOST_STROKES or count > MOST_POINTS or len(eyes) > MOST_EYES:
+    if len(found) > MAX_STROKES or count > MAX_POINTS or len(eyes) > MAX_EYES:
         raise OrbiflowError(
-            f"the drawing is too large: it may have {MOST_STROKES} lines with {MOST_POINTS} points in "
-            f"all, and {MOST_EYES} eyes; rub some out"
+            f"the drawing is too large: it may have {MAX_STROKES} lines with {MAX_POINTS} points in "
+            f"all, and {MAX_EYES} eyes; rub some out"
         )
     return found, tuple(tuple(as_array(eye, "an eye", (3,)).tolist()) for eye in eyes)
 
@@ -120,7 +120,7 @@ def _png(strokes: list[Stroke], tile: EscherTile, picture: Path) -> bytes:
 
     low, high = tile.covered[:2]
     image = open_image(picture)[0].convert("RGBA")
-    layer = Image.new("RGBA", (FINER * image.width, FINER * image.height))
+    layer = Image.new("RGBA", (SUPERSAMPLING * image.width, SUPERSAMPLING * image.height))
     pen, scale = ImageDraw.Draw(layer), layer.width / float(high[0] - low[0])
     for stroke in strokes:
         points, radius = scale * _on_page(stroke.points, tile), scale * stroke.width / 2

@@ -7,6 +7,7 @@ import unicodedata
 from pathlib import PurePosixPath
 from typing import Any
 
+from orbiflow.errors import Advice
 from orbiflow.studio.store import Store
 
 NAMES = {"tile": "New tile", "density": "New density"}
@@ -20,27 +21,28 @@ LABELS = {
     "area": "the width and height",
     "dpi": "the number of dots per inch",
     "fps": "the number of pictures per second",
+    "threshold": "edge (Where it ends)",
+    "invert": "side (The animal is)",
+    "smooth": "smoothing",
+    "thicken": "Thin parts",
 }
-"""What messages call settings whose names say too little."""
+"""What the pages call settings whose names say too little."""
 
 ON_THE_PAGE = {
-    "join them to it in the drawing, or by a larger --smooth": "more smoothing may join them",
-    "grow them by --thicken 0.04": "let them grow (Thin parts)",
-    "grow it by --thicken 0.1": "let it grow (Thin parts)",
     "with smooth 0.01": "with a little smoothing",
-    "another --threshold or --invert": "another edge (Where it ends) or another side (The animal is)",
-    "another --threshold": "another edge (Where it ends)",
     "set threshold": "set another edge (Where it ends)",
 }
-"""What messages of the reader say of its options, and what the page has for them."""
+"""What errors of the reader say of its options, and what the page has for them."""
 
 
 def page_words(text: str) -> str:
     """Return a message of the reader in the page's own words.
 
-    >>> page_words("it was read badly: try another --threshold")
-    'it was read badly: try another edge (Where it ends)'
+    >>> page_words("raise the contrast or set threshold")
+    'raise the contrast or set another edge (Where it ends)'
     """
+    if isinstance(text, Advice):
+        return text.named(lambda name: LABELS.get(name, name))
     for said, meant in ON_THE_PAGE.items():
         text = text.replace(said, meant)
     return text

@@ -36,7 +36,7 @@ from orbiflow.studio.words import page_words, plain_name
 READINGS = frozenset({"read", "density table"})
 """Tasks whose results the later ones of their project use."""
 
-WARM = (
+WARM_MODULES = (
     "orbiflow.studio.tasks",
     "orbiflow.studio.pulled_tiles",
     "orbiflow.studio.silhouette_file",
@@ -46,10 +46,10 @@ WARM = (
 )
 """What a worker has imported before there is work for it."""
 
-STEP = 0.002  # of a task: smaller progress is not told
-MOST_CALLS = 40  # of a process, one after another
-MOST_HELD = 3  # processes that are kept in memory while their tasks are paused
-FAULT = (
+MIN_PROGRESS_STEP = 0.002  # of a task: smaller progress is not told
+MAX_CALLS = 40  # of a process, one after another
+MAX_HELD = 3  # processes that are kept in memory while their tasks are paused
+FAULT_TEXT = (
     "something went wrong inside orbiflow; the server's own output says what. Try other settings."
 )
 
@@ -59,7 +59,7 @@ Spawn = Callable[[], CallProcess]
 
 def warm_process() -> CallProcess:
     """Return a process that gets ready and waits for calls."""
-    return CallProcess(modules=WARM, again=True)
+    return CallProcess(modules=WARM_MODULES, again=True)
 
 
 class WorkQueue:
@@ -148,7 +148,7 @@ class WorkQueue:
             self.store.change_task(task, state="paused")
             if process.pause():
                 self._held[task] = self._running.pop(task)
-                for oldest in list(self._held)[:-MOST_HELD]:
+                for oldest in list(self._held)[:-MAX_HELD]:
                     self._held.pop(oldest).kill()
             else:
                 self._running.pop(task).kill()
@@ -297,7 +297,7 @@ class WorkQueue:
         for processes in (self._running, self._held):
             processes.pop(number, None)
         self._calls[process] += 1
-        if lane == "quick" and process.alive and self._calls[process] < MOST_CALLS:
+        if lane == "quick" and process.alive and self._calls[process] < MAX_CALLS:
             self._spares.insert(0, process)
         else:
             del self._calls[process]
@@ -322,7 +322,7 @@ class _Told:
         with suppress(Missing):
             match event:
                 case Progress(share=share, what=what):
-                    if share >= self.share + STEP or what != self.what:
+                    if share >= self.share + MIN_PROGRESS_STEP or what != self.what:
                         self.share, self.what = share, what
                         self.store.change_task(self.number, share=share, what=what)
                 case ItemDone(name=name, state="done", what="tile"):
@@ -350,7 +350,7 @@ class _Told:
             changes |= {"state": "failed", "error": self._plain(ending.message)}
         else:
             log.error("task %s: %s", self.number, ending)
-            changes |= {"state": "failed", "error": FAULT}
+            changes |= {"state": "failed", "error": FAULT_TEXT}
         self.store.change_task(self.number, **changes)
 
     def _take_up(self, summary: dict[str, Any]) -> None:

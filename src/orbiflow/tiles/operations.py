@@ -149,9 +149,9 @@ def _figures(tile: EscherTile) -> dict[str, str]:
 def _closing(out: Path, written: bool, result: SearchResult, seconds: float) -> list[Note]:
     """What was written, or why nothing was; and the silhouette's doubts again, if they explain it."""
     from orbiflow.tiles.search import rounded_for, why_poor
-    from orbiflow.tiles.silhouette import doubts, is_hopeless
+    from orbiflow.tiles.silhouette import doubts, is_mere_line
 
-    explains = not result.tiles or is_hopeless(result.target)
+    explains = not result.tiles or is_mere_line(result.target)
     again = [Note(text, warning=True) for text in doubts(result.target)] if explains else []
     if poor := why_poor(result.tiles[0]) if result.tiles else "":
         again = [Note(poor), *again]

@@ -10,7 +10,7 @@ from orbiflow.errors import CertificationError
 from orbiflow.tiles import CLASSES, TileModel, certify, subdivided
 from orbiflow.tiles.flowing import tile_model
 from orbiflow.tiles.flowing.tile_model import converge, extract_tile
-from orbiflow.tiles.search.candidates import DENSE, TOLERANCES
+from orbiflow.tiles.search.candidates import SAMPLE_COUNTS, TOLERANCES
 from strategies import error_estimate
 
 
@@ -76,7 +76,7 @@ def test_polygon_follows_the_curve(name: str) -> None:
     assert (model.flow.steps, model.flow.method) == settings_before
     kind = CLASSES[name]
     with torch.no_grad():
-        pieces = 2 * -(-DENSE[0] // (2 * len(kind.template())))
+        pieces = 2 * -(-SAMPLE_COUNTS[0] // (2 * len(kind.template())))
         curve = fine(subdivided(fine.prototile()[0], pieces))[0].numpy()
     assert tile.isohedral_class == name
     assert len(tile.corners) == len(kind.template())
@@ -103,7 +103,7 @@ def test_a_crossing_boundary_is_refused_unless_forced() -> None:
     with pytest.raises(CertificationError, match="IH21: the boundary crosses itself"):
         extract_tile(crossed())
     tile, _ = extract_tile(crossed(), force=True)
-    assert len(tile.polygon) == DENSE[-1]
+    assert len(tile.polygon) == SAMPLE_COUNTS[-1]
     certificate = certify(tile)
     assert not certificate.valid
     assert "not simple: self-intersection" in certificate.reasons[0]

@@ -25,7 +25,7 @@ from orbiflow.tiles import (
     isohedral_class,
     trainable,
 )
-from orbiflow.tiles.flowing.descent import CALM, Descent
+from orbiflow.tiles.flowing.descent import MAX_STEP_STEEPNESS, Descent
 from orbiflow.tiles.flowing.starts import template_starts
 from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.likeness import boundary_iou
@@ -83,8 +83,8 @@ def test_steps_are_injective(name: str, soft: SoftTarget) -> None:
             columns.append((ahead - behind) / (2 * h))
         jacobian = torch.stack(columns, dim=-1)
         norms = torch.linalg.matrix_norm(jacobian, ord=2)
-        assert norms.max() <= CALM * 1.01
-        assert norms.max() * (1 + CALM / 2) < 1
+        assert norms.max() <= MAX_STEP_STEEPNESS * 1.01
+        assert norms.max() * (1 + MAX_STEP_STEEPNESS / 2) < 1
 
 
 def test_descent_climbs(soft: SoftTarget) -> None:

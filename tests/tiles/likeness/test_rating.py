@@ -18,7 +18,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import wallpaper_group
 from orbiflow.tiles import EscherTile, Fidelity, Rating, SearchResult, Target, Tile, rank_score
-from orbiflow.tiles.likeness.ranking import WORDS
+from orbiflow.tiles.likeness.ranking import STAR_WORDS
 from orbiflow.tiles.search.finished_tiles import rated
 
 DATA = Path(__file__).parents[3] / "benchmarks" / "data"
@@ -30,7 +30,7 @@ def test_stars_follow_the_order_of_scores(scores: list[float]) -> None:
     ratings = [Rating.of_likeness(score) for score in sorted(scores, reverse=True)]
     stars = [rating.stars for rating in ratings]
     assert stars == sorted(stars, reverse=True)
-    words = [list(WORDS.values()).index(rating.word) for rating in ratings]
+    words = [list(STAR_WORDS.values()).index(rating.word) for rating in ratings]
     assert words == sorted(words)
 
 
@@ -124,7 +124,7 @@ def test_a_score_means_the_same_for_long_outlines(shown: list[Marked]) -> None:
 
 
 def test_words_agree_with_marks_as_the_docs_say(shown: list[Marked]) -> None:
-    place = list(WORDS.values()).index
+    place = list(STAR_WORDS.values()).index
     pairs = [
         (place(Rating.of_likeness(score).word), place(Rating.of_mark(mark).word))
         for one in shown

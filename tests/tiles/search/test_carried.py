@@ -28,8 +28,8 @@ def bending(name: str, mirrored: bool = False) -> tuple[BentTile, Bending]:
 
 
 def outline(case: BentTile) -> Array:
-    hand = case.bent.hand
-    return hand.outline * (1.0, -1.0) if hand.mirrored else hand.outline
+    side = case.bent.orientation
+    return side.outline * (1.0, -1.0) if side.mirrored else side.outline
 
 
 def points_in(ring: Array, count: int, seed: int = 0) -> Array:
@@ -62,10 +62,10 @@ def test_the_outline_lands_on_the_certified_polygon(name: str, mirrored: bool) -
 @pytest.mark.parametrize(("name", "mirrored"), [("IH4", False), ("IH21", True)])
 def test_points_of_the_body_go_where_it_was_bent(name: str, mirrored: bool) -> None:
     case, carried = bending(name, mirrored)
-    rest = case.bent.hand.fine.mesh.points * ((1.0, -1.0) if mirrored else (1.0, 1.0))
+    rest = case.bent.orientation.fine.mesh.points * ((1.0, -1.0) if mirrored else (1.0, 1.0))
     apart = np.linalg.norm(carried.forward(rest) - case.images, axis=1)
     assert np.median(apart) < 0.02  # what is inside moves where it was folded
-    on_outline = apart[: case.bent.hand.fine.size]
+    on_outline = apart[: case.bent.orientation.fine.size]
     assert np.quantile(on_outline, 0.8) < 1e-3  # the polygon is simplified by 5e-4
     assert on_outline.max() < 0.015  # half a step: points may lie beside the tile's sharp vertices
 

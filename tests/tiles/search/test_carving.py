@@ -15,9 +15,9 @@ from orbiflow.tiles.likeness import Elastic, kept_of
 from orbiflow.tiles.search import bending, carving
 from orbiflow.tiles.search.bending import Bent, bent_tiles
 from orbiflow.tiles.search.carving import WRINKLE_COST, Carved, _Laid, carved
-from orbiflow.tiles.search.co_deformation import BentTiles, hands, held_on_tiles
+from orbiflow.tiles.search.co_deformation import BentTiles, held_on_tiles, orientations
 from orbiflow.tiles.search.tile_space import TileSpace, best_placements
-from outlines import SMALL, animal, squirrel_hands
+from outlines import SMALL, animal, squirrel_orientations
 
 PLAIN = replace(SMALL, carved=0)
 SPIDER = replace(SMALL, finalists=2)
@@ -25,7 +25,7 @@ NAMES = ("IH2", "IH4", "IH5", "IH7", "IH28", "IH8", "IH69")  # the last two: a h
 
 
 def bend(name: str) -> tuple[Elastic, TileSpace, BentTiles]:
-    kind, body = isohedral_class(name), squirrel_hands()[0].fine
+    kind, body = isohedral_class(name), squirrel_orientations()[0].fine
     own = best_placements(kind, body.rest[: body.size], 1)
     space = TileSpace(kind, own)
     return body, space, held_on_tiles(body, space, body.rest[:, None], 8)
@@ -115,13 +115,13 @@ def test_gradients_of_laid_points(smooth: bool) -> None:
 
 def test_tiles_that_cross_themselves_are_carved_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a spider, most of whose bent tiles do."""
-    both, kind = hands(animal("nagata/spider_120.dat"), SPIDER), CLASSES["IH7"]
+    both, kind = orientations(animal("nagata/spider_120.dat"), SPIDER), CLASSES["IH7"]
 
     def found() -> tuple[list[Bent], int]:
         return bent_tiles(both, kind, SPIDER)
 
     tiles, crossed = found()
-    monkeypatch.setattr(bending, "REPAIRED", 0)
+    monkeypatch.setattr(bending, "MAX_REPAIRED", 0)
     before, also = found()
     assert crossed == also > 0
     assert tiles[0].score > before[0].score + 0.02
@@ -131,11 +131,12 @@ def test_tiles_that_cross_themselves_are_carved_apart(monkeypatch: pytest.Monkey
 
 def test_a_search_that_carves_has_better_tiles() -> None:
     plain, best = (
-        bent_tiles(squirrel_hands()[:1], CLASSES["IH4"], settings)[0] for settings in (PLAIN, SMALL)
+        bent_tiles(squirrel_orientations()[:1], CLASSES["IH4"], settings)[0]
+        for settings in (PLAIN, SMALL)
     )
     assert best[0].score >= plain[0].score
     assert best[0].fidelity.mark > plain[0].fidelity.mark + 0.1
-    again = bent_tiles(squirrel_hands()[:1], CLASSES["IH4"], SMALL)[0]
+    again = bent_tiles(squirrel_orientations()[:1], CLASSES["IH4"], SMALL)[0]
     assert np.array_equal(again[0].points, best[0].points)
 
 
@@ -143,7 +144,7 @@ def test_parts_that_are_pinned_are_not_carved() -> None:
     target = animal("squirrel.dat")
     pins = Pins.at(target, [(400.0, 450.0)])
     found = [
-        bent_tiles(hands(target, own, pins=pins)[:1], CLASSES["IH4"], own)[0]
+        bent_tiles(orientations(target, own, pins=pins)[:1], CLASSES["IH4"], own)[0]
         for own in (PLAIN, SMALL)
     ]
     assert np.array_equal(found[0][0].points, found[1][0].points)

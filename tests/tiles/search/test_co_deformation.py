@@ -21,9 +21,9 @@ from orbiflow.tiles import (
 from orbiflow.tiles.flowing.tile_model import extract_tile
 from orbiflow.tiles.likeness import Elastic
 from orbiflow.tiles.search.bending import bent_tiles
-from orbiflow.tiles.search.co_deformation import BODIES, drawn_to_tiles, hands, held_on_tiles
+from orbiflow.tiles.search.co_deformation import BODIES, drawn_to_tiles, held_on_tiles, orientations
 from orbiflow.tiles.search.tile_space import Placements, TileSpace, best_placements
-from outlines import SMALL, animal, bent_squirrel, flowless, squirrel_hands
+from outlines import SMALL, animal, bent_squirrel, flowless, squirrel_orientations
 from strategies import seeds
 
 RING = resampled(animal("squirrel.dat").normal, 60)
@@ -110,8 +110,8 @@ def tile_body(name: str) -> tuple[Elastic, TileSpace]:
 )
 def test_bent_squirrels_certify(name: str, mirrored: bool) -> None:
     case = bent_squirrel(name, mirrored)
-    bent, n = case.bent, case.bent.hand.fine.size
-    assert bent.hand.mirrored == mirrored
+    bent, n = case.bent, case.bent.orientation.fine.size
+    assert bent.orientation.mirrored == mirrored
     certificate = certify(case.tile)
     assert certificate.valid
     ring = case.images[:n]
@@ -125,7 +125,7 @@ def test_the_model_keeps_every_vertex() -> None:
     case = bent_squirrel("IH4")
     model = flowless("IH4", case.bent, case.factor, case.shift)
     place = model.place(model.prototile()[0]).detach().numpy()[0]
-    n = case.bent.hand.fine.size
+    n = case.bent.orientation.fine.size
     order = (np.arange(n) + case.bent.placement.starts[0]) % n
     vertices = plane_points(case.factor * case.bent.ring + case.shift)
     assert abs(place - vertices[order]).max() < 1e-12
@@ -135,7 +135,7 @@ def test_the_model_keeps_every_vertex() -> None:
 def test_finalists_are_in_order_and_told() -> None:
     told: list[tuple[float, float]] = []
     several = replace(SMALL, finalists=3, multiples=(2,), below=1)
-    own = hands(animal("squirrel.dat"), several), CLASSES["IH5"], several
+    own = orientations(animal("squirrel.dat"), several), CLASSES["IH5"], several
     found, dropped = bent_tiles(*own, lambda *step: told.append(step))
     shares = [share for share, _ in told]
     assert shares == sorted(shares)
@@ -150,10 +150,10 @@ def test_finalists_are_in_order_and_told() -> None:
 def test_more_rounds_cost_no_more() -> None:
     """By what a firm body minimises; the order of tiles has another measure."""
     firm = replace(SMALL, bodies=("firm",), carved=0)
-    hand, kind = squirrel_hands()[0], CLASSES["IH5"]
+    side, kind = squirrel_orientations()[0], CLASSES["IH5"]
     settings = (firm, replace(firm, rounds=40))
-    found = [bent_tiles([hand], kind, own)[0][0].points[:, None] for own in settings]
-    _, _, body = hand.bodies(BODIES["firm"])
+    found = [bent_tiles([side], kind, own)[0][0].points[:, None] for own in settings]
+    _, _, body = side.bodies(BODIES["firm"])
     few, more = (float(objective(body, z)[0]) for z in found)
     assert more < few
     assert SMALL.rounds < 40
@@ -162,7 +162,9 @@ def test_more_rounds_cost_no_more() -> None:
 def test_judged_finalists_have_better_marks_and_are_no_twins() -> None:
     few = replace(SMALL, starts=5, finalists=2, bodies=("firm",), carved=0)
     judged = replace(few, judged=True)
-    found = [bent_tiles(squirrel_hands()[:1], CLASSES["IH4"], own)[0] for own in (few, judged)]
+    found = [
+        bent_tiles(squirrel_orientations()[:1], CLASSES["IH4"], own)[0] for own in (few, judged)
+    ]
     plain, best = (max(bent.fidelity.mark for bent in tiles) for tiles in found)
     assert best > plain + 0.05
     assert len(found[1]) > 1
@@ -177,7 +179,7 @@ def test_symmetric_tiles_are_searched_at_lower_efforts_too() -> None:
 def test_more_effort_never_scores_less() -> None:
     fast, normal = (LikenessSearch.for_effort(effort) for effort in ("fast", "normal"))
     normal = replace(normal, placements=40, held=12, starts=4, rounds=8)
-    both = hands(animal("squirrel.dat"), replace(SMALL, multiples=(2,)))
+    both = orientations(animal("squirrel.dat"), replace(SMALL, multiples=(2,)))
     found = [bent_tiles(both, CLASSES["IH5"], settings)[0] for settings in (fast, normal)]
     fast, normal = ([bent.score for bent in tiles] for tiles in found)
     assert normal[0] >= fast[0]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from orbiflow.runtime import Cancel, Cancelled
 from orbiflow.tiles import CLASSES, complex_points, plane_points, resampled, signed_area
 from orbiflow.tiles.likeness import Elastic, fidelity
-from orbiflow.tiles.search.co_deformation import CROSSED, _moves, shifted
+from orbiflow.tiles.search.co_deformation import CROSSING_COST, _moves, shifted
 from orbiflow.tiles.search.tile_space import Placements, TileSpace, best_placements
 from outlines import animal
 from strategies import seeds
@@ -94,7 +94,7 @@ def test_what_is_judged_moves_to_better_marks(name: str) -> None:
     own = (BODY, kind, best_placements(kind, complex_points(RING), 6), at_rest(BODY, 6))
     stay = shifted(*own, [], share=0.3, judged=True)
     gone = shifted(*own, [(2, 6), (1, 6)], share=0.3, judged=True)
-    sound = gone.costs < CROSSED
+    sound = gone.costs < CROSSING_COST
     marks = [fidelity(BODY.rest[: BODY.size], z[: BODY.size], 0.0).mark for z in gone.points.T]
     assert np.allclose(np.log(gone.costs[sound]), -np.array(marks)[sound])
     assert (np.diff(gone.costs) >= 0).all()

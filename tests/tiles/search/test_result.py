@@ -21,7 +21,7 @@ from orbiflow.tiles import (
     subdivided,
 )
 from orbiflow.tiles.result_file import tile_json
-from orbiflow.tiles.search.candidates import DENSE
+from orbiflow.tiles.search.candidates import SAMPLE_COUNTS
 from orbiflow.tiles.search.finished_tiles import best_tiles
 from strategies import random_tensor
 
@@ -115,7 +115,7 @@ def test_a_file_alone_places_the_tile_in_the_input(name: str, y_down: bool, tmp_
     saved = TileMap.read(path)
     assert saved.frame is not None
     loaded = as_model(saved)
-    pieces = 2 * -(-DENSE[0] // (2 * len(kind.template())))
+    pieces = 2 * -(-SAMPLE_COUNTS[0] // (2 * len(kind.template())))
     with torch.no_grad():
         curve = saved.frame.to_input(loaded(subdivided(loaded.prototile()[0], pieces)))[0].numpy()
     # half of the polygon is flowed, the other half its image: the map has both

@@ -36,7 +36,7 @@ from orbiflow.tiles.geometry import polygons_in, resampled
 from orbiflow.tiles.likeness import fidelity_to_original
 from orbiflow.tiles.search import Goal, SearchMethod, rounded_for, why_poor
 from orbiflow.tiles.search.candidates import OnProgress, StillTiles
-from orbiflow.tiles.search.likeness_search import ROUNDED_OFF
+from orbiflow.tiles.search.likeness_search import ROUNDED_SHARES
 from orbiflow.tiles.search.search_method import Sketches
 from orbiflow.tiles.search.search_record import best_of
 from orbiflow.tiles.tilings import IsohedralClass
@@ -69,7 +69,7 @@ class Hairless(SearchMethod):
 
 @pytest.fixture(scope="module")
 def found() -> SearchResult:
-    limit = (HAIR.normal[:, 1].max() + HAIR.smoothed(ROUNDED_OFF[0]).normal[:, 1].max()) / 2
+    limit = (HAIR.normal[:, 1].max() + HAIR.smoothed(ROUNDED_SHARES[0]).normal[:, 1].max()) / 2
     return searched(limit)
 
 
@@ -80,7 +80,7 @@ def searched(highest: float) -> SearchResult:
 
 def test_such_a_class_gets_a_tile_of_what_is_left(found: SearchResult) -> None:
     assert found.failures == []
-    assert [tile.smoothed for tile in found.tiles] == [ROUNDED_OFF[0]] * 2
+    assert [tile.smoothed for tile in found.tiles] == [ROUNDED_SHARES[0]] * 2
     assert all(tile.certificate.valid for tile in found.tiles)
 
 
@@ -116,7 +116,7 @@ def test_it_is_said_and_kept(found: SearchResult, tmp_path: Path) -> None:
         found.tiles, HAIR, ["IH4", "IH6"]
     )
     save_tiles(found.tiles[:1], tmp_path / "tile")
-    assert read_result(tmp_path / "tile").smoothed == ROUNDED_OFF[0]
+    assert read_result(tmp_path / "tile").smoothed == ROUNDED_SHARES[0]
 
 
 def test_a_blob_is_no_good_likeness_of_a_spider() -> None:
@@ -160,8 +160,8 @@ ANIMAL = Target.read(Path(__file__).parents[3] / "examples" / "silhouettes" / "s
 def test_what_was_said_to_matter_is_not_rounded_off() -> None:
     own, plain = LikenessSearch(), Goal(HAIR)
     spot = (2.08, 3.5, 0.6)
-    assert [share for share, _ in own.goals(plain)] == [0, *ROUNDED_OFF]
-    assert [share for share, _ in Sketches(own).goals(plain)] == [*ROUNDED_OFF, 0]
+    assert [share for share, _ in own.goals(plain)] == [0, *ROUNDED_SHARES]
+    assert [share for share, _ in Sketches(own).goals(plain)] == [*ROUNDED_SHARES, 0]
     pinned = replace(plain, pins=Pins.at(HAIR, [spot]))
     assert own.goals(pinned) == Sketches(own).goals(pinned) == [(0, pinned)]
     everything = Emphasis(np.ones((4, 4), np.float32), (-3.0, -3.0, 3.0, 3.0), 4.0, "mask.png")

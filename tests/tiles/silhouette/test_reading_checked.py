@@ -110,8 +110,8 @@ def test_a_gap_is_closed_and_its_part_kept(tmp_path: Path) -> None:
         (said,) = doubts(apart)
         assert "24." in said
         assert "a part apart from the rest" in said
-        assert "--smooth" in said
-        assert ("--threshold" in said) == (file.suffix == ".png")
+        assert "larger smooth" in said
+        assert ("another threshold" in said) == (file.suffix == ".png")
         joined = ReadingSettings(smooth=0.03).read(file)
         assert not doubts(joined)
         assert joined.outline.max(axis=0)[0] == pytest.approx(350, abs=1)
@@ -127,7 +127,7 @@ def test_a_hole_that_may_be_background_is_warned_of(tmp_path: Path) -> None:
         return doubts(ReadingSettings().read(tmp_path / "a.png"))
 
     assert "large holes were filled" in read(60)[0]
-    assert "--invert" in read(60)[0]
+    assert "another invert" in read(60)[0]
     assert not read(10)  # an eye
     assert not read(140)  # the line of a drawing
 

@@ -97,15 +97,16 @@ def test_growing_is_said_and_comes_before_smoothing() -> None:
 
 def test_legs_that_are_too_thin_are_said_before_a_search() -> None:
     (said,) = doubts(spider(4))
-    assert "grow them by --thicken 0.04" in said
+    assert "let them grow (--thicken) by 0.04" in said.named(lambda name: f"--{name}")
+    assert "let them grow (thicken) by 0.04" in said
     assert not doubts(spider(4).thickened(0.04))
     assert not doubts(spider(30))
     for file in FOLDER.rglob("*.*"):
         if file.suffix in (".dat", ".svg", ".png"):
-            assert "--thicken" not in " ".join(doubts(Target.read(file))), file
+            assert "(thicken)" not in " ".join(doubts(Target.read(file))), file
 
 
 def test_a_thread_can_be_grown() -> None:
     thread = Target.from_polygon([[0, 0], [200, 0], [200, 4], [0, 4]])
-    assert "--thicken 0.1" in " ".join(doubts(thread))
+    assert "(thicken) by 0.1" in " ".join(doubts(thread))
     assert not doubts(thread.thickened(0.1))

@@ -38,14 +38,14 @@ from orbiflow.typed_torch import linalg
 if TYPE_CHECKING:
     from orbiflow.tiles.flowing.overlap_search import OverlapSearch
 
-CALM = 0.4  # step length times the field's steepness, at most; less where `calm` finds it too bold
+MAX_STEP_STEEPNESS = 0.4  # of a step's length times the field's steepness
 
 
-def calm(field: FourierField) -> float:
-    """`CALM`, or as much less as makes every midpoint step injective whatever the field's group."""
+def max_step_steepness(field: FourierField) -> float:
+    """Return `MAX_STEP_STEEPNESS`, or less where midpoint steps would not be injective otherwise."""
     factor = group_factor(field.group, field.basis)
     safe = METHODS["midpoint"].injective_below
-    return min(CALM, safe / factor) if factor else CALM  # a constant field is as calm as can be
+    return min(MAX_STEP_STEEPNESS, safe / factor) if factor else MAX_STEP_STEEPNESS
 
 
 class Descent:
@@ -77,7 +77,7 @@ class Descent:
         self.model = model
         self.field = model.fourier_fields()[0]
         magnitude = torch.tensor(self.field.basis.magnitude, dtype=torch.float32)
-        self.magnitude, self.calm = magnitude, calm(self.field)
+        self.magnitude, self.steepest = magnitude, max_step_steepness(self.field)
 
     def _pose(self) -> dict[str, torch.nn.Parameter]:
         names = ["angle", "offset", "log_scale"] + ["stretch"] * self.settings.lattice
@@ -120,7 +120,7 @@ class Descent:
         size = slope.square().sum(dim=-1).amax(dim=1).sqrt() * self.model.log_scale.exp()
         steep = steepness(self.momentum, self.magnitude)
         tiny = torch.finfo(size.dtype).tiny
-        time = torch.minimum(reach / size.clamp_min(tiny), self.calm / steep.clamp_min(tiny))
+        time = torch.minimum(reach / size.clamp_min(tiny), self.steepest / steep.clamp_min(tiny))
         h = time[:, None, None]
         self.points = self.points + h * velocity(self.points + h / 2 * slope)
         self.record.append(time[:, None] * self.momentum)
@@ -155,9 +155,9 @@ def between(ends: tuple[float, float], share: float) -> float:
     return ends[0] * (ends[1] / ends[0]) ** share
 
 
-SMOOTHNESS = 1.25  # exponent s of the preconditioning (1 + |kappa|^2)^-s
-STEPS = 2  # midpoint steps through the new segment; each stays injective
-STALL = 2e-5  # polishing stops when ten iterations together gain less IoU than this
+PRECONDITIONING_EXPONENT = 1.25  # exponent s of the preconditioning (1 + |kappa|^2)^-s
+SEGMENT_STEPS = 2  # midpoint steps through the new segment; each stays injective
+MIN_GAIN = 2e-5  # polishing stops when ten iterations together gain less IoU than this
 
 
 def polish(
@@ -192,10 +192,10 @@ class _Polish:
         self.field = FourierField(
             model.group, model.max_frequency, batch=1, smoothness=0.0, dtype=torch.float64
         )
-        self.flow = Flow([self.field], steps=STEPS, method="midpoint", warn=False)
+        self.flow = Flow([self.field], steps=SEGMENT_STEPS, method="midpoint", warn=False)
         magnitude = torch.tensor(self.field.basis.magnitude, dtype=torch.float64)
-        self.scale = (1 + magnitude**2) ** (-SMOOTHNESS / 2)
-        self.magnitude, self.limit = magnitude, calm(self.field) * STEPS
+        self.scale = (1 + magnitude**2) ** (-PRECONDITIONING_EXPONENT / 2)
+        self.magnitude, self.limit = magnitude, max_step_steepness(self.field) * SEGMENT_STEPS
         pose = (self.model.angle, self.model.log_scale, self.model.offset, self.model.stretch)
         self.pose = [parameter for parameter in pose if parameter.numel()]
         self.start = [p.detach().clone() for p in self.pose]
@@ -216,8 +216,8 @@ class _Polish:
         parameters = self._set(values)
         placed = self.model.place(self.flow(self.points))
         ring = placed.detach()[0].numpy()
-        calm = steepness(self.field.parameters_.detach(), self.magnitude) <= self.limit
-        if not (calm and shapely.Polygon(ring).is_valid):
+        is_flat_enough = steepness(self.field.parameters_.detach(), self.magnitude) <= self.limit
+        if not (is_flat_enough and shapely.Polygon(ring).is_valid):
             return 1.0, self.gradient  # a barrier: the line search turns back
         value, gradient = self.overlap.iou(ring)
         if value > self.best_iou:
@@ -231,7 +231,7 @@ class _Polish:
     def stalled(self, xk: Array) -> None:  # noqa: ARG002 - SciPy's name
         """Stops the iteration when the last ten brought nothing."""
         self.history.append(self.best_iou)
-        if len(self.history) > 10 and self.history[-1] - self.history[-11] < STALL:
+        if len(self.history) > 10 and self.history[-1] - self.history[-11] < MIN_GAIN:
             raise StopIteration
 
     def result(self) -> TileModel:
@@ -257,8 +257,8 @@ class _Polish:
 
 
 # Starts from the outline, and IoU of the best of them, below which the template's join them
-FEW, POOR = 8, 0.4
-NEAR = 0.01  # IoU that a more recognisable candidate of a class may be behind the best
+MIN_STARTS, MIN_START_IOU = 8, 0.4
+MAX_IOU_BEHIND = 0.01  # IoU that a more recognisable candidate of a class may be behind the best
 
 
 def fit_descent(
@@ -364,7 +364,7 @@ def _best_first(target: Target, goal: shapely.Polygon, soft: SoftTarget, descent
     iou = _overlaps(goal, soft, descent)
     recognise = Recogniser(target.normal)
     scores = [
-        rank_score(overlap, recognise(ring).score) - float(overlap < iou.max() - NEAR)
+        rank_score(overlap, recognise(ring).score) - float(overlap < iou.max() - MAX_IOU_BEHIND)
         if overlap >= 0
         else -2.0
         for overlap, ring in zip(iou, boundaries, strict=True)
@@ -391,7 +391,7 @@ def _starts(
             phase=phase,
             cancel=cancel,
         )
-        if len(found.prototiles) >= FEW and found.iou.max() >= POOR:
+        if len(found.prototiles) >= MIN_STARTS and found.iou.max() >= MIN_START_IOU:
             return found
     templates = template_starts(
         kind,

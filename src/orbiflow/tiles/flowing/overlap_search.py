@@ -21,11 +21,11 @@ from orbiflow.tiles.tilings import CLASSES, ISOHEDRAL_TYPES, IsohedralClass
 NotNegative = Annotated[float, Range(0)]
 Positive = Annotated[float, Range(above=0)]
 
-POINTS = 60  # points of the outline that the preview looks at
+PREVIEW_POINTS = 60  # points of the outline that the preview looks at
 # Length of an outline, in square roots of its area, up to which the settings are as they are
-PLAIN = 8.0
-RAGGED = 3.5  # power of the length beyond, by which the number of starts grows
-MOST_TIMES = 6.0  # what a ragged outline may multiply the starts by
+USUAL_LENGTH = 8.0
+RAGGEDNESS_POWER = 3.5  # power of the length beyond, by which the number of starts grows
+MAX_MORE_STARTS = 6.0  # what a ragged outline may multiply the starts by
 
 
 EFFORTS: Mapping[str, Mapping[str, Any]] = {
@@ -133,9 +133,9 @@ class OverlapSearch(Settings, SearchMethod):
             return super().sketch(goal, kind, cancel)
         few: dict[str, Any] = {
             "count": 3,
-            "resolutions": (POINTS,),
+            "resolutions": (PREVIEW_POINTS,),
             "measured": 40,
-            "vertices": POINTS,
+            "vertices": PREVIEW_POINTS,
         }
         own = outline_starts(goal.target, kind, **few, cancel=cancel).prototiles
         if not len(own):
@@ -152,7 +152,7 @@ class OverlapSearch(Settings, SearchMethod):
 
     def for_outline(self, length: float) -> OverlapSearch:
         """More starts for a ragged silhouette, with an outline of this `length`; a disc has 3.5."""
-        share = min(max((length / PLAIN) ** RAGGED, 1.0), MOST_TIMES)
+        share = min(max((length / USUAL_LENGTH) ** RAGGEDNESS_POWER, 1.0), MAX_MORE_STARTS)
         (steps, kept), *later = self.stages
         return replace(
             self,

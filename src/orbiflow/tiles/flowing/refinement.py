@@ -26,13 +26,13 @@ from orbiflow.tiles.tilings import certify
 Loss = Callable[[Tensor], Tensor]
 """A differentiable function of a polygon (N, 2), float64, that gives one number."""
 
-HALVINGS = 25  # of a step, until it lowers the loss and the outline does not touch itself
-LEAST_GAIN = 1e-5  # of eight steps, as a share of what all gained, for the descent to go on
+MAX_HALVINGS = 25  # of a step, until it lowers the loss and the outline does not touch itself
+MIN_GAIN = 1e-5  # of eight steps, as a share of what all gained, for the descent to go on
 # in square roots of the area
-SMOOTHING = 0.6  # wavelength below which moves are damped
-LONGEST_MOVE = 0.1  # of a vertex in one step
-CLEARANCE = 2e-3  # least width of gaps and necks
-LEAST_SIDE = 1e-6  # least distance of vertices that follow each other
+SMOOTHING_WAVELENGTH = 0.6  # wavelength below which moves are damped
+MAX_MOVE = 0.1  # of a vertex in one step
+MIN_CLEARANCE = 2e-3  # least width of gaps and necks
+MIN_SIDE = 1e-6  # least distance of vertices that follow each other
 
 
 def refine(
@@ -116,7 +116,7 @@ class _Descent:
         sides = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
         self.shares = (sides + np.roll(sides, 1)) / (2 * sides.sum())
         moves = space.matrix.reshape(len(ring), 2, -1)
-        width = SMOOTHING * self.size / np.sqrt(sides * sides.sum())
+        width = SMOOTHING_WAVELENGTH * self.size / np.sqrt(sides * sides.sum())
         slopes = (np.roll(moves, -1, axis=0) - moves) * width[:, None, None]
         values = moves * np.sqrt(self.shares)[:, None, None]
         flat = np.concatenate([values, slopes]).reshape(-1, moves.shape[2])
@@ -124,7 +124,7 @@ class _Descent:
         # what moves no vertex, such as a free one that a centre holds
         metric[np.diag_indices_from(metric)] += 1e-10 * np.trace(metric) / len(metric)
         self.metric = scipy.linalg.cho_factor(metric)
-        self.clearance = min(CLEARANCE, 0.5 * _clearance(shapely.Polygon(ring)))
+        self.clearance = min(MIN_CLEARANCE, 0.5 * _clearance(shapely.Polygon(ring)))
         value, self.gradient = self.evaluated(space.start)
         if not np.isfinite([value, *self.gradient]).all():
             raise OrbiflowError("the loss of the tile, or its gradient, is not a finite number")
@@ -155,8 +155,8 @@ class _Descent:
         if not (slope < 0 and longest > 0):
             return False
         touched = False
-        length = min(self.length, LONGEST_MOVE * self.size / longest)
-        for _ in range(HALVINGS):
+        length = min(self.length, MAX_MOVE * self.size / longest)
+        for _ in range(MAX_HALVINGS):
             there = here + length * move
             outline = shapely.Polygon(self.space.polygon(there))
             if not outline.is_valid or _clearance(outline) < self.clearance:
@@ -176,7 +176,7 @@ class _Descent:
         self.gradient = gradient
         self.path.append(there)
         self.values.append(value)
-        return self.values[-8:][0] - value > LEAST_GAIN * (self.values[0] - value)
+        return self.values[-8:][0] - value > MIN_GAIN * (self.values[0] - value)
 
     def note(self) -> str:
         """Return in words what the descent did."""
@@ -192,7 +192,7 @@ def _clearance(outline: shapely.Polygon) -> float:
     Vertices that crowd together count as one, unless they come so near that rounding matters.
     """
     size = float(np.sqrt(outline.area))
-    if outline.minimum_clearance < LEAST_SIDE * size:
+    if outline.minimum_clearance < MIN_SIDE * size:
         return 0.0
-    thinned = shapely.remove_repeated_points(outline, 3 * CLEARANCE * size)
+    thinned = shapely.remove_repeated_points(outline, 3 * MIN_CLEARANCE * size)
     return float(thinned.minimum_clearance) / size

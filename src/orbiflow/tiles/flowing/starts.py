@@ -41,9 +41,9 @@ def initial_poses(isohedral_class: IsohedralClass, turns: int) -> tuple[Array, N
 
 
 # Starts differ by this share of the outline in where some corner sits, or they are twins
-APART = 0.025
+MIN_CORNER_SHIFT = 0.025
 # Standard deviations, in points, of the smoothing of outlines whose nearest tile crosses itself
-SMOOTHING = (0.0, 1.0, 2.0)
+SMOOTHING_SIGMAS = (0.0, 1.0, 2.0)
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ def _simple_tiles(
 
     Near an outline that was smoothed fewer cross: limbs are shorter, and the descent lets them grow.
     """
-    for spread in SMOOTHING:
+    for spread in SMOOTHING_SIGMAS:
         if not len(placements.starts) or wanted < 1:
             return
         smooth = outline
@@ -173,7 +173,7 @@ def _apart(scores: Array, places: Array, mirrored: NDArray[np.bool_], count: int
     chosen: list[int] = []
     for index in np.argsort(-scores, kind="stable"):
         gap = abs(places[chosen] - places[index]) % 1.0
-        near = np.minimum(gap, 1 - gap).max(axis=1) < APART
+        near = np.minimum(gap, 1 - gap).max(axis=1) < MIN_CORNER_SHIFT
         if (near & (mirrored[chosen] == mirrored[index])).any():
             continue
         chosen.append(int(index))
@@ -182,13 +182,13 @@ def _apart(scores: Array, places: Array, mirrored: NDArray[np.bool_], count: int
     return chosen
 
 
-CHUNK = 4000  # placements worked on at a time: bounds the memory at some hundred MB
+CHUNK_PLACEMENTS = 4000  # placements worked on at a time: bounds the memory at some hundred MB
 
 
 def nearest_tiles(kind: IsohedralClass, outline: Complex, placements: Placements) -> NearestTiles:
     """Project an outline (n,), counter-clockwise, onto the tiles of a class for every placement."""
     found: list[NearestTiles] = []
-    pieces = max(1, -(-len(placements.starts) // CHUNK))
+    pieces = max(1, -(-len(placements.starts) // CHUNK_PLACEMENTS))
     for index in np.array_split(np.arange(len(placements.starts)), pieces):
         space = TileSpace(kind, placements.take(index))
         found.append(space.nearest(np.broadcast_to(outline, (space.count, len(outline)))))

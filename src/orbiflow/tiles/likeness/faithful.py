@@ -49,7 +49,7 @@ from orbiflow.tiles.silhouette import sampled
 # Values of two pieces, `stretched`, `thickness`, `blunted`, `moved` and `merged`: those below which
 # differences matter little, those of a tile of medium likeness, and the marks that a unit of their
 # logarithms costs
-NEGLIGIBLE = (0.05, 0.05, 0.02, 0.02, 2.0, 0.002, 0.1)
+NEGLIGIBLE_VALUES = (0.05, 0.05, 0.02, 0.02, 2.0, 0.002, 0.1)
 USUAL_VALUES = (0.137, 0.12, 0.021, 0.105, 7.5, 0.0048, 0.15)
 WEIGHTS = (1.3, 1.65, 0.27, 0.45, 0.5, 0.27, 0.25)
 # Rough outlines forgive more: marks for the logarithm of the outline's length, and lengths, in square
@@ -60,7 +60,7 @@ USUAL_MARK = 5.8  # of a tile with usual values and of usual length
 # odds grow with it
 GOOD_MARK, STEEPNESS = 6.1, 1.6
 # What has happened where each of the measures costs marks
-LOST = (
+LOSS_WORDS = (
     "small parts such as ears and feet have lost their shapes",
     "heads and limbs are bent",
     "some parts have shrunk while others have grown",
@@ -101,13 +101,13 @@ class Fidelity:
         """The marks lost by each measure, two of them by pieces; below 0, better than usual."""
         others = self.stretched, self.thickness, self.blunted, self.moved, self.merged
         values = (*self.pieces, *others)
-        parts = zip(WEIGHTS, values, USUAL_VALUES, NEGLIGIBLE, strict=True)
+        parts = zip(WEIGHTS, values, USUAL_VALUES, NEGLIGIBLE_VALUES, strict=True)
         return tuple(w * math.log((least + x) / (least + usual)) for w, x, usual, least in parts)
 
     @property
     def lost(self) -> list[str]:
         """What is worse than usual, in words: at most two things, the worst first."""
-        worst = sorted(zip(self.losses, LOST, strict=True), reverse=True)[:2]
+        worst = sorted(zip(self.losses, LOSS_WORDS, strict=True), reverse=True)[:2]
         return [words for loss, words in worst if loss > 0]
 
     @property
@@ -193,7 +193,9 @@ def _longest_increasing(values: Array) -> list[int]:
 def mark_gradient(measures: Measures, bent: Complex) -> tuple[float, Complex]:
     """Return the mark of an outline (n,), and its gradient in the points, as of `Measures`."""
     values, along = measures.gradients(bent)
-    steep = [w / (least + x) for w, x, least in zip(WEIGHTS, values, NEGLIGIBLE, strict=True)]
+    steep = [
+        w / (least + x) for w, x, least in zip(WEIGHTS, values, NEGLIGIBLE_VALUES, strict=True)
+    ]
     return _kept(measures, values, 0.0).mark, -np.array(steep) @ along
 
 

@@ -33,7 +33,7 @@ MAX_NECK_WIDTH = 0.5  # the largest width of a neck, in square roots of the area
 PINCHED_SHARE = 0.25
 # the tolerance, in that unit, for simplifying a silhouette before necks are searched
 SIMPLIFICATION = 0.003
-SOUND_NECK_WIDTH = 0.05  # width, in square roots of the area, above which no neck looks cut through
+SAFE_NECK_WIDTH = 0.05  # width, in square roots of the area, above which no neck looks cut through
 # the distance of points on the outline, in square roots of the area: the error for tapering parts
 POINT_SPACING = 0.0125
 
@@ -69,7 +69,7 @@ def least_neck(silhouette: ArrayLike, min_neck: float) -> float:
     """Return how wide the necks of a silhouette's tiles should be, in square roots of the area.
 
     It is the larger of `min_neck` and `PINCHED_SHARE` times the silhouette's own narrowest neck,
-    the latter at most `SOUND_NECK_WIDTH`; 0 if `min_neck` is 0.
+    the latter at most `SAFE_NECK_WIDTH`; 0 if `min_neck` is 0.
 
     >>> bar = [[0.0, 0.0], [20.0, 0.0], [20.0, 0.2], [0.0, 0.2]]
     >>> least_neck(bar, 0.01), least_neck(bar, 0.1), least_neck(bar, 0.0)
@@ -81,7 +81,7 @@ def least_neck(silhouette: ArrayLike, min_neck: float) -> float:
     # a photo's outline may have 20,000 vertices, whose pairs fill gigabytes
     plain = shapely.simplify(polygon, SIMPLIFICATION * math.sqrt(polygon.area))
     ring = shapely.get_coordinates(plain.exterior)[:-1]
-    return max(min_neck, min(PINCHED_SHARE * narrowest_neck(ring).share, SOUND_NECK_WIDTH))
+    return max(min_neck, min(PINCHED_SHARE * narrowest_neck(ring).share, SAFE_NECK_WIDTH))
 
 
 def narrowest_neck(ring: ArrayLike) -> Thinnest:

@@ -16,10 +16,10 @@ from orbiflow.tiles.likeness.faithful import fidelity
 from orbiflow.tiles.likeness.metrics import iou
 from orbiflow.tiles.silhouette import sampled
 
-PAIRINGS = 12  # mirrors that are tried, by how well the directions of the outline agree
-SPRINGS = tuple(np.geomspace(1.2, 3000.0, 9))  # strengths, stage by stage
+MAX_PAIRINGS = 12  # mirrors that are tried, by how well the directions of the outline agree
+SPRING_STRENGTHS = tuple(np.geomspace(1.2, 3000.0, 9))  # strengths, stage by stage
 ROUNDS = 3  # steps in each stage
-NEAR = 0.77  # the score from which a silhouette is near to symmetric; docs/likeness.md has examples
+NEAR_SYMMETRIC_SCORE = 0.77  # a silhouette is near to symmetric from here; docs/likeness.md
 
 
 class NearSymmetry(NamedTuple):
@@ -31,7 +31,7 @@ class NearSymmetry(NamedTuple):
     @property
     def stabiliser(self) -> str:
         """The symmetry that it nearly has: "D1" for a mirror, "C2" for a half-turn, "C1" for none."""
-        if max(self) < NEAR:
+        if max(self) < NEAR_SYMMETRIC_SCORE:
             return "C1"
         return "D1" if self.mirror >= self.half_turn - 1e-9 else "C2"  # equal up to rounding
 
@@ -48,7 +48,7 @@ def near_symmetry(outline: Array) -> NearSymmetry:
     steps, points = np.roll(ring, -1) - ring, np.arange(body.size)
     sums = (np.arange(body.size)[:, None] - points) % body.size  # point i is the image of c - i
     agreement = abs((steps * steps[sums - 1]).sum(axis=1))
-    mirrors = sums[np.argsort(-agreement, kind="stable")[:PAIRINGS]]
+    mirrors = sums[np.argsort(-agreement, kind="stable")[:MAX_PAIRINGS]]
     opposite = (points + body.size // 2)[None] % body.size
     return NearSymmetry(
         _score(body, mirrors, mirrored=True), _score(body, opposite, mirrored=False)
@@ -58,7 +58,7 @@ def near_symmetry(outline: Array) -> NearSymmetry:
 def _score(body: Elastic, images: Integers, *, mirrored: bool) -> float:
     """Return the best score of the body bent until its points (C, n) are images of each other."""
     z = np.repeat(body.rest[:, None], len(images), axis=1)
-    for strength in SPRINGS:
+    for strength in SPRING_STRENGTHS:
         for _ in range(ROUNDS):
             goal = _symmetric(z[: body.size].T, images, mirrored=mirrored)
             z = body.pulled(z, goal.T, strength, 1)

@@ -18,7 +18,7 @@ from orbiflow.tiles.geometry import centroid, complex_points, orient, signed_are
 from orbiflow.tiles.likeness.faithful import GOOD_MARK, STEEPNESS
 from orbiflow.tiles.likeness.metrics import Overlap, best_overlay
 
-WORDS = {4.5: "excellent", 3.5: "good", 2.5: "fair", 1.0: "poor"}
+STAR_WORDS = {4.5: "excellent", 3.5: "good", 2.5: "fair", 1.0: "poor"}
 """The words, each with the least number of stars that has it."""
 
 MOST_STARS = 5
@@ -72,7 +72,7 @@ class Rating:
     @property
     def word(self) -> str:
         """The same in a word: excellent, good, fair or poor."""
-        return next(word for least, word in WORDS.items() if self.stars >= least)
+        return next(word for least, word in STAR_WORDS.items() if self.stars >= least)
 
     def __str__(self) -> str:
         return "★" * int(self.stars) + "½" * (self.stars % 1 > 0)

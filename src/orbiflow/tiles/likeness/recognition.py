@@ -27,17 +27,17 @@ from orbiflow.tiles.geometry import points_along, polygons_in, ring_length
 from orbiflow.tiles.likeness.metrics import Region, Shape, as_region, share
 
 POINTS = 256  # on the target's outline, and as dense on the tile's
-MOST_POINTS = 4 * POINTS  # on a tile's outline, however long it is
-FEWEST_POINTS = 8  # on each ring
+MAX_POINTS = 4 * POINTS  # on a tile's outline, however long it is
+MIN_POINTS = 8  # on each ring
 
 # Lengths in units of the square root of the target's area. Two points that are this far from each
 # other in one respect, and alike in the others, agree by 1/e.
-PLACE = 0.35
-DIRECTION = 0.85  # between unit vectors: 50 degrees
-THICKNESS = float(np.log(1.5))
-THIN = 0.05  # added to a thickness: what is thinner than this differs little
-WINDOW = 0.05  # of arc length to either side, over which a direction is taken
-THICKEST = 1.0
+PLACE_TOLERANCE = 0.35
+DIRECTION_TOLERANCE = 0.85  # between unit vectors: 50 degrees
+THICKNESS_TOLERANCE = float(np.log(1.5))
+THICKNESS_OFFSET = 0.05  # added to a thickness: what is thinner than this differs little
+DIRECTION_WINDOW = 0.05  # of arc length to either side, over which a direction is taken
+MAX_THICKNESS = 1.0
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Recogniser:
         self._start = corners[np.argmax((corners**2).sum(axis=1))]
         self._spacing = sum(ring_length(ring) for ring in rings) / POINTS
         self._target = _features(rings, self._spacing, self._start)
-        weights = 1 / (self._target.thickness + THIN)
+        weights = 1 / (self._target.thickness + THICKNESS_OFFSET)
         self._limb_weights = weights / weights.sum()
 
     def __call__(self, tile: Shape) -> Recognisability:
@@ -155,7 +155,7 @@ def _agreement(goal: _Features, own: _Features) -> Array:
 
 
 def _features(rings: list[Array], spacing: float, start: Array) -> _Features:
-    spacing = max(spacing, sum(ring_length(ring) for ring in rings) / MOST_POINTS)
+    spacing = max(spacing, sum(ring_length(ring) for ring in rings) / MAX_POINTS)
     samples = [_sample(ring, spacing, start) for ring in rings]
     points = np.concatenate([xy for xy, _ in samples])
     normals = np.concatenate([normal for _, normal in samples])
@@ -164,23 +164,25 @@ def _features(rings: list[Array], spacing: float, start: Array) -> _Features:
     before = np.concatenate([np.roll(ring, 1) for ring in by_ring])
     after = np.concatenate([np.roll(ring, -1) for ring in by_ring])
     thickness = _inscribed_radius(points, normals)
-    level = np.log(thickness + THIN)
+    level = np.log(thickness + THICKNESS_OFFSET)
     level = (level[before] + 2 * level + level[after]) / 4
-    lifted = np.column_stack([points / PLACE, normals / DIRECTION, level / THICKNESS])
+    lifted = np.column_stack(
+        [points / PLACE_TOLERANCE, normals / DIRECTION_TOLERANCE, level / THICKNESS_TOLERANCE]
+    )
     return _Features(lifted, thickness, before, after)
 
 
 def _sample(ring: Array, spacing: float, start: Array) -> tuple[Array, Array]:
     """Return evenly spaced points (P, 2) of a closed ring, and the outward normal around each.
 
-    The normal is the mean of the unit normals within `WINDOW`: shorter than 1 at a bend, so that a
-    corner and its rounding are alike.
+    The normal is the mean of the unit normals within `DIRECTION_WINDOW`: shorter than 1 at a bend, so
+    that a corner and its rounding are alike.
     """
     length = ring_length(ring)
-    count = max(round(length / spacing), FEWEST_POINTS)
+    count = max(round(length / spacing), MIN_POINTS)
     first = shapely.LinearRing(ring).project(shapely.Point(start))
     at = np.linspace(first, first + length, count, endpoint=False) + 0.5 * length / count
-    window = min(WINDOW, length / 4)
+    window = min(DIRECTION_WINDOW, length / 4)
     tangent = (points_along(ring, at + window) - points_along(ring, at - window)) / (2 * window)
     return points_along(ring, at), np.column_stack([tangent[:, 1], -tangent[:, 0]])
 
@@ -198,4 +200,4 @@ def _inscribed_radius(points: Array, normals: Array) -> Array:
     squared = cdist(points, points, "sqeuclidean")
     np.fill_diagonal(squared, np.inf)
     depth /= np.maximum(squared, 1e-18, out=squared)
-    return 1 / np.maximum(2 * depth.max(axis=1), 1 / THICKEST)
+    return 1 / np.maximum(2 * depth.max(axis=1), 1 / MAX_THICKNESS)

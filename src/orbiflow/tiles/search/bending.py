@@ -32,7 +32,7 @@ from orbiflow.tiles.search.carving import Carved, carved
 from orbiflow.tiles.search.co_deformation import (
     BODIES,
     Drawn,
-    Hand,
+    Orientation,
     drawn_to_tiles,
     held_on_tiles,
     shifted,
@@ -45,14 +45,14 @@ from orbiflow.tiles.tilings import IsohedralClass
 if TYPE_CHECKING:
     from orbiflow.tiles.search.likeness_search import LikenessSearch
 
-TWIN = 2e-4  # mean squared distance of two bent outlines below which they are twins
+TWIN_DISTANCE = 2e-4  # mean squared distance of two bent outlines below which they are twins
 FIRST_ROUNDS = 6  # steps of the minimisation for all that are held
-FOLLOWING = 60.0  # strength of the springs by which a finer body follows a coarser one
-RELAXED = 1500.0  # strength of the springs that keep a relaxed outline near its tile
-FOLLOWED = 3  # the number of times that the inside follows a carved outline
-REPAIRED = 1  # the most tiles of a class that cross themselves and are carved apart
-WORSE = 0.25  # how far below the best mark a tile that crosses itself may be to be carved apart
-ROOM = 0.012  # the gaps that carving apart leaves at least, in square roots of the area
+FOLLOWING_STRENGTH = 60.0  # strength of the springs by which a finer body follows a coarser one
+RELAXED_STRENGTH = 1500.0  # strength of the springs that keep a relaxed outline near its tile
+FOLLOW_ROUNDS = 3  # the number of times that the inside follows a carved outline
+MAX_REPAIRED = 1  # the most tiles of a class that cross themselves and are carved apart
+MAX_MARK_BEHIND = 0.25  # below the best mark: a tile that crosses itself may be carved apart
+MIN_CARVED_GAP = 0.012  # the gaps that carving apart leaves at least, in square roots of the area
 
 Item = TypeVar("Item")
 
@@ -60,7 +60,7 @@ Item = TypeVar("Item")
 class Bent(NamedTuple):
     """A bent silhouette that is a tile."""
 
-    hand: Hand  # what was bent
+    orientation: Orientation  # what was bent
     ring: Complex  # (n,) the vertices of the tile, up to a similarity
     points: Complex  # (N,) of the fine body; its outline lies on the tile
     corners: Integers  # (K,) which of these lie at the tile's corners
@@ -69,16 +69,16 @@ class Bent(NamedTuple):
     placement: Placements  # one, of the fine outline
     relaxed: Complex  # (n,) the outline let go a little: bent as it would like to be near this tile
     fidelity: Fidelity  # what is left of the outline, and what bending costs
-    sound: float  # 1, or less where a neck is too thin (`neck_factor`), or 0 if it crosses itself
+    factor: float  # of its score: 1, less where a neck is too thin, 0 if it crosses itself
 
     @property
     def score(self) -> float:
         """What finalists are ordered by."""
-        return self.fidelity.score * self.sound
+        return self.fidelity.score * self.factor
 
 
 def bent_tiles(
-    both: Sequence[Hand],
+    both: Sequence[Orientation],
     kind: IsohedralClass,
     settings: LikenessSearch,
     progress: OnProgress = silent,
@@ -86,48 +86,48 @@ def bent_tiles(
     *,
     wanted: int = 1,
 ) -> tuple[list[Bent], int]:
-    """Return finalists, at best `wanted` of each hand and without twins, and how many crossed."""
+    """Return finalists, at best `wanted` of each orientation, without twins, and how many crossed."""
     found: list[Bent] = []
     done = 0
-    sides = both[:1] if template_symmetries(kind)[1] else both
+    used = both[:1] if template_symmetries(kind)[1] else both
     searches = settings.searches(wanted, symmetric=len(kind.stabiliser) > 1)
-    tasks = [(hand, own, body) for own in searches for body in own.bodies for hand in sides]
+    tasks = [(side, own, body) for own in searches for body in own.bodies for side in used]
     never_soft = all("soft" not in own.bodies for own in searches)
     work = sum(own.starts for _, own, _ in tasks)
-    for hand, own, body in tasks:
-        finalists = _finalists(hand, BODIES[body], kind, own, cancel)
-        if never_soft and 2 * sum(bent.sound > 0 for bent in finalists) < own.finalists:
+    for side, own, body in tasks:
+        finalists = _finalists(side, BODIES[body], kind, own, cancel)
+        if never_soft and 2 * sum(bent.factor > 0 for bent in finalists) < own.finalists:
             progress(0.9 * (done + 0.5 * own.starts) / work, math.nan)
-            finalists += _finalists(hand, BODIES["soft"], kind, own, cancel)
+            finalists += _finalists(side, BODIES["soft"], kind, own, cancel)
         found, done = found + finalists, done + own.starts
         progress(0.9 * done / work, math.nan)
-    sound = _best_first([bent for bent in found if bent.sound])
-    crossed = [bent for bent in found if not bent.sound]
+    simple = _best_first([bent for bent in found if bent.factor])
+    crossed = [bent for bent in found if not bent.factor]
     if settings.carved and both[0].plain:
-        sound = _all_carved(kind, sound, crossed, max(wanted, settings.carved), settings, cancel)
-    return sound, len(crossed)
+        simple = _all_carved(kind, simple, crossed, max(wanted, settings.carved), settings, cancel)
+    return simple, len(crossed)
 
 
 def _all_carved(
     kind: IsohedralClass,
-    sound: list[Bent],
+    simple: list[Bent],
     crossed: list[Bent],
     count: int,
     settings: LikenessSearch,
     cancel: Cancel,
 ) -> list[Bent]:
-    """Carve the first of the sound tiles, and those that cross themselves but are worth it."""
-    least = max((bent.fidelity.mark for bent in sound), default=-math.inf) - WORSE
+    """Carve the first simple tiles, and those that cross themselves but are worth it."""
+    least = max((bent.fidelity.mark for bent in simple), default=-math.inf) - MAX_MARK_BEHIND
     worth = sorted(
         (bent for bent in crossed if bent.fidelity.mark > least),
         key=lambda bent: -bent.fidelity.mark,
     )
-    chosen = sound[:count] + _unlike(worth, REPAIRED, _twins)
+    chosen = simple[:count] + _unlike(worth, MAX_REPAIRED, _twins)
     done: list[Bent] = []
     for bent in chosen:
         cancel.check()
         done.append(_carved(kind, bent, settings.min_neck))
-    return _best_first([bent for bent in done if bent.sound] + sound[count:])
+    return _best_first([bent for bent in done if bent.factor] + simple[count:])
 
 
 def _best_first(found: list[Bent]) -> list[Bent]:
@@ -136,29 +136,37 @@ def _best_first(found: list[Bent]) -> list[Bent]:
 
 
 def _twins(a: Bent, b: Bent) -> bool:
-    return a.hand is b.hand and apart(a.ring, b.ring) <= TWIN
+    return a.orientation is b.orientation and apart(a.ring, b.ring) <= TWIN_DISTANCE
 
 
 def _finalists(
-    hand: Hand, stiffness: Stiffness, kind: IsohedralClass, settings: LikenessSearch, cancel: Cancel
+    side: Orientation,
+    stiffness: Stiffness,
+    kind: IsohedralClass,
+    settings: LikenessSearch,
+    cancel: Cancel,
 ) -> list[Bent]:
     """The best of one hand and stiffness worked out; some cross themselves."""
-    best = _best_placements(hand, stiffness, kind, settings, cancel)
-    _, _, fine = hand.bodies(stiffness)
+    best = _best_placements(side, stiffness, kind, settings, cancel)
+    _, _, fine = side.bodies(stiffness)
     found: list[Bent] = []
     for k in range(len(best.costs)):
         cancel.check()
         one = best.take(np.array([k]))
-        bent = _detailed(hand, fine, kind, one, settings)
+        bent = _detailed(side, fine, kind, one, settings)
         found += [] if bent is None else [bent]
     return found
 
 
 def _best_placements(
-    hand: Hand, stiffness: Stiffness, kind: IsohedralClass, settings: LikenessSearch, cancel: Cancel
+    side: Orientation,
+    stiffness: Stiffness,
+    kind: IsohedralClass,
+    settings: LikenessSearch,
+    cancel: Cancel,
 ) -> Drawn:
     """Placements of the fine outline whose tiles cost least: few points, then more and more."""
-    coarse, middle, fine = hand.bodies(stiffness)
+    coarse, middle, fine = side.bodies(stiffness)
     placements, points = _best_coarse(coarse, kind, settings)
     share = settings.share
     if middle is not fine:
@@ -209,8 +217,8 @@ def _best_coarse(
     chosen = np.argsort(rough, kind="stable")[: settings.held]
     picked = placements._replace(turns=space.turns).take(chosen)
     tiles = held_on_tiles(body, TileSpace(kind, picked), z[:, chosen], FIRST_ROUNDS)
-    costs, sound = _costs(body, tiles.points)
-    order = np.lexsort((costs, ~sound))
+    costs, simple = _costs(body, tiles.points)
+    order = np.lexsort((costs, ~simple))
     fresh = _unlike_outlines(tiles.points[: body.size].T, order.tolist(), settings.starts)
     return tiles.placements.take(fresh), tiles.points[:, fresh]
 
@@ -228,11 +236,11 @@ def _finer(
     more = placements._replace(
         lengths=placements.lengths * multiple, starts=placements.starts * multiple
     )
-    return more, finer.pulled(rest, outline, FOLLOWING, 6)
+    return more, finer.pulled(rest, outline, FOLLOWING_STRENGTH, 6)
 
 
 def _detailed(
-    hand: Hand, body: Elastic, kind: IsohedralClass, one: Drawn, settings: LikenessSearch
+    side: Orientation, body: Elastic, kind: IsohedralClass, one: Drawn, settings: LikenessSearch
 ) -> Bent | None:
     """One placement of the fine outline worked out with a body; None if nothing is left of it."""
     space = TileSpace(kind, one.placements)
@@ -240,28 +248,33 @@ def _detailed(
     ring, own = tiles.points[: body.size, 0], tiles.placements
     corners = (np.cumsum(own.lengths[0]) - own.lengths[0] + own.starts[0]) % body.size
     as_bent = Carved(ring, np.arange(body.size), corners, tiles.linear[0], tiles.offset[0])
-    return _bent(hand, body, as_bent, tiles.points, own, settings.min_neck)
+    return _bent(side, body, as_bent, tiles.points, own, settings.min_neck)
 
 
 def _carved(kind: IsohedralClass, bent: Bent, min_neck: float) -> Bent:
     """The tile carved, with room between its parts if it needs that, or as it is if no better."""
-    body, space = bent.hand.fine, TileSpace(kind, bent.placement)
+    body, space = bent.orientation.fine, TileSpace(kind, bent.placement)
     own = bent.placement._replace(turns=space.turns)
     found = [bent]
-    for room in (0.0,) * (bent.sound > 0) + (max(ROOM, 1.2 * min_neck),):
+    for room in (0.0,) * (bent.factor > 0) + (max(MIN_CARVED_GAP, 1.2 * min_neck),):
         tile = carved(body, space, bent.ring, bent.corners, room=room)
         points = bent.points[:, None]
-        for _ in range(FOLLOWED):
+        for _ in range(FOLLOW_ROUNDS):
             points = body.condensed.whole(tile.outline[:, None], body.forces(points))
-        better = _bent(bent.hand, body, tile, points, own, min_neck)
+        better = _bent(bent.orientation, body, tile, points, own, min_neck)
         found += [] if better is None else [better]
-        if better is not None and better.sound == 1:
+        if better is not None and better.factor == 1:
             break
     return max(found, key=lambda own: own.score)
 
 
 def _bent(
-    hand: Hand, body: Elastic, tile: Carved, points: Complex, placement: Placements, min_neck: float
+    side: Orientation,
+    body: Elastic,
+    tile: Carved,
+    points: Complex,
+    placement: Placements,
+    min_neck: float,
 ) -> Bent | None:
     """A tile and the shape (N, 1) of the body in it; None if there is no area, lattice or order."""
     polygon, outline = plane_points(tile.ring), points[: body.size]
@@ -272,15 +285,15 @@ def _bent(
         shapely.is_valid(shapely.Polygon(own)) for own in (polygon, plane_points(outline[:, 0]))
     )
     return Bent(
-        hand,
+        side,
         tile.ring,
         points[:, 0],
         tile.corners,
         tile.linear,
         tile.offset,
         placement,
-        body.pulled(points, outline, RELAXED, 3)[: body.size, 0],
-        kept_of(body.measures, outline[:, 0], float(hand.fine.cost(points)[0])),
+        body.pulled(points, outline, RELAXED_STRENGTH, 3)[: body.size, 0],
+        kept_of(body.measures, outline[:, 0], float(side.fine.cost(points)[0])),
         neck_factor(neck_up_to(polygon, min_neck), min_neck) if simple else 0.0,
     )
 
@@ -289,17 +302,17 @@ def _costs(body: Elastic, z: Complex) -> tuple[Array, NDArray[np.bool_]]:
     """Costs (C,) of shapes, and which of them do not cross themselves."""
     rings = plane_points(z[: body.size].T)
     area = signed_area(rings)
-    sound = np.asarray(shapely.is_valid(shapely.polygons(rings))) & (area > 0.1)
+    simple = np.asarray(shapely.is_valid(shapely.polygons(rings))) & (area > 0.1)
     return body.energy(z) / np.maximum(area, 0.1) + body.stiffness.pose * body.displacement(
         z
-    ), sound
+    ), simple
 
 
 def _unlike_outlines(outlines: Complex, order: Iterable[int], count: int) -> Integers:
     """Which outlines (C, n) come first in an order, at most `count`, without twins of earlier ones."""
 
     def twins(a: int, b: int) -> bool:
-        return apart(outlines[a], outlines[b]) <= TWIN
+        return apart(outlines[a], outlines[b]) <= TWIN_DISTANCE
 
     return np.array(_unlike(order, count, twins), dtype=np.int64)
 
@@ -318,14 +331,14 @@ def _unlike(items: Iterable[Item], count: int, twins: Callable[[Item, Item], boo
 class PlacedBent(NamedTuple):
     """A bent silhouette that is a tile, laid over the target by a similarity."""
 
-    bent: Bent  # the silhouette, in a frame of its own, mirrored if its hand is
+    bent: Bent  # the silhouette, in a frame of its own, mirrored if its orientation is
     factor: complex  # z -> factor z + shift, after which a mirrored one is reflected in the x axis
     shift: complex
 
     def place(self, z: Complex) -> Array:
         """Points (...) x + iy of the bent silhouette as points (..., 2) of the normal form."""
         placed = self.factor * z + self.shift
-        return plane_points(np.conj(placed) if self.bent.hand.mirrored else placed)
+        return plane_points(np.conj(placed) if self.bent.orientation.mirrored else placed)
 
     @property
     def outlines(self) -> tuple[Array, Array, Array]:
@@ -333,10 +346,10 @@ class PlacedBent(NamedTuple):
 
         Each is (n, 2) and counter-clockwise.
         """
-        hand, bent = self.bent.hand, self.bent
-        rest = hand.samples.fine * ((1.0, -1.0) if hand.mirrored else (1.0, 1.0))
+        side, bent = self.bent.orientation, self.bent
+        rest = side.samples.fine * ((1.0, -1.0) if side.mirrored else (1.0, 1.0))
         found = rest, self.place(bent.relaxed), self.place(bent.points[: len(rest)])
-        first, second, third = (ring[::-1] if hand.mirrored else ring for ring in found)
+        first, second, third = (ring[::-1] if side.mirrored else ring for ring in found)
         return first, second, third
 
 
@@ -344,7 +357,7 @@ def fit_bending(
     target: Target,
     kind: IsohedralClass,
     settings: LikenessSearch,
-    both: Sequence[Hand],
+    both: Sequence[Orientation],
     per_class: int,
     progress: OnProgress,
     cancel: Cancel,
@@ -356,8 +369,8 @@ def fit_bending(
     if not found:
         raise CertificationError("all tiles near the silhouette cross themselves")
     found = found[: enough + 1]  # one to spare, if one is not certified
-    overlaps = [Overlap(target.normal * (1.0, -1.0 if hand.mirrored else 1.0)) for hand in both]
-    placed = [placed_best(bent, overlaps[bent.hand.mirrored]) for bent in found]
+    overlaps = [Overlap(target.normal * (1.0, -1.0 if side.mirrored else 1.0)) for side in both]
+    placed = [placed_best(bent, overlaps[bent.orientation.mirrored]) for bent in found]
     starts = Prototiles.joined([prototile(kind, one) for one in placed])
     candidates = StillTiles(kind, starts)
     return Fit(candidates, settings.placements, dropped, enough, tuple(placed))
@@ -365,7 +378,7 @@ def fit_bending(
 
 def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:
     """Lay a bent tile over its silhouette by the similarity of largest IoU, found by L-BFGS."""
-    rest, points = bent.hand.fine.rest, bent.points
+    rest, points = bent.orientation.fine.rest, bent.points
     center = points.mean()
     ring = bent.ring - center
     factor, middle, _ = best_overlay(
@@ -377,7 +390,7 @@ def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:
 def prototile(kind: IsohedralClass, placed: PlacedBent) -> Prototiles:
     """A placed bent tile as a start tile of a flow."""
     bent, factor, shift = placed
-    n = bent.hand.fine.size
+    n = bent.orientation.fine.size
     order = (np.arange(n) + bent.placement.starts[0]) % n
     turn = np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])
     tiles = NearestTiles(
@@ -387,4 +400,4 @@ def prototile(kind: IsohedralClass, placed: PlacedBent) -> Prototiles:
         np.cumsum(bent.placement.lengths, axis=1) - bent.placement.lengths,
         np.zeros(1),
     )
-    return Prototiles.of(kind, tiles, n, mirrored=bent.hand.mirrored)
+    return Prototiles.of(kind, tiles, n, mirrored=bent.orientation.mirrored)

@@ -28,7 +28,7 @@ from orbiflow.tiles.search.bending import Bent
 from orbiflow.tiles.silhouette import Bending, Mesh, harmonic, triangulate, unfolded
 from orbiflow.tiles.tilings import Tile
 
-SAME = 1e-9  # distance along the outline, in outlines, below which points are one
+SAME_PLACE = 1e-9  # distance along the outline, in outlines, below which points are one
 SHARPENINGS = 12  # most tries to follow the outline's finest parts
 
 
@@ -38,28 +38,28 @@ def map_of_bent(bent: Bent, factor: complex, shift: complex, tile: Tile) -> Bend
     Its outline is laid onto the tile, the points between those that were bent as well; an
     `OrbiflowError` if the inside cannot follow without folds.
     """
-    hand = bent.hand
-    flip = np.array([1.0, -1.0]) if hand.mirrored else np.ones(2)
+    side = bent.orientation
+    flip = np.array([1.0, -1.0]) if side.mirrored else np.ones(2)
     z = factor * bent.points + shift
-    n = hand.fine.size
+    n = side.fine.size
     # how far along the outline each vertex of the mesh lies: all are points of it
-    knots = arc_lengths(hand.outline)
-    line = shapely.LinearRing(hand.outline)
-    vertices = shapely.points(hand.fine.mesh.points[:n])
+    knots = arc_lengths(side.outline)
+    line = shapely.LinearRing(side.outline)
+    vertices = shapely.points(side.fine.mesh.points[:n])
     along: Array = np.asarray(shapely.line_locate_point(line, vertices))
     places: Array = np.append((along - along[0]) % knots[-1], knots[-1])
     passed: Array = (knots - along[0]) % knots[-1]
     own = np.interp(passed, places, np.arange(n + 1))
-    mesh, images = divided(hand.fine.mesh, _unknown(hand.fine.mesh, own), plane_points(z))
+    mesh, images = divided(side.fine.mesh, _unknown(side.fine.mesh, own), plane_points(z))
     mesh, images = onto_polygon(
         mesh, images, tile.polygon * flip, bent.corners, np.array(tile.corners)
     )
     outline = points_along(
-        hand.outline, along[0] + np.interp(shares(mesh), np.arange(n + 1), places)
+        side.outline, along[0] + np.interp(shares(mesh), np.arange(n + 1), places)
     )
     rest = with_outline(mesh, mesh.points, outline)
     images = unfolded(mesh, images)
-    triangles = mesh.triangles[:, ::-1] if hand.mirrored else mesh.triangles
+    triangles = mesh.triangles[:, ::-1] if side.mirrored else mesh.triangles
     return Bending(rest * flip, images * flip, triangles)
 
 
@@ -105,10 +105,10 @@ def _places(ring: Array, polygon: Array, knots: Array, own: Integers, goal: Inte
         at[0], at[-1] = knots[a], knots[b]
         # vertices that are points of the edge lie exactly there
         apart = abs(loop[p : q + 1, None] - closed[None, a : b + 1]).max(axis=2)
-        same = apart.min(axis=1) < SAME
+        same = apart.min(axis=1) < SAME_PLACE
         same[[0, -1]] = False
         at = np.where(same, knots[a : b + 1][apart.argmin(axis=1)], at)
-        if (np.diff(at) <= SAME * knots[-1]).any():
+        if (np.diff(at) <= SAME_PLACE * knots[-1]).any():
             # where the edge comes back to itself the nearest point may be out of order
             at = np.interp(lengths[p : q + 1], lengths[[p, q]], knots[[a, b]])
         found[p:q] = at[:-1]
@@ -121,7 +121,7 @@ def _snapped(places: Array, known: Array, total: float) -> tuple[Array, NDArray[
     near = np.where(
         places - known[after - 1] < known[after] - places, known[after - 1], known[after]
     )
-    fresh = abs(near - places) > SAME * total
+    fresh = abs(near - places) > SAME_PLACE * total
     return np.where(fresh, places, near), fresh
 
 
@@ -144,7 +144,7 @@ def _unknown(mesh: Mesh, at: Array) -> Array:
     """Return the places (m,) on the outline, in vertices from the first, that are no points of it."""
     found = np.sort(at % mesh.size)
     found = found[_snapped(found, np.append(np.sort(shares(mesh)), mesh.size), 1.0)[1]]
-    return found[np.diff(found, prepend=-1.0) > SAME]
+    return found[np.diff(found, prepend=-1.0) > SAME_PLACE]
 
 
 def divided(mesh: Mesh, at: Array, images: Array) -> tuple[Mesh, Array]:
@@ -213,11 +213,11 @@ def carried_on(bending: Bending, before: Array, after: Array) -> Bending:
     return Bending(mesh.points, unfolded(mesh, images), mesh.triangles)
 
 
-TILE, SILHOUETTE = 240, 480  # points along the two outlines that are matched
-STEPS = 12  # most points of the silhouette that one step along the tile passes
-EVENNESS = 2e-3  # cost of a step that is not the usual two points, in areas a point squared
+TILE_POINTS, SILHOUETTE_POINTS = 240, 480  # points along the two outlines that are matched
+MAX_STEP_POINTS = 12  # most points of the silhouette that one step along the tile passes
+UNEVEN_COST = 2e-3  # cost of a step that is not the usual two points, in areas a point squared
 # Share of the matching that goes evenly round: no part of the silhouette is squeezed to nothing
-PROPORTION = 0.15
+EVEN_SHARE = 0.15
 
 
 def matched(silhouette: Array, polygon: Array) -> Bending:
@@ -230,19 +230,21 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
     rest = orient(silhouette, counter_clockwise=True)
     ring = orient(polygon, counter_clockwise=True)
     mesh = triangulate(ring)
-    tile, goal = resampled(ring, TILE), resampled(rest, SILHOUETTE)
-    first, start = np.unravel_index(cdist(tile, goal, "sqeuclidean").argmin(), (TILE, SILHOUETTE))
+    tile, goal = resampled(ring, TILE_POINTS), resampled(rest, SILHOUETTE_POINTS)
+    first, start = np.unravel_index(
+        cdist(tile, goal, "sqeuclidean").argmin(), (TILE_POINTS, SILHOUETTE_POINTS)
+    )
     steps = _matching(np.roll(tile, -first, axis=0), np.roll(goal, -start, axis=0))
-    even = np.linspace(0, SILHOUETTE, TILE + 1)
-    places = (1 - PROPORTION) * steps + PROPORTION * even
+    even = np.linspace(0, SILHOUETTE_POINTS, TILE_POINTS + 1)
+    places = (1 - EVEN_SHARE) * steps + EVEN_SHARE * even
     # what matches: how far round the polygon, in vertices, and how far round the silhouette
     knots, lengths = arc_lengths(ring), arc_lengths(rest)
-    turns, numbers = np.arange(TILE + 1), np.arange(len(knots))
+    turns, numbers = np.arange(TILE_POINTS + 1), np.arange(len(knots))
 
     def outline(mesh: Mesh) -> Array:
-        turn: Array = np.interp(shares(mesh), numbers, knots) / knots[-1] * TILE
-        place: Array = np.interp((turn - first) % TILE, turns, places) + start
-        return points_along(rest, place / SILHOUETTE * lengths[-1])
+        turn: Array = np.interp(shares(mesh), numbers, knots) / knots[-1] * TILE_POINTS
+        place: Array = np.interp((turn - first) % TILE_POINTS, turns, places) + start
+        return points_along(rest, place / SILHOUETTE_POINTS * lengths[-1])
 
     moved = mesh.points + harmonic(mesh, outline(mesh) - mesh.points[: len(shares(mesh))])
     try:
@@ -251,31 +253,31 @@ def matched(silhouette: Array, polygon: Array) -> Bending:
         raise OrbiflowError(
             "the silhouette cannot be carried to this tile without folds: they differ too much"
         ) from error
-    place: Array = (lengths / lengths[-1] * SILHOUETTE - start) % SILHOUETTE
+    place: Array = (lengths / lengths[-1] * SILHOUETTE_POINTS - start) % SILHOUETTE_POINTS
     turn = np.interp(place, places, turns)
-    along: Array = (turn + first) % TILE / TILE * knots[-1]
+    along: Array = (turn + first) % TILE_POINTS / TILE_POINTS * knots[-1]
     at = np.interp(along, knots, numbers)
     mesh, moved = divided(mesh, _unknown(mesh, at), moved)
     return Bending(with_outline(mesh, moved, outline(mesh)), mesh.points, mesh.triangles)
 
 
 def _matching(tile: Array, goal: Array) -> Array:
-    """(TILE + 1,) for each point of the tile, from 0 to SILHOUETTE, its point of the silhouette."""
+    """Return for each point of the tile, and the first again, its point of the silhouette."""
     cost = cdist(tile, np.concatenate([goal, goal[:1]]), "sqeuclidean")
     cost = np.concatenate([cost, cost[:1]])
-    pay = EVENNESS * (np.arange(STEPS + 1) - SILHOUETTE / TILE) ** 2
-    best = np.full(SILHOUETTE + 1, np.inf)
+    pay = UNEVEN_COST * (np.arange(MAX_STEP_POINTS + 1) - SILHOUETTE_POINTS / TILE_POINTS) ** 2
+    best = np.full(SILHOUETTE_POINTS + 1, np.inf)
     best[0] = 0.0
-    taken = np.zeros((TILE + 1, SILHOUETTE + 1), dtype=np.int64)
-    for i in range(1, TILE + 1):
-        options = np.full((STEPS + 1, SILHOUETTE + 1), np.inf)
-        for k in range(STEPS + 1):
-            options[k, k:] = best[: SILHOUETTE + 1 - k] + pay[k]
+    taken = np.zeros((TILE_POINTS + 1, SILHOUETTE_POINTS + 1), dtype=np.int64)
+    for i in range(1, TILE_POINTS + 1):
+        options = np.full((MAX_STEP_POINTS + 1, SILHOUETTE_POINTS + 1), np.inf)
+        for k in range(MAX_STEP_POINTS + 1):
+            options[k, k:] = best[: SILHOUETTE_POINTS + 1 - k] + pay[k]
         taken[i] = options.argmin(axis=0)
         best = options.min(axis=0) + cost[i]
-    found = np.empty(TILE + 1)
-    place = SILHOUETTE
-    for i in range(TILE, -1, -1):
+    found = np.empty(TILE_POINTS + 1)
+    place = SILHOUETTE_POINTS
+    for i in range(TILE_POINTS, -1, -1):
         found[i] = place
         place -= taken[i, place]
     return found

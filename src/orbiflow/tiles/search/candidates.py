@@ -92,7 +92,7 @@ def _pose(kind: IsohedralClass, linear: Array) -> tuple[Array, Array, Array]:
 
 
 # Least number of samples around the tile from which vertices are chosen; the second if need be
-DENSE = (960, 4320)
+SAMPLE_COUNTS = (960, 4320)
 # Largest deviation of the polygon from the sampled curve, in square roots of the tile's area
 TOLERANCES = (5e-4, 1e-4, 2e-5, 0.0)
 
@@ -115,7 +115,7 @@ def simplest_tile(
     is a `CertificationError`, unless `force` takes its finest polygon.
     """
     tile = None
-    for count in DENSE:
+    for count in SAMPLE_COUNTS:
         pieces = 2 * -(-count // (2 * len(vertices)))  # even: centres are sampled
         edges = _moved_edges(kind, vertices, corners, pieces, moved)
         placed = [edge @ linear.T + offset for edge in edges]
@@ -132,7 +132,7 @@ def simplest_tile(
     if force and tile is not None:
         return tile
     raise CertificationError(
-        f"{kind.name}: the boundary crosses itself even with {DENSE[-1]} samples"
+        f"{kind.name}: the boundary crosses itself even with {SAMPLE_COUNTS[-1]} samples"
     )
 
 

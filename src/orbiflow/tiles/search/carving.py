@@ -26,14 +26,14 @@ from orbiflow.arrays import Array, Complex, Integers
 from orbiflow.tiles.likeness import Elastic, mark_gradient, missing_gaps
 from orbiflow.tiles.search.tile_space import TileSpace
 
-STEPS = 60  # the largest number of steps while points slide, and again once they have slid
+MAX_STEPS = 60  # the largest number of steps while points slide, and again once they have slid
 WRINKLE_COST = 0.12  # in marks a radian by which the tile turns elsewhere than the silhouette
 GAP_COST = 1.0  # in marks for each point that has no gap at all
 UNEVEN_COST = 0.1  # in marks for a mean square of 1 of how much nearer points lie than vertices
 SLIDES = 36  # the number of pieces of the spline by which points slide
 SLIDE_UNIT = 1.0  # the step of the splines that counts like one of the outline
-NEAREST = 0.3  # the least distance of successive points, in vertices
-SPREAD = 3  # how many points to either side of a tile's corner move so that one lies there
+MIN_POINT_DISTANCE = 0.3  # the least distance of successive points, in vertices
+CORNER_REACH = 3  # how many points to either side of a tile's corner move so that one lies there
 
 
 class Carved(NamedTuple):
@@ -95,7 +95,7 @@ def carved(
             (fixed,),
             jac=True,
             method="L-BFGS-B",
-            options={"maxiter": STEPS, "maxcor": 20},
+            options={"maxiter": MAX_STEPS, "maxcor": 20},
         ).x
 
     whole = np.concatenate([basis.real, basis.imag])
@@ -178,7 +178,9 @@ class _Laid(NamedTuple):
 
 def _calmed(slide: Array) -> Array:
     """Return slides (n,) in proportion, so small that points keep their order and a distance."""
-    return slide * min(1.0, (1 - NEAREST) / max((slide - np.roll(slide, -1)).max(), 1e-9))
+    return slide * min(
+        1.0, (1 - MIN_POINT_DISTANCE) / max((slide - np.roll(slide, -1)).max(), 1e-9)
+    )
 
 
 def _cornered(places: Array, corners: Integers) -> tuple[Array, Integers]:
@@ -193,8 +195,8 @@ def _cornered(places: Array, corners: Integers) -> tuple[Array, Integers]:
     moved = -away[np.arange(len(own)), (own + points[0]) % n]
     fixed = dict(zip(own.tolist(), moved.tolist(), strict=True))
     for at in own.tolist():
-        for beyond in (at - SPREAD - 1, at + SPREAD + 1):
-            if all(abs((beyond - k + n / 2) % n - n / 2) > SPREAD for k in own.tolist()):
+        for beyond in (at - CORNER_REACH - 1, at + CORNER_REACH + 1):
+            if all(abs((beyond - k + n / 2) % n - n / 2) > CORNER_REACH for k in own.tolist()):
                 fixed[beyond % n] = 0.0
     known = np.array(sorted(fixed))
     shift = np.interp(np.arange(n), known, np.array([fixed[k] for k in known.tolist()]), period=n)

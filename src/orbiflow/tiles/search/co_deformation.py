@@ -36,7 +36,7 @@ from orbiflow.tiles.tilings import IsohedralClass
 if TYPE_CHECKING:
     from orbiflow.tiles.search.likeness_search import LikenessSearch
 
-TIGHTER = tuple(np.geomspace(1.2, 3000.0, 3))  # strengths of the springs, stage by stage
+SPRING_STRENGTHS = tuple(np.geomspace(1.2, 3000.0, 3))  # strengths of the springs, stage by stage
 ROUNDS = 3  # steps of choosing rotations and solving: in each stage, and of each neighbour
 
 
@@ -54,7 +54,7 @@ def drawn_to_tiles(
     kind: IsohedralClass,
     placements: Placements,
     *,
-    strengths: tuple[float, ...] = TIGHTER,
+    strengths: tuple[float, ...] = SPRING_STRENGTHS,
     rounds: int = ROUNDS,
 ) -> tuple[Complex, TileSpace]:
     """Bend a body by springs that tighten: shapes (N, C), nearly tiles, and the space of the tiles."""
@@ -121,7 +121,7 @@ BODIES = {
 
 
 @dataclass(frozen=True, eq=False)
-class Hand:
+class Orientation:
     """A silhouette or its mirror image."""
 
     mirrored: bool  # whether the latter
@@ -143,14 +143,14 @@ class Hand:
 
 
 @lru_cache(maxsize=4)  # one serves most classes
-def hands(
+def orientations(
     target: Target,
     settings: LikenessSearch,
     *,
     emphasis: Emphasis | None = None,
     pins: Pins | None = None,
     step: int = 6,
-) -> tuple[Hand, Hand]:
+) -> tuple[Orientation, Orientation]:
     """The silhouette and its mirror image in the x axis, with a multiple of `step` points."""
     phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
     outline = np.asarray(target.normal)
@@ -158,7 +158,7 @@ def hands(
     # read backwards from the same first point: every k-th fine point stays beside a coarse one
     mirror = Samples(*(reverse(part) * (1.0, -1.0) for part in samples))
 
-    def hand(outline: Array, points: Samples, mirrored: bool) -> Hand:
+    def oriented(outline: Array, points: Samples, mirrored: bool) -> Orientation:
         meshes = {name: triangulate(ring) for name, ring in points._asdict().items()}
 
         @cache  # of a level and stiffness, when it is first asked for
@@ -172,16 +172,16 @@ def hands(
             parts, angle = pins.parts(own, mesh.triangles), pins.keep_angle
             return Pinned(ring, parts, stiffness, keep_angle=angle, stiff=stiff, mesh=mesh)
 
-        return Hand(mirrored, outline, points, made, emphasis is None and pins is None)
+        return Orientation(mirrored, outline, points, made, emphasis is None and pins is None)
 
-    return hand(outline, samples, False), hand(reverse(outline) * (1.0, -1.0), mirror, True)
+    return oriented(outline, samples, False), oriented(reverse(outline) * (1.0, -1.0), mirror, True)
 
 
 # Strength of the springs by which neighbours are compared: nearly tiles, yet one matrix for all
-SPRINGS = 1500.0
-CROSSED = 100.0  # added to the cost of what crosses itself: more than anything sound costs
-BETTER = 0.998  # a neighbour is taken if it costs less than this much of what there is
-MOST_MOVES = 8  # of each placement with each step
+COMPARISON_STRENGTH = 1500.0
+CROSSING_COST = 100.0  # added to the cost of what crosses itself: more than anything simple costs
+MAX_COST_RATIO = 0.998  # a neighbour is taken if it costs less than this much of what there is
+MAX_MOVES = 8  # of each placement with each step
 
 
 class Drawn(NamedTuple):
@@ -189,7 +189,7 @@ class Drawn(NamedTuple):
 
     placements: Placements  # C of them
     points: Complex  # (N, C)
-    # (C,) energy, springs and displacement, or exp(-mark); `CROSSED` more of what crosses itself
+    # (C,) energy, springs and displacement, or exp(-mark); `CROSSING_COST` more of what crosses itself
     costs: Array
 
     def take(self, index: Integers) -> Drawn:
@@ -217,7 +217,7 @@ def shifted(
     for step, keep in stages:
         drawn = _distinct(drawn, keep)
         live = np.arange(len(drawn.costs))
-        for _ in range(MOST_MOVES):
+        for _ in range(MAX_MOVES):
             cancel.check()
             owners, options = _neighbours(body, kind, drawn, live, step, share)
             if not len(owners):
@@ -238,16 +238,16 @@ def _drawn(
         return space.in_order(space.nearest(points[:n].T).vertices).T
 
     for _ in range(ROUNDS):
-        points = body.pulled(points, tiles(), SPRINGS, 1)
+        points = body.pulled(points, tiles(), COMPARISON_STRENGTH, 1)
     rings = plane_points(points[:n].T)
     if judged:
         costs = np.exp([-kept_of(body.measures, z[:n], 0.0).mark for z in points.T])
     else:
         apart = (abs(points[:n] - tiles()) ** 2).mean(axis=0)
         area = np.maximum(signed_area(rings), 0.1)
-        costs = (body.lenient_energy(points) + SPRINGS * apart) / area
+        costs = (body.lenient_energy(points) + COMPARISON_STRENGTH * apart) / area
         costs += body.stiffness.pose * body.displacement(points)
-    costs[~shapely.is_valid(shapely.polygons(rings))] += CROSSED
+    costs[~shapely.is_valid(shapely.polygons(rings))] += CROSSING_COST
     return Drawn(placements._replace(turns=space.turns), points, costs)
 
 
@@ -291,7 +291,7 @@ def _take_better(drawn: Drawn, owners: Integers, tried: Drawn) -> Integers:
     for k in np.unique(owners):
         mine = np.flatnonzero(owners == k)
         best = mine[np.argmin(tried.costs[mine])]
-        if tried.costs[best] < BETTER * drawn.costs[k]:
+        if tried.costs[best] < MAX_COST_RATIO * drawn.costs[k]:
             for old, new in zip(drawn.placements, tried.placements, strict=True):
                 old[k] = new[best]
             drawn.points[:, k], drawn.costs[k] = tried.points[:, best], tried.costs[best]

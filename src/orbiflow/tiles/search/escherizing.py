@@ -34,9 +34,14 @@ from orbiflow.tiles.likeness import NearSymmetry, near_symmetry
 from orbiflow.tiles.result_file import SCHEMA_VERSION, tile_json
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
 from orbiflow.tiles.search.escherize_settings import EscherizeSettings
-from orbiflow.tiles.search.finished_tiles import HOW, ClassFailure, best_tiles, rated
+from orbiflow.tiles.search.finished_tiles import (
+    HOW_TO_GET_A_TARGET,
+    ClassFailure,
+    best_tiles,
+    rated,
+)
 from orbiflow.tiles.search.likeness_search import LikenessSearch
-from orbiflow.tiles.search.search_method import SYMMETRIC, Goal, SearchMethod
+from orbiflow.tiles.search.search_method import SYMMETRIC_CLASSES, Goal, SearchMethod
 from orbiflow.tiles.search.search_record import OnTile, Outcome, Record, without_twins
 from orbiflow.tiles.silhouette import Emphasis, Pins, Target
 from orbiflow.tiles.tile import EscherTile
@@ -110,7 +115,7 @@ def escherize(
         OrbiflowError: For an unknown class, a mask that cannot be read, or workers that die.
     """
     begin = time.perf_counter()
-    as_instance(target, Target, "the target", HOW)
+    as_instance(target, Target, "the target", HOW_TO_GET_A_TARGET)
     settings = as_instance(settings or EscherizeSettings(), EscherizeSettings, "settings")
     if emphasis is None and settings.emphasis is not None:
         strength = {} if settings.strength is None else {"strength": settings.strength}
@@ -127,7 +132,7 @@ def escherize(
     for source in (emphasis, pins):
         for note in source.notes if source else ():
             on_event(Note(note))
-    if near is not None and near.stabiliser in SYMMETRIC:
+    if near is not None and near.stabiliser in SYMMETRIC_CLASSES:
         on_event(Note(_told(near, names)))
     workers = min(settings.workers or 1, len(names))
     shown = None if on_tile is None else _rating(on_tile, target)
@@ -150,12 +155,12 @@ def searched_classes(target: Target, settings: EscherizeSettings) -> list[str]:
 def _class_names(classes: Sequence[str] | None, near: NearSymmetry | None) -> list[str]:
     """Return the names of classes to search: by default the nine, and what suits the silhouette."""
     if classes is None:
-        symmetric = SYMMETRIC.get(near.stabiliser, ()) if near else ()
+        symmetric = SYMMETRIC_CLASSES.get(near.stabiliser, ()) if near else ()
         classes = (*CLASSES, *symmetric)
     found: list[str] = []
     for name in classes:
         if name.strip().lower() == "all":
-            found += [*CLASSES, *itertools.chain(*SYMMETRIC.values())]
+            found += [*CLASSES, *itertools.chain(*SYMMETRIC_CLASSES.values())]
         else:
             found.append(isohedral_class(name).name)
     return list(dict.fromkeys(found))
@@ -164,7 +169,7 @@ def _class_names(classes: Sequence[str] | None, near: NearSymmetry | None) -> li
 def _told(near: NearSymmetry, names: Sequence[str]) -> str:
     """Return what a silhouette near to symmetric is told of, and which of its classes are searched."""
     what = "its mirror image" if near.stabiliser == "D1" else "itself turned by 180 degrees"
-    own = [name for name in SYMMETRIC[near.stabiliser] if name in names]
+    own = [name for name in SYMMETRIC_CLASSES[near.stabiliser] if name in names]
     searched = f"{', '.join(own)} with exactly symmetric tiles" if own else "no class of such tiles"
     return (
         f"the silhouette is much like {what} ({max(near):.2f} of 1): {searched} "
@@ -239,7 +244,7 @@ class _Task:
 
 def _task(goal: Goal, method: SearchMethod, per_class: int = 1, force: bool = False) -> _Task:
     """Return the task, checked, with what its method needs imported."""
-    as_instance(goal.target, Target, "the target", HOW)
+    as_instance(goal.target, Target, "the target", HOW_TO_GET_A_TARGET)
     if not is_a(method, SearchMethod):
         raise OrbiflowError(
             f"the method must be a search such as LikenessSearch(), got {described(method)}; for a "

@@ -12,7 +12,7 @@ import shapely
 
 from orbiflow.arguments import as_instance
 from orbiflow.arrays import Array
-from orbiflow.errors import CertificationError, OrbiflowError
+from orbiflow.errors import Advice, CertificationError, OrbiflowError
 from orbiflow.runtime import one_blas_thread, one_thread
 from orbiflow.tiles.likeness import (
     Pinned,
@@ -26,11 +26,11 @@ from orbiflow.tiles.likeness import (
 from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
 from orbiflow.tiles.search.candidates import Candidates, Fit
-from orbiflow.tiles.silhouette import Target, is_hopeless
+from orbiflow.tiles.silhouette import Target, is_mere_line
 from orbiflow.tiles.tile import EscherTile
 
 # How a target is made, for messages
-HOW = "Target.read, Target.from_mask and Target.from_polygon make one"
+HOW_TO_GET_A_TARGET = "Target.read, Target.from_mask and Target.from_polygon make one"
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def _with_bent(
         rings = original.without_fur, original.to_normal(rest), original.to_normal(ends)
         kept = fidelity_to_original(*rings, near, kept.cost)
     tile, simple = _region(result.tile.polygon)
-    body, maps, bending = placed.bent.hand.fine, result.map, None
+    body, maps, bending = placed.bent.orientation.fine, result.map, None
     with contextlib.suppress(OrbiflowError):  # hairs that no triangulation follows
         bending = map_of_bent(*placed, result.normal_tile)
     return result.changed(
@@ -133,7 +133,7 @@ def recogniser(target: Target) -> Recogniser:
 
 def rated(tiles: Sequence[EscherTile], target: Target) -> list[EscherTile]:
     """Return the tiles of a run with their ratings, in the same order."""
-    if is_hopeless(target):
+    if is_mere_line(target):
         return [tile.changed(rating=Rating(1)) for tile in tiles]
     return [
         tile.changed(
@@ -143,17 +143,17 @@ def rated(tiles: Sequence[EscherTile], target: Target) -> list[EscherTile]:
     ]
 
 
-FEW_PEOPLE = 0.4  # the score below which a run is told what makes its best likeness poor
-LONG_OUTLINE = 8.5  # in square roots of the area: that of long thin limbs, such as a spider's
+POOR_SCORE = 0.4  # the score below which a run is told what makes its best likeness poor
+LONG_OUTLINE_LENGTH = 8.5  # in square roots of the area: long thin limbs, such as a spider's
 
 
 def why_poor(best: EscherTile) -> str:
     """Return why few people would find a run's best tile good, and what to try; "" if many would."""
     kept = best.fidelity
     share = best.score if kept else 1.0
-    if share >= FEW_PEOPLE and not (best.rating and best.rating.word == "poor"):
+    if share >= POOR_SCORE and not (best.rating and best.rating.word == "poor"):
         return ""
-    long = kept is not None and kept.length > LONG_OUTLINE
+    long = kept is not None and kept.length > LONG_OUTLINE_LENGTH
     reasons = ["a tile fills the empty space around long thin limbs"] * long
     reasons += kept.lost if kept else []
     because = f", because {' and because '.join(reasons[:2])}" if reasons else ""
@@ -164,18 +164,19 @@ def why_poor(best: EscherTile) -> str:
     )
 
 
-def rounded_for(tiles: Sequence[EscherTile]) -> str:
+def rounded_for(tiles: Sequence[EscherTile]) -> Advice:
     """Return which tiles are of the silhouette with thin parts rounded off; "" if none are."""
     shares: dict[float, list[str]] = {}
     for tile in tiles:
         if tile.smoothed:
             shares.setdefault(tile.smoothed, []).append(tile.isohedral_class)
-    return "; ".join(
+    lines = (
         f"no tile of {', '.join(dict.fromkeys(names))} has all of the silhouette's thin parts: what is "
         f"narrower than {100 * share:g} % of its length was rounded off first; "
-        f"--thicken {max(0.04, 2 * share):g} grows thin parts instead"
+        f"{{thicken}} {max(0.04, 2 * share):g} grows thin parts instead"
         for share, names in sorted(shares.items())
     )
+    return Advice("; ".join(lines))
 
 
 def certified_tiles(
@@ -192,7 +193,7 @@ def certified_tiles(
         OrbiflowError: for what holds no candidates.
         CertificationError: if none of them is certified and `force` is not set.
     """
-    as_instance(target, Target, "the target", HOW)
+    as_instance(target, Target, "the target", HOW_TO_GET_A_TARGET)
     if isinstance(found, Candidates):
         found = Fit(found, found.size, 0, found.size)
     as_instance(found, Fit, "what was found", "fit_tile gives a Fit, load_model a TileModel")

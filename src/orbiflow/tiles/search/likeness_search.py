@@ -14,7 +14,7 @@ from orbiflow.settings import Count, Range, Seed, Settings
 from orbiflow.tiles.likeness import least_neck
 from orbiflow.tiles.search.bending import fit_bending
 from orbiflow.tiles.search.candidates import Fit, OnProgress, silent
-from orbiflow.tiles.search.co_deformation import Hand, hands
+from orbiflow.tiles.search.co_deformation import Orientation, orientations
 from orbiflow.tiles.search.search_method import Goal, SearchMethod, Sketches
 from orbiflow.tiles.silhouette import Target
 from orbiflow.tiles.tilings import IsohedralClass
@@ -55,8 +55,8 @@ BEST = {
     "judged": True,
 }
 # Widths, in lengths of the silhouette, below which parts are rounded off in classes without a tile
-ROUNDED_OFF = (0.02, 0.04)
-HALVED = ("placements", "held", "starts")  # in a search for symmetric tiles
+ROUNDED_SHARES = (0.02, 0.04)
+HALVED_SETTINGS = ("placements", "held", "starts")  # in a search for symmetric tiles
 
 
 @lru_cache(maxsize=4)  # targets hash by identity; one serves all classes
@@ -76,7 +76,7 @@ class LikenessSearch(Settings, SearchMethod):
     - `starts`: of these, the best whose corners are moved along the outline, step by step.
     - `share`: of all such steps that are worked out, those that look best.
     - `finalists`: of what comes of it, the best that are worked out with all of the outline's detail,
-      a class and hand.
+      a class and orientation.
     - `rounds`: steps of the minimisation for finalists.
     - `carved`: of these, the best of a class that are moved to the highest mark among the tiles of
       their placements; none where a user says which parts matter.
@@ -117,30 +117,30 @@ class LikenessSearch(Settings, SearchMethod):
         self, goal: Goal, kind: IsohedralClass, per_class: int, progress: OnProgress, cancel: Cancel
     ) -> Fit:
         """Let the silhouette bend into tiles of the class."""
-        both = self.hands(goal, kind.divisor)
+        both = self.orientations(goal, kind.divisor)
         return fit_bending(goal.target, kind, self, both, per_class, progress, cancel)
 
     def sketch(self, goal: Goal, kind: IsohedralClass, cancel: Cancel = NEVER) -> Fit:
         """Let the silhouette bend in haste."""
         quick = replace(self, below=0, **SKETCH)
-        both = self.hands(goal, kind.divisor)
+        both = self.orientations(goal, kind.divisor)
         return fit_bending(goal.target, kind, quick, both, 1, silent, cancel)
 
     def goals(self, goal: Goal) -> Sequence[tuple[float, Goal]]:
         """Return the silhouette, then without toes and hairs if nobody said what must survive."""
         if goal.emphasis is not None or goal.pins is not None:
             return [(0.0, goal)]
-        rounded = [(share, Goal(rounded_off(goal.target, share))) for share in ROUNDED_OFF]
+        rounded = [(share, Goal(rounded_off(goal.target, share))) for share in ROUNDED_SHARES]
         return [(0.0, goal), *rounded]
 
     def prepare(self, goal: Goal) -> None:
         """Triangulate the silhouette and its mirror image."""
-        self.hands(goal)
+        self.orientations(goal)
 
-    def hands(self, goal: Goal, divisor: int = 1) -> tuple[Hand, Hand]:
+    def orientations(self, goal: Goal, divisor: int = 1) -> tuple[Orientation, Orientation]:
         """Return the silhouette and its mirror image, with a multiple of `divisor` points."""
         step = lcm(divisor, 6)
-        return hands(goal.target, self, emphasis=goal.emphasis, pins=goal.pins, step=step)
+        return orientations(goal.target, self, emphasis=goal.emphasis, pins=goal.pins, step=step)
 
     def least_neck(self, goal: Goal) -> float:
         """Return `min_neck`, or a part of the silhouette's own narrowest neck."""
@@ -160,7 +160,7 @@ class LikenessSearch(Settings, SearchMethod):
         found: list[LikenessSearch] = []
         for own in self._alone():
             if symmetric:
-                fewer = {name: -(-getattr(own, name) // 2) for name in HALVED}
+                fewer = {name: -(-getattr(own, name) // 2) for name in HALVED_SETTINGS}
                 own = replace(own, **fewer)
             if own.finalists < wanted:
                 own = replace(own, finalists=wanted, starts=max(own.starts, 2 * wanted))

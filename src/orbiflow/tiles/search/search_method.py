@@ -17,11 +17,11 @@ from orbiflow.tiles.tile import EscherTile
 from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 
 # The classes by how often they come near a silhouette at once, for the time that they take
-PREFERRED = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")
+PREFERRED_CLASSES = ("IH6", "IH5", "IH4", "IH2", "IH3", "IH7", "IH21", "IH28", "IH1")
 
 # Classes whose tiles have a symmetry of their own, by that symmetry. They were chosen by looking at the
 # tiles of all 18 with a mirror: in the others many edges must be straight.
-SYMMETRIC = {"D1": ("IH13", "IH12", "IH69"), "C2": ("IH8", "IH9")}
+SYMMETRIC_CLASSES = {"D1": ("IH13", "IH12", "IH69"), "C2": ("IH8", "IH9")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,9 @@ class SearchMethod(ABC):
         """Return a certified tile of one of the classes in a moment, if the method can."""
         from orbiflow.tiles.search.finished_tiles import best_tiles
 
-        kind = isohedral_class(next((name for name in PREFERRED if name in names), names[0]))
+        kind = isohedral_class(
+            next((name for name in PREFERRED_CLASSES if name in names), names[0])
+        )
         for share, own in Sketches(self).goals(goal):
             with suppress(CertificationError):
                 fit = self.sketch(own, kind, cancel)._replace(enough=1)
@@ -149,8 +151,8 @@ class Sketches(SearchMethod):
 
     def in_order(self, names: Sequence[str]) -> list[str]:
         """Return those first that soonest give a tile to look at."""
-        return [name for name in PREFERRED if name in names] + [
-            name for name in names if name not in PREFERRED
+        return [name for name in PREFERRED_CLASSES if name in names] + [
+            name for name in names if name not in PREFERRED_CLASSES
         ]
 
     def goals(self, goal: Goal) -> Sequence[tuple[float, Goal]]:

@@ -13,11 +13,11 @@ from orbiflow.tiles.likeness import diverse, mutual_iou
 from orbiflow.tiles.search.finished_tiles import ClassFailure
 from orbiflow.tiles.tile import EscherTile
 
-ALIKE = 0.9  # mutual IoU from which two tiles are one to the eye
+TWIN_IOU = 0.9  # mutual IoU from which two tiles are one to the eye
 INTERRUPTED = "interrupted"  # the reason given for a class that was left undone
 Outcome = EscherTile | ClassFailure
 OnTile = Callable[[EscherTile, str], object]
-WHAT = {
+STAGE_WORDS = {
     "sketch": "sketching a tile of each kind",
     "better": "improving the tiles",
     "final": "finishing the tiles",
@@ -73,7 +73,7 @@ class Record:
 
     @property
     def _what(self) -> str:
-        return WHAT[self.stage] if self.on_tile else "fitting"
+        return STAGE_WORDS[self.stage] if self.on_tile else "fitting"
 
     def level_outcome(self, found: Outcome) -> None:
         """Keep what a level of effort gave for a class, unless an earlier one gave better."""
@@ -109,8 +109,8 @@ class Record:
         left = [name for name in names if name not in self.outcomes]
         for name in left:
             first = self.firsts.get(name)
-            sound = isinstance(first, EscherTile)
-            self.outcome(first if sound else ClassFailure(name, INTERRUPTED), 0.0)
+            is_tile = isinstance(first, EscherTile)
+            self.outcome(first if is_tile else ClassFailure(name, INTERRUPTED), 0.0)
         outcomes = self.outcomes.values()
         best = [found for found in outcomes if isinstance(found, EscherTile)]
         tiles = [tile for first in best for tile in first.family()]
@@ -142,8 +142,8 @@ def without_twins(tiles: Sequence[EscherTile], count: int) -> list[int]:
     """Return the indices of so many tiles of those given, best first, no two of them alike."""
     if count == 1 or len(tiles) == 1:
         return [0]
-    sound = [k for k, tile in enumerate(tiles) if tile.certificate.simple]
-    alike = mutual_iou([tiles[k].normal_tile.polygon for k in sound], ALIKE)
-    below = float(np.nextafter(ALIKE, 0))
-    chosen = diverse([tiles[k].score for k in sound], count, alike, twin=below)
-    return [sound[k] for k in chosen] or [0]
+    simple = [k for k, tile in enumerate(tiles) if tile.certificate.simple]
+    alike = mutual_iou([tiles[k].normal_tile.polygon for k in simple], TWIN_IOU)
+    below = float(np.nextafter(TWIN_IOU, 0))
+    chosen = diverse([tiles[k].score for k in simple], count, alike, twin=below)
+    return [simple[k] for k in chosen] or [0]

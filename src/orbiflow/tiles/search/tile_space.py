@@ -28,7 +28,7 @@ from orbiflow.tiles.search.tile_orbits import Orbits, relations_of
 from orbiflow.tiles.tilings import IsohedralClass
 
 # Beyond this many, lengths and starts run in steps of more than one point
-MOST_PLACEMENTS = 4_000_000
+MAX_PLACEMENTS = 4_000_000
 
 
 class Placements(NamedTuple):
@@ -53,7 +53,7 @@ def best_placements(kind: IsohedralClass, outline: Complex, keep: int) -> Placem
     n = len(outline)
     parts = _multiplicities(kind)
     units = (u for u in range(1, n + 1) if n % u == 0)
-    most = MOST_PLACEMENTS
+    most = MAX_PLACEMENTS
     unit = next(u for u in units if u == n or _count(parts, n // u) * (n // u) <= most)
     lengths = edge_lengths(kind, n // unit) * unit
     starts = np.arange(0, n, unit)

@@ -18,7 +18,7 @@ from orbiflow.tiles.geometry import arc_lengths, signed_area
 from orbiflow.tiles.tilings import Tile, commutant, edge_to_edge
 
 MAX_POINTS = 2000  # vertices, since matrices are dense
-SAME_POINT = 1e-6  # distance, in the lattice's basis, below which images of vertices are vertices
+SAME_POINT_DISTANCE = 1e-6  # in the lattice's basis: images this near to vertices are vertices
 
 
 def divided_tile(tile: Tile, points: int) -> Tile:
@@ -78,7 +78,7 @@ class TileVariations:
         moved = np.stack([g(ring) for g in group.cosets])
         around: dict[str, Any] = {"boxsize": 1.0}  # which the stubs believe to be a matrix
         tree = KDTree(within_cell(ring), **around)
-        found: Any = tree.query_ball_point(within_cell(moved.reshape(-1, 2)), SAME_POINT)
+        found: Any = tree.query_ball_point(within_cell(moved.reshape(-1, 2)), SAME_POINT_DISTANCE)
         pairs = np.array([(i, k) for k, near in enumerate(found) for i in near], dtype=np.int64)
         vertex, coset, source = pairs[:, 0], *np.divmod(pairs[:, 1], len(ring))
         first = np.full(len(ring), len(ring))

@@ -2,7 +2,7 @@ from .bending import Bending as Bending
 from .bending import unfolded as unfolded
 from .checks import doubts as doubts
 from .checks import holes_filled as holes_filled
-from .checks import is_hopeless as is_hopeless
+from .checks import is_mere_line as is_mere_line
 from .checks import parts_left_out as parts_left_out
 from .emphasis import Emphasis as Emphasis
 from .mesh import Mesh as Mesh

@@ -23,7 +23,7 @@ MAX_POINTS, MAX_TRIANGLES = 100_000, 200_000
 """Beyond these a mesh is refused: real ones have some thousands."""
 
 # twice the area of a triangle, in squares of the whole's extent, that rounding can turn over
-FLAT = 1e-18
+MIN_DOUBLED_AREA = 1e-18
 
 MAX_SHARPENINGS = 30  # the largest number of times that the penalty on folds is sharpened
 
@@ -62,7 +62,10 @@ class Bending:
         triangles = _indices(self.triangles, len(rest))
         for name, array in (("rest", rest), ("images", images)):
             with np.errstate(all="ignore"):  # an overflow counts as turned over
-                sound = doubled_areas(array, triangles) > FLAT * np.ptp(array, axis=0).max() ** 2
+                sound = (
+                    doubled_areas(array, triangles)
+                    > MIN_DOUBLED_AREA * np.ptp(array, axis=0).max() ** 2
+                )
             if not sound.all():
                 raise OrbiflowError(
                     f"the bending's {name}: {int((~sound).sum())} triangles are flat or turned over"

@@ -5,20 +5,21 @@ from __future__ import annotations
 import numpy as np
 from shapely import Polygon
 
+from orbiflow.errors import Advice
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette.outlines import THREAD, filled, is_thread, opened, percent
+from orbiflow.tiles.silhouette.outlines import MAX_THREAD_WIDTH, filled, is_thread, opened, percent
 from orbiflow.tiles.silhouette.target import Target
 
-MOST_LEFT_OUT = 0.02  # of what was seen
+MAX_LEFT_OUT_SHARE = 0.02  # of what was seen
 # Shares of the silhouette: smaller holes are eyes; larger ones are what the line of a drawing encloses.
-SMALL_HOLE, LARGE_HOLE = 0.02, 0.3
-CONVEX = 0.95  # of its convex hull: what a frame fills
-MOST_INSIDE = 0.1  # of the silhouette: more that lies in a hole is a shape of its own
-FEWEST_PIXELS = 40
-THIN = 3.0  # pixels
-MOSTLY_THIN = 0.5  # of the outline's length
-LEG_WIDTH = 0.035  # of the silhouette's length: what is thinner is easily lost
-MOSTLY_LEGS = 0.45  # of the outline's length: on thinner parts than this the likeness hangs
+MIN_HOLE_SHARE, MAX_HOLE_SHARE = 0.02, 0.3
+MIN_CONVEX_SHARE = 0.95  # of its convex hull: what a frame fills
+MAX_INSIDE_SHARE = 0.1  # of the silhouette: more that lies in a hole is a shape of its own
+MIN_LENGTH_PIXELS = 40
+THIN_PIXELS = 3.0  # pixels
+MAX_THIN_SHARE = 0.5  # of the outline's length
+LEG_WIDTH_SHARE = 0.035  # of the silhouette's length: what is thinner is easily lost
+MAX_LEG_SHARE = 0.45  # of the outline's length: on thinner parts than this the likeness hangs
 
 
 def parts_left_out(target: Target) -> list[Polygon]:
@@ -36,32 +37,32 @@ def holes_filled(target: Target) -> list[Polygon]:
     return [hole for hole in holes if outline.intersects(hole.representative_point())]
 
 
-def doubts(target: Target) -> list[str]:
+def doubts(target: Target) -> list[Advice]:
     """Return what may be wrong with a silhouette, each with what to do about it."""
-    return [*_missing(target), *_hopeless(target)]
+    return [*map(Advice, _lost_parts(target)), *map(Advice, _thin_parts(target))]
 
 
-def _missing(target: Target) -> list[str]:
+def _lost_parts(target: Target) -> list[str]:
     found: list[str] = []
     lost, holes, is_image = parts_left_out(target), holes_filled(target), target.kind == "image"
     seen = 0.0 if target.seen is None else float(target.seen.area)
     share = sum(part.area for part in lost) / seen if seen else 0.0
-    level = ", or try another --threshold, or a plain ground of another colour for a photograph"
-    if share > MOST_LEFT_OUT:
+    level = ", or try another {threshold}, or a plain ground of another colour for a photograph"
+    if share > MAX_LEFT_OUT_SHARE:
         parts = "a part" if len(lost) == 1 else f"{len(lost)} parts"
         found.append(
             f"{percent(share)} of what was seen is left out, in {parts} apart from the rest: join "
-            f"them to it in the drawing, or by a larger --smooth{level * is_image}"
+            f"them to it in the drawing, or by a larger {{smooth}}{level * is_image}"
         )
     share = sum(hole.area for hole in holes) / target.area
-    if SMALL_HOLE < share < LARGE_HOLE:
-        level = " or try another --threshold or --invert" if is_image else ""
+    if MIN_HOLE_SHARE < share < MAX_HOLE_SHARE:
+        level = " or try another {threshold} or another {invert}" if is_image else ""
         found.append(
             "large holes were filled, because a tile has none: if one is background, open it to the "
             f"outside in the drawing{level}"
         )
     share = _share_inside(target, holes)
-    if share > MOST_INSIDE:
+    if share > MAX_INSIDE_SHARE:
         found.append(
             f"another shape, of {percent(share)} of the silhouette, lies inside the hole that was "
             "filled: if it is the one meant, remove the frame or lines around it"
@@ -72,44 +73,49 @@ def _missing(target: Target) -> list[str]:
 def _share_inside(target: Target, holes: list[Polygon]) -> float:
     """Return the share of the silhouette, if it may be a frame, of the largest shape in its holes."""
     outline = Polygon(target.outline)
-    if not holes or target.seen is None or outline.area < CONVEX * outline.convex_hull.area:
+    if (
+        not holes
+        or target.seen is None
+        or outline.area < MIN_CONVEX_SHARE * outline.convex_hull.area
+    ):
         return 0.0
     parts = [filled(part) for part in polygons_in(target.seen)]
     inside = [part for part in parts if any(hole.contains(part) for hole in holes)]
     return max((part.area for part in inside), default=0.0) / target.area
 
 
-def is_hopeless(target: Target) -> bool:
+def is_mere_line(target: Target) -> bool:
     """Return whether a silhouette is a mere line, which no tile will look like."""
     return is_thread(Polygon(target.outline), float(np.ptp(target.outline, axis=0).max()))
 
 
-def _hopeless(target: Target) -> list[str]:
+def _thin_parts(target: Target) -> list[str]:
     """Return why no tile will look like a silhouette."""
     shape, found = Polygon(target.outline), list[str]()
     length = float(np.ptp(target.outline, axis=0).max())
-    if is_hopeless(target):
+    if is_mere_line(target):
         found.append(
-            f"the silhouette is a line or thread, nowhere wider than {THREAD:.0%} of its length: no "
-            "tile will look like it; grow it by --thicken 0.1, draw it wider, or close its outline"
+            f"the silhouette is a line or thread, nowhere wider than {MAX_THREAD_WIDTH:.0%} of its "
+            "length: no tile will look like it; let it grow ({thicken}) by 0.1, draw it wider, or "
+            "close its outline"
         )
-    elif (share := _thin_share(shape, LEG_WIDTH * length)) > MOSTLY_LEGS:
+    elif (share := _thin_share(shape, LEG_WIDTH_SHARE * length)) > MAX_LEG_SHARE:
         found.append(
-            f"legs or other parts thinner than {LEG_WIDTH:.1%} of the silhouette's length have "
-            f"{share:.0%} of its outline, and tiles may lose them: grow them by --thicken 0.04, or "
-            "draw them wider"
+            f"legs or other parts thinner than {LEG_WIDTH_SHARE:.1%} of the silhouette's length have "
+            f"{share:.0%} of its outline, and tiles may lose them: let them grow ({{thicken}}) by "
+            "0.04, or draw them wider"
         )
     if target.kind != "image":
         return found
-    if length < FEWEST_PIXELS:
+    if length < MIN_LENGTH_PIXELS:
         found.append(
             f"the silhouette is only {length:.0f} pixels long, so its outline is of stairs: give a "
-            f"larger picture, at least {FEWEST_PIXELS} pixels and better 400"
+            f"larger picture, at least {MIN_LENGTH_PIXELS} pixels and better 400"
         )
-    if _thin_share(shape, THIN) > MOSTLY_THIN:
+    if _thin_share(shape, THIN_PIXELS) > MAX_THIN_SHARE:
         found.append(
-            f"most of the silhouette is less than {THIN:.0f} pixels wide, which is too thin to be "
-            "followed: give a larger picture, or draw it wider"
+            f"most of the silhouette is less than {THIN_PIXELS:.0f} pixels wide, which is too thin to "
+            "be followed: give a larger picture, or draw it wider"
         )
     return found
 

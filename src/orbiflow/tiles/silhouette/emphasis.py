@@ -19,9 +19,9 @@ from orbiflow.tiles.silhouette.target import Covered, Target
 MAX_STRENGTH = 100.0
 # In the normal form, where the silhouette has area 1. The mask's edges are smoothed over a few points
 # of a tile's boundary, so that the force on it is continuous.
-SMOOTHING = 0.02  # standard deviation
+EDGE_SIGMA = 0.02  # standard deviation
 FADE_WIDTH = 0.05  # beyond the mask's box
-MAX_SMOOTHING = 32.0  # pixels: a bound of the work
+MAX_EDGE_SIGMA_PIXELS = 32.0  # pixels: a bound of the work
 # of full emphasis: what is nowhere above this on the silhouette does not touch it
 MIN_TOUCHING_LEVEL = 0.01
 GRID_SIDE = 512  # pixels along a side of the grids that integrals are taken on
@@ -95,7 +95,7 @@ class Emphasis:
         overhang = np.array(levels.shape[::-1]) * picture.reduced / picture.size
         box = _normal_box(target, covered, overhang)
         pixel = np.array([box[3] - box[1], box[2] - box[0]]) / levels.shape
-        sigma = np.minimum(SMOOTHING / pixel, MAX_SMOOTHING)
+        sigma = np.minimum(EDGE_SIGMA / pixel, MAX_EDGE_SIGMA_PIXELS)
         smooth = np.clip(gaussian_filter(levels, tuple(sigma), mode="nearest"), 0, 1)
         plain = cls(smooth.astype(np.float32), box, strength, str(path))
         share = _share_of(plain, target)

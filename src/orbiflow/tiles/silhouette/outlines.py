@@ -28,7 +28,7 @@ MAX_COORDINATE = 1e12
 MIN_RELATIVE_SIZE = 1e-9
 MIN_SIZE = 1e-100
 MIN_RELATIVE_AREA = 1e-9  # Relative to the square of the longer side of the bounding box.
-THREAD = 0.06  # greatest width, of the length; animals have at least 0.14
+MAX_THREAD_WIDTH = 0.06  # greatest width, of the length; animals have at least 0.14
 # Of the box's longer side: a polygon that is simple by less would cross itself when it is rescaled.
 CLEARANCE_DIGITS = 12
 DISC_OVERREACH = 1.005  # of the radius: without it, slivers are left along the outline
@@ -133,7 +133,7 @@ def simplified(polygon: Polygon, tolerance: float) -> Polygon:
 
 def is_thread(shape: Polygon, length: float) -> bool:
     """Return whether a shape is no more than a line, where what is drawn is so long."""
-    return shape.buffer(-THREAD / 2 * length).is_empty
+    return shape.buffer(-MAX_THREAD_WIDTH / 2 * length).is_empty
 
 
 def rounded(geometry: BaseGeometry, width: float) -> Polygon:

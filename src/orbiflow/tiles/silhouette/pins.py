@@ -22,7 +22,7 @@ from orbiflow.tiles.silhouette.target import Target
 
 DEFAULT_RADIUS = 0.08  # default radius of a spot, in longer sides of the silhouette's bounding box
 # the shares of the outline beyond which the tile cannot be similar, and nothing is left to bend
-MUCH_PINNED, ALL_PINNED = 0.4, 0.9
+MUCH_PINNED_SHARE, MAX_PINNED_SHARE = 0.4, 0.9
 REACH_PAST_OUTLINE = 1.5  # the reach of a spot without a radius, in distances from the outline
 _NUMBER = r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*"
 _SPOT = re.compile(rf"{_NUMBER}(?:,{_NUMBER}){{1,2}}")
@@ -140,12 +140,12 @@ class Pins:
 def _warnings(pins: Pins, target: Target) -> list[str]:
     """Return notes of how much of the outline is held; an error where that is all of it."""
     share = float(pins.holds(resampled(target.normal, 720)).mean())
-    if share >= ALL_PINNED:
+    if share >= MAX_PINNED_SHARE:
         raise OrbiflowError(
             f"the pins hold {percent(share)} of the outline, so that nothing is left to bend; pin "
             "only a head or a hand"
         )
-    if share > MUCH_PINNED:
+    if share > MUCH_PINNED_SHARE:
         return [f"the pins hold {percent(share)} of the outline: little is left to bend"]
     if not share:
         return ["the pins touch no part of the outline: the tile's shape does not heed them"]

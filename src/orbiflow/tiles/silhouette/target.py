@@ -37,10 +37,10 @@ from orbiflow.tiles.silhouette.thickening import thickened
 if TYPE_CHECKING:
     import torch
 
-FUR = 0.015  # of the silhouette's length: gaps narrower than this are not seen in a tile
-SLIVER = 0.1  # of a width: what is rounded off and thinner is no more than another polygon
-LIMB = 2.0  # widths: what is rounded off and longer is a limb, and no corner or bump
-SAME_ASPECT = 0.01  # relative difference up to which two aspect ratios count as the same
+FUR_GAP_SHARE = 0.015  # of the silhouette's length: gaps narrower than this are not seen in a tile
+SLIVER_WIDTHS = 0.1  # of a width: what is rounded off and thinner is no more than another polygon
+LIMB_WIDTHS = 2.0  # widths: what is rounded off and longer is a limb, and no corner or bump
+ASPECT_TOLERANCE = 0.01  # relative difference up to which two aspect ratios count as the same
 
 
 class Covered(NamedTuple):
@@ -61,7 +61,7 @@ class Covered(NamedTuple):
     def require_aspect(self, path: Path, what: str, size: Sequence[float]) -> None:
         """Refuse a picture, drawing or mask of this width and height unless its aspect is the same."""
         (width, height), (wide, high) = size, self.high - self.low
-        if abs(width * high / (height * wide) - 1) > SAME_ASPECT:
+        if abs(width * high / (height * wide) - 1) > ASPECT_TOLERANCE:
             raise InputFileError(
                 f"{path}: the {what} is {width:.6g} x {height:.6g} and {self.name} is "
                 f"{wide:.6g} x {high:.6g}; a {what} covers all of that and must have its aspect "
@@ -322,8 +322,8 @@ class Target(Reading):
             )
         went = Polygon(self.outline).difference(shape)
         width = share * length
-        parts = polygons_in(opened(went, SLIVER * width))
-        limbs = sum(_reach(part) > LIMB * width for part in parts)
+        parts = polygons_in(opened(went, SLIVER_WIDTHS * width))
+        limbs = sum(_reach(part) > LIMB_WIDTHS * width for part in parts)
         lost = f"{percent(went.area / self.area)} of the area"
         named = f" and {limbs} limb{'s' * (limbs > 1)}" if limbs else ""
         note = (
@@ -374,8 +374,8 @@ class Target(Reading):
 
     @cached_property
     def without_fur(self) -> Array:
-        """The outline (N, 2) in the normal form with the gaps between hairs filled: `FUR`."""
-        width = FUR * float(np.ptp(self.normal, axis=0).max())
+        """The outline (N, 2) in the normal form with the gaps between hairs filled: `FUR_GAP_SHARE`."""
+        width = FUR_GAP_SHARE * float(np.ptp(self.normal, axis=0).max())
         return orient(outer_ring(closed(Polygon(self.normal), width)))
 
     def to_input(self, points: ArrayLike) -> Array:

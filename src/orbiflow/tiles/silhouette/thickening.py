@@ -21,7 +21,7 @@ from orbiflow.tiles.geometry import arc_lengths, polygons_in
 from orbiflow.tiles.silhouette.outlines import DISC_OVERREACH, filled, opened, simplified
 
 POINTS_PER_WIDTH = 16  # points on the outline for each width that is asked for
-MOST_POINTS = 12_000  # points on the outline, however long it is
+MAX_POINTS = 12_000  # points on the outline, however long it is
 # The least distance of a ridge's two points of the outline, in radii. It is 2 along a leg and 1.4 in a
 # right angle, so that only sharp corners have a middle line.
 FACING_IN_PARTS, FACING_IN_GAPS = 1.7, 1.2
@@ -31,7 +31,7 @@ OUTLINE_PER_WIDTH = 3.0  # the least length of the outline of a part that grows,
 GAP_SHARE = 0.5  # of the width: the gaps that growing leaves, where there was as much
 # A ridge is of a tuft of hair if a wider place, by this factor, is nearer than its radius and a share
 # of the width
-TUFT, TUFT_SHARE = 2.0, 0.25
+TUFT_RATIO, TUFT_SHARE = 2.0, 0.25
 
 
 def thickened(shape: Polygon, width: float) -> Polygon:
@@ -94,7 +94,7 @@ class _Ridges(NamedTuple):
 
 def _ridges(shape: Polygon, width: float) -> _Ridges:
     """Return the middle lines, inside and outside, of what is narrower than a width and a half."""
-    step = max(shape.length / MOST_POINTS, width / POINTS_PER_WIDTH)
+    step = max(shape.length / MAX_POINTS, width / POINTS_PER_WIDTH)
     points = shapely.get_coordinates(shapely.segmentize(shape.exterior, step))[:-1]
     diagram = Voronoi(points)
     ends = np.array(diagram.ridge_vertices)
@@ -120,7 +120,9 @@ def _are_tufts(ridges: _Ridges, width: float) -> Any:
         i, j = np.concatenate([near, near[:, ::-1]]).T
         apart = np.linalg.norm(places[i] - places[j], axis=1)
         wider = ridges.radii[j]
-        tufts[i[(wider > TUFT * ridges.radii[i]) & (apart < wider + TUFT_SHARE * width)]] = True
+        tufts[i[(wider > TUFT_RATIO * ridges.radii[i]) & (apart < wider + TUFT_SHARE * width)]] = (
+            True
+        )
     return tufts
 
 

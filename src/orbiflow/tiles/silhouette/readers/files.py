@@ -27,8 +27,8 @@ from orbiflow.tiles.silhouette.readers.svg import read_svg
 from orbiflow.tiles.silhouette.readers.svg_drawing import MAX_BYTES
 
 _HEAD_BYTES = 65536
-GAP = 0.03  # of the drawing's size: such gaps in an outline are closed
-MOST = 0.8  # of the lines' area
+MAX_GAP_SHARE = 0.03  # of the drawing's size: such gaps in an outline are closed
+MIN_LINE_SHARE = 0.8  # of the lines' area
 GZIP = b"\x1f\x8b"
 _SAVE_SVG = "open it in the program that made it, or in Inkscape, and save it as SVG or PNG"
 _CONVERTIBLE = {
@@ -98,18 +98,18 @@ def _bridged(reading: Reading) -> Reading:
     size = 0.0 if seen is None else float(np.ptp(np.reshape(seen.bounds, (2, 2)), axis=0).max())
     if seen is None or not is_thread(Polygon(reading.outline), size):
         return reading
-    grown = outer_outline(seen.buffer(GAP / 2 * size))[0]
-    body = grown.buffer(-GAP / 2 * size)
+    grown = outer_outline(seen.buffer(MAX_GAP_SHARE / 2 * size))[0]
+    body = grown.buffer(-MAX_GAP_SHARE / 2 * size)
     body = max(polygons_in(body), key=lambda part: part.area, default=Polygon())
     lines = seen.buffer(0).intersection(body).area  # what is traced may touch itself
-    if is_thread(body, size) or not MOST * seen.area < lines < body.area / 2:
+    if is_thread(body, size) or not MIN_LINE_SHARE * seen.area < lines < body.area / 2:
         return reading
     note = (
         f"the largest part is no more than a line: took instead what the lines enclose when gaps of "
-        f"up to {GAP:.0%} of the drawing's size are closed"
+        f"up to {MAX_GAP_SHARE:.0%} of the drawing's size are closed"
     )
     kept = [other for other in reading.notes if not other.startswith("kept the largest")]
-    thin = simplified(body, GAP * size / 50)
+    thin = simplified(body, MAX_GAP_SHARE * size / 50)
     return replace(
         reading, outline=outer_ring(thin if thin.is_valid else body), notes=(*kept, note)
     )

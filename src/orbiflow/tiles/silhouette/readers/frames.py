@@ -10,16 +10,19 @@ from scipy import ndimage
 
 from orbiflow.arrays import Array
 
-WIDEST = 0.03  # of the frame's shorter side: its line
-MARKS = 0.06  # of the frame's shorter side: how far the marks of axes reach out of it, or into it
-LEAST_LINE = 0.85  # of the box of a frame with its marks: its lines
-LEAST_SIDE = 0.5  # of the picture's: a frame's
-LEAST_DRAWN = 0.25  # of a frame's sides: what is drawn inside it
-CARD = 0.94  # of its box: what a card fills, round corners apart
-CARD_SIDES = 0.85  # of the page's: a card's, which lies on another ground
-CARD_COLOURS, DRAWN_COLOURS = 25, 75  # of 255: a card's colours are nearer, its drawing's farther
-MOST_BETWEEN = 0.05  # of a card's pixels: those between its colour and the drawing's
-ENOUGH = 500  # pixels a side, in which a card is looked for
+MAX_LINE_SHARE = 0.03  # of the frame's shorter side: its line
+MAX_MARK_SHARE = 0.06  # of the frame's shorter side: how far marks of axes reach out or in
+MIN_LINE_COVERAGE = 0.85  # of the box of a frame with its marks: its lines
+MIN_FRAME_SHARE = 0.5  # of the picture's: a frame's
+MIN_DRAWN_SHARE = 0.25  # of a frame's sides: what is drawn inside it
+MIN_CARD_COVERAGE = 0.94  # of its box: what a card fills, round corners apart
+MIN_CARD_SHARE = 0.85  # of the page's: a card's, which lies on another ground
+MAX_CARD_DISTANCE, MIN_DRAWN_DISTANCE = (
+    25,
+    75,
+)  # of 255: a card's colours are nearer, its drawing's farther
+MAX_BETWEEN_SHARE = 0.05  # of a card's pixels: those between its colour and the drawing's
+SEARCH_SIDE_PIXELS = 500  # pixels a side, in which a card is looked for
 CARD_NOTE = "left out the card that the drawing lies on; if it is the shape, remove what lies on it"
 AXES_NOTE = "left out the frame around the drawing, with what lies outside of it"
 _TOGETHER = np.ones((3, 3), dtype=int)
@@ -66,7 +69,7 @@ def _frames(part: _Mask) -> Iterator[_Frame]:
     labels = np.asarray(ndimage.label(part, _TOGETHER)[0])
     for number, outer in enumerate(ndimage.find_objects(labels), start=1):
         sides = [side.stop - side.start for side in outer]
-        if any(a < LEAST_SIDE * b for a, b in zip(sides, part.shape, strict=True)):
+        if any(a < MIN_FRAME_SHARE * b for a, b in zip(sides, part.shape, strict=True)):
             continue
         line = labels == number
         box = _without_marks(line[outer], outer)
@@ -79,10 +82,10 @@ def _frames(part: _Mask) -> Iterator[_Frame]:
 
 def _without_marks(line: _Mask, outer: tuple[slice, ...]) -> tuple[slice, ...]:
     """Return the box of the straight lines in an outer box, without short marks outside of it."""
-    most = max(1, int(MARKS * min(line.shape)))
+    most = max(1, int(MAX_MARK_SHARE * min(line.shape)))
     found: list[slice] = []
     for axis, side in enumerate(outer):
-        full = np.flatnonzero(line.mean(axis=1 - axis) > LEAST_LINE)
+        full = np.flatnonzero(line.mean(axis=1 - axis) > MIN_LINE_COVERAGE)
         first, last = (int(full[0]), int(full[-1])) if full.size else (0, line.shape[axis] - 1)
         is_near = first <= most and line.shape[axis] - 1 - last <= most
         found.append(slice(side.start + first, side.start + last + 1) if is_near else side)
@@ -91,7 +94,7 @@ def _without_marks(line: _Mask, outer: tuple[slice, ...]) -> tuple[slice, ...]:
 
 def _inner_marks(line: _Mask) -> _Mask:
     """Return the marks of axes that point inwards: what is near the line of a frame and lies inside."""
-    most = max(3, int(MARKS * min(line.shape)))
+    most = max(3, int(MAX_MARK_SHARE * min(line.shape)))
     width = max(1, int(np.argmin(line[:, line.shape[1] // 3]) or 1))
     inner = np.zeros_like(line)
     inner[width:-width, width:-width] = line[width:-width, width:-width]
@@ -100,7 +103,7 @@ def _inner_marks(line: _Mask) -> _Mask:
 
 def _line_width(line: _Mask) -> int | None:
     """Return the width of a line along all of its box and nowhere else, or None."""
-    most = max(3, int(WIDEST * min(line.shape)))
+    most = max(3, int(MAX_LINE_SHARE * min(line.shape)))
     middle = line[line.shape[0] // 2], line[:, line.shape[1] // 2]
     runs = [int(np.argmin(run)) for m in middle for run in (m, m[::-1])]
     width = max(runs)
@@ -116,7 +119,7 @@ def _is_drawn_on(inside: _Mask) -> bool:
     if not boxes:
         return False
     sides = [side.stop - side.start for side in boxes[0]]
-    return all(a > LEAST_DRAWN * b for a, b in zip(sides, inside.shape, strict=True))
+    return all(a > MIN_DRAWN_SHARE * b for a, b in zip(sides, inside.shape, strict=True))
 
 
 def without_card(image: Image.Image) -> Image.Image | None:
@@ -127,13 +130,13 @@ def without_card(image: Image.Image) -> Image.Image | None:
     """
     if image.mode not in ("L", "RGB", "RGBA"):
         return None
-    small = image.convert("RGBA").reduce(-(-max(image.size) // ENOUGH))
+    small = image.convert("RGBA").reduce(-(-max(image.size) // SEARCH_SIDE_PIXELS))
     rgba = np.asarray(small)
     rgb = rgba[..., :3].astype(int)
     is_cut_out = rgba[..., 3].min() < 128
     opaque = rgba[..., 3] >= 128 if is_cut_out else ~_margin(rgb)
     colour = _card_colour(rgb, opaque)
-    is_margin = not is_cut_out and colour and abs(rgb[0, 0] - colour).max() <= CARD_COLOURS
+    is_margin = not is_cut_out and colour and abs(rgb[0, 0] - colour).max() <= MAX_CARD_DISTANCE
     if colour is None or is_margin:
         return None
     inside = Image.fromarray(ndimage.binary_erosion(opaque, iterations=2))  # without a blurred edge
@@ -145,11 +148,11 @@ def without_card(image: Image.Image) -> Image.Image | None:
 def _margin(rgb: NDArray[np.int_]) -> _Mask:
     """Return what is joined to the border and has its usual colour (H, W); nothing, if it is thin."""
     border = np.concatenate([rgb[0], rgb[-1], rgb[:, 0], rgb[:, -1]])
-    alike = abs(rgb - np.median(border, axis=0)).max(axis=2) <= CARD_COLOURS
+    alike = abs(rgb - np.median(border, axis=0)).max(axis=2) <= MAX_CARD_DISTANCE
     labels = np.asarray(ndimage.label(alike)[0])
     at_border = np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))
     margin = np.isin(labels, at_border[at_border > 0])
-    width = int(WIDEST * min(margin.shape))
+    width = int(MAX_LINE_SHARE * min(margin.shape))
     edges = (
         margin[: width + 1],
         margin[-width - 1 :],
@@ -165,7 +168,7 @@ def _card_colour(rgb: NDArray[np.int_], opaque: _Mask) -> tuple[int, ...] | None
         return None
     box = ndimage.find_objects(opaque.astype(int))[0]
     sides = zip(opaque[box].shape, opaque.shape, strict=True)
-    if opaque[box].mean() < CARD or any(a < CARD_SIDES * b for a, b in sides):
+    if opaque[box].mean() < MIN_CARD_COVERAGE or any(a < MIN_CARD_SHARE * b for a, b in sides):
         return None
     inside = ndimage.binary_erosion(opaque[box], iterations=2)
     rim = inside & ~ndimage.binary_erosion(inside, iterations=2)
@@ -173,8 +176,8 @@ def _card_colour(rgb: NDArray[np.int_], opaque: _Mask) -> tuple[int, ...] | None
         return None
     colour = np.median(rgb[box][rim], axis=0).astype(int)
     apart = abs(rgb - colour).max(axis=2)
-    alike, other = apart[box] <= CARD_COLOURS, apart[box] > DRAWN_COLOURS
-    is_parted = (alike | other)[inside].mean() > 1 - MOST_BETWEEN
+    alike, other = apart[box] <= MAX_CARD_DISTANCE, apart[box] > MIN_DRAWN_DISTANCE
+    is_parted = (alike | other)[inside].mean() > 1 - MAX_BETWEEN_SHARE
     if is_parted and alike[rim].mean() > 0.9 and is_drawing(other & inside):
         return tuple(colour.tolist())
     return None
@@ -189,4 +192,4 @@ def is_drawing(drawn: _Mask) -> bool:
     box = ndimage.find_objects(labels)[largest - 1]
     part = np.asarray(ndimage.binary_fill_holes(labels[box] == largest))
     sides = zip(part.shape, drawn.shape, strict=True)
-    return bool(all(a > LEAST_DRAWN * b for a, b in sides) and part.mean() < CARD)
+    return bool(all(a > MIN_DRAWN_SHARE * b for a, b in sides) and part.mean() < MIN_CARD_COVERAGE)

@@ -11,7 +11,11 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from orbiflow.errors import InputFileError
-from orbiflow.tiles.silhouette.readers.label_masks import DARKEST, is_of_labels, may_be_labels
+from orbiflow.tiles.silhouette.readers.label_masks import (
+    MAX_INDISTINCT_LEVEL,
+    is_of_labels,
+    may_be_labels,
+)
 from orbiflow.tiles.silhouette.readers.reading import Source, check_file, read_bytes, read_head
 
 MAX_BYTES = 64 * 2**20
@@ -19,7 +23,7 @@ MAX_PIXELS = 40_000_000  # that are kept: of a larger image, several become one
 MAX_PIXELS_READ = 128_000_000  # before they are shrunk: telephones have 48 or 108 million
 MAX_FRAMES = 100  # of an animation, in which one that shows anything is sought
 FULL_SCALES = (255.0, 1023.0, 4095.0, 16383.0, 65535.0)  # of 8, 10, 12, 14 and 16 bits
-STRIP = 256  # rows of the shrunk image that are made at once
+STRIP_ROWS = 256  # rows of the shrunk image that are made at once
 MIN_COLOURS = 10  # of 255: a palette whose colours differ less shows nothing
 _STARTS = {
     **{
@@ -291,7 +295,7 @@ def _levels(path: Source, image: Image.Image, notes: list[str]) -> tuple[float, 
     if image.mode == "F" or low < 0 or high > FULL_SCALES[-1]:
         return low, max(high, low + float(np.finfo(np.float32).tiny))
     white = next(scale for scale in FULL_SCALES if high <= scale)
-    if DARKEST < high <= FULL_SCALES[-2]:
+    if MAX_INDISTINCT_LEVEL < high <= FULL_SCALES[-2]:
         notes.append(
             f"took {white:.0f} for white: the levels, of 16 bits or more, go up to {high:.0f}"
         )
@@ -309,8 +313,8 @@ def _shrunk(raw: _Raw, factor: int, levels: tuple[float, float] | None) -> Image
     """Return the image with `factor` x `factor` pixels averaged into one, by strips: it is large."""
     width, height = raw.image.size
     strips: list[tuple[int, Image.Image]] = []
-    for top in range(0, height, STRIP * factor):
-        strip = raw.rows(top, min(top + STRIP * factor, height)).shown(levels)
+    for top in range(0, height, STRIP_ROWS * factor):
+        strip = raw.rows(top, min(top + STRIP_ROWS * factor, height)).shown(levels)
         strips.append((top // factor, strip.reduce(factor)))
     whole = Image.new(strips[0][1].mode, (-(-width // factor), -(-height // factor)))
     for top, strip in strips:

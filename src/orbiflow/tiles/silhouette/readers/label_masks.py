@@ -8,18 +8,18 @@ from scipy import ndimage
 
 from orbiflow.arrays import Array
 
-DARKEST = 10  # of 255: numbers no larger cannot be told apart as levels
-FEW = 40  # three numbers or more, and none larger, are labels if their regions are even
-MOST_LABELS = 256
-STRIP = 4_000_000  # pixels
-VOID = 255  # what segmented photographs have along the borders of objects, which is no label
+MAX_INDISTINCT_LEVEL = 10  # of 255: numbers no larger cannot be told apart as levels
+MAX_SMALL_LABEL = 40  # three numbers or more, and none larger, are labels if their regions are even
+MAX_LABELS = 256
+STRIP_PIXELS = 4_000_000  # pixels
+VOID_LABEL = 255  # what segmented photographs have along the borders of objects, which is no label
 # of the pixels on borders between regions: those of labels that fill no 3 x 3 pixels
-MAX_STRAY = 0.1
+MAX_STRAY_SHARE = 0.1
 
 _Mask = NDArray[np.bool_]
 VOC_LABELS = 21  # of Pascal VOC: DAVIS has the same colours up to there, and grey ones beyond
-ROUNDED = 1  # of 255: so much DAVIS's colours differ
-VGA_LIKE = 7  # of Windows' 16 colours, which are VOC's, too
+COLOUR_ROUNDING = 1  # of 255: so much DAVIS's colours differ
+VGA_COLOURS = 7  # of Windows' 16 colours, which are VOC's, too
 
 
 def label_mask(
@@ -29,7 +29,7 @@ def label_mask(
 
     Labels are small whole numbers, or 0, 1, 2 and so on, each of which fills regions. Levels of grey
     are not: between two levels of an anti-aliased or noisy picture there are others, which fill none.
-    The label that most of the border has is the background. What is `VOID` beside small labels is
+    The label that most of the border has is the background. What is `VOID_LABEL` beside small labels is
     background, too. Where a palette says that they `are_labels`, they may be large, and lines.
     """
     border = np.concatenate([numbers[0], numbers[-1], numbers[1:-1, 0], numbers[1:-1, -1]])
@@ -40,16 +40,18 @@ def label_mask(
     if low < 0 or high > 65535 or low == high:
         return None
     # by strips: counting takes eight bytes for each pixel
-    strips = np.array_split(numbers, 1 + numbers.size // STRIP)
+    strips = np.array_split(numbers, 1 + numbers.size // STRIP_PIXELS)
     counts = np.sum([np.bincount(strip.ravel(), minlength=high + 1) for strip in strips], axis=0)
     values = np.flatnonzero(counts)
     n = len(values)
-    are_few = are_labels or high <= (DARKEST if n == 2 and numbers is given else FEW)
-    if n > MOST_LABELS or not (are_few or (n > 2 and low <= 1 and high - low == n - 1)):
+    are_few = are_labels or high <= (
+        MAX_INDISTINCT_LEVEL if n == 2 and numbers is given else MAX_SMALL_LABEL
+    )
+    if n > MAX_LABELS or not (are_few or (n > 2 and low <= 1 and high - low == n - 1)):
         return None
     even = ndimage.maximum_filter(numbers, 3) == ndimage.minimum_filter(numbers, 3)
     filling = np.bincount(numbers[even], minlength=len(counts)) > 0
-    if not are_labels and counts[~filling].sum() > MAX_STRAY * (~even).sum():
+    if not are_labels and counts[~filling].sum() > MAX_STRAY_SHARE * (~even).sum():
         return None
     counts[background] = 0
     label, labelled = int(counts.argmax()), int(counts.sum())
@@ -77,7 +79,7 @@ def may_be_labels(indices: NDArray[np.integer[Any]], palette: NDArray[np.int64])
     They may be if most of the border is black and has the number 0, and numbers in between are left
     out, which programs that count a picture's colours do not do.
     """
-    if _are_as_in_voc(palette[:VGA_LIKE]).all():  # and no more: Windows' 16 colours
+    if _are_as_in_voc(palette[:VGA_COLOURS]).all():  # and no more: Windows' 16 colours
         return False
     used: list[int] = np.unique(indices).tolist()
     edge = np.concatenate([indices[0], indices[-1], indices[1:-1, 0], indices[1:-1, -1]])
@@ -95,16 +97,16 @@ def _are_as_in_voc(palette: NDArray[np.int64]) -> _Mask:
     for k in range(8):
         for channel in range(3):
             colours[:, channel] |= (numbers >> (3 * k + channel) & 1) << (7 - k)
-    return abs(colours - palette).max(axis=1) <= ROUNDED
+    return abs(colours - palette).max(axis=1) <= COLOUR_ROUNDING
 
 
 def _without_void(
     numbers: Array | NDArray[np.integer[Any]], background: int
 ) -> Array | NDArray[np.integer[Any]]:
-    """Return numbers with `VOID` as background, where what else there is are small labels."""
-    if int(numbers.max()) != VOID or background > FEW:
+    """Return numbers with `VOID_LABEL` as background, where what else there is are small labels."""
+    if int(numbers.max()) != VOID_LABEL or background > MAX_SMALL_LABEL:
         return numbers
-    kept = np.where(numbers == VOID, background, numbers)
+    kept = np.where(numbers == VOID_LABEL, background, numbers)
     labelled = int(np.count_nonzero(kept != background))
-    is_border = np.count_nonzero(numbers == VOID) < labelled
-    return kept if is_border and int(kept.max()) <= FEW else numbers
+    is_border = np.count_nonzero(numbers == VOID_LABEL) < labelled
+    return kept if is_border and int(kept.max()) <= MAX_SMALL_LABEL else numbers

@@ -14,20 +14,17 @@ from orbiflow.contours import level_curves
 from orbiflow.tiles.geometry import signed_area
 from orbiflow.tiles.silhouette.readers.tracing import Level
 
-MIN_BARE = 0.5  # of what the line encloses
-CONVEX = 0.95  # of its convex hull: what a frame fills
-MOST_INSIDE = 0.1  # of what a frame encloses: more is a shape of its own
-THINNEST = 0.7  # pixels: what is thinner is noise
-WIDEST = 0.07  # of the drawing's longer side: a wider line is a ring
-FAINTEST = (
-    0.25  # of the usual ink: an anti-aliased line of a pixel is no darker where it lies between two
-)
-NOISE = 4.0  # times the usual deviation of the background
-ENDS = (
-    1.6  # widths: what is farther from the inside is no part of the line's outer half, but a limb
-)
-LIMB = 4.0  # widths: the least length of a limb that is drawn as a single line
-NEXT = 2.0  # pixels: points of one border that follow on each other are nearer
+MIN_BARE_SHARE = 0.5  # of what the line encloses
+MIN_CONVEX_SHARE = 0.95  # of its convex hull: what a frame fills
+MAX_INSIDE_SHARE = 0.1  # of what a frame encloses: more is a shape of its own
+MIN_WIDTH_PIXELS = 0.7  # pixels: what is thinner is noise
+MAX_WIDTH_SHARE = 0.07  # of the drawing's longer side: a wider line is a ring
+# of the usual ink: an anti-aliased line of a pixel is no darker where it lies between two
+MIN_INK_SHARE = 0.25
+NOISE_FACTOR = 4.0  # times the usual deviation of the background
+LIMB_DISTANCE_WIDTHS = 1.6  # farther from the inside than the line's outer half: a limb
+MIN_LIMB_WIDTHS = 4.0  # widths: the least length of a limb that is drawn as a single line
+MAX_STEP_PIXELS = 2.0  # pixels: points of one border that follow on each other are nearer
 # a line holds together across corners where its background does not
 _ACROSS_CORNERS = np.ones((3, 3), dtype=int)
 _Mask = NDArray[np.bool_]
@@ -57,13 +54,13 @@ def outline_drawing(level: Level, *, is_given: bool = False) -> OutlineDrawing |
     line = _line_of(shape & mask)
     inside = ndimage.binary_fill_holes(line) & ~line
     enclosed = int(inside.sum())
-    if enclosed < MIN_BARE * areas.max() or shape.all():
+    if enclosed < MIN_BARE_SHARE * areas.max() or shape.all():
         return None
-    if _largest_area(mask & inside) > MOST_INSIDE * areas.max() and _is_frame(shape):
+    if _largest_area(mask & inside) > MAX_INSIDE_SHARE * areas.max() and _is_frame(shape):
         return None
     outer, inner = _borders(level.values, cut)
     width = 2 * float(line.sum()) / (_length(outer) + _length(inner))
-    if not THINNEST <= width <= WIDEST * max(np.ptp(np.nonzero(shape), axis=1)):
+    if not MIN_WIDTH_PIXELS <= width <= MAX_WIDTH_SHARE * max(np.ptp(np.nonzero(shape), axis=1)):
         return None
     values = _from_middle(line, inside, (outer, inner), width)
     values[mask & ~shape] = width
@@ -79,15 +76,15 @@ def _largest_area(drawn: _Mask) -> int:
 def _is_frame(shape: _Mask) -> bool:
     """Whether a filled shape is all but convex, as frames are."""
     border = np.argwhere(shape & ~ndimage.binary_erosion(shape))
-    return int(shape.sum()) > CONVEX * MultiPoint(border).convex_hull.area
+    return int(shape.sum()) > MIN_CONVEX_SHARE * MultiPoint(border).convex_hull.area
 
 
 def _faint_cut(level: Level) -> float:
     """Return a cut near the background, which has the level of most pixels below the usual cut."""
     below = level.values[level.values <= level.cut]
     background = float(np.median(below))
-    noise = NOISE * float(np.median(abs(below - background)))
-    return background + max(FAINTEST * (level.inside - background), noise)
+    noise = NOISE_FACTOR * float(np.median(abs(below - background)))
+    return background + max(MIN_INK_SHARE * (level.inside - background), noise)
 
 
 def _line_of(drawn: _Mask) -> _Mask:
@@ -111,7 +108,7 @@ def _borders(values: Array, cut: float) -> tuple[Array, Array]:
 
 def _length(border: Array) -> float:
     steps = np.linalg.norm(np.diff(border, axis=0), axis=1)
-    return float(steps[steps < NEXT].sum())
+    return float(steps[steps < MAX_STEP_PIXELS].sum())
 
 
 def _from_middle(line: _Mask, inside: _Mask, borders: tuple[Array, Array], width: float) -> Array:
@@ -128,9 +125,11 @@ def _from_middle(line: _Mask, inside: _Mask, borders: tuple[Array, Array], width
     sign = np.where(inside, 1.0, -1.0)
     apart = np.where(line, to_outer - to_inner, sign * (to_outer + to_inner))
     values = np.where(near, apart, values)
-    limbs = _limbs(line & (to_inner > ENDS * width), LIMB * width)
+    limbs = _limbs(line & (to_inner > LIMB_DISTANCE_WIDTHS * width), MIN_LIMB_WIDTHS * width)
     if limbs.any():
-        limbs = ndimage.binary_dilation(limbs, _ACROSS_CORNERS, round(ENDS * width) + 2)
+        limbs = ndimage.binary_dilation(
+            limbs, _ACROSS_CORNERS, round(LIMB_DISTANCE_WIDTHS * width) + 2
+        )
         own = np.where(line, to_outer, -to_outer)
         values = np.where(limbs & near & ~inside, np.maximum(values, own), values)
     return np.clip(values, -width, width)
@@ -139,7 +138,7 @@ def _from_middle(line: _Mask, inside: _Mask, borders: tuple[Array, Array], width
 def _distances(points: NDArray[np.integer[Any]], border: Array) -> Array:
     """Return distances from points to a border, whose own points are about a pixel apart."""
     halves = (border[1:] + border[:-1]) / 2
-    neighbours = np.linalg.norm(np.diff(border, axis=0), axis=1) < NEXT
+    neighbours = np.linalg.norm(np.diff(border, axis=0), axis=1) < MAX_STEP_PIXELS
     tree = KDTree(np.concatenate([border, halves[neighbours]]))
     return np.asarray(tree.query(points)[0])
 

@@ -11,19 +11,19 @@ from scipy.cluster.vq import vq
 
 from orbiflow.arrays import Array
 
-SIDE = 400  # pixels: the shape is found in a picture of this size, its edge in the picture itself
+SEARCH_SIDE_PIXELS = 400  # the shape is found at this size, its edge in the picture itself
 LUMINANCE = np.array([0.299, 0.587, 0.114])  # of red, green and blue, as Pillow weighs them
-FLAT = 8.0  # in CIE Lab: one ink or one paper differs less from itself
+FLAT_SPREAD = 8.0  # in CIE Lab: one ink or one paper differs less from itself
 MAX_SHARE_NOT_FLAT = 0.02  # of the pixels of a drawing in two colours, edges apart
-MARGIN = 0.03  # of the shorter side: the border, which is background
+MARGIN_SHARE = 0.03  # of the shorter side: the border, which is background
 QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a background's colours, which are parted around them
-LEAST_SHARE = 0.02  # of the background: rarer colours are none of its own
-GRAIN = 2.0  # in CIE Lab: the least spread of a background's colours
-FAR = 8.0  # standard deviations: nothing is farther from a background
+MIN_COLOUR_SHARE = 0.02  # of the background: rarer colours are none of its own
+MIN_SPREAD = 2.0  # in CIE Lab: the least spread of a background's colours
+MAX_SIGMAS = 8.0  # standard deviations: nothing is farther from a background
 GAINS = np.arange(1, 0.45, -0.05)
-DEEPEST = (1.0, 0.8, 0.65, 0.5)  # gains of the deepest shadows that are tried
-DEPTH_COST = 4.0  # standard deviations for a shadow that is black
-BINS = 256
+DEEPEST_GAINS = (1.0, 0.8, 0.65, 0.5)  # gains of the deepest shadows that are tried
+SHADOW_SIGMAS = 4.0  # standard deviations for a shadow that is black
+HISTOGRAM_BINS = 256
 """Bins of the histogram in which two classes are told apart."""
 
 SRGB_KNEE, SRGB_SLOPE, SRGB_SHIFT, SRGB_POWER = 0.04045, 12.92, 0.055, 2.4
@@ -34,13 +34,13 @@ TO_XYZ = np.array(
 )
 """From linear red, green and blue to CIE XYZ."""
 
-WHITE = np.array([0.95047, 1.0, 1.08883])
+WHITE_XYZ = np.array([0.95047, 1.0, 1.08883])
 """XYZ of the white of daylight, D65."""
 
 LAB_KNEE = (6 / 29) ** 3
 """Share of white below which CIE Lab is linear."""
 
-EDGE_WIDTH = 2  # pixels of that picture within which the outline is drawn again
+EDGE_PIXELS = 2  # pixels of that picture within which the outline is drawn again
 
 _Mask = NDArray[np.bool_]
 
@@ -55,7 +55,7 @@ def is_photograph(rgb: Array) -> bool:
     colours = [np.median(part, axis=0) for part in parts]
     if not parts:
         return False
-    flatness = min(FLAT, float(np.linalg.norm(colours[0] - colours[-1])) / 4)
+    flatness = min(FLAT_SPREAD, float(np.linalg.norm(colours[0] - colours[-1])) / 4)
     off = [np.linalg.norm(p - c, axis=1) > flatness for p, c in zip(parts, colours, strict=True)]
     return float(np.mean(np.concatenate(off))) > MAX_SHARE_NOT_FLAT
 
@@ -66,12 +66,12 @@ def shape_in(rgb: Array) -> Array:
     The background is what the border shows, in a light that varies slowly. Shadows of several
     depths are taken for background; the depth that leaves the sharpest outline is right.
     """
-    scale = min(SIDE / max(rgb.shape), 1)
+    scale = min(SEARCH_SIDE_PIXELS / max(rgb.shape), 1)
     size = tuple(round(scale * side) for side in rgb.shape[:2])
     lab = _lab(resized(rgb, size))
     region = _sharpest(ndimage.gaussian_filter(lab, (1, 1, 0)))
     region = resized(region.astype(float), rgb.shape[:2]) > 0.5
-    return _matte(_lab(rgb), region, round(EDGE_WIDTH / scale))
+    return _matte(_lab(rgb), region, round(EDGE_PIXELS / scale))
 
 
 def _lab(rgb: Array) -> Array:
@@ -80,13 +80,13 @@ def _lab(rgb: Array) -> Array:
 
 def _sharpest(lab: Array) -> _Mask:
     """Return the region with the sharpest outline."""
-    margin = max(3, round(MARGIN * min(lab.shape[:2])))
+    margin = max(3, round(MARGIN_SHARE * min(lab.shape[:2])))
     border = np.ones(lab.shape[:2], dtype=bool)
     border[margin:-margin, margin:-margin] = False
     surprise = _surprise(lab, border)
     slopes = [ndimage.gaussian_gradient_magnitude(band, 1) for band in np.moveaxis(lab, 2, 0)]
     slope = ndimage.maximum_filter(np.linalg.norm(slopes, axis=0), 3)
-    regions = [_differing(surprise, deepest, border) for deepest in DEEPEST]
+    regions = [_differing(surprise, deepest, border) for deepest in DEEPEST_GAINS]
     return max(regions, key=lambda region: _steepness(slope, region, regions[0]))
 
 
@@ -104,8 +104,8 @@ def _surprise(lab: Array, background: _Mask) -> Array:
     label, _ = vq(colours, np.quantile(colours, QUANTILES, axis=0))
     distances: list[Array] = []
     for colour in (colours[label == k] for k in range(len(QUANTILES))):
-        if len(colour) > LEAST_SHARE * len(colours):
-            root = np.linalg.cholesky(np.linalg.inv(np.cov(colour.T) + GRAIN**2 * np.eye(3)))
+        if len(colour) > MIN_COLOUR_SHARE * len(colours):
+            root = np.linalg.cholesky(np.linalg.inv(np.cov(colour.T) + MIN_SPREAD**2 * np.eye(3)))
             apart = lab / GAINS[:, None, None, None] - colour.mean(axis=0)
             distances.append(np.sum((apart @ root) ** 2, axis=3))
     return np.min(distances, axis=0)
@@ -123,9 +123,9 @@ def _light(lightness: Array, background: _Mask) -> Array:
 def _differing(surprise: Array, deepest: float, border: _Mask) -> _Mask:
     """Return where no background is, in shadows up to the deepest."""
     shadows = deepest - 0.01 < GAINS
-    cost = DEPTH_COST * (1 - GAINS[shadows, None, None])
+    cost = SHADOW_SIGMAS * (1 - GAINS[shadows, None, None])
     far = np.sqrt(np.min(surprise[shadows] + cost**2, axis=0))
-    far = ndimage.gaussian_filter(np.minimum(far, FAR), 0.7)
+    far = ndimage.gaussian_filter(np.minimum(far, MAX_SIGMAS), 0.7)
     split = far > threshold_of(far)
     level = (np.median(far[split]) + np.median(far[~split])) / 2
     return far > max(level, 1.2 * np.quantile(far[border], 0.95))
@@ -150,7 +150,7 @@ def _average(lab: Array, part: _Mask, width: int) -> Array:
 
 def threshold_of(values: Array) -> float:
     """Return the value that parts others into two classes of the least variance (Otsu, 1979)."""
-    counts, edges = np.histogram(values, bins=BINS)
+    counts, edges = np.histogram(values, bins=HISTOGRAM_BINS)
     centers = (edges[:-1] + edges[1:]) / 2
     below, above = np.cumsum(counts), np.cumsum(counts[::-1])[::-1]
     sums = np.cumsum(counts * centers)
@@ -168,7 +168,7 @@ def lab_of(rgb: Array) -> Array:
     """
     bent = ((rgb + SRGB_SHIFT) / (1 + SRGB_SHIFT)) ** SRGB_POWER
     linear = np.where(rgb > SRGB_KNEE, bent, rgb / SRGB_SLOPE)
-    share = linear @ TO_XYZ.T / WHITE
+    share = linear @ TO_XYZ.T / WHITE_XYZ
     straight = share / (3 * (6 / 29) ** 2) + 4 / 29
     x, y, z = np.moveaxis(np.where(share > LAB_KNEE, np.cbrt(share), straight), -1, 0)
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)

@@ -20,13 +20,18 @@ from orbiflow.tiles.silhouette.outlines import (
     percent,
     simplified,
 )
-from orbiflow.tiles.silhouette.readers.frames import CARD, CARD_NOTE, CARD_SIDES, LEAST_DRAWN
+from orbiflow.tiles.silhouette.readers.frames import (
+    CARD_NOTE,
+    MIN_CARD_COVERAGE,
+    MIN_CARD_SHARE,
+    MIN_DRAWN_SHARE,
+)
 from orbiflow.tiles.silhouette.readers.reading import Reading, Source
 from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
 from orbiflow.tiles.silhouette.readers.svg_overlays import (
-    NOTEWORTHY,
-    PAPER,
-    PLAIN,
+    BLACK,
+    MIN_NOTED_SHARE,
+    PAPER_COLOUR,
     alike,
     overlay,
     solid,
@@ -34,18 +39,21 @@ from orbiflow.tiles.silhouette.readers.svg_overlays import (
     without_grid,
 )
 from orbiflow.tiles.silhouette.readers.svg_paths import MAX_POINTS, TooManyPoints, TooTangled
-from orbiflow.tiles.silhouette.readers.svg_regions import FAINT, Layer, Regions
+from orbiflow.tiles.silhouette.readers.svg_regions import MIN_VISIBLE_OPACITY, Layer, Regions
 
 # Flattening error, of the size of each shape, and its floor, of the size of the drawing.
 FLATNESS = 1 / 2000
 FLATNESS_FLOOR = 1 / 20_000
 # of the size of the drawing: vertices nearer their chord than this are dropped
 COLLINEAR_TOLERANCE = 1e-6
-WHOLE, ALL_BUT = 0.999, 0.95  # shares of the page that a background covers: one shape, several
-DISC_DIGITS = 0.01  # of its box: how nearly a disc has the area of one
-BADGE_DRAWN = 0.5  # of a disc's width or height: more than an eye or a spot on it has
-MOSTLY_HOLE = 0.1  # of what fills the page: what is cut out of it is larger
-MOST_STRIPS = 500  # rectangles that a background is made of, as strips or a chequerboard
+WHOLE_SHARE, PAVED_SHARE = (
+    0.999,
+    0.95,
+)  # shares of the page that a background covers: one shape, several
+DISC_AREA_TOLERANCE = 0.01  # of its box: how nearly a disc has the area of one
+MIN_BADGE_SHARE = 0.5  # of a disc's width or height: more than an eye or a spot on it has
+MIN_HOLE_SHARE = 0.1  # of what fills the page: what is cut out of it is larger
+MAX_STRIPS = 500  # rectangles that a background is made of, as strips or a chequerboard
 
 
 def read_svg(path: Source) -> Reading:
@@ -111,7 +119,7 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
                 "width and height); fit the page to the drawing"
             )
         fills = [regions.shown(shape, regions.fill(shape)) for shape in drawing.shapes]
-        layers = [[Layer(region, PLAIN)] for region in fills if region.area > 0]
+        layers = [[Layer(region, BLACK)] for region in fills if region.area > 0]
         notes = ["nothing is painted: took the closed paths as filled"]
     layers = [own for own in layers if own]
     paper, grounds = _background(layers, drawing)
@@ -125,17 +133,17 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
     noun = "a background rectangle" if n == 1 else f"{n} background rectangles"
     notes += [f"left out {noun} that cover{'s' * (n == 1)} the whole drawing"] * (n > 0)
     notes += carded
-    shown, ruled = without_grid(shown, paper or PAPER)
+    shown, ruled = without_grid(shown, paper or PAPER_COLOUR)
     seen, decided = overlay(shown, paper)
     seen, framed = without_axes(seen)
     decided = [*ruled, *framed, *decided]
-    colours = {layer.brush.colour for layer in shown if layer.brush.opacity >= FAINT}
+    colours = {layer.brush.colour for layer in shown if layer.brush.opacity >= MIN_VISIBLE_OPACITY}
     whole = solid(seen)
-    if whole >= ALL_BUT * _page(layers, drawing).area:
+    if whole >= PAVED_SHARE * _page(layers, drawing).area:
         if len(colours) > 1:
             note = "the silhouette is all but the whole page; if that is a background, delete it"
             notes.append(note)
-        elif seen.area < (1 - MOSTLY_HOLE) * whole:
+        elif seen.area < (1 - MIN_HOLE_SHARE) * whole:
             note = "the silhouette is all but the whole page; if the hole in it is the shape, fill that"
             notes.append(note)
     elif _is_badge(seen, shown):
@@ -143,7 +151,7 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
             "the silhouette is a disc with a drawing on it; if it is a background, delete it"
         )
     cut = regions.beyond / (regions.beyond + sum(layer.region.area for layer in shown))
-    if cut > NOTEWORTHY:
+    if cut > MIN_NOTED_SHARE:
         notes.append(f"left out what lies beyond the page: {percent(cut)} of what is painted")
     return seen, notes + decided
 
@@ -169,15 +177,15 @@ def _background(layers: list[list[Layer]], drawing: Drawing) -> tuple[str | None
     if whole == set(range(len(layers))) and not drawing.others.keys() & {"image", "text"}:
         return drawing.ground, set()
     # frames have no colour that others lie on
-    solid = [k for k in sorted(whole) if first[k].region.area >= WHOLE * page.area]
+    solid = [k for k in sorted(whole) if first[k].region.area >= WHOLE_SHARE * page.area]
     under = solid[-1:] or sorted(paving, key=lambda k: first[k].region.area)[-1:]
     return first[under[0]].brush.colour if under else drawing.ground, whole | paving
 
 
 def _covers(region: BaseGeometry, page: shapely.Polygon) -> bool:
-    if region.envelope.intersection(page).area < WHOLE * page.area:
+    if region.envelope.intersection(page).area < WHOLE_SHARE * page.area:
         return False
-    return _without_holes(region).area >= WHOLE * region.envelope.area
+    return _without_holes(region).area >= WHOLE_SHARE * region.envelope.area
 
 
 def _paving(layers: list[list[Layer]], page: shapely.Polygon) -> int:
@@ -186,22 +194,27 @@ def _paving(layers: list[list[Layer]], page: shapely.Polygon) -> int:
     Corners may be rounded. Once the page is paved, what lies beside the rest or reaches from edge to
     edge still belongs to it.
     """
-    xmin, ymin, xmax, ymax = page.buffer(-(1 - WHOLE) * page.length / 4).bounds
+    xmin, ymin, xmax, ymax = page.buffer(-(1 - WHOLE_SHARE) * page.length / 4).bounds
     ground: BaseGeometry = shapely.Polygon()
     count, paved = 0, False
-    for own in layers[:MOST_STRIPS]:
+    for own in layers[:MAX_STRIPS]:
         parts = polygons_in(own[0].region)
-        if any(filled(part).area < ALL_BUT * part.envelope.area for part in parts):
+        if any(filled(part).area < PAVED_SHARE * part.envelope.area for part in parts):
             break
         region = _without_holes(own[0].region)
         left, low, right, high = region.bounds
         spans = (left <= xmin and right >= xmax) or (low <= ymin and high >= ymax)
-        beside = region.intersection(ground).area <= NOTEWORTHY * region.area
+        beside = region.intersection(ground).area <= MIN_NOTED_SHARE * region.area
         if paved and not spans and not beside:
             break
         ground, count = ground.union(region), count + 1
-        paved = ground.intersection(page).area >= ALL_BUT * page.area
-    on_it = [layer for own in layers[count:] for layer in own if layer.brush.opacity >= FAINT]
+        paved = ground.intersection(page).area >= PAVED_SHARE * page.area
+    on_it = [
+        layer
+        for own in layers[count:]
+        for layer in own
+        if layer.brush.opacity >= MIN_VISIBLE_OPACITY
+    ]
     widest = max(
         (own[0] for own in layers[:count]), key=lambda layer: layer.region.area, default=None
     )
@@ -215,44 +228,47 @@ def _card(layers: list[list[Layer]], grounds: set[int], drawing: Drawing) -> int
     if len(rest) < 2 or drawing.box is None:
         return None
     card, page = layers[rest[0]][0], shapely.box(*drawing.box)
-    on_it = [layer for k in rest[1:] for layer in layers[k] if layer.brush.opacity >= FAINT]
+    on_it = [
+        layer for k in rest[1:] for layer in layers[k] if layer.brush.opacity >= MIN_VISIBLE_OPACITY
+    ]
     on_it = [layer for layer in on_it if not alike(layer.brush.colour, card.brush.colour)]
     region = _without_holes(card.region)
     drawn = shapely.union_all([layer.region for layer in on_it])
     is_card = (
-        card.brush.opacity >= FAINT
+        card.brush.opacity >= MIN_VISIBLE_OPACITY
         and _is_rectangle(region)
-        and (_sides(region) >= CARD_SIDES * _sides(page)).all()
-        and drawn.difference(region).area <= NOTEWORTHY * drawn.area
+        and (_sides(region) >= MIN_CARD_SHARE * _sides(page)).all()
+        and drawn.difference(region).area <= MIN_NOTED_SHARE * drawn.area
     )
     if not is_card or drawn.is_empty:
         return None
     largest = outer_outline(drawn)[0]
-    is_drawing = (_sides(largest) > LEAST_DRAWN * _sides(region)).all()
+    is_drawing = (_sides(largest) > MIN_DRAWN_SHARE * _sides(region)).all()
     return rest[0] if is_drawing and not _is_rectangle(largest) else None
 
 
 def _is_badge(seen: BaseGeometry, layers: list[Layer]) -> bool:
     """Return whether what is seen is a disc in one colour with a drawing of another on it."""
     whole = outer_outline(seen)[0]
-    gap = DISC_DIGITS * whole.envelope.area
+    gap = DISC_AREA_TOLERANCE * whole.envelope.area
     if abs(whole.area - np.pi / 4 * whole.envelope.area) > gap:
         return False
     disc = max(layers, key=lambda layer: layer.region.area)
     on_it = [
         layer.region
         for layer in layers
-        if layer.brush.opacity >= FAINT and not alike(layer.brush.colour, disc.brush.colour)
+        if layer.brush.opacity >= MIN_VISIBLE_OPACITY
+        and not alike(layer.brush.colour, disc.brush.colour)
     ]
     is_round = whole.convex_hull.area - whole.area < gap and disc.region.area > whole.area - gap
     if not on_it or not is_round:
         return False
     shares = _sides(outer_outline(shapely.union_all(on_it))[0]) / _sides(whole)
-    return bool(shares.min() > LEAST_DRAWN and shares.max() > BADGE_DRAWN)
+    return bool(shares.min() > MIN_DRAWN_SHARE and shares.max() > MIN_BADGE_SHARE)
 
 
 def _is_rectangle(region: BaseGeometry) -> bool:
-    return region.area >= CARD * region.envelope.area
+    return region.area >= MIN_CARD_COVERAGE * region.envelope.area
 
 
 def _sides(region: BaseGeometry) -> Array:

@@ -39,7 +39,7 @@ from orbiflow.tiles.silhouette.readers.svg_xml import MAX_DEPTH, Notes, is_own, 
 MAX_BYTES = 16 * 2**20
 MAX_DRAWN = 10_000  # elements, those drawn again by <use>, clips, masks and markers counted again
 MAX_TOKENS = 400_000  # commands and numbers in all path data; one with a fraction counts twice
-ROUNDING = 1e-9  # of the page: what reaches beyond it by less does not
+PAGE_TOLERANCE = 1e-9  # of the page: what reaches beyond it by less does not
 LANGUAGE = "en"  # what drawings in several languages are read in
 _SOURCE = "SourceGraphic"  # what a filter's first step is of
 _GROUPS = {"svg", "g", "a", "switch"}
@@ -151,7 +151,7 @@ class Drawing:
             return self.box, np.eye(3)
         corners = np.array([[0.0, 0.0], [width, height]]) - view[:2, 2]
         (xmin, ymin), (xmax, ymax) = (corners / np.diag(view)[:2]).tolist()
-        margin = ROUNDING * max(xmax - xmin, ymax - ymin)  # the page's own edge is not cut
+        margin = PAGE_TOLERANCE * max(xmax - xmin, ymax - ymin)  # the page's own edge is not cut
         return (xmin - margin, ymin - margin, xmax + margin, ymax + margin), view
 
     def _pixels(self, style: Style, key: str) -> float | None:

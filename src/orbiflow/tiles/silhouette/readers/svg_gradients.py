@@ -34,11 +34,11 @@ from orbiflow.tiles.silhouette.readers.svg_xml import reference
 if TYPE_CHECKING:
     from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
 
-MOST_REFERENCES = 10  # from gradient to gradient
-MOST_STOPS = 500
-MOST_PERIODS = 100  # of a gradient that repeats, to either side
-_ROUND = 64  # segments of a quarter of a circle
-_EMPTY = 1e-9  # of a vector or radius: a gradient of less has its last colour everywhere
+MAX_REFERENCES = 10  # from gradient to gradient
+MAX_STOPS = 500
+MAX_PERIODS = 100  # of a gradient that repeats, to either side
+_QUARTER_SEGMENTS = 64  # segments of a quarter of a circle
+_MIN_EXTENT = 1e-9  # of a vector or radius: a gradient of less has its last colour everywhere
 _LINEAR = {"x1": "0%", "y1": "0%", "x2": "100%", "y2": "0%"}
 _RADIAL = {"cx": "50%", "cy": "50%", "r": "50%", "fr": "0%"}
 
@@ -90,7 +90,7 @@ class Gradient:
         if self.spread == "pad":
             every = spans
         else:
-            low, high = max(low, -MOST_PERIODS), min(high, MOST_PERIODS)
+            low, high = max(low, -MAX_PERIODS), min(high, MAX_PERIODS)
             turns = range(int(np.floor(low)), int(high) + 1)
             back = self.spread == "reflect"
             every = [
@@ -123,7 +123,7 @@ class Gradient:
 
         def disc(t: float) -> BaseGeometry:
             centre = Point(x + t * step[0], y + t * step[1])
-            return centre.buffer(max(radius + t * step[2], 0.0), quad_segs=_ROUND)
+            return centre.buffer(max(radius + t * step[2], 0.0), quad_segs=_QUARTER_SEGMENTS)
 
         return [
             shapely.difference(disc(b), disc(a)) if a > 0 else disc(b)
@@ -151,8 +151,8 @@ def gradient_of(drawing: Drawing, element: Element, shape: DrawnShape) -> Gradie
     brushes = [_stop(drawing, stop) for stop in stops]
     given = [min(max(as_number(stop.get("offset"), 0.0), 0.0), 1.0) for stop in stops]
     radial, ends = element.tag == "radialGradient", _ends(element.tag, attribute, size)
-    flat = np.linalg.det(matrix) == 0 or not np.ptp(ends, axis=0).max() > _EMPTY
-    if len(stops) == 1 or len(stops) > MOST_STOPS or flat:
+    flat = np.linalg.det(matrix) == 0 or not np.ptp(ends, axis=0).max() > _MIN_EXTENT
+    if len(stops) == 1 or len(stops) > MAX_STOPS or flat:
         return brushes[-1]
     along = ends[1] - ends[0]
     if radial and float(np.hypot(*along[:2])) >= along[2]:
@@ -188,7 +188,7 @@ _SHAPED = {*_LINEAR, *_RADIAL, "fx", "fy"}
 
 def references(drawing: Drawing, element: Element | None) -> Iterator[Element]:
     """Yield a gradient or pattern and those that it takes its stops, content or attributes from."""
-    for _ in range(MOST_REFERENCES):
+    for _ in range(MAX_REFERENCES):
         if element is None or element.tag not in _SERVERS:
             return
         yield element

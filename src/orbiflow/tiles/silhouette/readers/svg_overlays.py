@@ -14,28 +14,33 @@ from shapely.geometry.base import BaseGeometry
 from orbiflow.drawing import rgb
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.silhouette.outlines import filled, outer_outline, percent
-from orbiflow.tiles.silhouette.readers.frames import AXES_NOTE, LEAST_DRAWN, MARKS, WIDEST
-from orbiflow.tiles.silhouette.readers.svg_regions import FAINT, Layer, painted
+from orbiflow.tiles.silhouette.readers.frames import (
+    AXES_NOTE,
+    MAX_LINE_SHARE,
+    MAX_MARK_SHARE,
+    MIN_DRAWN_SHARE,
+)
+from orbiflow.tiles.silhouette.readers.svg_regions import MIN_VISIBLE_OPACITY, Layer, painted
 from orbiflow.tiles.silhouette.readers.svg_values import Brush
 
 OVERLAY_GRID = 1e-9  # of the size of the drawing: the grid that the united outline is snapped to
 OVERLAY_GRID_FLOOR = 1e-12  # of the largest coordinate
-PAPER = "#ffffff"  # what a drawing without a background lies on
-SAME_COLOUR = 10  # of 255: colours whose channels differ by no more are one
-COVERING = 0.9  # opacity: more hides what lies below
-MOSTLY, NOTEWORTHY, OVER = 0.5, 0.001, 0.1  # shares of areas
-MOST_FAINT = 200  # faint layers that are laid over one another; of more, each is judged by itself
-THINNEST = 0.01  # of all that is painted: a line that is no wider may belong to a grid
-ACROSS = 0.98  # of the shape's width or height: what a line of a grid spans
-SQUARE = 0.97  # of its box: what a frame encloses, marks that point inwards apart
-PLAIN = Brush("#000000", 1.0)
+PAPER_COLOUR = "#ffffff"  # what a drawing without a background lies on
+MAX_CHANNEL_DISTANCE = 10  # of 255: colours whose channels differ by no more are one
+COVERING_OPACITY = 0.9  # opacity: more hides what lies below
+MIN_SHOWN_SHARE, MIN_NOTED_SHARE, MIN_OVERLAP_SHARE = 0.5, 0.001, 0.1  # shares of areas
+MAX_FAINT_LAYERS = 200  # laid over one another; of more, each is judged by itself
+MAX_GRID_LINE_SHARE = 0.01  # of all that is painted: a line that is no wider may belong to a grid
+MIN_SPAN_SHARE = 0.98  # of the shape's width or height: what a line of a grid spans
+MIN_FRAME_COVERAGE = 0.97  # of its box: what a frame encloses, marks that point inwards apart
+BLACK = Brush("#000000", 1.0)
 _Shades = dict[tuple[float, float], BaseGeometry]
 """Regions by how much of the shapes' paint is seen there, and how much of the ground is covered."""
 
 
 def overlay(layers: list[Layer], ground: str | None) -> tuple[BaseGeometry, list[str]]:
     """Return the region that is seen of layers on a ground, and notes."""
-    paper = ground or PAPER
+    paper = ground or PAPER_COLOUR
     # Snapped to a grid: neighbours that all but share an edge would leave cracks between them.
     bounds = shapely.total_bounds([layer.region for layer in layers])
     size = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
@@ -46,7 +51,7 @@ def overlay(layers: list[Layer], ground: str | None) -> tuple[BaseGeometry, list
     notes = [f"left out {n} faint shape{'s' * (n > 1)}"] * (n > 0)
     pale = [alike(layer.brush.colour, paper) for layer in opaque]
     signs = [
-        1 if not own else -1 if layer.brush.opacity >= COVERING else 0
+        1 if not own else -1 if layer.brush.opacity >= COVERING_OPACITY else 0
         for layer, own in zip(opaque, pale, strict=True)
     ]
     seen = painted(opaque, signs, grid)
@@ -55,11 +60,11 @@ def overlay(layers: list[Layer], ground: str | None) -> tuple[BaseGeometry, list
     # what has the paper's colour and lies on the bare paper may be the shape itself
     every = painted(opaque, [_sign(opaque, k, pale) for k in range(len(opaque))], grid)
     hidden = 1 - solid(seen) / (solid(every) or 1.0)
-    if not seen.area > 0 or (ground is None and hidden > MOSTLY):
+    if not seen.area > 0 or (ground is None and hidden > MIN_SHOWN_SHARE):
         return every, [*notes, f"took shapes in {paper} too: they are most of the drawing"]
     dark = painted(opaque, [int(not own) for own in pale], grid)
     bitten = 1 - solid(seen) / solid(dark)
-    if bitten > NOTEWORTHY:
+    if bitten > MIN_NOTED_SHARE:
         notes.append(
             f"took shapes in {paper} for background, which hide {percent(bitten)} of the others; "
             "give them another colour if they belong to the shape"
@@ -71,13 +76,13 @@ def _sign(layers: list[Layer], k: int, pale: list[bool]) -> int:
     """Return -1 for a pale layer that lies over darker ones for a good part, else 1."""
     below = [layer.region for layer, own in zip(layers[:k], pale, strict=False) if not own]
     over = shapely.area(shapely.intersection(below, layers[k].region)).sum() if pale[k] else 0.0
-    return -1 if over > OVER * layers[k].region.area else 1
+    return -1 if over > MIN_OVERLAP_SHARE * layers[k].region.area else 1
 
 
 def alike(colour: str, other: str) -> bool:
     """Return whether two colours all but are one."""
-    both = (rgb(c if c[0] == "#" else PLAIN.colour) for c in (colour, other))
-    return max(abs(a - b) for a, b in zip(*both, strict=True)) <= SAME_COLOUR
+    both = (rgb(c if c[0] == "#" else BLACK.colour) for c in (colour, other))
+    return max(abs(a - b) for a, b in zip(*both, strict=True)) <= MAX_CHANNEL_DISTANCE
 
 
 def solid(region: BaseGeometry) -> float:
@@ -91,7 +96,7 @@ def _with_faint_joined(layers: list[Layer], paper: str) -> tuple[list[Layer], in
     A group is laid on with its opacity as a whole: what overlaps inside it does not add up to more.
     """
     faint = [layer for layer in layers if _is_faint(layer)]
-    if not 1 < len(faint) <= MOST_FAINT or not _overlap(faint):
+    if not 1 < len(faint) <= MAX_FAINT_LAYERS or not _overlap(faint):
         return [layer for layer in layers if not _is_faint(layer)], len(faint)
     found: list[Layer] = []
     shades: _Shades = {}
@@ -101,21 +106,21 @@ def _with_faint_joined(layers: list[Layer], paper: str) -> tuple[list[Layer], in
         if not is_faint:
             found += own
             for layer in own:
-                if alike(layer.brush.colour, paper) and layer.brush.opacity >= COVERING:
+                if alike(layer.brush.colour, paper) and layer.brush.opacity >= COVERING_OPACITY:
                     shades = _laid(shades, layer.region, 0.0, 1.0)
             continue
         for (dark, cover), region in _shades(own, 0, paper).items():
             shades = _laid(shades, region, dark, cover)
-        dense = [region for (dark, _), region in shades.items() if dark >= FAINT]
-        shades = {key: region for key, region in shades.items() if key[0] < FAINT}
+        dense = [region for (dark, _), region in shades.items() if dark >= MIN_VISIBLE_OPACITY]
+        shades = {key: region for key, region in shades.items() if key[0] < MIN_VISIBLE_OPACITY}
         colours = (layer.brush.colour for layer in own if not alike(layer.brush.colour, paper))
-        brush = Brush(next(colours, PLAIN.colour), 1.0)
+        brush = Brush(next(colours, BLACK.colour), 1.0)
         found += [Layer(region, brush) for region in dense]
     seen = _united(found)
-    if len(faint) == len(layers) and seen.area < MOSTLY * _united(layers).area:
+    if len(faint) == len(layers) and seen.area < MIN_SHOWN_SHARE * _united(layers).area:
         return [], len(faint)  # the overlaps of a drawing that is all faint are not its shape
     shares = [layer.region.intersection(seen).area / layer.region.area for layer in faint]
-    return found, sum(share < MOSTLY for share in shares)
+    return found, sum(share < MIN_SHOWN_SHARE for share in shares)
 
 
 def _united(layers: Sequence[Layer]) -> BaseGeometry:
@@ -123,7 +128,7 @@ def _united(layers: Sequence[Layer]) -> BaseGeometry:
 
 
 def _is_faint(layer: Layer) -> bool:
-    return layer.brush.opacity < FAINT
+    return layer.brush.opacity < MIN_VISIBLE_OPACITY
 
 
 def _overlap(layers: Sequence[Layer]) -> bool:
@@ -175,7 +180,7 @@ def _laid(shades: _Shades, region: BaseGeometry, dark: float, cover: float) -> _
 def without_grid(layers: list[Layer], paper: str) -> tuple[list[Layer], list[str]]:
     """Return layers without level or upright thin lines of another colour that run past the shape."""
     bounds = shapely.total_bounds([layer.region for layer in layers])
-    thin = THINNEST * max(bounds[2] - bounds[0], bounds[3] - bounds[1])
+    thin = MAX_GRID_LINE_SHARE * max(bounds[2] - bounds[0], bounds[3] - bounds[1])
     dark = [k for k, layer in enumerate(layers) if not alike(layer.brush.colour, paper)]
     lines = [k for k in dark if _is_of_lines(layers[k].region, thin)]
     rest = [layers[k] for k in dark if k not in {*lines}]
@@ -193,7 +198,7 @@ def without_grid(layers: list[Layer], paper: str) -> tuple[list[Layer], list[str
         f"left out {lines_left} of another colour that run{'s' * (len(left) == 1)} across the shape"
     )
     kept = [layer for k, layer in enumerate(layers) if k not in left]
-    return kept, [note] * (beyond > NOTEWORTHY * whole.area)
+    return kept, [note] * (beyond > MIN_NOTED_SHARE * whole.area)
 
 
 def _is_of_lines(region: BaseGeometry, thin: float) -> bool:
@@ -207,7 +212,7 @@ def _is_across(region: BaseGeometry, whole: Polygon) -> bool:
     low, high = np.array(whole.bounds).reshape(2, 2)
     bounds = shapely.bounds(polygons_in(region))
     common = np.minimum(bounds[:, 2:], high) - np.maximum(bounds[:, :2], low)
-    return bool((common >= ACROSS * (high - low)).any(axis=1).all())
+    return bool((common >= MIN_SPAN_SHARE * (high - low)).any(axis=1).all())
 
 
 def without_axes(seen: BaseGeometry) -> tuple[BaseGeometry, list[str]]:
@@ -222,9 +227,9 @@ def without_axes(seen: BaseGeometry) -> tuple[BaseGeometry, list[str]]:
     hole = max((Polygon(ring) for ring in frame.interiors), key=lambda own: own.area)
     xmin, ymin, xmax, ymax = hole.bounds
     width, height = xmax - xmin, ymax - ymin
-    most, reach = WIDEST * min(width, height), MARKS * min(width, height)
+    most, reach = MAX_LINE_SHARE * min(width, height), MAX_MARK_SHARE * min(width, height)
     is_frame = (
-        hole.area >= SQUARE * width * height
+        hole.area >= MIN_FRAME_COVERAGE * width * height
         and shapely.box(xmin - reach, ymin - reach, xmax + reach, ymax + reach).covers(frame)
         and frame.area <= most * hole.length
     )
@@ -232,6 +237,6 @@ def without_axes(seen: BaseGeometry) -> tuple[BaseGeometry, list[str]]:
     if not is_frame or not inside:
         return seen, []
     drawn = outer_outline(shapely.union_all(inside))[0].bounds
-    if min((drawn[2] - drawn[0]) / width, (drawn[3] - drawn[1]) / height) <= LEAST_DRAWN:
+    if min((drawn[2] - drawn[0]) / width, (drawn[3] - drawn[1]) / height) <= MIN_DRAWN_SHARE:
         return seen, []
     return shapely.union_all(inside), [AXES_NOTE]

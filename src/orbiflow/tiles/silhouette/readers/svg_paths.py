@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from orbiflow.arrays import Array, Integers
 
 MAX_POINTS = 200_000
-DIRECTION = 1e-6  # of a curve's size: its chords at the ends stray by less
+DIRECTION_TOLERANCE = 1e-6  # of a curve's size: its chords at the ends stray by less
 
 
 class TooManyPoints(Exception):
@@ -157,7 +157,7 @@ def corners(paths: list[SubPath], matrix: Array) -> Iterator[tuple[str, Array, f
         out: list[Array] = []
         for curve in [*path.curves, *close]:
             size = float(np.ptp([last, *curve.reach()], axis=0).max()) or 1.0
-            along = np.diff([last, *curve.flatten(last, DIRECTION * size)], axis=0)
+            along = np.diff([last, *curve.flatten(last, DIRECTION_TOLERANCE * size)], axis=0)
             out.append(along[along.any(axis=1).argmax()])
             into.append(along[::-1][along[::-1].any(axis=1).argmax()])
             found.append((last, into[-2], out[-1]))
@@ -178,7 +178,7 @@ MAX_OVERLAPS = 200_000
 MAX_OVERLAPS_EACH = 20
 MAX_OVERLAPS_WIDE = 20  # as many times more of strokes, which are mostly beside each other
 MAX_FACES = 50_000
-_SAMPLE = 400
+_SAMPLE_SIZE = 400
 
 
 class TooTangled(Exception):
@@ -207,7 +207,7 @@ def fill(rings: list[Array], rule: str = "nonzero") -> BaseGeometry:
 
 def check_tangle(segments: Array, half: float = 0.0) -> None:
     """Refuse segments (S, 2, 2), `half` of whose width is given, if a sample has too many overlaps."""
-    sample = np.random.default_rng(0).permutation(len(segments))[:_SAMPLE]
+    sample = np.random.default_rng(0).permutation(len(segments))[:_SAMPLE_SIZE]
     for wider, most in ((0.0, 1), (half, MAX_OVERLAPS_WIDE)):
         low, high = segments.min(axis=1) - wider, segments.max(axis=1) + wider
         overlaps = sum(

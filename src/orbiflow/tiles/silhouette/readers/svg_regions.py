@@ -33,11 +33,11 @@ from orbiflow.tiles.silhouette.readers.svg_values import (
     mean_colour,
 )
 
-FINER = 8  # the paths of strokes are flattened as much finer, as a wide pen magnifies what is left
-EDGE = 1e-3  # of the page's longer side: shapes that reach no farther beyond it are kept whole
-FAINT = 0.5  # opacity: less is not seen
-NEARLY = 1e-3  # share of a region: it is kept whole where no more of it is faint
-PATTERN = Brush("#808080", 1.0)
+STROKE_REFINEMENT = 8  # strokes are flattened as much finer: a wide pen magnifies errors
+EDGE_SHARE = 1e-3  # of the page's longer side: shapes that reach less beyond are whole
+MIN_VISIBLE_OPACITY = 0.5  # opacity: less is not seen
+NEGLIGIBLE_SHARE = 1e-3  # share of a region: it is kept whole where no more of it is faint
+PATTERN_BRUSH = Brush("#808080", 1.0)
 _SAMPLES = np.linspace(0, 1, 257)
 
 
@@ -95,7 +95,7 @@ def _served(element: Element | None, drawing: Drawing, shape: DrawnShape) -> Pai
         if not any(len(one) for one in references(drawing, element)):
             return None
         drawing.notes.add("took a pattern for an even gray")
-        return Paint(*PATTERN)
+        return Paint(*PATTERN_BRUSH)
     if element.tag not in ("linearGradient", "radialGradient"):
         drawing.notes.add(f"paint by a <{element.tag[:40]}> is left out")
         return None
@@ -117,7 +117,7 @@ class Regions:
     """The regions that a drawing's shapes cover.
 
     Paths are flattened to within `tolerance`, a function of points that span them, and come to `most`
-    points at most. What lies beyond a `page` is not shown, unless it is as near as `EDGE`.
+    points at most. What lies beyond a `page` is not shown, unless it is as near as `EDGE_SHARE`.
     """
 
     def __init__(
@@ -160,7 +160,7 @@ class Regions:
         linear, offset = shape.matrix[:2, :2], shape.matrix[:2, 2]
         back = np.linalg.inv(linear).T
         lines: list[Line] = []
-        for points, path in self.lines(shape, FINER):
+        for points, path in self.lines(shape, STROKE_REFINEMENT):
             ends = np.array([path.start, *(curve.end for curve in path.curves)])
             corners = np.isin(complex_points(points), complex_points(ends))
             lines.append(Line((points - offset) @ back, corners, path.closed))
@@ -206,12 +206,12 @@ class Regions:
             return Layer(region, Brush(paint.colour, paint.opacity))
         values = paint.opacity * np.array([brush.opacity for brush in paint.gradient.brushes])
         along = np.interp(_SAMPLES, paint.gradient.offsets, values)
-        part = paint.gradient.part(values, FAINT, region)
-        counts = along >= FAINT if part.area > 0 else along < FAINT
+        part = paint.gradient.part(values, MIN_VISIBLE_OPACITY, region)
+        counts = along >= MIN_VISIBLE_OPACITY if part.area > 0 else along < MIN_VISIBLE_OPACITY
         beyond = values.max() if part.area > 0 else values.min()  # where it shows beyond its ends
         opacity = along[counts].mean() if counts.any() else beyond
         brush = Brush(paint.colour, float(opacity))
-        if not 0 < part.area < (1 - NEARLY) * region.area:
+        if not 0 < part.area < (1 - NEGLIGIBLE_SHARE) * region.area:
             return Layer(region, brush)
         self.drawing.notes.add("left out what of a gradient is less than half visible")
         return Layer(part, brush)
@@ -243,14 +243,14 @@ class Regions:
             light = np.array([lightness(brush.colour) for brush in brushes])
             shown = opaque * (1.0 if kind == "alpha" else light)
             for values, sign in ((opaque, -1), (shown, 1)):
-                part = gradient.part(values, FAINT, region) if gradient else region
-                if gradient or values[0] >= FAINT:
+                part = gradient.part(values, MIN_VISIBLE_OPACITY, region) if gradient else region
+                if gradient or values[0] >= MIN_VISIBLE_OPACITY:
                     yield Layer(part, Brush(paint.colour, paint.opacity)), sign
 
 
 def _is_within(bounds: Array, page: BaseGeometry) -> bool:
     xmin, ymin, xmax, ymax = page.bounds
-    edge = EDGE * max(xmax - xmin, ymax - ymin)
+    edge = EDGE_SHARE * max(xmax - xmin, ymax - ymin)
     bounds = bounds + edge * np.array([1, 1, -1, -1])
     return bool((bounds[:2] >= [xmin, ymin]).all() and (bounds[2:] <= [xmax, ymax]).all())
 

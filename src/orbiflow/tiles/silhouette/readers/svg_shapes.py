@@ -21,7 +21,7 @@ from orbiflow.tiles.silhouette.readers.svg_values import (
     without_font_units,
 )
 
-MOST_DASHES = 1000  # lengths in one pattern
+MAX_DASHES = 1000  # lengths in one pattern
 BOX_FLATNESS = 1e-4  # of the size of a shape: how exact its bounding box is
 SHAPES = {"path", "line", "rect", "circle", "ellipse", "polygon", "polyline"}
 MARKED = {"path", "line", "polygon", "polyline"}
@@ -69,7 +69,7 @@ class DrawnShape:
     def dashes(self) -> list[float]:
         """The lengths of dashes and gaps in turn, an even number of them; none for a whole line."""
         words = self.paint.get("stroke-dasharray", "none").replace(",", " ").split()
-        found = [as_number(word, -1.0, self.diagonal) for word in words[:MOST_DASHES]]
+        found = [as_number(word, -1.0, self.diagonal) for word in words[:MAX_DASHES]]
         return found * (1 + len(found) % 2) if sum(found) > 0 and min(found) >= 0 else []
 
     def number(self, key: str, usual: float) -> float:

@@ -15,8 +15,8 @@ from orbiflow.arrays import Array
 from orbiflow.tiles.silhouette.readers.svg_paths import MAX_POINTS, TooManyPoints, check_tangle
 from orbiflow.tiles.silhouette.readers.svg_shapes import DrawnShape
 
-WIGGLE = 1 / 500  # of half a pen's width: lines are simplified by as much
-SMOOTH = 0.999  # the cosine of half the turn above which a corner needs no mitre
+SIMPLIFICATION_SHARE = 1 / 500  # of half a pen's width: lines are simplified by as much
+MIN_SMOOTH_COSINE = 0.999  # the cosine of half the turn above which a corner needs no mitre
 
 
 class Line(NamedTuple):
@@ -41,7 +41,7 @@ def stroked(lines: list[Line], shape: DrawnShape) -> BaseGeometry:
     corner = shape.paint.get("stroke-linejoin", "miter")
     join = "round" if corner == "round" else "bevel"
     strings = [shapely.LineString(piece.points) for piece in pieces]
-    simple = shapely.simplify(strings, WIGGLE * half)
+    simple = shapely.simplify(strings, SIMPLIFICATION_SHARE * half)
     runs = [shapely.get_coordinates(line) for line in simple]
     check_tangle(np.concatenate([np.stack([p[:-1], p[1:]], axis=1) for p in runs]), half)
     regions = [shapely.buffer(simple, half, cap_style=cap, join_style=join)]
@@ -108,10 +108,10 @@ def _joins(line: Line, half: float, limit: float) -> Array:
     # from the centre of the pen to where its outer edge leaves one side and reaches the next
     outward = -half * np.sign(turn)[:, None]
     before, after = (outward * side[:, ::-1] * [-1, 1] for side in (first, last))
-    sharp = corners[1:-1] & (cosine < SMOOTH) & (cosine * limit >= 1)
+    sharp = corners[1:-1] & (cosine < MIN_SMOOTH_COSINE) & (cosine * limit >= 1)
     at, tip = points[1:-1], (before + after)[sharp] / (1 + dot[sharp, None])
     kites = np.stack([0 * tip, before[sharp], tip, after[sharp]], axis=1) + at[sharp, None]
-    bent = ~corners[1:-1] & (cosine < SMOOTH)
+    bent = ~corners[1:-1] & (cosine < MIN_SMOOTH_COSINE)
     angles = turn[bent, None] * np.linspace(0, 1, 9)
     around = np.stack([-before[bent][:, ::-1] * [1, -1], before[bent]], axis=1)
     arcs = np.stack([np.sin(angles), np.cos(angles)], axis=2) @ around

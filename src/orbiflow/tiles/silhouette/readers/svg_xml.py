@@ -64,7 +64,7 @@ def is_own(element: Element) -> bool:
 class Notes:
     """What a reader tells the user about a drawing, each thing once."""
 
-    MOST = 12
+    MAX_SHOWN = 12
 
     def __init__(self) -> None:
         self.texts = Counter[str]()
@@ -75,8 +75,8 @@ class Notes:
     def said(self) -> list[str]:
         """Return the notes, with how often each was met, and how many more there are."""
         every = [f"{text} ({n} times)" if n > 1 else text for text, n in self.texts.items()]
-        more = len(every) - self.MOST
-        return every[: self.MOST] + [f"and {more} more notes of this kind"] * (more > 0)
+        more = len(every) - self.MAX_SHOWN
+        return every[: self.MAX_SHOWN] + [f"and {more} more notes of this kind"] * (more > 0)
 
 
 class _BoundedTree:

@@ -25,11 +25,11 @@ SIMPLIFY_TOLERANCE = 0.15  # pixels
 STEP_TOLERANCE = 0.7  # pixels
 STEP_TOLERANCE_OF_SIZE = 0.005  # of the square root of the area
 # A shape that is cut off is as wide at the image's border as further in; one that touches it is not.
-CUT_OFF = 0.8
-FURTHER_IN = 0.015  # of the image's longer side
+CUT_OFF_RATIO = 0.8
+INNER_SHARE = 0.015  # of the image's longer side
 # Components and holes of at most so many pixels, or this share of the shape, are no parts of a drawing.
-DUST = 4
-DUST_OF_SHAPE = 1e-4
+DUST_PIXELS = 4
+DUST_SHARE = 1e-4
 # for `scipy.ndimage`: background holds together across corners where the shape does not
 _ACROSS_CORNERS = np.ones((3, 3), dtype=int)
 
@@ -80,15 +80,15 @@ def trace(
 
 
 def _is_cut_off(shape: NDArray[np.bool_]) -> bool:
-    inner = min(round(FURTHER_IN * max(shape.shape)) + 1, *(side - 1 for side in shape.shape))
+    inner = min(round(INNER_SHARE * max(shape.shape)) + 1, *(side - 1 for side in shape.shape))
     sides = (shape, shape[::-1], shape.T, shape.T[::-1])
-    return any(side[0].sum() > CUT_OFF * side[inner].sum() for side in sides)
+    return any(side[0].sum() > CUT_OFF_RATIO * side[inner].sum() for side in sides)
 
 
 def _without_dust(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], list[str]]:
     """Return the mask without specks and pinholes, and a note if there were any."""
     most = np.bincount(np.ravel(ndimage.label(mask)[0]))[1:].max(initial=0)
-    limit = min(max(DUST, DUST_OF_SHAPE * most), most - 1)
+    limit = min(max(DUST_PIXELS, DUST_SHARE * most), most - 1)
     filled = ndimage.binary_fill_holes(mask, structure=_ACROSS_CORNERS)
     specks = _small(mask, limit)
     pinholes = _small(filled & ~mask, limit, _ACROSS_CORNERS)
