@@ -138,7 +138,7 @@ def animal(name: str) -> Target:
     return Target.read(FOLDER / name)
 
 
-SMALL = LikenessSearch(placements=40, held=8, starts=4, finalists=1, rounds=8, multiples=(2,))
+SMALL = LikenessSearch(placements=40, held=8, starts=4, finalists=1, rounds=8, multiples=(4,))
 """A search of a fraction of a second a class."""
 
 

@@ -18,7 +18,7 @@ from orbiflow.tiles import (
     Target,
     Tile,
     index_page,
-    pages,
+    run_folder,
     search,
 )
 from orbiflow.tiles.likeness import Recognisability, compare
@@ -82,7 +82,7 @@ def test_it_is_said_after_the_table(
 ) -> None:
     found = SearchResult(TARGET, [tile(kept)])
     monkeypatch.setattr(search, "escherize", lambda *_args, **_settings: found)
-    monkeypatch.setattr(pages, "write_run", lambda *_args, **_settings: True)
+    monkeypatch.setattr(run_folder, "write_run", lambda *_args, **_settings: True)
     image, told = tmp_path / "boot.json", list[Event]()
     image.write_text(str(np.round(TARGET.outline, 2).tolist()))
     escherize(image, tmp_path / "out", on_event=told.append)
