@@ -124,7 +124,7 @@ def test_a_hole_that_may_be_background_is_warned_of(tmp_path: Path) -> None:
         pen.ellipse((50, 50, 350, 350), fill=0)
         pen.ellipse((200 - hole, 200 - hole, 200 + hole, 200 + hole), fill=255)
         image.save(tmp_path / "a.png")
-        return doubts(ReadingSettings().read(tmp_path / "a.png"))
+        return [*doubts(ReadingSettings().read(tmp_path / "a.png"))]
 
     assert "large holes were filled" in read(60)[0]
     assert "another invert" in read(60)[0]
@@ -136,7 +136,7 @@ def drawn(tmp_path: Path, size: int, draw: str, *args: object, **options: object
     image = Image.new("L", (size * 4, size * 4), 255)
     getattr(ImageDraw.Draw(image), draw)(*args, **{"fill": 0, **options})
     image.reduce(4).save(tmp_path / "a.png")
-    return doubts(ReadingSettings().read(tmp_path / "a.png"))
+    return [*doubts(ReadingSettings().read(tmp_path / "a.png"))]
 
 
 def test_what_is_hopeless_is_said(tmp_path: Path) -> None:
