@@ -179,7 +179,7 @@ def test_pixels_cover_the_map_and_measure_the_sphere(projection: Projection) -> 
     whole = 4 * math.pi
     if isinstance(projection, Azimuthal):
         whole = 2 * math.pi * (1 - math.cos(math.radians(projection.radius)))
-    found = pixels.areas[pixels.within].sum() * float(pixels.side(pixels.points)) ** 2
+    found = pixels.areas[pixels.within].sum() * float(pixels.side(pixels.points)) ** 2  # pyright: ignore[reportOptionalSubscript]
     assert found == pytest.approx(whole, rel=0.02)
 
 
