@@ -91,7 +91,8 @@ def line(space: str, rows: int, points: int, parts: str) -> str:
     data = clustered(space, rows)
     begin, wall = time.process_time(), time.perf_counter()
     name = "torus" if space == "three angles" else space
-    estimator = DensityEstimator(name, components=parts).fit(data)
+    unit = "radians" if name in ("torus", "klein-bottle") else None
+    estimator = DensityEstimator(name, unit=unit, components=parts).fit(data)
     fit, wall = time.process_time() - begin, time.perf_counter() - wall
     density = estimator.density_
     assert isinstance(density, Mixture)
@@ -118,7 +119,7 @@ def search() -> str:
 
     begin, wall = time.process_time(), time.perf_counter()
     settings = ["auto", "kernels", "mixture", "kernels,mixture", "flow,kernels"]
-    found = GridSearchCV(DensityEstimator("torus"), {"components": settings}, cv=5)
+    found = GridSearchCV(DensityEstimator("torus", unit="radians"), {"components": settings}, cv=5)
     found.fit(clustered("torus", 2_000))
     return (
         f"GridSearchCV, 5 settings of 2,000 points, 26 fits on one core: "

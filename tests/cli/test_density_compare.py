@@ -235,7 +235,7 @@ def test_score_refuses_other_columns(folder: Path, orbiflow: Any) -> None:
     refused = orbiflow(*score)
     assert refused.status == 2
     assert (
-        "the model was fitted to phi, psi, and the file has chi1, chi2: say with --columns"
+        "the model was fitted to phi, psi, and the file has chi1, chi2: specify with --columns"
         in refused.err
     )
     assert not (folder / "s.csv").exists()
@@ -265,7 +265,7 @@ MISTAKES: dict[str, tuple[tuple[object, ...], str]] = {
     "no model": (("compare", "-m", "good", "-m", "nope", "-d", "held.csv"), "nope"),
     "other columns": (
         ("compare", "-d", "good.csv", "-d", "held.csv", "--space", "torus", "--unit", "degrees"),
-        "say with --columns which to compare",
+        "specify with --columns which to compare",
     ),
     "no unit": (("compare", "-d", "good.csv", "-d", "poor.csv", "--space", "torus"), "give --unit"),
     "mass": (("region", "-m", "good", "--mass", "95"), "--mass: entry 1: must be above 0 and below 1"),

@@ -133,7 +133,7 @@ def test_a_flow_that_was_meant_and_not_tried_is_said(
     tmp_path: Path, folder: Path, orbiflow
 ) -> None:
     fit = ("density", "fit", folder / "two.csv", "--space", "torus", "--out", tmp_path / "m")
-    said = "no flow was tried: of fewer than 300 rows, here 40, none has gained anything"
+    said = "no flow was tried: with fewer than 300 rows, here 40, none gains anything"
     for options, told in (
         (("--components", "kernels,flow"), True),
         (("--max-frequency", 2), True),

@@ -115,7 +115,9 @@ DEGREES = ("--unit", "degrees")
 
 
 def test_numerals(summary) -> None:
-    assert "may be 1025 or 1.025; say with --decimal" in summary("american.csv", "torus", *DEGREES)
+    assert "may be 1025 or 1.025; specify with --decimal" in summary(
+        "american.csv", "torus", *DEGREES
+    )
     (read,) = summary("american.csv", "torus", *DEGREES, "--decimal", ".")["columns"]
     (german,) = summary("german.csv", "torus", *DEGREES)["columns"]
     assert abs(read["mean"] - german["mean"]) < 1  # the same, to a digit more

@@ -78,7 +78,7 @@ DOUBTFUL = {
 @pytest.mark.parametrize("content", DOUBTFUL)
 def test_what_may_be_thousands_or_decimals_is_asked(content: str, tmp_path: Path) -> None:
     path = write(tmp_path, content)
-    with pytest.raises(TableError, match=r"column 'h': '.*' may be .* or .*; say with decimal"):
+    with pytest.raises(TableError, match=r"column 'h': '.*' may be .* or .*; specify with decimal"):
         read_table(path, columns=["h"], width=None)
     whole, fraction = DOUBTFUL[content]
     marks: tuple[Mark, Mark] = (".", ",")
@@ -105,7 +105,7 @@ def test_both_marks_before_decimals_are_refused(content: str, tmp_path: Path) ->
 def test_a_mark_that_is_first_seen_late_is_refused_with_its_cure(tmp_path: Path) -> None:
     rows = "".join(f"{k},{k}\n" for k in range(200))
     path = write(tmp_path, f'run,h\n{rows}9,"1,5"\n')
-    with pytest.raises(TableError, match=r"line 202: column 'h': '1,5' .*say with decimal"):
+    with pytest.raises(TableError, match=r"line 202: column 'h': '1,5' .*specify with decimal"):
         read_table(path, columns=["h"], width=None)
     assert read_table(path, columns=["h"], width=None, decimal=",").values[-1, 0] == 1.5
 
@@ -162,7 +162,9 @@ def test_a_spreadsheets_error_begins_no_comment(error: str, tmp_path: Path) -> N
 def test_decimal_commas_that_begin_late(tmp_path: Path) -> None:
     rows = [f"{k};1" for k in range(100, 250)] + ["353,621;1", "128,250;1"]
     path = write(tmp_path, "\n".join(["angle;n", *rows]) + "\n")
-    with pytest.raises(TableError, match=r"'353,621' may be 353621 or 353\.621; say with decimal"):
+    with pytest.raises(
+        TableError, match=r"'353,621' may be 353621 or 353\.621; specify with decimal"
+    ):
         read_table(path, columns=["angle"], width=None)
     found = read_table(path, columns=["angle"], width=None, decimal=",").values
     assert found[-2:, 0].tolist() == [353.621, 128.25]

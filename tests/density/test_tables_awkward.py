@@ -40,7 +40,7 @@ def test_commas_beside_points_are_refused_by_name(tmp_path: Path) -> None:
 
 def test_without_a_header(tmp_path: Path) -> None:
     path = write(tmp_path, "Paris,48.9,2.4\nRome,41.9,12.5\n")
-    with pytest.raises(InputFileError, match="say with header"):
+    with pytest.raises(InputFileError, match="specify with header"):
         read_table(path, columns=None, width=2)
     table = read_table(path, columns=None, width=2, has_header=False)
     assert table.values.tolist() == [[48.9, 2.4], [41.9, 12.5]]

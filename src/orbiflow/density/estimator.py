@@ -142,7 +142,7 @@ class DensityEstimator:
 
         Data are an array or a data frame (pandas, polars, pyarrow, xarray) with as many columns as the
         space takes. Of a frame whose columns have names, later frames are read by these names. What
-        one may doubt is a `DataWarning`.
+        is doubtful is a `DataWarning`.
 
         Args:
             sample_weight: of the rows (N,), at least 0: how much each counts in everything that is

@@ -8,10 +8,11 @@ from .columns import arrangements as arrangements
 from .columns import check_columns as check_columns
 from .columns import chosen_arrangement as chosen_arrangement
 from .doubts import Doubt as Doubt
+from .doubts import is_identifier as is_identifier
+from .doubts import place_doubts as place_doubts
 from .frames import as_data as as_data
 from .frames import as_numbers as as_numbers
 from .frames import require_values as require_values
-from .identifiers import is_identifier as is_identifier
 from .names import LATITUDES as LATITUDES
 from .names import LONGITUDES as LONGITUDES
 from .names import UNITS as UNITS
@@ -22,7 +23,6 @@ from .names import is_other_quantity as is_other_quantity
 from .names import pairs_of as pairs_of
 from .names import unit_named as unit_named
 from .names import words_of as words_of
-from .places import place_doubts as place_doubts
 from .strikes import DIP_DIRECTION as DIP_DIRECTION
 from .strikes import data_of as data_of
 from .strikes import dip_direction_among as dip_direction_among

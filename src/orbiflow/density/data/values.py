@@ -12,9 +12,16 @@ import numpy as np
 from orbiflow.arrays import Array
 from orbiflow.density.data.codes import refuse_no_angles, refuse_no_places
 from orbiflow.density.data.columns import DIRECTIONS, ROTATIONS, Arrangement, check_columns
-from orbiflow.density.data.doubts import FEW_ROWS, Doubt, doubts_of_angle, doubts_of_torus
+from orbiflow.density.data.doubts import (
+    FEW_ROWS,
+    FULL_SHARE_OF_TURN,
+    Doubt,
+    doubts_of_angle,
+    doubts_of_torus,
+    is_identifier,
+    place_doubts,
+)
 from orbiflow.density.data.foreign_units import refuse_foreign_units
-from orbiflow.density.data.identifiers import is_identifier
 from orbiflow.density.data.names import (
     AZIMUTHS,
     FROM_VERTICAL,
@@ -24,7 +31,6 @@ from orbiflow.density.data.names import (
     unit_named,
     words_of,
 )
-from orbiflow.density.data.places import FULL_SHARE_OF_TURN, place_doubts
 from orbiflow.density.data.units import TURN_TOLERANCE, TURNS, Unit, check_unit, is_angular
 from orbiflow.errors import DataWarning, SettingError, literal
 

@@ -73,7 +73,7 @@ from orbiflow.errors import DataWarning, OrbiflowError
 from orbiflow.runtime import SideBySide
 
 LEAST_FLOW_ROWS = 300
-"""With fewer, a flow is not tried: none has gained anything."""
+"""With fewer, a flow is not tried: on no data has one gained anything."""
 
 CHAINS_PER_SIZE = 12
 """Chains of one size on tori of four or more angles, all folds together."""
@@ -275,7 +275,7 @@ def _untried_note(folds: Folds, settings: DensitySettings, flows: bool) -> list[
     meant = "flow" in settings.allowed and (settings.of_flow or settings.allowed != COMPONENTS)
     if flows or not meant:
         return []
-    rows = f"of fewer than {LEAST_FLOW_ROWS} rows, here {len(folds.rows)}, none has gained anything"
+    rows = f"with fewer than {LEAST_FLOW_ROWS} rows, here {len(folds.rows)}, none gains anything"
     return [f"no flow was tried: {rows}"]
 
 

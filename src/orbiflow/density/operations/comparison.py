@@ -218,7 +218,7 @@ def _columns_of_models(
         if sorted(wanted) != sorted(other):
             raise OrbiflowError(
                 f"{first} was fitted to {', '.join(wanted)}, {name} to {', '.join(other)}: are they "
-                "the same quantities? Then say with --columns which columns they are"
+                "the same quantities? Then specify with --columns which columns they are"
             )
     settings = with_columns_of(read.settings, data, dict(extras[first]), read.tell)
     if settings.columns is not None:
@@ -244,7 +244,7 @@ def _common_columns(data: Sequence[Path], space: str, read: _Reader) -> Columns:
         return None
     if sorted(n.casefold() for n in one) != sorted(n.casefold() for n in other):
         raise OrbiflowError(
-            f"{data[0]} has the columns {', '.join(one)}, {data[1]} {', '.join(other)}: say with "
+            f"{data[0]} has the columns {', '.join(one)}, {data[1]} {', '.join(other)}: specify with "
             "--columns which to compare"
         )
     group = (read.group or "").strip().casefold()

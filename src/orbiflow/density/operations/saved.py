@@ -73,7 +73,7 @@ def with_columns_of(
                 f"{data}: the model was fitted to {', '.join(names)}, and the file has {some}"
                 f"{listing(own)}"
             )
-            + ": say with {columns} which they are, in this order"
+            + ": specify with {columns} which they are, in this order"
         )
     return settings.replace(columns=names)
 
@@ -91,7 +91,7 @@ def check_fits(
                 f"{data}: {count} column{'s' * (count != 1)} ({', '.join(table.columns)}) cannot be "
                 f"those of the model, which was fitted to {len(wanted)} ({', '.join(wanted)})"
             )
-            + ": say with {columns} which they are, in this order"
+            + ": specify with {columns} which they are, in this order"
         )
     if list(table.columns) != wanted and sorted(table.columns) == sorted(wanted):
         listed = literal(

@@ -68,7 +68,7 @@ def plot_density(
 
     The density of angles is drawn on its square; that of directions or axes on a map ("density"), on
     the sphere also in plain latitude and longitude ("latlon"), and on its square ("square"). A flow
-    that has no part in the density is left out. On a torus of more or fewer than two angles there are
+    that is not in the density is left out. On a torus of more or fewer than two angles there are
     samples alone, all pairs of angles, and of one angle a rose. All is drawn before any is written.
 
     Args:
@@ -99,7 +99,7 @@ def plot_density(
         pictures[name] = make()
     captions = tuple(f"{own.title}. {own.caption}".strip() for own in pictures.values())
     flowless = shown.space.is_planar and not shown.flows
-    notes = ("the flow has no part in this density, so that there is no picture of it",) * flowless
+    notes = ("there is no flow in this density, and so no picture of one",) * flowless
     if single:
         path = write_atomic(out, pdf_pages(list(pictures.values())))
         return Plotted((path,), captions, notes)

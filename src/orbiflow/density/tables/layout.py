@@ -241,8 +241,8 @@ def _has_header(
         literal(
             f"{path}: line {first} may be a header or a row, as its numbers stand above numbers "
         )
-        + "and its words above words; say with {header} which it is, put a header line of names above "
-        "it, or choose columns by the names in it with {columns}"
+        + "and its words above words; specify with {header} which it is, put a header line of names "
+        "above it, or choose columns by the names in it with {columns}"
     )
 
 

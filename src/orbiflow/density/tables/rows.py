@@ -352,7 +352,7 @@ def _name(path: Path, column: str, header: bool | None) -> str:
 
 
 def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
-    """Return the unit of angles, and tell what one may doubt of a space's data.
+    """Return the unit of angles, and tell the user of doubts about a space's data.
 
     The user is also told of a cell that was not given: data of another size would be folded into it.
     """

@@ -105,7 +105,7 @@ def _two_ways(path: Path, name: str, cell: str) -> TableError:
     right, other = cell.replace(mark, ""), cell.replace(mark, ".")
     return TableError(
         literal(f"{path}: column {quote(name)}: {cell!r} may be {right} or {other}")
-        + "; say with {decimal} which mark is before decimals, . or ,"
+        + "; specify with {decimal} which mark is before decimals, . or ,"
     )
 
 
@@ -169,7 +169,9 @@ def _cure(cell: str, decimal: str) -> str:
     """Return what to do with a cell that is no number."""
     if kind_of(plain(cell, OTHER[decimal])) == "number":
         right, wrong = ("points", "commas") if decimal == "." else ("commas", "points")
-        return f"write decimal {right}, not {wrong}, or say with {{decimal}} that they are {wrong}"
+        return (
+            f"write decimal {right}, not {wrong}, or specify with {{decimal}} that they are {wrong}"
+        )
     if is_time(cell):
         return HOURS
     return DEGREES if _IN_DEGREES.search(cell) else "correct it or drop the line"
