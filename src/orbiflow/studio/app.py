@@ -97,7 +97,7 @@ async def _settle(store: Store) -> None:
 routes = Routes()
 
 
-@routes.get("/about")
+@routes("GET", "/about")
 async def about(here: Studio) -> dict[str, Any]:
     """Return what the pages need to know of the studio."""
     limits = here.limits
@@ -113,13 +113,13 @@ async def about(here: Studio) -> dict[str, Any]:
     }
 
 
-@routes.get("/animals/{name}.png")
+@routes("GET", "/animals/{name}.png")
 async def animal(name: str) -> FileResponse:
     """Return the picture of an animal."""
     return FileResponse(animal_file(name))
 
 
-@routes.get("/operations/{name}/schema")
+@routes("GET", "/operations/{name}/schema")
 async def schema(name: str) -> dict[str, Any]:
     """Return the settings of a task."""
     kind = kind_of_work(name)
