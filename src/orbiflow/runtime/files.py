@@ -311,7 +311,7 @@ def check_outside_runs(out: Path, *reads: Path | None) -> None:
 
 
 def _run_around(read: Path) -> tuple[Path, set[str]]:
-    """The folder of the run that is read, or to which what is read belongs, and its files, if any."""
+    """Return the folder of the run that is read, or that it is part of, and its files, if any."""
     if read.is_dir() and (known := _files_of_run(read)):
         return read, known
     whole = _real(read) if read.is_dir() else read
@@ -321,7 +321,7 @@ def _run_around(read: Path) -> tuple[Path, set[str]]:
 
 
 def _files_of_run(folder: Path) -> set[str]:
-    """The files of earlier runs in a folder; the file that is read, alone, is somebody's copy."""
+    """Return the files of earlier runs in a folder; the file that is read, alone, is a copy."""
     from orbiflow.commands import RUN_FOLDERS
 
     found: set[str] = set()

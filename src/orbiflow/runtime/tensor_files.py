@@ -35,7 +35,9 @@ def tensor_bytes(
     header: Mapping[str, Any], tensors: Mapping[str, Tensor], what: str = "tensors"
 ) -> bytes:
     """Return the content of a file that `read_tensors` reads again, as `array_bytes` does."""
-    return array_bytes(header, {name: t.detach().cpu().numpy() for name, t in tensors.items()}, what)
+    return array_bytes(
+        header, {name: t.detach().cpu().numpy() for name, t in tensors.items()}, what
+    )
 
 
 def array_bytes(
@@ -67,7 +69,7 @@ def _check_sum(data: bytes, digest: object) -> str:
     """Return what is wrong with a file by its checksum, "" if nothing is."""
     if not isinstance(digest, str) or len(digest) != len(_ZEROS):
         return (
-            "it has no checksum, so whether it is damaged cannot be told; it was changed, or another "
+            "it has no checksum that would show damage; it was changed, or another "
             "program wrote it: save it again with orbiflow"
         )
     if hashlib.sha256(data.replace(_entry(digest), _entry(_ZEROS), 1)).hexdigest() != digest:

@@ -60,8 +60,8 @@ async def open_file(request: Request, here: Studio) -> dict[str, Any]:
         await save_body(request, here.store.home(made) / f"opened{ENDING}")
         task = await here.done(made, "open", {})
         if task["state"] in ("failed", "cancelled"):
-            told = task["error"] or "opening was cancelled; open the file again"
-            raise OrbiflowError(told.replace(f"opened{ENDING}", "this file"))
+            reason = task["error"] or "opening was cancelled; open the file again"
+            raise OrbiflowError(reason.replace(f"opened{ENDING}", "this file"))
     except BaseException:
         here.store.delete(made)
         raise
