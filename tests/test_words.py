@@ -18,7 +18,7 @@ TEXTS = [
 ]
 BANNED = {
     "a quantity and its unit, or what the thing is": (
-        r"\b(CALM|DEAR|HOPELESS|SOUND|Hand|_no|as_written|go_through|still_flow|told_of)\b"
+        r"(?m)^(CALM|DEAR|HOPELESS|SOUND)\b|\b(Hand|_no|as_written|go_through|still_flow|told_of)\b"
         r"|\b(asked|enough|place|slopes)\.py\b|\bpartial/"
     ),
     "predict": r"\b(foretell|foretells|foretold)\b",
