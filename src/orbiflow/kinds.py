@@ -347,7 +347,7 @@ def _plain_kind(annotation: Any, allowed: Range, unit: str, repeated: bool) -> K
 
 
 def _entries(parts: Sequence[Any], kinds: Iterable[Kind], text: bool) -> tuple[Any, ...]:
-    """What kinds take of the entries of a list; a refusal says which entry."""
+    """Return what kinds take of the entries of a list; a refusal says which entry."""
     taken: list[Any] = []
     for part, kind in zip(parts, kinds, strict=False):
         try:
@@ -360,7 +360,7 @@ def _entries(parts: Sequence[Any], kinds: Iterable[Kind], text: bool) -> tuple[A
 
 
 def _parts(value: Any, text: bool) -> Sequence[Any]:
-    """The entries of a list, or those that a text has between commas."""
+    """Return the entries of a list, or those that a text has between commas."""
     if text:
         return [part.strip() for part in value.split(",")]
     if not isinstance(value, list | tuple):

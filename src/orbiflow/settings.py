@@ -451,7 +451,7 @@ def _doc_finder(cls: type, name: str) -> Callable[[], str]:
 
 @cache
 def _docs(cls: type) -> dict[str, str]:
-    """The strings under the fields of a class, from its source."""
+    """Return the strings under the fields of a class, from its source."""
     if cls in (object, Settings):
         return {}
     (found,) = ast.parse(inspect.cleandoc("\n" + inspect.getsource(cls))).body
@@ -469,13 +469,13 @@ def _docs(cls: type) -> dict[str, str]:
 
 
 def _condition(name: str, allowed: tuple[Any, ...]) -> str:
-    """What must hold of another field, such as "{cut} none or skeleton"; True goes without saying."""
+    """Return what must hold of another field, such as "{cut} none or skeleton"; True needs no word."""
     words = [_word(value) for value in allowed if value is not None and value is not True]
     return f"{{{name}}} {literal(one_of(words))}" if words else f"{{{name}}}"
 
 
 def _word(value: Any) -> str:
-    """A value as a user writes it."""
+    """Return a value as a user writes it."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):

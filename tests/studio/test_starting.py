@@ -33,7 +33,7 @@ def test_a_port_that_is_taken_is_told(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         settings = StudioSettings(data=tmp_path, browser=False, port=port)
-        with pytest.raises(SettingError, match=f"port {port} cannot be had") as caught:
+        with pytest.raises(SettingError, match=f"port {port} cannot be used") as caught:
             studio(settings)
     assert "--port" in caught.value.named(lambda name: f"--{name}")
 

@@ -109,7 +109,7 @@ def _operation(words: Sequence[str]) -> Operation | None:
 
 
 def _command(operation: Operation) -> Callable[..., int]:
-    """A function whose signature is the command line of an operation."""
+    """Return a function whose signature is the command line of an operation."""
     fields = {entry.name: entry for entry in operation.fields if not entry.of_class(Hidden)}
 
     def command(*words: Any, **options: Any) -> int:
@@ -154,13 +154,13 @@ def _argument(entry: Field, groups: dict[str, Group], named: Callable[[str], str
 
 
 def _either(choices: Sequence[str]) -> str:
-    """The choices as the help has them; where a column may be too narrow, spaces let them wrap."""
+    """Return the choices for the help; where a column may be too narrow, spaces let them wrap."""
     joined = "|".join(choices)
     return joined if len(joined) <= 24 else " | ".join(choices)
 
 
 def _hint(entry: Field) -> Any:
-    """What cyclopts takes: words, which the field then reads."""
+    """Return what cyclopts takes: words, which the field then reads."""
     if entry.is_of(FlagKind):
         hint: Any = bool
     else:
@@ -178,19 +178,19 @@ def _value(entry: Field, word: Any) -> Any:
 
 
 def _help(entry: Field, named: Callable[[str], str]) -> str:
-    """The field's sentence, then range, default and rules in brackets."""
+    """Return the field's sentence, then range, default and rules in brackets."""
     rules = [SettingError(str(rule)).named(named) for rule in entry.rules if str(rule)]
     notes = {
         "": entry.kind.limits,
         "default: ": entry.default_text,
         "only with ": " and ".join(rules),
     }
-    said = "; ".join(word + note for word, note in notes.items() if note)
-    return f"{entry.doc} [{said}]" if said else entry.doc
+    remarks = "; ".join(word + note for word, note in notes.items() if note)
+    return f"{entry.doc} [{remarks}]" if remarks else entry.doc
 
 
 def _namer(operation: Operation) -> Callable[[str], str]:
-    """What the command line calls each setting of an operation."""
+    """Return what the command line calls each setting of an operation."""
     fields = {entry.name: entry for entry in operation.fields}
 
     def named(name: str) -> str:
@@ -218,7 +218,7 @@ def _do(operation: Operation, given: dict[str, Any]) -> int:
 def _mistake(
     error: CycloptsError, operation: Operation | None, words: Sequence[str]
 ) -> OrbiflowError:
-    """What is wrong with a command line, in the words of settings."""
+    """Return what is wrong with a command line, in the words of settings."""
     fields = {entry.name: entry for entry in operation.fields} if operation else {}
     named = error.argument.field_info.name if error.argument else ""
     if isinstance(error, RepeatArgumentError):
@@ -256,7 +256,7 @@ def _needs_value(field: Field) -> SettingError:
 
 
 def _repeated(word: str, words: Sequence[str], fields: Iterable[Field]) -> OrbiflowError:
-    """What is wrong where an option is given again, or a flag both ways."""
+    """Return what is wrong where an option is given again, or a flag both ways."""
     for option in (field.option for field in fields):
         given = dict.fromkeys(w for w in words if w in (*option.names, option.off))
         if word in given and option.off in given and len(given) > 1:
@@ -265,7 +265,7 @@ def _repeated(word: str, words: Sequence[str], fields: Iterable[Field]) -> Orbif
 
 
 def _unknown(words: Sequence[str], fields: Iterable[Field]) -> OrbiflowError | None:
-    """What is wrong with the first option that there is not, if there is one."""
+    """Return what is wrong with the first unknown option, if there is one."""
     known = [name for field in fields for name in (*field.option.names, field.option.off) if name]
     for word in words:
         option = word.split("=")[0]

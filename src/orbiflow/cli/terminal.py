@@ -41,7 +41,7 @@ class Terminal:
     def __init__(
         self, named: Callable[[str], str] = str, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        self.named, self.clock, self.told = named, clock, clock()
+        self.named, self.clock, self.last_line = named, clock, clock()
         self.first: tuple[float, float] | None = None  # the time and share of the first progress
         self.last = Progress(1.0, "")
         self.forks = False
@@ -92,13 +92,17 @@ class Terminal:
         The work calls it where it looks whether it is to stop: no thread may run beside it.
         """
         now = self.clock()
-        if now - self.told >= PROGRESS_SECONDS and self.last.share < 1 and not output.is_terminal:
-            self.told = now
+        if (
+            now - self.last_line >= PROGRESS_SECONDS
+            and self.last.share < 1
+            and not output.is_terminal
+        ):
+            self.last_line = now
             _say(self._line(now), errors)
         return False
 
     def _line(self, now: float) -> str:
-        """What is done, of which class, and how much is left."""
+        """Return a line about what is done, of which class, and how much is left."""
         begin, before = self.first or (now, 0.0)
         event, passed = self.last, now - begin
         line = f"{event.share:.0%} after {_duration(passed)}: {event.what}"
@@ -111,8 +115,8 @@ class Terminal:
     def _show_progress(self, event: Progress) -> None:
         self.last = event
         if self.first is None:
-            self.told = self.clock()
-            self.first = self.told, event.share
+            self.last_line = self.clock()
+            self.first = self.last_line, event.share
         if self.bar is None:
             columns = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
             # no thread that refreshes: workers are forked from a process with one thread
@@ -145,7 +149,7 @@ def _say(text: str, console: Console = output) -> None:
 
 
 def _aligned(event: Table) -> TextTable:
-    """A table with its numbers at the right."""
+    """Return a table with its numbers at the right."""
     table = TextTable(title=event.title)
     cells = zip(*event.rows, strict=True) if event.rows else ((),) * len(event.columns)
     for heading, column in zip(event.columns, cells, strict=True):
@@ -167,7 +171,7 @@ def _writable(text: str) -> str:
 def stopped_by_interrupt(cancel: Cancel) -> Generator[None]:
     """Let the first Ctrl-C in this block cancel a token; a second raises `KeyboardInterrupt`.
 
-    A shell may have told this process to ignore Ctrl-C, as with `nohup` or `&` in a script: then it
+    A shell may have made this process ignore Ctrl-C, as with `nohup` or `&` in a script: then it
     stays ignored.
     """
 

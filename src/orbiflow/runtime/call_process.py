@@ -174,7 +174,7 @@ class CallProcess:
 
 
 def _main() -> int:
-    """Run the call, or calls, and tell events; return the exit status."""
+    """Run the call, or calls, and write their events; return the exit status."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
     events = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
@@ -182,7 +182,7 @@ def _main() -> int:
     for name in sys.argv[1 + again :]:
         import_module(name)
 
-    def tell(event: Event) -> None:
+    def send(event: Event) -> None:
         events.write(json.dumps(event.to_json(), allow_nan=False) + "\n")
         events.flush()
 
@@ -191,24 +191,24 @@ def _main() -> int:
     with open(0, "rb", buffering=0, closefd=False) as words:
         while line := words.readline():
             if not (again and line == CANCEL):  # of a call that had ended
-                status = _run(line, tell)
+                status = _run(line, send)
             if not again:
                 break
     return status
 
 
-def _run(line: bytes, tell: Sink) -> int:
+def _run(line: bytes, send: Sink) -> int:
     """Run a call and return the exit status."""
     try:
         call = call_from_json(json.loads(line))
     except (OrbiflowError, ValueError, RecursionError) as error:
-        tell(Failed(str(error), "mistake"))
+        send(Failed(str(error), "mistake"))
         return 1
     try:
-        call.run(tell, _token())
+        call.run(send, _token())
     except Cancelled:
         return 0
-    except (BrokenPipeError, OrbiflowError):  # nobody listens, or it was told
+    except (BrokenPipeError, OrbiflowError):  # nobody listens, or the error was sent
         return 1
     except Exception:
         traceback.print_exc()

@@ -1,4 +1,4 @@
-"""What an operation tells while it runs, and the token by which it is told to stop.
+"""Events that an operation sends while it runs, and the token that stops it.
 
 `Started` comes first; then `Note`, `Table`, `Progress`, `Preview` (at most one, before any
 `TileFound`), `TileFound`, `ClassFailed`, `ItemDone` and `Written` as they happen; last `Finished` or
@@ -150,7 +150,7 @@ State = Literal["done", "nothing found", "cancelled"]
 class Finished(Event):
     """The end of an operation.
 
-    - `state`: "cancelled" if it was told to stop; what was found by then is written.
+    - `state`: "cancelled" if it was stopped; what was found by then is written.
     - `summary`: What was done, as JSON has it; each operation has its own.
     """
 
@@ -219,7 +219,7 @@ def _read(field: Field, value: Any) -> Any:
 
 
 class Cancelled(Exception):
-    """The work was told to stop. No mistake, hence no `OrbiflowError`."""
+    """The work was stopped by its token. No mistake, hence no `OrbiflowError`."""
 
 
 class Cancel:

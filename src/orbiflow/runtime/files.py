@@ -94,10 +94,9 @@ LITTER = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
 class ResultFolder:
     """Where a run's results go, checked before the work.
 
-    A folder that is not there yet, is empty, or holds nothing but what an earlier run wrote can be
-    had. The results are written beside it and take its place by a rename, so that it holds one run's
-    files at any time. Where it cannot be renamed (a mount point, the working directory, a parent that
-    cannot be written to) the files themselves are moved in.
+    The folder must not be there yet, be empty, or hold nothing but what an earlier run wrote. Results
+    are written beside it, or into a hidden folder in it, and are moved to their places once all are
+    there, so that it holds one run's files at any time.
 
     Args:
         path: The folder.
@@ -117,8 +116,7 @@ class ResultFolder:
             elif next(self._real.iterdir(), None) and not os.access(self._real, os.W_OK):
                 raise PermissionError(13, "Permission denied")
             self.has_a_run = self._refuse_others()
-            self._fixed = self._is_fixed()
-            self._new_sibling().rmdir()
+            self._new_folder().rmdir()
         except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle
             raise self._cannot(error) from error
 
@@ -130,7 +128,7 @@ class ResultFolder:
         `OutputError` says where the results are.
         """
         try:
-            staged = self._new_sibling()
+            staged = self._new_folder()
         except OSError as error:
             raise self._cannot(error) from error
         try:
@@ -140,7 +138,10 @@ class ResultFolder:
             raise
         try:
             self._refuse_others(staged)  # they may have come in the meantime
-            self._put(staged)
+            if self._real.exists():
+                _exchange_files(staged, self._real)
+            else:
+                staged.rename(self._real)
         except (OSError, OutputError) as error:
             raise OutputError(f"{self._cannot(error)}; the results are in {staged}") from error
 
@@ -164,42 +165,12 @@ class ResultFolder:
                 entries += [p for p in path.iterdir() if not _is_litter(p.name)]
         return bool(known)
 
-    def _is_fixed(self) -> bool:
-        """Whether the folder must stay where it is, and only its files can be exchanged."""
-        if not self._real.exists():
-            return False
-        above = self._real.parent
-        return (
-            self._real == above
-            or self._real.is_mount()
-            or Path.cwd().is_relative_to(self._real)
-            or not os.access(above, os.W_OK | os.X_OK)
-        )
-
-    def _new_sibling(self) -> Path:
-        if self._fixed:
-            path = self._real / _temporary()
-        else:
-            path = self._real.with_name(f".{self._real.name}{_temporary()}")
+    def _new_folder(self) -> Path:
+        own = self._real
+        there = own.exists()
+        path = own / _temporary() if there else own.with_name(f".{own.name}{_temporary()}")
         path.mkdir()
         return path
-
-    def _put(self, staged: Path) -> None:
-        if self._fixed:
-            _exchange_files(staged, self._real)
-            return
-        if not self._real.exists():
-            staged.rename(self._real)
-            return
-        shutil.copymode(self._real, staged)
-        aside = self._real.with_name(f".{self._real.name}{_temporary()}")
-        self._real.rename(aside)
-        try:
-            staged.rename(self._real)
-        except BaseException:
-            aside.rename(self._real)
-            raise
-        shutil.rmtree(aside, ignore_errors=True)
 
     def _cannot(self, error: Exception) -> OutputError:
         if isinstance(error, OutputError):
@@ -212,16 +183,19 @@ def _temporary() -> str:
     return f".orbiflow-{secrets.token_hex(4)}.tmp"
 
 
+def _is_temporary(name: str) -> bool:
+    return name.startswith(".orbiflow-") and name.endswith(".tmp")
+
+
 def _is_litter(name: str) -> bool:
-    # what a run left that was killed may go as well
-    return name in LITTER or (name.startswith(".orbiflow-") and name.endswith(".tmp"))
+    return name in LITTER or _is_temporary(name)
 
 
 def _exchange_files(staged: Path, folder: Path) -> None:
-    """Put the files of `staged`, which is in `folder`, in the place of all others there."""
+    """Put the files of `staged` in the place of those in a folder, but for other runs' hidden ones."""
     aside = folder / _temporary()
     aside.mkdir()
-    moves = [(p, aside / p.name) for p in folder.iterdir() if p not in (staged, aside)]
+    moves = [(p, aside / p.name) for p in folder.iterdir() if not _is_temporary(p.name)]
     moves += [(p, folder / p.name) for p in staged.iterdir()]
     done: list[tuple[Path, Path]] = []
     try:
@@ -337,7 +311,7 @@ def check_outside_runs(out: Path, *reads: Path | None) -> None:
 
 
 def _run_around(read: Path) -> tuple[Path, set[str]]:
-    """The folder of the run that is read, or to which what is read belongs, and its files, if any."""
+    """Return the folder of the run that is read, or that it is part of, and its files, if any."""
     if read.is_dir() and (known := _files_of_run(read)):
         return read, known
     whole = _real(read) if read.is_dir() else read
@@ -347,7 +321,7 @@ def _run_around(read: Path) -> tuple[Path, set[str]]:
 
 
 def _files_of_run(folder: Path) -> set[str]:
-    """The files of earlier runs in a folder; the file that is read, alone, is somebody's copy."""
+    """Return the files of earlier runs in a folder; the file that is read, alone, is a copy."""
     from orbiflow.commands import RUN_FOLDERS
 
     found: set[str] = set()

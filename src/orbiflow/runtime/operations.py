@@ -25,7 +25,7 @@ one an option. Settings are flattened, so names must be unique within an operati
 read, call, write; it returns an `Outcome`, and raises `SettingError` for a mistake, before it imports
 anything heavy where that is possible.
 
-When called, arguments are checked; `on_event` gets `Started`, then what the body tells, then
+When called, arguments are checked; `on_event` gets `Started`, then what the body sends, then
 `Finished` or `Failed`.
 """
 
@@ -214,30 +214,30 @@ class Call:
     given: frozenset[str]
 
     def run(self, on_event: Sink = ignore, cancel: Cancel | None = None) -> Outcome:
-        """Run the operation and tell its events."""
-        broken = False  # whether the sink has failed: it is not told of that
+        """Run the operation and send its events."""
+        broken = False  # whether the sink has failed, so that it gets no `Failed`
 
-        def tell(event: Event) -> None:
+        def send(event: Event) -> None:
             nonlocal broken
             broken = True
             on_event(event)
             broken = False
 
-        tell(Started(self.operation.name))
+        send(Started(self.operation.name))
         try:
             own = self.operation
             with naming_extras(f"orbiflow {own.name}"):
-                outcome = own.function(**self.arguments, on_event=tell, cancel=cancel or Cancel())
+                outcome = own.function(**self.arguments, on_event=send, cancel=cancel or Cancel())
         except Cancelled:
-            tell(Finished("cancelled", {}))
+            send(Finished("cancelled", {}))
             raise
         except Exception as error:
             known = isinstance(error, OrbiflowError)
             message = str(error) if known else f"{type(error).__name__}: {error}"
             if not broken:
-                tell(Failed(message, "mistake" if known else "error"))
+                send(Failed(message, "mistake" if known else "error"))
             raise
-        tell(Finished(outcome.state, outcome.summary))
+        send(Finished(outcome.state, outcome.summary))
         return outcome
 
     @property
@@ -271,7 +271,7 @@ class Call:
 def operation(
     name: str, *, keeps_partial: bool = False, starts_processes: bool = False
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Make a function an operation: its arguments are checked and its events told.
+    """Make a function an operation: its arguments are checked and its events sent.
 
     Args:
         name: The name by which `orbiflow.commands` knows it.
@@ -296,10 +296,10 @@ def operation(
     return decorate
 
 
-def progress_events(tell: Sink, cancel: Cancel) -> Callable[[float, str], None]:
-    """Return a function that tells the share of the work done and what is being done.
+def progress_events(send: Sink, cancel: Cancel) -> Callable[[float, str], None]:
+    """Return a function that sends the share of the work done and what is being done.
 
-    The share that is told never falls. The function raises `Cancelled` if the work is to stop.
+    The share that is sent never falls. The function raises `Cancelled` if the work is to stop.
     """
     reached = 0.0
 
@@ -307,29 +307,29 @@ def progress_events(tell: Sink, cancel: Cancel) -> Callable[[float, str], None]:
         nonlocal reached
         cancel.check()
         reached = max(reached, share)
-        tell(Progress(min(1.0, reached), what))
+        send(Progress(min(1.0, reached), what))
 
     return progress
 
 
-def as_part(tell: Sink, begin: float = 0.0, end: float = 1.0) -> Sink:
+def as_part(send: Sink, begin: float = 0.0, end: float = 1.0) -> Sink:
     """Return a sink for an operation that another one calls, which is a part of its work.
 
-    Its progress is told as from one share of the whole to another, and its notes; nothing else is.
+    It passes on notes, and progress as from one share of the whole to another; nothing else.
 
-    >>> told = []
-    >>> as_part(told.append, 0.5, 1.0)(Progress(0.5, "drawing"))
-    >>> told[0].share
+    >>> events = []
+    >>> as_part(events.append, 0.5, 1.0)(Progress(0.5, "drawing"))
+    >>> events[0].share
     0.75
     """
 
-    def told(event: Event) -> None:
+    def pass_on(event: Event) -> None:
         if isinstance(event, Progress):
-            tell(Progress(begin + (end - begin) * event.share, event.what))
+            send(Progress(begin + (end - begin) * event.share, event.what))
         elif isinstance(event, Note):
-            tell(event)
+            send(event)
 
-    return told
+    return pass_on
 
 
 @cache

@@ -161,7 +161,7 @@ class _Pool:
             process.join()
 
     def _next(self) -> _Order | None:
-        """What is to be done next, or None at the end."""
+        """Return what is to be done next, or None at the end."""
         if self.stop_by is not None:
             return None
         return self.again.popleft() if self.again else next(self.left, None)

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from safetensors import SafetensorError
+from safetensors.numpy import load, save
 
 from orbiflow.arguments import as_path
 from orbiflow.arrays import Array
@@ -20,8 +22,6 @@ from orbiflow.runtime.files import is_object
 
 if TYPE_CHECKING:
     from torch import Tensor
-
-Values = TypeVar("Values")
 
 MAX_BYTES, MAX_HEADER = 256 * 2**20, 2**20
 KEY = "orbiflow"
@@ -34,32 +34,24 @@ _ZEROS = "0" * hashlib.sha256().digest_size * 2
 def tensor_bytes(
     header: Mapping[str, Any], tensors: Mapping[str, Tensor], what: str = "tensors"
 ) -> bytes:
-    """The content of a file that `read_tensors` reads again; `what` it holds is for messages."""
-    from safetensors.torch import save
-
-    alone = {name: t.detach().cpu().contiguous().clone() for name, t in tensors.items()}
-    return _sealed(header, what, KEY, lambda metadata: save(alone, metadata=metadata))
+    """Return the content of a file that `read_tensors` reads again, as `array_bytes` does."""
+    return array_bytes(
+        header, {name: t.detach().cpu().numpy() for name, t in tensors.items()}, what
+    )
 
 
 def array_bytes(
     header: Mapping[str, Any], arrays: Mapping[str, Array], what: str, *, key: str = KEY
 ) -> bytes:
-    """The content of a file that `read_arrays` reads again, as `tensor_bytes`."""
-    from safetensors.numpy import save
+    """Return the content of a file that `read_arrays` reads again; `what` it holds is for messages.
 
-    own = dict(arrays)
-    return _sealed(header, what, key, lambda metadata: save(own, metadata=metadata))
-
-
-def _sealed(
-    header: Mapping[str, Any], what: str, key: str, save: Callable[[dict[str, str]], bytes]
-) -> bytes:
-    """Return a file with its checksum; it has one entry of metadata, as several are in random order."""
+    It has one entry of metadata, as several are in random order.
+    """
     try:
         text = json.dumps({CHECKSUM: _ZEROS, **header}, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise OrbiflowError(f"what is saved beside {what} must be JSON: {error}") from error
-    data = save({key: text})
+    data = save({name: np.asarray(a, order="C") for name, a in arrays.items()}, {key: text})
     if int.from_bytes(data[:8], "little") > MAX_HEADER or len(data) > MAX_BYTES:
         raise OrbiflowError(
             f"the file would have {len(data) / 2**20:.1f} MB, {len(text) / 2**20:.1f} MB of them "
@@ -77,7 +69,7 @@ def _check_sum(data: bytes, digest: object) -> str:
     """Return what is wrong with a file by its checksum, "" if nothing is."""
     if not isinstance(digest, str) or len(digest) != len(_ZEROS):
         return (
-            "it has no checksum, so whether it is damaged cannot be told; it was changed, or another "
+            "it has no checksum, so damage would not show; it was changed, or another "
             "program wrote it: save it again with orbiflow"
         )
     if hashlib.sha256(data.replace(_entry(digest), _entry(_ZEROS), 1)).hexdigest() != digest:
@@ -89,27 +81,16 @@ def _check_sum(data: bytes, digest: object) -> str:
 
 def read_tensors(path: str | Path, what: str) -> tuple[dict[str, Any], dict[str, Tensor]]:
     """Return the header and the tensors of a file that is to hold `what`, such as "a flow"."""
-    from safetensors.torch import load
+    import torch
 
-    return _read(path, what, KEY, MAX_BYTES, load)
+    header, arrays = read_arrays(path, what)
+    return header, {name: torch.tensor(array) for name, array in arrays.items()}
 
 
 def read_arrays(
     path: str | Path, what: str, *, key: str = KEY, max_bytes: int = MAX_BYTES
 ) -> tuple[dict[str, Any], dict[str, Array]]:
     """Return the header of a file and its tensors as NumPy arrays; as `read_tensors`."""
-    from safetensors.numpy import load
-
-    return _read(path, what, key, max_bytes, load)
-
-
-def _read(
-    path: str | Path,
-    what: str,
-    key: str,
-    max_bytes: int,
-    load: Callable[[bytes], dict[str, Values]],
-) -> tuple[dict[str, Any], dict[str, Values]]:
     path = as_path(path, "the file")
     with system_errors(InputFileError, f"cannot read {path}"):
         size = path.stat().st_size

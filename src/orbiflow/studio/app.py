@@ -1,4 +1,4 @@
-"""The web application and its server: pages, what it tells of itself, and what went wrong in words."""
+"""The web application and its server: pages, facts about the studio, and errors in words."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def create_app(
     kinds = (Refused, OrbiflowError, HTTPException, Exception)
     app = Starlette(
         routes=[Mount("/api", routes=every), Mount("/", pages)],
-        exception_handlers=dict.fromkeys(kinds, _told),
+        exception_handlers=dict.fromkeys(kinds, _error_answer),
         lifespan=lifespan,
     )
     app.state.studio = Studio(store, queue, hub, limits)
@@ -97,7 +97,7 @@ async def _settle(store: Store) -> None:
 routes = Routes()
 
 
-@routes.get("/about")
+@routes("GET", "/about")
 async def about(here: Studio) -> dict[str, Any]:
     """Return what the pages need to know of the studio."""
     limits = here.limits
@@ -113,13 +113,13 @@ async def about(here: Studio) -> dict[str, Any]:
     }
 
 
-@routes.get("/animals/{name}.png")
+@routes("GET", "/animals/{name}.png")
 async def animal(name: str) -> FileResponse:
     """Return the picture of an animal."""
     return FileResponse(animal_file(name))
 
 
-@routes.get("/operations/{name}/schema")
+@routes("GET", "/operations/{name}/schema")
 async def schema(name: str) -> dict[str, Any]:
     """Return the settings of a task."""
     kind = kind_of_work(name)
@@ -127,7 +127,7 @@ async def schema(name: str) -> dict[str, Any]:
     return {**found, "x-presets": presets(kind.makes) if kind.makes else {}}
 
 
-async def _told(_request: Request, error: Exception) -> JSONResponse:
+async def _error_answer(_request: Request, error: Exception) -> JSONResponse:
     """Answer what went wrong in words, without paths or insides."""
     if isinstance(error, Refused):
         return JSONResponse({"error": error.text}, error.status)
@@ -164,7 +164,7 @@ class PatientProtocol(H11Protocol):
 
 
 class Server(uvicorn.Server):
-    """A server whose streams end when it is told to stop; others it would wait for."""
+    """A server that ends its streams when it stops; uvicorn's own would wait for them."""
 
     def __init__(self, config: uvicorn.Config, streams: Hub) -> None:
         super().__init__(config)
@@ -177,7 +177,7 @@ class Server(uvicorn.Server):
 
 
 def serve(app: Guard, own: socket.socket) -> None:
-    """Serve an application at a socket until the process is told to stop."""
+    """Serve an application at a socket until the process is stopped."""
     config = uvicorn.Config(
         app,
         http=PatientProtocol,

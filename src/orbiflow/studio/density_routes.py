@@ -47,13 +47,13 @@ USUAL_NAMES = (NAMES["density"], "My table")
 routes = Routes()
 
 
-@routes.get("/density/surface.js")
+@routes("GET", "/density/surface.js")
 async def script() -> FileResponse:
     """Serve the script that turns surfaces, here and in the page that a plot writes."""
     return FileResponse(SCRIPT, media_type="text/javascript")
 
 
-@routes.get("/projects/{project}/density")
+@routes("GET", "/projects/{project}/density")
 async def density(project: str, here: Studio) -> dict[str, Any]:
     """Tell of a project's table, of what is fitted to it, and of tables to try."""
     home, table, fit = _home(here, project), None, None
@@ -67,7 +67,7 @@ async def density(project: str, here: Studio) -> dict[str, Any]:
     return {"table": table, "fit": fit, "examples": titles}
 
 
-@routes.put("/projects/{project}/density/table")
+@routes("PUT", "/projects/{project}/density/table")
 async def upload(request: Request, project: str, here: Studio, name: str = "") -> dict[str, Any]:
     """Take a table."""
     called = plain_name(name, "table.csv")
@@ -76,7 +76,7 @@ async def upload(request: Request, project: str, here: Studio, name: str = "") -
     return await _new_table(here, project, file, called)
 
 
-@routes.post("/projects/{project}/density/example")
+@routes("POST", "/projects/{project}/density/example")
 async def example(request: Request, project: str, here: Studio) -> dict[str, Any]:
     """Take a table of ours."""
     name = (await body_object(request)).get("name")
@@ -87,13 +87,13 @@ async def example(request: Request, project: str, here: Studio) -> dict[str, Any
     return await _new_table(here, project, file, f"{EXAMPLES[name][0]}.csv")
 
 
-@routes.get("/projects/{project}/density/{fit}/surface")
+@routes("GET", "/projects/{project}/density/{fit}/surface")
 async def surface(project: str, fit: int, here: Studio) -> Response:
     """Give what the script draws."""
     return _document(fit_folder(_home(here, project), fit) / SURFACE)
 
 
-@routes.get("/projects/{project}/density/{fit}/map")
+@routes("GET", "/projects/{project}/density/{fit}/map")
 async def flat(project: str, fit: int, here: Studio, axes: str = "0") -> Response:
     """Give the density on a grid, of one angle or of two."""
     chosen = axes.split("-")

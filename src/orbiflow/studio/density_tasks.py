@@ -87,8 +87,8 @@ def density(
     data = table_file(job.project)
     asked = {"data": data, "out": folder / FIT, "drop_missing": True, **choice.to_json()}
     call = find("density fit").call(asked)
-    told = as_part(on_event, 0.0, FIT_SHARE)
-    call.operation.function(**call.arguments, on_event=told, cancel=cancel)
+    fit_events = as_part(on_event, 0.0, FIT_SHARE)
+    call.operation.function(**call.arguments, on_event=fit_events, cancel=cancel)
     cancel.check()
     view = _view(folder, data, choice, as_part(on_event, FIT_SHARE, 1.0))
     cancel.check()
@@ -99,13 +99,13 @@ def density(
     return Outcome({"fit": job.task, "rows": view["rows"]})
 
 
-def _view(folder: Path, data: Path, choice: FitChoice, tell: Sink) -> dict[str, Any]:
+def _view(folder: Path, data: Path, choice: FitChoice, on_event: Sink) -> dict[str, Any]:
     """Return what a page shows of a fit, and write the files of its surface and its map."""
     from orbiflow.density import PlotSettings, flat_data, flat_frame, read_table, surface_data
 
     fitted = _model(folder)
     space, names = fitted.space, choice.columns
-    tell(Progress(0.0, "drawing"))
+    on_event(Progress(0.0, "drawing"))
     rows = read_table(data, columns=names, width=None, drop_missing=True).values
     points = space.to_chart(rows)
     if space.is_planar:
@@ -114,7 +114,7 @@ def _view(folder: Path, data: Path, choice: FitChoice, tell: Sink) -> dict[str, 
             levels=True,
         )  # fmt: skip
         write_json(folder / SURFACE, surface)
-    tell(Progress(0.5, "drawing"))
+    on_event(Progress(0.5, "drawing"))
     axes = tuple(range(min(2, space.dim)))
     write_json(map_file(folder, axes), flat_data(fitted, axes if space.dim > 1 else None))
     return {

@@ -52,7 +52,7 @@ class Kind:
 
 
 TAKE_SETTINGS = ("tile", "picture", "drawing", "called")
-"""What is said of a take-away, besides the settings of its operation."""
+"""Settings of a take-away besides those of its operation."""
 
 WITH_DRAWING = ("export", "art")
 """What shows the drawing on a tile."""

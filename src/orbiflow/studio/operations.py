@@ -56,7 +56,7 @@ def _usual_folder() -> Path:
 def _serve(
     settings: StudioSettings, folder: Path, token: str, on_event: Sink, cancel: Cancel
 ) -> None:
-    """Run the server until it is told to stop."""
+    """Run the server until it is stopped."""
     from orbiflow.studio.app import create_app, serve
     from orbiflow.studio.store import Store
     from orbiflow.studio.work_queue import WorkQueue
@@ -83,8 +83,8 @@ def _listening(host: str, port: int) -> socket.socket:
         return socket.create_server((host, port), family=family, backlog=256)
     except (OSError, UnicodeError) as error:
         why = literal((getattr(error, "strerror", None) or "no such name").partition(" (")[0])
-        told = f"{name} {{port}} {port} cannot be had ({why}); give another {{port}}"
+        text = f"{name} {{port}} {port} cannot be used ({why}); give another {{port}}"
         unknown = isinstance(error, socket.gaierror | UnicodeError)
         if unknown or error.errno == errno.EADDRNOTAVAIL:
-            told = f"{{host}} {name} is no address of this machine ({why}); leave {{host}} out"
-        raise SettingError(told) from error
+            text = f"{{host}} {name} is no address of this machine ({why}); leave {{host}} out"
+        raise SettingError(text) from error

@@ -31,13 +31,13 @@ from orbiflow.tiles import ReadingSettings
 routes = Routes()
 
 
-@routes.get("/projects")
+@routes("GET", "/projects")
 async def projects(here: Studio) -> list[dict[str, Any]]:
     """List all projects."""
     return [shown_summary(summary) for summary in here.store.summaries()]
 
 
-@routes.post("/projects")
+@routes("POST", "/projects")
 async def create(request: Request, here: Studio) -> dict[str, Any]:
     """Make a project."""
     given = await body_object(request)
@@ -52,7 +52,7 @@ async def create(request: Request, here: Studio) -> dict[str, Any]:
     return shown_project(here.store, here.store.project(made))
 
 
-@routes.post("/projects/open")
+@routes("POST", "/projects/open")
 async def open_file(request: Request, here: Studio) -> dict[str, Any]:
     """Make a project of a file, once a task has taken up what is in it; of no other file."""
     made = here.store.create("tile", "Opened project", here.limits.projects)
@@ -60,15 +60,15 @@ async def open_file(request: Request, here: Studio) -> dict[str, Any]:
         await save_body(request, here.store.home(made) / f"opened{ENDING}")
         task = await here.done(made, "open", {})
         if task["state"] in ("failed", "cancelled"):
-            told = task["error"] or "opening was cancelled; open the file again"
-            raise OrbiflowError(told.replace(f"opened{ENDING}", "this file"))
+            reason = task["error"] or "opening was cancelled; open the file again"
+            raise OrbiflowError(reason.replace(f"opened{ENDING}", "this file"))
     except BaseException:
         here.store.delete(made)
         raise
     return shown_project(here.store, here.store.project(made))
 
 
-@routes.get("/projects/{project}/file")
+@routes("GET", "/projects/{project}/file")
 def file(project: str, here: Studio) -> FileResponse:
     """Save a project as a file."""
     with here.store.still():
@@ -88,14 +88,14 @@ def file(project: str, here: Studio) -> FileResponse:
     )
 
 
-@routes.get("/projects/{project}")
+@routes("GET", "/projects/{project}")
 async def get(project: str, here: Studio) -> dict[str, Any]:
     """Return all of a project, as it is at one moment."""
     with here.store.still():
         return shown_project(here.store, here.store.project(project))
 
 
-@routes.patch("/projects/{project}")
+@routes("PATCH", "/projects/{project}")
 async def patch(request: Request, project: str, here: Studio) -> dict[str, Any]:
     """Change a project's name, or parts of what its pages remember."""
     given, own = await body_object(request), here.store.project(project)
@@ -112,7 +112,7 @@ async def patch(request: Request, project: str, here: Studio) -> dict[str, Any]:
     return shown_project(here.store, here.store.project(project))
 
 
-@routes.delete("/projects/{project}")
+@routes("DELETE", "/projects/{project}")
 async def delete(project: str, here: Studio) -> dict[str, Any]:
     """Delete a project with all its files."""
     here.store.project(project)
@@ -121,7 +121,7 @@ async def delete(project: str, here: Studio) -> dict[str, Any]:
     return {}
 
 
-@routes.post("/projects/{project}/tasks")
+@routes("POST", "/projects/{project}/tasks")
 async def task(request: Request, project: str, here: Studio) -> dict[str, Any]:
     """Give a project work."""
     given = await body_object(request)
@@ -138,7 +138,7 @@ async def task(request: Request, project: str, here: Studio) -> dict[str, Any]:
     return await here.submit(project, operation, settings)
 
 
-@routes.post("/tasks/{number}/{action}")
+@routes("POST", "/tasks/{number}/{action}")
 async def steer(number: int, action: str, here: Studio) -> dict[str, Any]:
     """Pause, resume or cancel a task."""
     queue = here.queue
@@ -149,7 +149,7 @@ async def steer(number: int, action: str, here: Studio) -> dict[str, Any]:
     return {"task": shown_task(here.store, here.store.task(number))}
 
 
-@routes.get("/projects/{project}/events")
+@routes("GET", "/projects/{project}/events")
 async def events(request: Request, project: str, here: Studio, after: int = 0) -> StreamingResponse:
     """Stream what changes in a project, from some event on."""
     here.store.project(project)
@@ -168,7 +168,7 @@ PNG = b"\x89PNG\r\n\x1a\n"
 PLAIN_ENDING = re.compile("[.][a-z0-9]{1,7}")
 
 
-@routes.put("/projects/{project}/input")
+@routes("PUT", "/projects/{project}/input")
 async def upload(request: Request, project: str, here: Studio, name: str = "") -> dict[str, Any]:
     """Take a picture or drawing of any kind, as raw bytes."""
     here.store.project(project)
@@ -179,7 +179,7 @@ async def upload(request: Request, project: str, here: Studio, name: str = "") -
     return await _new_input(here, project, called, file)
 
 
-@routes.post("/projects/{project}/animal")
+@routes("POST", "/projects/{project}/animal")
 async def animal(request: Request, project: str, here: Studio) -> dict[str, Any]:
     """Take one of the bundled animals."""
     name = str((await body_object(request)).get("name"))
@@ -215,7 +215,7 @@ async def _read_anew(here: Studio, project: str) -> dict[str, Any]:
     )
 
 
-@routes.put("/projects/{project}/reading")
+@routes("PUT", "/projects/{project}/reading")
 async def reading(request: Request, project: str, here: Studio) -> dict[str, Any]:
     """Read the picture anew, with other settings."""
     given = {k: v for k, v in (await body_object(request)).items() if v is not None}
@@ -223,7 +223,7 @@ async def reading(request: Request, project: str, here: Studio) -> dict[str, Any
     return await _read_anew(here, project)
 
 
-@routes.put("/projects/{project}/{mask}")
+@routes("PUT", "/projects/{project}/{mask}")
 async def put_mask(request: Request, project: str, mask: str, here: Studio) -> dict[str, Any]:
     """Take what was painted over the picture."""
     file = _mask_file(here, project, mask)
@@ -236,7 +236,7 @@ async def put_mask(request: Request, project: str, mask: str, here: Studio) -> d
     return await _mask_changed(here, project, mask)
 
 
-@routes.delete("/projects/{project}/{mask}")
+@routes("DELETE", "/projects/{project}/{mask}")
 async def delete_mask(project: str, mask: str, here: Studio) -> dict[str, Any]:
     """Forget what was painted over the picture."""
     _mask_file(here, project, mask).unlink(missing_ok=True)
@@ -255,7 +255,7 @@ async def _mask_changed(here: Studio, project: str, mask: str) -> dict[str, Any]
     return await _read_anew(here, project) if mask == "mend" else {}
 
 
-@routes.get("/projects/{project}/{picture}.png")
+@routes("GET", "/projects/{project}/{picture}.png")
 async def get_picture(project: str, picture: str, here: Studio) -> FileResponse:
     """Return the backdrop, or what was painted over it."""
     here.store.project(project)
@@ -277,13 +277,13 @@ def stage_of(here: Studio, project: str, tile: int) -> Path:
     return found
 
 
-@routes.get("/projects/{project}/tiles/{tile}")
+@routes("GET", "/projects/{project}/tiles/{tile}")
 async def view(project: str, tile: int, here: Studio) -> FileResponse:
     """Return what the page of a tile shows."""
     return FileResponse(stage_of(here, project, tile) / VIEW, media_type="application/json")
 
 
-@routes.delete("/projects/{project}/tiles/{tile}")
+@routes("DELETE", "/projects/{project}/tiles/{tile}")
 async def delete_tile(project: str, tile: int, here: Studio) -> dict[str, Any]:
     """Delete a tile."""
     here.store.delete_tile(project, tile)
@@ -291,7 +291,7 @@ async def delete_tile(project: str, tile: int, here: Studio) -> dict[str, Any]:
     return {}
 
 
-@routes.get("/projects/{project}/tiles/{tile}/space")
+@routes("GET", "/projects/{project}/tiles/{tile}/space")
 async def space(project: str, tile: int, here: Studio) -> FileResponse:
     """Return the space in which a tile is pulled."""
     file = stage_of(here, project, tile) / SPACE
@@ -302,7 +302,7 @@ async def space(project: str, tile: int, here: Studio) -> FileResponse:
     return FileResponse(file, media_type="application/json")
 
 
-@routes.post("/projects/{project}/tiles/{tile}/pulled")
+@routes("POST", "/projects/{project}/tiles/{tile}/pulled")
 async def pulled(request: Request, project: str, tile: int, here: Studio) -> dict[str, Any]:
     """Make a tile of one that was pulled, and return its card."""
     given = await body_object(request)
@@ -325,13 +325,13 @@ def _made(here: Studio, task: int, name: str) -> Path:
     return file
 
 
-@routes.get("/takeaways/{task}/files/{name}")
+@routes("GET", "/takeaways/{task}/files/{name}")
 async def download(task: int, name: str, here: Studio) -> FileResponse:
     """Return a file to keep."""
     return FileResponse(_made(here, task, name), filename=name, headers=SANDBOX)
 
 
-@routes.get("/takeaways/{task}/preview.png")
+@routes("GET", "/takeaways/{task}/preview.png")
 async def preview(task: int, here: Studio) -> FileResponse:
     """Return a picture of what a task has made."""
     return FileResponse(_made(here, task, PREVIEW), headers=SANDBOX)

@@ -27,40 +27,18 @@ Answer = TypeVar("Answer", bound=Callable[..., Any])
 
 
 class Routes(list[Route]):
-    """Routes of one topic; `get`, `put` and so on decorate the functions that answer.
+    """Routes of one topic; called with a method and an address, it decorates a function that answers.
 
-    A function is given what it names: a `Request`, the `Studio`, parts of the address in braces, and
+    The function is given what it names: a `Request`, the `Studio`, parts of the address in braces, and
     what comes after its question mark, as texts or whole numbers. It returns a response, or what JSON
     has.
     """
 
-    def __init__(self, prefix: str = "") -> None:
-        super().__init__()
-        self.prefix = prefix
+    def __call__(self, method: str, path: str) -> Callable[[Answer], Answer]:
+        """Return the decorator that adds a route."""
 
-    def get(self, path: str) -> Callable[[Answer], Answer]:
-        """Answer GET."""
-        return self._adding(path, "GET")
-
-    def post(self, path: str) -> Callable[[Answer], Answer]:
-        """Answer POST."""
-        return self._adding(path, "POST")
-
-    def put(self, path: str) -> Callable[[Answer], Answer]:
-        """Answer PUT."""
-        return self._adding(path, "PUT")
-
-    def patch(self, path: str) -> Callable[[Answer], Answer]:
-        """Answer PATCH."""
-        return self._adding(path, "PATCH")
-
-    def delete(self, path: str) -> Callable[[Answer], Answer]:
-        """Answer DELETE."""
-        return self._adding(path, "DELETE")
-
-    def _adding(self, path: str, method: str) -> Callable[[Answer], Answer]:
         def add(answer: Answer) -> Answer:
-            self.append(Route(self.prefix + path, _endpoint(answer), methods=[method]))
+            self.append(Route(path, _endpoint(answer), methods=[method]))
             return answer
 
         return add

@@ -101,7 +101,7 @@ class Store:
 
     @contextmanager
     def _changing(self, project: str) -> Iterator[sqlite3.Connection]:
-        """Do several changes or none, and tell the listeners."""
+        """Do several changes or none, and notify the listeners."""
         with self._lock:
             self._data.execute("BEGIN IMMEDIATE")
             try:
@@ -125,7 +125,7 @@ class Store:
             raise Missing(f"there is no such {what} (any more); go back to the list of projects")
         return found[0]
 
-    def _tell(self, project: str, kind: str, subject: Any = "", data: Any = None) -> None:
+    def _record(self, project: str, kind: str, subject: Any = "", data: Any = None) -> None:
         self._data.execute(
             "INSERT OR REPLACE INTO events(project, kind, subject, data) VALUES (?, ?, ?, ?)",
             (project, kind, str(subject), json.dumps(data)),
@@ -163,11 +163,11 @@ class Store:
         return self._row("SELECT * FROM projects WHERE id = ?", project, what="project")
 
     def change(self, project: str, kind: str = "project", **changes: Any) -> None:
-        """Change columns of a project, and tell an event of this kind."""
+        """Change columns of a project, and record an event of this kind."""
         with self._changing(project):
             self.project(project)
             self._update("projects", project, {**changes, "changed": time.time()})
-            self._tell(project, kind)
+            self._record(project, kind)
 
     def delete(self, project: str) -> None:
         """Forget a project, and remove its files."""
@@ -194,7 +194,7 @@ class Store:
                 (tile, project, card["score"], json.dumps(card)),
             )
             data.execute("UPDATE projects SET changed = ? WHERE id = ?", (time.time(), project))
-            self._tell(project, "card", tile)
+            self._record(project, "card", tile)
 
     def cards(self, project: str) -> list[dict[str, Any]]:
         """Return the cards of a project's tiles, best first."""
@@ -215,7 +215,7 @@ class Store:
                 "DELETE FROM events WHERE project = ? AND kind = 'card' AND subject = ?",
                 (project, str(tile)),
             )
-            self._tell(project, "gone", tile, {"tile": tile})
+            self._record(project, "gone", tile, {"tile": tile})
 
     # tasks
 
@@ -238,7 +238,7 @@ class Store:
                 (project, operation, json.dumps(settings), lane),
             )
             assert made.lastrowid is not None
-            self._tell(project, "task", made.lastrowid)
+            self._record(project, "task", made.lastrowid)
             return made.lastrowid
 
     def task(self, task: int) -> dict[str, Any]:
@@ -265,7 +265,7 @@ class Store:
             project = self.task(task)["project"]
             with self._changing(project):
                 self._update("tasks", task, changes)
-                self._tell(project, "task", task)
+                self._record(project, "task", task)
 
     # events
 
@@ -273,7 +273,7 @@ class Store:
         """Tell a project's users something in words."""
         with suppress(Missing), self._changing(project):
             self.project(project)
-            self._tell(project, "notice", text, {"text": text, "warning": warning})
+            self._record(project, "notice", text, {"text": text, "warning": warning})
 
     @property
     def head(self) -> int:

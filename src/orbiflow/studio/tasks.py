@@ -31,9 +31,9 @@ from orbiflow.studio.settings import Job, SearchChoice
 from orbiflow.studio.tile_files import (
     PLACES,
     STAGES,
+    announce_tile,
     best_stage,
     put_tile,
-    tell_tile,
     tile_folder,
     tile_number,
 )
@@ -85,7 +85,7 @@ def search(
     whole = _search_settings(job.project, settings)
     names = searched_classes(target, whole)
     left = [name for k, name in enumerate(names) if not _is_done(job, k)]
-    _tell_again(job, on_event)
+    _announce_again(job, on_event)
     if not left:
         return Outcome({"tiles": len(names)})
     seen: dict[tuple[str, str], int] = {}
@@ -149,13 +149,13 @@ def _is_done(job: Job, place: int) -> bool:
     return found is not None and found.name == STAGES[-1]
 
 
-def _tell_again(job: Job, on_event: Sink) -> None:
-    """Tell of tiles that this task found before it was interrupted."""
+def _announce_again(job: Job, on_event: Sink) -> None:
+    """Announce tiles that this task found before it was interrupted."""
     for number in sorted(
         int(folder.name) for folder in (job.project / "tiles").glob("[0-9]*") if folder.is_dir()
     ):
         if number // PLACES == job.task and (found := best_stage(job.project, number)):
-            tell_tile(number, found.name, on_event)
+            announce_tile(number, found.name, on_event)
 
 
 @operation("studio open")
@@ -206,8 +206,7 @@ def space(job: Job, tile: int, *, on_event: Sink = ignore, cancel: Cancel = NEVE
     del on_event
     cancel.check()
     own = tile_folder(job.project, tile)
-    told = space_json(read_result(own))
-    write_json(own.parent / SPACE, told)
+    write_json(own.parent / SPACE, space_json(read_result(own)))
     return Outcome({"tile": tile})
 
 
@@ -340,7 +339,7 @@ def take(
 
 
 def _preview(call: Call, first: Path, folder: Path, cancel: Cancel) -> bool:
-    """Write a picture of a take-away, if that can be had; return whether it was."""
+    """Write a picture of a take-away if it can be drawn; return whether it was."""
     if first.suffix == ".png":
         shutil.copyfile(first, folder / PREVIEW)
         return True

@@ -47,9 +47,9 @@ def tile_folder(home: Path, number: int) -> Path:
 
 
 def put_tile(
-    home: Path, number: int, stage: str, tile: EscherTile, tell: Sink, parent: int | None = None
+    home: Path, number: int, stage: str, tile: EscherTile, on_event: Sink, parent: int | None = None
 ) -> None:
-    """Write a certified `EscherTile` as a stage of a tile, and tell that it is there."""
+    """Write a certified `EscherTile` as a stage of a tile, and announce it."""
     from orbiflow.studio.tile_view import tile_card, tile_view
     from orbiflow.tiles import save_tiles
 
@@ -65,9 +65,9 @@ def put_tile(
         with suppress(OSError):  # a worker of a server that died was faster
             staged.rename(place)
         shutil.rmtree(staged, ignore_errors=True)
-    tell_tile(number, stage, tell)
+    announce_tile(number, stage, on_event)
 
 
-def tell_tile(number: int, stage: str, tell: Sink) -> None:
-    """Tell that a stage of a tile is there."""
-    tell(ItemDone(f"{number}/{stage}", "done", "tile"))
+def announce_tile(number: int, stage: str, on_event: Sink) -> None:
+    """Send the event that a stage of a tile is there."""
+    on_event(ItemDone(f"{number}/{stage}", "done", "tile"))

@@ -1,4 +1,4 @@
-"""Projects and tasks as browsers are told of them."""
+"""Projects and tasks as pages show them."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ def page_words(text: str) -> str:
     """
     if isinstance(text, Advice):
         return text.named(lambda name: LABELS.get(name, name))
-    for said, meant in ON_THE_PAGE.items():
-        text = text.replace(said, meant)
+    for words, meant in ON_THE_PAGE.items():
+        text = text.replace(words, meant)
     return text
 
 

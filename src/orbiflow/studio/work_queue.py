@@ -46,7 +46,7 @@ WARM_MODULES = (
 )
 """What a worker has imported before there is work for it."""
 
-MIN_PROGRESS_STEP = 0.002  # of a task: smaller progress is not told
+MIN_PROGRESS_STEP = 0.002  # of a task: smaller progress is not reported
 MAX_CALLS = 40  # of a process, one after another
 MAX_HELD = 3  # processes that are kept in memory while their tasks are paused
 FAULT_TEXT = (
@@ -274,9 +274,9 @@ class WorkQueue:
         ).start()
 
     def _follow(self, number: int, project: str, process: CallProcess, call: Call) -> None:
-        """Give a process its call and record what it tells, to its end."""
+        """Give a process its call and record its events, to its end."""
         process.begin(call)  # which waits until the process reads it
-        told = _Told(self.store, project, number)
+        recorder = _Recorder(self.store, project, number)
         ending: Event | None = None
         for event in process.events():
             if self._owner(number) is not process:
@@ -284,10 +284,10 @@ class WorkQueue:
             if isinstance(event, Finished | Failed):
                 ending = event
             else:
-                told.record(event)
+                recorder.record(event)
         with self._lock:
             if self._owner(number) is process and not self._closed:
-                told.end(ending)
+                recorder.end(ending)
                 self._let_go(number, process)
         self._schedule()
 
@@ -308,8 +308,8 @@ class WorkQueue:
             return self._running.get(number) or self._held.get(number)
 
 
-class _Told:
-    """What a task's process tells, put into the store."""
+class _Recorder:
+    """Puts the events of a task's process into the store."""
 
     def __init__(self, store: Store, project: str, number: int) -> None:
         self.store, self.project, self.number = store, project, number
@@ -318,7 +318,7 @@ class _Told:
         self.notes: list[str] = []
 
     def record(self, event: Event) -> None:
-        """Keep what an event tells, if anybody is to know it."""
+        """Keep an event, if anybody is to know of it."""
         with suppress(Missing):
             match event:
                 case Progress(share=share, what=what):

@@ -108,7 +108,7 @@ def escherize(
 
 
 def _tables(tiles: Sequence[EscherTile]) -> list[Table]:
-    """Return what is said of the tiles, in words and in figures; nothing of none."""
+    """Return a table of the tiles, in words and in figures; empty if there are none."""
     if not tiles:
         return []
     figures = _table("Figures", [_figures(tile) for tile in tiles])
@@ -121,7 +121,7 @@ def _table(title: str, rows: Sequence[dict[str, str]]) -> Table:
 
 
 def _words(tile: EscherTile) -> dict[str, str]:
-    """What is said of a tile, in 80 characters."""
+    """Return a line about a tile, in 80 characters."""
     rating, lies = tile.rating, tile.arrangement
     return {
         "class": f"{tile.name} ({tile.group_name})",

@@ -95,7 +95,7 @@ def as_tile(source: TileSource, which: str | int | None = None) -> EscherTile:
 
 
 def _contents(file: Path, document: dict[str, Any]) -> tuple[list[str], str, dict[str, Any]]:
-    """Return the classes of a run's tiles, the silhouette's name, and what is said of it."""
+    """Return the classes of a run's tiles, and the silhouette's name and report."""
     try:
         names = [str(entry["class"]) for entry in document["tiles"]]
         silhouette = document["input"]

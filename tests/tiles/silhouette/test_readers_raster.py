@@ -119,7 +119,7 @@ def test_threshold_and_invert_override(tmp_path: Path) -> None:
     ImageDraw.Draw(image).rectangle((20, 10, 39, 49), fill=20)
     path = save(tmp_path, image)
     reading = read_outline(path, threshold=0.2, invert=False)
-    assert reading.notes == ("shape taken as told: dark on light (threshold 0.20, as given)",)
+    assert reading.notes == ("shape as set: dark on light (threshold 0.20, as given)",)
     # Interpolated towards a light ground, a low threshold draws the edge inwards.
     assert iou(reading.outline, [[20, 10], [40, 10], [40, 50], [20, 50]]) > 0.9
     with pytest.raises(InputFileError, match=r"fills the whole image .* set invert"):

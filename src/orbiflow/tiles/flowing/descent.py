@@ -85,7 +85,7 @@ class Descent:
         return {name: every[name] for name in names if every[name].numel()}
 
     def step(self, soft: SoftTarget) -> None:
-        """One step of all candidates: another segment of their flows."""
+        """Take one step with all candidates: another segment of their flows."""
         share = self.done / max(1, self.settings.iterations - 1)
         reach, blur = (between(ends, share) for ends in (self.settings.reach, self.settings.blur))
         first, last = self.settings.smoothness
@@ -105,7 +105,7 @@ class Descent:
         self.done += 1
 
     def _force(self, soft: SoftTarget, placed: Tensor, blur: float) -> Tensor:
-        """(occupancy - Dice / 2) n ds at the boundary points, outward: the gradient of the IoU."""
+        """Return (occupancy - Dice / 2) n ds at boundary points, outward: the gradient of the IoU."""
         along = (placed.roll(-1, dims=1) - placed.roll(1, dims=1)) / 2
         outward = torch.stack([along[..., 1], -along[..., 0]], dim=-1)
         outward = torch.where(self.model.mirror[:, None, None], -outward, outward)
@@ -135,7 +135,7 @@ class Descent:
 
     @torch.no_grad()
     def placed(self) -> Array:
-        """Boundaries (S, N, 2) in the target's normal form, float64."""
+        """Return boundaries (S, N, 2) in the target's normal form, float64."""
         return self.model.place(self.points).double().numpy()
 
     @torch.no_grad()
@@ -211,7 +211,7 @@ class _Polish:
         self.history: list[float] = []
 
     def loss(self, x: Array) -> tuple[float, Array]:
-        """1 - IoU and its gradient in all parameters."""
+        """Return 1 - IoU and its gradient in all parameters."""
         values = torch.tensor(x, dtype=torch.float64)
         parameters = self._set(values)
         placed = self.model.place(self.flow(self.points))
@@ -229,13 +229,13 @@ class _Polish:
         return 1 - value, self.gradient
 
     def stalled(self, xk: Array) -> None:  # noqa: ARG002 - SciPy's name
-        """Stops the iteration when the last ten brought nothing."""
+        """Stop the iteration when the last ten brought nothing."""
         self.history.append(self.best_iou)
         if len(self.history) > 10 and self.history[-1] - self.history[-11] < MIN_GAIN:
             raise StopIteration
 
     def result(self) -> TileModel:
-        """The model at the best iterate."""
+        """Return the model at the best iterate."""
         if self.best_iou <= self.first_iou:
             self._set(torch.zeros(self.size, dtype=torch.float64))
             return self.model
@@ -272,7 +272,7 @@ def fit_descent(
 ) -> Fit:
     """Fit tiles of one class to a target by Sobolev descent, all starts side by side.
 
-    `progress` is told 1 - IoU as the loss.
+    `progress` is called with 1 - IoU as the loss.
     """
     kind = isohedral_class(kind)
     as_instance(target, Target, "the target", "Target.read and Target.from_polygon make one")
@@ -317,7 +317,7 @@ def shared_soft_target(target: Target, emphasis: Emphasis | None) -> SoftTarget:
 
 
 def _with_start(model: TileModel, prototile: Prototiles) -> TileModel:
-    """The candidates after a start that none of them beats, with a flow that stays where it is."""
+    """Return the candidates after a start that none of them beats, whose flow moves nothing."""
     still = TileModel(
         model.isohedral_class,
         max_frequency=model.max_frequency,
@@ -334,7 +334,7 @@ def _with_start(model: TileModel, prototile: Prototiles) -> TileModel:
 def _polished(
     target: Target, model: TileModel, settings: OverlapSearch, cancel: Cancel
 ) -> TileModel:
-    """The same candidates, each with one segment more."""
+    """Return the same candidates, each with one segment more."""
     polished: list[TileModel] = []
     for index in range(model.size):
         single = model.take([index])
@@ -348,7 +348,7 @@ def _polished(
 
 
 def _overlaps(goal: shapely.Polygon, soft: SoftTarget, descent: Descent) -> Array:
-    """IoU (S,) of the candidates, weighted if there is emphasis; -1 for those that cross themselves."""
+    """Return IoU (S,) of the candidates, weighted if there is emphasis; -1 where one crosses itself."""
     boundaries = descent.placed()
     plain = boundary_iou(goal, boundaries)
     if soft.weights is None:

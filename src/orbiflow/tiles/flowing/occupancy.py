@@ -59,7 +59,7 @@ class OccupancySamples:
         self._generator = torch.Generator().manual_seed(seed)
 
     def draw(self, count: int) -> tuple[Tensor, Tensor]:
-        """A random batch: points (count, 2) and occupancies (count,)."""
+        """Draw a random batch: points (count, 2) and occupancies (count,)."""
         chosen = torch.randint(len(self.points), (count,), generator=self._generator)
         return self.points[chosen], self.inside[chosen]
 
@@ -67,7 +67,7 @@ class OccupancySamples:
 def occupancy_loss(
     model: TileModel, points: Tensor, inside: Tensor, hardness: float, *, affine: bool = False
 ) -> Tensor:
-    """Mean binary cross-entropy of sigmoid(tau phi(D^-1 q)) against o(q), one value a candidate.
+    """Return the mean binary cross-entropy of sigmoid(tau phi(D^-1 q)) and o(q), one a candidate.
 
     phi is the signed distance to the template, rescaled to the target's units, tau the `hardness`
     (paper, equation of L). The points (N, 2) are in the target's normal form, `inside` (N,) is 0 or
@@ -144,7 +144,7 @@ def _affine_phase(
 
 @torch.no_grad()
 def _distinct(model: TileModel, count: int) -> list[int]:
-    """The first `count` candidates whose placed templates differ: starts often meet in one pose."""
+    """Return the first `count` candidates whose placed templates differ: many end in one pose."""
     order, _ = template_symmetries(model.isohedral_class)
     placed = model.place(model.template())
     sides = placed.shape[1]

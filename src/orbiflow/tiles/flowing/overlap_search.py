@@ -151,7 +151,7 @@ class OverlapSearch(Settings, SearchMethod):
         return self.min_neck
 
     def for_outline(self, length: float) -> OverlapSearch:
-        """More starts for a ragged silhouette, with an outline of this `length`; a disc has 3.5."""
+        """Return settings with more starts for a ragged outline of this `length`; a disc has 3.5."""
         share = min(max((length / USUAL_LENGTH) ** RAGGEDNESS_POWER, 1.0), MAX_MORE_STARTS)
         (steps, kept), *later = self.stages
         return replace(

@@ -32,7 +32,7 @@ from orbiflow.tiles.tilings import IsohedralClass, isohedral_class
 
 
 def initial_poses(isohedral_class: IsohedralClass, turns: int) -> tuple[Array, NDArray[np.bool_]]:
-    """Angles (S,) in radians that tell templates apart, and mirror flags (S,) if these matter."""
+    """Return angles (S,) in radians that give different templates, and mirror flags (S,)."""
     order, symmetric = template_symmetries(isohedral_class)
     angles = np.arange(turns, dtype=np.float64) * (2 * math.pi / order / turns)
     if symmetric:
@@ -145,7 +145,7 @@ def _simple_tiles(
     placements: Placements,
     wanted: int,
 ) -> Iterator[tuple[NearestTiles, Placements, Array]]:
-    """The `wanted` nearest tiles that do not cross themselves, their placements and their IoU.
+    """Return the `wanted` nearest tiles that do not cross themselves, their placements and IoU.
 
     Near an outline that was smoothed fewer cross: limbs are shorter, and the descent lets them grow.
     """
@@ -169,7 +169,7 @@ def _simple_tiles(
 
 
 def _apart(scores: Array, places: Array, mirrored: NDArray[np.bool_], count: int) -> list[int]:
-    """Greedily the best scores whose corners are not where those of a better one are."""
+    """Choose the best scores, greedily, whose corners are not where those of a better one are."""
     chosen: list[int] = []
     for index in np.argsort(-scores, kind="stable"):
         gap = abs(places[chosen] - places[index]) % 1.0

@@ -139,11 +139,11 @@ class TileModel(nn.Module, Candidates):
         return len(self.angle)
 
     def template(self) -> Tensor:
-        """Vertices (S, K, 2) of each candidate's template."""
+        """Return vertices (S, K, 2) of each candidate's template."""
         return self.isohedral_class.template(self.shape)
 
     def linear(self) -> Tensor:
-        """The linear part of A o L, (S, 2, 2)."""
+        """Return the linear part of A o L, (S, 2, 2)."""
         c, s = self.angle.cos(), self.angle.sin()
         sign = torch.where(self.mirror, -1.0, 1.0).to(c)
         turn = torch.stack([torch.stack([c, -s * sign], -1), torch.stack([s, c * sign], -1)], -2)
@@ -151,23 +151,23 @@ class TileModel(nn.Module, Candidates):
         return scale * turn @ self.isohedral_class.stretch(self.stretch)
 
     def place(self, points: Tensor) -> Tensor:
-        """A o L at points (S, N, 2) of the group's frame."""
+        """Apply A o L to points (S, N, 2) of the group's frame."""
         return self._points(points) @ self.linear().mT + self.offset[:, None, :]
 
     def unplace(self, points: Tensor) -> Tensor:
-        """(A o L)^-1 at points (N, 2) or (S, N, 2) of the target's normal form."""
+        """Apply (A o L)^-1 to points (N, 2) or (S, N, 2) of the target's normal form."""
         return (self._points(points) - self.offset[:, None, :]) @ linalg.inv(self.linear()).mT
 
     def forward(self, points: Tensor) -> Tensor:
-        """D at points (S, N, 2) of the group's frame."""
+        """Apply D to points (S, N, 2) of the group's frame."""
         return self.place(self.flow(self._points(points)))
 
     def inverse(self, points: Tensor) -> Tensor:
-        """D^-1 at points (N, 2) or (S, N, 2) of the target's normal form."""
+        """Apply D^-1 to points (N, 2) or (S, N, 2) of the target's normal form."""
         return self.flow.inverse(self.unplace(points))
 
     def _points(self, points: Tensor | ArrayLike) -> Tensor:
-        """`points` if they suit the model; arrays and lists become tensors of its dtype."""
+        """Return `points` if they suit the model; arrays and lists become tensors of its dtype."""
         if not isinstance(points, Tensor):
             return torch.as_tensor(
                 as_array(points, "points", (..., "N", 2), finite=False),
@@ -184,7 +184,7 @@ class TileModel(nn.Module, Candidates):
         return points
 
     def prototile(self) -> tuple[Tensor, Tensor]:
-        """What the flow starts from: vertices (S, N, 2) and the corners' indices (S, K)."""
+        """Return what the flow starts from: vertices (S, N, 2) and the corners' indices (S, K)."""
         if self.vertices is None or self.corners is None:
             template = self.template()
             corners = torch.arange(template.shape[1], device=template.device)
@@ -192,7 +192,7 @@ class TileModel(nn.Module, Candidates):
         return self.vertices.to(self.angle.dtype), self.corners
 
     def take(self, indices: Sequence[int] | int) -> TileModel:
-        """A new model with the candidates at `indices` only, at the same parameters."""
+        """Return a new model with the candidates at `indices` only, at the same parameters."""
         several = indices if isinstance(indices, Sequence | np.ndarray) else [indices]
         chosen = [as_whole(i, "a candidate's index", 0, self.size - 1) for i in several]
         if not chosen:
@@ -203,7 +203,7 @@ class TileModel(nn.Module, Candidates):
     @staticmethod
     @torch.no_grad()
     def joined(models: Sequence[TileModel]) -> TileModel:
-        """The candidates of models of one class that differ in their parameters alone, as one stack."""
+        """Return the candidates of models of one class, different in parameters alone, as one stack."""
         names = {model.isohedral_class.name for model in models}
         if len(names) != 1:
             raise OrbiflowError(f"models of one class can be joined, got {sorted(names) or 'none'}")
@@ -219,12 +219,12 @@ class TileModel(nn.Module, Candidates):
         return stack
 
     def fourier_fields(self) -> list[FourierField]:
-        """The segments of the flow."""
+        """Return the segments of the flow."""
         return [field for field in self.flow.segments if isinstance(field, FourierField)]
 
     @torch.no_grad()
     def with_fields(self, fields: list[Tensor], indices: list[int] | None = None) -> TileModel:
-        """The candidates at `indices` (default all) with one segment for each field's parameters."""
+        """Return the candidates at `indices` (default: all), with a segment for each of the fields."""
         chosen = list(range(self.size)) if indices is None else indices
         model = TileModel(
             self.isohedral_class,

@@ -1,6 +1,6 @@
 """How faithful a bent outline is to its silhouette, as people judge it, point by point.
 
-The mark that people would give is foretold from seven measures (docs/likeness.md has the evidence):
+The mark that people would give is predicted from seven measures (docs/likeness.md has the evidence):
 
 - `pieces`: how well short and long pieces of the outline are kept, each compared after its own best
   motion (Procrustes; Gower, 1975), by the mean of the roots: a few pieces may be lost, the rest should
@@ -56,7 +56,7 @@ WEIGHTS = (1.3, 1.65, 0.27, 0.45, 0.5, 0.27, 0.25)
 # roots of the area: the usual one, and the extremes of those that were marked
 LENGTH_WEIGHT, USUAL_LENGTH, LENGTHS = 2.0, 6.5, (4.2, 10.9)
 USUAL_MARK = 5.8  # of a tile with usual values and of usual length
-# The foretold mark at which half of the people find a tile good, 6.5 or more, and how fast their log
+# The predicted mark at which half of the people find a tile good, 6.5 or more, and how fast their log
 # odds grow with it
 GOOD_MARK, STEEPNESS = 6.1, 1.6
 # What has happened where each of the measures costs marks

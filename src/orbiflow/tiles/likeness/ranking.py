@@ -23,7 +23,7 @@ STAR_WORDS = {4.5: "excellent", 3.5: "good", 2.5: "fair", 1.0: "poor"}
 
 MOST_STARS = 5
 LOWEST_MARK, HIGHEST_MARK = 3.0, 8.5  # one star, and five
-OVERLAP_MARKS = (12.5, -4.8)  # the mark of a tile for overlap, foretold as a line in its score
+OVERLAP_MARKS = (12.5, -4.8)  # the predicted mark of a tile for overlap: a line in its score
 
 
 @dataclass(frozen=True)

@@ -131,7 +131,7 @@ def _all_carved(
 
 
 def _best_first(found: list[Bent]) -> list[Bent]:
-    """The tiles without twins, by their scores."""
+    """Return the tiles without twins, by their scores."""
     return _unlike(sorted(found, key=lambda bent: -bent.score), len(found), _twins)
 
 
@@ -146,7 +146,7 @@ def _finalists(
     settings: LikenessSearch,
     cancel: Cancel,
 ) -> list[Bent]:
-    """The best of one hand and stiffness worked out; some cross themselves."""
+    """Work out the best of one orientation and stiffness; some cross themselves."""
     best = _best_placements(side, stiffness, kind, settings, cancel)
     _, _, fine = side.bodies(stiffness)
     found: list[Bent] = []
@@ -165,7 +165,7 @@ def _best_placements(
     settings: LikenessSearch,
     cancel: Cancel,
 ) -> Drawn:
-    """Placements of the fine outline whose tiles cost least: few points, then more and more."""
+    """Return placements of the fine outline whose tiles cost least: few points, then more and more."""
     coarse, middle, fine = side.bodies(stiffness)
     placements, points = _best_coarse(coarse, kind, settings)
     share = settings.share
@@ -193,7 +193,7 @@ def _judged(
     settings: LikenessSearch,
     cancel: Cancel,
 ) -> Drawn:
-    """Placements of the best marks, without twins.
+    """Return placements of the best marks, without twins.
 
     Corners move as long as bending costs less, and those of the best marks as long as these rise.
     """
@@ -209,7 +209,7 @@ def _judged(
 def _best_coarse(
     body: Elastic, kind: IsohedralClass, settings: LikenessSearch
 ) -> tuple[Placements, Complex]:
-    """Placements whose tiles cost least, with these: few points, all placements side by side."""
+    """Return placements whose tiles cost least, with these: few points, all placements side by side."""
     outline = body.rest[: body.size]
     placements = best_placements(kind, outline, settings.placements)
     z, space = drawn_to_tiles(body, kind, placements)
@@ -226,7 +226,7 @@ def _best_coarse(
 def _finer(
     body: Elastic, finer: Elastic, placements: Placements, points: Complex
 ) -> tuple[Placements, Complex]:
-    """The same placements, and shapes (N, C) much like those given, of a body with more points."""
+    """Return the same placements, and shapes (N, C) like those given, of a body with more points."""
     n, multiple = body.size, finer.size // body.size
     closed = np.vstack([points[:n], points[:1]])
     below, part = np.divmod(np.arange(finer.size), multiple)
@@ -242,7 +242,7 @@ def _finer(
 def _detailed(
     side: Orientation, body: Elastic, kind: IsohedralClass, one: Drawn, settings: LikenessSearch
 ) -> Bent | None:
-    """One placement of the fine outline worked out with a body; None if nothing is left of it."""
+    """Work out one placement of the fine outline with a body; None if nothing is left of it."""
     space = TileSpace(kind, one.placements)
     tiles = held_on_tiles(body, space, one.points, settings.rounds)
     ring, own = tiles.points[: body.size, 0], tiles.placements
@@ -252,7 +252,7 @@ def _detailed(
 
 
 def _carved(kind: IsohedralClass, bent: Bent, min_neck: float) -> Bent:
-    """The tile carved, with room between its parts if it needs that, or as it is if no better."""
+    """Carve a tile, with room between its parts if it needs that; return it as it is if no better."""
     body, space = bent.orientation.fine, TileSpace(kind, bent.placement)
     own = bent.placement._replace(turns=space.turns)
     found = [bent]
@@ -276,7 +276,7 @@ def _bent(
     placement: Placements,
     min_neck: float,
 ) -> Bent | None:
-    """A tile and the shape (N, 1) of the body in it; None if there is no area, lattice or order."""
+    """Return a tile and the shape (N, 1) of the body in it; None without area, lattice or order."""
     polygon, outline = plane_points(tile.ring), points[: body.size]
     whole = float(signed_area(polygon)) > 0.1 and np.linalg.det(tile.linear) > 1e-6
     if not whole or not tile.in_order:
@@ -299,7 +299,7 @@ def _bent(
 
 
 def _costs(body: Elastic, z: Complex) -> tuple[Array, NDArray[np.bool_]]:
-    """Costs (C,) of shapes, and which of them do not cross themselves."""
+    """Return costs (C,) of shapes, and which of them do not cross themselves."""
     rings = plane_points(z[: body.size].T)
     area = signed_area(rings)
     simple = np.asarray(shapely.is_valid(shapely.polygons(rings))) & (area > 0.1)
@@ -309,7 +309,7 @@ def _costs(body: Elastic, z: Complex) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def _unlike_outlines(outlines: Complex, order: Iterable[int], count: int) -> Integers:
-    """Which outlines (C, n) come first in an order, at most `count`, without twins of earlier ones."""
+    """Return which outlines (C, n) come first in an order, at most `count`, without twins."""
 
     def twins(a: int, b: int) -> bool:
         return apart(outlines[a], outlines[b]) <= TWIN_DISTANCE
@@ -318,7 +318,7 @@ def _unlike_outlines(outlines: Complex, order: Iterable[int], count: int) -> Int
 
 
 def _unlike(items: Iterable[Item], count: int, twins: Callable[[Item, Item], bool]) -> list[Item]:
-    """The first `count` items at most, without twins of earlier ones."""
+    """Return the first `count` items at most, without twins of earlier ones."""
     kept: list[Item] = []
     for item in items:
         if len(kept) == count:
@@ -336,7 +336,7 @@ class PlacedBent(NamedTuple):
     shift: complex
 
     def place(self, z: Complex) -> Array:
-        """Points (...) x + iy of the bent silhouette as points (..., 2) of the normal form."""
+        """Return points (...) x + iy of the bent silhouette as points (..., 2) of the normal form."""
         placed = self.factor * z + self.shift
         return plane_points(np.conj(placed) if self.bent.orientation.mirrored else placed)
 
@@ -388,7 +388,7 @@ def placed_best(bent: Bent, overlap: Overlap) -> PlacedBent:
 
 
 def prototile(kind: IsohedralClass, placed: PlacedBent) -> Prototiles:
-    """A placed bent tile as a start tile of a flow."""
+    """Return a placed bent tile as a start tile of a flow."""
     bent, factor, shift = placed
     n = bent.orientation.fine.size
     order = (np.arange(n) + bent.placement.starts[0]) % n

@@ -94,7 +94,7 @@ def onto_polygon(
 
 
 def _places(ring: Array, polygon: Array, knots: Array, own: Integers, goal: Integers) -> Array:
-    """(Q,) where on the ring, in arc length, the polygon's vertices belong: increasing from 0."""
+    """Return where (Q,) the polygon's vertices belong on the ring, in arc length: increasing from 0."""
     lengths = arc_lengths(polygon)
     closed, loop = np.concatenate([ring, ring[:1]]), np.concatenate([polygon, polygon[:1]])
     found = np.empty(len(polygon))
@@ -116,7 +116,7 @@ def _places(ring: Array, polygon: Array, knots: Array, own: Integers, goal: Inte
 
 
 def _snapped(places: Array, known: Array, total: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Places moved to the known ones that they agree with, and which agree with none."""
+    """Return places moved to the known ones that they agree with, and which agree with none."""
     after = np.searchsorted(known, places).clip(1, len(known) - 1)
     near = np.where(
         places - known[after - 1] < known[after] - places, known[after - 1], known[after]

@@ -43,12 +43,12 @@ class Prototiles:
         return len(self.vertices)
 
     def take(self, indices: Sequence[int]) -> Prototiles:
-        """Those at `indices`."""
+        """Return those at `indices`."""
         return Prototiles(*(getattr(self, f.name)[list(indices)] for f in fields(self)))
 
     @staticmethod
     def joined(parts: Sequence[Prototiles]) -> Prototiles:
-        """All of `parts` in one; they have as many vertices."""
+        """Return all of `parts` in one; they have as many vertices."""
         return Prototiles(
             *(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Prototiles))
         )
@@ -78,7 +78,7 @@ class Prototiles:
 
 
 def _pose(kind: IsohedralClass, linear: Array) -> tuple[Array, Array, Array]:
-    """Angle, log of the scale and stretch parameters: linear = scale rotation(angle) stretch."""
+    """Return angle, log of the scale and stretch parameters: linear = scale rotation(angle) stretch."""
     log_scale = np.log(np.linalg.det(linear)) / 2
     unit = linear * np.exp(-log_scale)[:, None, None]
     u, _, v = np.linalg.svd(unit)  # the polar decomposition
@@ -165,7 +165,7 @@ def _moved_edges(
 
 
 def _chosen_samples(kind: IsohedralClass, closed: list[Array], tolerance: float) -> list[Array]:
-    """For each edge, which of its samples to keep, both ends included: matching on identified edges."""
+    """Return which samples of each edge to keep, both ends included: matching on identified edges."""
     masks: dict[int, Array] = {}
     for own in kind.edge_classes:
         curve = closed[own.edge]

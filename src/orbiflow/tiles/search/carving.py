@@ -144,12 +144,12 @@ class _Laid(NamedTuple):
 
     @classmethod
     def straight(cls, places: Array) -> _Laid:
-        """On the sides of the ring."""
+        """Lay points on the sides of the ring."""
         return cls._of(places, np.array([[1.0, -1.0], [0.0, 1.0]]), 0)
 
     @classmethod
     def smoothly(cls, places: Array) -> _Laid:
-        """On Catmull and Rom's cubics through the vertices, which have no kinks."""
+        """Lay points on Catmull and Rom's cubics through the vertices, which have no kinks."""
         cubics = [[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]
         return cls._of(places, np.array(cubics) / 2, -1)
 

@@ -128,7 +128,7 @@ class Orientation:
     outline: Array  # (N, 2) its outline, counter-clockwise
     samples: Samples  # points of its outline, coarse to fine
     made: Callable[[str, Stiffness], Elastic]  # the body of a level of points and a stiffness
-    plain: bool  # whether nobody said which parts matter
+    plain: bool  # whether there is neither emphasis nor pins
 
     @cached_property
     def fine(self) -> Elastic:
@@ -136,7 +136,7 @@ class Orientation:
         return self.made("fine", Stiffness())
 
     def bodies(self, stiffness: Stiffness) -> tuple[Elastic, Elastic, Elastic]:
-        """The bodies of a stiffness with few points, more and all."""
+        """Return the bodies of a stiffness with few points, more and all."""
         middle = "fine" if len(self.samples.middle) == len(self.samples.fine) else "middle"
         fine = self.made("fine", stiffness)
         return self.made("coarse", stiffness), self.made(middle, stiffness), fine
@@ -151,7 +151,7 @@ def orientations(
     pins: Pins | None = None,
     step: int = 6,
 ) -> tuple[Orientation, Orientation]:
-    """The silhouette and its mirror image in the x axis, with a multiple of `step` points."""
+    """Return the silhouette and its mirror image in the x axis, with a multiple of `step` points."""
     phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
     outline = np.asarray(target.normal)
     samples = sampled(outline, phase, settings.multiples, step)
@@ -193,7 +193,7 @@ class Drawn(NamedTuple):
     costs: Array
 
     def take(self, index: Integers) -> Drawn:
-        """Those at `index`."""
+        """Return those at `index`."""
         return Drawn(self.placements.take(index), self.points[:, index], self.costs[index])
 
 
@@ -252,7 +252,7 @@ def _drawn(
 
 
 def _distinct(drawn: Drawn, count: int) -> Drawn:
-    """The best `count` at most, best first, no placement twice."""
+    """Return the best `count` at most, best first, no placement twice."""
     seen: set[tuple[int, ...]] = set()
     kept: list[int] = []
     for k in np.argsort(drawn.costs, kind="stable"):
@@ -266,7 +266,7 @@ def _distinct(drawn: Drawn, count: int) -> Drawn:
 def _neighbours(
     body: Elastic, kind: IsohedralClass, drawn: Drawn, live: Integers, step: int, share: float
 ) -> tuple[Integers, Placements]:
-    """Whose neighbours (M,), and these, of those at `live`: the share whose tiles are nearest."""
+    """Return owners (M,) and their neighbours, for those at `live`: the share of the nearest tiles."""
     longer, later = _moves(kind, step)
     own = drawn.placements
     owners = np.repeat(live, len(later))
@@ -301,7 +301,7 @@ def _take_better(drawn: Drawn, owners: Integers, tried: Drawn) -> Integers:
 
 @lru_cache(maxsize=64)
 def _moves(kind: IsohedralClass, step: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Neighbours of a placement: what is added to lengths (M, K) and starts (M,).
+    """Return neighbours of a placement: what is added to lengths (M, K) and starts (M,).
 
     The edges of one class become longer and those of another shorter, with the first corner where it
     is, or moved so that one of the other corners stays; or all corners move.

@@ -135,4 +135,4 @@ class EscherizeSettings(SearchSettings, group="Search"):
     """Keep the angle of what is pinned, too."""
 
     workers: Annotated[int | None, Range(1), DefaultText("one per core")] = None
-    """Number of processes. Python calls take 1 unless told otherwise."""
+    """Number of processes. Python calls default to 1."""

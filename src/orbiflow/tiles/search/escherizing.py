@@ -133,7 +133,7 @@ def escherize(
         for note in source.notes if source else ():
             on_event(Note(note))
     if near is not None and near.stabiliser in SYMMETRIC_CLASSES:
-        on_event(Note(_told(near, names)))
+        on_event(Note(_symmetry_note(near, names)))
     workers = min(settings.workers or 1, len(names))
     shown = None if on_tile is None else _rating(on_tile, target)
     record = Record(names, on_event, shown, most=settings.per_class)
@@ -166,8 +166,8 @@ def _class_names(classes: Sequence[str] | None, near: NearSymmetry | None) -> li
     return list(dict.fromkeys(found))
 
 
-def _told(near: NearSymmetry, names: Sequence[str]) -> str:
-    """Return what a silhouette near to symmetric is told of, and which of its classes are searched."""
+def _symmetry_note(near: NearSymmetry, names: Sequence[str]) -> str:
+    """Return a note on a silhouette near to symmetric, and which of its classes are searched."""
     what = "its mirror image" if near.stabiliser == "D1" else "itself turned by 180 degrees"
     own = [name for name in SYMMETRIC_CLASSES[near.stabiliser] if name in names]
     searched = f"{', '.join(own)} with exactly symmetric tiles" if own else "no class of such tiles"
@@ -192,7 +192,7 @@ def escherize_class(
     `progress` is called with the share of the work done, and the best loss so far.
 
     Raises:
-        Cancelled: If it was told to stop.
+        Cancelled: If the token was cancelled.
     """
     task = _task(Goal(target), method, per_class, force)
     return _outcome(task, isohedral_class(kind), progress, cancel)
@@ -218,7 +218,7 @@ def fit_tile(
     Raises:
         OrbiflowError: For an argument that cannot be used.
         CertificationError: If no candidate is left.
-        Cancelled: If it was told to stop.
+        Cancelled: If the token was cancelled.
 
     >>> boot = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])
     >>> few = LikenessSearch(placements=10, held=3, finalists=1, rounds=2)

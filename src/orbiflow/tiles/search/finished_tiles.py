@@ -127,7 +127,7 @@ def _with_bent(
 
 @lru_cache(maxsize=2)  # targets hash by identity; one serves all tiles
 def recogniser(target: Target) -> Recogniser:
-    """Of the target's outline in the input's own coordinates."""
+    """Return the recogniser of the target's outline, in the input's own coordinates."""
     return Recogniser(target.outline)
 
 
@@ -143,7 +143,7 @@ def rated(tiles: Sequence[EscherTile], target: Target) -> list[EscherTile]:
     ]
 
 
-POOR_SCORE = 0.4  # the score below which a run is told what makes its best likeness poor
+POOR_SCORE = 0.4  # the score below which a note explains what makes the best likeness poor
 LONG_OUTLINE_LENGTH = 8.5  # in square roots of the area: long thin limbs, such as a spider's
 
 

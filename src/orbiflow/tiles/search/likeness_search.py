@@ -127,7 +127,7 @@ class LikenessSearch(Settings, SearchMethod):
         return fit_bending(goal.target, kind, quick, both, 1, silent, cancel)
 
     def goals(self, goal: Goal) -> Sequence[tuple[float, Goal]]:
-        """Return the silhouette, then without toes and hairs if nobody said what must survive."""
+        """Return the silhouette and, without emphasis and pins, it with thin parts rounded off."""
         if goal.emphasis is not None or goal.pins is not None:
             return [(0.0, goal)]
         rounded = [(share, Goal(rounded_off(goal.target, share))) for share in ROUNDED_SHARES]
@@ -147,7 +147,7 @@ class LikenessSearch(Settings, SearchMethod):
         return least_neck(goal.target.normal, self.min_neck)
 
     def searches(self, wanted: int = 1, *, symmetric: bool = False) -> tuple[LikenessSearch, ...]:
-        """Those of the levels below, least first, and these, with so many finalists `wanted`.
+        """Return the levels below, least first, and this one, with so many finalists `wanted`.
 
         Each has twice as many starts as finalists at least, where more are wanted. For symmetric tiles,
         which have half the freedom, half as much is tried.

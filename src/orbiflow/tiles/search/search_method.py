@@ -82,7 +82,7 @@ class SearchMethod(ABC):
 
         Raises:
             CertificationError: if no candidate is left.
-            Cancelled: if it was told to stop.
+            Cancelled: If the token was cancelled.
         """
 
     def preview(

@@ -1,4 +1,4 @@
-"""What a search has found so far, and how it is told."""
+"""What a search has found so far, and the events that report it."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ STAGE_WORDS = {
 
 
 class Record:
-    """What a search has found, and how far each class is, told as events.
+    """What a search has found, and how far each class is, reported as events.
 
     Args:
         names: The classes.
-        on_event: Who is told.
-        on_tile: Who is shown each tile and its stage.
-        most: The number of tiles of a class that are kept.
+        on_event: Called with each event.
+        on_tile: Called with each tile and its stage.
+        most: Maximum number of tiles that are kept of a class.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Record:
         self.on_event(Preview(tile.name, tile.metrics.iou, seconds))
 
     def progress(self, name: str, share: float, loss: float = math.nan) -> None:
-        """Tell how far a class is, which never falls."""
+        """Report how far a class is, which never falls."""
         share = max(self._done + self._share * share, self.shares[name])
         self.shares[name] = share = min(1.0, share)
         whole = sum(self.shares.values()) / len(self.shares)
@@ -91,7 +91,7 @@ class Record:
                     self.on_tile(tile, self.stage)
 
     def outcome(self, found: Outcome, share: float = 1.0) -> None:
-        """Keep what a class gave, and then tell it."""
+        """Keep what a class gave, and report it."""
         self.outcomes[found.name] = found
         self.progress(found.name, share)
         if isinstance(found, ClassFailure):

@@ -47,7 +47,7 @@ class Relation(NamedTuple):
 
 @lru_cache(maxsize=128)
 def relations_of(kind: IsohedralClass) -> tuple[Relation, ...]:
-    """All isometries between a class's edges; a tile's steps are means over those of each edge.
+    """Return all isometries between a class's edges; a tile's steps are means over those of each edge.
 
     What an outline agrees with its mean is its length, squared, of which half is left out.
     """

@@ -40,7 +40,7 @@ class Placements(NamedTuple):
     gains: NDArray[np.float64]  # (C,) at most 1, which is an outline that is a tile already
 
     def take(self, index: Integers) -> Placements:
-        """Those at `index`."""
+        """Return those at `index`."""
         return self._make(part[index] for part in self)
 
 
@@ -74,7 +74,7 @@ def _multiplicities(kind: IsohedralClass) -> list[int]:
 
 
 def _count(multiplicities: Sequence[int], total: int) -> int:
-    """Number of compositions: a coefficient of the product of x^m / (1 - x^m)."""
+    """Return the number of compositions: a coefficient of the product of x^m / (1 - x^m)."""
     ways = np.zeros(total + 1, dtype=np.int64)
     ways[0] = 1
     for m in multiplicities:
@@ -86,7 +86,7 @@ def _count(multiplicities: Sequence[int], total: int) -> int:
 
 
 def _compositions(multiplicities: Sequence[int], total: int) -> Integers:
-    """All (L_1, ..., L_g) >= 1 with sum of m_i L_i = total, as rows."""
+    """Return all (L_1, ..., L_g) >= 1 with sum of m_i L_i = total, as rows."""
     rows = np.zeros((1, 0), dtype=np.int64)
     left = np.array([total])
     for i, m in enumerate(multiplicities[:-1]):
@@ -101,7 +101,7 @@ def _compositions(multiplicities: Sequence[int], total: int) -> Integers:
 
 
 def edge_lengths(kind: IsohedralClass, total: int) -> Integers:
-    """All (C, K) lengths of the template's edges with sum `total`, equal on identified edges."""
+    """Return all (C, K) lengths of the template's edges with sum `total`, equal on identified edges."""
     parts = _compositions(_multiplicities(kind), total)
     lengths = np.zeros((len(parts), len(kind.template())), dtype=np.int64)
     for column, own in enumerate(kind.edge_classes):
@@ -112,7 +112,7 @@ def edge_lengths(kind: IsohedralClass, total: int) -> Integers:
 def _gains(
     kind: IsohedralClass, steps: Complex, lengths: Integers, starts: Integers
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Gains and turns (C, len(starts)) of all placements."""
+    """Return gains and turns (C, len(starts)) of all placements."""
     n = len(steps)
     first = np.cumsum(lengths, axis=1) - lengths
     relations = relations_of(kind)
@@ -135,7 +135,7 @@ def _gains(
 
 
 def _sums_along(steps: Complex, flips: bool, back: bool) -> Complex:
-    """[k, a, b]: sum over j < k of conj(s[a+j]) s[b+j]; of s[a+j] if it flips, of s[b-j] if back."""
+    """Return sums [k, a, b] over j < k of conj(s[a+j]) s[b+j]; s[a+j] if it flips, s[b-j] if back."""
     n = len(steps)
     points = np.arange(n)
     products = (steps if flips else np.conj(steps))[:, None] * steps
@@ -160,7 +160,7 @@ class NearestTiles(NamedTuple):
     distance: Array  # (C,) sum of squared distances
 
     def take(self, index: Integers) -> NearestTiles:
-        """Those at `index`."""
+        """Return those at `index`."""
         return self._make(part[index] for part in self)
 
 
@@ -219,7 +219,7 @@ class TileSpace:
         return _Fit(columns, means, basis, np.linalg.inv(matrix + ridge) @ adjoint)
 
     def best_turns(self, outlines: Complex) -> Array:
-        """(C,) directions of the glide axes that suit the outlines (C, n) best; 0 without glides."""
+        """Return directions (C,) of the glide axes that suit outlines (C, n) best; 0 without glides."""
         if not self.glides:
             return self.turns
         total = np.zeros(self.count, dtype=complex)
@@ -239,7 +239,7 @@ class TileSpace:
         return np.angle(total) / 2
 
     def nearest(self, outlines: Complex) -> NearestTiles:
-        """The tile of each placement that is nearest to its own outline (C, n)."""
+        """Return the tile of each placement that is nearest to its own outline (C, n)."""
         orbits, (columns, images, *_) = self._orbits, self._fit
         means, solution, left = self._fitted(outlines)
         free = means[..., 0] - (images @ solution[..., None])[..., 0]
@@ -255,11 +255,11 @@ class TileSpace:
         )
 
     def distances(self, outlines: Complex) -> Array:
-        """`distance` (C,) of the nearest tiles."""
+        """Return `distance` (C,) of the nearest tiles."""
         return (abs(self._fitted(outlines)[2]) ** 2).sum(axis=1)
 
     def _fitted(self, outlines: Complex) -> tuple[Complex, Array, Complex]:
-        """Means over orbits, parameters (C, m) of the nearest tile, and what is left of the outline."""
+        """Return orbits' means, parameters (C, m) of the nearest tile, and the outline's residual."""
         goal = np.take_along_axis(outlines, self.order, axis=1)[..., None]
         pulled = _unturn(self._factor, self._orbits.flips, goal)
         means = self._orbit_means(pulled)
@@ -268,11 +268,11 @@ class TileSpace:
         return means, solution, rest[..., 0] - (self._fit.basis @ solution[..., None])[..., 0]
 
     def in_order(self, vertices: Complex) -> Complex:
-        """Vertices (C, n), as of tiles, in the order of the outline's points."""
+        """Return vertices (C, n), as of tiles, in the order of the outline's points."""
         return np.take_along_axis(vertices, self._place, axis=1)
 
     def matrices(self, index: int) -> tuple[Array, Array]:
-        """Real and imaginary part, (n, d) each, of the map from parameters (d,) to one tile.
+        """Return real and imaginary part, (n, d) each, of the map from parameters (d,) to one tile.
 
         Rows are in the order of the outline; `group` reads the last columns, offset and lattice.
         """
@@ -297,7 +297,7 @@ class TileSpace:
         return real[self._place[index]], imaginary[self._place[index]]
 
     def group(self, index: int, parameters: Array) -> tuple[Array, Array]:
-        """Linear part (2, 2) and offset (2,) of the map from the group's frame, from `matrices`."""
+        """Return linear part (2, 2) and offset (2,) of the map from the group's frame."""
         own = parameters[-self._fit.columns.shape[2] :][None]
         return _linear(self.kind, own[:, 2:], self.turns[[index]])[0], own[0, :2]
 
@@ -307,7 +307,7 @@ class TileSpace:
         return np.where(self._orbits.fixed[..., None], pulled, pulled - at_source)
 
     def _orbit_means(self, values: Complex) -> Complex:
-        """Means of values (C, n, m) over each orbit, at its free vertex."""
+        """Return means of values (C, n, m) over each orbit, at its free vertex."""
         count, n, m = values.shape
         means: Complex = np.empty((count * n, m), dtype=complex)
         for column in range(m):
@@ -324,7 +324,7 @@ class TileSpace:
 def _columns(
     kind: IsohedralClass, orbits: Orbits, factor: Complex, mirror: Complex, turn: Complex
 ) -> Complex:
-    """(C, n, 2 + m): how offset and linear part move each vertex, its free vertex held."""
+    """Return (C, n, 2 + m): how offset and linear part move each vertex, its free vertex held."""
     one = np.ones_like(factor)
     offsets = [z * one for z in (1, 1j)]
     columns = [
@@ -339,7 +339,7 @@ def _columns(
 
 
 def _along_lattice(kind: IsohedralClass, z: Complex, turn: Complex) -> list[Complex]:
-    """How the coefficients of the linear part move points (C, n) of the group's own frame."""
+    """Return how the coefficients of the linear part move points (C, n) of the group's own frame."""
     match kind.stretch_dim, kind.has_reflections:
         case 2, _:
             return [z, 1j * z, np.conj(z), 1j * np.conj(z)]
@@ -352,7 +352,7 @@ def _along_lattice(kind: IsohedralClass, z: Complex, turn: Complex) -> list[Comp
 
 
 def _linear(kind: IsohedralClass, solution: Array, turns: Array) -> Array:
-    """(C, 2, 2) from the coefficients of `_along_lattice`."""
+    """Return (C, 2, 2) from the coefficients of `_along_lattice`."""
     cos, sin = np.cos(turns), np.sin(turns)
     match kind.stretch_dim, kind.has_reflections:
         case 2, _:
@@ -375,7 +375,7 @@ def _turn(factor: Complex, flips: NDArray[np.bool_], z: Complex) -> Complex:
 
 
 def _unturn(factor: Complex, flips: NDArray[np.bool_], z: Complex) -> Complex:
-    """The inverse of `_turn` on (C, n, m)."""
+    """Return the inverse of `_turn` on (C, n, m)."""
     return np.where(
         flips[..., None], factor[..., None] * np.conj(z), np.conj(factor)[..., None] * z
     )

@@ -1,4 +1,4 @@
-"""What may be wrong with a silhouette, to be said before a search: parts left out, holes, threads."""
+"""Warnings about a silhouette before a search: parts left out, holes, threads."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ _cosh, _sinh = (np.vectorize(f, otypes=[float]) for f in (math.cosh, math.sinh))
 
 
 def _cosh_sinhc(square: Any) -> tuple[Any, Any]:
-    """cosh r and sinh(r) / r as functions of r^2, by their series where the root would hurt."""
+    """Return cosh r and sinh(r) / r as functions of r^2, by their series where the root would hurt."""
     own = array_functions(square)
     hyperbolic_cosh, hyperbolic_sinh = (own.cosh, own.sinh) if is_tensor(square) else (_cosh, _sinh)
     small = square < 1e-2

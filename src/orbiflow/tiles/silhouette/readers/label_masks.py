@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from orbiflow.arrays import Array
 
-MAX_INDISTINCT_LEVEL = 10  # of 255: numbers no larger cannot be told apart as levels
+MAX_INDISTINCT_LEVEL = 10  # of 255: the eye cannot distinguish such levels
 MAX_SMALL_LABEL = 40  # three numbers or more, and none larger, are labels if their regions are even
 MAX_LABELS = 256
 STRIP_PIXELS = 4_000_000  # pixels

@@ -1,4 +1,4 @@
-"""Photographs: the shape is told from the background by colour, and its shadow is background.
+"""Photographs: the shape and the background are distinguished by colour, and its shadow is background.
 
 Colours are CIE Lab, with lightness counted from -16: a shadow then scales all three coordinates by
 one factor, its gain, so that a background in shadow lies on the ray from the origin to its colour.
@@ -24,7 +24,7 @@ GAINS = np.arange(1, 0.45, -0.05)
 DEEPEST_GAINS = (1.0, 0.8, 0.65, 0.5)  # gains of the deepest shadows that are tried
 SHADOW_SIGMAS = 4.0  # standard deviations for a shadow that is black
 HISTOGRAM_BINS = 256
-"""Bins of the histogram in which two classes are told apart."""
+"""Bins of the histogram that is divided into two classes."""
 
 SRGB_KNEE, SRGB_SLOPE, SRGB_SHIFT, SRGB_POWER = 0.04045, 12.92, 0.055, 2.4
 """The curve of sRGB (IEC 61966-2-1)."""

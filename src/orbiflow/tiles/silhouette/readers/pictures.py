@@ -51,7 +51,7 @@ def read_image(
     """Read the outline of the shape in a PNG, JPEG or WebP image, in pixels with y down.
 
     The shape is the opaque part where enough of the image is transparent and some is opaque, else it is
-    told from the background, which is what most of the border is: in a drawing by its luminance, in
+    distinguished from the background, which most of the border is: in a drawing by its luminance, in
     a photograph by its colours. `threshold`, between 0 and 1, is the luminance (or opacity) that
     parts them; with `invert` the shape is the light (or transparent) part; with either, a photograph
     is read like a drawing. Coordinates are those of the image turned as its EXIF orientation asks.
@@ -165,7 +165,7 @@ def _is_hardly_cut_out(image: Image.Image) -> bool:
 def choose_shape(
     path: Source, picture: Picture, threshold: float | None, invert: bool | None
 ) -> tuple[Level, list[str]]:
-    """Return the level turned so that the shape is high, and notes of how it was told apart."""
+    """Return the level turned so that the shape is high, and notes of how it was distinguished."""
     channel = picture.channel
     if channel.min() == channel.max():
         raise InputFileError(
@@ -190,8 +190,8 @@ def choose_shape(
     if picture.name == "photograph":
         take_high = True
         notes = [
-            "photograph: the shape was told from its background by colour; look whether a shadow "
-            "belongs to it"
+            "photograph: shape and background were distinguished by colour; check that no shadow "
+            "belongs to the shape"
         ]
     elif picture.name in _PARTS:
         take_high = not invert
@@ -227,7 +227,7 @@ def _polarity(
     light = float(border.mean())
     shape_is_light = light < 0.5 if invert is None else invert
     kind = "light on dark" if shape_is_light else "dark on light"
-    how = "detected" if invert is None else "taken as told"
+    how = "detected" if invert is None else "as set"
     notes = [f"shape {how}: {kind} ({threshold})"]
     if invert is None and 0.3 < light < 0.7:
         notes.append(

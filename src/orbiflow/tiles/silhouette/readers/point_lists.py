@@ -5,7 +5,7 @@
 - An aerofoil (`.dat`), with y up: a title, then the points from the trailing edge around the nose and
   back (Selig), or the numbers of points of both sides and then these, each from the nose (Lednicer).
 - Points in two columns, in two that a header names, or in two after row numbers, with y up. A column of
-  parts tells several rings apart.
+  parts distinguishes several rings.
 """
 
 import re
@@ -37,7 +37,7 @@ PARTS = {
     *("part", "parts", "piece", "ring", "polygon", "poly", "shape", "object", "feature", "fid"),
     *("id", "group", "contour", "path", "component", "l1", "l2", "l3"),
 }
-"""Words in the names of columns that tell rings apart, such as QGIS's and R's."""
+"""Words in the names of columns that distinguish rings, such as QGIS's and R's."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?")
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")  # of "pickup_longitude" and "decimalLatitude"
@@ -260,9 +260,9 @@ def _numbered(path: Source, lines: list[Line]) -> Reading:
 def _header(line: Line) -> list[str]:
     """Return the axis that the name of each column says, "" for none; nothing without x and y."""
     axes = [{COLUMNS.get(word.lower(), "") for word in _WORD.findall(cell)} for cell in line.cells]
-    said = [(found - {""}).pop() if len(found - {""}) == 1 else "" for found in axes]
+    named = [(found - {""}).pop() if len(found - {""}) == 1 else "" for found in axes]
     in_pixels = [PIXELS.get(name.strip('"').lower(), "") for name in line.cells]
-    return next((names for names in (said, in_pixels) if {"x", "y"} <= {*names}), list[str]())
+    return next((names for names in (named, in_pixels) if {"x", "y"} <= {*names}), list[str]())
 
 
 def _table(path: Source, lines: Sequence[Line], header: list[str]) -> Reading:
@@ -308,9 +308,9 @@ def _points(path: Source, lines: Sequence[Line], at: tuple[int, int]) -> Array:
 def _parted(
     lines: Sequence[Line], header: list[str], points: Array
 ) -> tuple[list[Array], list[str]]:
-    """Return the rings that columns of parts tell apart, and a note of it.
+    """Return the rings that columns of parts distinguish, and a note of it.
 
-    A column tells rings apart if its name says so. Another one does if its values come in runs that
+    A column distinguishes rings if its name says so. Another one does if its values come in runs that
     are closed rings, or that make no ring together; else a note asks.
     """
     names = lines[0].cells
@@ -347,9 +347,9 @@ def _split(
     keys = list(zip(*columns, strict=True))
     groups = [[k for k, own in enumerate(keys) if own == key] for key in dict.fromkeys(keys)]
     rings = [points[group] for group in groups if len(group) >= MIN_ROWS]
-    told = " and ".join(map(quoted, names))
+    columns = " and ".join(map(quoted, names))
     return rings or [points], [
-        f"took the largest part of {len(groups)} rings that {told} tells apart"
+        f"took the largest part of {len(groups)} rings that {columns} distinguishes"
     ]
 
 

@@ -50,12 +50,12 @@ def read_rings(
     `degrees` says whether the pairs are longitudes and latitudes; None if nobody says what they are.
     Raises `InputFileError` for what is no ring, and for one around a pole.
     """
-    told, cleaned = [*notes], list[Array]()
+    every_note, cleaned = [*notes], list[Array]()
     for ring in rings:
         points, more = _placed(path, ring, degrees)
         outline, dropped = clean_ring(points, str(path), InputFileError)
         cleaned.append(outline)
-        told += [*more, *dropped]
+        every_note += [*more, *dropped]
     outline, seen = cleaned[0], None
     if len(cleaned) > 1:
         cleaned, joined = _at_date_line(cleaned) if degrees else (cleaned, [])
@@ -63,9 +63,9 @@ def read_rings(
         seen = shapely.MultiPolygon(parts)
         shape, kept = outer_outline(seen)
         outline = outer_ring(shape)
-        told += [*joined, *kept]
-    told += _widened(outline) if degrees else []
-    return Reading(outline, y_down, kind, None, tuple(dict.fromkeys(told)), seen=seen)
+        every_note += [*joined, *kept]
+    every_note += _widened(outline) if degrees else []
+    return Reading(outline, y_down, kind, None, tuple(dict.fromkeys(every_note)), seen=seen)
 
 
 def _placed(path: Source, ring: Any, degrees: bool | None) -> tuple[Any, list[str]]:

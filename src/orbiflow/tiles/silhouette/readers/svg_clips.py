@@ -72,7 +72,7 @@ class Clips:
         return _basic(text, tuple(corners), place.moved(np.linalg.inv(view)))
 
     def _note_mode(self, text: str, key: str, source: Element) -> None:
-        """Note what else is said of a clip or mask than which it is."""
+        """Note what a reference to a clip or mask says that is not read."""
         notes, rest = self.drawing.notes, REFERENCE.sub("", text, count=1).strip()
         if rest:
             notes.add(f"of {key} {text[:40]!a} only the first reference is read")

@@ -43,7 +43,7 @@ _SILENT = {
     *("color-profile", "font-feature-values", "font-palette-values", "view-transition"),
 }
 _PREFERENCE = re.compile(r"(?:(?:all|screen) and )?\(prefers-[a-z-]+\s*:?\s*([a-z-]*)\)")
-_USUAL = {"light", "no-preference"}  # what readers prefer who have said nothing
+_USUAL = {"light", "no-preference"}  # what a reader prefers by default
 _ABSENT = {"", "null", "undefined"}  # as SVG-edit and scripts write what is not set
 
 # what the library raises for selectors that it does not know, or that nest too deeply for Python
@@ -195,7 +195,7 @@ class StyleSheets:
             self.notes.add(f"@{name} {prelude[:40]} of the style sheet is left out")
 
     def _applies(self, query: str) -> bool:
-        """Return whether a media query is of a screen; what cannot be told is noted, and is not."""
+        """Return whether a media query is of a screen; note one that cannot be judged."""
         found = [_screen(part) for part in query.lower().split(",")]
         if not any(found) and None in found:
             self.notes.add(f"@media {query.strip()[:40]} of the style sheet is left out")
@@ -203,7 +203,7 @@ class StyleSheets:
 
 
 def _screen(query: str) -> bool | None:
-    """Return whether one media query is true of a screen, or None if that cannot be told."""
+    """Return whether one media query is true of a screen, or None if it cannot be judged."""
     words = query.split()
     refused = words[:1] == ["not"]
     words = words[refused or words[:1] == ["only"] :]

@@ -92,7 +92,7 @@ class Drawing:
             f"{count} {name if count == 1 else _PLURALS.get(name, f'{name}s')}"
             for name, count in self.others.items()
         ]
-        return [f"left out {' and '.join(left)} of the drawing"] * bool(left) + self.notes.said()
+        return [f"left out {' and '.join(left)} of the drawing"] * bool(left) + self.notes.counted()
 
     def referred(self, text: str | None, what: str) -> Element | None:
         """Return the element that `url(#id)` names; say so if there is none."""

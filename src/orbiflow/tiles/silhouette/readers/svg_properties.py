@@ -46,13 +46,13 @@ def _dashes(text: str, _: bool) -> str | None:
 
 
 def _geometry(text: str, css: bool) -> str | None:
-    """A length of a shape, which needs a unit in CSS; an attribute is checked where it is used."""
+    """Return a shape's length, which needs a unit in CSS; attributes are checked where they count."""
     with_unit = re.fullmatch(f"auto|{NUMBER}{_UNIT}|[-+]?0*[.]?0+", text, re.IGNORECASE)
     return text if with_unit or not css else None
 
 
 def _path_data(text: str, css: bool) -> str | None:
-    """Path data: in CSS the text in `path("...")`."""
+    """Return path data: in CSS the text in `path("...")`."""
     if not css:
         return text
     found = _PATH.fullmatch(text)

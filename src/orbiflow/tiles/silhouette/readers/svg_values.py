@@ -13,7 +13,7 @@ from orbiflow.drawing import rgb
 
 PIXELS_PER_INCH = 96
 MAX_NUMBER = 1e9  # the largest width or opacity that is believed
-FONT_SIZE = 16.0  # pixels, where nothing else is said
+FONT_SIZE = 16.0  # pixels, by default
 _PIXELS = {
     **{"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "in": 96.0},
     **{"cm": 96 / 2.54, "mm": 96 / 25.4, "q": 96 / 101.6},

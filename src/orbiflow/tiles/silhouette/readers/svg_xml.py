@@ -1,4 +1,4 @@
-"""The elements of an SVG document, read within bounds, with what is SVG's own told from the rest."""
+"""The elements of an SVG document, read within bounds; other names than SVG's keep their namespace."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -62,7 +62,7 @@ def is_own(element: Element) -> bool:
 
 
 class Notes:
-    """What a reader tells the user about a drawing, each thing once."""
+    """Notes for the user about a drawing, each once."""
 
     MAX_SHOWN = 12
 
@@ -72,7 +72,7 @@ class Notes:
     def add(self, text: str) -> None:
         self.texts[text] += 1
 
-    def said(self) -> list[str]:
+    def counted(self) -> list[str]:
         """Return the notes, with how often each was met, and how many more there are."""
         every = [f"{text} ({n} times)" if n > 1 else text for text, n in self.texts.items()]
         more = len(every) - self.MAX_SHOWN
