@@ -35,7 +35,10 @@ const PLAIN = {
   warn_neck: "Tell me where it is thinner than",
 };
 
-const plain = (words) => ({ ...Object.fromEntries(Object.entries(PLAIN).map(([name, title]) => [name, { title }])), ...words });
+const plain = (words) => ({
+  ...Object.fromEntries(Object.entries(PLAIN).map(([name, title]) => [name, { title }])),
+  ...words,
+});
 
 export const KINDS = {
   export: {
@@ -49,20 +52,61 @@ export const KINDS = {
         title: "What is it for?",
         about: "This sets everything else so that it suits.",
         options: {
-          laser: "Laser cutter", print: "Poster or mug", paper: "Figure in a text", web: "Web page", plotter: "Pen plotter",
-          template: "Template to trace by hand", colouring: "Colouring page", stickers: "Stickers",
+          laser: "Laser cutter",
+          print: "Poster or mug",
+          paper: "Figure in a text",
+          web: "Web page",
+          plotter: "Pen plotter",
+          template: "Template to trace by hand",
+          colouring: "Colouring page",
+          stickers: "Stickers",
         },
       },
-      format: { about: "", title: "Kind of file", usual: "What suits it", options: { svg: "SVG", pdf: "PDF", dxf: "DXF", png: "PNG", json: "JSON (numbers)" } },
+      format: {
+        about: "",
+        title: "Kind of file",
+        usual: "What suits it",
+        options: { svg: "SVG", pdf: "PDF", dxf: "DXF", png: "PNG", json: "JSON (numbers)" },
+      },
       tile_size: { title: "How long is one tile?" },
-      area: { title: "How large is the page?", about: "Such as A4, letter, mug, phone or 300x200mm.", some: ["A4", "A4-landscape", "A3", "A3-landscape", "letter", "letter-landscape", "mug", "phone"] },
-      clip: { title: "Fill the page to its edge", about: "Tiles at the edge are cut. Otherwise only whole tiles are on the page." },
+      area: {
+        title: "How large is the page?",
+        about: "Such as A4, letter, mug, phone or 300x200mm.",
+        some: [
+          "A4",
+          "A4-landscape",
+          "A3",
+          "A3-landscape",
+          "letter",
+          "letter-landscape",
+          "mug",
+          "phone",
+        ],
+      },
+      clip: {
+        title: "Fill the page to its edge",
+        about: "Tiles at the edge are cut. Otherwise only whole tiles are on the page.",
+      },
       palette: {
         about: "",
         title: "Colours",
-        not: { purpose: ["laser", "plotter", "template", "colouring"], cut: ["skeleton", "jigsaw", "template"], filled: [false] },
+        not: {
+          purpose: ["laser", "plotter", "template", "colouring"],
+          cut: ["skeleton", "jigsaw", "template"],
+          filled: [false],
+        },
       },
-      cut: { title: "What is drawn", about: "", options: { none: "every tile, filled", skeleton: "each line once", pieces: "tiles apart", jigsaw: "a jigsaw", template: "one tile, by hand" } },
+      cut: {
+        title: "What is drawn",
+        about: "",
+        options: {
+          none: "every tile, filled",
+          skeleton: "each line once",
+          pieces: "tiles apart",
+          jigsaw: "a jigsaw",
+          template: "one tile, by hand",
+        },
+      },
     }),
   },
   art: {
@@ -71,10 +115,17 @@ export const KINDS = {
     first: ["size", "tile_size", "palette", "colour"],
     words: plain({
       tolerance: { title: "How much it may be stretched" },
-      size: { title: "Width x height", about: "Pixels such as 3000x2000, or lengths such as 300x200mm." },
+      size: {
+        title: "Width x height",
+        about: "Pixels such as 3000x2000, or lengths such as 300x200mm.",
+      },
       tile_size: { title: "How long is one tile?" },
       palette: { about: "", title: "Colours" },
-      colour: { about: "", title: "Which tiles share a colour", options: { neighbour: "neighbours differ", aspect: "those that lie alike", one: "all" } },
+      colour: {
+        about: "",
+        title: "Which tiles share a colour",
+        options: { neighbour: "neighbours differ", aspect: "those that lie alike", one: "all" },
+      },
     }),
   },
   solid: {
@@ -84,9 +135,24 @@ export const KINDS = {
     first: ["kind", "tile_size", "height", "format"],
     words: plain({
       border: { title: "Edge of the tray" },
-      kind: { about: "", title: "What kind of thing?", options: { tile: "Tile", cutter: "Cookie cutter", stamp: "Stamp", mould: "Mould", puzzle: "Puzzle in a tray" } },
+      kind: {
+        about: "",
+        title: "What kind of thing?",
+        options: {
+          tile: "Tile",
+          cutter: "Cookie cutter",
+          stamp: "Stamp",
+          mould: "Mould",
+          puzzle: "Puzzle in a tray",
+        },
+      },
       tile_size: { title: "How long is one tile?" },
-      format: { about: "", title: "Kind of file", usual: "What suits it", options: { stl: "STL", "3mf": "3MF" } },
+      format: {
+        about: "",
+        title: "Kind of file",
+        usual: "What suits it",
+        options: { stl: "STL", "3mf": "3MF" },
+      },
     }),
   },
   animate: {
@@ -94,18 +160,35 @@ export const KINDS = {
     image: "film",
     first: ["kind", "seconds", "shape", "palette", "format"],
     words: plain({
-      kind: { about: "", title: "What happens?", options: { morph: "a plain tiling becomes animals", bend: "the animal bends into the tile", grow: "the tiling grows" } },
+      kind: {
+        about: "",
+        title: "What happens?",
+        options: {
+          morph: "a plain tiling becomes animals",
+          bend: "the animal bends into the tile",
+          grow: "the tiling grows",
+        },
+      },
       seconds: { title: "How long?" },
       size: { title: "How wide?" },
       palette: { about: "", title: "Colours" },
-      format: { about: "", title: "Kind of file", usual: "What suits it", options: { gif: "GIF", mp4: "MP4", svg: "SVG" } },
+      format: {
+        about: "",
+        title: "Kind of file",
+        usual: "What suits it",
+        options: { gif: "GIF", mp4: "MP4", svg: "SVG" },
+      },
     }),
   },
 };
 
 const UNITS = { mm: 1, cm: 10, m: 1000, in: 25.4, pt: 25.4 / 72 };
 
-/** A length in mm from a number or a text such as "4 cm"; undefined if it is none. */
+/**
+ * A length in mm from a number or a text such as "4 cm"; undefined if it is none.
+ *
+ * @param {unknown} value
+ */
 export function lengthIn(value) {
   const found = /^\s*([\d.]+)\s*(mm|cm|m|in|pt)?\s*$/.exec(String(value ?? ""));
   const length = found ? Number(found[1]) * UNITS[found[2] ?? "mm"] : NaN;
@@ -117,10 +200,15 @@ const OWN = "My own colours";
 /**
  * The colours that were chosen in this project: {palette, value, options}: to draw with, as a setting,
  * and the words of all that can be chosen, by value.
+ *
+ * @param {Project} project
+ * @param {About} about
  */
 export function colours({ view }, { palettes }) {
   const { palette: name, custom } = view?.closeup?.look ?? {};
-  const found = [name, view?.search?.palette].map((wanted) => palettes.find((own) => own.name === wanted));
+  const found = [name, view?.search?.palette].map((wanted) =>
+    palettes.find((own) => own.name === wanted)
+  );
   const palette = found.find(Boolean) ?? palettes[0];
   const options = Object.fromEntries(palettes.map((own) => [own.name, undefined]));
   if (name !== "own" || !custom) return { palette, value: palette.name, options };
