@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 import orbiflow
+from density.quick_fits import quick_fits, quick_pictures
 from orbiflow import density, drawing, tiles
 
 ROOT = Path(__file__).parents[1]
@@ -18,6 +19,8 @@ TEXT = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
 @pytest.mark.usefixtures("small_searches")
 def test_the_snippets(tmp_path: Path, monkeypatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
+    quick_fits(monkeypatch)
+    quick_pictures(monkeypatch)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     names: dict[str, object] = {}
     for snippet in re.findall(r"```python\n(.*?)```", TEXT, flags=re.DOTALL):

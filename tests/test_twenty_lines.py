@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from density.quick_fits import quick_fits, quick_pictures
+
 PAGE = Path(__file__).parents[1] / "docs" / "twenty-lines.md"
 PROGRAMS = re.findall(
     r"^## (.*?)$.*?```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL | re.MULTILINE
@@ -35,11 +37,14 @@ LEFT = (
 )
 
 
+@pytest.mark.usefixtures("small_searches")
 @pytest.mark.parametrize("number", range(8))
 def test_a_program(
     number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    quick_fits(monkeypatch)
+    quick_pictures(monkeypatch)
     name, program = PROGRAMS[number]
     for whole, part in SMALLER:
         program = program.replace(whole, part)

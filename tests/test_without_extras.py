@@ -37,6 +37,7 @@ def run(words: list[str], bare: dict[str, str], folder: Path) -> subprocess.Comp
 
 
 JOBS = """
+import runtime.small_process
 from orbiflow.cli.app import run
 from sys import argv, modules
 
@@ -71,6 +72,7 @@ def test_a_tile_from_the_picture_to_all_files(bare: dict[str, str], tmp_path: Pa
 
 
 STUDIO = """
+import runtime.small_process
 import sys
 from pathlib import Path
 from orbiflow import tiles
@@ -116,9 +118,7 @@ def test_the_studio_from_a_picture_to_files(bare: dict[str, str], tmp_path: Path
     ("words", "who", "extra"),
     [
         (f"density fit {ANGLES} {TORUS}", "orbiflow density fit needs torch", "density"),
-        (f"density summary {ANGLES} {TORUS}", "orbiflow density summary needs torch", "density"),
         (f"escherize {TURTLE} --objective overlap", "orbiflow escherize needs torch", "flows"),
-        (f"escherize {TURTLE} --method occupancy", "orbiflow escherize needs torch", "flows"),
     ],
 )
 def test_what_is_missing_is_said_in_one_line(

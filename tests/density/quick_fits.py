@@ -17,6 +17,18 @@ def quick_fits(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(f"{FITTING}.folds.USED", ())
 
 
+def quick_pictures(patch: pytest.MonkeyPatch) -> None:
+    """Draw densities and fields from fewer values and by shorter lines."""
+    pictures = "orbiflow.density.pictures"
+    patch.setattr(f"{pictures}.square._GRID", 40)
+    patch.setattr(f"{pictures}.square._FINE_GRID", 80)
+    patch.setattr(f"{pictures}.surfaces._CELLS", 20)
+    patch.setattr(f"{pictures}.maps._PIXELS", 2000)
+    patch.setattr(f"{pictures}.colours._COARSE", 24)
+    patch.setattr("orbiflow.drawing.canvas._SAMPLES", 40)
+    patch.setattr("orbiflow.drawing.canvas._STEPS", 4)
+
+
 @pytest.fixture(name="_quick_fits", scope="module", autouse=True)
 def quick_fits_fixture() -> Iterator[pytest.MonkeyPatch]:
     """Fits of all tests in the folder try less, but for those that ask for `whole_fits`."""

@@ -41,7 +41,6 @@ from printed import check_inside, letters
 
 SPACES = [Torus(2, unit="degrees"), KleinBottle(), Sphere(), ProjectivePlane()]
 every_space = pytest.mark.parametrize("space", SPACES, ids=lambda s: s.name)
-every_width = pytest.mark.parametrize("width", ["single", "double"])
 
 
 @pytest.fixture(autouse=True)
@@ -81,8 +80,9 @@ def test_the_narrowest_figure_has_room() -> None:
         check_inside(density_picture(example(SPACES[0]), settings=settings, sheet=sheet))
 
 
-@every_space
-@every_width
+@pytest.mark.parametrize(
+    ("space", "width"), zip(SPACES, ("single", "double", "double", "single"), strict=True)
+)
 def test_density_figures_have_room_and_letters_of_7_to_8_points(space: Any, width: Any) -> None:
     density, sheet = example(space), coarse(width)
     names = ("a rather long name of an angle", "ψ") if space.unit else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import socket
 import subprocess
@@ -21,6 +22,15 @@ from exported import polygons, svg_lines
 
 CHROMIUM = Path("/usr/bin/chromium")
 PATIENCE = 120.0  # seconds until something that never comes counts as missing
+TESTS = Path(__file__).parents[1]
+# the command, whose workers search by less at the effort "fast"
+SMALL = """
+from orbiflow.cli.app import main
+from orbiflow.studio import work_queue
+
+work_queue.WARM += ("runtime.small_process",)
+main()
+"""
 BOOT = b"[[0, 0], [60, 0], [60, 20], [30, 25], [28, 70], [0, 70]]"
 
 
@@ -44,7 +54,12 @@ class RunningStudio:
         """Start the server and wait until it answers."""
         own = ["--port", str(self.port), "--data", str(self.folder), "--no-browser"]
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "orbiflow", "studio", *own], stdout=subprocess.DEVNULL
+            [sys.executable, "-c", SMALL, "studio", *own],
+            stdout=subprocess.DEVNULL,
+            env={
+                **os.environ,
+                "PYTHONPATH": f"{TESTS}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
+            },
         )
         self.until(self._answers)
 

@@ -86,7 +86,7 @@ def run_in_node(program: str, given: Any) -> Any:
 
 
 CASES = [
-    (name, lattice) for name in ("IH1", "IH4", "IH6", "IH21", "IH26") for lattice in (True, False)
+    (name, lattice) for name in ("IH1", "IH6", "IH21") for lattice in (True, False)
 ]
 
 
@@ -94,7 +94,7 @@ CASES = [
 def told_fixture() -> dict[str, Any]:
     """For some classes what a pull with and one without the lattice gave."""
     found = {}
-    for name in ("IH1", "IH4", "IH6", "IH21", "IH26"):
+    for name in ("IH1", "IH6", "IH21"):
         tile = EscherTile(bent_tile(name, 30.0))
         space = space_json(tile)
         pulls = [
@@ -113,7 +113,7 @@ def ring_of(answer: dict[str, Any]) -> Array:
     return np.array(answer["polygon"]).reshape(-1, 2)
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH4", "IH6", "IH21", "IH26"])
+@pytest.mark.parametrize("name", ["IH1", "IH6", "IH21"])
 def test_it_starts_as_the_tile_is(told, name: str) -> None:
     space, start = told[name]["space"], told[name]["start"]
     assert np.abs(ring_of(start) - space["polygon"]).max() < 1e-9
@@ -166,10 +166,10 @@ def test_it_follows_the_hand_and_what_is_far_stays(told, name: str, lattice: boo
 def followed_fixture() -> dict[tuple[str, float], Any]:
     """Where random pulls of some lengths, in sizes of the tile, led on some tiles of a search."""
     rng, found = np.random.default_rng(1), {}
-    for name in ("IH1", "IH4", "IH6", "IH21"):
+    for name in ("IH1", "IH4"):
         tile = EscherTile(bent_tile(name) if name == "IH1" else bent_squirrel(name).tile)
         space = space_json(tile)
-        for reach, count in ((0.05, 10), (1.0, 2)):
+        for reach, count in ((0.05, 6), (1.0, 2)):
             turns = rng.uniform(0, 2 * np.pi, count)
             pulls = [
                 {"share": rng.random(), "by": [reach * np.cos(turn), reach * np.sin(turn)]}
@@ -180,15 +180,15 @@ def followed_fixture() -> dict[tuple[str, float], Any]:
     return found
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH4", "IH6", "IH21"])
+@pytest.mark.parametrize("name", ["IH1", "IH4"])
 def test_ordinary_pulls_succeed_whole(followed, name: str) -> None:
     _, answers = followed[name, 0.05]
     assert all(shapely.Polygon(ring_of(answer)).is_valid for answer in answers)
-    assert sum(not answer["stopped"] for answer in answers) >= 8
+    assert sum(not answer["stopped"] for answer in answers) >= 5
     assert min(answer["moved"] for answer in answers if not answer["stopped"]) > 0.03
 
 
-@pytest.mark.parametrize("name", ["IH1", "IH4", "IH6", "IH21"])
+@pytest.mark.parametrize("name", ["IH1", "IH4"])
 def test_a_pull_too_far_stops_at_a_tile_and_can_go_back(followed, name: str) -> None:
     tile, answers = followed[name, 1.0]
     for answer in answers:

@@ -217,6 +217,7 @@ def dying_once(
     return carry_out(*order, cancel)
 
 
+@pytest.mark.usefixtures("whole_fits")
 def test_processes_and_their_deaths_change_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

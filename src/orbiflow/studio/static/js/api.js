@@ -7,17 +7,30 @@ export const client = crypto.getRandomValues(new Uint32Array(2)).join("");
 export class Refusal extends Error {
   constructor(message, status, setting = "") {
     super(message);
-    Object.assign(this, { status, setting });
+    this.status = status;
+    this.setting = setting;
   }
 }
 
+/**
+ * @param {string} method
+ * @param {string} path
+ * @param {any} body
+ * @param {Options} [options]
+ * @returns {Promise<any>}
+ */
 async function call(method, path, body, { signal } = {}) {
   const headers = { "X-Orbiflow": "1", "X-Orbiflow-Client": client };
   const raw = body instanceof Blob;
   if (body !== undefined && !raw) headers["Content-Type"] = "application/json";
   let answer;
   try {
-    answer = await fetch(`api/${path}`, { method, headers, signal, body: raw || body === undefined ? body : JSON.stringify(body) });
+    answer = await fetch(`api/${path}`, {
+      method,
+      headers,
+      signal,
+      body: raw || body === undefined ? body : JSON.stringify(body),
+    });
   } catch (error) {
     if (error.name === "AbortError") throw error;
     throw new Refusal("The studio does not answer. Start it again; your work is kept.", 0);
@@ -27,20 +40,39 @@ async function call(method, path, body, { signal } = {}) {
   try {
     found = text ? JSON.parse(text) : null;
   } catch {
-    throw new Refusal("The studio answered something that this page cannot read. Reload the page.", answer.status);
+    throw new Refusal(
+      "The studio answered something that this page cannot read. Reload the page.",
+      answer.status,
+    );
   }
-  if (!answer.ok) throw new Refusal(sentence(found?.error) || `The studio refused this (${answer.status}).`, answer.status, found?.setting);
+  if (!answer.ok) {
+    throw new Refusal(
+      sentence(found?.error) || `The studio refused this (${answer.status}).`,
+      answer.status,
+      found?.setting,
+    );
+  }
   return found;
 }
 
+/** @typedef {{ signal?: AbortSignal }} Options */
+
 export const api = {
+  /** @type {(path: string, options?: Options) => Promise<any>} */
   get: (path, options) => call("GET", path, undefined, options),
+  /** @type {(path: string, body?: any, options?: Options) => Promise<any>} */
   post: (path, body = {}, options = {}) => call("POST", path, body, options),
+  /** @type {(path: string, body: any, options?: Options) => Promise<any>} */
   put: (path, body, options) => call("PUT", path, body, options),
+  /** @type {(path: string, body: any, options?: Options) => Promise<any>} */
   patch: (path, body, options) => call("PATCH", path, body, options),
+  /** @type {(path: string, options?: Options) => Promise<any>} */
   remove: (path, options) => call("DELETE", path, undefined, options),
 };
 
 let told;
 /** What the server can do: limits, animals, palettes, efforts. Asked once. */
-export const about = () => (told ??= api.get("about").catch((error) => { told = undefined; throw error; }));
+export const about = () => (told ??= api.get("about").catch((error) => {
+  told = undefined;
+  throw error;
+}));

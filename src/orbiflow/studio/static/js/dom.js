@@ -2,17 +2,27 @@
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** Make an element. Attributes that are functions listen, `style` is an object, the rest is as in HTML. */
+/**
+ * Make an element. Attributes that are functions listen, `style` is an object, the rest is as in HTML.
+ *
+ * @template {keyof HTMLElementTagNameMap} T
+ * @param {T} tag
+ * @param {Record<string, any>} [attributes]
+ * @param {...Child} children
+ */
 export function h(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
     if (value === undefined || value === null || value === false) continue;
     if (typeof value === "function") made.addEventListener(name.replace(/^on/, ""), value);
-    else if (name === "style") Object.entries(value).forEach(([key, entry]) => made.style.setProperty(key, entry));
-    else if (["value", "checked", "srcObject", "muted"].includes(name)) made[name] = value;
+    else if (name === "style") {
+      Object.entries(value).forEach(([key, entry]) => made.style.setProperty(key, entry));
+    } else if (["value", "checked", "srcObject", "muted"].includes(name)) made[name] = value;
     else made.setAttribute(name, value === true ? "" : value);
   }
-  made.append(...children.flat().filter((child) => child !== null && child !== undefined && child !== false));
+  /** @type {any[]} */
+  const all = children.flat();
+  made.append(...all.filter((child) => child !== null && child !== undefined && child !== false));
   return made;
 }
 
@@ -43,7 +53,11 @@ const ICONS = {
   film: "M4 5h16v14H4zM8 5v14M16 5v14M4 12h16",
 };
 
-/** An icon; words stand beside it, so readers of screens skip it. */
+/**
+ * An icon; words stand beside it, so readers of screens skip it.
+ *
+ * @param {keyof typeof ICONS} name
+ */
 export function icon(name) {
   const made = document.createElementNS(SVG, "svg");
   const path = document.createElementNS(SVG, "path");
@@ -55,55 +69,144 @@ export function icon(name) {
   return made;
 }
 
-/** A button with a text, and an icon if one is named; `kind`: classes such as "primary". */
+/**
+ * A button with a text, and an icon if one is named; `kind`: classes such as "primary".
+ *
+ * @param {string} text
+ * @param {(event: MouseEvent) => any} onclick
+ * @param {{ kind?: string, image?: keyof typeof ICONS, [attribute: string]: any }} [options]
+ */
 export function button(text, onclick, { kind = "", image, ...rest } = {}) {
   const shown = kind.includes("icon") ? [h("span", { class: "unseen" }, text)] : [text];
   const title = kind.includes("icon") ? text : undefined;
-  return h("button", { type: "button", class: `button ${kind}`, onclick, title, ...rest }, image && icon(image), ...shown);
+  return h(
+    "button",
+    { type: "button", class: `button ${kind}`, onclick, title, ...rest },
+    image && icon(image),
+    ...shown,
+  );
 }
 
 let count = 0;
-/** A name that no other element of the page has. */
+/**
+ * A name that no other element of the page has.
+ *
+ * @param {string} stem
+ */
 export const unique = (stem) => `${stem}-${(count += 1)}`;
 
-/** One of a few, as buttons side by side. Options: [value, words, icon]. `.set(value)` changes it. */
+/**
+ * One of a few, as buttons side by side. `.set(value)` changes it.
+ *
+ * @template V
+ * @param {string} label
+ * @param {[value: V, words: string, image?: keyof typeof ICONS][]} options
+ * @param {V} value
+ * @param {(value: V) => any} onchange
+ * @param {{ unseen?: boolean }} [look]
+ */
 export function choice(label, options, value, onchange, { unseen = false } = {}) {
   const name = unique("choice");
   const boxes = options.map(([own]) =>
-    h("input", { type: "radio", name, value: String(own), checked: own === value, onchange: () => onchange(own) }));
-  const made = h("fieldset", { class: "choice" }, h("legend", { class: unseen && "unseen" }, label),
-    h("div", {}, options.map(([, words, image], k) => h("label", {}, boxes[k], h("span", {}, image && icon(image), words)))));
-  made.set = (chosen) => boxes.forEach((box, k) => { box.checked = options[k][0] === chosen; });
-  return made;
+    h("input", {
+      type: "radio",
+      name,
+      value: String(own),
+      checked: own === value,
+      onchange: () => onchange(own),
+    })
+  );
+  const made = h(
+    "fieldset",
+    { class: "choice" },
+    h("legend", { class: unseen && "unseen" }, label),
+    h(
+      "div",
+      {},
+      options.map(([, words, image], k) =>
+        h("label", {}, boxes[k], h("span", {}, image && icon(image), words))
+      ),
+    ),
+  );
+  return Object.assign(made, {
+    /** @param {V} chosen */
+    set: (chosen) =>
+      boxes.forEach((box, k) => {
+        box.checked = options[k][0] === chosen;
+      }),
+  });
 }
 
-/** A slider that says its value in words. `.set(value)` changes it. */
+/**
+ * A slider that says its value in words. `.set(value)` changes it.
+ *
+ * @param {string} label
+ * @param {{ min: number, max: number, step: number, value: number, said?: (value: number) => string }} range
+ * @param {(value: number) => any} oninput
+ */
 export function slider(label, { min, max, step, value, said = String }, oninput) {
   const id = unique("slider");
   const shown = h("output", { for: id });
-  const box = h("input", { type: "range", id, min, max, step, oninput: () => { tell(); oninput(Number(box.value)); } });
+  const box = h("input", {
+    type: "range",
+    id,
+    min,
+    max,
+    step,
+    oninput: () => {
+      tell();
+      oninput(Number(box.value));
+    },
+  });
   const tell = () => {
     shown.textContent = said(Number(box.value));
     box.setAttribute("aria-valuetext", shown.textContent);
   };
-  const made = h("div", { class: "slider" }, h("label", { for: id, class: "label" }, label), shown, box);
-  made.set = (number) => { box.value = number; tell(); };
-  made.set(value);
-  return made;
+  const made = h(
+    "div",
+    { class: "slider" },
+    h("label", { for: id, class: "label" }, label),
+    shown,
+    box,
+  );
+  /** @param {number} number */
+  const set = (number) => {
+    box.value = String(number);
+    tell();
+  };
+  set(value);
+  return Object.assign(made, { set });
 }
 
-/** Show a sentence for a while; one that is bad stays until it is closed. */
+/**
+ * Show a sentence for a while; one that is bad stays until it is closed.
+ *
+ * @param {string} text
+ */
 export function toast(text, { bad = false } = {}) {
   const box = document.querySelector("#toasts");
   if ([...box.children].some((other) => other.firstChild.textContent === text)) return;
-  const made = h("div", { class: bad ? "toast bad" : "toast" }, h("span", {}, text),
-    h("button", { type: "button", "aria-label": "Close", onclick: () => made.remove() }, icon("close")));
+  const made = h(
+    "div",
+    { class: bad ? "toast bad" : "toast" },
+    h("span", {}, text),
+    h(
+      "button",
+      { type: "button", "aria-label": "Close", onclick: () => made.remove() },
+      icon("close"),
+    ),
+  );
   box.append(made);
   while (box.children.length > 3) box.firstChild.remove();
   if (!bad) setTimeout(() => made.remove(), 6000);
 }
 
-/** Call a function that may fail; if it does, say why. */
+/**
+ * Call a function that may fail; if it does, say why.
+ *
+ * @template R
+ * @param {() => R | Promise<R>} work
+ */
 export async function trying(work) {
   try {
     return await work();
@@ -113,32 +216,75 @@ export async function trying(work) {
   }
 }
 
-/** Open a dialog; resolves with what `close(value)` is given, undefined if it was dismissed. */
+/**
+ * Open a dialog; resolves with what `close(value)` is given, undefined if it was dismissed.
+ *
+ * @param {string} title
+ * @param {(close: (value?: any) => void) => HTMLElement} build
+ * @returns {Promise<any>}
+ */
 export function dialog(title, build) {
   return new Promise((resolve) => {
     const id = unique("dialog");
     let result;
-    const made = h("dialog", { "aria-labelledby": id, onclose: () => { made.remove(); resolve(result); } });
-    const close = (value) => { result = value; made.close(); };
-    made.append(h("div", {},
-      h("header", {}, h("h2", { id }, title), button("Close", () => close(), { kind: "quiet icon", image: "close" })),
-      build(close)));
+    const made = h("dialog", {
+      "aria-labelledby": id,
+      onclose: () => {
+        made.remove();
+        resolve(result);
+      },
+    });
+    const close = (value) => {
+      result = value;
+      made.close();
+    };
+    made.append(
+      h(
+        "div",
+        {},
+        h(
+          "header",
+          {},
+          h("h2", { id }, title),
+          button("Close", () => close(), { kind: "quiet icon", image: "close" }),
+        ),
+        build(close),
+      ),
+    );
     document.body.append(made);
     made.showModal();
   });
 }
 
-/** Ask before something that cannot be taken back. */
+/**
+ * Ask before something that cannot be taken back.
+ *
+ * @param {string} title
+ * @param {string} text
+ * @param {string} verb
+ */
 export function confirmed(title, text, verb) {
-  return dialog(title, (close) => [
-    h("p", {}, text),
-    h("footer", {}, button("Keep it", () => close(false), { autofocus: true }), button(verb, () => close(true), { kind: "primary" })),
-  ].reduce((box, part) => { box.append(part); return box; }, h("div", { class: "stack" })));
+  return dialog(title, (close) =>
+    [
+      h("p", {}, text),
+      h(
+        "footer",
+        {},
+        button("Keep it", () => close(false), { autofocus: true }),
+        button(verb, () => close(true), { kind: "primary" }),
+      ),
+    ].reduce((box, part) => {
+      box.append(part);
+      return box;
+    }, h("div", { class: "stack" })));
 }
 
 /**
  * A function that does `work` for its newest arguments only, when calls have paused for `ms`;
  * `.done()` does at once what waits, and resolves when all is done.
+ *
+ * @template {any[]} Given
+ * @param {(...given: Given) => any} work
  */
 export function newest(work, ms = 250) {
   let timer = 0;
@@ -150,7 +296,9 @@ export function newest(work, ms = 250) {
       if (!running) {
         const given = waiting;
         waiting = null;
-        running = trying(() => work(...given)).then(() => { running = null; });
+        running = trying(() => work(...given)).then(() => {
+          running = null;
+        });
       }
       await running;
     }
@@ -165,11 +313,17 @@ export function newest(work, ms = 250) {
 }
 
 const sheets = new Map();
-/** Use a page's style sheet, and no other page's; resolves when it applies. */
+/**
+ * Use a page's style sheet, and no other page's; resolves when it applies.
+ *
+ * @param {string} name
+ */
 export async function style(name) {
   if (!sheets.has(name)) {
     const link = h("link", { rel: "stylesheet", href: `css/${name}.css` });
-    const ready = new Promise((resolve) => { link.onload = link.onerror = resolve; });
+    const ready = new Promise((resolve) => {
+      link.onload = link.onerror = resolve;
+    });
     sheets.set(name, { link, ready });
     document.head.append(link);
   }
@@ -177,5 +331,14 @@ export async function style(name) {
   for (const [other, { link }] of sheets) link.disabled = other !== name;
 }
 
-/** Replace all children. */
-export const put = (place, ...children) => place.replaceChildren(...children.flat().filter(Boolean));
+/**
+ * Replace all children.
+ *
+ * @param {Element} place
+ * @param {...Child} children
+ */
+export function put(place, ...children) {
+  /** @type {any[]} */
+  const all = children.flat();
+  place.replaceChildren(...all.filter(Boolean));
+}

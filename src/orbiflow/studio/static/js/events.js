@@ -10,11 +10,20 @@ const byId = (list, item, add) => {
   else list[add](item);
 };
 
-/** Best first: certified stars, then the score. */
+/**
+ * Best first: certified stars, then the score.
+ *
+ * @param {Card} a
+ * @param {Card} b
+ */
 export const better = (a, b) => b.stars - a.stars || b.score - a.score || a.id - b.id;
 
 export class Feed {
-  /** The feed of a project that was just fetched. */
+  /**
+   * The feed of a project that was just fetched.
+   *
+   * @param {Project} project
+   */
   constructor(project) {
     this.project = project;
     this.heard = new Map();
@@ -44,7 +53,9 @@ export class Feed {
   }
 
   open() {
-    const source = new EventSource(`api/projects/${this.project.id}/events?after=${this.project.head ?? 0}`);
+    const source = new EventSource(
+      `api/projects/${this.project.id}/events?after=${this.project.head ?? 0}`,
+    );
     this.source = source;
     let lost = false;
     for (const kind of KINDS) {
@@ -55,7 +66,13 @@ export class Feed {
         this.tell(kind, data);
       });
     }
-    source.onopen = () => { if (lost) { lost = false; this.tell("back"); this.refresh(); } };
+    source.onopen = () => {
+      if (lost) {
+        lost = false;
+        this.tell("back");
+        this.refresh();
+      }
+    };
     source.onerror = () => {
       if (this.source !== source) return;
       if (!lost) this.tell("lost");
@@ -68,7 +85,10 @@ export class Feed {
   again() {
     this.source?.close();
     clearTimeout(this.timer);
-    this.timer = setTimeout(() => this.refresh().then((fine) => (fine ? this.tell("back") : this.again())), 1500);
+    this.timer = setTimeout(
+      () => this.refresh().then((fine) => (fine ? this.tell("back") : this.again())),
+      1500,
+    );
   }
 
   /** Take over the project as the server has it, and listen from there. */

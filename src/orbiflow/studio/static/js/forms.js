@@ -12,13 +12,18 @@ function kinds(schema) {
 const label = (name) => capital(name.replaceAll("_", " "));
 
 /** A value as a text that the server reads again: sides with their unit. */
-const text = (value, unit = "") => (Array.isArray(value) ? value.join("x") + unit : String(value ?? ""));
+const text = (
+  value,
+  unit = "",
+) => (Array.isArray(value) ? value.join("x") + unit : String(value ?? ""));
 
 /** What a box holds as a value: an array of texts, a number, or text. */
 function read(given, found) {
   const types = found.map(({ type }) => type);
   if (types.includes("array") && !types.includes("string")) return given.split(/[;\s]+/);
-  return ["number", "integer"].some((type) => types.includes(type)) && !Number.isNaN(Number(given)) ? Number(given) : given;
+  return ["number", "integer"].some((type) => types.includes(type)) && !Number.isNaN(Number(given))
+    ? Number(given)
+    : given;
 }
 
 /**
@@ -36,26 +41,57 @@ function control(name, schema, words, changed) {
   const unit = schema["x-unit"];
   const title = words?.title ?? label(name);
   const yes = found.some(({ type }) => type === "boolean");
-  const some = words?.some && h("datalist", { id: `${id}-some` }, words.some.map((own) => h("option", { value: own })));
+  const some = words?.some &&
+    h("datalist", { id: `${id}-some` }, words.some.map((own) => h("option", { value: own })));
   let standard = schema.default ?? (yes ? false : null);
-  let [box, show, get] = [];
+  /** @type {HTMLInputElement | HTMLSelectElement} */
+  let box;
+  /** @type {(value: any) => void} */
+  let show;
+  /** @type {() => any} */
+  let get;
   if (yes) {
-    box = h("input", { ...shared, type: "checkbox" });
-    [show, get] = [(value) => { box.checked = value; }, () => box.checked];
+    const tick = box = h("input", { ...shared, type: "checkbox" });
+    show = (value) => {
+      tick.checked = value;
+    };
+    get = () => tick.checked;
   } else if (options) {
-    const first = standard === null ? [h("option", { value: "" }, words?.usual ?? capital(schema["x-default"] || "as it comes"))] : [];
-    box = h("select", shared, first, options.map((option) => h("option", { value: option }, words?.options?.[option] ?? capital(option))));
-    [show, get] = [(value) => { box.value = value ?? ""; }, () => box.value || null];
+    const first = standard === null
+      ? [h("option", { value: "" }, words?.usual ?? capital(schema["x-default"] || "as it comes"))]
+      : [];
+    box = h(
+      "select",
+      shared,
+      first,
+      options.map((option) =>
+        h("option", { value: option }, words?.options?.[option] ?? capital(option))
+      ),
+    );
+    show = (value) => {
+      box.value = value ?? "";
+    };
+    get = () => box.value || null;
   } else {
     const bare = found.find(({ type }) => type === "number" || type === "integer");
     const numeric = bare && found.length === 1;
-    box = h("input", {
-      ...shared, type: numeric ? "number" : "text", min: numeric ? bare.minimum ?? bare.exclusiveMinimum : undefined,
-      max: numeric ? bare.maximum : undefined, step: !numeric ? undefined : bare.type === "integer" ? 1 : "any",
-      autocomplete: "off", list: some?.id, inputmode: bare ? "decimal" : undefined,
+    const field = box = h("input", {
+      ...shared,
+      type: numeric ? "number" : "text",
+      min: numeric ? bare.minimum ?? bare.exclusiveMinimum : undefined,
+      max: numeric ? bare.maximum : undefined,
+      step: !numeric ? undefined : bare.type === "integer" ? 1 : "any",
+      autocomplete: "off",
+      list: some?.id,
+      inputmode: bare ? "decimal" : undefined,
     });
-    show = (value) => { box.value = text(value, unit); box.placeholder = box.value || schema["x-default"] || ""; };
-    get = () => (["", text(standard, unit)].includes(box.value.trim()) ? standard : read(box.value.trim(), found));
+    show = (value) => {
+      field.value = text(value, unit);
+      field.placeholder = field.value || schema["x-default"] || "";
+    };
+    get = () => (["", text(standard, unit)].includes(box.value.trim())
+      ? standard
+      : read(box.value.trim(), found));
   }
   const value = () => (get() === standard ? undefined : get());
   const usual = (next) => {
@@ -64,8 +100,18 @@ function control(name, schema, words, changed) {
     if (own === undefined) show(next);
   };
   show(standard);
-  const named = yes ? [h("label", { class: "check" }, box, title)] : [h("label", { for: id, class: "label" }, unit && !options ? `${title} (${unit})` : title), box];
-  return { root: h("div", { class: "field" }, named, some, about), box, now: get, value, usual, standard };
+  const named = yes ? [h("label", { class: "check" }, box, title)] : [
+    h("label", { for: id, class: "label" }, unit && !options ? `${title} (${unit})` : title),
+    box,
+  ];
+  return {
+    root: h("div", { class: "field" }, named, some, about),
+    box,
+    now: get,
+    value,
+    usual,
+    standard,
+  };
 }
 
 /**
@@ -75,11 +121,16 @@ function control(name, schema, words, changed) {
  * `.values()`: what differs from the defaults and applies. `.refuse(name, text)`: show what is wrong beside the
  * setting that the text begins with; false if it names none.
  */
-export function form(schema, { first, words = {}, hidden = [], start = {} }, changed = () => {}) {
+export function form(schema, { first, words = {}, hidden = [], start = {} }, changed = (_) => {}) {
   const controls = new Map();
   const presets = Object.entries(schema["x-presets"] ?? {});
-  const names = Object.keys(schema.properties).filter((name) => !hidden.includes(name) && !("const" in schema.properties[name]));
-  const heard = () => { fit(); changed(made.values()); };
+  const names = Object.keys(schema.properties).filter((name) =>
+    !hidden.includes(name) && !("const" in schema.properties[name])
+  );
+  const heard = () => {
+    fit();
+    changed(values());
+  };
   for (const name of names) {
     controls.set(name, control(name, schema.properties[name], words[name], heard));
     if (start[name] !== undefined) controls.get(name).box.value = start[name];
@@ -87,29 +138,56 @@ export function form(schema, { first, words = {}, hidden = [], start = {} }, cha
 
   /** Show the defaults that other choices give, and hide what does not apply to the rest, so that only what works can be set. */
   function fit() {
-    const given = Object.assign({}, ...presets.map(([name, choices]) => (controls.has(name) && choices[now(name)]) || {}));
-    for (const [name, { usual, standard }] of controls) usual(name in given ? given[name] : standard);
+    const given = Object.assign(
+      {},
+      ...presets.map(([name, choices]) => (controls.has(name) && choices[now(name)]) || {}),
+    );
+    for (const [name, { usual, standard }] of controls) {
+      usual(name in given ? given[name] : standard);
+    }
     for (const name of names) {
       const rules = Object.entries(schema.properties[name]["x-only-with"] ?? {});
-      const applies = rules.every(([other, allowed]) => !controls.has(other) || [allowed].flat().includes(now(other)));
-      const never = Object.entries(words[name]?.not ?? {}).some(([other, values]) => controls.has(other) && values.includes(now(other)));
+      const applies = rules.every(([other, allowed]) =>
+        !controls.has(other) || [allowed].flat().includes(now(other))
+      );
+      const never = Object.entries(words[name]?.not ?? {}).some(([other, values]) =>
+        controls.has(other) && values.includes(now(other))
+      );
       controls.get(name).root.hidden = !applies || never;
     }
-    for (const box of made.querySelectorAll("details")) box.hidden = ![...box.querySelectorAll(".field")].some((field) => !field.hidden);
+    for (const box of made.querySelectorAll("details")) {
+      box.hidden = !box.querySelector(".field:not([hidden])");
+    }
   }
   const now = (name) => controls.get(name).now();
   const groups = Map.groupBy
-    ? Map.groupBy(names.filter((name) => !first.includes(name)), (name) => schema.properties[name]["x-group"] || "More")
+    ? Map.groupBy(
+      names.filter((name) => !first.includes(name)),
+      (name) => schema.properties[name]["x-group"] || "More",
+    )
     : new Map([["More", names.filter((name) => !first.includes(name))]]);
-  const made = h("div", { class: "stack form" },
+  const made = h(
+    "div",
+    { class: "stack form" },
     first.filter((name) => controls.has(name)).map((name) => controls.get(name).root),
-    [...groups].map(([group, own]) => h("details", {}, h("summary", {}, group), h("div", { class: "stack" }, own.map((name) => controls.get(name).root)))));
-  made.now = (name) => (controls.has(name) ? now(name) : undefined);
-  made.values = () => {
+    [...groups].map(([group, own]) =>
+      h(
+        "details",
+        {},
+        h("summary", {}, group),
+        h("div", { class: "stack" }, own.map((name) => controls.get(name).root)),
+      )
+    ),
+  );
+  function values() {
     const shown = names.filter((name) => !controls.get(name).root.hidden);
-    return Object.fromEntries(shown.map((name) => [name, controls.get(name).value()]).filter(([, value]) => value !== undefined));
-  };
-  made.refuse = (name, text) => {
+    return Object.fromEntries(
+      shown.map((name) => [name, controls.get(name).value()]).filter(([, value]) =>
+        value !== undefined
+      ),
+    );
+  }
+  function refuse(name, text) {
     if (!controls.has(name)) return false;
     const { root, box } = controls.get(name);
     const said = h("p", { class: "error small", role: "alert" }, text);
@@ -117,10 +195,14 @@ export function form(schema, { first, words = {}, hidden = [], start = {} }, cha
     root.append(said);
     root.closest("details")?.setAttribute("open", "");
     box.setAttribute("aria-invalid", "true");
-    box.addEventListener("input", () => { said.remove(); box.removeAttribute("aria-invalid"); }, { once: true });
+    box.addEventListener("input", () => {
+      said.remove();
+      box.removeAttribute("aria-invalid");
+    }, { once: true });
     box.focus();
     return true;
-  };
+  }
   fit();
-  return made;
+  const known = (name) => (controls.has(name) ? now(name) : undefined);
+  return Object.assign(made, { now: known, values, refuse });
 }

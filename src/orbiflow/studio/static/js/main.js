@@ -5,6 +5,7 @@ import { h, newest, put, toast } from "./dom.js";
 import { Feed } from "./events.js";
 import { sentence } from "./words.js";
 
+/** @type {[pattern: RegExp, load: () => Promise<any>, step?: string][]} */
 const ROUTES = [
   [/^$/, () => import("./start/page.js")],
   [/^p\/([\w-]+)\/picture$/, () => import("./start/picture.js"), "picture"],
@@ -17,10 +18,15 @@ const ROUTES = [
 const page = document.querySelector("#page");
 const bar = document.querySelector("#top");
 let close = () => {};
+/** @type {Feed | null} */
 let feed = null;
 let turn = 0;
 
-/** Go to a page; `replace` leaves no step in the history. */
+/**
+ * Go to a page; `replace` leaves no step in the history.
+ *
+ * @param {string} path
+ */
 export function navigate(path, { replace = false, quiet = false } = {}) {
   if (quiet) {
     history.replaceState(null, "", `#/${path}`);
@@ -40,7 +46,10 @@ async function show() {
   close();
   close = () => {};
   const root = h("div", { class: "page" });
-  const waiting = setTimeout(() => put(page, h("p", { class: "lonely soft" }, "One moment …")), 300);
+  const waiting = setTimeout(
+    () => put(page, h("p", { class: "lonely soft" }, "One moment …")),
+    300,
+  );
   try {
     if (!pattern) throw new Error("There is no such page.");
     const [module, known] = await Promise.all([load(), about(), follow(id)]);
@@ -49,7 +58,12 @@ async function show() {
     clearTimeout(waiting);
     put(page, root);
     const shown = await module.show(root, {
-      api, events: feed, project: feed?.project ?? null, tileId: Number(tileId) || null, navigate, about: known,
+      api,
+      events: feed,
+      project: feed?.project ?? null,
+      tileId: Number(tileId) || null,
+      navigate,
+      about: known,
     });
     if (mine !== turn) shown?.();
     else close = shown ?? (() => {});
@@ -57,8 +71,16 @@ async function show() {
   } catch (error) {
     if (mine !== turn) return;
     drawBar();
-    put(page, h("div", { class: "lonely stack" }, h("h1", { tabindex: "-1" }, "This page cannot be shown"),
-      h("p", {}, error.message), h("p", {}, h("a", { href: "#/" }, "Back to the start"))));
+    put(
+      page,
+      h(
+        "div",
+        { class: "lonely stack" },
+        h("h1", { tabindex: "-1" }, "This page cannot be shown"),
+        h("p", {}, error.message),
+        h("p", {}, h("a", { href: "#/" }, "Back to the start")),
+      ),
+    );
     head();
   } finally {
     clearTimeout(waiting);
@@ -83,12 +105,21 @@ async function follow(id) {
   const project = await api.get(`projects/${id}`);
   const own = new Feed(project);
   feed = own;
-  own.on("lost", () => { document.querySelector(".lost").hidden = false; });
-  own.on("back", () => { document.querySelector(".lost").hidden = true; });
+  const lost = (yes) => document.querySelector(".lost").toggleAttribute("hidden", !yes);
+  own.on("lost", () => lost(true));
+  own.on("back", () => lost(false));
   own.on("notice", ({ text, warning }) => toast(sentence(text), { bad: warning }));
-  own.on("gone", (what) => { if (what.project) { toast("This project was deleted."); navigate(""); } });
+  own.on("gone", (what) => {
+    if (what.project) {
+      toast("This project was deleted.");
+      navigate("");
+    }
+  });
   own.on("project", rename);
-  own.on("refresh", () => { rename(); links(); });
+  own.on("refresh", () => {
+    rename();
+    links();
+  });
   own.on("card", links);
 }
 
@@ -96,6 +127,7 @@ let shownStep;
 let shownTile;
 
 function rename() {
+  /** @type {HTMLInputElement | null} */
   const box = bar.querySelector(".title");
   if (box && document.activeElement !== box) box.value = feed.project.name;
 }
@@ -108,27 +140,63 @@ function links() {
   const tile = shownTile ?? tiles[0]?.id;
   const steps = [["picture", "Picture", `p/${id}/picture`]];
   if (silhouette || tiles.length) steps.push(["tiles", "Tiles", `p/${id}`]);
-  if (tile) steps.push(["closeup", "Close up", `p/${id}/t/${tile}`], ["take", "Take away", `p/${id}/take/${tile}`]);
-  put(place, steps.map(([key, words, path]) =>
-    h("a", { href: `#/${path}`, "aria-current": key === shownStep && "page" }, words)));
+  if (tile) {
+    steps.push(["closeup", "Close up", `p/${id}/t/${tile}`], [
+      "take",
+      "Take away",
+      `p/${id}/take/${tile}`,
+    ]);
+  }
+  put(
+    place,
+    steps.map(([key, words, path]) =>
+      h("a", { href: `#/${path}`, "aria-current": key === shownStep && "page" }, words)
+    ),
+  );
 }
 
 function drawBar(step, tile) {
   [shownStep, shownTile] = [step, tile];
   const project = feed?.project;
   const save = newest((name) => api.patch(`projects/${project.id}`, { name }), 500);
-  put(bar, h("div", { class: `bar at-${step}` },
-    h("a", { class: "brand", href: "#/", "aria-label": "orbiflow studio: start" },
-      h("img", { src: "icon.svg", alt: "" }), h("span", {}, "orbiflow")),
-    project && h("input", {
-      class: "title", type: "text", "aria-label": "Name of the project", maxlength: 80, value: project.name,
-      oninput: ({ target }) => { if (target.value.trim()) { project.name = target.value.trim(); save(project.name); } },
-    }),
-    project && step && h("nav", { class: "steps", "aria-label": "Steps" })),
-  h("p", { class: "lost", role: "status", hidden: true }, "The studio does not answer. Trying again …"));
+  put(
+    bar,
+    h(
+      "div",
+      { class: `bar at-${step}` },
+      h(
+        "a",
+        { class: "brand", href: "#/", "aria-label": "orbiflow studio: start" },
+        h("img", { src: "icon.svg", alt: "" }),
+        h("span", {}, "orbiflow"),
+      ),
+      project && h("input", {
+        class: "title",
+        type: "text",
+        "aria-label": "Name of the project",
+        maxlength: 80,
+        value: project.name,
+        oninput: ({ target }) => {
+          if (target.value.trim()) {
+            project.name = target.value.trim();
+            save(project.name);
+          }
+        },
+      }),
+      project && step && h("nav", { class: "steps", "aria-label": "Steps" }),
+    ),
+    h(
+      "p",
+      { class: "lost", role: "status", hidden: true },
+      "The studio does not answer. Trying again …",
+    ),
+  );
   if (project) links();
 }
 
 addEventListener("hashchange", show);
-addEventListener("unhandledrejection", ({ reason }) => toast(reason?.message ?? "Something went wrong."));
+addEventListener(
+  "unhandledrejection",
+  ({ reason }) => toast(reason?.message ?? "Something went wrong."),
+);
 show();

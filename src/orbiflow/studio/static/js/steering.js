@@ -8,16 +8,29 @@ export const LATE = 600;
 /**
  * {root, update(task)}. The same buttons stand at the same places in all states, whenever these change: whoever
  * presses one meets no other.
+ *
+ * @param {Api} api
  */
 export function steering(api) {
+  /** @type {Task | null} */
   let task = null;
   const act = (deed) => trying(() => api.post(`tasks/${task.id}/${deed}`));
-  const hold = button("Pause", () => act(task.state === "paused" ? "resume" : "pause"), { kind: "hold" });
-  const root = h("div", { class: "row" }, hold, button("Stop", () => act("cancel"), { image: "stop" }));
+  const hold = button("Pause", () => act(task.state === "paused" ? "resume" : "pause"), {
+    kind: "hold",
+  });
+  const root = h(
+    "div",
+    { class: "row" },
+    hold,
+    button("Stop", () => act("cancel"), { image: "stop" }),
+  );
 
+  /** @param {Task} now */
   function update(now) {
     const held = now.state === "paused";
-    if (held !== (task && task.state === "paused")) hold.replaceChildren(icon(held ? "play" : "pause"), held ? "Go on" : "Pause");
+    if (held !== (task && task.state === "paused")) {
+      hold.replaceChildren(icon(held ? "play" : "pause"), held ? "Go on" : "Pause");
+    }
     hold.classList.toggle("primary", held);
     task = now;
   }

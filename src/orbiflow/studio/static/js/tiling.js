@@ -5,17 +5,33 @@ const MOST_COPIES = 6000;
 /** A camera shows the input's point (x, y) in the middle, `scale` pixels a unit, turned by `turn`. */
 export class Camera {
   constructor({ x = 0, y = 0, scale = 1, turn = 0, yDown = true } = {}) {
-    Object.assign(this, { x, y, scale, turn, yDown });
+    this.x = x;
+    this.y = y;
+    this.scale = scale;
+    this.turn = turn;
+    this.yDown = yDown;
   }
 
-  /** The camera that shows about `across` tiles along the longer side of a canvas. */
+  /**
+   * The camera that shows about `across` tiles along the longer side of a canvas.
+   *
+   * @param {Tiling} tiling
+   * @param {number} width
+   * @param {number} height
+   */
   static fit(tiling, width, height, across = 5) {
     const { x, y } = tiling.middle;
     const scale = Math.max(width, height) / (across * Math.sqrt(tiling.area));
     return new Camera({ x, y, scale, yDown: tiling.yDown });
   }
 
-  /** [a, b, c, d, e, f] of canvas, from the input to a canvas of this size. */
+  /**
+   * The matrix from the input to a canvas of this size.
+   *
+   * @param {number} width
+   * @param {number} height
+   * @returns {Matrix}
+   */
   matrix(width, height) {
     const cos = this.scale * Math.cos(this.turn);
     const sin = this.scale * Math.sin(this.turn);
@@ -25,29 +41,60 @@ export class Camera {
   }
 }
 
-/** The product of two canvas matrices: first `second`, then `first`. */
+/**
+ * The product of two canvas matrices: first `second`, then `first`.
+ *
+ * @param {Matrix} first
+ * @param {Matrix} second
+ * @returns {Matrix}
+ */
 export function times(first, second) {
   const [a, b, c, d, e, f] = first;
   const [g, h, i, j, k, l] = second;
   return [
-    a * g + c * h, b * g + d * h, a * i + c * j, b * i + d * j, a * k + c * l + e, b * k + d * l + f,
+    a * g + c * h,
+    b * g + d * h,
+    a * i + c * j,
+    b * i + d * j,
+    a * k + c * l + e,
+    b * k + d * l + f,
   ];
 }
 
-/** Where a canvas matrix takes a point. */
+/**
+ * Where a canvas matrix takes a point.
+ *
+ * @param {Matrix} matrix
+ * @param {Point} point
+ * @returns {Point}
+ */
 export function moved([a, b, c, d, e, f], [x, y]) {
   return [a * x + c * y + e, b * x + d * y + f];
 }
 
-/** The inverse of a canvas matrix. */
+/**
+ * The inverse of a canvas matrix.
+ *
+ * @param {Matrix} matrix
+ * @returns {Matrix}
+ */
 export function inverse([a, b, c, d, e, f]) {
   const size = a * d - b * c;
   return [
-    d / size, -b / size, -c / size, a / size, (c * f - d * e) / size, (b * e - a * f) / size,
+    d / size,
+    -b / size,
+    -c / size,
+    a / size,
+    (c * f - d * e) / size,
+    (b * e - a * f) / size,
   ];
 }
 
-/** The area of a polygon, and the coordinates of its centroid: {area, x, y}. */
+/**
+ * The area of a polygon, and the coordinates of its centroid.
+ *
+ * @param {Point[]} polygon
+ */
 export function measured(polygon) {
   let [area, x, y] = [0, 0, 0];
   polygon.forEach(([x0, y0], k) => {
@@ -60,18 +107,29 @@ export function measured(polygon) {
   return { area: Math.abs(area), x: x / area, y: y / area };
 }
 
+/**
+ * @param {Group["cosets"][0]} coset
+ * @returns {Matrix}
+ */
+const asMatrix = ({ linear: [[a, c], [b, d]], translation: [e, f] }) => [a, b, c, d, e, f];
+
 /** A polygon and its group, ready to be drawn. */
 export class Tiling {
+  /** @param {Outlined} card */
   constructor(card) {
     const { lattice, cosets } = card.group;
     this.yDown = card.y_down;
     this.basis = [lattice[0][0], lattice[1][0], lattice[0][1], lattice[1][1]]; // columns are vectors
-    this.aspects = cosets.map(({ linear: [[a, c], [b, d]], translation: [e, f] }) => [a, b, c, d, e, f]);
+    this.aspects = cosets.map(asMatrix);
     this.colours = card.colours;
     this.change(card.polygon);
   }
 
-  /** Take another polygon for the same group. */
+  /**
+   * Take another polygon for the same group.
+   *
+   * @param {Point[]} polygon
+   */
   change(polygon) {
     this.polygon = polygon;
     const { area, x, y } = measured(polygon);
@@ -81,7 +139,13 @@ export class Tiling {
     this.path = pathOf(polygon);
   }
 
-  /** The number of the colour of the copy of an aspect in the lattice cell (m, n). */
+  /**
+   * The number of the colour of the copy of an aspect in the lattice cell (m, n).
+   *
+   * @param {number} aspect
+   * @param {number} m
+   * @param {number} n
+   */
   colour(aspect, m, n) {
     if (!this.colours) return aspect % 3;
     const [a, b, c] = this.colours.sublattice;
@@ -90,28 +154,47 @@ export class Tiling {
     return this.colours.table[aspect][first][n - wraps * c];
   }
 
-  /** The matrix, from the prototile to the input, of the copy of an aspect in a cell. */
+  /**
+   * The matrix, from the prototile to the input, of the copy of an aspect in a cell.
+   *
+   * @param {number} aspect
+   * @param {number} m
+   * @param {number} n
+   * @returns {Matrix}
+   */
   copy(aspect, m, n) {
     const [a, b, c, d, e, f] = this.aspects[aspect];
     const [p, q, r, s] = this.basis;
     return [a, b, c, d, e + p * m + r * n, f + q * m + s * n];
   }
 
-  /** All copies that meet a canvas: {aspect, cell: [m, n], colour, matrix: prototile to canvas}. */
+  /**
+   * All copies that meet a canvas.
+   *
+   * @param {Camera} camera
+   * @param {number} width
+   * @param {number} height
+   */
   copies(camera, width, height) {
     const view = camera.matrix(width, height);
     const back = inverse(view);
     const [p, q, r, s] = this.basis;
     const cells = inverse([p, q, r, s, 0, 0]);
     const reach = this.radius * camera.scale;
-    const edge = [[-reach, -reach], [width + reach, -reach], [width + reach, height + reach], [-reach, height + reach]];
+    const [right, bottom] = [width + reach, height + reach];
+    /** @type {Point[]} */
+    const edge = [[-reach, -reach], [right, -reach], [right, bottom], [-reach, bottom]];
     const corners = edge.map((corner) => moved(back, corner));
+    /** @type {Copy[]} */
     const found = [];
     this.aspects.forEach((element, aspect) => {
       const [x, y] = moved(element, [this.middle.x, this.middle.y]);
       const at = corners.map(([u, v]) => moved(cells, [u - x, v - y]));
       const [low, high] = [0, 1].map((k) => at.map((point) => point[k])).reduce(
-        ([lows, highs], line) => [[...lows, Math.ceil(Math.min(...line))], [...highs, Math.floor(Math.max(...line))]],
+        (
+          [lows, highs],
+          line,
+        ) => [[...lows, Math.ceil(Math.min(...line))], [...highs, Math.floor(Math.max(...line))]],
         [[], []],
       );
       for (let m = low[0]; m <= high[0]; m += 1) {
@@ -128,7 +211,11 @@ export class Tiling {
   }
 }
 
-/** A closed polygon as a path. */
+/**
+ * A closed polygon as a path.
+ *
+ * @param {Point[]} polygon
+ */
 export function pathOf(polygon) {
   const path = new Path2D();
   polygon.forEach(([x, y], k) => (k ? path.lineTo(x, y) : path.moveTo(x, y)));
@@ -136,24 +223,44 @@ export function pathOf(polygon) {
   return path;
 }
 
-/** Colour number `index` of a palette; after the last they start again, paler. */
+/**
+ * Colour number `index` of a palette; after the last they start again, paler.
+ *
+ * @param {Palette} palette
+ * @param {number} index
+ */
 export function fill(palette, index) {
   const count = palette.colours.length;
   const colour = palette.colours[index % count];
   const turn = Math.floor(index / count);
-  return turn ? `color-mix(in srgb, ${colour} ${100 * 0.5 ** turn}%, ${palette.paper ?? "#fff"})` : colour;
+  return turn
+    ? `color-mix(in srgb, ${colour} ${100 * 0.5 ** turn}%, ${palette.paper ?? "#fff"})`
+    : colour;
 }
 
 /**
  * Draw a tiling over the whole of a canvas, `ratio` device pixels a CSS pixel.
  * `line`: width of the outline in CSS pixels, 0 for none. `only`: which copies, by default all.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {Tiling} tiling
+ * @param {Camera} camera
+ * @param {Palette} palette
+ * @param {{ width: number, height: number, ratio?: number, line?: number, only?: (copy: Copy) => boolean }} how
  */
-export function paint(context, tiling, camera, palette, { width, height, ratio = 1, line = 1.2, only } = {}) {
+export function paint(
+  context,
+  tiling,
+  camera,
+  palette,
+  { width, height, ratio = 1, line = 1.2, only },
+) {
   const path = tiling.path;
   context.lineJoin = "round";
   for (const { colour, matrix, ...copy } of tiling.copies(camera, width, height)) {
     if (only && !only({ colour, matrix, ...copy })) continue;
-    context.setTransform(...matrix.map((entry) => entry * ratio));
+    const [a, b, c, d, e, f] = matrix;
+    context.setTransform(a * ratio, b * ratio, c * ratio, d * ratio, e * ratio, f * ratio);
     context.fillStyle = fill(palette, colour);
     context.fill(path);
     context.strokeStyle = line ? palette.outline : context.fillStyle; // without a line: hide the seam
@@ -163,7 +270,11 @@ export function paint(context, tiling, camera, palette, { width, height, ratio =
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
 }
 
-/** Give a canvas as many pixels as the screen has where it lies; returns {context, width, height, ratio}. */
+/**
+ * Give a canvas as many pixels as the screen has where it lies.
+ *
+ * @param {HTMLCanvasElement} canvas
+ */
 export function sized(canvas) {
   const ratio = Math.min(globalThis.devicePixelRatio || 1, 2);
   const [width, height] = [canvas.clientWidth || 1, canvas.clientHeight || 1];
@@ -172,9 +283,20 @@ export function sized(canvas) {
   return { context: canvas.getContext("2d"), width, height, ratio };
 }
 
-/** Draw a card's tiling into a canvas as large as it lies in the page. */
+/**
+ * Draw a card's tiling into a canvas as large as it lies in the page.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @param {Outlined} card
+ * @param {Palette} palette
+ */
 export function paintCard(canvas, card, palette, { across = 5, line = 1.2 } = {}) {
   const { context, width, height, ratio } = sized(canvas);
   const tiling = new Tiling(card);
-  paint(context, tiling, Camera.fit(tiling, width, height, across), palette, { width, height, ratio, line });
+  paint(context, tiling, Camera.fit(tiling, width, height, across), palette, {
+    width,
+    height,
+    ratio,
+    line,
+  });
 }

@@ -24,18 +24,37 @@ export const STATES = {
   cancelled: "Stopped",
 };
 
-/** Whether a task may still do something. */
+/**
+ * Whether a task may still do something.
+ *
+ * @param {Task | null | undefined} task
+ */
 export const alive = (task) => ["waiting", "running", "paused"].includes(task?.state);
 
+/**
+ * @param {number} count
+ * @param {string} one
+ * @param {string} [many]
+ */
 export const number = (count, one, many = `${one}s`) => `${count} ${count === 1 ? one : many}`;
 
-/** "★★★½" for sight and "3.5 of 5 stars" for hearing. */
+/**
+ * "★★★½" for sight and "3.5 of 5 stars" for hearing.
+ *
+ * @param {number} stars
+ */
 export const starText = (stars) => `${"★".repeat(Math.floor(stars))}${stars % 1 ? "½" : ""}`;
+/** @param {number} stars */
 export const starWords = (stars) => (stars ? `${stars} of 5 stars` : "not rated yet");
 
+/** @param {string} text */
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
-/** What the server says, as a sentence: names of settings become words, names of files stay. */
+/**
+ * What the server says, as a sentence: names of settings become words, names of files stay.
+ *
+ * @param {string} text
+ */
 export function sentence(text) {
   if (!text) return "";
   const plain = text.replace(/\b[a-z]+(_[a-z]+)+\b(?!\.)/g, (name) => name.replaceAll("_", " "));
@@ -43,15 +62,32 @@ export function sentence(text) {
   return /[.!?…]$/.test(begun) ? begun : `${begun}.`;
 }
 
-/** How long ago a moment was. Moments: ISO texts, or seconds since 1970. */
+/**
+ * How long ago a moment was. Moments: ISO texts, or seconds since 1970.
+ *
+ * @param {string | number} moment
+ */
 export function ago(moment) {
-  const seconds = (Date.now() - (typeof moment === "number" ? moment * 1000 : Date.parse(moment))) / 1000;
+  const seconds = (Date.now() - (typeof moment === "number" ? moment * 1000 : Date.parse(moment))) /
+    1000;
+  /** @type {[Intl.RelativeTimeFormatUnit, number][]} */
   const units = [["day", 86400], ["hour", 3600], ["minute", 60]];
   const [unit, size] = units.find(([, length]) => seconds >= length) ?? [null, 1];
   if (!unit) return "just now";
-  return new Intl.RelativeTimeFormat("en", { numeric: "auto" }).format(-Math.floor(seconds / size), unit);
+  return new Intl.RelativeTimeFormat("en", { numeric: "auto" }).format(
+    -Math.floor(seconds / size),
+    unit,
+  );
 }
 
-/** How large a file is. */
+/**
+ * How large a file is.
+ *
+ * @param {number} count
+ */
 export const bytes = (count) =>
-  count < 1e3 ? `${count} bytes` : count < 1e6 ? `${(count / 1e3).toFixed(0)} kB` : `${(count / 1e6).toFixed(1)} MB`;
+  count < 1e3
+    ? `${count} bytes`
+    : count < 1e6
+    ? `${(count / 1e3).toFixed(0)} kB`
+    : `${(count / 1e6).toFixed(1)} MB`;

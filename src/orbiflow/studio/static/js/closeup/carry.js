@@ -4,8 +4,15 @@ const CELLS = 40; // of the grid that finds triangles, along each side
 
 /** One direction: where points of `from` go. */
 class Way {
+  /**
+   * @param {Point[]} from
+   * @param {Point[]} to
+   * @param {[number, number, number][]} triangles
+   */
   constructor(from, to, triangles) {
-    Object.assign(this, { from, to, triangles });
+    this.from = from;
+    this.to = to;
+    this.triangles = triangles;
     const xs = from.map((p) => p[0]);
     const ys = from.map((p) => p[1]);
     this.low = [Math.min(...xs), Math.min(...ys)];
@@ -13,8 +20,16 @@ class Way {
     this.cells = new Map();
     triangles.forEach((triangle, t) => {
       const corners = triangle.map((k) => this.#cell(from[k]));
-      for (let i = Math.min(...corners.map((c) => c[0])); i <= Math.max(...corners.map((c) => c[0])); i += 1) {
-        for (let j = Math.min(...corners.map((c) => c[1])); j <= Math.max(...corners.map((c) => c[1])); j += 1) {
+      for (
+        let i = Math.min(...corners.map((c) => c[0]));
+        i <= Math.max(...corners.map((c) => c[0]));
+        i += 1
+      ) {
+        for (
+          let j = Math.min(...corners.map((c) => c[1]));
+          j <= Math.max(...corners.map((c) => c[1]));
+          j += 1
+        ) {
           const key = i * 4096 + j;
           if (!this.cells.has(key)) this.cells.set(key, []);
           this.cells.get(key).push(t);
@@ -47,7 +62,11 @@ class Way {
     };
     (this.cells.get(i * 4096 + j) ?? []).forEach(look);
     if (best.least < -1e-9) {
-      for (let k = -1; k <= 1; k += 1) for (let l = -1; l <= 1; l += 1) (this.cells.get((i + k) * 4096 + j + l) ?? []).forEach(look);
+      for (let k = -1; k <= 1; k += 1) {
+        for (let l = -1; l <= 1; l += 1) {
+          (this.cells.get((i + k) * 4096 + j + l) ?? []).forEach(look);
+        }
+      }
     }
     if (best.triangle < 0) this.triangles.forEach((_, t) => look(t));
     return best;
@@ -62,8 +81,13 @@ class Way {
 
 /** From the silhouette to the tile (`forward`) and back (`inverse`); without a map all stays. */
 export class Carry {
+  /** @param {TileMap | null} map */
   constructor(map) {
     this.map = map;
+    /** @type {Way | undefined} */
+    this.ahead = undefined;
+    /** @type {Way | undefined} */
+    this.behind = undefined;
   }
 
   get there() {
@@ -86,7 +110,9 @@ export class Carry {
   growth(point, reach) {
     if (!this.map) return 1;
     const [x, y] = this.forward(point);
-    const around = [[1, 0], [0, 1], [-1, 0], [0, -1]].map(([u, v]) => this.forward([point[0] + reach * u, point[1] + reach * v]));
+    const around = [[1, 0], [0, 1], [-1, 0], [0, -1]].map(([u, v]) =>
+      this.forward([point[0] + reach * u, point[1] + reach * v])
+    );
     return around.reduce((sum, [u, v]) => sum + Math.hypot(u - x, v - y), 0) / (4 * reach);
   }
 }

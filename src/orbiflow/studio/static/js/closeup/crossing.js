@@ -1,6 +1,10 @@
 /** Whether an outline can be one of a tile. No page is needed here. */
 
-/** Whether an outline x0, y0, x1, y1 ... crosses itself. */
+/**
+ * Whether an outline x0, y0, x1, y1 ... crosses itself.
+ *
+ * @param {ArrayLike<number>} ring
+ */
 export function crosses(ring) {
   const count = ring.length / 2;
   const order = Array.from({ length: count }, (_, k) => k);
@@ -24,7 +28,9 @@ function meet(ring, count, a, b) {
   if (apart <= 1 || apart === count - 1) return false;
   const point = (k) => [ring[2 * (k % count)], ring[2 * (k % count) + 1]];
   const [p, q, r, s] = [point(a), point(a + 1), point(b), point(b + 1)];
-  if (Math.max(p[1], q[1]) < Math.min(r[1], s[1]) || Math.max(r[1], s[1]) < Math.min(p[1], q[1])) return false;
+  if (Math.max(p[1], q[1]) < Math.min(r[1], s[1]) || Math.max(r[1], s[1]) < Math.min(p[1], q[1])) {
+    return false;
+  }
   const side = (o, u, v) => (u[0] - o[0]) * (v[1] - o[1]) - (u[1] - o[1]) * (v[0] - o[0]);
   return side(p, q, r) * side(p, q, s) <= 0 && side(r, s, p) * side(r, s, q) <= 0;
 }

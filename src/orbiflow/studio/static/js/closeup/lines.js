@@ -1,13 +1,25 @@
 /** Lines that were drawn: made simple, rubbed out. No page is needed here. */
 
-/** Where on a side from a to b, 0 to 1, a point is nearest, and how far away. */
+/**
+ * Where on a side from a to b, 0 to 1, a point is nearest, and how far away.
+ *
+ * @param {Point} point
+ * @param {Point} a
+ * @param {Point} b
+ */
 export function beside([x, y], a, b) {
   const [u, v] = [b[0] - a[0], b[1] - a[1]];
   const share = Math.max(0, Math.min(1, ((x - a[0]) * u + (y - a[1]) * v) / (u * u + v * v || 1)));
   return { share, apart: Math.hypot(a[0] + share * u - x, a[1] + share * v - y) };
 }
 
-/** A line through fewer points, nowhere farther than `near` from the one given, no side above `longest`. */
+/**
+ * A line through fewer points, nowhere farther than `near` from the one given, no side above `longest`.
+ *
+ * @param {Point[]} points
+ * @param {number} near
+ * @param {number} longest
+ */
 export function simplified(points, near, longest) {
   if (points.length < 3) return points;
   const keep = new Uint8Array(points.length);
@@ -32,7 +44,13 @@ export function simplified(points, near, longest) {
   return points.filter((_, k) => keep[k]);
 }
 
-/** The parts of a line that are left when a rubber of this radius was at a place; null if all is. */
+/**
+ * The parts of a line that are left when a rubber of this radius was at a place; null if all is.
+ *
+ * @param {Point[]} points
+ * @param {Point} place
+ * @param {number} radius
+ */
 export function rubbed(points, place, radius) {
   const away = ([x, y]) => Math.hypot(x - place[0], y - place[1]) > radius;
   const near = (a, b) => beside(place, a, b).apart <= radius;
@@ -45,5 +63,11 @@ export function rubbed(points, place, radius) {
   return parts.filter((part) => part.length > 1);
 }
 
-/** A number with as many digits as show, for what is kept. */
-export const short = (value, size) => Number((Math.round((value / size) * 2e4) / 2e4 * size).toPrecision(7));
+/**
+ * A number with as many digits as show, for what is kept.
+ *
+ * @param {number} value
+ * @param {number} size
+ */
+export const short = (value, size) =>
+  Number((Math.round((value / size) * 2e4) / 2e4 * size).toPrecision(7));

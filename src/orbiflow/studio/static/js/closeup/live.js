@@ -1,33 +1,51 @@
 /** A tiling whose tile and group move, and the scene that is painted of it. */
 
-import { Tiling, fill, pathOf, times } from "../tiling.js";
+import { fill, pathOf, Tiling, times } from "../tiling.js";
 
 const COARSE = 0.6; // pixels below which a side of the outline is left out
 
 export class LiveTiling extends Tiling {
+  /** @param {TileView} view */
   constructor(view) {
     super(view);
     this.home = { aspects: this.aspects, basis: this.basis };
+    /** @type {{ linear: [Point, Point], shift: Point }} */
     this.moved = { linear: [[1, 0], [0, 1]], shift: [0, 0] };
+    /** @type {{ scale: number, path: Path2D } | null} */
+    this.simple = null;
   }
 
-  /** Move the group by p -> M p + b, where M commutes with its turns. */
+  /**
+   * Move the group by p -> M p + b, where M commutes with its turns.
+   *
+   * @param {{ linear: [Point, Point], shift: Point }} by
+   */
   place({ linear, shift }) {
     this.moved = { linear, shift };
     const by = (x, y) => [linear[0][0] * x + linear[0][1] * y, linear[1][0] * x + linear[1][1] * y];
     const [p, q, r, s] = this.home.basis;
     this.basis = [...by(p, q), ...by(r, s)];
-    this.aspects = this.home.aspects.map(([a, b, c, d, e, f]) => {
+    const [u, v] = shift;
+    /** @type {(aspect: Matrix) => Matrix} */
+    const placed = ([a, b, c, d, e, f]) => {
       const [x, y] = by(e, f);
-      const [u, v] = shift;
       return [a, b, c, d, x + u - a * u - c * v, y + v - b * u - d * v];
-    });
+    };
+    this.aspects = this.home.aspects.map(placed);
   }
 
-  /** Where a point that the group has gone to has come to. */
+  /**
+   * Where a point that the group has gone to has come to.
+   *
+   * @param {Point} point
+   * @returns {Point}
+   */
   carried([x, y]) {
     const { linear, shift } = this.moved;
-    return [linear[0][0] * x + linear[0][1] * y + shift[0], linear[1][0] * x + linear[1][1] * y + shift[1]];
+    return [
+      linear[0][0] * x + linear[0][1] * y + shift[0],
+      linear[1][0] * x + linear[1][1] * y + shift[1],
+    ];
   }
 
   /** Take an outline, x0, y0, x1, y1 ... or points; `exact` measures it as well. */
@@ -43,7 +61,9 @@ export class LiveTiling extends Tiling {
 
   /** The outline with as many points as can be seen at a scale. */
   pathAt(scale) {
-    if (this.simple && Math.abs(Math.log2(this.simple.scale / scale)) < 0.5) return this.simple.path;
+    if (this.simple && Math.abs(Math.log2(this.simple.scale / scale)) < 0.5) {
+      return this.simple.path;
+    }
     const least = COARSE / scale;
     let last = this.polygon[0];
     const kept = this.polygon.filter((point, k) => {
@@ -56,7 +76,9 @@ export class LiveTiling extends Tiling {
   }
 }
 
+/** @param {ArrayLike<number>} flat */
 export function pairs(flat) {
+  /** @type {Point[]} */
   const found = [];
   for (let k = 0; k < flat.length; k += 2) found.push([flat[k], flat[k + 1]]);
   return found;
@@ -65,15 +87,29 @@ export function pairs(flat) {
 /**
  * Paint a tiling with what lies on its tiles. `skin`: {canvas, matrix: its pixels to the prototile}.
  * `over(context)` draws more on each copy, in the prototile's own coordinates. Returns the copies.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {LiveTiling} tiling
+ * @param {import("../tiling.js").Camera} camera
+ * @param {Palette} palette
+ * @param {{ width: number, height: number, ratio: number, line: number, skin?: any, over?: any }} how
  */
-export function paintScene(context, tiling, camera, palette, { width, height, ratio, line, skin, over }) {
+export function paintScene(
+  context,
+  tiling,
+  camera,
+  palette,
+  { width, height, ratio, line, skin, over },
+) {
   const path = tiling.pathAt(camera.scale * ratio);
   const copies = tiling.copies(camera, width, height);
   const fills = new Map();
   context.lineJoin = "round";
   for (const copy of copies) {
     if (!fills.has(copy.colour)) fills.set(copy.colour, fill(palette, copy.colour));
-    const matrix = copy.matrix.map((entry) => entry * ratio);
+    const [a, b, c, d, e, f] = copy.matrix;
+    /** @type {Matrix} */
+    const matrix = [a * ratio, b * ratio, c * ratio, d * ratio, e * ratio, f * ratio];
     context.setTransform(...matrix);
     context.fillStyle = fills.get(copy.colour);
     context.fill(path);

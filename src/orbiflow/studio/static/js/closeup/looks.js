@@ -3,50 +3,173 @@
 import { button, choice, h, put, slider, unique } from "../dom.js";
 import { kindsOf, signInto } from "./signs.js";
 
+export const HELP = {
+  look: ["Drag to move, scroll or pinch to zoom.", "arrows, + and −, 0 fits."],
+  pull: [
+    "Drag beside the outline, or hold Shift and drag, to move the view. Scroll or pinch to zoom.",
+    "+ and −, 0 fits.",
+  ],
+  draw: [
+    "Hold Shift and drag, or use two fingers, to move the view. Scroll or pinch to zoom.",
+    "+ and −, 0 fits.",
+  ],
+};
+const PEN_COLOURS = [
+  ["#1b1b1b", "Black"],
+  ["#ffffff", "White"],
+  ["#c8322b", "Red"],
+  ["#e9a13b", "Yellow"],
+  ["#2f7d4f", "Green"],
+  ["#2563a8", "Blue"],
+];
 const PERCENT = (value) => `${Math.round(100 * value)} %`;
 
 function check(words, checked, onchange) {
-  return h("label", { class: "check" }, h("input", { type: "checkbox", checked, onchange: ({ target }) => onchange(target.checked) }), h("span", {}, words));
+  return h(
+    "label",
+    { class: "check" },
+    h("input", { type: "checkbox", checked, onchange: ({ target }) => onchange(target.checked) }),
+    h("span", {}, words),
+  );
 }
 
-/** Palettes as rows of swatches, and one of the user's own. */
+/**
+ * Palettes as rows of swatches, and one of the user's own.
+ *
+ * @param {About} about
+ * @param {any} look
+ * @param {number} needed
+ * @param {(what: object) => void} change
+ */
 export function colourPanel(about, look, needed, change) {
   const name = unique("palette");
-  const own = () => look.custom ?? { colours: [...about.palettes[0].colours], outline: about.palettes[0].outline };
-  const chips = (colours) => h("span", { class: "chips" }, colours.slice(0, 5).map((colour) => h("span", { style: { background: colour } })));
+  const own = () =>
+    look.custom ?? { colours: [...about.palettes[0].colours], outline: about.palettes[0].outline };
+  const chips = (colours) =>
+    h(
+      "span",
+      { class: "chips" },
+      colours.slice(0, 5).map((colour) => h("span", { style: { background: colour } })),
+    );
   const wells = h("div", { class: "wells" });
   const drawWells = () => {
     const custom = own();
-    const labels = [...Array(Math.max(needed, 1)).keys()].map((k) => [`Colour ${k + 1}`, custom.colours[k] ?? "#cccccc", (colour) => { custom.colours[k] = colour; }]);
-    labels.push(["Lines", custom.outline, (colour) => { custom.outline = colour; }]);
-    put(wells, labels.map(([words, value, set]) => h("label", {}, h("input", {
-      type: "color", value, oninput: ({ target }) => { set(target.value); look.custom = custom; change({ palette: "own" }); },
-    }), h("span", {}, words))));
+    const labels = [...Array(Math.max(needed, 1)).keys()].map((
+      k,
+    ) => [`Colour ${k + 1}`, custom.colours[k] ?? "#cccccc", (colour) => {
+      custom.colours[k] = colour;
+    }]);
+    labels.push(["Lines", custom.outline, (colour) => {
+      custom.outline = colour;
+    }]);
+    put(
+      wells,
+      labels.map(([words, value, set]) =>
+        h(
+          "label",
+          {},
+          h("input", {
+            type: "color",
+            value,
+            oninput: ({ target }) => {
+              set(target.value);
+              look.custom = custom;
+              change({ palette: "own" });
+            },
+          }),
+          h("span", {}, words),
+        )
+      ),
+    );
     wells.hidden = look.palette !== "own";
   };
-  const radio = (value, words, colours) => h("label", { class: "palette", title: words }, h("input", {
-    type: "radio", name, value, checked: look.palette === value, "aria-label": words,
-    onchange: () => { if (value === "own") look.custom = own(); change({ palette: value }); drawWells(); },
-  }), chips(colours));
-  const made = h("fieldset", {}, h("legend", {}, "Colours"),
-    h("div", { class: "palettes" }, about.palettes.map((palette) => radio(palette.name, palette.name, palette.colours)),
-      h("label", { class: "palette own" }, h("input", {
-        type: "radio", name, value: "own", checked: look.palette === "own",
-        onchange: () => { look.custom = own(); change({ palette: "own" }); drawWells(); },
-      }), h("span", {}, "My own"))), wells);
+  const radio = (value, words, colours) =>
+    h(
+      "label",
+      { class: "palette", title: words },
+      h("input", {
+        type: "radio",
+        name,
+        value,
+        checked: look.palette === value,
+        "aria-label": words,
+        onchange: () => {
+          if (value === "own") look.custom = own();
+          change({ palette: value });
+          drawWells();
+        },
+      }),
+      chips(colours),
+    );
+  const made = h(
+    "fieldset",
+    {},
+    h("legend", {}, "Colours"),
+    h(
+      "div",
+      { class: "palettes" },
+      about.palettes.map((palette) => radio(palette.name, palette.name, palette.colours)),
+      h(
+        "label",
+        { class: "palette own" },
+        h("input", {
+          type: "radio",
+          name,
+          value: "own",
+          checked: look.palette === "own",
+          onchange: () => {
+            look.custom = own();
+            change({ palette: "own" });
+            drawWells();
+          },
+        }),
+        h("span", {}, "My own"),
+      ),
+    ),
+    wells,
+  );
   drawWells();
   return made;
 }
 
-/** From silhouette to tile, outline, artwork. */
+/**
+ * From silhouette to tile, outline, artwork.
+ *
+ * @param {any} look
+ * @param {{ hasMap: boolean, hasArt: boolean }} has
+ * @param {(what: object) => void} change
+ */
 export function shapePanel(look, { hasMap, hasArt }, change) {
-  return h("div", { class: "stack" },
-    hasMap && slider("From your picture to the tile", { min: 0, max: 1, step: 0.01, value: 1, said: (v) => (v >= 1 ? "the tile" : v <= 0 ? "your picture" : PERCENT(v)) }, (share) => change({ share })),
-    slider("Outline", { min: 0, max: 6, step: 0.2, value: look.line, said: (v) => (v ? `${v} px` : "none") }, (line) => change({ line })),
-    hasArt && check("Show my picture on the tiles", look.art, (art) => change({ art })));
+  return h(
+    "div",
+    { class: "stack" },
+    hasMap &&
+      slider("From your picture to the tile", {
+        min: 0,
+        max: 1,
+        step: 0.01,
+        value: 1,
+        said: (v) => (v >= 1 ? "the tile" : v <= 0 ? "your picture" : PERCENT(v)),
+      }, (share) => change({ share })),
+    slider("Outline", {
+      min: 0,
+      max: 6,
+      step: 0.2,
+      value: look.line,
+      said: (v) => (v ? `${v} px` : "none"),
+    }, (line) => change({ line })),
+    hasArt && check("Show my picture on the tiles", look.art, (art) => change({ art })),
+  );
 }
 
-/** The symmetry, with a sentence for each kind; `light(key)` when one is pointed at or focused. */
+/**
+ * The symmetry, with a sentence for each kind; `light(key)` when one is pointed at or focused.
+ *
+ * @param {Elements} elements
+ * @param {any} look
+ * @param {(what: object) => void} change
+ * @param {(key: string | null) => void} light
+ */
 export function signPanel(elements, look, change, light) {
   const list = h("ul", { class: "signs", hidden: !look.signs });
   const ratio = 2;
@@ -58,43 +181,155 @@ export function signPanel(elements, look, change, light) {
       const ink = colour === "currentcolor" ? getComputedStyle(canvas).color : colour;
       signInto(context, key, 14, 14, 9, ink);
     };
-    const row = h("button", { type: "button", class: "sign", "data-key": key, onfocus: () => light(key), onblur: () => light(null), onpointerenter: () => light(key), onpointerleave: () => light(null), onclick: () => light(key) },
-      canvas, h("span", {}, h("strong", {}, name), h("span", { class: "small" }, says)));
+    const row = h(
+      "button",
+      {
+        type: "button",
+        class: "sign",
+        "data-key": key,
+        onfocus: () => light(key),
+        onblur: () => light(null),
+        onpointerenter: () => light(key),
+        onpointerleave: () => light(null),
+        onclick: () => light(key),
+      },
+      canvas,
+      h("span", {}, h("strong", {}, name), h("span", { class: "small" }, says)),
+    );
     list.append(h("li", {}, row));
     requestAnimationFrame(draw);
   }
-  const made = h("div", {}, check("Show the symmetry", look.signs, (signs) => { list.hidden = !signs; change({ signs }); }), list);
-  made.light = (key) => list.querySelectorAll(".sign").forEach((row) => row.classList.toggle("lit", row.dataset.key === key));
-  return made;
-}
-
-/** How a point is pulled. */
-export function pullPanel(pull, change, back) {
-  return h("div", { class: "stack" },
-    h("p", { class: "soft" }, "Take hold of any point of the outline and pull. All copies follow, so there is never a gap."),
-    slider("How far the pull reaches", { min: 0.1, max: 2, step: 0.05, value: pull.reach, said: (v) => (v < 0.3 ? "a little" : v < 0.8 ? "a part" : v < 1.5 ? "most of it" : "all of it") }, (reach) => change({ reach })),
-    check("The grid may change, too", pull.lattice, (lattice) => change({ lattice })),
-    h("p", { class: "small soft by-keys" }, "By keyboard: click the picture or go to it with ", h("kbd", {}, "Tab"), ", choose a point with ", h("kbd", {}, "←"), " ", h("kbd", {}, "→"), ", move it with ", h("kbd", {}, "Shift"), " and arrows."),
-    button("Put it back", back, { kind: "quiet" }));
-}
-
-/** What is drawn with. */
-export function penPanel(pen, colours, change, clear) {
-  const name = unique("pen");
-  const well = h("input", { type: "color", value: pen.colour, "aria-label": "Another colour", oninput: ({ target }) => change({ colour: target.value }) });
-  const swatches = h("fieldset", {}, h("legend", {}, "Colour"), h("div", { class: "swatches" },
-    colours.map(([colour, words]) => h("label", { title: words }, h("input", {
-      type: "radio", name, checked: pen.colour === colour, "aria-label": words, onchange: () => change({ colour }),
-    }), h("span", { style: { background: colour } }))), well));
-  const lines = h("div", { class: "stack", hidden: pen.tool !== "pencil" }, swatches,
-    choice("Line", [["thin", "Thin"], ["medium", "Medium"], ["thick", "Thick"]], pen.width, (width) => change({ width })));
-  return h("div", { class: "stack" },
-    h("p", { class: "soft" }, "Draw inside any tile: the same appears in all of them."),
-    choice("Draw with", [["pencil", "Pencil", "pencil"], ["rubber", "Rubber", "rub"], ["eye", "Eye"]], pen.tool, (tool) => {
-      lines.hidden = tool !== "pencil";
-      change({ tool });
+  const made = h(
+    "div",
+    {},
+    check("Show the symmetry", look.signs, (signs) => {
+      list.hidden = !signs;
+      change({ signs });
     }),
+    list,
+  );
+  /** @param {string | null} key */
+  const lit = (key) =>
+    list.querySelectorAll(".sign").forEach((row) =>
+      row.classList.toggle("lit", row.getAttribute("data-key") === key)
+    );
+  return Object.assign(made, { light: lit });
+}
+
+/**
+ * How a point is pulled.
+ *
+ * @param {{ reach: number, lattice: boolean }} pull
+ * @param {(what: object) => void} change
+ * @param {() => void} back
+ */
+export function pullPanel(pull, change, back) {
+  return h(
+    "div",
+    { class: "stack" },
+    h(
+      "p",
+      { class: "soft" },
+      "Take hold of any point of the outline and pull. All copies follow, so there is never a gap.",
+    ),
+    slider("How far the pull reaches", {
+      min: 0.1,
+      max: 2,
+      step: 0.05,
+      value: pull.reach,
+      said: (
+        v,
+      ) => (v < 0.3 ? "a little" : v < 0.8 ? "a part" : v < 1.5 ? "most of it" : "all of it"),
+    }, (reach) => change({ reach })),
+    check("The grid may change, too", pull.lattice, (lattice) => change({ lattice })),
+    h(
+      "p",
+      { class: "small soft by-keys" },
+      "By keyboard: click the picture or go to it with ",
+      h("kbd", {}, "Tab"),
+      ", choose a point with ",
+      h("kbd", {}, "←"),
+      " ",
+      h("kbd", {}, "→"),
+      ", move it with ",
+      h("kbd", {}, "Shift"),
+      " and arrows.",
+    ),
+    button("Put it back", back, { kind: "quiet" }),
+  );
+}
+
+/**
+ * What is drawn with.
+ *
+ * @param {{ tool: string, colour: string, width: string }} pen
+ * @param {(what: object) => void} change
+ * @param {() => void} clear
+ */
+export function penPanel(pen, change, clear) {
+  const name = unique("pen");
+  const well = h("input", {
+    type: "color",
+    value: pen.colour,
+    "aria-label": "Another colour",
+    oninput: ({ target }) => change({ colour: target.value }),
+  });
+  const swatches = h(
+    "fieldset",
+    {},
+    h("legend", {}, "Colour"),
+    h(
+      "div",
+      { class: "swatches" },
+      PEN_COLOURS.map(([colour, words]) =>
+        h(
+          "label",
+          { title: words },
+          h("input", {
+            type: "radio",
+            name,
+            checked: pen.colour === colour,
+            "aria-label": words,
+            onchange: () => change({ colour }),
+          }),
+          h("span", { style: { background: colour } }),
+        )
+      ),
+      well,
+    ),
+  );
+  const lines = h(
+    "div",
+    { class: "stack", hidden: pen.tool !== "pencil" },
+    swatches,
+    choice(
+      "Line",
+      [["thin", "Thin"], ["medium", "Medium"], ["thick", "Thick"]],
+      pen.width,
+      (width) => change({ width }),
+    ),
+  );
+  return h(
+    "div",
+    { class: "stack" },
+    h("p", { class: "soft" }, "Draw inside any tile: the same appears in all of them."),
+    choice(
+      "Draw with",
+      [["pencil", "Pencil", "pencil"], ["rubber", "Rubber", "rub"], ["eye", "Eye"]],
+      pen.tool,
+      (tool) => {
+        lines.hidden = tool !== "pencil";
+        change({ tool });
+      },
+    ),
     lines,
-    h("p", { class: "small soft by-keys" }, "By keyboard: move the pen with arrows, put it down and up with ", h("kbd", {}, "Space"), "."),
-    button("Clear the drawing", clear, { kind: "quiet", image: "bin" }));
+    h(
+      "p",
+      { class: "small soft by-keys" },
+      "By keyboard: move the pen with arrows, put it down and up with ",
+      h("kbd", {}, "Space"),
+      ".",
+    ),
+    button("Clear the drawing", clear, { kind: "quiet", image: "bin" }),
+  );
 }

@@ -2,27 +2,26 @@
 
 import { client } from "../api.js";
 import { button, choice, h, newest, put, style, toast, trying } from "../dom.js";
+import { capital } from "../words.js";
 import { Carry } from "./carry.js";
 import { LiveTiling } from "./live.js";
-import { colourPanel, penPanel, pullPanel, shapePanel, signPanel } from "./looks.js";
+import { colourPanel, HELP, penPanel, pullPanel, shapePanel, signPanel } from "./looks.js";
 import { Pen } from "./pen.js";
 import { Pulling } from "./pulling.js";
 import { kindsOf, paintSigns, placed, signAt } from "./signs.js";
-import { paintSkin } from "./skin.js";
+import { between, paintSkin } from "./skin.js";
 import { Stage } from "./stage.js";
 
-const PEN_COLOURS = [["#1b1b1b", "Black"], ["#ffffff", "White"], ["#c8322b", "Red"], ["#e9a13b", "Yellow"], ["#2f7d4f", "Green"], ["#2563a8", "Blue"]];
-const HELP = {
-  look: ["Drag to move, scroll or pinch to zoom.", "arrows, + and −, 0 fits."],
-  pull: ["Drag beside the outline, or hold Shift and drag, to move the view. Scroll or pinch to zoom.", "+ and −, 0 fits."],
-  draw: ["Hold Shift and drag, or use two fingers, to move the view. Scroll or pinch to zoom.", "+ and −, 0 fits."],
-};
 const CALM = 8000; // ms after which a refusal makes way
 const SHARPER = 1.5; // times that the scale may change before the skin is painted anew
 
 /** What was undone and redone, by project: it outlives a change of the address. */
 const pasts = new Map();
 
+/**
+ * @param {HTMLElement} root
+ * @param {Page} given
+ */
 export async function show(root, given) {
   await style("closeup");
   const page = new Closeup(root, given);
@@ -31,21 +30,54 @@ export async function show(root, given) {
 }
 
 class Closeup {
+  /**
+   * @param {HTMLElement} root
+   * @param {Page} page
+   */
   constructor(root, { api, events, project, navigate, about }) {
-    Object.assign(this, { root, api, events, project, navigate, about });
+    this.root = root;
+    this.api = api;
+    this.events = events;
+    this.project = project;
+    this.navigate = navigate;
+    this.about = about;
     this.home = `projects/${project.id}`;
     const kept = project.view?.closeup ?? {};
-    this.look = { palette: project.view?.search?.palette ?? about.palettes[0].name, custom: null, line: 1.4, art: false, signs: false, ...kept.look, share: 1 };
+    this.look = {
+      palette: project.view?.search?.palette ?? about.palettes[0].name,
+      custom: null,
+      line: 1.4,
+      art: false,
+      signs: false,
+      ...kept.look,
+      share: 1,
+    };
     this.pull = { reach: 0.5, lattice: true, ...kept.pull };
     this.penSettings = { tool: "pencil", colour: "#1b1b1b", width: "medium", ...kept.pen };
     this.mode = kept.mode ?? "look";
     this.past = pasts.get(project.id) ?? { done: [], undone: [] };
     pasts.set(project.id, this.past);
     this.lit = null;
-    this.keep = newest(() => api.patch(this.home, { view: { closeup: { look: { ...this.look, share: 1 }, pull: this.pull, pen: this.penSettings, mode: this.mode } } }), 600);
+    this.keep = newest(
+      () =>
+        api.patch(this.home, {
+          view: {
+            closeup: {
+              look: { ...this.look, share: 1 },
+              pull: this.pull,
+              pen: this.penSettings,
+              mode: this.mode,
+            },
+          },
+        }),
+      600,
+    );
     this.keepDrawing = newest((drawing) => api.patch(this.home, { view: { drawing } }), 500);
     this.#build();
-    this.offs = [events.on("card", (card) => this.#better(card)), events.on("project", (now) => this.#elsewhere(now))];
+    this.offs = [
+      events.on("card", (card) => this.#better(card)),
+      events.on("project", (now) => this.#elsewhere(now)),
+    ];
     this.keys = (event) => this.#shortcut(event);
     addEventListener("keydown", this.keys);
   }
@@ -71,14 +103,20 @@ class Closeup {
 
   /** Another tab has drawn. */
   #elsewhere({ view, changed_by: by }) {
-    if (by !== client && view?.drawing && this.carry && !this.pen.line) this.pen.use(this.carry, view.drawing);
+    if (by !== client && view?.drawing && this.carry && !this.pen.line) {
+      this.pen.use(this.carry, view.drawing);
+    }
   }
 
   #build() {
     this.said = h("p", { class: "unseen", role: "status", "aria-live": "polite" });
     this.badge = h("p", { class: "badge" });
     this.hint = h("p", { class: "hint", hidden: true });
-    this.stage = new Stage({ label: "The tiling, without end", help: "closeup-help", tool: () => this.tool });
+    this.stage = new Stage({
+      label: "The tiling, without end",
+      help: "closeup-help",
+      tool: () => this.tool,
+    });
     this.pulling = new Pulling(this.stage, this.pull, {
       released: (parameters) => this.#released(parameters),
       said: (text) => this.say(text),
@@ -95,18 +133,31 @@ class Closeup {
     this.stage.options.over = (context) => this.pen.over(context);
     this.undoButton = button("Undo", () => this.undo(), { kind: "icon", image: "undo" });
     this.redoButton = button("Redo", () => this.redo(), { kind: "icon", image: "redo" });
-    const zooms = h("div", { class: "zooms" },
-      h("button", { type: "button", class: "button icon", "aria-label": "Nearer", onclick: () => this.stage.zoom(1.35) }, "+"),
-      h("button", { type: "button", class: "button icon", "aria-label": "Farther", onclick: () => this.stage.zoom(1 / 1.35) }, "−"),
-      h("button", { type: "button", class: "button", onclick: () => this.stage.fit() }, "Fit"));
-    this.stage.box.append(h("div", { class: "past" }, this.undoButton, this.redoButton), this.badge, this.hint, zooms);
+    this.stage.box.append(
+      h("div", { class: "past" }, this.undoButton, this.redoButton),
+      this.badge,
+      this.hint,
+      this.stage.zooms(),
+    );
     this.heading = h("h1", { tabindex: "-1" }, "Close up");
     this.kind = h("p", { class: "soft small" });
-    this.modes = choice("What to do", [["look", "Look"], ["pull", "Pull"], ["draw", "Draw"]], this.mode, (mode) => this.#choose(mode), { unseen: true });
+    this.modes = choice(
+      "What to do",
+      [["look", "Look"], ["pull", "Pull"], ["draw", "Draw"]],
+      this.mode,
+      (mode) => this.#choose(mode),
+      { unseen: true },
+    );
     this.panel = h("div", { class: "stack" });
     this.help = h("p", { class: "small soft", id: "closeup-help" });
-    const side = h("div", { class: "closeup-side" }, h("div", {}, this.heading, this.kind), this.modes, this.panel,
-      this.help);
+    const side = h(
+      "div",
+      { class: "closeup-side" },
+      h("div", {}, this.heading, this.kind),
+      this.modes,
+      this.panel,
+      this.help,
+    );
     this.root.classList.add("closeup");
     put(this.root, h("div", { class: "closeup-page" }, this.stage.box, side), this.said);
     this.#past(); // nothing can be undone before the tile is there
@@ -129,7 +180,7 @@ class Closeup {
     this.stage.show(this.tiling);
     this.#palette();
     this.pen.use(this.carry, drawing);
-    this.heading.textContent = view.arrangement ? sentence(view.arrangement) : "Close up";
+    this.heading.textContent = view.arrangement ? capital(view.arrangement) : "Close up";
     this.kind.textContent = [view.class_name, view.group.name].filter(Boolean).join(" · ");
     this.#proved();
     this.#panels();
@@ -179,12 +230,29 @@ class Closeup {
     const change = (what) => this.#change(what);
     if (this.mode === "look") {
       this.signs = signPanel(view.elements, look, change, (key) => this.#light(key));
-      put(this.panel, shapePanel(look, { hasMap: Boolean(view.map), hasArt: this.#hasArt() }, change), this.signs, colourPanel(about, look, needed, change));
+      put(
+        this.panel,
+        shapePanel(look, { hasMap: Boolean(view.map), hasArt: this.#hasArt() }, change),
+        this.signs,
+        colourPanel(about, look, needed, change),
+      );
     } else if (this.mode === "pull") {
-      put(this.panel, pullPanel(this.pull, (what) => { Object.assign(this.pull, what); this.keep(); this.stage.redraw(); }, () => this.#restore()));
+      put(
+        this.panel,
+        pullPanel(this.pull, (what) => {
+          Object.assign(this.pull, what);
+          this.keep();
+          this.stage.redraw();
+        }, () => this.#restore()),
+      );
     } else {
-      put(this.panel, penPanel(this.penSettings, PEN_COLOURS, (what) => { Object.assign(this.penSettings, what); this.keep(); },
-        () => this.#setDrawing({ strokes: [], eyes: [] })));
+      put(
+        this.panel,
+        penPanel(this.penSettings, (what) => {
+          Object.assign(this.penSettings, what);
+          this.keep();
+        }, () => this.#setDrawing({ strokes: [], eyes: [] })),
+      );
     }
   }
 
@@ -214,7 +282,12 @@ class Closeup {
   #between() {
     const { share } = this.look;
     const { silhouette_track: from, tile_track: to, polygon } = this.view;
-    this.tiling.outline(share >= 1 ? this.space?.polygon ?? polygon : from.map(([x, y], k) => [x + share * (to[k][0] - x), y + share * (to[k][1] - y)]), { exact: share >= 1 });
+    this.tiling.outline(
+      share >= 1
+        ? this.space?.polygon ?? polygon
+        : from.map(([x, y], k) => [x + share * (to[k][0] - x), y + share * (to[k][1] - y)]),
+      { exact: share >= 1 },
+    );
     this.stale();
   }
 
@@ -229,10 +302,20 @@ class Closeup {
     const scale = this.stage.camera.scale * Math.min(globalThis.devicePixelRatio || 1, 2);
     if (!this.skin || Math.abs(Math.log(this.skin.asked / scale)) > Math.log(SHARPER)) {
       const { look, view, tiling } = this;
-      const map = view.map && look.share < 1 ? { ...view.map, images: view.map.images.map(([x, y], k) => view.map.rest[k].map((v, j) => v + look.share * ([x, y][j] - v))) } : view.map;
-      const art = look.art && this.#hasArt() && this.#picture() ? { picture: this.backdrop, map, covered: view.covered } : null;
+      const map = between(view.map, look.share);
+      const art = look.art && this.#hasArt() && this.#picture()
+        ? { picture: this.backdrop, map, covered: view.covered }
+        : null;
       const marks = look.share < 1 ? { lines: [], eyes: [] } : this.pen.marks;
-      this.skin = { asked: scale, own: paintSkin(tiling, { art, marks, palette: this.stage.options.palette, yDown: view.y_down }, scale) };
+      this.skin = {
+        asked: scale,
+        own: paintSkin(tiling, {
+          art,
+          marks,
+          palette: this.stage.options.palette,
+          yDown: view.y_down,
+        }, scale),
+      };
     }
     return this.skin.own;
   }
@@ -250,7 +333,13 @@ class Closeup {
 
   #overlay(context) {
     if (this.mode !== "look" || !this.look.signs) return;
-    this.places = placed(this.view.elements, this.tiling, this.stage.camera, this.stage.width, this.stage.height);
+    this.places = placed(
+      this.view.elements,
+      this.tiling,
+      this.stage.camera,
+      this.stage.width,
+      this.stage.height,
+    );
     paintSigns(context, this.places, this.lit);
   }
 
@@ -315,7 +404,7 @@ class Closeup {
       this.say("Proved to tile.");
     } catch (error) {
       if (this.closed) return;
-      const why = sentence(error.message);
+      const why = capital(error.message);
       this.pulling.back();
       this.tell("refused", why);
       this.say(why);
@@ -359,7 +448,9 @@ class Closeup {
   }
 
   async undo() {
-    if (!this.past.done.length && this.view?.parent) this.past.done.push({ tile: [this.view.parent, this.view.id] });
+    if (!this.past.done.length && this.view?.parent) {
+      this.past.done.push({ tile: [this.view.parent, this.view.id] });
+    }
     await this.#go(this.past.done, this.past.undone, 0, "Undone.");
   }
 
@@ -391,13 +482,9 @@ class Closeup {
     const typing = event.target.matches?.("input[type=text], input[type=number], textarea, select");
     if (typing || !(event.ctrlKey || event.metaKey) || event.altKey) return;
     const key = event.key.toLowerCase();
-    if (key === "z") (event.shiftKey ? this.redo() : this.undo());
+    if (key === "z") event.shiftKey ? this.redo() : this.undo();
     else if (key === "y") this.redo();
     else return;
     event.preventDefault();
   }
-}
-
-function sentence(text) {
-  return text.charAt(0).toUpperCase() + text.slice(1);
 }

@@ -1,6 +1,5 @@
 /** The tool that draws on the tile: pencil, rubber and eyes, in all copies at once. */
 
-import { inverse, moved } from "../tiling.js";
 import { eyeInto, lineInto } from "./skin.js";
 import { beside, rubbed, short, simplified } from "./lines.js";
 import { Riders } from "./carry.js";
@@ -16,7 +15,9 @@ const KEY_STEP = 7; // pixels that a key moves the pen
 export class Pen {
   /** `settings`: {tool: "pencil" | "rubber" | "eye", colour, width}; `on`: {drawn(drawing), said(text), marks()}. */
   constructor(stage, settings, on) {
-    Object.assign(this, { stage, settings, on });
+    this.stage = stage;
+    this.settings = settings;
+    this.on = on;
     this.drawing = { strokes: [], eyes: [] };
     this.marks = { lines: [], eyes: [] };
     this.line = null;
@@ -36,7 +37,9 @@ export class Pen {
   #carried() {
     this.marks = {
       lines: this.drawing.strokes.map(({ points, colour, width }) => ({
-        points: points.map((point) => this.carry.forward(point)), colour, width, // as exports keep it
+        points: points.map((point) => this.carry.forward(point)),
+        colour,
+        width, // as exports keep it
       })),
       eyes: this.drawing.eyes.map(([x, y, radius]) => this.#eye([x, y], radius)),
     };
@@ -76,7 +79,8 @@ export class Pen {
   }
 
   #draw({ copy, at }) {
-    const same = copy.aspect === this.line.copy.aspect && String(copy.cell) === String(this.line.copy.cell);
+    const same = copy.aspect === this.line.copy.aspect &&
+      String(copy.cell) === String(this.line.copy.cell);
     if (same) {
       this.line.points.push(at);
       return;
@@ -101,8 +105,14 @@ export class Pen {
 
   #keepLine() {
     const points = simplified(this.line.points, NEAR * this.size, LONGEST * this.size);
-    const own = points.map((point) => this.carry.inverse(point).map((value) => short(value, this.size)));
-    const stroke = { colour: this.settings.colour, width: short(WIDTHS[this.settings.width] * this.size, this.size), points: own };
+    const own = points.map((point) =>
+      this.carry.inverse(point).map((value) => short(value, this.size))
+    );
+    const stroke = {
+      colour: this.settings.colour,
+      width: short(WIDTHS[this.settings.width] * this.size, this.size),
+      points: own,
+    };
     this.#change({ strokes: [...this.drawing.strokes, stroke], eyes: this.drawing.eyes });
   }
 
@@ -143,11 +153,16 @@ export class Pen {
       const riders = new Riders(space.body);
       this.moving = {
         puller,
-        lines: this.marks.lines.map((line) => ({ ...line, seats: line.points.map((point) => riders.seat(point)) })),
+        lines: this.marks.lines.map((line) => ({
+          ...line,
+          seats: line.points.map((point) => riders.seat(point)),
+        })),
         eyes: this.marks.eyes.map((eye) => ({ ...eye, seat: riders.seat(eye.at) })),
       };
     }
-    for (const line of this.moving.lines) line.points = line.seats.map((seat) => Riders.at(seat, body));
+    for (const line of this.moving.lines) {
+      line.points = line.seats.map((seat) => Riders.at(seat, body));
+    }
     for (const eye of this.moving.eyes) eye.at = Riders.at(eye.seat, body);
   }
 
@@ -157,10 +172,21 @@ export class Pen {
     const { palette } = this.stage.options;
     context.save();
     context.clip(this.stage.tiling.path);
-    for (const { points, colour, width } of this.moving?.lines ?? []) lineInto(context, points, colour, width);
-    if (this.line) lineInto(context, this.line.points, this.settings.colour, WIDTHS[this.settings.width] * this.size);
+    for (const { points, colour, width } of this.moving?.lines ?? []) {
+      lineInto(context, points, colour, width);
+    }
+    if (this.line) {
+      lineInto(
+        context,
+        this.line.points,
+        this.settings.colour,
+        WIDTHS[this.settings.width] * this.size,
+      );
+    }
     context.restore();
-    for (const { at, radius } of this.moving?.eyes ?? []) eyeInto(context, at, radius, palette, this.stage.tiling.yDown);
+    for (const { at, radius } of this.moving?.eyes ?? []) {
+      eyeInto(context, at, radius, palette, this.stage.tiling.yDown);
+    }
   }
 
   hover(place) {
@@ -189,7 +215,11 @@ export class Pen {
       } else if (this.down(this.pen)) {
         this.penDown = this.settings.tool !== "eye";
         if (!this.penDown) this.up();
-        this.on.said(this.penDown ? "The pen is down. Arrow keys draw; press space to lift it." : "An eye is in its place.");
+        this.on.said(
+          this.penDown
+            ? "The pen is down. Arrow keys draw; press space to lift it."
+            : "An eye is in its place.",
+        );
       }
       return true;
     }

@@ -10,6 +10,7 @@
 
 import { measured } from "../tiling.js";
 import { crosses } from "./crossing.js";
+import { dot, multiply, multiplyBack, sparse } from "./sparse.js";
 
 const GRAB = 600; // strength of the spring to the pointer; that of a triangle is about one
 const GRIP = 0.3; // width of the hand, in reaches
@@ -21,39 +22,6 @@ const STRIDE = 0.04; // of a hand that is followed, in sizes of the tile
 const SLACK = 1.02; // times the way from rest that must be free as well, so that sides do not touch
 const HALVINGS = 6; // by which the last good place is found
 const ENOUGH = 1e-4; // of the residual, at which conjugate gradients stop
-
-/** Rows of a sparse matrix as typed arrays, from {indptr, indices, values}. */
-function sparse({ indptr, indices, values }, cols) {
-  return { start: Int32Array.from(indptr), at: Int32Array.from(indices), value: Float64Array.from(values), cols };
-}
-
-/** out = matrix x, as many rows as fit */
-function multiply(matrix, x, out) {
-  const { start, at, value } = matrix;
-  for (let i = 0; i < out.length; i += 1) {
-    let sum = 0;
-    for (let k = start[i]; k < start[i + 1]; k += 1) sum += value[k] * x[at[k]];
-    out[i] = sum;
-  }
-  return out;
-}
-
-/** out = transposed matrix x */
-function multiplyBack(matrix, x, out) {
-  const { start, at, value } = matrix;
-  out.fill(0);
-  for (let i = 0; i < start.length - 1; i += 1) {
-    const own = x[i];
-    if (own !== 0) for (let k = start[i]; k < start[i + 1]; k += 1) out[at[k]] += value[k] * own;
-  }
-  return out;
-}
-
-function dot(a, b) {
-  let sum = 0;
-  for (let i = 0; i < a.length; i += 1) sum += a[i] * b[i];
-  return sum;
-}
 
 export class Puller {
   /** `space` is what the server tells of a tile's space; see space_json in changing.py. */
@@ -77,15 +45,22 @@ export class Puller {
     this.reset();
     this.free = new Float64Array(columns).fill(1);
     const fresh = () => new Float64Array(columns);
-    Object.assign(this, { residual: fresh(), step: fresh(), image: fresh(), goal: fresh(), scaled: fresh(), diagonal: fresh() });
-    Object.assign(this, { x: new Float64Array(2 * this.size), y: new Float64Array(2 * this.size) });
+    this.residual = fresh();
+    this.step = fresh();
+    this.image = fresh();
+    this.goal = fresh();
+    this.scaled = fresh();
+    this.diagonal = fresh();
+    this.x = new Float64Array(2 * this.size);
+    this.y = new Float64Array(2 * this.size);
     this.hold = new Float64Array(this.size);
     this.pin = null;
   }
 
   #measure(polygon) {
     const { area, x, y } = measured(polygon);
-    Object.assign(this, { area, middle: [x, y] });
+    this.area = area;
+    this.middle = [x, y];
   }
 
   /** Every point of the body as rows of one matrix; the group moves about the middle of the tile. */
@@ -110,7 +85,9 @@ export class Puller {
       for (const j of [0, 1]) {
         const row = new Map();
         for (const [vertex, part] of [[side, 1 - share], [(side + 1) % this.count, share]]) {
-          for (const [column, value] of rows[2 * vertex + j]) row.set(column, (row.get(column) ?? 0) + part * value);
+          for (const [column, value] of rows[2 * vertex + j]) {
+            row.set(column, (row.get(column) ?? 0) + part * value);
+          }
         }
         rows.push(row);
       }
@@ -121,7 +98,11 @@ export class Puller {
     const indptr = [0];
     rows.forEach((row) => indptr.push(indptr.at(-1) + row.size));
     return sparse(
-      { indptr, indices: rows.flatMap((row) => [...row.keys()]), values: rows.flatMap((row) => [...row.values()]) },
+      {
+        indptr,
+        indices: rows.flatMap((row) => [...row.keys()]),
+        values: rows.flatMap((row) => [...row.values()]),
+      },
       cols + 2 * this.size - tied,
     );
   }
@@ -151,7 +132,11 @@ export class Puller {
     const indptr = [0];
     near.forEach((row) => indptr.push(indptr.at(-1) + row.size));
     this.laplacian = sparse(
-      { indptr, indices: near.flatMap((row) => [...row.keys()]), values: near.flatMap((row) => [...row.values()]) },
+      {
+        indptr,
+        indices: near.flatMap((row) => [...row.keys()]),
+        values: near.flatMap((row) => [...row.values()]),
+      },
       size,
     );
   }
@@ -161,7 +146,9 @@ export class Puller {
     const { start, at } = this.points;
     this.orbit = Int32Array.from({ length: this.count }, (_, vertex) => {
       for (let row = 2 * vertex; row < 2 * vertex + 2; row += 1) {
-        for (let k = start[row]; k < start[row + 1]; k += 1) if (at[k] < this.group) return at[k] >> 1;
+        for (let k = start[row]; k < start[row + 1]; k += 1) {
+          if (at[k] < this.group) return at[k] >> 1;
+        }
       }
       return -1 - vertex; // held by a centre
     });
@@ -172,7 +159,9 @@ export class Puller {
     this.ahead = null;
     this.z.set(this.start);
     this.z.set(this.middle, this.parametersCount - 2);
-    for (let i = this.tied; i < 2 * this.size; i += 1) this.z[this.parametersCount + i - this.tied] = this.rest[i];
+    for (let i = this.tied; i < 2 * this.size; i += 1) {
+      this.z[this.parametersCount + i - this.tied] = this.rest[i];
+    }
   }
 
   /** Whether a vertex is the centre of a rotation, and so stays where it is. */
@@ -199,7 +188,8 @@ export class Puller {
   #grip(width) {
     const { pin, count, rest } = this;
     const [x, y] = this.grip();
-    const weight = (i) => Math.exp(-3 * ((rest[2 * i] - x) ** 2 + (rest[2 * i + 1] - y) ** 2) / width ** 2);
+    const weight = (i) =>
+      Math.exp(-3 * ((rest[2 * i] - x) ** 2 + (rest[2 * i + 1] - y) ** 2) / width ** 2);
     const found = new Map([[pin.vertex, 1 - pin.share], [pin.next, pin.share]]);
     for (const [from, step] of [[pin.vertex, -1], [pin.next, 1]]) {
       for (let k = 0, i = from; k < count / 4; k += 1, i = (i + step + count) % count) {
@@ -231,17 +221,28 @@ export class Puller {
     }
   }
 
-  /** The point of the outline that was taken hold of, where it is now. */
+  /**
+   * The point of the outline that was taken hold of, where it is now.
+   *
+   * @returns {Point}
+   */
   grip() {
     const { vertex, next, share } = this.pin;
-    const at = this.#pointsOf(2 * vertex, 2 * vertex + 2).concat(this.#pointsOf(2 * next, 2 * next + 2));
-    return [0, 1].map((j) => (1 - share) * at[j] + share * at[2 + j]);
+    const at = this.#pointsOf(2 * vertex, 2 * vertex + 2).concat(
+      this.#pointsOf(2 * next, 2 * next + 2),
+    );
+    return [(1 - share) * at[0] + share * at[2], (1 - share) * at[1] + share * at[3]];
   }
 
   /** What the hand holds, the mean of the outline nearby, where it is now. */
   held() {
+    /** @type {Point} */
     const found = [0, 0];
-    for (const [i, part] of this.pin.parts) this.#pointsOf(2 * i, 2 * i + 2).forEach((own, j) => { found[j] += part * own; });
+    for (const [i, part] of this.pin.parts) {
+      this.#pointsOf(2 * i, 2 * i + 2).forEach((own, j) => {
+        found[j] += part * own;
+      });
+    }
     return found;
   }
 
@@ -268,7 +269,9 @@ export class Puller {
     for (const [i, part] of this.pin.parts) own[i] += GRAB * part ** 2;
     this.diagonal.fill(0);
     for (let i = 0; i < 2 * this.size; i += 1) {
-      for (let k = start[i]; k < start[i + 1]; k += 1) this.diagonal[at[k]] += value[k] ** 2 * Math.max(own[i >> 1], 1e-6);
+      for (let k = start[i]; k < start[i + 1]; k += 1) {
+        this.diagonal[at[k]] += value[k] ** 2 * Math.max(own[i >> 1], 1e-6);
+      }
     }
     const unit = new Float64Array(this.z.length);
     for (let column = this.group; column < this.parametersCount; column += 1) {
@@ -294,7 +297,11 @@ export class Puller {
       y[2 * i] = u;
       y[2 * i + 1] = v;
     }
-    this.#addGrab(y, pin.parts.reduce((sum, [i, part]) => sum + part * x[2 * i], 0), pin.parts.reduce((sum, [i, part]) => sum + part * x[2 * i + 1], 0));
+    this.#addGrab(
+      y,
+      pin.parts.reduce((sum, [i, part]) => sum + part * x[2 * i], 0),
+      pin.parts.reduce((sum, [i, part]) => sum + part * x[2 * i + 1], 0),
+    );
     return multiplyBack(this.points, y, out);
   }
 
@@ -329,8 +336,10 @@ export class Puller {
       for (let k = 0; k < 3; k += 1) {
         const b = 2 * triangles[t + AFTER[k]];
         const c = 2 * triangles[t + AFTER[k + 1]];
-        const u = cotangents[t + k] * (cos * (rest[b] - rest[c]) - sin * (rest[b + 1] - rest[c + 1]));
-        const v = cotangents[t + k] * (sin * (rest[b] - rest[c]) + cos * (rest[b + 1] - rest[c + 1]));
+        const u = cotangents[t + k] *
+          (cos * (rest[b] - rest[c]) - sin * (rest[b + 1] - rest[c + 1]));
+        const v = cotangents[t + k] *
+          (sin * (rest[b] - rest[c]) + cos * (rest[b + 1] - rest[c + 1]));
         y[b] += u;
         y[b + 1] += v;
         y[c] -= u;
@@ -372,7 +381,10 @@ export class Puller {
   /** From a good place as far ahead as is free. */
   #between(good, halvings) {
     let free = 0;
-    const part = (own) => good.forEach((value, k) => { this.z[k] = value + own * (this.ahead[k] - value); });
+    const part = (own) =>
+      good.forEach((value, k) => {
+        this.z[k] = value + own * (this.ahead[k] - value);
+      });
     for (let k = 1; k <= halvings; k += 1) {
       part(free + 2 ** -k);
       if (!this.#blocked()) free += 2 ** -k;
@@ -383,7 +395,8 @@ export class Puller {
   /** Whether the outline crosses itself here or a little farther. */
   #blocked() {
     const ring = this.polygon();
-    return crosses(ring) || crosses(ring.map((value, k) => this.rest[k] + SLACK * (value - this.rest[k])));
+    return crosses(ring) ||
+      crosses(ring.map((value, k) => this.rest[k] + SLACK * (value - this.rest[k])));
   }
 
   #solve(steps) {
@@ -419,7 +432,10 @@ export class Puller {
 
   /** How far the outline is from where it rests, at most, in sizes of the tile. */
   moved() {
-    return this.polygon().reduce((most, value, k) => Math.max(most, Math.abs(value - this.rest[k])), 0) / Math.sqrt(this.area);
+    return this.polygon().reduce(
+      (most, value, k) => Math.max(most, Math.abs(value - this.rest[k])),
+      0,
+    ) / Math.sqrt(this.area);
   }
 
   /** All points of the body, for what lies on the tile. */

@@ -15,7 +15,9 @@ const KEY_STEP = 6; // pixels that a key moves a point
 export class Pulling {
   /** `on`: {released(parameters), said(text), changed()}; `settings`: {reach, lattice}. */
   constructor(stage, settings, on) {
-    Object.assign(this, { stage, settings, on });
+    this.stage = stage;
+    this.settings = settings;
+    this.on = on;
     this.chosen = null;
   }
 
@@ -50,9 +52,13 @@ export class Pulling {
 
   #take({ copy, vertex, share }) {
     if (this.puller.isHeld(share < 0.5 ? vertex : (vertex + 1) % this.puller.count)) {
-      this.on.said("This point is a turning point of the pattern. It moves when the grid does, or pull next to it.");
+      this.on.said(
+        "This point is a turning point of the pattern. It moves when the grid does, or pull next to it.",
+      );
     }
-    this.puller.grab(vertex, share, this.settings.reach * this.size, { lattice: this.settings.lattice });
+    this.puller.grab(vertex, share, this.settings.reach * this.size, {
+      lattice: this.settings.lattice,
+    });
     this.hand = { copy, vertex, share, offset: [0, 0] };
   }
 
@@ -114,6 +120,7 @@ export class Pulling {
 
   #step() {
     const own = moved(inverse(this.stage.matrixOf(this.hand.copy)), this.aim);
+    /** @type {Point} */
     const goal = [own[0] + this.hand.offset[0], own[1] + this.hand.offset[1]];
     const { left, stopped } = this.puller.follow(goal);
     this.stopped = stopped;
@@ -130,7 +137,10 @@ export class Pulling {
 
   /** Spring back to the tile as it was. */
   back() {
-    Object.assign(this, { waiting: false, hand: null, aim: null, stopped: false });
+    this.waiting = false;
+    this.hand = null;
+    this.aim = null;
+    this.stopped = false;
     if (!this.puller) return;
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     const from = this.puller.z.slice();
@@ -141,7 +151,9 @@ export class Pulling {
       if (this.hand) return;
       const share = calm ? 1 : Math.min(1, Math.max(0, (now - began) / 220));
       const eased = 1 - (1 - share) ** 3;
-      this.puller.z.forEach((_, k) => { this.puller.z[k] = from[k] + eased * (to[k] - from[k]); });
+      this.puller.z.forEach((_, k) => {
+        this.puller.z[k] = from[k] + eased * (to[k] - from[k]);
+      });
       this.#show();
       if (share < 1) setTimeout(() => this.stage.redraw());
       else {
@@ -185,7 +197,10 @@ export class Pulling {
     const { count } = this.puller;
     const stride = Math.max(1, Math.round(count / 120));
     const { width, height } = this.stage;
-    const copy = this.chosen?.copy && this.stage.copies.find((c) => c.aspect === this.chosen.copy.aspect && String(c.cell) === String(this.chosen.copy.cell));
+    const copy = this.chosen?.copy &&
+      this.stage.copies.find((c) =>
+        c.aspect === this.chosen.copy.aspect && String(c.cell) === String(this.chosen.copy.cell)
+      );
     const own = copy ?? this.#middleCopy([width / 2, height / 2]);
     const vertex = this.chosen ? (this.chosen.vertex + step * stride + count) % count : 0;
     this.chosen = { copy: own, vertex };
@@ -198,7 +213,9 @@ export class Pulling {
     const { copy, point } = this.#pointOf({ ...this.chosen, share: 0 });
     const [x, y] = moved(this.stage.matrixOf(copy), point);
     const { width, height } = this.stage;
-    if (x < EDGE || y < EDGE || x > width - EDGE || y > height - EDGE) this.stage.pan(width / 2 - x, height / 2 - y);
+    if (x < EDGE || y < EDGE || x > width - EDGE || y > height - EDGE) {
+      this.stage.pan(width / 2 - x, height / 2 - y);
+    }
     this.stage.redraw();
   }
 
@@ -226,7 +243,11 @@ export class Pulling {
   paint(context) {
     const at = this.hand
       ? { copy: this.hand.copy, point: this.puller.grip() }
-      : this.near ? this.#pointOf(this.near) : this.chosen && this.puller ? this.#pointOf({ ...this.chosen, share: 0 }) : null;
+      : this.near
+      ? this.#pointOf(this.near)
+      : this.chosen && this.puller
+      ? this.#pointOf({ ...this.chosen, share: 0 })
+      : null;
     if (!at) return;
     const [x, y] = moved(this.stage.matrixOf(at.copy), at.point);
     const reach = this.settings.reach * this.size * this.stage.camera.scale;
@@ -257,6 +278,10 @@ export class Pulling {
     ring(6, 2.5, "#ffffff");
   }
 
+  /**
+   * @param {{ copy: Copy, vertex: number, share: number }} place
+   * @returns {{ copy: Copy, point: Point }}
+   */
   #pointOf({ copy, vertex, share }) {
     const ring = this.stage.tiling.polygon;
     const [a, b] = [ring[vertex % ring.length], ring[(vertex + 1) % ring.length]];

@@ -5,7 +5,15 @@ import { inverse } from "../tiling.js";
 const MOST = 1400; // pixels along a side
 const BLEED = 0.7; // pixels by which triangles overlap, so that no seam shows
 
-/** An eye as exports draw it: white, dark ring, pupil and a light. */
+/**
+ * An eye as exports draw it: white, dark ring, pupil and a light.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {Point} at
+ * @param {number} radius
+ * @param {Palette} palette
+ * @param {boolean} yDown
+ */
 export function eyeInto(context, [x, y], radius, palette, yDown) {
   const disc = (u, v, r, colour) => {
     context.fillStyle = colour;
@@ -16,9 +24,20 @@ export function eyeInto(context, [x, y], radius, palette, yDown) {
   disc(x, y, 1.1 * radius, palette.outline);
   disc(x, y, 0.9 * radius, palette.paper ?? "#ffffff");
   disc(x, y, 0.58 * radius, palette.outline);
-  disc(x - 0.27 * radius, y - (yDown ? 0.315 : -0.315) * radius, 0.2 * radius, palette.paper ?? "#ffffff");
+  disc(
+    x - 0.27 * radius,
+    y - (yDown ? 0.315 : -0.315) * radius,
+    0.2 * radius,
+    palette.paper ?? "#ffffff",
+  );
 }
 
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {Point[]} points
+ * @param {string} colour
+ * @param {number} width
+ */
 export function lineInto(context, points, colour, width) {
   context.strokeStyle = colour;
   context.lineWidth = width;
@@ -32,7 +51,10 @@ export function lineInto(context, points, colour, width) {
 
 /** Lay triangles of a picture onto their images. `shares` are places in the picture, 0 to 1. */
 function triangles(context, picture, { images, shares, list }, scale) {
-  const [wide, high] = [picture.naturalWidth || picture.width, picture.naturalHeight || picture.height];
+  const [wide, high] = [
+    picture.naturalWidth || picture.width,
+    picture.naturalHeight || picture.height,
+  ];
   const base = context.getTransform();
   for (const corners of list) {
     const [a, b, c] = corners.map((k) => images[k]);
@@ -63,8 +85,30 @@ function triangles(context, picture, { images, shares, list }, scale) {
 }
 
 /**
+ * The map to what lies a share of the way from the silhouette to the tile.
+ *
+ * @param {TileMap | null} map
+ * @param {number} share
+ * @returns {TileMap | null}
+ */
+export function between(map, share) {
+  if (!map || share >= 1) return map;
+  const { rest, images } = map;
+  /** @type {(image: Point, k: number) => Point} */
+  const there = ([x, y], k) => [
+    rest[k][0] + share * (x - rest[k][0]),
+    rest[k][1] + share * (y - rest[k][1]),
+  ];
+  return { ...map, images: images.map(there) };
+}
+
+/**
  * Paint the prototile's skin at a scale (pixels a unit), or null if nothing lies on it.
  * `art`: {picture, map, covered, yDown} or null; `marks`: {lines: [{points, colour, width}], eyes: [{at, radius}]}.
+ *
+ * @param {import("../tiling.js").Tiling} tiling
+ * @param {{ art: any, marks: any, palette: Palette, yDown: boolean }} what
+ * @param {number} scale
  */
 export function paintSkin(tiling, { art, marks, palette, yDown }, scale) {
   if (!art && !marks.lines.length && !marks.eyes.length) return null;
@@ -78,6 +122,7 @@ export function paintSkin(tiling, { art, marks, palette, yDown }, scale) {
   canvas.width = Math.ceil((high[0] - low[0] + 2 * pad) * own);
   canvas.height = Math.ceil((high[1] - low[1] + 2 * pad) * own);
   const context = canvas.getContext("2d");
+  /** @type {Matrix} */
   const matrix = [own, 0, 0, own, (pad - low[0]) * own, (pad - low[1]) * own];
   context.setTransform(...matrix);
   if (art) {
@@ -86,7 +131,12 @@ export function paintSkin(tiling, { art, marks, palette, yDown }, scale) {
       const v = (y - from[1]) / (to[1] - from[1]);
       return [(x - from[0]) / (to[0] - from[0]), yDown ? v : 1 - v];
     });
-    triangles(context, art.picture, { images: art.map.images, shares, list: art.map.triangles }, own);
+    triangles(
+      context,
+      art.picture,
+      { images: art.map.images, shares, list: art.map.triangles },
+      own,
+    );
     context.globalCompositeOperation = "destination-in";
     context.fill(tiling.path);
     context.globalCompositeOperation = "source-over";

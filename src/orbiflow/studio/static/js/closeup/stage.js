@@ -1,6 +1,7 @@
 /** The canvas: what it shows, how it is moved by mouse, touch and keys, and when it is painted. */
 
 import { Camera, inverse, moved, sized } from "../tiling.js";
+/** @import { LiveTiling } from "./live.js" */
 import { h } from "../dom.js";
 import { beside } from "./lines.js";
 import { paintScene } from "./live.js";
@@ -13,11 +14,29 @@ export class Stage {
   /** `tool()` gives the tool in hand: {down, move, up, cancel, hover, key, paint}, all optional. */
   constructor({ label, help, tool }) {
     this.tool = tool;
-    this.canvas = h("canvas", { class: "closeup-canvas", tabindex: "0", role: "application", "aria-label": label, "aria-describedby": help });
+    /** @type {((now: number) => void) | null} */
+    this.before = null;
+    /** @type {((place: Point | null) => void) | null} */
+    this.onhover = null;
+    /** @type {LiveTiling} */
+    this.tiling = undefined;
+    /** @type {Camera} */
+    this.camera = undefined;
+    /** @type {Copy[]} */
+    this.copies = [];
+    this.canvas = h("canvas", {
+      class: "closeup-canvas",
+      tabindex: "0",
+      role: "application",
+      "aria-label": label,
+      "aria-describedby": help,
+    });
     this.box = h("div", { class: "closeup-stage" }, this.canvas);
     this.pointers = new Map();
     this.layers = [];
+    /** @type {{ line: number, palette: Palette, skin?: () => any, over?: any }} */
     this.options = { line: 1.4, palette: null };
+    this.tester = document.createElement("canvas").getContext("2d");
     this.frames = 0;
     this.#listen();
     this.watcher = new ResizeObserver(() => this.redraw());
@@ -61,11 +80,19 @@ export class Stage {
   paint() {
     const { context, width, height, ratio } = sized(this.canvas);
     const { line, palette, skin, over } = this.options;
-    Object.assign(this, { width, height });
+    this.width = width;
+    this.height = height;
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.fillStyle = palette.paper ?? "#ffffff";
     context.fillRect(0, 0, this.canvas.width, this.canvas.height);
-    this.copies = paintScene(context, this.tiling, this.camera, palette, { width, height, ratio, line, skin: skin?.(), over });
+    this.copies = paintScene(context, this.tiling, this.camera, palette, {
+      width,
+      height,
+      ratio,
+      line,
+      skin: skin?.(),
+      over,
+    });
     for (const layer of this.layers) layer(context);
     this.tool()?.paint?.(context);
     this.frames += 1;
@@ -75,7 +102,10 @@ export class Stage {
   zoom(by, [x, y] = [this.canvas.clientWidth / 2, this.canvas.clientHeight / 2]) {
     const { width, height } = this.#size();
     const size = Math.sqrt(this.tiling.area);
-    const scale = Math.min((MOST_TILE * Math.max(width, height)) / size, Math.max(LEAST_TILE / size, this.camera.scale * by));
+    const scale = Math.min(
+      (MOST_TILE * Math.max(width, height)) / size,
+      Math.max(LEAST_TILE / size, this.camera.scale * by),
+    );
     const [u, v] = moved(inverse(this.camera.matrix(width, height)), [x, y]);
     this.camera.scale = scale;
     const [a, b] = moved(inverse(this.camera.matrix(width, height)), [x, y]);
@@ -84,19 +114,46 @@ export class Stage {
     this.changed();
   }
 
+  /** Buttons to come nearer, go farther and see all. */
+  zooms() {
+    return h(
+      "div",
+      { class: "zooms" },
+      h("button", {
+        type: "button",
+        class: "button icon",
+        "aria-label": "Nearer",
+        onclick: () => this.zoom(1.35),
+      }, "+"),
+      h("button", {
+        type: "button",
+        class: "button icon",
+        "aria-label": "Farther",
+        onclick: () => this.zoom(1 / 1.35),
+      }, "−"),
+      h("button", { type: "button", class: "button", onclick: () => this.fit() }, "Fit"),
+    );
+  }
+
   /** Move the picture by pixels. */
   pan(x, y) {
     const { width, height } = this.#size();
-    const [u, v] = moved(inverse(this.camera.matrix(width, height)), [width / 2 - x, height / 2 - y]);
+    const [u, v] = moved(inverse(this.camera.matrix(width, height)), [
+      width / 2 - x,
+      height / 2 - y,
+    ]);
     Object.assign(this.camera, { x: u, y: v });
     this.changed();
   }
 
   changed() {
     this.redraw();
-    this.onview?.(this.camera);
   }
 
+  /**
+   * @param {MouseEvent} event
+   * @returns {Point}
+   */
   place(event) {
     const box = this.canvas.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top];
@@ -116,7 +173,11 @@ export class Stage {
       if (pointers.size === 2) {
         this.tool()?.cancel?.();
         this.busy = false;
-      } else if (pointers.size === 1) this.busy = Boolean(event.button === 0 && !event.shiftKey && this.tool()?.down?.(this.place(event), event));
+      } else if (pointers.size === 1) {
+        this.busy = Boolean(
+          event.button === 0 && !event.shiftKey && this.tool()?.down?.(this.place(event), event),
+        );
+      }
     });
     canvas.addEventListener("pointermove", (event) => {
       const at = this.place(event);
@@ -159,7 +220,12 @@ export class Stage {
       event.preventDefault();
       return;
     }
-    const pans = { ArrowLeft: [STEP, 0], ArrowRight: [-STEP, 0], ArrowUp: [0, STEP], ArrowDown: [0, -STEP] };
+    const pans = {
+      ArrowLeft: [STEP, 0],
+      ArrowRight: [-STEP, 0],
+      ArrowUp: [0, STEP],
+      ArrowDown: [0, -STEP],
+    };
     if (pans[event.key]) this.pan(...pans[event.key]);
     else if (event.key === "+" || event.key === "=") this.zoom(1.25);
     else if (event.key === "-") this.zoom(0.8);
@@ -170,10 +236,9 @@ export class Stage {
 
   /** The copy under a place: {copy, at: the place in the prototile}, or null. */
   copyAt(place) {
-    const test = this.tester ??= document.createElement("canvas").getContext("2d");
     for (let k = this.copies.length - 1; k >= 0; k -= 1) {
       const at = moved(inverse(this.copies[k].matrix), place);
-      if (test.isPointInPath(this.tiling.path, ...at)) return { copy: this.copies[k], at };
+      if (this.tester.isPointInPath(this.tiling.path, ...at)) return { copy: this.copies[k], at };
     }
     return null;
   }
@@ -193,14 +258,22 @@ export class Stage {
     return best;
   }
 
-  /** The matrix, prototile to canvas, of a copy as it lies now. */
+  /**
+   * The matrix, prototile to canvas, of a copy as it lies now.
+   *
+   * @param {{ aspect: number, cell: [number, number] }} copy
+   * @returns {Matrix}
+   */
   matrixOf({ aspect, cell }) {
     const view = this.camera.matrix(this.width, this.height);
     const own = this.tiling.copy(aspect, ...cell);
     return [
-      view[0] * own[0] + view[2] * own[1], view[1] * own[0] + view[3] * own[1],
-      view[0] * own[2] + view[2] * own[3], view[1] * own[2] + view[3] * own[3],
-      view[0] * own[4] + view[2] * own[5] + view[4], view[1] * own[4] + view[3] * own[5] + view[5],
+      view[0] * own[0] + view[2] * own[1],
+      view[1] * own[0] + view[3] * own[1],
+      view[0] * own[2] + view[2] * own[3],
+      view[1] * own[2] + view[3] * own[3],
+      view[0] * own[4] + view[2] * own[5] + view[4],
+      view[1] * own[4] + view[3] * own[5] + view[5],
     ];
   }
 }

@@ -9,10 +9,18 @@ export const dark = matchMedia("(prefers-color-scheme: dark)");
 export const pale = () => (dark.matches ? 0.25 : 0.8);
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-/** Draw a canvas, and again when its size or the colours of the page change; returns what asks for it, `ends` what stops it. */
+/**
+ * Draw a canvas, and again when its size or the colours of the page change; returns what asks for it, `ends` what stops it.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @param {(() => void)[]} ends
+ * @param {(pen: CanvasRenderingContext2D, width: number, height: number, ratio: number) => void} paint
+ */
 export function painted(canvas, ends, paint) {
   const draw = () => {
-    const ratio = Math.min(2, window.devicePixelRatio || 1), width = canvas.clientWidth, height = canvas.clientHeight;
+    const ratio = Math.min(2, globalThis.devicePixelRatio || 1),
+      width = canvas.clientWidth,
+      height = canvas.clientHeight;
     if (!width || !height) return;
     [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
     const pen = canvas.getContext("2d");
@@ -20,11 +28,18 @@ export function painted(canvas, ends, paint) {
     paint(pen, width, height, ratio);
   };
   let asked = 0;
-  const soon = () => { cancelAnimationFrame(asked); asked = requestAnimationFrame(draw); };
+  const soon = () => {
+    cancelAnimationFrame(asked);
+    asked = requestAnimationFrame(draw);
+  };
   const observer = new ResizeObserver(soon);
   observer.observe(canvas);
   dark.addEventListener("change", soon);
-  ends.push(() => { cancelAnimationFrame(asked); observer.disconnect(); dark.removeEventListener("change", soon); });
+  ends.push(() => {
+    cancelAnimationFrame(asked);
+    observer.disconnect();
+    dark.removeEventListener("change", soon);
+  });
   return soon;
 }
 
@@ -33,7 +48,12 @@ export class FlatMap {
    * `frame` is what `flat_frame` gives; `pick(u, v)` hears of pointers on the map.
    */
   constructor(canvas, ends, frame, pick) {
-    Object.assign(this, { frame, colours: unpack(frame.colours, Uint8Array), points: unpack(frame.points, Float32Array), least: -Infinity, dots: true, held: null });
+    this.frame = frame;
+    this.colours = unpack(frame.colours, Uint8Array);
+    this.points = unpack(frame.points, Float32Array);
+    this.least = -Infinity;
+    this.dots = true;
+    this.held = null;
     this.redraw = painted(canvas, ends, (...given) => this.paint(...given));
     const heard = (event) => {
       if (!event.buttons || !this.box) return;
@@ -46,14 +66,17 @@ export class FlatMap {
 
   /** Show a grid of two axes, across and up. */
   show(grid, axes) {
-    Object.assign(this, { grid, axes, cache: null });
+    this.grid = grid;
+    this.axes = axes;
+    this.cache = null;
     this.redraw();
   }
 
   /** The place of the picture in the canvas: beside ticks on squares. */
   room(width, height) {
     const { map, onGlobe } = this.grid, pad = onGlobe ? [2, 2, 2, 2] : [54, 8, 20, 44];
-    const [left, top, right, below] = pad, w = Math.min(width - left - right, (height - top - below) * map.aspect);
+    const [left, top, right, below] = pad,
+      w = Math.min(width - left - right, (height - top - below) * map.aspect);
     return { x: left + (width - left - right - w) / 2, y: top, w, h: w / map.aspect };
   }
 
@@ -63,7 +86,13 @@ export class FlatMap {
     this.box = box;
     if (box.w < 10) return;
     pen.clearRect(0, 0, width, height);
-    pen.drawImage(this.picture(Math.round(box.w * ratio), Math.round(box.h * ratio), ratio), box.x, box.y, box.w, box.h);
+    pen.drawImage(
+      this.picture(Math.round(box.w * ratio), Math.round(box.h * ratio), ratio),
+      box.x,
+      box.y,
+      box.w,
+      box.h,
+    );
     this.lines(pen, box);
     if (this.dots) this.draw(pen, box);
     if (this.held) this.hold(pen, box);
@@ -71,11 +100,21 @@ export class FlatMap {
 
   /** The colours of all pixels, inside of regions and outside, which are kept while the size stays. */
   pixels(w, h) {
-    if (this.cache?.w === w && this.cache.h === h && this.cache.grid === this.grid && this.cache.grey === pale()) return this.cache;
-    const { grid, colours } = this, logs = new Float32Array(w * h), strong = new Uint32Array(w * h), weak = new Uint32Array(w * h), grey = pale();
+    if (
+      this.cache?.w === w && this.cache.h === h && this.cache.grid === this.grid &&
+      this.cache.grey === pale()
+    ) return this.cache;
+    const { grid, colours } = this,
+      logs = new Float32Array(w * h),
+      strong = new Uint32Array(w * h),
+      weak = new Uint32Array(w * h),
+      grey = pale();
     const pack = (rgb) => (255 << 24) | (rgb[2] << 16) | (rgb[1] << 8) | rgb[0];
     const ramp = Array.from({ length: 256 }, (_, k) => colours.subarray(4 * k, 4 * k + 3));
-    const full = ramp.map(pack), faint = ramp.map((rgb) => pack([0, 1, 2].map((k) => Math.round(rgb[k] + PALENESS * (255 * grey - rgb[k])))));
+    const full = ramp.map(pack),
+      faint = ramp.map((rgb) =>
+        pack([0, 1, 2].map((k) => Math.round(rgb[k] + PALENESS * (255 * grey - rgb[k]))))
+      );
     for (let j = 0; j < h; j += 1) {
       for (let i = 0; i < w; i += 1) {
         const k = j * w + i, place = grid.map.place((i + 0.5) / w, 1 - (j + 0.5) / h);
@@ -92,13 +131,20 @@ export class FlatMap {
   }
 
   picture(w, h, ratio) {
-    const { logs, strong, weak } = this.pixels(w, h), made = new OffscreenCanvas(w, h), image = new ImageData(w, h);
-    const out = new Uint32Array(image.data.buffer), { least } = this, wide = Math.max(1, Math.round(0.8 * ratio));
+    const { logs, strong, weak } = this.pixels(w, h),
+      made = new OffscreenCanvas(w, h),
+      image = new ImageData(w, h);
+    const out = new Uint32Array(image.data.buffer),
+      { least } = this,
+      wide = Math.max(1, Math.round(0.8 * ratio));
     for (let k = 0; k < out.length; k += 1) {
       const inside = logs[k] >= least;
       out[k] = inside || least === -Infinity ? strong[k] : weak[k];
       const edge = inside !== logs[k + wide] >= least || inside !== logs[k + wide * w] >= least;
-      if (edge && least > -Infinity && strong[k] && (k % w) + wide < w && k + wide * w < out.length && strong[k + wide] && strong[k + wide * w]) out[k] = dark.matches ? 0xffffffff : 0xff1a1a1a;
+      if (
+        edge && least > -Infinity && strong[k] && (k % w) + wide < w && k + wide * w < out.length &&
+        strong[k + wide] && strong[k + wide * w]
+      ) out[k] = dark.matches ? 0xffffffff : 0xff1a1a1a;
     }
     made.getContext("2d").putImageData(image, 0, 0);
     return made;
@@ -126,7 +172,9 @@ export class FlatMap {
     pen.font = "13px system-ui, sans-serif";
     const [across, up] = this.axes.map((axis) => this.frame.axes[axis]);
     pen.textAlign = "center";
-    across.at.forEach((t, k) => pen.fillText(across.texts[k], box.x + t * box.w, box.y + box.h + 18));
+    across.at.forEach((t, k) =>
+      pen.fillText(across.texts[k], box.x + t * box.w, box.y + box.h + 18)
+    );
     pen.fillText(across.label, box.x + box.w / 2, box.y + box.h + 38);
     pen.textAlign = "right";
     up.at.forEach((t, k) => pen.fillText(up.texts[k], box.x - 6, box.y + (1 - t) * box.h + 4));
@@ -140,13 +188,19 @@ export class FlatMap {
 
   /** The rows: places in the window, or degrees north and east. */
   draw(pen, box) {
-    const { points, grid, axes } = this, wide = grid.onGlobe ? 2 : this.frame.axes.length, many = this.frame.shown > 500;
-    pen.fillStyle = many ? `rgb(255 255 255 / ${dark.matches ? 40 : 60}%)` : "rgb(255 255 255 / 85%)";
+    const { points, grid, axes } = this,
+      wide = grid.onGlobe ? 2 : this.frame.axes.length,
+      many = this.frame.shown > 500;
+    pen.fillStyle = many
+      ? `rgb(255 255 255 / ${dark.matches ? 40 : 60}%)`
+      : "rgb(255 255 255 / 85%)";
     pen.strokeStyle = "rgb(26 26 26 / 75%)";
     pen.lineWidth = many ? 0.3 : 0.7;
     for (let k = 0; k < points.length; k += wide) {
       const own = (axis) => points[k + axis];
-      const [x, y] = grid.onGlobe ? grid.map.spot(0.5 + own(1) / 360, 0.5 + own(0) / 180) : axes.map(own);
+      const [x, y] = grid.onGlobe
+        ? grid.map.spot(0.5 + own(1) / 360, 0.5 + own(0) / 180)
+        : axes.map(own);
       pen.beginPath();
       pen.arc(box.x + x * box.w, box.y + (1 - y) * box.h, many ? 1.1 : 2, 0, 7);
       pen.fill();
@@ -157,7 +211,9 @@ export class FlatMap {
   /** The line along which one axis is held. */
   hold(pen, box) {
     const { axis, place } = this.held, x = box.x + place * box.w, y = box.y + (1 - place) * box.h;
-    const [from, to] = axis === 0 ? [[x, box.y], [x, box.y + box.h]] : [[box.x, y], [box.x + box.w, y]];
+    const [from, to] = axis === 0
+      ? [[x, box.y], [x, box.y + box.h]]
+      : [[box.x, y], [box.x + box.w, y]];
     for (const [colour, width] of [["#fff", 5], ["#c81e5a", 2.5]]) {
       pen.strokeStyle = colour;
       pen.lineWidth = width;
@@ -169,7 +225,14 @@ export class FlatMap {
   }
 }
 
-/** A bar of colours with its ticks, from left to right. */
+/**
+ * A bar of colours with its ticks, from left to right.
+ *
+ * @param {CanvasRenderingContext2D} pen
+ * @param {number} width
+ * @param {any} frame
+ * @param {any} data
+ */
 export function drawBar(pen, width, frame, data) {
   const colours = unpack(frame.colours, Uint8Array), left = 8, across = width - 2 * left;
   for (let k = 0; k < 256; k += 1) {
@@ -181,7 +244,8 @@ export function drawBar(pen, width, frame, data) {
   pen.textAlign = "center";
   let end = -Infinity;
   for (const { at, text } of data.ticks) {
-    const half = pen.measureText(text).width / 2, x = Math.max(half, Math.min(width - half, left + at * across));
+    const half = pen.measureText(text).width / 2,
+      x = Math.max(half, Math.min(width - half, left + at * across));
     if (x - half < end + 6) continue;
     pen.fillText(text, x, 27);
     end = x + half;
@@ -189,15 +253,34 @@ export function drawBar(pen, width, frame, data) {
   pen.fillText(data.measure, width / 2, 46);
 }
 
-/** A curve over an axis of the window, filled down to its foot, with what is inside a region filled strongly. */
+/**
+ * A curve over an axis of the window, filled down to its foot, with what is inside a region filled strongly.
+ *
+ * @param {CanvasRenderingContext2D} pen
+ * @param {number} width
+ * @param {number} height
+ * @param {{ values: number[], axis: any, least?: number }} curve
+ */
 export function drawCurve(pen, width, height, { values, axis, least = -Infinity }) {
-  const [left, top, right, below] = [14, 10, 14, 44], w = width - left - right, h = height - top - below, foot = top + h, peak = Math.max(...values);
-  const x = (k) => left + ((k + 0.5) / values.length) * w, y = (value) => foot - (value / peak / 1.06) * h;
+  const [left, top, right, below] = [14, 10, 14, 44],
+    w = width - left - right,
+    h = height - top - below,
+    foot = top + h,
+    peak = Math.max(...values);
+  const x = (k) => left + ((k + 0.5) / values.length) * w,
+    y = (value) => foot - (value / peak / 1.06) * h;
   pen.clearRect(0, 0, width, height);
   const fill = (colour, inside) => {
     pen.fillStyle = colour;
     values.forEach((value, k) => {
-      if (inside(value)) pen.fillRect(x(k) - w / values.length / 2, y(value), w / values.length + 0.7, foot - y(value));
+      if (inside(value)) {
+        pen.fillRect(
+          x(k) - w / values.length / 2,
+          y(value),
+          w / values.length + 0.7,
+          foot - y(value),
+        );
+      }
     });
   };
   fill(ink("--line"), () => true);

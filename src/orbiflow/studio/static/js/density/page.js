@@ -6,18 +6,39 @@ import { Result } from "./result.js";
 import { chooseSpace, chooseTable } from "./table.js";
 import { Watch } from "./watch.js";
 
+/**
+ * @param {HTMLElement} root
+ * @param {Page} page
+ */
 export async function show(root, page) {
   const { api, events, project } = page, path = `projects/${project.id}/density`;
   await style("density");
-  const body = h("div", { class: "stack" }), problem = h("div", {}), actions = h("div", { class: "row" });
-  put(root, h("div", { class: "density stack" }, h("div", { class: "row" }, h("h1", { class: "grow", tabindex: "-1" }, "See where your data crowd"), actions), problem, body));
+  const body = h("div", { class: "stack" }),
+    problem = h("div", {}),
+    actions = h("div", { class: "row" });
+  put(
+    root,
+    h(
+      "div",
+      { class: "density stack" },
+      h(
+        "div",
+        { class: "row" },
+        h("h1", { class: "grow", tabindex: "-1" }, "See where your data crowd"),
+        actions,
+      ),
+      problem,
+      body,
+    ),
+  );
   let state = await api.get(path), shown = "", part = null, changing = false;
 
   const newest = (operation) => project.tasks.find((task) => task.operation === operation);
-  const start = (settings) => trying(async () => {
-    await api.post(`projects/${project.id}/tasks`, { operation: "density fit", settings });
-    changing = false;
-  });
+  const start = (settings) =>
+    trying(async () => {
+      await api.post(`projects/${project.id}/tasks`, { operation: "density fit", settings });
+      changing = false;
+    });
   /** Which part of the page it is time for, and a word that changes when it must be built again. */
   function wanted() {
     const reading = newest("density table"), fitting = newest("density fit");
@@ -30,17 +51,34 @@ export async function show(root, page) {
 
   function build() {
     const [kind, word] = wanted();
-    if (kind === "watch" && part instanceof Watch && shown === word) part.update(newest("density fit"));
+    if (kind === "watch" && part instanceof Watch && shown === word) {
+      part.update(newest("density fit"));
+    }
     if (shown === word) return;
     shown = word;
     part?.stop?.();
     part = null;
-    const again = button("Change what is fitted", () => { changing = true; build(); }, { image: "pencil" });
-    const back = button("Back to the density", () => { changing = false; build(); }, { image: "undo" });
-    put(actions, kind === "result" && again, kind === "space" && state.fit && back, ["result", "space"].includes(kind) && button("Another table", another));
+    const again = button("Change what is fitted", () => {
+      changing = true;
+      build();
+    }, { image: "pencil" });
+    const back = button("Back to the density", () => {
+      changing = false;
+      build();
+    }, { image: "undo" });
+    put(
+      actions,
+      kind === "result" && again,
+      kind === "space" && state.fit && back,
+      ["result", "space"].includes(kind) && button("Another table", another),
+    );
     if (kind === "table") put(body, intro(), chooseTable(page, state.examples));
-    if (kind === "reading") put(body, h("p", { class: "panel", role: "status" }, "Reading the table …"));
-    if (kind === "space") put(body, chooseSpace(state.table, start, state.fit && { ...state.fit, why: "" }));
+    if (kind === "reading") {
+      put(body, h("p", { class: "panel", role: "status" }, "Reading the table …"));
+    }
+    if (kind === "space") {
+      put(body, chooseSpace(state.table, start, state.fit && { ...state.fit, why: "" }));
+    }
     if (kind === "watch") {
       part = new Watch(page, newest("density fit"));
       put(body, part.root);
@@ -48,15 +86,22 @@ export async function show(root, page) {
     if (kind === "result") (part = new Result(page, state.fit)).show(body);
   }
 
-  const another = () => trying(async () => page.navigate(`d/${(await api.post("projects", { kind: "density" })).id}`));
-  const intro = () => h("p", { class: "soft lead" }, "A density says where rows of a table are likely. It is made for numbers that go round: angles, directions, axes.");
+  const another = () =>
+    trying(async () => page.navigate(`d/${(await api.post("projects", { kind: "density" })).id}`));
+  const intro = () =>
+    h(
+      "p",
+      { class: "soft lead" },
+      "A density says where rows of a table are likely. It is made for numbers that go round: angles, directions, axes.",
+    );
 
   const STEPS = ["density table", "density fit"];
+  let told = undefined;
   /** Say what went wrong in the newest step, if anything did. */
   function complain() {
     const fault = STEPS.map(newest).find((task) => task?.state === "failed");
-    if (fault?.id === problem.told) return;
-    problem.told = fault?.id;
+    if (fault?.id === told) return;
+    told = fault?.id;
     put(problem, fault && h("p", { class: "error", role: "alert" }, `${capital(fault.error)}.`));
   }
 
@@ -68,9 +113,16 @@ export async function show(root, page) {
   }
   const offs = [
     events.on("task", (task) => trying(() => hear(task))),
-    events.on("refresh", () => trying(async () => { state = await api.get(path); build(); })),
+    events.on("refresh", () =>
+      trying(async () => {
+        state = await api.get(path);
+        build();
+      })),
   ];
   build();
   complain();
-  return () => { offs.forEach((off) => off()); part?.stop?.(); };
+  return () => {
+    offs.forEach((off) => off());
+    part?.stop?.();
+  };
 }

@@ -1,16 +1,25 @@
 /** What a fit shows: the surface, the map, regions, an angle that is held, how well it fits, and files. */
 
 import { showSurface } from "../../api/density/surface.js";
-import { button, choice, h, icon, put, slider, toast, trying, unique } from "../dom.js";
-import { alive, bytes } from "../words.js";
+import { choice, h, put, slider, toast, trying, unique } from "../dom.js";
+import { likelihood, parts } from "./facts.js";
 import { Grid } from "./grid.js";
-import { FlatMap, dark, drawBar, drawCurve, painted, pale } from "./map.js";
-import { partBar } from "./watch.js";
-import { EDGES, PARTS, angleText, count, figure, percent, shape } from "./words.js";
+import { dark, drawBar, drawCurve, FlatMap, painted, pale } from "./map.js";
+import { takeaway } from "./takeaway.js";
+import { angleText, count, EDGES, percent, shape } from "./words.js";
 
 export class Result {
+  /**
+   * @param {Page} page
+   * @param {any} fit
+   */
   constructor(page, fit) {
-    Object.assign(this, { page, fit, ends: [], grids: new Map(), share: 1, holding: false });
+    this.page = page;
+    this.fit = fit;
+    this.ends = [];
+    this.grids = new Map();
+    this.share = 1;
+    this.holding = false;
     this.path = `projects/${page.project.id}/density/${fit.number}`;
     this.pair = fit.angles === 1 ? [0] : [0, 1];
     this.held = { axis: 0, place: 0.5 };
@@ -24,10 +33,21 @@ export class Result {
   /** Build everything into an element. */
   async show(root) {
     const { fit } = this;
-    const names = fit.names.join(", "), parts = [this.views()];
-    if (fit.angles === 2) parts.push(this.conditional());
-    parts.push(h("div", { class: "grid" }, this.likelihood(), this.parts()), this.takeaway());
-    put(root, h("p", { class: "soft" }, `${shape(fit.space, fit.columns.length)}. ${count(fit.rows)} rows of ${names}.`), ...parts);
+    const names = fit.names.join(", "), panels = [this.views()];
+    if (fit.angles === 2) panels.push(this.conditional());
+    panels.push(
+      h("div", { class: "grid" }, likelihood(fit), parts(fit)),
+      takeaway(this.page, fit, this.ends, (what) => this.submit("density take", what)),
+    );
+    put(
+      root,
+      h(
+        "p",
+        { class: "soft" },
+        `${shape(fit.space, fit.columns.length)}. ${count(fit.rows)} rows of ${names}.`,
+      ),
+      ...panels,
+    );
     await trying(async () => {
       if (fit.surface) await this.openSurface();
       await this.openMap();
@@ -36,36 +56,91 @@ export class Result {
 
   views() {
     const { fit } = this, one = fit.angles === 1;
-    this.mapCanvas = h("canvas", { role: "img", class: one ? "curve" : fit.space === "sphere" ? "map wide" : "map" });
+    this.mapCanvas = h("canvas", {
+      role: "img",
+      class: one ? "curve" : fit.space === "sphere" ? "map wide" : "map",
+    });
     this.bar = h("canvas", { class: "bar-of-colours", "aria-hidden": "true" });
     this.pairs = h("div", {});
     this.areaText = h("p", { class: "soft small", role: "status" });
     const region = slider("Show the smallest region that holds", {
-      min: 0.05, max: 1, step: 0.01, value: 1, said: (share) => (share >= 1 ? "everything" : percent(share)),
-    }, (share) => { this.share = share; this.mark(); });
+      min: 0.05,
+      max: 1,
+      step: 0.01,
+      value: 1,
+      said: (share) => (share >= 1 ? "everything" : percent(share)),
+    }, (share) => {
+      this.share = share;
+      this.mark();
+    });
+    /** @type {(words: string, checked: boolean) => [HTMLInputElement, HTMLLabelElement]} */
     const box = (words, checked) => {
       const made = h("input", { type: "checkbox", checked, onchange: () => this.mark() });
       return [made, h("label", { class: "check" }, made, words)];
     };
-    const [dots, dotsLabel] = box("Rows of the table as dots on the map", true), [surfaceDots, surfaceLabel] = box("and on the surface", false);
-    Object.assign(this, { dots, surfaceDots });
+    const [dots, dotsLabel] = box("Rows of the table as dots on the map", true),
+      [surfaceDots, surfaceLabel] = box("and on the surface", false);
+    this.dots = dots;
+    this.surfaceDots = surfaceDots;
     const about = EDGES[one ? "circle" : fit.space];
-    const figures = [h("figure", { class: "panel stack" }, h("h2", {}, one ? "The curve" : "The map"), this.pairs, this.mapCanvas, !one && this.bar, h("p", { class: "soft small" }, about))];
+    const figures = [
+      h(
+        "figure",
+        { class: "panel stack" },
+        h("h2", {}, one ? "The curve" : "The map"),
+        this.pairs,
+        this.mapCanvas,
+        !one && this.bar,
+        h("p", { class: "soft small" }, about),
+      ),
+    ];
     if (fit.surface) figures.unshift(this.surfaceFigure());
     else if (!one) figures.push(this.conditional());
-    return h("section", { class: "stack" }, h("div", { class: one ? "stack" : "grid views" }, figures),
-      h("div", { class: "panel stack controls" }, h("div", {}, region, this.areaText), !one && h("div", { class: "row" }, dotsLabel, fit.surface && surfaceLabel)));
+    return h(
+      "section",
+      { class: "stack" },
+      h("div", { class: one ? "stack" : "grid views" }, figures),
+      h(
+        "div",
+        { class: "panel stack controls" },
+        h("div", {}, region, this.areaText),
+        !one && h("div", { class: "row" }, dotsLabel, fit.surface && surfaceLabel),
+      ),
+    );
   }
 
   surfaceFigure() {
-    this.surfaceCanvas = h("canvas", { role: "img", tabindex: "0", "aria-describedby": "surface-tips" });
-    this.cut = slider("Cut away the front", { min: 0, max: 100, step: 1, value: 0, said: (cut) => `${cut} %` }, (cut) => {
-      if (this.surface) { this.surface.view.cut = cut; this.surface.redraw(); }
+    this.surfaceCanvas = h("canvas", {
+      role: "img",
+      tabindex: "0",
+      "aria-describedby": "surface-tips",
+    });
+    this.cut = slider("Cut away the front", {
+      min: 0,
+      max: 100,
+      step: 1,
+      value: 0,
+      said: (cut) => `${cut} %`,
+    }, (cut) => {
+      if (this.surface) {
+        this.surface.view.cut = cut;
+        this.surface.redraw();
+      }
     });
     this.caption = h("p", { class: "soft small" });
-    return h("figure", { class: "panel stack" }, h("h2", {}, "The surface"), h("div", { class: "turned" }, this.surfaceCanvas),
-      h("p", { class: "soft small", id: "surface-tips" }, "Drag to turn, or use the arrow keys. Plus and minus zoom, 0 starts again."), this.cut,
-      h("details", {}, h("summary", {}, "What am I looking at?"), this.caption));
+    return h(
+      "figure",
+      { class: "panel stack" },
+      h("h2", {}, "The surface"),
+      h("div", { class: "turned" }, this.surfaceCanvas),
+      h(
+        "p",
+        { class: "soft small", id: "surface-tips" },
+        "Drag to turn, or use the arrow keys. Plus and minus zoom, 0 starts again.",
+      ),
+      this.cut,
+      h("details", {}, h("summary", {}, "What am I looking at?"), this.caption),
+    );
   }
 
   async openSurface() {
@@ -75,7 +150,10 @@ export class Result {
     this.caption.textContent = data.caption;
     this.surfaceCanvas.setAttribute("aria-label", `The density on its surface. ${data.caption}`);
     this.cut.hidden = data.round;
-    this.surface = showSurface(this.surfaceCanvas, data, { scrolls: true, changed: (view) => this.cut.set(view.cut) });
+    this.surface = showSurface(this.surfaceCanvas, data, {
+      scrolls: true,
+      changed: (view) => this.cut.set(view.cut),
+    });
     this.cut.set(data.start.cut);
     const shade = () => this.mark();
     dark.addEventListener("change", shade);
@@ -87,9 +165,15 @@ export class Result {
     const { fit, ends } = this;
     if (fit.angles === 1) {
       const redraw = painted(this.mapCanvas, ends, (pen, width, height) => {
-        if (this.grid) drawCurve(pen, width, height, { values: [...this.grid.logs].map(Math.exp), axis: fit.axes[0], least: this.least });
+        if (this.grid) {
+          drawCurve(pen, width, height, {
+            values: [...this.grid.logs].map(Math.exp),
+            axis: fit.axes[0],
+            least: this.least,
+          });
+        }
       });
-      this.map = { redraw, show: redraw };
+      this.map = { redraw, show: redraw, least: -Infinity, dots: true, held: null };
     } else {
       this.map = new FlatMap(this.mapCanvas, ends, fit, (u, v) => this.pick(u, v));
       this.redrawBar = painted(this.bar, ends, (pen, width, height) => {
@@ -98,20 +182,41 @@ export class Result {
       });
       if (fit.angles > 2) this.choosePair();
     }
-    ends.push(this.page.events.on("refresh", () => trying(() => this.showPair())), this.page.events.on("task", ({ operation, state, error }) => {
-      if (operation !== "density map" || this.grids.has(this.pair.join("-"))) return;
-      if (state === "done") trying(() => this.showPair());
-      if (state === "failed") toast(error, { bad: true });
-    }));
+    ends.push(
+      this.page.events.on("refresh", () => trying(() => this.showPair())),
+      this.page.events.on("task", ({ operation, state, error }) => {
+        if (operation !== "density map" || this.grids.has(this.pair.join("-"))) return;
+        if (state === "done") trying(() => this.showPair());
+        if (state === "failed") toast(error, { bad: true });
+      }),
+    );
     return this.showPair();
   }
 
   /** A box that says which two angles the map shows. */
   choosePair() {
-    const { names } = this.fit, id = unique("pair"), pairs = names.flatMap((_, up) => names.slice(0, up).map((__, across) => [across, up]));
-    const box = h("select", { id, onchange: () => { this.pair = pairs[box.value]; trying(() => this.showPair()); } },
-      pairs.map((pair, k) => h("option", { value: k }, pair.map((axis) => names[axis]).join(" and "))));
-    put(this.pairs, h("label", { for: id, class: "label" }, "Which two angles"), box, h("p", { class: "soft small" }, "Whatever the others are."));
+    const { names } = this.fit,
+      id = unique("pair"),
+      pairs = names.flatMap((_, up) => names.slice(0, up).map((__, across) => [across, up]));
+    const box = h(
+      "select",
+      {
+        id,
+        onchange: () => {
+          this.pair = pairs[box.value];
+          trying(() => this.showPair());
+        },
+      },
+      pairs.map((pair, k) =>
+        h("option", { value: k }, pair.map((axis) => names[axis]).join(" and "))
+      ),
+    );
+    put(
+      this.pairs,
+      h("label", { for: id, class: "label" }, "Which two angles"),
+      box,
+      h("p", { class: "soft small" }, "Whatever the others are."),
+    );
   }
 
   /** Show the chosen angles; where their grid is not there yet, the server makes it, and this is called again. */
@@ -129,7 +234,10 @@ export class Result {
     if (!this.holding) this.held.place = this.grid.top[this.held.axis];
     this.redrawBar?.();
     const names = fit.angles ? pair.map((axis) => fit.names[axis]) : fit.names;
-    this.mapCanvas.setAttribute("aria-label", `Map of the density of ${names.join(" and ")}. Bright is where rows are likely.`);
+    this.mapCanvas.setAttribute(
+      "aria-label",
+      `Map of the density of ${names.join(" and ")}. Bright is where rows are likely.`,
+    );
     this.mapCanvas.classList.remove("busy");
     this.mark();
     return this.drawHolding?.();
@@ -152,7 +260,9 @@ export class Result {
       this.surface.redraw();
     }
     const where = this.fit.angles > 2 ? "this map" : "the space";
-    this.areaText.textContent = this.share >= 1 ? "Pull the slider to find where most rows are." : `${percent(this.share)} of all rows to come fall into ${percent(area)} of ${where}.`;
+    this.areaText.textContent = this.share >= 1
+      ? "Pull the slider to find where most rows are."
+      : `${percent(this.share)} of all rows to come fall into ${percent(area)} of ${where}.`;
   }
 
   pick(u, v) {
@@ -170,21 +280,31 @@ export class Result {
 
   /** One angle is held: the curve of the other follows. */
   conditional() {
-    const canvas = h("canvas", { class: "curve", role: "img" }), controls = h("div", { class: "stack" }), place = h("div", {});
+    const canvas = h("canvas", { class: "curve", role: "img" }),
+      controls = h("div", { class: "stack" }),
+      place = h("div", {});
     const says = h("p", { class: "soft small" });
     const redraw = painted(canvas, this.ends, (pen, width, height) => {
       if (!this.grid) return;
       const { axis, place: at } = this.held, other = this.pair[1 - axis];
-      drawCurve(pen, width, height, { values: this.grid.slice(axis, at), axis: this.fit.axes[other] });
+      drawCurve(pen, width, height, {
+        values: this.grid.slice(axis, at),
+        axis: this.fit.axes[other],
+      });
     });
     const names = () => this.pair.map((axis) => this.fit.names[axis]);
     const build = () => {
       const [name, other] = this.held.axis === 0 ? names() : names().reverse();
       this.heldSlider = slider(`${name} is held at`, {
-        min: 0, max: 360, step: 1, value: 360 * this.held.place, said: (at) => `${name} = ${angleText(at / 360, this.fit.unit)}`,
+        min: 0,
+        max: 360,
+        step: 1,
+        value: 360 * this.held.place,
+        said: (at) => `${name} = ${angleText(at / 360, this.fit.unit)}`,
       }, (at) => this.hold(at / 360));
       put(place, this.heldSlider);
-      says.textContent = `The curve says how likely each ${other} then is. You may also drag on the map.`;
+      says.textContent =
+        `The curve says how likely each ${other} then is. You may also drag on the map.`;
       canvas.setAttribute("aria-label", `Curve of ${other} while ${name} is held`);
       redraw();
     };
@@ -192,59 +312,27 @@ export class Result {
     this.drawHolding = () => {
       if (built !== this.pair) {
         built = this.pair;
-        const which = choice("Hold", [0, 1].map((axis) => [axis, names()[axis]]), this.held.axis, (axis) => {
-          this.held = { axis, place: this.grid.top[axis] };
-          build();
-          this.hold(this.held.place);
-        });
+        const which = choice(
+          "Hold",
+          [0, 1].map((axis) => [axis, names()[axis]]),
+          this.held.axis,
+          (axis) => {
+            this.held = { axis, place: this.grid.top[axis] };
+            build();
+            this.hold(this.held.place);
+          },
+        );
         put(controls, which, place, says);
         build();
       }
       redraw();
     };
-    return h("section", { class: "panel grid" }, h("div", { class: "stack" }, h("h2", {}, "If you know one angle"), controls), canvas);
-  }
-
-  likelihood() {
-    const { mean, rows, uniform } = this.fit.likelihood, { rows: kept, gain } = this.fit.held_out, times = (nats) => figure(Math.exp(nats), 2);
-    const which = rows === this.fit.rows ? `all ${count(rows)} rows` : `${count(rows)} of the ${count(this.fit.rows)} rows, drawn at random`;
-    return h("section", { class: "panel stack" }, h("h2", {}, "How well it fits"),
-      h("p", { class: "big" }, `Rows are ${times(mean - uniform)} times as likely as by chance`),
-      h("p", {}, `Mean log density: ${figure(mean, 4)} nats, over ${which} that it was made from. If all places were alike it would be ${figure(uniform, 4)}.`),
-      h("p", { class: "soft" }, `The fairer test: ${count(kept)} rows were kept aside in turn while it was made. They were ${times(gain)} times as likely as by chance (${figure(gain, 3)} nats).`));
-  }
-
-  parts() {
-    const { components, weights, notes } = this.fit;
-    const said = ({ name, share, gain, error }) => partBar(name, share, percent(share), gain === undefined ? "" : gain > error
-      ? `Without it, rows would be ${figure(100 * (1 - Math.exp(-gain)), 2)} % less likely.` : "The others could do without it.");
-    const used = components.filter(({ share }) => share > 0).sort((one, other) => other.share - one.share);
-    const idle = components.filter(({ share }) => !share).map(({ name }) => PARTS[name]?.[0] ?? name);
-    if (weights?.uniform) used.push({ name: "uniform", share: weights.uniform });
-    return h("section", { class: "panel stack" }, h("h2", {}, "What it is made of"), h("ul", { class: "parts stack" }, used.map(said)),
-      idle.length > 0 && h("p", { class: "soft small" }, `Also tried, and not needed: ${idle.join(", ").toLowerCase()}.`),
-      h("details", {}, h("summary", {}, "Notes of the fit"), h("ul", { class: "notes soft small" }, notes.map((note) => h("li", {}, note)))));
-  }
-
-  takeaway() {
-    const amount = h("input", { type: "number", id: unique("amount"), min: 1, max: 1000000, value: 1000 });
-    const format = h("select", { id: unique("format") }, [["png", "PNG, for screens"], ["svg", "SVG, for print"], ["pdf", "PDF, for print"]].map(([value, words]) => h("option", { value }, words)));
-    const made = h("ul", { class: "made" });
-    const get = (words, what, settings = () => ({})) => button(words, () => trying(() => this.submit("density take", { fit: this.fit.number, what, ...settings() })));
-    const card = (title, about, act, ...fields) => h("div", { class: "take stack" }, h("h3", {}, title), h("p", { class: "soft small" }, about), fields, act);
-    const list = () => {
-      const tasks = this.page.project.tasks.filter(({ operation }) => operation === "density take");
-      put(made, tasks.map((task) => h("li", {}, alive(task) ? h("span", { role: "status" }, `${task.what || "Waiting"} …`) : task.state === "done"
-        ? task.result.files.map((file) => h("a", { class: "button", download: file.name, href: `api/takeaways/${task.id}/files/${encodeURIComponent(file.name)}` }, icon("download"), `${file.name}, ${bytes(file.bytes)}`))
-        : h("span", { class: "error" }, task.error ?? "Stopped."))));
-    };
-    this.ends.push(this.page.events.on("task", list), this.page.events.on("refresh", list));
-    list();
-    return h("section", { class: "panel stack" }, h("h2", {}, "Take away"), h("div", { class: "grid narrow" },
-      card("New rows", "As many as you like, drawn from the density.", get("Draw rows", "samples", () => ({ count: Number(amount.value) })), h("label", { for: amount.id, class: "label" }, "How many"), amount),
-      card("Pictures", this.fit.surface ? "The map, and the surface as a page of its own." : "New rows beside yours, angle by angle.", get("Make pictures", "figures", () => ({ format: format.value })), h("label", { for: format.id, class: "label" }, "Format"), format),
-      card("Regions", `The smallest regions that hold a half and nine tenths: ${this.fit.surface ? "their outlines" : "how large, and how dense"}.`, get("Find regions", "regions")),
-      card("The density itself", "To go on with in Python, or with the command orbiflow density.", get("Get the density", "model"))), made);
+    return h(
+      "section",
+      { class: "panel grid" },
+      h("div", { class: "stack" }, h("h2", {}, "If you know one angle"), controls),
+      canvas,
+    );
   }
 
   /** Give the server a task. */

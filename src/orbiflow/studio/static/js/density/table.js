@@ -1,64 +1,190 @@
 /** Choosing a table, and what is fitted to it. */
 
 import { button, h, icon, put, trying, unique } from "../dom.js";
-import { SEEMS, SPACES, UNITS, count, figure, shape, spaceOf } from "./words.js";
+import { count, figure, SEEMS, shape, spaceOf, SPACES, UNITS } from "./words.js";
 
 const ENDINGS = ".csv,.tsv,.txt,.npy";
 
-/** Where a table is dropped or chosen, and tables to try. */
+/**
+ * Where a table is dropped or chosen, and tables to try.
+ *
+ * @param {Page} page
+ * @param {{ name: string, title: string, about: string }[]} examples
+ */
 export function chooseTable(page, examples) {
   const { api, project } = page, path = `projects/${project.id}/density`;
-  const take = (file) => file && trying(async () => {
-    if (file.size > page.about.limits.bytes) throw new Error(`This file is too large: at most ${Math.round(page.about.limits.bytes / 2 ** 20)} MB are taken.`);
-    await api.put(`${path}/table?name=${encodeURIComponent(file.name)}`, file.slice(0, file.size, "application/octet-stream"));
+  const take = (file) =>
+    file && trying(async () => {
+      if (file.size > page.about.limits.bytes) {
+        throw new Error(
+          `This file is too large: at most ${
+            Math.round(page.about.limits.bytes / 2 ** 20)
+          } MB are taken.`,
+        );
+      }
+      await api.put(
+        `${path}/table?name=${encodeURIComponent(file.name)}`,
+        file.slice(0, file.size, "application/octet-stream"),
+      );
+    });
+  const input = h("input", {
+    type: "file",
+    id: unique("table"),
+    class: "unseen",
+    accept: ENDINGS,
+    onchange: () => take(input.files[0]),
   });
-  const input = h("input", { type: "file", id: unique("table"), class: "unseen", accept: ENDINGS, onchange: () => take(input.files[0]) });
-  const drop = h("div", { class: "drop panel stack" }, icon("upload"), h("p", {}, "Drop a table here"),
-    h("p", { class: "soft small" }, "CSV, TSV or .npy, with a row for each thing that you measured."),
-    h("div", {}, button("Choose a file", () => input.click(), { kind: "primary" }), input));
+  const drop = h(
+    "div",
+    { class: "drop panel stack" },
+    icon("upload"),
+    h("p", {}, "Drop a table here"),
+    h(
+      "p",
+      { class: "soft small" },
+      "CSV, TSV or .npy, with a row for each thing that you measured.",
+    ),
+    h("div", {}, button("Choose a file", () => input.click(), { kind: "primary" }), input),
+  );
   input.tabIndex = -1;
   input.setAttribute("aria-label", "A table");
-  const over = (yes) => (event) => { event.preventDefault(); drop.classList.toggle("over", yes); };
+  const over = (yes) => (event) => {
+    event.preventDefault();
+    drop.classList.toggle("over", yes);
+  };
   drop.addEventListener("dragover", over(true));
   drop.addEventListener("dragleave", over(false));
-  drop.addEventListener("drop", (event) => { over(false)(event); take(event.dataTransfer.files[0]); });
-  const example = ({ name, title, about }) => h("li", {}, h("button", { type: "button", class: "example panel", onclick: () => trying(() => api.post(`${path}/example`, { name })) },
-    h("strong", {}, title), h("span", { class: "soft small" }, about)));
-  return h("div", { class: "stack" }, drop, h("h2", {}, "Or try one of these"), h("ul", { class: "grid narrow" }, examples.map(example)),
-    h("p", { class: "soft small" }, "From the Top8000 proteins of Duke University (CC BY 4.0), PmagPy and javaPlex (BSD)."));
+  drop.addEventListener("drop", (event) => {
+    over(false)(event);
+    take(event.dataTransfer.files[0]);
+  });
+  const example = ({ name, title, about }) =>
+    h(
+      "li",
+      {},
+      h(
+        "button",
+        {
+          type: "button",
+          class: "example panel",
+          onclick: () => trying(() => api.post(`${path}/example`, { name })),
+        },
+        h("strong", {}, title),
+        h("span", { class: "soft small" }, about),
+      ),
+    );
+  return h(
+    "div",
+    { class: "stack" },
+    drop,
+    h("h2", {}, "Or try one of these"),
+    h("ul", { class: "grid narrow" }, examples.map(example)),
+    h(
+      "p",
+      { class: "soft small" },
+      "From the Top8000 proteins of Duke University (CC BY 4.0), PmagPy and javaPlex (BSD).",
+    ),
+  );
 }
 
 /** The first rows of a table. */
 function firstRows(table) {
-  const head = table.columns.map(({ name, seems, missing }) => h("th", { scope: "col" }, name,
-    h("span", { class: "soft small" }, SEEMS[seems], missing > 0 && `, ${count(missing)} empty`)));
+  const head = table.columns.map(({ name, seems, missing }) =>
+    h(
+      "th",
+      { scope: "col" },
+      name,
+      h("span", { class: "soft small" }, SEEMS[seems], missing > 0 && `, ${count(missing)} empty`),
+    )
+  );
   const cell = (value) => h("td", {}, value === null ? "" : figure(value, 6));
-  return h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "First rows of the table" }, h("table", {},
-    h("caption", { class: "unseen" }, "First rows of the table"), h("thead", {}, h("tr", {}, head)),
-    h("tbody", {}, table.first.map((row) => h("tr", {}, row.map(cell))))));
+  return h(
+    "div",
+    { class: "scroll", tabindex: "0", role: "region", "aria-label": "First rows of the table" },
+    h(
+      "table",
+      {},
+      h("caption", { class: "unseen" }, "First rows of the table"),
+      h("thead", {}, h("tr", {}, head)),
+      h("tbody", {}, table.first.map((row) => h("tr", {}, row.map(cell)))),
+    ),
+  );
 }
 
-/** A form that says where the rows live, with the guess made; `start(settings)` begins the fit. */
+/**
+ * A form that says where the rows live, with the guess made; `start(settings)` begins the fit.
+ *
+ * @param {any} table
+ * @param {(settings: object) => any} start
+ * @param {any} last
+ */
 export function chooseSpace(table, start, last) {
   const guess = last ?? table.guess;
   const chosen = { space: guess.space, columns: [...guess.columns], unit: guess.unit };
-  const units = h("div", { class: "unit" }), go = button("Fit the density", () => start(settings()), { kind: "primary big" });
+  const units = h("div", { class: "unit" }),
+    go = button("Fit the density", () => start(settings()), { kind: "primary big" });
   const says = h("p", { class: "soft", role: "status" });
-  const settings = () => ({ space: chosen.space, columns: chosen.columns, ...(spaceOf(chosen.space)?.angular ? { unit: chosen.unit } : {}) });
+  const settings = () => ({
+    space: chosen.space,
+    columns: chosen.columns,
+    ...(spaceOf(chosen.space)?.angular ? { unit: chosen.unit } : {}),
+  });
 
   const name = unique("space");
-  const spaces = h("fieldset", {}, h("legend", {}, "What are the numbers?"), h("div", { class: "grid narrow" }, SPACES.map((space) =>
-    h("label", { class: "space" }, h("input", { type: "radio", name, checked: space.name === chosen.space, onchange: () => { chosen.space = space.name; fit(); } }),
-      h("span", {}, h("strong", {}, space.title), h("span", { class: "soft small" }, space.about), h("span", { class: "soft small" }, `Needs ${space.needs}.`))))));
+  const spaces = h(
+    "fieldset",
+    {},
+    h("legend", {}, "What are the numbers?"),
+    h(
+      "div",
+      { class: "grid narrow" },
+      SPACES.map((space) =>
+        h(
+          "label",
+          { class: "space" },
+          h("input", {
+            type: "radio",
+            name,
+            checked: space.name === chosen.space,
+            onchange: () => {
+              chosen.space = space.name;
+              fit();
+            },
+          }),
+          h(
+            "span",
+            {},
+            h("strong", {}, space.title),
+            h("span", { class: "soft small" }, space.about),
+            h("span", { class: "soft small" }, `Needs ${space.needs}.`),
+          ),
+        )
+      ),
+    ),
+  );
   const order = h("span", { class: "soft small" });
-  const columns = h("fieldset", {}, h("legend", {}, "Which columns?"), h("div", { class: "row" }, table.columns.map((column) => {
-    const box = h("input", { type: "checkbox", checked: chosen.columns.includes(column.name), onchange: () => {
-      chosen.columns = chosen.columns.filter((own) => own !== column.name);
-      if (box.checked) chosen.columns.push(column.name);
-      fit();
-    } });
-    return h("label", { class: "check" }, box, column.name);
-  })), order);
+  const columns = h(
+    "fieldset",
+    {},
+    h("legend", {}, "Which columns?"),
+    h(
+      "div",
+      { class: "row" },
+      table.columns.map((column) => {
+        const box = h("input", {
+          type: "checkbox",
+          checked: chosen.columns.includes(column.name),
+          onchange: () => {
+            chosen.columns = chosen.columns.filter((own) => own !== column.name);
+            if (box.checked) chosen.columns.push(column.name);
+            fit();
+          },
+        });
+        return h("label", { class: "check" }, box, column.name);
+      }),
+    ),
+    order,
+  );
 
   function fit() {
     const space = spaceOf(chosen.space), number = chosen.columns.length;
@@ -67,18 +193,61 @@ export function chooseSpace(table, start, last) {
     if (space?.angular) {
       const first = table.columns.find((column) => column.name === chosen.columns[0]);
       chosen.unit ??= ["degrees", "radians"].includes(first?.seems) ? first.seems : "degrees";
-      const box = h("select", { id, onchange: () => { chosen.unit = box.value; } }, UNITS.map(([value, words]) => h("option", { value }, words)));
+      const box = h("select", {
+        id,
+        onchange: () => {
+          chosen.unit = box.value;
+        },
+      }, UNITS.map(([value, words]) => h("option", { value }, words)));
       box.value = chosen.unit;
       put(units, h("label", { for: id, class: "label" }, "How are angles counted?"), box);
     } else put(units);
     const fits = space && number >= space.least && number <= space.most;
     go.disabled = !fits;
-    says.textContent = !space ? "Choose what the numbers are." : fits ? `${shape(space.name, number)}.${table.rows > 5000 ? " So many rows take some minutes." : ""}` : `This needs ${space.needs}; ${number} ${number === 1 ? "column is" : "columns are"} chosen.`;
+    says.textContent = !space
+      ? "Choose what the numbers are."
+      : fits
+      ? `${shape(space.name, number)}.${
+        table.rows > 5000 ? " So many rows take some minutes." : ""
+      }`
+      : `This needs ${space.needs}; ${number} ${
+        number === 1 ? "column is" : "columns are"
+      } chosen.`;
   }
   fit();
-  const why = h("p", { class: guess.space ? "notice good" : "notice" }, guess.why.charAt(0).toUpperCase() + guess.why.slice(1) + (guess.space ? ". So this is chosen already; change it if it is wrong." : "."));
-  return h("div", { class: "ask" },
-    h("section", { class: "panel stack" }, h("h2", {}, "The table"), h("p", { class: "soft" }, `${count(table.rows)} rows${table.more ? `; ${count(table.more)} more columns are not shown` : ""}. Rows with an empty cell are left out.`), firstRows(table),
-      table.notes.length > 0 && h("p", { class: "soft small" }, `Read so: ${table.notes.join("; ")}.`)),
-    h("section", { class: "panel stack" }, h("h2", {}, "Where they live"), !last && why, spaces, columns, units, h("div", { class: "row" }, go, says)));
+  const why = h(
+    "p",
+    { class: guess.space ? "notice good" : "notice" },
+    guess.why.charAt(0).toUpperCase() + guess.why.slice(1) +
+      (guess.space ? ". So this is chosen already; change it if it is wrong." : "."),
+  );
+  return h(
+    "div",
+    { class: "ask" },
+    h(
+      "section",
+      { class: "panel stack" },
+      h("h2", {}, "The table"),
+      h(
+        "p",
+        { class: "soft" },
+        `${count(table.rows)} rows${
+          table.more ? `; ${count(table.more)} more columns are not shown` : ""
+        }. Rows with an empty cell are left out.`,
+      ),
+      firstRows(table),
+      table.notes.length > 0 &&
+        h("p", { class: "soft small" }, `Read so: ${table.notes.join("; ")}.`),
+    ),
+    h(
+      "section",
+      { class: "panel stack" },
+      h("h2", {}, "Where they live"),
+      !last && why,
+      spaces,
+      columns,
+      units,
+      h("div", { class: "row" }, go, says),
+    ),
+  );
 }

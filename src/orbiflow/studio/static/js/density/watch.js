@@ -2,7 +2,7 @@
 
 import { h, put } from "../dom.js";
 import { steering } from "../steering.js";
-import { STATES, capital } from "../words.js";
+import { capital, STATES } from "../words.js";
 import { PARTS } from "./words.js";
 
 const TRIED = /^held-out part (\d+) of (\d+): (\w+)(?: of (\d+))?/;
@@ -10,39 +10,79 @@ const TRIED = /^held-out part (\d+) of (\d+): (\w+)(?: of (\d+))?/;
 /** A part of a density, with a bar that says how much of it there is. */
 export const partBar = (name, share, words, more = "") => {
   const [title, about] = PARTS[name] ?? [name, ""];
-  return h("li", {}, h("div", { class: "share" }, h("strong", {}, title), h("span", {}, words)),
-    h("meter", { value: share, "aria-label": title }), h("p", { class: "soft small" }, `${capital(about)}. ${more}`));
+  return h(
+    "li",
+    {},
+    h("div", { class: "share" }, h("strong", {}, title), h("span", {}, words)),
+    h("meter", { value: share, "aria-label": title }),
+    h("p", { class: "soft small" }, `${capital(about)}. ${more}`),
+  );
 };
 
 export class Watch {
+  /**
+   * @param {Page} page
+   * @param {Task} task
+   */
   constructor(page, task) {
-    Object.assign(this, { page, found: new Map() });
+    this.page = page;
+    this.found = new Map();
     this.bar = h("progress", { max: 1, "aria-label": "How far the fit is" });
     this.says = h("p");
     this.kinds = h("ul", { class: "parts stack" });
     this.steer = steering(page.api);
-    this.root = h("section", { class: "panel stack watch" }, h("h2", {}, "Fitting"), this.bar, this.says, this.steer.root,
-      h("p", { class: "soft small" }, "Several kinds of density are tried. Rows that were kept aside choose among them."), this.kinds);
+    this.root = h(
+      "section",
+      { class: "panel stack watch" },
+      h("h2", {}, "Fitting"),
+      this.bar,
+      this.says,
+      this.steer.root,
+      h(
+        "p",
+        { class: "soft small" },
+        "Several kinds of density are tried. Rows that were kept aside choose among them.",
+      ),
+      this.kinds,
+    );
     this.update(task);
   }
 
   update(task) {
     this.task = task;
-    const what = task.what ?? "", step = { drawing: ": drawing it", "putting together": ": putting it together" }[what] ?? (this.hear(what) ? ": trying what suits the rows" : "");
+    const what = task.what ?? "",
+      step = { drawing: ": drawing it", "putting together": ": putting it together" }[what] ??
+        (this.hear(what) ? ": trying what suits the rows" : "");
     this.bar.value = task.share;
-    const state = task.state === "waiting" && task.place ? `${STATES.waiting}: ${task.place} before it` : STATES[task.state];
-    this.says.textContent = task.state === "running" ? `${Math.round(100 * task.share)} % done${step}` : state;
+    const state = task.state === "waiting" && task.place
+      ? `${STATES.waiting}: ${task.place} before it`
+      : STATES[task.state];
+    this.says.textContent = task.state === "running"
+      ? `${Math.round(100 * task.share)} % done${step}`
+      : state;
     this.steer.update(task);
   }
 
   hear(what) {
-    const tried = TRIED.exec(what), kind = tried ? tried[3] : what.startsWith("flow") ? "flow" : null;
+    const tried = TRIED.exec(what),
+      kind = tried ? tried[3] : what.startsWith("flow") ? "flow" : null;
     if (!kind) return false;
     const own = this.found.get(kind) ?? {};
-    this.found.set(kind, tried ? { part: Number(tried[1]), parts: Number(tried[2]), size: tried[4] ?? own.size } : {});
-    put(this.kinds, [...this.found].map(([name, { part, parts, size }]) => (part
-      ? partBar(name, part / parts, `part ${part} of ${parts}${size ? `, up to ${size} bumps` : ""}`)
-      : partBar(name, this.task.share, "being stirred"))));
+    this.found.set(
+      kind,
+      tried ? { part: Number(tried[1]), parts: Number(tried[2]), size: tried[4] ?? own.size } : {},
+    );
+    put(
+      this.kinds,
+      [...this.found].map(([name, { part, parts, size }]) => (part
+        ? partBar(
+          name,
+          part / parts,
+          `part ${part} of ${parts}${size ? `, up to ${size} bumps` : ""}`,
+        )
+        : partBar(name, this.task.share, "being stirred"))
+      ),
+    );
     return true;
   }
 }

@@ -1,25 +1,75 @@
 /** Words of the density page. */
 
 export const SPACES = [
-  { name: "torus", title: "Angles", about: "Each comes back to its start, like a clock. Two angles live on a doughnut.", needs: "1 to 7 columns of angles", least: 1, most: 7, angular: true },
-  { name: "sphere", title: "Directions", about: "Where an arrow points: places on the Earth, winds, stars.", needs: "latitude and longitude, or x, y, z", least: 2, most: 3 },
-  { name: "projective-plane", title: "Lines without an arrow", about: "Both ends mean the same: crystals, magnetic poles, cracks in rock.", needs: "latitude and longitude, or x, y, z", least: 2, most: 3 },
-  { name: "klein-bottle", title: "Theta and phi of picture patches", about: "How edges lie in tiny bits of photographs: a Klein bottle.", needs: "theta, then phi", least: 2, most: 2, angular: true },
+  {
+    name: "torus",
+    title: "Angles",
+    about: "Each comes back to its start, like a clock. Two angles live on a doughnut.",
+    needs: "1 to 7 columns of angles",
+    least: 1,
+    most: 7,
+    angular: true,
+  },
+  {
+    name: "sphere",
+    title: "Directions",
+    about: "Where an arrow points: places on the Earth, winds, stars.",
+    needs: "latitude and longitude, or x, y, z",
+    least: 2,
+    most: 3,
+  },
+  {
+    name: "projective-plane",
+    title: "Lines without an arrow",
+    about: "Both ends mean the same: crystals, magnetic poles, cracks in rock.",
+    needs: "latitude and longitude, or x, y, z",
+    least: 2,
+    most: 3,
+  },
+  {
+    name: "klein-bottle",
+    title: "Theta and phi of picture patches",
+    about: "How edges lie in tiny bits of photographs: a Klein bottle.",
+    needs: "theta, then phi",
+    least: 2,
+    most: 2,
+    angular: true,
+  },
 ];
 
+/** @param {string} name */
 export const spaceOf = (name) => SPACES.find((space) => space.name === name);
 
-/** Where rows of so many columns live, in a few words. */
+/**
+ * Where rows of so many columns live, in a few words.
+ *
+ * @param {string} space
+ * @param {number} count
+ */
 export function shape(space, count) {
-  const angles = { 1: "One angle: a circle", 2: "Two angles: a doughnut" }[count] ?? `${count} angles, all at once`;
-  return { torus: angles, sphere: "Directions: a ball", "projective-plane": "Lines without an arrow: the projective plane", "klein-bottle": "Theta and phi: the Klein bottle" }[space];
+  const angles = { 1: "One angle: a circle", 2: "Two angles: a doughnut" }[count] ??
+    `${count} angles, all at once`;
+  return {
+    torus: angles,
+    sphere: "Directions: a ball",
+    "projective-plane": "Lines without an arrow: the projective plane",
+    "klein-bottle": "Theta and phi: the Klein bottle",
+  }[space];
 }
 
 export const SEEMS = {
-  degrees: "angle, in degrees", radians: "angle, in radians", latitude: "latitude", longitude: "longitude", count: "counts the rows", number: "number",
+  degrees: "angle, in degrees",
+  radians: "angle, in radians",
+  latitude: "latitude",
+  longitude: "longitude",
+  count: "counts the rows",
+  number: "number",
 };
 
-export const UNITS = [["degrees", "Degrees (360 all round)"], ["radians", "Radians (6.28 all round)"], ["turns", "Turns (1 all round)"]];
+export const UNITS = [["degrees", "Degrees (360 all round)"], [
+  "radians",
+  "Radians (6.28 all round)",
+], ["turns", "Turns (1 all round)"]];
 
 /** What a density may be made of: a title, and what it is. */
 export const PARTS = {
@@ -36,24 +86,44 @@ export const EDGES = {
   circle: "The left and the right end are one.",
   torus: "The left and the right edge are one, and so are the top and the bottom.",
   sphere: "Equal areas look equal. The left and the right edge are one.",
-  "projective-plane": "Half of the ball, as the other is the same. Opposite points of the rim are one.",
-  "klein-bottle": "The left and the right edge are one. So are top and bottom, one of them turned round.",
+  "projective-plane":
+    "Half of the ball, as the other is the same. Opposite points of the rim are one.",
+  "klein-bottle":
+    "The left and the right edge are one. So are top and bottom, one of them turned round.",
 };
 
-/** A number in a few digits, with a true minus sign. */
+/**
+ * A number in a few digits, with a true minus sign.
+ *
+ * @param {number} value
+ * @param {number} [digits]
+ */
 export const figure = (value, digits = 3) => {
   const size = Math.abs(value);
-  const text = size !== 0 && (size < 0.001 || size >= 1e5) ? value.toExponential(digits - 1) : String(Number(value.toPrecision(digits)));
+  const text = size !== 0 && (size < 0.001 || size >= 1e5)
+    ? value.toExponential(digits - 1)
+    : String(Number(value.toPrecision(digits)));
   return text.replaceAll("-", "\u2212");
 };
+/** @param {number} value */
 export const count = (value) => value.toLocaleString("en");
+/** @param {number} share */
 export const percent = (share) => {
   const rest = Math.min(share, 1 - share);
-  return `${rest > 0 && rest < 0.01 ? figure(100 * share, share < 0.5 ? 1 : 3) : Math.round(100 * share)} %`;
+  return `${
+    rest > 0 && rest < 0.01 ? figure(100 * share, share < 0.5 ? 1 : 3) : Math.round(100 * share)
+  } %`;
 };
-/** An angle of a torus' window, from 0 to 1, in its unit. */
+/**
+ * An angle of a torus' window, from 0 to 1, in its unit.
+ *
+ * @param {number} place
+ * @param {string} unit
+ */
 export const angleText = (place, unit) => {
   const turns = place - 0.5;
   if (unit === "degrees") return `${Math.round(360 * turns)}°`.replace("-", "\u2212");
-  return figure(unit === "radians" ? Number((2 * Math.PI * turns).toFixed(2)) : Number(turns.toFixed(3)));
+  return figure(
+    unit === "radians" ? Number((2 * Math.PI * turns).toFixed(2)) : Number(turns.toFixed(3)),
+  );
 };

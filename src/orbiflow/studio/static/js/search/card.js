@@ -2,9 +2,14 @@
 
 import { button, h } from "../dom.js";
 import { paintCard } from "../tiling.js";
-import { STAGES, capital, starText, starWords } from "../words.js";
+import { capital, STAGES, starText, starWords } from "../words.js";
 
-/** A card that can be told to change: {root, update(card, palette), paint()}. */
+/**
+ * A card that can be told to change: {root, update(card, palette), paint()}.
+ *
+ * @param {Project} project
+ * @param {{ more(card: Card): void, remove(card: Card): void }} actions
+ */
 export function cardView(project, actions) {
   const canvas = h("canvas", { "aria-hidden": "true" });
   const stars = h("span", { class: "stars", role: "img" });
@@ -12,14 +17,32 @@ export function cardView(project, actions) {
   const lies = h("span", { class: "lies" });
   const name = h("span", { class: "tag" });
   const stage = h("span", { class: "stage-word" });
-  const link = h("a", { class: "open" }, canvas, h("span", { class: "facts" },
-    h("span", { class: "row" }, stars, word, h("span", { class: "grow" }), stage),
-    h("span", { class: "row" }, lies, h("span", { class: "grow" }), name)));
+  const link = h(
+    "a",
+    { class: "open" },
+    canvas,
+    h(
+      "span",
+      { class: "facts" },
+      h("span", { class: "row" }, stars, word, h("span", { class: "grow" }), stage),
+      h("span", { class: "row" }, lies, h("span", { class: "grow" }), name),
+    ),
+  );
   const more = button("More like this", () => actions.more(shown), { kind: "quiet" });
-  const drop = button("Remove this tile", () => actions.remove(shown), { kind: "quiet icon", image: "bin" });
+  const drop = button("Remove this tile", () => actions.remove(shown), {
+    kind: "quiet icon",
+    image: "bin",
+  });
   const take = h("a", { class: "button quiet" }, "Take away");
-  const root = h("li", { class: "card" }, link, h("div", { class: "row deeds" }, take, more, h("span", { class: "grow" }), drop));
+  const root = h(
+    "li",
+    { class: "card" },
+    link,
+    h("div", { class: "row deeds" }, take, more, h("span", { class: "grow" }), drop),
+  );
+  /** @type {Card | null} */
   let shown = null;
+  /** @type {Palette | null} */
   let palette = null;
   let painted = "";
 
@@ -31,10 +54,14 @@ export function cardView(project, actions) {
     paintCard(canvas, shown, palette, { across: canvas.clientWidth > 480 ? 6 : 4.5 });
   }
 
+  /**
+   * @param {Card} card
+   * @param {Palette} colours
+   */
   function update(card, colours) {
     const anew = !shown || shown.polygon !== card.polygon || palette !== colours;
     [shown, palette] = [card, colours];
-    root.dataset.tile = card.id;
+    root.dataset.tile = String(card.id);
     root.dataset.stage = card.stage;
     root.classList.toggle("rough", card.stage !== "final");
     link.href = `#/p/${project.id}/t/${card.id}`;
@@ -46,7 +73,10 @@ export function cardView(project, actions) {
     name.textContent = card.parent ? `${card.class_name}, pulled` : card.class_name;
     stage.textContent = card.stage === "final" ? "" : STAGES[card.stage] ?? "";
     const about = `${capital(card.word || "a tile")}, ${card.arrangement}`;
-    link.setAttribute("aria-label", `Open: ${about}. ${starWords(card.stars)}. Class ${card.class_name}.`);
+    link.setAttribute(
+      "aria-label",
+      `Open: ${about}. ${starWords(card.stars)}. Class ${card.class_name}.`,
+    );
     more.setAttribute("aria-label", `More like this: ${about}`);
     take.setAttribute("aria-label", `Take away: ${about}`);
     if (anew) paint();

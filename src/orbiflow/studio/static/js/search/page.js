@@ -3,13 +3,27 @@
 import { button, choice, confirmed, h, newest, put, style, toast, trying } from "../dom.js";
 import { better } from "../events.js";
 import { LATE, steering } from "../steering.js";
-import { EFFORTS, EFFORT_TIMES, OBJECTIVES, OBJECTIVE_MEANINGS, STATES, alive, capital, number, sentence } from "../words.js";
+import {
+  alive,
+  capital,
+  EFFORT_TIMES,
+  EFFORTS,
+  number,
+  OBJECTIVE_MEANINGS,
+  OBJECTIVES,
+  sentence,
+  STATES,
+} from "../words.js";
 import { cardView } from "./card.js";
 import { reordered } from "./moving.js";
 
 const NINE = 9; // classes that are searched for every picture
 const REST = 1500; // ms after the last move of the mouse, for which cards stay where they are
 
+/**
+ * @param {HTMLElement} root
+ * @param {Page} page
+ */
 export async function show(root, page) {
   const { project, navigate } = page;
   if (!project.silhouette && !project.tiles.length) {
@@ -23,22 +37,36 @@ export async function show(root, page) {
 }
 
 class SearchPage {
+  /** @param {Page} page */
   constructor({ api, events, project, about }) {
-    Object.assign(this, { api, events, project, about });
+    this.api = api;
+    this.events = events;
+    this.project = project;
+    this.about = about;
     this.place = `projects/${project.id}`;
-    this.wanted = { effort: "normal", objective: "likeness", palette: about.palettes[0].name, ...project.view?.search };
+    this.wanted = {
+      effort: "normal",
+      objective: "likeness",
+      palette: about.palettes[0].name,
+      ...project.view?.search,
+    };
     this.keep = newest(() => api.patch(this.place, { view: { search: this.wanted } }), 400);
     this.views = new Map();
     this.spare = []; // cards that hold a place
     this.touched = -Infinity; // when the mouse last moved over the cards
     this.soon = () => {
       cancelAnimationFrame(this.due);
-      this.due = requestAnimationFrame(() => { this.arrange(); this.tell(); });
+      this.due = requestAnimationFrame(() => {
+        this.arrange();
+        this.tell();
+      });
     };
   }
 
   build(root) {
-    const moved = ({ pointerType }) => { if (pointerType === "mouse") this.touched = performance.now(); };
+    const moved = ({ pointerType }) => {
+      if (pointerType === "mouse") this.touched = performance.now();
+    };
     this.grid = h("ul", { class: "cards", onpointermove: moved });
     this.said = h("p", { class: "state-words", role: "status" });
     this.bar = h("progress", { max: 1, "aria-label": "How far the search is" });
@@ -47,10 +75,26 @@ class SearchPage {
     this.deeds = h("div", { class: "row" }, this.steer.root, this.again);
     this.heading = h("h1", { tabindex: "-1" }, "Tiles");
     this.panel = this.wishes();
-    this.empty = h("div", { class: "lonely stack" }, h("p", { class: "soft" }, "No tiles yet."),
-      h("p", {}, h("a", { href: `#/p/${this.project.id}/picture` }, "Back to the picture")));
-    put(root, h("div", { class: "head" }, h("div", { class: "grow" }, this.heading, this.said), this.colours(), this.deeds),
-      this.bar, this.panel, this.empty, this.grid);
+    this.empty = h(
+      "div",
+      { class: "lonely stack" },
+      h("p", { class: "soft" }, "No tiles yet."),
+      h("p", {}, h("a", { href: `#/p/${this.project.id}/picture` }, "Back to the picture")),
+    );
+    put(
+      root,
+      h(
+        "div",
+        { class: "head" },
+        h("div", { class: "grow" }, this.heading, this.said),
+        this.colours(),
+        this.deeds,
+      ),
+      this.bar,
+      this.panel,
+      this.empty,
+      this.grid,
+    );
     this.watch = new ResizeObserver(() => this.views.forEach((view) => view.paint(false)));
     this.watch.observe(this.grid);
     this.off = ["card", "gone", "refresh", "task"].map((kind) => this.events.on(kind, this.soon));
@@ -69,17 +113,33 @@ class SearchPage {
   wishes() {
     const wish = (label, name, options, meanings) => {
       const meaning = h("p", { class: "soft small" }, meanings[this.wanted[name]]);
-      return h("div", { class: "stack" }, choice(label, options, this.wanted[name], (own) => {
-        this.wanted[name] = own;
-        meaning.textContent = meanings[own] ?? "";
-        this.keep();
-      }), meaning);
+      return h(
+        "div",
+        { class: "stack" },
+        choice(label, options, this.wanted[name], (own) => {
+          this.wanted[name] = own;
+          meaning.textContent = meanings[own] ?? "";
+          this.keep();
+        }),
+        meaning,
+      );
     };
-    return h("details", { class: "panel wishes", open: !this.project.tiles.length },
+    return h(
+      "details",
+      { class: "panel wishes", open: !this.project.tiles.length },
       h("summary", {}, "How to search"),
-      h("div", { class: "wish" },
-        wish("How long", "effort", this.about.efforts.map((own) => [own, EFFORTS[own] ?? own]), EFFORT_TIMES),
-        wish("What counts", "objective", Object.entries(OBJECTIVES), OBJECTIVE_MEANINGS)));
+      h(
+        "div",
+        { class: "wish" },
+        wish(
+          "How long",
+          "effort",
+          this.about.efforts.map((own) => [own, EFFORTS[own] ?? own]),
+          EFFORT_TIMES,
+        ),
+        wish("What counts", "objective", Object.entries(OBJECTIVES), OBJECTIVE_MEANINGS),
+      ),
+    );
   }
 
   get palette() {
@@ -90,13 +150,20 @@ class SearchPage {
   /** The choice of colours. */
   colours() {
     const dots = h("span", { class: "dots", "aria-hidden": "true" });
-    const show = () => put(dots, this.palette.colours.slice(0, 4).map((colour) => h("i", { style: { background: colour } })));
-    const list = h("select", { "aria-label": "Colours", onchange: () => {
-      this.wanted.palette = list.value;
-      show();
-      this.arrange();
-      this.keep();
-    } }, this.about.palettes.map(({ name }) => h("option", { value: name }, capital(name))));
+    const show = () =>
+      put(
+        dots,
+        this.palette.colours.slice(0, 4).map((colour) => h("i", { style: { background: colour } })),
+      );
+    const list = h("select", {
+      "aria-label": "Colours",
+      onchange: () => {
+        this.wanted.palette = list.value;
+        show();
+        this.arrange();
+        this.keep();
+      },
+    }, this.about.palettes.map(({ name }) => h("option", { value: name }, capital(name))));
     list.value = this.palette.name;
     show();
     return h("label", { class: "palette row" }, dots, list);
@@ -111,7 +178,10 @@ class SearchPage {
   start(words, more = {}) {
     const { effort, objective } = this.wanted;
     return trying(async () => {
-      await this.api.post(`${this.place}/tasks`, { operation: "search", settings: { effort, objective, ...more } });
+      await this.api.post(`${this.place}/tasks`, {
+        operation: "search",
+        settings: { effort, objective, ...more },
+      });
       toast(words);
     });
   }
@@ -121,7 +191,13 @@ class SearchPage {
   }
 
   async remove({ id }) {
-    if (!(await confirmed("Remove this tile?", "It will be gone for good. A new search may find it again.", "Remove it"))) return;
+    if (
+      !(await confirmed(
+        "Remove this tile?",
+        "It will be gone for good. A new search may find it again.",
+        "Remove it",
+      ))
+    ) return;
     await trying(() => this.api.remove(`${this.place}/tiles/${id}`));
     this.heading.focus();
   }
@@ -139,7 +215,11 @@ class SearchPage {
     this.offer(task);
   }
 
-  /** Show the buttons that a state has; the focus stays on one of them. */
+  /**
+   * Show the buttons that a state has; the focus stays on one of them.
+   *
+   * @param {Task | undefined} task
+   */
   offer(task) {
     const [busy, held] = [alive(task), this.deeds.contains(document.activeElement)];
     if (task) this.steer.update(task);
@@ -149,7 +229,9 @@ class SearchPage {
     this.busy = this.again.hidden = this.panel.hidden = busy;
     this.steer.root.hidden = !busy;
     if (busy) this.panel.open = false;
-    if (held) this.deeds.querySelector("button:not([hidden], [hidden] *)").focus();
+    /** @type {HTMLButtonElement} */
+    const first = this.deeds.querySelector("button:not([hidden], [hidden] *)");
+    if (held) first.focus();
   }
 
   /** Search again, unless the click was meant for the button that stood here. */
@@ -180,16 +262,27 @@ class SearchPage {
     const { tiles } = this.project;
     const begun = alive(this.task) && !tiles.some(({ stage }) => stage === "final");
     const missing = begun ? Math.max(0, NINE - tiles.length) : 0;
-    while (this.spare.length < missing) this.spare.push(h("li", { class: "card ghost", "aria-hidden": "true" }, h("div", {})));
+    while (this.spare.length < missing) {
+      this.spare.push(h("li", { class: "card ghost", "aria-hidden": "true" }, h("div", {})));
+    }
     return this.spare.slice(0, missing);
   }
 }
 
-/** What there is to say of a search. */
+/**
+ * What there is to say of a search.
+ *
+ * @param {Task | undefined} task
+ * @param {number} tiles
+ */
 function stateWords(task, tiles) {
   if (!task) return "Nothing has been searched yet.";
   if (task.state === "failed") return sentence(task.error);
-  if (task.state === "waiting") return task.place > 0 ? `Waiting: ${number(task.place, "other thing")} to do first.` : "It starts in a moment.";
+  if (task.state === "waiting") {
+    return task.place > 0
+      ? `Waiting: ${number(task.place, "other thing")} to do first.`
+      : "It starts in a moment.";
+  }
   if (task.state === "running") return task.what ? capital(task.what) : "Looking for tiles";
   if (task.state !== "done") return `${STATES[task.state]}.`;
   if (!tiles) return "No tile was found. Smooth the picture a little, or search more thoroughly.";

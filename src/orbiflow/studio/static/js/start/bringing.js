@@ -12,7 +12,11 @@ const hasCamera = () => Boolean(navigator.mediaDevices?.getUserMedia);
 /** A field for files that a button opens. */
 function chooser(label, use, attributes) {
   const box = h("input", {
-    type: "file", class: "unseen", tabindex: "-1", "aria-label": label, ...attributes,
+    type: "file",
+    class: "unseen",
+    tabindex: "-1",
+    "aria-label": label,
+    ...attributes,
     onchange: () => {
       const [file] = box.files;
       box.value = ""; // the same file can be chosen again
@@ -39,18 +43,35 @@ function filled(project) {
 }
 
 export class Bringing {
+  /** @param {Page} page */
   constructor({ api, navigate, about }) {
-    Object.assign(this, { api, navigate, most: about.limits?.bytes ?? Infinity });
+    this.api = api;
+    this.navigate = navigate;
+    this.most = about.limits?.bytes ?? Infinity;
     this.touch = matchMedia("(pointer: coarse)").matches;
-    this.file = chooser("A picture from your computer", (file) => this.take(file), { accept: PICTURES, id: "file" });
-    this.photo = chooser("A photo", (file) => this.take(file), { accept: "image/*", capture: "environment" });
+    this.file = chooser("A picture from your computer", (file) => this.take(file), {
+      accept: PICTURES,
+      id: "file",
+    });
+    this.photo = chooser("A photo", (file) => this.take(file), {
+      accept: "image/*",
+      capture: "environment",
+    });
     this.said = h("div", { class: "told", role: "status" });
     this.saved = chooser("A project file", (file) => this.open(file), { accept: ".orbiflow" });
+    /** @type {Record<string, (event: any) => any>} */
     this.heard = {
-      dragover: (event) => { event.preventDefault(); document.body.classList.add("over"); },
-      dragleave: (event) => { if (!event.relatedTarget) document.body.classList.remove("over"); },
+      dragover: (event) => {
+        event.preventDefault();
+        document.body.classList.add("over");
+      },
+      dragleave: (event) => {
+        if (!event.relatedTarget) document.body.classList.remove("over");
+      },
       drop: (event) => this.dropped(event),
-      paste: ({ clipboardData: { files: [first] } }) => { if (first) this.either(first); },
+      paste: ({ clipboardData: { files: [first] } }) => {
+        if (first) this.either(first);
+      },
     };
     Object.entries(this.heard).forEach(([name, hear]) => document.addEventListener(name, hear));
   }
@@ -81,15 +102,33 @@ export class Bringing {
   }
 
   panel() {
-    return h("div", { class: "drop" },
+    return h(
+      "div",
+      { class: "drop" },
       h("p", { class: "drop-words" }, this.touch ? "Bring a picture" : "Drop a picture here"),
-      h("p", { class: "soft small" }, "One animal, or any other shape, on a plain background works best."),
-      h("div", { class: "row" },
-        button("Choose a picture", () => this.file.click(), { kind: "primary big", image: "upload" }),
-        (this.touch || hasCamera()) && button("Take a photo", () => this.snap(), { image: "camera" }),
+      h(
+        "p",
+        { class: "soft small" },
+        "One animal, or any other shape, on a plain background works best.",
+      ),
+      h(
+        "div",
+        { class: "row" },
+        button("Choose a picture", () => this.file.click(), {
+          kind: "primary big",
+          image: "upload",
+        }),
+        (this.touch || hasCamera()) &&
+          button("Take a photo", () => this.snap(), { image: "camera" }),
         button("Draw a shape", () => this.draw(), { image: "pencil" }),
-        navigator.clipboard?.read && button("Paste", () => this.trying(() => this.paste()), { image: "paste" })),
-      this.said, this.file, this.photo, this.saved);
+        navigator.clipboard?.read &&
+          button("Paste", () => this.trying(() => this.paste()), { image: "paste" }),
+      ),
+      this.said,
+      this.file,
+      this.photo,
+      this.saved,
+    );
   }
 
   /** Make a project of what `send` puts into it, and go and see what was read. */
@@ -126,9 +165,17 @@ export class Bringing {
   take(file) {
     const name = file.name || "picture.png";
     if (file.size > this.most) {
-      return this.tell(`${name} has ${bytes(file.size)}; at most ${bytes(this.most)} can be read. Make it smaller first.`, "error");
+      return this.tell(
+        `${name} has ${bytes(file.size)}; at most ${
+          bytes(this.most)
+        } can be read. Make it smaller first.`,
+        "error",
+      );
     }
-    return this.begin(stem(name), (id) => this.api.put(`projects/${id}/input?name=${encodeURIComponent(name)}`, file));
+    return this.begin(
+      stem(name),
+      (id) => this.api.put(`projects/${id}/input?name=${encodeURIComponent(name)}`, file),
+    );
   }
 
   open(file) {
@@ -142,8 +189,16 @@ export class Bringing {
   /** Begin with a table, or with none yet. */
   count(file) {
     return this.trying(async () => {
-      const { id } = await this.api.post("projects", { kind: "density", name: file ? stem(file.name) : "My table" });
-      if (file) await this.api.put(`projects/${id}/density/table?name=${encodeURIComponent(file.name)}`, file);
+      const { id } = await this.api.post("projects", {
+        kind: "density",
+        name: file ? stem(file.name) : "My table",
+      });
+      if (file) {
+        await this.api.put(
+          `projects/${id}/density/table?name=${encodeURIComponent(file.name)}`,
+          file,
+        );
+      }
       this.navigate(`d/${id}`);
     });
   }

@@ -5,7 +5,11 @@ import { button, dialog, h } from "../dom.js";
 /** Show what the camera sees; resolves with a PNG, or undefined. */
 export async function photograph() {
   const video = h("video", { autoplay: true, playsinline: true, muted: true, class: "seen" });
-  const said = h("p", { class: "soft", role: "status" }, "Hold the animal before a plain background.");
+  const said = h(
+    "p",
+    { class: "soft", role: "status" },
+    "Hold the animal before a plain background.",
+  );
   let stream = null;
   const shot = await dialog("Take a photo", (close) => {
     const shutter = button("Take the photo", () => {
@@ -13,13 +17,21 @@ export async function photograph() {
       canvas.getContext("2d").drawImage(video, 0, 0);
       canvas.toBlob(close, "image/png");
     }, { kind: "primary", image: "camera", disabled: true });
-    video.addEventListener("loadedmetadata", () => { shutter.disabled = false; });
+    video.addEventListener("loadedmetadata", () => {
+      shutter.disabled = false;
+    });
     navigator.mediaDevices.getUserMedia({ video: { width: 1280 } }).then(
-      (found) => { stream = found; video.srcObject = found; },
-      () => { said.textContent = "The camera cannot be used. Allow it in your browser's settings, or choose a picture instead."; },
+      (found) => {
+        stream = found;
+        video.srcObject = found;
+      },
+      () => {
+        said.textContent =
+          "The camera cannot be used. Allow it in your browser's settings, or choose a picture instead.";
+      },
     );
     return h("div", { class: "stack" }, video, said, h("footer", {}, shutter));
   });
-  stream?.getTracks().forEach((track) => track.stop());
+  /** @type {MediaStream | null} */ (stream)?.getTracks().forEach((track) => track.stop());
   return shot;
 }

@@ -1,7 +1,7 @@
 /** Draw a shape: each closed line adds to it or cuts from it. */
 
 import { button, choice, dialog, h } from "../dom.js";
-import { Marks, drawStroke } from "./marks.js";
+import { drawStroke, Marks } from "./marks.js";
 import { pointing } from "./pointing.js";
 
 const SIDE = 1000;
@@ -13,8 +13,13 @@ export function drawn() {
   let stroke = null;
   let cross = null;
   const canvas = h("canvas", {
-    class: "sheet", width: SIDE, height: SIDE, tabindex: "0", role: "application",
-    "aria-label": "Sheet to draw on. With the keyboard: arrow keys move the pen, Space begins and ends a line.",
+    class: "sheet",
+    width: SIDE,
+    height: SIDE,
+    tabindex: "0",
+    role: "application",
+    "aria-label":
+      "Sheet to draw on. With the keyboard: arrow keys move the pen, Space begins and ends a line.",
   });
   const context = canvas.getContext("2d");
 
@@ -26,14 +31,24 @@ export function drawn() {
       context.globalAlpha = 0.35;
       drawStroke(context, stroke, stroke.black ? "#000000" : "#a3241d");
       context.globalAlpha = 1;
-      drawStroke(context, { ...stroke, shape: "brush", size: 4 }, stroke.black ? "#000000" : "#a3241d");
+      drawStroke(
+        context,
+        { ...stroke, shape: "brush", size: 4 },
+        stroke.black ? "#000000" : "#a3241d",
+      );
     }
     if (cross) drawStroke(context, { shape: "brush", size: 14, points: [cross] }, "#0b6b66");
   }
 
   return dialog("Draw a shape", (close) => {
-    const back = button("Undo", () => { marks.undo(); tell(); }, { kind: "quiet", image: "undo" });
-    const again = button("Redo", () => { marks.redo(); tell(); }, { kind: "quiet", image: "redo" });
+    const back = button("Undo", () => {
+      marks.undo();
+      tell();
+    }, { kind: "quiet", image: "undo" });
+    const again = button("Redo", () => {
+      marks.redo();
+      tell();
+    }, { kind: "quiet", image: "redo" });
     const use = button("Use this shape", () => {
       cross = null;
       paint();
@@ -46,22 +61,41 @@ export function drawn() {
       paint();
     };
     pointing(canvas, () => [SIDE, SIDE], {
-      begin(point) { stroke = { shape: "lasso", size: 1, points: [point], black }; paint(); },
-      move(points) { stroke?.points.push(...points); paint(); },
+      begin(point) {
+        stroke = { shape: "lasso", size: 1, points: [point], black };
+        paint();
+      },
+      move(points) {
+        stroke?.points.push(...points);
+        paint();
+      },
       end() {
         if (stroke && stroke.points.length > 2) marks.add(stroke);
         stroke = null;
         tell();
       },
-      hover(point) { cross = canvas.matches(":focus-visible") ? point : null; paint(); },
+      hover(point) {
+        cross = canvas.matches(":focus-visible") ? point : null;
+        paint();
+      },
     });
     tell();
-    return h("div", { class: "stack" },
+    return h(
+      "div",
+      { class: "stack" },
       h("p", { class: "soft" }, "Draw around the animal in one line. It closes when you let go."),
       canvas,
-      h("div", { class: "row" },
-        choice("A line", [[true, "adds", "more"], [false, "cuts away", "cut"]], true, (chosen) => { black = chosen; }, { unseen: true }),
-        h("span", { class: "grow" }), back, again),
-      h("footer", {}, use));
+      h(
+        "div",
+        { class: "row" },
+        choice("A line", [[true, "adds", "more"], [false, "cuts away", "cut"]], true, (chosen) => {
+          black = chosen;
+        }, { unseen: true }),
+        h("span", { class: "grow" }),
+        back,
+        again,
+      ),
+      h("footer", {}, use),
+    );
   });
 }

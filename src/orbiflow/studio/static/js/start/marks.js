@@ -1,10 +1,22 @@
 /** What people paint over a picture: strokes on layers, with undo and redo, as masks to send. */
 
-/** Draw a stroke, {shape: "brush" or "lasso", size, points}, in a colour. */
+/**
+ * Draw a stroke, whose shape is "brush" or "lasso", in a colour.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {{ shape: string, size: number, points: Point[], erases?: boolean }} stroke
+ * @param {string} colour
+ */
 export function drawStroke(context, { shape, size, points, erases }, colour) {
   context.save();
   context.globalCompositeOperation = erases ? "destination-out" : "source-over";
-  Object.assign(context, { strokeStyle: colour, fillStyle: colour, lineWidth: size, lineCap: "round", lineJoin: "round" });
+  Object.assign(context, {
+    strokeStyle: colour,
+    fillStyle: colour,
+    lineWidth: size,
+    lineCap: "round",
+    lineJoin: "round",
+  });
   context.beginPath();
   points.forEach(([x, y]) => context.lineTo(x, y));
   if (shape === "lasso") {
@@ -20,7 +32,11 @@ export function drawStroke(context, { shape, size, points, erases }, colour) {
 /** Layers of strokes of width by height pixels, each over the picture that it began with, if any. */
 export class Marks {
   constructor(width, height) {
-    Object.assign(this, { width, height, strokes: [], undone: [], before: {} });
+    this.width = width;
+    this.height = height;
+    this.strokes = [];
+    this.undone = [];
+    this.before = {};
   }
 
   add(stroke) {
@@ -43,7 +59,9 @@ export class Marks {
 
   /** Forget all strokes, and what the layers began with. */
   clear() {
-    Object.assign(this, { strokes: [], undone: [], before: {} });
+    this.strokes = [];
+    this.undone = [];
+    this.before = {};
   }
 
   /** The strokes that touch a layer. */
@@ -71,7 +89,10 @@ export class Marks {
   }
 
   canvas() {
-    return Object.assign(document.createElement("canvas"), { width: this.width, height: this.height });
+    return Object.assign(document.createElement("canvas"), {
+      width: this.width,
+      height: this.height,
+    });
   }
 
   /** A layer as a canvas; `colour(stroke)`: that of each stroke. */
@@ -96,6 +117,8 @@ export class Marks {
       context.globalCompositeOperation = "destination-over";
       context.fillRect(0, 0, this.width, this.height);
     }
-    return new Promise((resolve) => { painted.toBlob(resolve, "image/png"); });
+    return new Promise((resolve) => {
+      painted.toBlob(resolve, "image/png");
+    });
   }
 }

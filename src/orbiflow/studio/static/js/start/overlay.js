@@ -3,7 +3,13 @@
 import { pathOf } from "../tiling.js";
 import { drawStroke } from "./marks.js";
 
-export const COLOURS = { add: "#0f8f86", remove: "#c2362c", pins: "#3a6fd8", emphasis: "#e09a1b", rub: "#777777" };
+export const COLOURS = {
+  add: "#0f8f86",
+  remove: "#c2362c",
+  pins: "#3a6fd8",
+  emphasis: "#e09a1b",
+  rub: "#777777",
+};
 const EDGE = [[4, "#ffffff"], [2, "#0b6b66"]];
 const BRUSH = [[3, "#ffffff"], [1.5, "#1d1c1a"]];
 
@@ -16,7 +22,14 @@ function lines(context, pairs, pixel, ...path) {
   }
 }
 
-/** Paint the picture, veiled outside of the silhouette. Lengths are in pixels of the picture, `pixel` is one of the screen. */
+/**
+ * Paint the picture, veiled outside of the silhouette. Lengths are in pixels of the picture, `pixel` is one of the screen.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {HTMLImageElement} picture
+ * @param {Silhouette} silhouette
+ * @param {number} pixel
+ */
 export function paintSilhouette(context, picture, silhouette, pixel) {
   const { width, height, outline: ring, left_out: others = [] } = silhouette;
   const outline = pathOf(ring);
@@ -36,23 +49,46 @@ export function paintSilhouette(context, picture, silhouette, pixel) {
   context.setLineDash([]);
 }
 
-/** Paint what is not read yet: strokes, the one that is being drawn, and marks, which are tinted pictures. */
+/**
+ * Paint what is not read yet: strokes, the one that is being drawn, and marks, which are tinted pictures.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {{ marks: any[], fresh: any[], stroke: any, tool: string }} what
+ */
 export function paintStrokes(context, { marks, fresh, stroke, tool }) {
   context.globalAlpha = 0.65;
   marks.forEach((mark) => context.drawImage(mark, 0, 0));
   for (const one of fresh) drawStroke(context, one, COLOURS[one.black ? "remove" : "add"]);
-  if (stroke) drawStroke(context, { ...stroke, erases: false, size: stroke.shape === "lasso" ? 1 : stroke.size }, COLOURS[tool]);
+  if (stroke) {
+    drawStroke(context, {
+      ...stroke,
+      erases: false,
+      size: stroke.shape === "lasso" ? 1 : stroke.size,
+    }, COLOURS[tool]);
+  }
   context.globalAlpha = 1;
 }
 
-/** Paint where the brush is. */
+/**
+ * Paint where the brush is.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {Point} at
+ * @param {number} radius
+ * @param {number} pixel
+ */
 export function paintBrush(context, [x, y], radius, pixel) {
   context.beginPath();
   context.arc(x, y, radius, 0, 7);
   lines(context, BRUSH, pixel);
 }
 
-/** A layer of marks in its colour. */
+/**
+ * A layer of marks in its colour.
+ *
+ * @param {import("./marks.js").Marks} marks
+ * @param {string} layer
+ */
 export function tinted(marks, layer) {
   const own = marks.layer(layer, () => COLOURS[layer]);
   const context = own.getContext("2d");
@@ -62,10 +98,17 @@ export function tinted(marks, layer) {
   return own;
 }
 
-/** Whether a stroke meets a ring. */
+/**
+ * Whether a stroke meets a ring.
+ *
+ * @param {{ points: Point[], size: number }} stroke
+ * @param {Point[]} ring
+ */
 export function touches({ points, size }, ring) {
   const context = document.createElement("canvas").getContext("2d");
   const path = pathOf(ring);
   context.lineWidth = size;
-  return points.some(([x, y]) => context.isPointInPath(path, x, y) || context.isPointInStroke(path, x, y));
+  return points.some(([x, y]) =>
+    context.isPointInPath(path, x, y) || context.isPointInStroke(path, x, y)
+  );
 }

@@ -1,56 +1,127 @@
 /** The first page: bring a picture, take one of ours, or go on with an earlier project. */
 
 import { button, confirmed, h, icon, put, style, trying } from "../dom.js";
-import { Camera, Tiling, paint, sized } from "../tiling.js";
+import { Camera, paint, sized, Tiling } from "../tiling.js";
 import { ago, number } from "../words.js";
 import { Bringing } from "./bringing.js";
 import { sample } from "./sample.js";
 
 const SOME = 24; // projects that are shown at first
 
+/**
+ * @param {HTMLElement} root
+ * @param {Page} page
+ */
 export async function show(root, page) {
   await style("start");
   const bring = new Bringing(page);
   const art = h("canvas", { class: "hero-art", role: "img", "aria-label": "A tiling of lizards" });
   const projects = h("section", { "aria-labelledby": "yours", hidden: true });
   const watch = new ResizeObserver(() => paintSample(art));
-  put(root,
-    h("section", { class: "hero" },
-      h("div", { class: "stack" },
+  put(
+    root,
+    h(
+      "section",
+      { class: "hero" },
+      h(
+        "div",
+        { class: "stack" },
         h("h1", { tabindex: "-1" }, "Turn an animal into a tile"),
-        h("p", { class: "lead soft" }, "Bring a picture. We bend its outline, as little as we can, until copies of it fill the plane without a gap."),
-        bring.panel()),
-      art),
-    h("section", { "aria-labelledby": "ours" }, h("h2", { id: "ours" }, "Or take one of ours"), animals(page.about, bring)),
+        h(
+          "p",
+          { class: "lead soft" },
+          "Bring a picture. We bend its outline, as little as we can, until copies of it fill the plane without a gap.",
+        ),
+        bring.panel(),
+      ),
+      art,
+    ),
+    h(
+      "section",
+      { "aria-labelledby": "ours" },
+      h("h2", { id: "ours" }, "Or take one of ours"),
+      animals(page.about, bring),
+    ),
     projects,
-    h("section", { class: "others" },
+    h(
+      "section",
+      { class: "others" },
       button("Open a project file", () => bring.saved.click(), { image: "open" }),
       button("Numbers instead of animals", () => bring.count(), { kind: "quiet", image: "arrow" }),
-      h("span", { class: "soft small" }, "Angles, directions or axes in a table: see where they crowd.")));
+      h(
+        "span",
+        { class: "soft small" },
+        "Angles, directions or axes in a table: see where they crowd.",
+      ),
+    ),
+  );
   watch.observe(art);
   await trying(() => list(projects, page.api));
-  return () => { watch.disconnect(); bring.close(); };
+  return () => {
+    watch.disconnect();
+    bring.close();
+  };
 }
 
 function paintSample(canvas) {
   const { context, width, height, ratio } = sized(canvas);
   const tiling = new Tiling(sample.card);
-  paint(context, tiling, Camera.fit(tiling, width, height, 5.2), sample.palette, { width, height, ratio, line: 1.4 });
+  paint(context, tiling, Camera.fit(tiling, width, height, 5.2), sample.palette, {
+    width,
+    height,
+    ratio,
+    line: 1.4,
+  });
 }
 
 function animals(about, bring) {
-  return h("ul", { class: "animals" }, about.animals.map((own) =>
-    h("li", {}, h("button", { type: "button", class: "animal", onclick: () => bring.animal(own) },
-      h("img", { src: own.picture, alt: "", loading: "lazy" }), h("span", {}, own.title)))));
+  return h(
+    "ul",
+    { class: "animals" },
+    about.animals.map((own) =>
+      h(
+        "li",
+        {},
+        h(
+          "button",
+          {
+            type: "button",
+            class: "animal",
+            onclick: () => bring.animal(own),
+          },
+          h("img", { src: own.picture, alt: "", loading: "lazy" }),
+          h("span", {}, own.title),
+        ),
+      )
+    ),
+  );
 }
 
 /** Show the projects that there are, newest first; the others when they are asked for. */
 async function list(place, api, most = SOME) {
   const found = await api.get("projects");
   place.hidden = !found.length;
-  put(place, h("h2", { id: "yours", tabindex: "-1" }, "Your projects"), h("ul", { class: "projects" }, found.slice(0, most).map((own) =>
-    h("li", { class: "project" }, link(own), button(`Delete ${own.name}`, () => remove(own, place, api, most), { kind: "quiet icon", image: "bin" })))),
-  found.length > most && button(`Show all ${found.length}`, () => all(place, api), { image: "more" }));
+  put(
+    place,
+    h("h2", { id: "yours", tabindex: "-1" }, "Your projects"),
+    h(
+      "ul",
+      { class: "projects" },
+      found.slice(0, most).map((own) =>
+        h(
+          "li",
+          { class: "project" },
+          link(own),
+          button(`Delete ${own.name}`, () => remove(own, place, api, most), {
+            kind: "quiet icon",
+            image: "bin",
+          }),
+        )
+      ),
+    ),
+    found.length > most &&
+      button(`Show all ${found.length}`, () => all(place, api), { image: "more" }),
+  );
 }
 
 async function all(place, api) {
@@ -60,15 +131,31 @@ async function all(place, api) {
 
 function link({ id, kind, name, thumb, tiles, busy, changed }) {
   const path = kind === "density" ? `d/${id}` : tiles || busy ? `p/${id}` : `p/${id}/picture`;
-  const facts = [kind === "tile" ? number(tiles, "tile") : "a table", busy ? "at work" : ago(changed)];
-  return h("a", { href: `#/${path}` },
-    h("span", { class: "thumb" }, thumb ? h("img", { src: thumb, alt: "", loading: "lazy" }) : icon("picture")),
+  const facts = [
+    kind === "tile" ? number(tiles, "tile") : "a table",
+    busy ? "at work" : ago(changed),
+  ];
+  return h(
+    "a",
+    { href: `#/${path}` },
+    h(
+      "span",
+      { class: "thumb" },
+      thumb ? h("img", { src: thumb, alt: "", loading: "lazy" }) : icon("picture"),
+    ),
     h("span", { class: "project-name" }, name),
-    h("span", { class: "soft small" }, facts.join(" · ")));
+    h("span", { class: "soft small" }, facts.join(" · ")),
+  );
 }
 
 async function remove({ id, name }, place, api, most) {
-  if (!(await confirmed("Delete this project?", `“${name}” and all its tiles will be gone for good.`, "Delete it"))) return;
+  if (
+    !(await confirmed(
+      "Delete this project?",
+      `“${name}” and all its tiles will be gone for good.`,
+      "Delete it",
+    ))
+  ) return;
   await trying(() => api.remove(`projects/${id}`));
   await trying(() => list(place, api, most));
   place.querySelector("h2").focus();

@@ -12,6 +12,10 @@ const LAYERS = ["mend", "pins", "emphasis"];
 const MANY = 6; // parts left out, from which a picture is a photograph with a background
 const KEYS = "With the keyboard: arrow keys move the brush, Space begins and ends a stroke.";
 
+/**
+ * @param {HTMLElement} root
+ * @param {Page} page
+ */
 export async function show(root, page) {
   await style("start");
   const own = new PicturePage(page);
@@ -20,40 +24,74 @@ export async function show(root, page) {
 }
 
 class PicturePage {
+  /** @param {Page} page */
   constructor({ api, events, project, navigate }) {
-    Object.assign(this, { api, events, project, navigate });
+    this.api = api;
+    this.events = events;
+    this.project = project;
+    this.navigate = navigate;
     this.place = `projects/${project.id}`;
     this.pen = { tool: "add", shape: "brush", size: 4 };
     this.marks = new Marks(1, 1);
+    /** @type {HTMLImageElement | undefined} */
+    this.picture = undefined;
+    this.shown = ""; // the address of the picture
     this.tints = new Map(); // the marks in their colours, painted anew when strokes change
     this.known = 0; // strokes that the outline on the screen knows
     this.sent = 0; // strokes that the server has
     this.reading = { threshold: null, invert: null, smooth: 0, thicken: 0, ...project.reading };
-    this.read = newest(async () => this.began(await api.put(`${this.place}/reading`, this.reading)));
-    this.send = Object.fromEntries(LAYERS.map((layer) => [layer, newest(() => this.upload(layer), 200)]));
+    this.read = newest(async () =>
+      this.began(await api.put(`${this.place}/reading`, this.reading))
+    );
+    this.send = Object.fromEntries(
+      LAYERS.map((layer) => [layer, newest(() => this.upload(layer), 200)]),
+    );
   }
 
   build(root) {
     this.canvas = h("canvas", {
-      class: "reading", tabindex: "0", role: "application",
+      class: "reading",
+      tabindex: "0",
+      role: "application",
       "aria-label": `The picture with the outline that was read. ${KEYS}`,
     });
     this.stage = h("div", { class: "stage", hidden: true }, this.canvas);
     this.heading = h("h1", { tabindex: "-1" }, this.title);
     this.said = h("div", { class: "said stack", role: "status" });
-    this.lead = h("p", { class: "soft" }, "The green shape is what we read. If something is missing or too much, mend it here.");
+    this.lead = h(
+      "p",
+      { class: "soft" },
+      "The green shape is what we read. If something is missing or too much, mend it here.",
+    );
     this.find = button("Find tiles", () => this.search(), { kind: "primary big", image: "arrow" });
-    this.back = button("Undo", () => this.changed(this.marks.undo()), { kind: "quiet", image: "undo" });
-    this.again = button("Redo", () => this.changed(this.marks.redo()), { kind: "quiet", image: "redo" });
+    this.back = button("Undo", () => this.changed(this.marks.undo()), {
+      kind: "quiet",
+      image: "undo",
+    });
+    this.again = button("Redo", () => this.changed(this.marks.redo()), {
+      kind: "quiet",
+      image: "redo",
+    });
     const clear = button("Start over", () => this.startOver(), { kind: "quiet", image: "bin" });
     this.controls = readingControls(this.reading, () => this.read());
     this.unread = h("div", { class: "lonely stack", role: "status" });
-    this.side = h("div", { class: "stack side" }, h("div", { class: "go" }, this.find), this.said, this.controls.root,
-      paintingControls(this.pen, () => this.paint(), [this.back, this.again, clear]));
-    put(root, h("div", { class: "picture" },
-      h("div", { class: "stack" },
-        this.heading, this.lead, this.stage, this.unread),
-      this.side));
+    this.side = h(
+      "div",
+      { class: "stack side" },
+      h("div", { class: "go" }, this.find),
+      this.said,
+      this.controls.root,
+      paintingControls(this.pen, () => this.paint(), [this.back, this.again, clear]),
+    );
+    put(
+      root,
+      h(
+        "div",
+        { class: "picture" },
+        h("div", { class: "stack" }, this.heading, this.lead, this.stage, this.unread),
+        this.side,
+      ),
+    );
     this.listen();
     this.ready();
   }
@@ -61,12 +99,21 @@ class PicturePage {
   listen() {
     pointing(this.canvas, () => [this.marks.width, this.marks.height], {
       begin: (point) => this.begin(point),
-      move: (points) => { this.stroke?.points.push(...points); this.paint(); },
+      move: (points) => {
+        this.stroke?.points.push(...points);
+        this.paint();
+      },
       end: () => this.end(),
-      hover: (point) => { this.cross = point; this.paint(); },
+      hover: (point) => {
+        this.cross = point;
+        this.paint();
+      },
     });
     this.keys = (event) => {
-      if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || event.target.type === "text") return;
+      if (
+        !(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" ||
+        event.target.type === "text"
+      ) return;
       event.preventDefault();
       this.changed(event.shiftKey ? this.marks.redo() : this.marks.undo());
     };
@@ -74,7 +121,9 @@ class PicturePage {
     this.watch = new ResizeObserver(() => this.paint());
     this.watch.observe(this.stage);
     const ready = () => this.ready();
-    this.off = [["silhouette", ready], ["refresh", ready], ["task", () => this.tell()]].map(([kind, heard]) => this.events.on(kind, heard));
+    this.off = [["silhouette", ready], ["refresh", ready], ["task", () => this.tell()]].map((
+      [kind, heard],
+    ) => this.events.on(kind, heard));
   }
 
   close() {
@@ -95,10 +144,14 @@ class PicturePage {
       image.src = silhouette.backdrop;
       await trying(() => image.decode());
       [this.picture, this.shown] = [image, silhouette.backdrop];
-      if (this.marks.width !== silhouette.width || this.marks.height !== silhouette.height) await this.fit(silhouette);
+      if (this.marks.width !== silhouette.width || this.marks.height !== silhouette.height) {
+        await this.fit(silhouette);
+      }
     }
     this.known = Math.min(this.sent, this.marks.strokes.length);
-    [this.lead, this.stage, this.side].forEach((part) => { part.hidden = !silhouette; });
+    [this.lead, this.stage, this.side].forEach((part) => {
+      part.hidden = !silhouette;
+    });
     this.unread.hidden = Boolean(silhouette);
     this.heading.textContent = this.title;
     this.tell();
@@ -107,10 +160,14 @@ class PicturePage {
   /** Begin with marks of the picture's size, those that the server has. */
   async fit({ width, height }) {
     this.stage.style.setProperty("--shape", `${width} / ${height}`);
-    this.stage.style.setProperty("--ratio", width / height);
+    this.stage.style.setProperty("--ratio", String(width / height));
     const marks = new Marks(width, height);
     const found = LAYERS.filter((layer) => this.project[layer]);
-    await Promise.all(found.map((layer) => trying(() => marks.load(layer, this.project[layer], { both: layer === "mend" }))));
+    await Promise.all(
+      found.map((layer) =>
+        trying(() => marks.load(layer, this.project[layer], { both: layer === "mend" }))
+      ),
+    );
     this.marks = marks;
   }
 
@@ -122,11 +179,16 @@ class PicturePage {
     context.setTransform(ratio / pixel, 0, 0, ratio / pixel, 0, 0);
     paintSilhouette(context, picture, silhouette, pixel);
     paintStrokes(context, {
-      marks: ["pins", "emphasis"].filter((layer) => marks.has(layer)).map((layer) => this.tint(layer)),
+      marks: ["pins", "emphasis"].filter((layer) => marks.has(layer)).map((layer) =>
+        this.tint(layer)
+      ),
       fresh: marks.strokes.slice(this.known).filter(({ layer }) => layer === "mend"),
-      stroke: this.stroke, tool: pen.tool,
+      stroke: this.stroke,
+      tool: pen.tool,
     });
-    if (this.cross) paintBrush(context, this.cross, pen.shape === "lasso" ? 4 * pixel : this.brush() / 2, pixel);
+    if (this.cross) {
+      paintBrush(context, this.cross, pen.shape === "lasso" ? 4 * pixel : this.brush() / 2, pixel);
+    }
   }
 
   tint(layer) {
@@ -142,7 +204,14 @@ class PicturePage {
   begin(point) {
     const { tool, shape } = this.pen;
     const layer = { add: "mend", remove: "mend", rub: "all" }[tool] ?? tool;
-    this.stroke = { layer, shape, size: this.brush(), points: [point], black: tool === "remove", erases: tool === "rub" };
+    this.stroke = {
+      layer,
+      shape,
+      size: this.brush(),
+      points: [point],
+      black: tool === "remove",
+      erases: tool === "rub",
+    };
     this.paint();
   }
 
@@ -150,7 +219,10 @@ class PicturePage {
     const { stroke } = this;
     this.stroke = null;
     if (!stroke || (stroke.shape === "lasso" && stroke.points.length < 3)) return this.paint();
-    if (["pins", "emphasis"].includes(stroke.layer) && !touches(stroke, this.project.silhouette.outline)) {
+    if (
+      ["pins", "emphasis"].includes(stroke.layer) &&
+      !touches(stroke, this.project.silhouette.outline)
+    ) {
       toast("Paint on the animal itself: that is outside of it.");
       return this.paint();
     }
@@ -163,15 +235,19 @@ class PicturePage {
     if (!stroke) return;
     this.tints.clear();
     this.known = Math.min(this.known, this.marks.strokes.length);
-    LAYERS.filter((layer) => stroke.layer === layer || (stroke.erases && this.marks.has(layer))).forEach((layer) => this.send[layer]());
+    LAYERS.filter((layer) => stroke.layer === layer || (stroke.erases && this.marks.has(layer)))
+      .forEach((layer) => this.send[layer]());
     this.tell();
   }
 
   async upload(layer) {
     const count = this.marks.strokes.length;
     const address = `${this.place}/${layer}`;
-    if (this.marks.has(layer)) this.began(await this.api.put(address, await this.marks.png(layer, { clear: layer === "mend" })));
-    else this.began(await this.api.remove(address));
+    if (this.marks.has(layer)) {
+      this.began(
+        await this.api.put(address, await this.marks.png(layer, { clear: layer === "mend" })),
+      );
+    } else this.began(await this.api.remove(address));
     if (layer === "mend") this.sent = count;
   }
 
@@ -186,7 +262,9 @@ class PicturePage {
 
   /** Take note of a reading that has begun, if its events have not told of it already. */
   began({ task }) {
-    if (task && !this.project.tasks.some(({ id }) => id === task.id)) this.events.apply("task", task);
+    if (task && !this.project.tasks.some(({ id }) => id === task.id)) {
+      this.events.apply("task", task);
+    }
     this.tell();
   }
 
@@ -203,12 +281,30 @@ class PicturePage {
     this.again.disabled = !marks.undone.length;
     this.canvas.setAttribute("aria-busy", String(Boolean(busy)));
     this.paint();
-    const told = JSON.stringify([busy, task?.state, task?.error, this.project.tasks.some(alive), silhouette && { ...silhouette, outline: null }]);
+    const told = JSON.stringify([
+      busy,
+      task?.state,
+      task?.error,
+      this.project.tasks.some(alive),
+      silhouette && { ...silhouette, outline: null },
+    ]);
     if (told === this.told) return; // what is open stays open
     this.told = told;
-    const error = !busy && task?.state === "failed" && h("p", { class: "error" }, sentence(task.error));
-    if (silhouette) put(this.said, busy && h("p", { class: "soft" }, "Reading it again …"), error, notes(silhouette, this.controls.grow));
-    else put(this.unread, ...(this.project.tasks.some(alive) ? [h("p", { class: "soft" }, "Reading the picture …")] : this.nothing(error)));
+    const error = !busy && task?.state === "failed" &&
+      h("p", { class: "error" }, sentence(task.error));
+    if (silhouette) {
+      put(
+        this.said,
+        busy && h("p", { class: "soft" }, "Reading it again …"),
+        error,
+        notes(silhouette, this.controls.grow),
+      );
+    } else {put(
+        this.unread,
+        ...(this.project.tasks.some(alive)
+          ? [h("p", { class: "soft" }, "Reading the picture …")]
+          : this.nothing(error)),
+      );}
   }
 
   /** What is shown if there is no silhouette, and none to come. */
@@ -217,7 +313,10 @@ class PicturePage {
       if (!this.project.tiles.length) await this.api.remove(this.place);
       this.navigate("");
     };
-    return [error || h("p", { class: "soft" }, "There is no picture yet."), h("p", {}, button("Choose another picture", () => trying(leave), { kind: "primary" }))];
+    return [
+      error || h("p", { class: "soft" }, "There is no picture yet."),
+      h("p", {}, button("Choose another picture", () => trying(leave), { kind: "primary" })),
+    ];
   }
 
   /** Search for tiles of what is on the screen: first all of it must have been read. */
@@ -227,15 +326,25 @@ class PicturePage {
       await Promise.all([this.read, ...Object.values(this.send)].map((pending) => pending.done()));
       await this.settled();
       const { objective = "likeness", effort = "normal" } = this.project.view?.search ?? {};
-      await this.api.post(`${this.place}/tasks`, { operation: "search", settings: { objective, effort } });
+      await this.api.post(`${this.place}/tasks`, {
+        operation: "search",
+        settings: { objective, effort },
+      });
       this.navigate(`p/${this.project.id}`);
-    }).then(() => { this.searching = this.find.disabled = false; });
+    }).then(() => {
+      this.searching = this.find.disabled = false;
+    });
   }
 
   /** Resolves when nothing is being read. */
   settled() {
     return new Promise((resolve) => {
-      const check = () => { if (!alive(this.task)) { stop(); resolve(); } };
+      const check = () => {
+        if (!alive(this.task)) {
+          stop();
+          resolve();
+        }
+      };
       const stop = this.events.on("task", check);
       check();
     });
@@ -245,11 +354,40 @@ class PicturePage {
 /** What there is to say of a silhouette; `grow` makes thin parts thicker. */
 function notes({ doubts, notes: said, left_out: others = [] }, grow) {
   const out = others.length;
-  return h("ul", { class: "notes stack" },
-    doubts.map((text) => h("li", { class: "notice stack" }, sentence(text),
-      text.includes("(Thin parts)") && button("Make thin parts thicker", () => grow(text.includes("thread") ? 0.1 : 0.04), { kind: "quiet" }))),
-    out > 0 && h("li", {}, h("span", { class: "swatch" }), `${number(out, "part is", "parts are")} left out: a tile is one piece. `, out < MANY
-      ? `Paint a bridge with “Add” to keep ${out === 1 ? "it" : "them"}.`
-      : "A busy photograph? Draw round the head first: choose “Add” and the lasso. Then “Remove” what is too much."),
-    said.length > 0 && h("li", {}, h("details", {}, h("summary", {}, "How it was read"), h("p", { class: "soft" }, said.map(sentence).join(" ")))));
+  return h(
+    "ul",
+    { class: "notes stack" },
+    doubts.map((text) =>
+      h(
+        "li",
+        { class: "notice stack" },
+        sentence(text),
+        text.includes("(Thin parts)") &&
+          button("Make thin parts thicker", () => grow(text.includes("thread") ? 0.1 : 0.04), {
+            kind: "quiet",
+          }),
+      )
+    ),
+    out > 0 &&
+      h(
+        "li",
+        {},
+        h("span", { class: "swatch" }),
+        `${number(out, "part is", "parts are")} left out: a tile is one piece. `,
+        out < MANY
+          ? `Paint a bridge with “Add” to keep ${out === 1 ? "it" : "them"}.`
+          : "A busy photograph? Draw round the head first: choose “Add” and the lasso. Then “Remove” what is too much.",
+      ),
+    said.length > 0 &&
+      h(
+        "li",
+        {},
+        h(
+          "details",
+          {},
+          h("summary", {}, "How it was read"),
+          h("p", { class: "soft" }, said.map(sentence).join(" ")),
+        ),
+      ),
+  );
 }

@@ -37,7 +37,10 @@ const PLAIN = {
 
 const SHARED = { neighbour: "neighbours differ", aspect: "those that lie alike", one: "all" };
 
-const plain = (words) => ({ ...Object.fromEntries(Object.entries(PLAIN).map(([name, title]) => [name, { title }])), ...words });
+const plain = (words) => ({
+  ...Object.fromEntries(Object.entries(PLAIN).map(([name, title]) => [name, { title }])),
+  ...words,
+});
 
 export const KINDS = {
   export: {
@@ -51,21 +54,62 @@ export const KINDS = {
         title: "What is it for?",
         about: "This sets everything else so that it suits.",
         options: {
-          laser: "Laser cutter", print: "Poster or mug", paper: "Figure in a text", web: "Web page", plotter: "Pen plotter",
-          template: "Template to trace by hand", colouring: "Colouring page", stickers: "Stickers",
+          laser: "Laser cutter",
+          print: "Poster or mug",
+          paper: "Figure in a text",
+          web: "Web page",
+          plotter: "Pen plotter",
+          template: "Template to trace by hand",
+          colouring: "Colouring page",
+          stickers: "Stickers",
         },
       },
-      format: { about: "", title: "Kind of file", usual: "What suits it", options: { svg: "SVG", pdf: "PDF", dxf: "DXF", png: "PNG", json: "JSON (numbers)" } },
+      format: {
+        about: "",
+        title: "Kind of file",
+        usual: "What suits it",
+        options: { svg: "SVG", pdf: "PDF", dxf: "DXF", png: "PNG", json: "JSON (numbers)" },
+      },
       tile_size: { title: "How long is one tile?" },
-      area: { title: "How large is the page?", about: "Such as A4, letter, mug, phone or 300x200mm.", some: ["A4", "A4-landscape", "A3", "A3-landscape", "letter", "letter-landscape", "mug", "phone"] },
-      clip: { title: "Fill the page to its edge", about: "Tiles at the edge are cut. Otherwise only whole tiles are on the page." },
+      area: {
+        title: "How large is the page?",
+        about: "Such as A4, letter, mug, phone or 300x200mm.",
+        some: [
+          "A4",
+          "A4-landscape",
+          "A3",
+          "A3-landscape",
+          "letter",
+          "letter-landscape",
+          "mug",
+          "phone",
+        ],
+      },
+      clip: {
+        title: "Fill the page to its edge",
+        about: "Tiles at the edge are cut. Otherwise only whole tiles are on the page.",
+      },
       palette: {
         about: "",
         title: "Colours",
-        not: { purpose: ["laser", "plotter", "template", "colouring"], cut: ["skeleton", "jigsaw", "template"], filled: [false] },
+        not: {
+          purpose: ["laser", "plotter", "template", "colouring"],
+          cut: ["skeleton", "jigsaw", "template"],
+          filled: [false],
+        },
       },
       colour: { about: "", title: "Which tiles share a colour", options: SHARED },
-      cut: { title: "What is drawn", about: "", options: { none: "every tile, filled", skeleton: "each line once", pieces: "tiles apart", jigsaw: "a jigsaw", template: "one tile, by hand" } },
+      cut: {
+        title: "What is drawn",
+        about: "",
+        options: {
+          none: "every tile, filled",
+          skeleton: "each line once",
+          pieces: "tiles apart",
+          jigsaw: "a jigsaw",
+          template: "one tile, by hand",
+        },
+      },
     }),
   },
   art: {
@@ -74,7 +118,10 @@ export const KINDS = {
     first: ["area", "tile_size", "palette", "colour"],
     words: plain({
       stretch: { title: "How much it may be stretched" },
-      area: { title: "Width x height", about: "Pixels such as 3000x2000px, a size such as 300x200mm, or A4, square or story." },
+      area: {
+        title: "Width x height",
+        about: "Pixels such as 3000x2000px, a size such as 300x200mm, or A4, square or story.",
+      },
       tile_size: { title: "How long is one tile?" },
       palette: { about: "", title: "Colours" },
       colour: { about: "", title: "Which tiles share a colour", options: SHARED },
@@ -87,9 +134,24 @@ export const KINDS = {
     first: ["kind", "tile_size", "height", "format"],
     words: plain({
       tray_border: { title: "Edge of the tray" },
-      kind: { about: "", title: "What kind of thing?", options: { tile: "Tile", cutter: "Cookie cutter", stamp: "Stamp", mould: "Mould", puzzle: "Puzzle in a tray" } },
+      kind: {
+        about: "",
+        title: "What kind of thing?",
+        options: {
+          tile: "Tile",
+          cutter: "Cookie cutter",
+          stamp: "Stamp",
+          mould: "Mould",
+          puzzle: "Puzzle in a tray",
+        },
+      },
       tile_size: { title: "How long is one tile?" },
-      format: { about: "", title: "Kind of file", usual: "What suits it", options: { stl: "STL", "3mf": "3MF" } },
+      format: {
+        about: "",
+        title: "Kind of file",
+        usual: "What suits it",
+        options: { stl: "STL", "3mf": "3MF" },
+      },
     }),
   },
   animate: {
@@ -97,13 +159,30 @@ export const KINDS = {
     image: "film",
     first: ["kind", "seconds", "area", "palette", "format"],
     words: plain({
-      kind: { about: "", title: "What happens?", options: { morph: "a plain tiling becomes animals", bend: "the animal bends into the tile", grow: "the tiling grows" } },
+      kind: {
+        about: "",
+        title: "What happens?",
+        options: {
+          morph: "a plain tiling becomes animals",
+          bend: "the animal bends into the tile",
+          grow: "the tiling grows",
+        },
+      },
       seconds: { title: "How long?" },
-      area: { title: "Width x height", about: "Pixels such as 800x534px, or square or story, as posts and clips have it.", some: ["800x534px", "square", "story"] },
+      area: {
+        title: "Width x height",
+        about: "Pixels such as 800x534px, or square or story, as posts and clips have it.",
+        some: ["800x534px", "square", "story"],
+      },
       tile_size: { title: "How long is one tile?" },
       colour: { about: "", title: "Which tiles share a colour", options: SHARED },
       palette: { about: "", title: "Colours" },
-      format: { about: "", title: "Kind of file", usual: "What suits it", options: { gif: "GIF", mp4: "MP4", svg: "SVG" } },
+      format: {
+        about: "",
+        title: "Kind of file",
+        usual: "What suits it",
+        options: { gif: "GIF", mp4: "MP4", svg: "SVG" },
+      },
     }),
   },
 };
@@ -125,7 +204,9 @@ const OWN = "My own colours";
  */
 export function colours({ view }, { palettes }) {
   const { palette: name, custom } = view?.closeup?.look ?? {};
-  const found = [name, view?.search?.palette].map((wanted) => palettes.find((own) => own.name === wanted));
+  const found = [name, view?.search?.palette].map((wanted) =>
+    palettes.find((own) => own.name === wanted)
+  );
   const palette = found.find(Boolean) ?? palettes[0];
   const options = Object.fromEntries(palettes.map((own) => [own.name, undefined]));
   if (name !== "own" || !custom) return { palette, value: palette.name, options };

@@ -5,7 +5,7 @@ import { form } from "../forms.js";
 import { paintCard } from "../tiling.js";
 import { LATE } from "../steering.js";
 import { alive } from "../words.js";
-import { KINDS, colours, lengthIn } from "./kinds.js";
+import { colours, KINDS, lengthIn } from "./kinds.js";
 import { isMade, madeBefore, picture, words } from "./made.js";
 import { trueSize } from "./truesize.js";
 
@@ -13,6 +13,10 @@ const DRAWN = ["export", "art"]; // what a drawing or the picture can be laid on
 const NEVER = ["tile", "result", "out", "force", "picture", "drawing", "eyes"]; // what the page itself sets, or drawings hold
 const PICTURES = ["png", "jpg", "jpeg", "webp", "svg"];
 
+/**
+ * @param {HTMLElement} root
+ * @param {Page} page
+ */
 export async function show(root, page) {
   const card = page.project.tiles.find(({ id }) => id === page.tileId);
   if (!card) throw new Error("This tile is not there any more.");
@@ -24,19 +28,33 @@ export async function show(root, page) {
 }
 
 class TakeawayPage {
+  /**
+   * @param {Page} page
+   * @param {Card} card
+   */
   constructor({ api, events, project, navigate, about }, card) {
-    Object.assign(this, { api, events, project, navigate, card });
+    this.api = api;
+    this.events = events;
+    this.project = project;
+    this.navigate = navigate;
+    this.card = card;
     this.place = `projects/${project.id}`;
     this.colours = colours(project, about);
     this.schemas = new Map();
     this.task = null; // the one whose result is shown
     this.stale = false; // whether settings were changed since
     this.busy = false;
+    this.turned = -Infinity; // when the button last changed its meaning
   }
 
   build(root) {
     const section = (kind, id, title, ...parts) =>
-      h("section", { class: `stack ${kind}`, "aria-labelledby": id }, h("h2", { id }, title), parts);
+      h(
+        "section",
+        { class: `stack ${kind}`, "aria-labelledby": id },
+        h("h2", { id }, title),
+        parts,
+      );
     this.canvas = h("canvas", { role: "img", "aria-label": `A tiling: ${this.card.arrangement}` });
     this.shown = h("div", { class: "preview" }, this.canvas);
     this.said = h("div", { class: "stack said", role: "status" });
@@ -46,15 +64,50 @@ class TakeawayPage {
     this.earlier = section("earlier", "earlier", "Made before", this.before);
     this.wishes = h("div", { class: "stack" });
     this.make = button("Make it", () => trying(() => this.press()), { kind: "primary big" });
-    const kinds = choice("What shall it be?", Object.entries(KINDS).map(([key, { title, image }]) => [key, title, image]), "export",
-      (kind) => trying(() => this.choose(kind)));
-    put(root, h("h1", { tabindex: "-1" }, "Take it away"), h("div", { class: "take" },
-      h("div", { class: "stack" }, this.shown, this.said, this.real, this.earlier),
-      h("div", { class: "stack side" },
-        h("section", { class: "panel stack wishes" }, kinds, this.wishes, h("div", { class: "go" }, this.make)),
-        section("panel whole", "whole", "The whole project",
-          h("p", { class: "soft small" }, "One file with the picture and all tiles. It opens again here, and from Python."),
-          h("a", { class: "button", href: `api/${this.place}/file`, download: true }, icon("download"), "Save the project")))));
+    /** @type {[string, string, any][]} */
+    const kindChoices = Object.entries(KINDS).map(([key, { title, image }]) => [key, title, image]);
+    const kinds = choice(
+      "What shall it be?",
+      kindChoices,
+      "export",
+      (kind) => trying(() => this.choose(kind)),
+    );
+    put(
+      root,
+      h("h1", { tabindex: "-1" }, "Take it away"),
+      h(
+        "div",
+        { class: "take" },
+        h("div", { class: "stack" }, this.shown, this.said, this.real, this.earlier),
+        h(
+          "div",
+          { class: "stack side" },
+          h(
+            "section",
+            { class: "panel stack wishes" },
+            kinds,
+            this.wishes,
+            h("div", { class: "go" }, this.make),
+          ),
+          section(
+            "panel whole",
+            "whole",
+            "The whole project",
+            h(
+              "p",
+              { class: "soft small" },
+              "One file with the picture and all tiles. It opens again here, and from Python.",
+            ),
+            h(
+              "a",
+              { class: "button", href: `api/${this.place}/file`, download: true },
+              icon("download"),
+              "Save the project",
+            ),
+          ),
+        ),
+      ),
+    );
     this.listen();
   }
 
@@ -62,8 +115,12 @@ class TakeawayPage {
     this.watch = new ResizeObserver(() => this.paint());
     this.watch.observe(this.shown);
     const tell = () => this.tell();
-    const gone = ({ tile }) => { if (tile === this.card.id) this.navigate(`p/${this.project.id}`); };
-    this.off = [["task", tell], ["refresh", tell], ["gone", gone]].map(([kind, heard]) => this.events.on(kind, heard));
+    const gone = ({ tile }) => {
+      if (tile === this.card.id) this.navigate(`p/${this.project.id}`);
+    };
+    this.off = [["task", tell], ["refresh", tell], ["gone", gone]].map(([kind, heard]) =>
+      this.events.on(kind, heard)
+    );
   }
 
   close() {
@@ -72,13 +129,17 @@ class TakeawayPage {
   }
 
   paint() {
-    if (this.canvas.clientWidth) paintCard(this.canvas, this.card, this.colours.palette, { across: 6 });
+    if (this.canvas.clientWidth) {
+      paintCard(this.canvas, this.card, this.colours.palette, { across: 6 });
+    }
   }
 
   /** Show the settings of another kind of thing. */
   async choose(kind) {
     this.kind = kind;
-    if (!this.schemas.has(kind)) this.schemas.set(kind, await this.api.get(`operations/${kind}/schema`));
+    if (!this.schemas.has(kind)) {
+      this.schemas.set(kind, await this.api.get(`operations/${kind}/schema`));
+    }
     if (this.kind !== kind) return;
     const schema = structuredClone(this.schemas.get(kind));
     const { palette } = schema.properties;
@@ -86,10 +147,17 @@ class TakeawayPage {
     if (palette) palette.enum = Object.keys(options);
     const { first, words: names } = KINDS[kind];
     this.form = form(schema, {
-      first, words: { ...names, palette: { ...names.palette, options } }, hidden: NEVER, start: { ...KINDS[kind].start, ...(palette && { palette: value }) },
+      first,
+      words: { ...names, palette: { ...names.palette, options } },
+      hidden: NEVER,
+      start: { ...KINDS[kind].start, ...(palette && { palette: value }) },
     }, () => this.changed());
     this.layers = this.laidOn(kind);
-    put(this.wishes, this.layers.map(({ box, text }) => h("label", { class: "check" }, box, text)), this.form);
+    put(
+      this.wishes,
+      this.layers.map(({ box, text }) => h("label", { class: "check" }, box, text)),
+      this.form,
+    );
     this.task = null;
     this.changed();
     this.tell();
@@ -98,10 +166,15 @@ class TakeawayPage {
   /** What can be laid on the tiles: {name, box, text} of each. */
   laidOn(kind) {
     const { strokes, eyes } = this.project.view?.drawing ?? {};
-    const layer = (name, text, checked) => ({ name, text, box: h("input", { type: "checkbox", checked, onchange: () => this.changed() }) });
+    const layer = (name, text, checked) => ({
+      name,
+      text,
+      box: h("input", { type: "checkbox", checked, onchange: () => this.changed() }),
+    });
     return [
       (strokes?.length || eyes?.length) && layer("drawing", "With what you drew on it", true),
-      PICTURES.includes(this.project.input?.type) && layer("picture", "With your picture on each tile, in its own colours", false),
+      PICTURES.includes(this.project.input?.type) &&
+      layer("picture", "With your picture on each tile, in its own colours", false),
     ].filter((own) => own && DRAWN.includes(kind));
   }
 
@@ -124,7 +197,8 @@ class TakeawayPage {
     const layers = this.layers.filter(({ box }) => box.checked).map(({ name }) => [name, true]);
     const settings = { tile: this.card.id, ...Object.fromEntries(layers), ...this.form.values() };
     try {
-      this.task = (await this.api.post(`${this.place}/tasks`, { operation: this.kind, settings })).task;
+      this.task =
+        (await this.api.post(`${this.place}/tasks`, { operation: this.kind, settings })).task;
     } catch (error) {
       if (this.form.refuse(error.setting, error.message)) return;
       throw error;

@@ -11,9 +11,14 @@ const ROOM = 150; // pixels of a tile beside whose circle there is room for word
 
 export const pixels = () => Number(localStorage.getItem(KEY)) || USUAL;
 
-/** The corners of a polygon's hull, in order. */
+/**
+ * The corners of a polygon's hull, in order.
+ *
+ * @param {Point[]} polygon
+ */
 function hull(polygon) {
   const half = (points) => {
+    /** @type {Point[]} */
     const found = [];
     for (const [x, y] of points) {
       const turns = ([a, b], [c, d]) => (c - a) * (y - b) - (d - b) * (x - a) > 0;
@@ -27,8 +32,11 @@ function hull(polygon) {
 }
 
 /**
- * The smallest rectangle of any direction around a polygon, by which files measure a tile: {long, short, corners}.
+ * The smallest rectangle of any direction around a polygon, by which files measure a tile.
  * It lies along a side of the hull. Of the same area, the shortest.
+ *
+ * @param {Point[]} polygon
+ * @returns {{ long: number, short: number, corners: Point[] }}
  */
 export function smallest(polygon) {
   const ring = hull(polygon);
@@ -38,14 +46,29 @@ export function smallest(polygon) {
     const [u, v] = [(p - x) / far, (q - y) / far];
     const along = ring.map(([a, b]) => a * u + b * v);
     const across = ring.map(([a, b]) => b * u - a * v);
-    const [left, right, low, high] = [Math.min(...along), Math.max(...along), Math.min(...across), Math.max(...across)];
-    const corners = [[left, low], [right, low], [right, high], [left, high]].map(([a, b]) => [a * u - b * v, a * v + b * u]);
+    const [left, right, low, high] = [
+      Math.min(...along),
+      Math.max(...along),
+      Math.min(...across),
+      Math.max(...across),
+    ];
+    /** @type {(a: number, b: number) => Point} */
+    const corner = (a, b) => [a * u - b * v, a * v + b * u];
+    const corners = [
+      corner(left, low),
+      corner(right, low),
+      corner(right, high),
+      corner(left, high),
+    ];
     const [short, long] = [right - left, high - low].sort((a, b) => a - b);
     return { short, long, corners };
   });
   const area = ({ short, long }) => short * long;
   const least = Math.min(...found.map(area));
-  return found.filter((own) => area(own) <= least * (1 + 1e-6)).reduce((best, own) => (own.long < best.long ? own : best));
+  return found.filter((own) => area(own) <= least * (1 + 1e-6)).reduce((
+    best,
+    own,
+  ) => (own.long < best.long ? own : best));
 }
 
 /** The least coordinates and the sides of the upright box around points: [left, top, width, height]. */
@@ -59,7 +82,11 @@ function upright(points) {
 function markNeck(context, [x, y], words, wide, look) {
   const left = x > wide / 2;
   const at = [x + (left ? -1 : 1) * (NECK + 6), y];
-  Object.assign(context, { font: "600 13px system-ui, sans-serif", textAlign: left ? "right" : "left", textBaseline: "middle" });
+  Object.assign(context, {
+    font: "600 13px system-ui, sans-serif",
+    textAlign: left ? "right" : "left",
+    textBaseline: "middle",
+  });
   context.setLineDash([]);
   for (const [colour, width] of [[look("--surface"), 5], [look("--ink"), 2]]) {
     Object.assign(context, { strokeStyle: colour, fillStyle: colour, lineWidth: width });
@@ -72,7 +99,11 @@ function markNeck(context, [x, y], words, wide, look) {
   }
 }
 
-/** A view of a card's tile: {root, show(size in mm, the width in mm below which a neck is told)}. */
+/**
+ * A view of a card's tile: {root, show(size in mm, the width in mm below which a neck is told)}.
+ *
+ * @param {Card} card
+ */
 export function trueSize({ polygon, y_down: yDown, neck = null }) {
   const canvas = h("canvas", { class: "true-tile", role: "img" });
   const said = h("p", { class: "soft small" });
@@ -80,12 +111,33 @@ export function trueSize({ polygon, y_down: yDown, neck = null }) {
   const card = h("div", { class: "bank-card", "aria-hidden": "true" }, h("span", {}, "bank card"));
   const { long, short, corners } = smallest(polygon);
   let [size, least] = [40, 0];
-  const fit = slider("Make this as large as a bank card held to the screen", { min: 2, max: 9, step: 0.01, value: pixels(), said: (value) => `${Math.round((value / USUAL) * 100)} %` }, (value) => {
-    localStorage.setItem(KEY, value);
+  const fit = slider("Make this as large as a bank card held to the screen", {
+    min: 2,
+    max: 9,
+    step: 0.01,
+    value: pixels(),
+    said: (value) => `${Math.round((value / USUAL) * 100)} %`,
+  }, (value) => {
+    localStorage.setItem(KEY, String(value));
     draw();
   });
-  const tools = h("div", { class: "stack", hidden: true }, card, fit, h("div", { class: "row" }, button("That fits", () => { tools.hidden = true; }, {})));
-  const measure = button("Measure my screen", () => { tools.hidden = !tools.hidden; draw(); }, { kind: "quiet" });
+  const tools = h(
+    "div",
+    { class: "stack", hidden: true },
+    card,
+    fit,
+    h(
+      "div",
+      { class: "row" },
+      button("That fits", () => {
+        tools.hidden = true;
+      }, {}),
+    ),
+  );
+  const measure = button("Measure my screen", () => {
+    tools.hidden = !tools.hidden;
+    draw();
+  }, { kind: "quiet" });
 
   function draw() {
     const scale = pixels();
@@ -94,13 +146,22 @@ export function trueSize({ polygon, y_down: yDown, neck = null }) {
     const [left, top, wide, high] = upright([...polygon, ...corners]);
     const unit = (size * scale) / long;
     const ratio = globalThis.devicePixelRatio || 1;
-    const [width, height] = [wide * unit + 4, high * unit + 4].map((side) => Math.min(side, 4000 / ratio));
+    const [width, height] = [wide * unit + 4, high * unit + 4].map((side) =>
+      Math.min(side, 4000 / ratio)
+    );
     Object.assign(canvas, { width: width * ratio, height: height * ratio });
     canvas.style.setProperty("width", `${width}px`);
     canvas.style.setProperty("height", `${height}px`);
     const context = canvas.getContext("2d");
     const flip = yDown ? 1 : -1;
-    context.setTransform(unit * ratio, 0, 0, flip * unit * ratio, (2 - left * unit) * ratio, (2 - (yDown ? top : -(top + high)) * unit) * ratio);
+    context.setTransform(
+      unit * ratio,
+      0,
+      0,
+      flip * unit * ratio,
+      (2 - left * unit) * ratio,
+      (2 - (yDown ? top : -(top + high)) * unit) * ratio,
+    );
     const look = getComputedStyle(canvas);
     context.strokeStyle = look.color;
     context.lineWidth = 1.5 / unit;
@@ -112,23 +173,59 @@ export function trueSize({ polygon, y_down: yDown, neck = null }) {
     context.setLineDash([4 / unit, 4 / unit]);
     context.lineWidth = 1 / unit;
     context.stroke(pathOf(corners));
-    if (neck) tellNeck(context, context.getTransform(), unit, ratio, width);
-    const [length, across, lying, standing] = [long, short, ...upright(polygon).slice(2)].map((side) => ((side * size) / long).toFixed(1));
-    canvas.setAttribute("aria-label", `The tile in its true size, ${lying} by ${standing} mm as it lies, in a rectangle of ${length} by ${across} mm`);
-    said.textContent = `${lying} × ${standing} mm as it lies; the smallest rectangle around it has ${length} × ${across} mm. ${localStorage.getItem(KEY) ? "Your screen is measured." : "Screens differ: measure yours once."}`;
+    if (neck) tellNeck(context, context.getTransform(), ratio, width);
+    const [length, across, lying, standing] = [long, short, ...upright(polygon).slice(2)].map((
+      side,
+    ) => ((side * size) / long).toFixed(1));
+    canvas.setAttribute(
+      "aria-label",
+      `The tile in its true size, ${lying} by ${standing} mm as it lies, in a rectangle of ${length} by ${across} mm`,
+    );
+    said.textContent =
+      `${lying} × ${standing} mm as it lies; the smallest rectangle around it has ${length} × ${across} mm. ${
+        localStorage.getItem(KEY)
+          ? "Your screen is measured."
+          : "Screens differ: measure yours once."
+      }`;
   }
 
-  function tellNeck(context, at, unit, ratio, wide) {
+  function tellNeck(context, at, ratio, wide) {
     const [[a, b], [c, d]] = neck;
     const words = `${((Math.hypot(c - a, d - b) * size) / long).toFixed(1)} mm`;
     const narrow = parseFloat(words) < least;
     const { x, y } = at.transformPoint({ x: (a + c) / 2, y: (b + d) / 2 });
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    markNeck(context, [x / ratio, y / ratio], words, wide, (name) => getComputedStyle(canvas).getPropertyValue(narrow && name === "--ink" ? "--bad" : name));
+    markNeck(
+      context,
+      [x / ratio, y / ratio],
+      words,
+      wide,
+      (name) =>
+        getComputedStyle(canvas).getPropertyValue(narrow && name === "--ink" ? "--bad" : name),
+    );
     thin.classList.toggle("notice", narrow);
-    thin.textContent = `Its thinnest part, in the circle, is ${words} wide.${narrow ? " It may break there: choose a longer tile." : ""}`;
+    thin.textContent = `Its thinnest part, in the circle, is ${words} wide.${
+      narrow ? " It may break there: choose a longer tile." : ""
+    }`;
   }
   const root = h("div", { class: "stack" });
-  put(root, h("div", { class: "true-place", tabindex: "0", role: "group", "aria-label": "The tile in its true size" }, canvas), thin, h("div", { class: "row" }, said, h("span", { class: "grow" }), measure), tools);
-  return { root, show(millimetres, limit = 0) { [size, least] = [millimetres, limit]; draw(); } };
+  put(
+    root,
+    h("div", {
+      class: "true-place",
+      tabindex: "0",
+      role: "group",
+      "aria-label": "The tile in its true size",
+    }, canvas),
+    thin,
+    h("div", { class: "row" }, said, h("span", { class: "grow" }), measure),
+    tools,
+  );
+  return {
+    root,
+    show(millimetres, limit = 0) {
+      [size, least] = [millimetres, limit];
+      draw();
+    },
+  };
 }
