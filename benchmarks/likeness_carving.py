@@ -3,7 +3,7 @@
     python benchmarks/likeness_carving.py [--picture FILE.png] [NAME ...]
 
 For each silhouette of data/likeness_shapes.json the best tile of the classes IH4, IH5 and IH6 at effort
-fast, as bending leaves it and then carved: the foretold marks, and by how many radians the silhouette
+fast, as bending leaves it and then carved: the predicted marks, and by how many radians the silhouette
 and the tiles turn in all. The picture shows the silhouette in blue and both tiles.
 """
 

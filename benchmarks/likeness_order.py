@@ -106,7 +106,7 @@ def print_orders(found: list[Marked], *, fitted: bool) -> None:
 
 
 def fitted_weights(found: list[Marked]) -> Ring:
-    """The weights of losses that foretell marks best, less each silhouette's mean."""
+    """The weights of losses that predict marks best, less each silhouette's mean."""
     losses = np.concatenate([one.losses - one.losses.mean(axis=0) for one in found])
     return nnls(-losses, np.concatenate([one.marks - one.marks.mean() for one in found]))[0]
 
@@ -154,8 +154,8 @@ class Ranked:
         self.marks = np.array([tile["marks"] for tile in ours])
         self.others = np.array([tile["places"] for tile in tiles if tile["method"] != "ours"])
 
-    def foretold(self, left_out: list[int]) -> Ring:
-        """The marks (N,) that the order foretells without some of its measures."""
+    def predicted(self, left_out: list[int]) -> Ring:
+        """The marks (N,) that the order predicts without some of its measures."""
         marks = np.array([own.mark for own in self.kept])
         return marks + self.losses[:, left_out].sum(axis=1)
 
@@ -175,7 +175,7 @@ def ranks() -> None:
     print(f"{'':22}correlation  place of our first  its mark  preferred to EST and ARAP")
     orders = {"the order": []} | {f"without `{name}`": [at] for name, at in LATER.items()}
     for label, left_out in (orders | {"without these three": list(LATER.values())}).items():
-        marks = [own.foretold(left_out) for own in found]
+        marks = [own.predicted(left_out) for own in found]
         both = list(zip(marks, found, strict=True))
         rank = np.mean([spearmanr(-own, one.places.mean(axis=1)).statistic for own, one in both])
         rows = [one.chosen(int(own.argmax()), slice(0, 2)) for own, one in both]

@@ -85,9 +85,7 @@ def run_in_node(program: str, given: Any) -> Any:
     return json.loads(done.stdout)
 
 
-CASES = [
-    (name, lattice) for name in ("IH1", "IH6", "IH21") for lattice in (True, False)
-]
+CASES = [(name, lattice) for name in ("IH1", "IH6", "IH21") for lattice in (True, False)]
 
 
 @pytest.fixture(scope="module", name="told")

@@ -1,14 +1,11 @@
 """The narrowest places of polygons, and how much of their outline is hair."""
 
-import time
-
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from awkward import NOT_SIMPLE, USELESS
-from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import rotation_matrix
 from orbiflow.tiles import (
@@ -17,12 +14,11 @@ from orbiflow.tiles import (
     narrowest_slit,
     resampled,
     ring_length,
-    signed_area,
     slit_share,
 )
 from orbiflow.tiles.likeness import least_neck
 from orbiflow.tiles.likeness.necks import MIN_OUTLINE, POINT_SPACING
-from outlines import ANIMALS, SHAPES, animal, bar, comb, disc, dumbbell, slit_square, star
+from outlines import ANIMALS, SHAPES, animal, bar, comb, dumbbell, slit_square, star
 
 widths = st.floats(0.005, 0.2)
 

@@ -206,11 +206,7 @@ def test_colours_behind_full_transparency_are_hinted_at() -> None:
 
 @pytest.mark.parametrize(
     ("mode", "kind", "size", "orientation"),
-    [
-        ("L", "JPEG", (8000, 6000), 6),
-        ("1", "PNG", (8000, 6000), 1),
-        ("P", "GIF", (6500, 6500), 1),
-    ],
+    [("L", "JPEG", (8000, 6000), 6), ("1", "PNG", (8000, 6000), 1), ("P", "GIF", (6500, 6500), 1)],
 )
 def test_pictures_of_telephones_are_shrunk_and_said(
     mode: str, kind: str, size: tuple[int, int], orientation: int
@@ -223,10 +219,7 @@ def test_pictures_of_telephones_are_shrunk_and_said(
     options = {"exif": exif} if kind != "GIF" else {}
     reading = read(saved(image.convert(mode), kind, **options))
     shape = SHAPE * scale
-    turned = {
-        1: shape,
-        6: np.stack([size[1] - shape[:, 1], shape[:, 0]], axis=1),
-    }[orientation]
+    turned = {1: shape, 6: np.stack([size[1] - shape[:, 1], shape[:, 0]], axis=1)}[orientation]
     assert reading.size == (size if orientation == 1 else size[::-1])
     assert "megapixels: 2 x 2 pixels became one" in reading.notes[0]
     assert iou(reading.outline, turned) > 0.995
