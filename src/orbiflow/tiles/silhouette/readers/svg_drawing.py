@@ -12,28 +12,34 @@ from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.reading import Source, read_bytes
 from orbiflow.tiles.silhouette.readers.svg_clips import Clips, window_clip
 from orbiflow.tiles.silhouette.readers.svg_css import Style, Styles
-from orbiflow.tiles.silhouette.readers.svg_markers import Markers
+from orbiflow.tiles.silhouette.readers.svg_paths import corners
 from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
 from orbiflow.tiles.silhouette.readers.svg_shapes import (
+    MARKED,
     SHAPES,
     BadElement,
     DrawnShape,
     Place,
     bounds_of,
+    mapped,
     path_tokens,
     shape_paths,
     view_box,
     view_matrix,
 )
-from orbiflow.tiles.silhouette.readers.svg_transforms import (
+from orbiflow.tiles.silhouette.readers.svg_values import (
+    KEYWORDS,
     MAX_TRANSFORM,
     NotATransform,
+    angle,
+    as_number,
+    colour_of,
     origin_of,
+    quantity,
     shift,
     single_transforms,
     transform_matrix,
 )
-from orbiflow.tiles.silhouette.readers.svg_values import as_number, colour_of
 from orbiflow.tiles.silhouette.readers.svg_xml import MAX_DEPTH, Notes, is_own, parse_xml, reference
 
 MAX_BYTES = 16 * 2**20
@@ -80,7 +86,7 @@ class Drawing:
         for item in self.root.iter():
             if is_own(item) and (key := item.get("id")):
                 self.by_id.setdefault(key, item)
-        self.clips, self.markers = Clips(self), Markers(self)
+        self.clips = Clips(self)
         try:
             self._read()
         except BadElement as exc:
@@ -337,7 +343,61 @@ class Drawing:
             path_length=own if own >= 0 else None,
             decorates=place.decorates,
         )
-        return self.markers.around(element, drawn, place)
+        return self._with_markers(element, drawn, place)
+
+    def _with_markers(self, element: Element, shape: DrawnShape, place: Place) -> list[DrawnShape]:
+        """Return a shape and its markers, in the order in which they are painted."""
+        if element.tag not in MARKED or place.style.get("visibility", "visible") != "visible":
+            return [shape]
+        named: dict[str, Element] = {}
+        for key in ("start", "mid", "end"):
+            text = place.style.get(f"marker-{key}", "none")
+            found = self.referred(text, f"marker-{key}") if text != "none" else None
+            if found is not None and found.tag == "marker":
+                named[key] = found
+        drawn = [
+            one
+            for key, (x, y), turn in corners(
+                shape.paths if named else [], np.linalg.inv(place.matrix)
+            )
+            if key in named
+            for one in self._marker(named[key], shape, place.moved(shift(x, y)), turn, key)
+        ]
+        order = place.style.get("paint-order", "").split()
+        return [*drawn, shape] if order[:1] == ["markers"] else [shape, *drawn]
+
+    def _marker(
+        self, marker: Element, shape: DrawnShape, place: Place, turn: float, key: str
+    ) -> list[DrawnShape]:
+        """Return what one marker shows with its reference point at the origin of a place."""
+        orient = marker.get("orient", "0").strip()
+        if not orient.startswith("auto"):
+            turn = angle(orient) or 0.0
+        elif orient == "auto-start-reverse" and key == "start":
+            turn += np.pi
+        scale = 1.0 if marker.get("markerUnits") == "userSpaceOnUse" else shape.width
+        x, y = scale * np.cos(turn), scale * np.sin(turn)
+        inner = place.moved(np.array([[x, -y, 0.0], [y, x, 0.0], [0, 0, 1.0]]))
+        context = place.style.get("fill", "#000000"), place.style.get("stroke", "none")
+        inner = replace(inner, context=context, decorates=True)
+        inner = inner.styled(self.styles.standing(marker))
+        if np.linalg.det(inner.matrix) == 0:
+            return []
+        box = view_box(marker)
+        size = replace(inner, viewport=box[2:] if box else inner.viewport)
+        sides = [(name, marker.get(name)) for name in ("markerWidth", "markerHeight")]
+        width, height = (size.length(marker, name, text, 3.0) for name, text in sides)
+        whole = box or (0.0, 0.0, width, height)
+        at: list[float] = []
+        for k, name in enumerate(("refX", "refY")):
+            text = (marker.get(name) or "0").strip()
+            if text in KEYWORDS:
+                at.append(whole[k] + as_number(KEYWORDS[text], 0.0) * whole[2 + k])
+            else:
+                at.append(size.length(marker, name, text if quantity(text) else "0"))
+        frame = (0.0, 0.0, width, height)
+        x, y = -mapped(view_matrix(marker, frame)[0], np.array([at]))[0]
+        return self.viewport(marker, (x, y, width, height), inner)
 
     def _own_box(self, element: Element, place: Place) -> Window:
         """Return the box of what an element holds, in the units of a place, without counting it."""

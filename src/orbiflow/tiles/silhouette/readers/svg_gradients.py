@@ -20,14 +20,15 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
     mapped,
     unit_box_matrix,
 )
-from orbiflow.tiles.silhouette.readers.svg_transforms import can_transform, transform_matrix
 from orbiflow.tiles.silhouette.readers.svg_values import (
     CURRENT,
     Brush,
     as_number,
+    can_transform,
     colour_of,
     length,
     mean_colour,
+    transform_matrix,
 )
 from orbiflow.tiles.silhouette.readers.svg_xml import reference
 

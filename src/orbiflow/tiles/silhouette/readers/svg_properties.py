@@ -3,8 +3,7 @@
 import re
 from collections.abc import Callable
 
-from orbiflow.tiles.silhouette.readers.svg_transforms import can_transform
-from orbiflow.tiles.silhouette.readers.svg_values import NUMBER, colour_of, quantity
+from orbiflow.tiles.silhouette.readers.svg_values import NUMBER, can_transform, colour_of, quantity
 
 WIDE = {"inherit", "initial", "unset", "revert", "revert-layer"}  # values of every property
 MAX_VALUE = 20_000  # characters

@@ -20,10 +20,9 @@ from orbiflow.tiles.geometry import complex_points
 from orbiflow.tiles.silhouette.outlines import MAX_COORDINATE
 from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
 from orbiflow.tiles.silhouette.readers.svg_gradients import Gradient, gradient_of, references
-from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, TooManyPoints, fill
+from orbiflow.tiles.silhouette.readers.svg_paths import Line, SubPath, TooManyPoints, fill, stroked
 from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
 from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, DrawnShape, Group
-from orbiflow.tiles.silhouette.readers.svg_strokes import Line, stroked
 from orbiflow.tiles.silhouette.readers.svg_values import (
     CURRENT,
     Brush,
@@ -161,8 +160,7 @@ class Regions:
         back = np.linalg.inv(linear).T
         lines: list[Line] = []
         for points, path in self.lines(shape, STROKE_REFINEMENT):
-            ends = np.array([path.start, *(curve.end for curve in path.curves)])
-            corners = np.isin(complex_points(points), complex_points(ends))
+            corners = np.isin(complex_points(points), complex_points(path.ends))
             lines.append(Line((points - offset) @ back, corners, path.closed))
         region = stroked(lines, shape)
         return shapely.transform(region, lambda points: points @ linear.T + offset)

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element
 
@@ -13,11 +13,11 @@ from orbiflow.arrays import Array, Window
 from orbiflow.tiles.silhouette.outlines import MAX_COORDINATE
 from orbiflow.tiles.silhouette.readers.svg_css import Style
 from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, sub_paths
-from orbiflow.tiles.silhouette.readers.svg_transforms import shift
 from orbiflow.tiles.silhouette.readers.svg_values import (
     FONT_SIZE,
     as_number,
     length,
+    shift,
     without_font_units,
 )
 
@@ -25,9 +25,8 @@ MAX_DASHES = 1000  # lengths in one pattern
 BOX_FLATNESS = 1e-4  # of the size of a shape: how exact its bounding box is
 SHAPES = {"path", "line", "rect", "circle", "ellipse", "polygon", "polyline"}
 MARKED = {"path", "line", "polygon", "polyline"}
-_BAD_VALUE = (ValueError, TypeError, IndexError, AttributeError, ZeroDivisionError, OverflowError)
+BAD_VALUE = (ValueError, TypeError, IndexError, AttributeError, ZeroDivisionError, OverflowError)
 _TOKEN = re.compile(r"[A-Za-z]|\.?\d+")
-Number = Callable[..., float]  # the length that an attribute is, or the usual one
 
 
 class BadElement(Exception):
@@ -150,8 +149,8 @@ def shape_paths(element: Element, place: Place) -> list[SubPath]:
     """Return the sub-paths of an element in the drawing's user units; none of what has no size."""
     try:
         shape = _shape(element, place)
-        return [] if shape is None else sub_paths(svgelements.Path(shape), place.matrix[:2])
-    except _BAD_VALUE as exc:
+        return [] if shape is None else sub_paths(shape, place.matrix)
+    except BAD_VALUE as exc:
         raise BadElement(element, "its geometry cannot be read; redraw or delete it") from exc
 
 
@@ -168,35 +167,31 @@ def _shape(element: Element, place: Place) -> svgelements.Shape | None:
         return place.length(element, key, text, usual)
 
     if tag == "line":
-        ends = {key: number(key) for key in ("x1", "y1", "x2", "y2")}
-        return svgelements.SimpleLine(_written(ends))
-    if tag == "rect":
-        return _rectangle({key: number(key) for key in ("x", "y", "width", "height")}, number)
-    middle = {key: number(key) for key in ("cx", "cy")}
+        return svgelements.SimpleLine(*map(number, ("x1", "y1", "x2", "y2")))
     if tag == "circle":
-        radius = number("r")
-        return svgelements.Circle(_written({**middle, "r": radius})) if radius > 0 else None
-    rx, ry = _radii(number)
-    size = {"rx": rx, "ry": ry}
-    return svgelements.Ellipse(_written({**middle, **size})) if rx > 0 and ry > 0 else None
-
-
-def _rectangle(box: dict[str, float], number: Number) -> svgelements.Shape | None:
-    if not (box["width"] > 0 and box["height"] > 0):
-        return None
-    rx, ry = _radii(number)
-    rounded = {"rx": min(rx, box["width"] / 2), "ry": min(ry, box["height"] / 2)}
-    return svgelements.Rect(_written({**box, **(rounded if rx > 0 and ry > 0 else {})}))
-
-
-def _radii(number: Number) -> tuple[float, float]:
-    """Return rx and ry, each of which is the other where it is not given."""
+        return ellipse(number("cx"), number("cy"), number("r"), number("r"))
     rx, ry = number("rx", -1.0), number("ry", -1.0)
-    return (rx if rx >= 0 else max(ry, 0.0)), (ry if ry >= 0 else max(rx, 0.0))
+    # each is the other where it is not given
+    rx, ry = (rx if rx >= 0 else max(ry, 0.0)), (ry if ry >= 0 else max(rx, 0.0))
+    if tag == "ellipse":
+        return ellipse(number("cx"), number("cy"), rx, ry)
+    x, y, width, height = map(number, ("x", "y", "width", "height"))
+    return rectangle(x, y, width, height, rx, ry)
 
 
-def _written(values: dict[str, float]) -> dict[str, str]:
-    return {key: f"{value!r}" for key, value in values.items()}
+def ellipse(x: float, y: float, rx: float, ry: float) -> svgelements.Shape | None:
+    """Return an ellipse by its middle and radii, if it has a size."""
+    return svgelements.Ellipse(x, y, rx, ry) if rx > 0 and ry > 0 else None
+
+
+def rectangle(
+    x: float, y: float, width: float, height: float, rx: float = 0.0, ry: float = 0.0
+) -> svgelements.Shape | None:
+    """Return a rectangle with round corners, if it has a size."""
+    if not (width > 0 and height > 0):
+        return None
+    corner = (min(rx, width / 2), min(ry, height / 2)) if rx > 0 and ry > 0 else ()
+    return svgelements.Rect(x, y, width, height, *corner)
 
 
 def bounds_of(shapes: Iterable[DrawnShape], matrix: Array) -> Window | None:

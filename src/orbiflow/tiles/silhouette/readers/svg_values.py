@@ -1,17 +1,18 @@
-"""Numbers, lengths, angles and colours as SVG and CSS write them."""
+"""Numbers, lengths, angles, colours and transforms as SVG and CSS write them."""
 
 import math
 import re
+from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import tinycss2.color4
+from svgelements import Matrix
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import rgb
 
-PIXELS_PER_INCH = 96
 MAX_NUMBER = 1e9  # the largest width or opacity that is believed
 FONT_SIZE = 16.0  # pixels, by default
 _PIXELS = {
@@ -161,3 +162,117 @@ def _hexadecimal(channels: Array) -> str:
         raise ValueError
     red, green, blue = (channels.clip(0, 1) * 255).round().astype(int)
     return f"#{red:02x}{green:02x}{blue:02x}"
+
+
+MAX_TRANSFORM = 2000  # characters
+_CALL = re.compile(r"\s*,?\s*([a-zA-Z0-9]+)\s*\(([^()]*)\)")
+_ARGUMENT = re.compile(rf"\s*,?\s*({NUMBER}(?:[a-z]+|%)?)", re.IGNORECASE)
+# a list of transforms as SVG's attributes write it: six names with plain numbers
+_ATTRIBUTE = re.compile(
+    r"(?:[\s,]*(?:matrix|translate|scale|rotate|skewX|skewY)\s*\([-+.,\s\deE]*\))*[\s,]*"
+)
+KEYWORDS = {"left": "0%", "top": "0%", "center": "50%", "right": "100%", "bottom": "100%"}
+_Size = tuple[float, float]  # what percentages refer to
+
+
+class NotATransform(ValueError):
+    """The text is no list of transforms in the plane."""
+
+
+def transform_matrix(text: str, size: _Size, *, css: bool = False) -> Array:
+    """Return the matrix of a list of transforms such as "translate(10,20) rotate(30deg)".
+
+    Percentages are those of `size`. With `css` units are needed, as in a style. Raises `NotATransform`.
+    """
+    if len(text) > MAX_TRANSFORM or _CALL.sub("", text).strip(" \t\r\n,"):
+        raise NotATransform(text[:60])
+    matrix = np.eye(3)
+    for name, arguments in _CALL.findall(text):
+        if _ARGUMENT.sub("", arguments).strip():
+            raise NotATransform(text)
+        words: list[str] = _ARGUMENT.findall(arguments)
+        kinds, counts, make = _RULES.get(name.lower(), ("", (), Matrix))
+        if len(words) not in counts or (css and kinds == "axy" and len(words) == 3):
+            raise NotATransform(name)
+        values = (_value(kind, word, size, css) for kind, word in zip(kinds, words, strict=False))
+        made = make(*values)
+        matrix = matrix @ [[made.a, made.c, made.e], [made.b, made.d, made.f], [0, 0, 1]]
+    return matrix
+
+
+def can_transform(text: str, *, css: bool) -> bool:
+    """Return whether a text is a list of plane transforms as CSS or an attribute of SVG writes it."""
+    if not css and _ATTRIBUTE.fullmatch(text) is None:
+        return False
+    try:
+        transform_matrix(text, (1.0, 1.0), css=css)
+    except NotATransform:
+        return False
+    return True
+
+
+def origin_of(text: str, size: _Size) -> _Size:
+    """Return the point that a `transform-origin` names, relative to the corner of its box."""
+    words = text.replace(",", " ").lower().split()[:2]
+    if len(words) == 1:
+        words = ["center", words[0]] if words[0] in ("top", "bottom") else [words[0], "center"]
+    if words and (words[0] in ("top", "bottom") or words[1] in ("left", "right")):
+        words = words[::-1]
+    found = [length(KEYWORDS.get(word, word), own) for word, own in zip(words, size, strict=False)]
+    if len(found) < 2 or found[0] is None or found[1] is None:
+        raise NotATransform(text)
+    return found[0], found[1]
+
+
+def single_transforms(translate: str, rotate: str, scale: str, size: _Size) -> Array:
+    """Return the matrix of the properties `translate`, `rotate` and `scale` of CSS; "none" is none."""
+    calls = {"translate": translate.split()[:2], "rotate": [rotate], "scale": scale.split()[:2]}
+    given = {name: ",".join(words) for name, words in calls.items() if words != ["none"]}
+    return transform_matrix(
+        "".join(f"{name}({text})" for name, text in given.items()), size, css=True
+    )
+
+
+def shift(x: float, y: float = 0.0) -> Array:
+    """Return the matrix that moves by (x, y)."""
+    return np.array([[1.0, 0.0, x], [0.0, 1.0, y], [0.0, 0.0, 1.0]])
+
+
+def _value(kind: str, word: str, size: _Size, css: bool) -> float:
+    """Return an argument: a plain number or a share "n", an angle "a", or a length along "x" or "y"."""
+    found = quantity(word)
+    number, unit = found or (0.0, "")
+    if kind == "n":
+        value = {"": number, "%": number / 100}.get(unit)
+    elif kind == "a":
+        value = angle(word)
+    else:
+        # in sizes of the font: checked before that is known
+        value = 0.0 if unit in FONT_UNITS else length(word, size[kind == "y"])
+    if found is None or value is None or (css and kind != "n" and not unit and number):
+        raise NotATransform(word)
+    return value
+
+
+def _rotated(turn: float, x: float = 0.0, y: float = 0.0) -> Matrix:
+    made = Matrix()
+    made.post_rotate(turn, x, y)
+    return made
+
+
+_RULES: dict[str, tuple[str, tuple[int, ...], Callable[..., Matrix]]] = {
+    "matrix": ("nnnnnn", (6,), Matrix),
+    "translate": ("xy", (1, 2), Matrix.translate),
+    "translatex": ("x", (1,), Matrix.translate_x),
+    "translatey": ("y", (1,), Matrix.translate_y),
+    "translate3d": ("xy", (3,), Matrix.translate),
+    "scale": ("nn", (1, 2), Matrix.scale),
+    "scalex": ("n", (1,), Matrix.scale_x),
+    "scaley": ("n", (1,), Matrix.scale_y),
+    "rotate": ("axy", (1, 3), _rotated),
+    "rotatez": ("a", (1,), _rotated),
+    "skew": ("aa", (1, 2), Matrix.skew),
+    "skewx": ("a", (1,), Matrix.skew_x),
+    "skewy": ("a", (1,), Matrix.skew_y),
+}
+"""The kinds of each transform's arguments, how many it may have, and what makes its matrix of them."""
