@@ -18,10 +18,9 @@ from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.silhouette.readers.frames import CARD_NOTE, without_card, without_frame
 from orbiflow.tiles.silhouette.readers.image_files import MAX_PIXELS, check_size, decoded_image
 from orbiflow.tiles.silhouette.readers.label_masks import label_mask
-from orbiflow.tiles.silhouette.readers.outline_drawings import outline_drawing
 from orbiflow.tiles.silhouette.readers.photographs import is_photograph, shape_in, threshold_of
 from orbiflow.tiles.silhouette.readers.reading import FileContent, Reading, Source
-from orbiflow.tiles.silhouette.readers.tracing import Level, trace
+from orbiflow.tiles.silhouette.readers.tracing import Level, middle_of_line, trace
 
 MAX_SIDE = 1500  # pixels; beyond this an image is averaged down before it is traced
 MAX_SIDE_OF_PHOTOGRAPH = 1000  # pixels, in the same way
@@ -84,8 +83,8 @@ def _traced(
         raise OrbiflowError(f"threshold must lie between 0 and 1, got {threshold}")
     level, notes = choose_shape(path, picture, threshold, invert)
     is_given = threshold is not None or picture.name == "photograph"
-    if (drawn := outline_drawing(level, is_given=is_given)) is not None:
-        level, width = drawn.level, drawn.width * picture.reduced
+    if (drawn := middle_of_line(level, is_given=is_given)) is not None:
+        level, width = drawn[0], drawn[1] * picture.reduced
         notes.append(
             f"an outline drawing: took the middle of its line, which is {width:.2g} pixels wide"
         )
