@@ -26,14 +26,8 @@ FULL_SCALES = (255.0, 1023.0, 4095.0, 16383.0, 65535.0)  # of 8, 10, 12, 14 and 
 STRIP_ROWS = 256  # rows of the shrunk image that are made at once
 MIN_COLOURS = 10  # of 255: a palette whose colours differ less shows nothing
 _STARTS = {
-    **{
-        b"\x89PNG\r\n\x1a\n": "PNG",
-        b"\xff\xd8\xff": "JPEG",
-        b"BM": "BMP",
-        b"GIF87a": "GIF",
-        b"GIF89a": "GIF",
-    },
-    **{b"II*\0": "TIFF", b"MM\0*": "big-endian TIFF"},
+    **{b"\x89PNG\r\n\x1a\n": "PNG", b"\xff\xd8\xff": "JPEG", b"BM": "BMP"},
+    **{b"GIF87a": "GIF", b"GIF89a": "GIF", b"II*\0": "TIFF", b"MM\0*": "big-endian TIFF"},
 }
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
 # What Pillow raises on a damaged file depends on the format.
@@ -41,10 +35,8 @@ _DAMAGED = (
     *(OSError, SyntaxError, ValueError, EOFError, KeyError, IndexError, TypeError),
     *(OverflowError, MemoryError, ArithmeticError, Image.DecompressionBombError),
 )
-_PNG_SCALES = {
-    "L;2": 85,
-    "L;4": 17,
-}  # by which Pillow scales these levels, but not the transparent one
+# by which Pillow scales these levels, but not the transparent one
+_PNG_SCALES = {"L;2": 85, "L;4": 17}
 # by EXIF orientation
 _TURNS = {
     2: Image.Transpose.FLIP_LEFT_RIGHT,
@@ -118,7 +110,15 @@ def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
     except PermissionError as exc:
         raise InputFileError(f"{path}: cannot be read; check its permissions") from exc
     except UnidentifiedImageError as exc:
-        raise InputFileError(f"{path}: {_unidentified(path)}") from exc
+        kind = image_kind(read_head(path, 12))
+        named = f"{kind} image".strip()
+        why = f"the {named} is damaged or cut short, or it is none; give a PNG, JPEG or WebP image"
+        if "TIFF" in kind:
+            why = (
+                "this kind of TIFF image (such as colours of floating-point numbers) is not read, or "
+                "it is damaged; save it as PNG"
+            )
+        raise InputFileError(f"{path}: {why}") from exc
     except _DAMAGED as exc:
         kind = image_kind(read_head(path, 12))
         raise InputFileError(
@@ -129,17 +129,6 @@ def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
 def _stream(path: Source) -> io.BytesIO:
     """Return a file's bytes: some TIFFs that are turned Pillow misreads where it is given a path."""
     return io.BytesIO(read_bytes(path, MAX_BYTES))
-
-
-def _unidentified(path: Source) -> str:
-    kind = image_kind(read_head(path, 12))
-    if "TIFF" in kind:
-        return (
-            "this kind of TIFF image (such as colours of floating-point numbers) is not read, or it is "
-            "damaged; save it as PNG"
-        )
-    named = f"{kind} image".strip()
-    return f"the {named} is damaged or cut short, or it is none; give a PNG, JPEG or WebP image"
 
 
 def check_size(path: Source, size: tuple[int, int], most: int = MAX_PIXELS_READ) -> None:
@@ -166,11 +155,8 @@ def _first_shown(path: Source, file: Any, enough: int | None) -> DecodedImage:
         pixels += file.width * file.height
         if first is not None and pixels > MAX_PIXELS_READ:
             break
-        which = (
-            "the first frame"
-            if number == 0
-            else f"frame {number + 1}, the first that shows anything,"
-        )
+        other = f"frame {number + 1}, the first that shows anything,"
+        which = other if number else "the first frame"
         notes = [f"took {which} of {n_frames}"] * (n_frames > 1)
         found = _frame(path, file, enough, notes)
         if n_frames == 1 or _shows_anything(found.image):

@@ -29,8 +29,6 @@ MIN_TRANSPARENT = 0.005  # of the picture: less, such as rounded corners, cuts n
 MIN_CONTRAST = 0.04  # of full scale, between the shape's and the background's usual level
 # channels that say by themselves where the shape is: their high part and their low part
 _PARTS = {"alpha": ("opaque", "transparent"), "mask": ("marked", "unmarked")}
-_WHOLLY_TRANSPARENT = "the image is wholly transparent; there is no shape in it"
-_PLAIN = "cut it out, photograph it on a plain ground of another colour, or set a threshold"
 
 
 @dataclass(frozen=True)
@@ -117,7 +115,10 @@ def _photograph(path: Source, image: Image.Image, notes: Sequence[str]) -> Pictu
         return None
     channel = shape_in(rgb)
     if not (channel > 0.5).any():
-        raise InputFileError(f"{path}: no shape stands out in the photograph; {_PLAIN}")
+        raise InputFileError(
+            f"{path}: no shape stands out in the photograph; cut it out, photograph it on a plain "
+            "ground of another colour, or set a threshold"
+        )
     return Picture(channel, "photograph", image.size, reduced, (*notes, *averaging))
 
 
@@ -128,23 +129,17 @@ def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, str, list[s
     alpha = image.getchannel("A")
     low, high = np.asarray(alpha.getextrema()).tolist()
     if high == 0:
-        raise InputFileError(f"{path}: {_WHOLLY_TRANSPARENT}{_hidden(image)}")
+        extrema: Any = image.convert("RGB").getextrema()
+        shows = any(least < most - MIN_CONTRAST * 255 for least, most in extrema)
+        cure = "; its colours have one: save it without transparency (without an alpha channel)"
+        text = "the image is wholly transparent; there is no shape in it"
+        raise InputFileError(f"{path}: {text}{cure * shows}")
     if low == 255:
         return image.convert("RGB").convert("L"), "luminance", []
     if low < 128 <= high:
         return alpha, "alpha", []
-    return (
-        _on_white(image).convert("L"),
-        "luminance",
-        ["laid the half-transparent image on white"],
-    )
-
-
-def _hidden(image: Image.Image) -> str:
-    """Return a hint where a transparent image has colours all the same."""
-    extrema: Any = image.convert("RGB").getextrema()
-    shows = any(high - low > MIN_CONTRAST * 255 for low, high in extrema)
-    return "; its colours have one: save it without transparency (without an alpha channel)" * shows
+    laid = ["laid the half-transparent image on white"]
+    return _on_white(image).convert("L"), "luminance", laid
 
 
 def _on_white(image: Image.Image) -> Image.Image:
