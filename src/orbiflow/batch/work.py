@@ -17,8 +17,7 @@ from typing import Any
 
 from orbiflow import __version__
 from orbiflow.batch.executors import WorkSettings, executor_for
-from orbiflow.batch.folder import RESERVED, BatchFolder
-from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Entry, Kind
+from orbiflow.batch.folder import PAGE, RESERVED, TABLE, BatchFolder, ContactSheet, Entry, Kind
 from orbiflow.batch.parcels import Answer, Parcel
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError, system_errors
 from orbiflow.runtime import (

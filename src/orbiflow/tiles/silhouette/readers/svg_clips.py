@@ -14,7 +14,6 @@ from svgelements import Path, Polygon, Shape
 
 from orbiflow.arrays import Window
 from orbiflow.tiles.silhouette.readers.svg_paths import sub_paths
-from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
 from orbiflow.tiles.silhouette.readers.svg_shapes import (
     BAD_VALUE,
     SHAPES,
@@ -27,7 +26,13 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
     rectangle,
     unit_box_matrix,
 )
-from orbiflow.tiles.silhouette.readers.svg_values import as_number, length, origin_of, shift
+from orbiflow.tiles.silhouette.readers.svg_values import (
+    REFERENCE,
+    as_number,
+    length,
+    origin_of,
+    shift,
+)
 from orbiflow.tiles.silhouette.readers.svg_xml import reference
 
 if TYPE_CHECKING:
@@ -133,7 +138,7 @@ class Clips:
                 found += drawing.visit(child, place)
             elif child.tag in ("g", "svg", "symbol", "switch", "a", "image"):
                 drawing.notes.add(f"a <{child.tag}> in a <clipPath> clips nothing and is left out")
-        return [shape for shape in found if not shape.decorates]
+        return [shape for shape in found if not shape.place.decorates]
 
 
 def window_clip(frame: Window, place: Place) -> Clip:
@@ -159,7 +164,7 @@ def _mask_frame(source: Element, place: Place, box: Window | None) -> Window:
 def _as_clip(shape: Shape | None, place: Place, rule: str = "nonzero") -> Clip:
     """Return a shape in the units of a place as what cuts."""
     paths = [] if shape is None else sub_paths(shape, place.matrix)
-    return Clip([DrawnShape(paths, {"clip-rule": rule}, 1.0, place.matrix, 1.0, place)])
+    return Clip([DrawnShape(paths, replace(place, style={"clip-rule": rule}), place.matrix)])
 
 
 def _basic(text: str, box: Window | None, place: Place) -> Clip | None:

@@ -12,15 +12,17 @@ from tinycss2.ast import AtRule, Declaration, FunctionBlock, Node, QualifiedRule
 
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.reading import Source
-from orbiflow.tiles.silhouette.readers.svg_properties import (
+from orbiflow.tiles.silhouette.readers.svg_values import (
     ATTRIBUTES,
+    FONT_SIZE,
     INHERITED,
     WIDE,
     WITH_LENGTHS,
     checked,
+    font_size,
     longhands,
+    without_font_units,
 )
-from orbiflow.tiles.silhouette.readers.svg_values import FONT_SIZE, font_size, without_font_units
 from orbiflow.tiles.silhouette.readers.svg_xml import SVG, Notes
 
 MAX_STYLE = 200_000  # characters of all style sheets

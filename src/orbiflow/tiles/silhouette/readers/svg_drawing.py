@@ -13,7 +13,6 @@ from orbiflow.tiles.silhouette.readers.reading import Source, read_bytes
 from orbiflow.tiles.silhouette.readers.svg_clips import Clips, window_clip
 from orbiflow.tiles.silhouette.readers.svg_css import Style, Styles
 from orbiflow.tiles.silhouette.readers.svg_paths import corners
-from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
 from orbiflow.tiles.silhouette.readers.svg_shapes import (
     MARKED,
     SHAPES,
@@ -30,6 +29,7 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
 from orbiflow.tiles.silhouette.readers.svg_values import (
     KEYWORDS,
     MAX_TRANSFORM,
+    REFERENCE,
     NotATransform,
     angle,
     as_number,
@@ -336,13 +336,8 @@ class Drawing:
         matrix = place.matrix
         if place.style.get("vector-effect") == "non-scaling-stroke":
             matrix = np.diag([self.pixel()] * 2 + [1.0])
-        diagonal = float(np.hypot(*place.viewport)) / 2**0.5
         own = as_number(element.get("pathLength"), -1.0)
-        drawn = DrawnShape(
-            *(paths, place.style, place.opacity, matrix, diagonal, place),
-            path_length=own if own >= 0 else None,
-            decorates=place.decorates,
-        )
+        drawn = DrawnShape(paths, place, matrix, own if own >= 0 else None)
         return self._with_markers(element, drawn, place)
 
     def _with_markers(self, element: Element, shape: DrawnShape, place: Place) -> list[DrawnShape]:

@@ -21,10 +21,10 @@ from orbiflow.tiles.silhouette.outlines import MAX_COORDINATE
 from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
 from orbiflow.tiles.silhouette.readers.svg_gradients import Gradient, gradient_of, references
 from orbiflow.tiles.silhouette.readers.svg_paths import Line, SubPath, TooManyPoints, fill, stroked
-from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
 from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, DrawnShape, Group
 from orbiflow.tiles.silhouette.readers.svg_values import (
     CURRENT,
+    REFERENCE,
     Brush,
     as_number,
     colour_of,
@@ -60,7 +60,7 @@ def paints(drawing: Drawing, shape: DrawnShape) -> dict[str, Paint]:
         if paint and (kind == "fill" or shape.width > 0):
             own = min(max(as_number(shape.paint.get(f"{kind}-opacity"), 1.0), 0.0), 1.0)
             paint = _tinted(paint, shape.tint) if shape.tint else paint
-            found[kind] = paint._replace(opacity=shape.opacity * paint.opacity * own)
+            found[kind] = paint._replace(opacity=shape.place.opacity * paint.opacity * own)
     return {kind: paint for kind, paint in found.items() if paint.opacity > 0}
 
 

@@ -43,15 +43,16 @@ class DrawnShape:
     """One element's sub-paths in the drawing's user units, and how they are painted."""
 
     paths: list[SubPath]
-    paint: Style  # the properties that apply to it
-    opacity: float  # its own times that of the groups around it
-    matrix: Array  # the map (3, 3) from the units of its pen to the drawing's
-    diagonal: float  # what percentages of the pen refer to, in units of the pen
     place: "Place"
+    matrix: Array  # the map (3, 3) from the units of its pen to the drawing's
     path_length: float | None = None  # what its author takes for the length of its paths
-    decorates: bool = False  # as a marker does, which is not part of the shape's box
     clips: tuple["Clip", ...] = ()  # what cuts it: it shows where all of these are
     tint: str | None = None  # the colour that a filter gives it, whatever its paint
+
+    @property
+    def paint(self) -> Style:
+        """The properties that apply to it."""
+        return self.place.style
 
     @property
     def scale(self) -> float:
@@ -68,12 +69,12 @@ class DrawnShape:
     def dashes(self) -> list[float]:
         """The lengths of dashes and gaps in turn, an even number of them; none for a whole line."""
         words = self.paint.get("stroke-dasharray", "none").replace(",", " ").split()
-        found = [as_number(word, -1.0, self.diagonal) for word in words[:MAX_DASHES]]
+        found = [as_number(word, -1.0, self.place.diagonal) for word in words[:MAX_DASHES]]
         return found * (1 + len(found) % 2) if sum(found) > 0 and min(found) >= 0 else []
 
     def number(self, key: str, usual: float) -> float:
         """Read a property as a length in units of the pen, or return the usual one."""
-        return as_number(self.paint.get(key), usual, self.diagonal)
+        return as_number(self.paint.get(key), usual, self.place.diagonal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +103,12 @@ class Place:
     depth: int = 0
     groups: tuple[Group, ...] = ()  # those around that are not opaque, the outermost first
     context: tuple[str, str] = ("none", "none")  # the fill and stroke around a marker or <use>
-    decorates: bool = False
+    decorates: bool = False  # as a marker does, which is not part of a shape's box
+
+    @property
+    def diagonal(self) -> float:
+        """What percentages refer to that are of neither side."""
+        return float(np.hypot(*self.viewport)) / 2**0.5
 
     @property
     def opacity(self) -> float:
@@ -128,11 +134,10 @@ class Place:
         if text is None or text.strip().lower() == "auto":
             return usual
         text = without_font_units(text, float(self.style.get("font-size", FONT_SIZE)), self.rem)
-        width, height = self.viewport
         along_x = key in {"x", "width", "cx", "rx", "x1", "x2", "refX", "markerWidth"}
         along_y = key in {"y", "height", "cy", "ry", "y1", "y2", "refY", "markerHeight"}
-        across = float(np.hypot(width, height)) / 2**0.5
-        found = length(text, width if along_x else height if along_y else across)
+        width, height = self.viewport
+        found = length(text, width if along_x else height if along_y else self.diagonal)
         if found is None:
             reason = f"{key} {text[:40]!a} is not a length in px, mm, in, pt, em or %"
             raise BadElement(element, reason)
@@ -202,7 +207,7 @@ def bounds_of(shapes: Iterable[DrawnShape], matrix: Array) -> Window | None:
     back = np.linalg.inv(matrix)
     found: list[Array] = []
     for shape in shapes:
-        for path in () if shape.decorates else shape.paths:
+        for path in () if shape.place.decorates else shape.paths:
             reach = path.reach()
             size = float(np.ptp(reach, axis=0).max())
             exact = 0 < size < MAX_COORDINATE  # not NaN, either
