@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import replace
+from itertools import islice
 from urllib.parse import unquote
 from xml.etree.ElementTree import Element
 
@@ -119,7 +120,8 @@ class Drawing:
 
     def _read(self) -> None:
         style = self.styles.standing(self.root)
-        self.box = self._box(style)
+        self.sides = [self._pixels(style, key) for key in ("width", "height")]
+        self.box, self.window, view = self._page()
         if any(item.tag in _ANIMATIONS for item in self.root.iter()):
             self.notes.add(_EFFECTS["animation"][0])
         if self.root.get("{}xml-stylesheet"):
@@ -127,7 +129,6 @@ class Drawing:
         xmin, ymin, xmax, ymax = self.box or (0.0, 0.0, 100.0, 100.0)
         size = xmax - xmin, ymax - ymin
         place = Place(np.eye(3), size, {}, self.styles.rem, depth=-1).styled(style)
-        self.window, view = self._window(style)
         self.view = view
         ground = colour_of(style.get("background-color", "transparent"))
         self.ground = ground.colour if ground and ground.opacity == 1 else None
@@ -136,29 +137,23 @@ class Drawing:
         found = [] if style.get("display") == "none" else self.children(self.root, inner)
         self.shapes = self._cut(found, style, inner)
 
-    def _box(self, style: Style) -> Window | None:
-        """Return the page in user units: the viewBox, or the size."""
+    def _page(self) -> tuple[Window | None, Window | None, Array]:
+        """Return the page in user units, the part of the plane that shows, and the map to pixels."""
         box = view_box(self.root)
-        if box is not None:
-            return box[0], box[1], box[0] + box[2], box[1] + box[3]
-        width, height = (self._pixels(style, key) for key in ("width", "height"))
-        if width is None or height is None or not (width > 0 and height > 0):
-            return None
-        return 0.0, 0.0, width, height
-
-    def _window(self, style: Style) -> tuple[Window | None, Array]:
-        """Return the part of the plane that shows, and the map (3, 3) from it to pixels."""
-        box, size = view_box(self.root), [self._pixels(style, key) for key in ("width", "height")]
-        width, height = (own if own and own > 0 else None for own in size)
-        if box is None or width is None or height is None:
-            return self.box, np.eye(3)
+        width, height = (side if side and side > 0 else None for side in self.sides)
+        if box is None:
+            page = None if width is None or height is None else (0.0, 0.0, width, height)
+            return page, page, np.eye(3)
+        page = box[0], box[1], box[0] + box[2], box[1] + box[3]
+        if width is None or height is None:
+            return page, page, np.eye(3)
         view = view_matrix(self.root, (0.0, 0.0, width, height))[0]
         if not np.isfinite(np.linalg.inv(view)).all():
-            return self.box, np.eye(3)
+            return page, page, np.eye(3)
         corners = np.array([[0.0, 0.0], [width, height]]) - view[:2, 2]
         (xmin, ymin), (xmax, ymax) = (corners / np.diag(view)[:2]).tolist()
         margin = PAGE_TOLERANCE * max(xmax - xmin, ymax - ymin)  # the page's own edge is not cut
-        return (xmin - margin, ymin - margin, xmax + margin, ymax + margin), view
+        return page, (xmin - margin, ymin - margin, xmax + margin, ymax + margin), view
 
     def _pixels(self, style: Style, key: str) -> float | None:
         """Return the width or height of the root in pixels, or None if it is a share or not given."""
@@ -170,11 +165,8 @@ class Drawing:
     def pixel(self) -> float:
         """Return the size of a pixel in user units."""
         xmin, ymin, xmax, ymax = self.box or (0.0, 0.0, 1.0, 1.0)
-        style, sizes = (
-            self.styles.standing(self.root),
-            {"width": xmax - xmin, "height": ymax - ymin},
-        )
-        return max(own / (self._pixels(style, key) or own) for key, own in sizes.items())
+        sizes = zip((xmax - xmin, ymax - ymin), self.sides, strict=True)
+        return max(own / (pixels or own) for own, pixels in sizes)
 
     def children(self, element: Element, place: Place) -> list[DrawnShape]:
         """Return the shapes that the elements inside one show."""
@@ -220,8 +212,9 @@ class Drawing:
         if tag == "svg":
             return self.viewport(element, self._frame(element, place.style, place), place)
         if tag == "switch":
-            chosen = [child for child in element if is_own(child) and self._chosen(child)][:1]
-            return self.visit(chosen[0], place) if chosen else []
+            drawn = _GROUPS | SHAPES | {"use", "text", "image"}
+            chosen = (child for child in element if child.tag in drawn and self._meant(child))
+            return [shape for child in islice(chosen, 1) for shape in self.visit(child, place)]
         if tag in _GROUPS:
             return self.children(element, place)
         if tag == "use":
@@ -269,10 +262,6 @@ class Drawing:
         if not (pure and (rows[3] == [0, 0, 0, 1, 0]).all()):
             return None
         return "#" + "".join("ff" if value >= 1 else "00" for value in rows[:3, 4])
-
-    def _chosen(self, child: Element) -> bool:
-        drawn = child.tag in _GROUPS | SHAPES | {"use", "text", "image"}
-        return drawn and self._meant(child)
 
     def _meant(self, element: Element) -> bool:
         """Return whether an element is meant for a program like this one and its language."""
