@@ -40,7 +40,8 @@ from orbiflow.tiles.silhouette import (
     paints,
     read_head,
 )
-from orbiflow.tiles.tile import EscherTile, TileMap, TileSource
+from orbiflow.tiles.tile import EscherTile, TileSource
+from orbiflow.tiles.tile_map import TileMap
 from orbiflow.tiles.write import Sheet, painted, shape_of
 
 
