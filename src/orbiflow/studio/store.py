@@ -138,11 +138,7 @@ class Store:
         return self._rows(SUMMARY)
 
     def create(self, kind: str, name: str, most: int) -> str:
-        """Return the id of a new project.
-
-        Raises:
-            OrbiflowError: If there are `most` already.
-        """
+        """Return the id of a new project. Raises `OrbiflowError` if there are `most` already."""
         project = secrets.token_urlsafe(9)
         with self._changing(project) as data:
             (count,) = data.execute("SELECT count(*) FROM projects").fetchone()
@@ -224,8 +220,7 @@ class Store:
     ) -> int:
         """Return the number of a new task.
 
-        Raises:
-            OrbiflowError: If the project has `most` that are not done.
+        Raises `OrbiflowError` if the project has `most` that are not done.
         """
         with self._changing(project) as data:
             self.project(project)

@@ -123,8 +123,7 @@ class WorkQueue:
     ) -> int:
         """Put a task at the end of the queue and return its number.
 
-        Raises:
-            OrbiflowError: For settings that cannot be used, or too many tasks.
+        Raises `OrbiflowError` for settings that cannot be used, or too many tasks.
         """
         kind = kind_of_work(operation)
         kind.call(self.store.home(project), 1, settings)

@@ -276,7 +276,7 @@ def _parts(shape: DrawnShape, regions: Regions, carry: _Carry) -> list[Part]:
             lines = regions.lines(shape)
             curves = [_line(carry, points, path) for points, path in lines if len(points) > 1]
         else:
-            region, (colour, opacity), _ = regions.layer(shape, kind, paint)
+            region, (colour, opacity, _), _ = regions.layer(shape, kind, paint)
             style, curves = Style(colour), _area(region, carry)
         if curves:
             found.append(Part(tuple(curves), style, opacity))

@@ -1,10 +1,12 @@
 """Values as SVG and CSS write them: numbers, colours and transforms, and which a property takes."""
 
+from __future__ import annotations
+
 import math
 import re
 from collections.abc import Callable
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import tinycss2.color4
@@ -12,6 +14,9 @@ from svgelements import Matrix
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import rgb
+
+if TYPE_CHECKING:
+    from orbiflow.tiles.silhouette.readers.svg_gradients import Gradient
 
 MAX_NUMBER = 1e9  # the largest width or opacity that is believed
 FONT_SIZE = 16.0  # pixels, by default
@@ -107,10 +112,14 @@ def font_size(text: str, parent: float, rem: float) -> float:
 
 
 class Brush(NamedTuple):
-    """A colour, #rrggbb or `CURRENT`, and its opacity, 0 to 1."""
+    """A colour, #rrggbb or `CURRENT`, and its opacity, 0 to 1.
+
+    With a `gradient` it is its mean colour, and the opacity is without that of its stops.
+    """
 
     colour: str
     opacity: float
+    gradient: Gradient | None = None
 
 
 @lru_cache(4096)
