@@ -90,12 +90,7 @@ def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
     With `enough` pixels a side, a JPEG may be decoded to fewer than it has, which is faster.
     Raises `InputFileError` for one that is too large, before a pixel of it is decoded, or damaged.
     """
-    n_bytes = check_file(path)
-    if n_bytes > MAX_BYTES:
-        raise InputFileError(
-            f"{path}: {n_bytes / 2**20:.0f} MB, images over {MAX_BYTES / 2**20:.0f} MB are not "
-            "read; downscale it"
-        )
+    check_file(path)
     try:
         with warnings.catch_warnings():
             # Pillow warns of damaged metadata and of sizes that are refused here anyway.
@@ -107,8 +102,6 @@ def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
     except Image.DecompressionBombError as exc:
         n_pixels = max(map(int, re.findall(r"\d+", str(exc))), default=0)
         raise InputFileError(_too_large(path, f"{n_pixels / 1e6:.0f} megapixels")) from exc
-    except PermissionError as exc:
-        raise InputFileError(f"{path}: cannot be read; check its permissions") from exc
     except UnidentifiedImageError as exc:
         kind = image_kind(read_head(path, 12))
         named = f"{kind} image".strip()
