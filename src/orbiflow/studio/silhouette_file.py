@@ -115,9 +115,7 @@ def _mended(target: Target, home: Path, size: tuple[int, int]) -> Target:
     if not mask.any():
         raise InputFileError("nothing of the picture is left; paint some of it back")
     found = Target.from_mask(mask, source=target.source)
-    low, high, _, y_down = target.covered
-    at = (found.outline - 1) / size
-    outline = (at if y_down else (at - (0, 1)) * (1, -1)) * (high - low) + low
+    outline = target.covered.at((found.outline - 1) / size)
     notes = tuple(note for note in target.notes if not note.startswith("kept the largest"))
     return replace(target, outline=outline, notes=notes, seen=None)
 

@@ -209,7 +209,7 @@ FARTHEST = 1e6  # greatest reach of a drawing, in sizes of the silhouette
 def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
     """Read an SVG file and carry its fills and strokes onto a tile, in the tile's units, with notes."""
     drawing = Drawing(path)
-    carry = _Carry(tile, *_onto(path, drawing, tile))
+    carry = _Carry(path, drawing, tile)
     regions = Regions(drawing, lambda _: carry.tolerance, 2 * MOST_CARRIED)
     parts: list[Part] = []
     for shape in drawing.shapes:
@@ -224,31 +224,23 @@ def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
     return Motif(tuple(parts)), tuple(drawing.left_out())
 
 
-def _onto(path: Path, drawing: Drawing, tile: EscherTile) -> tuple[Array, Array]:
-    """Return the map from the drawing's user units to the silhouette's coordinates."""
-    covered = tile.covered
-    if drawing.box is None:
-        return np.eye(2), np.zeros(2)
-    low, high = np.array(drawing.box[:2]), np.array(drawing.box[2:])
-    own, there = high - low, covered.high - covered.low
-    covered.require_aspect(path, "drawing", own.tolist())
-    flip = np.array([1.0, 1.0 if tile.y_down else -1.0])
-    scale = there / own * flip
-    start = covered.low if tile.y_down else np.array([covered.low[0], covered.high[1]])
-    return np.diag(scale), start - scale * low
-
-
 class _Carry:
-    """The map from the drawing to the tile, point by point."""
+    """The map from a drawing to the tile, point by point."""
 
-    def __init__(self, tile: EscherTile, linear: Array, offset: Array) -> None:
-        self.tile, self.linear, self.offset, self.count = tile, linear, offset, 0
-        self.size = float(np.sqrt(abs(tile.tile.signed_area)))
-        self.scale = float(np.sqrt(abs(np.linalg.det(linear))))
+    def __init__(self, path: Path, drawing: Drawing, tile: EscherTile) -> None:
+        self.tile, self.box, self.count = tile, drawing.box, 0
+        self.size, self.scale = float(np.sqrt(abs(tile.tile.signed_area))), 1.0
+        if self.box is not None:
+            covered, extent = tile.covered, np.subtract(self.box[2:], self.box[:2])
+            covered.require_aspect(path, "drawing", extent.tolist())
+            self.scale = float(np.sqrt(np.prod((covered.high - covered.low) / extent)))
         self.tolerance = FLATNESS * self.size / self.scale
 
     def __call__(self, points: Array, *, closed: bool) -> Array:
-        here = points @ self.linear.T + self.offset
+        here = points
+        if self.box is not None:
+            low, high = self.box[:2], self.box[2:]
+            here = self.tile.covered.at((points - low) / np.subtract(high, low))
         line = shapely.LinearRing(here) if closed else shapely.LineString(here)
         # before any point is made
         if line.length / (LONGEST * self.size) > MOST_CARRIED:

@@ -189,13 +189,12 @@ def _frame(path: Source, file: Any, enough: int | None, notes: list[str]) -> Dec
     turn = None if file.format == "TIFF" else _TURNS.get(orientation)
     levels = _levels(path, raw.image, notes) if raw.image.mode.startswith(("I", "F")) else None
     factor = max(1, round(shrunk * file.width / width))
-    raw = raw if turn is None or factor > 1 else raw.turned(turn)
     image = raw.shown(levels) if factor == 1 else _shrunk(raw, factor, levels)
-    if factor > 1 and turn is not None:
-        image = image.transpose(turn)
+    image = image if turn is None else image.transpose(turn)
     if shrunk > 1:
         return DecodedImage(image, size, shrunk, None, tuple(notes))
     palette = None
+    raw = raw if turn is None else raw._replace(image=raw.image.transpose(turn))
     if raw.image.mode == "P" and image.mode == "RGB":  # without transparent colours
         palette = np.array(raw.image.getpalette() or [0, 0, 0], dtype=np.int64).reshape(-1, 3)
     are_labels = palette is not None and is_of_labels(palette)
@@ -207,10 +206,6 @@ class _Raw(NamedTuple):
 
     image: Image.Image
     opaque: Image.Image | None = None
-
-    def turned(self, turn: Image.Transpose) -> "_Raw":
-        """Return it turned or mirrored."""
-        return _Raw(self.image.transpose(turn), self.opaque and self.opaque.transpose(turn))
 
     def rows(self, top: int, bottom: int) -> "_Raw":
         """Return some of the rows."""

@@ -27,7 +27,7 @@ from orbiflow.tiles.silhouette.readers.svg_xml import SVG, Notes
 
 MAX_STYLE = 200_000  # characters of all style sheets
 MAX_STYLES = 4_000_000  # characters of all attributes `style`
-MAX_BRACKETS = 50  # how deep brackets may nest
+MAX_BRACKETS = 50  # how deep brackets may nest: the recursion of serializing stands it
 MAX_SELECTORS = 5_000
 MAX_SELECTOR = 1_000  # characters
 MAX_STEPS = 5_000_000  # comparisons of elements with selectors, and steps from element to element
@@ -385,7 +385,7 @@ def _with_variables(text: str, style: Style) -> str | None:
     """Return a value with each `var(--name, fallback)` replaced, or None where that is impossible."""
     for _ in range(_MAX_NESTED):
         tokens = tinycss2.parse_component_value_list(text, skip_comments=True)
-        if not (len(text) <= MAX_VARIABLE and _balanced(text)):
+        if len(text) > MAX_VARIABLE or text.count("(") > MAX_BRACKETS:
             return None
         parts = [_replaced(token, style) for token in tokens]
         found = [part for part in parts if part is not None]
@@ -395,10 +395,6 @@ def _with_variables(text: str, style: Style) -> str | None:
         if "var(" not in text.lower():
             return text.strip()
     return None
-
-
-def _balanced(text: str) -> bool:
-    return text.count("(") <= 50  # which the recursion of serializing stands
 
 
 def _replaced(token: Node, style: Style) -> str | None:
