@@ -1,43 +1,45 @@
-"""Small pictures of densities without axes, for pages of many.
+"""Small pictures of densities for pages of many.
 
 In two dimensions they show the canonical square, or a map of directions; of one angle the data's
 histogram and the density; of a few angles every pair of samples, and each alone; of many a stripe for
 each.
 """
 
+# matplotlib types no keyword arguments
+# pyright: reportUnknownMemberType=false
+
 from __future__ import annotations
 
-import io
-import math
-from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
-from PIL import Image, ImageDraw
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
 from orbiflow.density.pictures.colours import COLOURS
 from orbiflow.density.pictures.figures import plane_ground
-from orbiflow.density.pictures.frames import view_of
+from orbiflow.density.pictures.frames import INK, view_of
 from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.projections import chosen_map
 from orbiflow.density.pictures.settings import PlotSettings
+from orbiflow.drawing import Sheet
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SIZE = (360, 240)
 """Width and height in pixels, half as many again as a page shows."""
 
-PAPER, INK, BARS = "#ffffff", "#1a1a1a", "#b9c4d0"
-COARSE = 120
-"""Points along a side at which a density is evaluated; pixels between them are interpolated."""
+SHEET = Sheet(SIZE[0] / 100, 8.0, dpi=100)
+BARS = "#b9c4d0"
+PIXELS, MAP_PIXELS = 120, 14_000
+"""Points along a side at which a density is evaluated, and of a map in all."""
 
-MAP_PLACES = 14_000
 SAMPLES, SEED = 4_000, 0
 MAX_PAIRS = 6
 """Number of angles up to which pairs are drawn, instead of stripes."""
-
-MARGIN = 6
 
 
 @torch.no_grad()
@@ -49,114 +51,73 @@ def density_thumbnail(density: Density, data: ArrayLike) -> bytes:
     """
     space, table = density.space, np.asarray(data, dtype=np.float64)
     whole = table[~np.isnan(table).any(axis=1)]
-    if not space.has_chart:
-        drawn = density.sample((SAMPLES,), torch.Generator().manual_seed(SEED)).numpy()
-        picture = (
-            _pairs((drawn + 1) / 2) if len(drawn[0]) <= MAX_PAIRS else _stripes((drawn + 1) / 2)
-        )
-    elif space.dim == 2:
-        picture = _plane(density, whole)
-    elif space.dim == 1 and space.has_square:
-        picture = _histogram(density, whole)
+    figure = SHEET.figure(SIZE[1] / 100)
+    if space.has_chart and space.dim == 2:
+        _draw_plane(figure, density, whole)
+    elif space.has_square and space.dim == 1:
+        _draw_angle(figure, density, whole)
     else:
         drawn = density.sample((SAMPLES,), torch.Generator().manual_seed(SEED))
-        places = view_of(space).places(drawn)
-        if not space.has_square:
+        places = view_of(space).places(drawn) if space.has_chart else (drawn.numpy() + 1) / 2
+        if space.has_chart and not space.has_square:
             places = (places - places.min(axis=0)) / np.ptp(places, axis=0)
-        picture = _pairs(places) if space.dim <= MAX_PAIRS else _stripes(places)
-    sheet = Image.new("RGB", SIZE, PAPER)
-    sheet.paste(picture, ((SIZE[0] - picture.width) // 2, (SIZE[1] - picture.height) // 2))
-    out = io.BytesIO()
-    sheet.save(out, "PNG", optimize=True)
-    return out.getvalue()
+        draw = _draw_pairs if places.shape[1] <= MAX_PAIRS else _draw_stripes
+        draw(figure, places)
+    return SHEET.file(figure)
 
 
-def _coloured(places: Array) -> Image.Image:
-    """Return an image of places (rows, columns) on the colour bar, the first row on top."""
-    from matplotlib import colormaps
-
-    shades = colormaps[COLOURS](np.clip(places, 0, 1))[..., :3]
-    return Image.fromarray((255 * shades + 0.5).astype(np.uint8), "RGB")
-
-
-def _plane(density: Density, data: Array) -> Image.Image:
+def _draw_plane(figure: Figure, density: Density, data: Array) -> None:
     """Draw the canonical square, a lattice's cell, or a map that suits data (N, k)."""
     space, settings = density.space, PlotSettings()
     if space.is_round:
         ground = Map(space, chosen_map(space, space.to_chart(data)))
-        colours = ground.colouring(density, settings, MAP_PLACES)
     else:
         ground = plane_ground(space, settings)
-        colours = ground.colouring(density, settings, COARSE)
-    left, right, below, above = colours.extent
-    scale = min((SIZE[0] - MARGIN) / (right - left), (SIZE[1] - MARGIN) / (above - below))
-    size = (round(scale * (right - left)), round(scale * (above - below)))
-    picture = _coloured(colours.places[::-1]).resize(size, Image.Resampling.BICUBIC)
-    if ground.outline is None:
-        return picture
-    ring = (ground.outline - (left, above)) * (scale, -scale)
-    # four times finer, so that the outline is a curve
-    mask = Image.new("L", (4 * size[0], 4 * size[1]))
-    ImageDraw.Draw(mask).polygon([tuple(place) for place in (4 * ring).tolist()], fill=255)
-    paper = Image.new("RGB", size, PAPER)
-    paper.paste(picture, mask=mask.resize(size, Image.Resampling.BOX))
-    return paper
+    axes = figure.add_axes((0.01, 0.01, 0.98, 0.98))
+    count = MAP_PIXELS if space.is_round else PIXELS
+    ground.colouring(density, settings, count).draw(axes)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
 
 
-def _histogram(density: Density, data: Array) -> Image.Image:
+def _draw_angle(figure: Figure, density: Density, data: Array) -> None:
     """Draw bars of the data under the density's line, from minus half a turn to half a turn."""
-    space, view, fine = density.space, view_of(density.space), 4
-    width, height = (fine * (side - 2 * MARGIN) for side in SIZE)
-    bins = min(72, max(12, round(2 * len(data) ** (1 / 3))))
-    bars, _ = np.histogram(view.places(space.to_chart(data))[:, 0], bins, (0, 1), density=True)
-    t = (torch.arange(width, dtype=torch.float64)[:, None] + 0.5) / width
-    line = density.log_prob(view.to_chart(t), measure="square").exp().numpy()
-    top = 1.05 * min(max(float(bars.max()), float(line.max())), 4 * float(bars.max()))
-    picture = Image.new("RGB", (width, height), PAPER)
-    draw = ImageDraw.Draw(picture)
-    edges = np.linspace(0, width, bins + 1)
-    for (left, right), bar in zip(pairwise(edges.tolist()), bars.tolist(), strict=True):
-        draw.rectangle((left + fine / 2, height * (1 - bar / top), right - fine / 2, height), BARS)
-    heights: list[float] = (height * (1 - np.minimum(line / top, 1.0))).tolist()
-    draw.line(list(enumerate(heights)), INK, width=2 * fine)
-    return picture.resize((width // fine, height // fine), Image.Resampling.BOX)
+    view = view_of(density.space)
+    count = min(72, max(12, round(2 * len(data) ** (1 / 3))))
+    places = view.places(density.space.to_chart(data))[:, 0]
+    t = torch.linspace(0, 1, SIZE[0], dtype=torch.float64)
+    line = density.log_prob(view.to_chart(t[:, None]), measure="square").exp().numpy()
+    axes = figure.add_axes((0.02, 0.03, 0.96, 0.94))
+    bars, *_ = axes.hist(places, count, (0, 1), density=True, rwidth=0.95, color=BARS)
+    axes.plot(t, line, color=INK, linewidth=1.5)
+    top = float(np.max(bars))
+    axes.set(xlim=(0, 1), ylim=(0, 1.05 * min(max(top, float(line.max())), 4 * top)))
+    axes.set_axis_off()
 
 
-def _pairs(places: Array) -> Image.Image:
+def _draw_pairs(figure: Figure, places: Array) -> None:
     """Draw every pair of angles below the diagonal, each alone on it."""
-    count = places.shape[1]
-    side = SIZE[1] // count
-    sheet = Image.new("RGB", (side * count, side * count), PAPER)
-    for row, column in zip(*np.tril_indices(count), strict=True):
-        cell = (_bars if row == column else _pair)(places[:, [column, row]], side - 3)
-        sheet.paste(cell, (int(side * column + 1), int(side * row + 1)))
-    return sheet
+    dim, side = places.shape[1], SIZE[1] // places.shape[1]
+    room = (1 - SIZE[1] / SIZE[0]) / 2
+    edges = {"left": room, "right": 1 - room, "bottom": 0, "top": 1, "wspace": 0.05, "hspace": 0.05}
+    panels = figure.subplots(dim, dim, squeeze=False, gridspec_kw=edges)
+    for (row, column), axes in np.ndenumerate(panels):
+        axes.set_axis_off()
+        if row == column:
+            axes.hist(places[:, row], side // 2, (0, 1), color=BARS)
+            axes.set_xlim(0, 1)
+        elif row > column:
+            bins = max(12, side // 3)
+            counts, *_ = np.histogram2d(*places[:, [row, column]].T, bins, ((0, 1), (0, 1)))
+            # a square root: most cells of many angles are nearly empty
+            shades, most = np.sqrt(counts), max(1.0, float(np.quantile(counts, 0.995))) ** 0.5
+            axes.imshow(shades, COLOURS, interpolation="bicubic", vmax=most, origin="lower")
 
 
-def _pair(places: Array, side: int) -> Image.Image:
-    bins = max(12, side // 3)
-    counts, _ = np.histogramdd(places, (bins, bins), ((0, 1), (0, 1)))
-    shade = counts / max(1.0, float(np.quantile(counts, 0.995)))
-    # a square root: most cells of many angles are nearly empty
-    return _coloured(np.sqrt(shade).T[::-1]).resize((side, side), Image.Resampling.BICUBIC)
-
-
-def _bars(places: Array, side: int) -> Image.Image:
-    counts, _ = np.histogram(places[:, 0], side // 2, (0, 1))
-    picture = Image.new("RGB", (side, side), PAPER)
-    draw = ImageDraw.Draw(picture)
-    for k, bar in enumerate((counts / max(1, counts.max())).tolist()):
-        draw.rectangle((2 * k, side * (1 - 0.95 * bar), 2 * k + 1, side), BARS)
-    return picture
-
-
-def _stripes(places: Array) -> Image.Image:
+def _draw_stripes(figure: Figure, places: Array) -> None:
     """Draw a stripe for each angle, from the top, each as bright as its largest bin."""
-    counts = [np.histogram(column, 90, (0, 1))[0] for column in places.T]
-    shades = np.stack([count / max(1, count.max()) for count in counts])
-    height = max(1, math.floor(SIZE[1] / len(shades)))
-    picture = _coloured(shades).resize((SIZE[0], height * len(shades)), Image.Resampling.BOX)
-    draw = ImageDraw.Draw(picture)
-    for k in range(1, len(shades) if height > 6 else 0):
-        draw.line((0, k * height, SIZE[0], k * height), PAPER)
-    return picture
+    edges = {"left": 0, "right": 1, "bottom": 0, "top": 1, "hspace": 0.05}
+    panels = figure.subplots(places.shape[1], 1, gridspec_kw=edges)
+    for axes, column in zip(panels, places.T, strict=True):
+        axes.imshow(np.histogram(column, 90, (0, 1))[0][None], COLOURS, vmin=0, aspect="auto")
+        axes.set_axis_off()
