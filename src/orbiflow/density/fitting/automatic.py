@@ -37,7 +37,13 @@ from orbiflow.density.fitting.flow_trial import (
     flow_settings,
     try_flow,
 )
-from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, folds_of
+from orbiflow.density.fitting.held_out import (
+    LEAST_PLACES,
+    Folds,
+    folds_of,
+    stacked,
+    supported_weights,
+)
 from orbiflow.density.fitting.kernels import limit_notes, narrowest_for
 from orbiflow.density.fitting.likelihood import Budget, training
 from orbiflow.density.fitting.repeats import Repeats, repeats_of, spread_evenly
@@ -66,7 +72,6 @@ from orbiflow.density.fitting.rows import (
     weights_of,
 )
 from orbiflow.density.fitting.settings import COMPONENTS, DensitySettings
-from orbiflow.density.fitting.stacking import stacked, supported_weights
 from orbiflow.density.models import MOST_DIM, Mixture, flow_obstacle
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import DataWarning, OrbiflowError

@@ -18,7 +18,7 @@ from orbiflow.density.data import (
     refuse_codes,
     seeming_unit,
 )
-from orbiflow.density.inference.observed import at_observed
+from orbiflow.density.inference.angles import at_observed
 from orbiflow.density.models import Density
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError, SettingError, literal

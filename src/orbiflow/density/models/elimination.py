@@ -15,8 +15,8 @@ from torch import Tensor
 from orbiflow.density.models.chain_sums import SCALES
 from orbiflow.density.models.chains import Factor, VonMisesChains, waves
 from orbiflow.density.models.density import Split
-from orbiflow.density.models.lattice import KERNEL_STEP, sharpest_on
-from orbiflow.density.models.terms import FAINT_LOG, LOG2_E, log_sum_exp
+from orbiflow.density.models.kernels import KERNEL_STEP, sharpest_on
+from orbiflow.density.models.sums import FAINT_LOG, LOG2_E, log_sum_exp
 from orbiflow.typed_torch import special
 
 STEP_DEVIATIONS = 0.9

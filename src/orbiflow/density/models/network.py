@@ -12,16 +12,15 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance
-from orbiflow.density.models.chain_nodes import quantiles
+from orbiflow.density.models.chain_integrals import quantiles
 from orbiflow.density.models.chain_sums import SCALES
 from orbiflow.density.models.chains import Factor, VonMisesChains, waves
 from orbiflow.density.models.density import Density, Split, Weighted
 from orbiflow.density.models.elimination import eliminated, grids_for
 from orbiflow.density.models.files import within
-from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.models.lattice import lattice_kernels
+from orbiflow.density.models.kernels import AdaptiveKernels, lattice_kernels
+from orbiflow.density.models.sums import log_sum_exp, shares_of
 from orbiflow.density.models.tensors import in_blocks
-from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list, is_object

@@ -17,7 +17,6 @@ from torch import Tensor
 
 from orbiflow.density.models import Density
 from orbiflow.density.pictures import frames, overlays
-from orbiflow.density.pictures.cell import Cell
 from orbiflow.density.pictures.coastlines import coastlines_for
 from orbiflow.density.pictures.colours import bar_label, bar_ticks
 from orbiflow.density.pictures.frames import INK, chart_points, require_plane, space_title, view_of
@@ -25,7 +24,7 @@ from orbiflow.density.pictures.grounds import Ground
 from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.projections import chosen_map
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.density.pictures.square import Square
+from orbiflow.density.pictures.square import Cell, Square
 from orbiflow.density.regions import DensityRegion
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import Picture, Sheet, draw_flow, draw_magnitude

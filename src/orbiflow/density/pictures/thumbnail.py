@@ -88,7 +88,7 @@ def _draw_angle(figure: Figure, density: Density, data: Array) -> None:
     t = torch.linspace(0, 1, SIZE[0], dtype=torch.float64)
     line = density.log_prob(view.to_chart(t[:, None]), measure="square").exp().numpy()
     axes = figure.add_axes((0.02, 0.03, 0.96, 0.94))
-    bars, *_ = axes.hist(places, count, (0, 1), density=True, rwidth=0.95, color=BARS)
+    bars, *_ = axes.hist(places, count, range=(0, 1), density=True, rwidth=0.95, color=BARS)
     axes.plot(t, line, color=INK, linewidth=1.5)
     top = float(np.max(bars))
     axes.set(xlim=(0, 1), ylim=(0, 1.05 * min(max(top, float(line.max())), 4 * top)))
@@ -104,11 +104,11 @@ def _draw_pairs(figure: Figure, places: Array) -> None:
     for (row, column), axes in np.ndenumerate(panels):
         axes.set_axis_off()
         if row == column:
-            axes.hist(places[:, row], side // 2, (0, 1), color=BARS)
+            axes.hist(places[:, row], side // 2, range=(0, 1), color=BARS)
             axes.set_xlim(0, 1)
         elif row > column:
             bins = max(12, side // 3)
-            counts, *_ = np.histogram2d(*places[:, [row, column]].T, bins, ((0, 1), (0, 1)))
+            counts, _ = np.histogramdd(places[:, [row, column]], (bins, bins), ((0, 1), (0, 1)))
             # a square root: most cells of many angles are nearly empty
             shades, most = np.sqrt(counts), max(1.0, float(np.quantile(counts, 0.995))) ** 0.5
             axes.imshow(shades, COLOURS, interpolation="bicubic", vmax=most, origin="lower")
@@ -117,7 +117,7 @@ def _draw_pairs(figure: Figure, places: Array) -> None:
 def _draw_stripes(figure: Figure, places: Array) -> None:
     """Draw a stripe for each angle, from the top, each as bright as its largest bin."""
     edges = {"left": 0, "right": 1, "bottom": 0, "top": 1, "hspace": 0.05}
-    panels = figure.subplots(places.shape[1], 1, gridspec_kw=edges)
-    for axes, column in zip(panels, places.T, strict=True):
+    panels = figure.subplots(places.shape[1], 1, squeeze=False, gridspec_kw=edges)
+    for axes, column in zip(panels.flat, places.T, strict=True):
         axes.imshow(np.histogram(column, 90, (0, 1))[0][None], COLOURS, vmin=0, aspect="auto")
         axes.set_axis_off()

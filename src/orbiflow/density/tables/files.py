@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from orbiflow.density.tables import text
-from orbiflow.density.tables.layout import layout_of
-from orbiflow.density.tables.lines import is_utf16, split_line, text_lines
-from orbiflow.density.tables.numerals import Mark
+from orbiflow.density.tables.cells import Mark
+from orbiflow.density.tables.layout import is_utf16, layout_of, split_line, text_lines
 from orbiflow.density.tables.table import (
     BLOCK,
     MAX_COLUMNS,

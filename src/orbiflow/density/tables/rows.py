@@ -32,8 +32,8 @@ from orbiflow.density.data import (
     strike_note,
     unit_named,
 )
-from orbiflow.density.tables.beside import check_hemispheres, tell_of_calm, tell_of_counts
 from orbiflow.density.tables.files import column_names, read_labels, read_table
+from orbiflow.density.tables.guesses import check_hemispheres, tell_of_calm, tell_of_counts
 from orbiflow.density.tables.settings import SPACES, RowSettings, SpaceSettings, TableSettings
 from orbiflow.density.tables.table import MissingCellsError, Table, TableError, find, listing, quote
 from orbiflow.errors import SettingError, literal

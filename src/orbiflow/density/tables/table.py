@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.density.tables.numerals import Mark
+from orbiflow.density.tables.cells import Mark
 from orbiflow.errors import InputFileError, SettingError, literal
 
 MAX_COLUMNS = 10_000

@@ -18,10 +18,17 @@ from pathlib import Path
 import numpy as np
 
 from orbiflow.density.tables import table as tables
-from orbiflow.density.tables.cells import COMPASS, bare, is_time, unit_of_cell
-from orbiflow.density.tables.layout import Layout, layout_of
-from orbiflow.density.tables.lines import check_length, split_line, text_lines
-from orbiflow.density.tables.numerals import OTHER, Marks, kind_of, plain
+from orbiflow.density.tables.cells import (
+    COMPASS,
+    OTHER,
+    Marks,
+    bare,
+    is_time,
+    kind_of,
+    plain,
+    unit_of_cell,
+)
+from orbiflow.density.tables.layout import Layout, check_length, layout_of, split_line, text_lines
 from orbiflow.density.tables.table import (
     BLOCK,
     Reading,
