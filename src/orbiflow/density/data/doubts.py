@@ -83,17 +83,22 @@ def codes_among(column: Array, turn: float) -> list[float]:
 
 
 def refuse_codes(space: str, values: Array, names: Sequence[str], unit: str, cure: str) -> None:
-    """Refuse data (N, k) some of which seem to stand for missing values; `cure` says what to do."""
-    if is_angular(space, values.shape[1]):
-        refuse_no_angles(values, names, unit, cure)
-    elif space in DIRECTIONS and values.shape[1] == 2:
-        refuse_no_places(values, names, cure)
+    """Refuse angles or places (N, k), some of which seem to stand for missing values.
 
-
-def refuse_no_angles(values: Array, names: Sequence[str], unit: str, cure: str) -> None:
-    """Refuse angles (N, k) some of which are codes for missing values."""
-    for name, column in zip(names, values.T, strict=True):
-        if codes := codes_among(column, TURNS[unit]):
+    `cure` says what to do.
+    """
+    width = values.shape[1]
+    if not is_angular(space, width) and not (space in DIRECTIONS and width == 2):
+        return
+    for name, column, most in zip(names, values.T, (90.0, *[360.0] * width), strict=False):
+        if is_angular(space, width):
+            codes = codes_among(column, TURNS[unit])
+        else:
+            known = column[np.isfinite(column) & (np.abs(column) > most * (1 + TURN_TOLERANCE))]
+            codes = np.unique(known).tolist()
+            if not all(abs(v) in CODES or abs(v) > MAX_ANGLE for v in codes):
+                continue
+        if codes:
             raise SettingError(literal(f"column {name!r} has {_counted(codes, column)}: ") + cure)
 
 
@@ -159,17 +164,6 @@ def _counted(codes: Sequence[float], column: Array) -> str:
     words = [f"{code:.10g} in {n} row{'s' * (n > 1)}" for code, n in zip(codes, often, strict=True)]
     listed = words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
     return f"{listed}, which seem{'s' * (len(words) == 1)} to stand for missing values"
-
-
-def refuse_no_places(values: Array, names: Sequence[str], cure: str) -> None:
-    """Refuse latitudes and longitudes (N, 2) some of which are codes for missing values."""
-    for name, column, most in zip(names, values.T, (90.0, 360.0), strict=True):
-        known = np.unique(
-            column[np.isfinite(column) & (np.abs(column) > most * (1 + TURN_TOLERANCE))]
-        )
-        codes = [v for v in known.tolist() if abs(v) in CODES or abs(v) > MAX_ANGLE]
-        if codes and len(codes) == len(known):
-            raise SettingError(literal(f"column {name!r} has {_counted(codes, column)}: ") + cure)
 
 
 LEAST_END, ABOUT_ENDS = 0.05, 0.3

@@ -19,8 +19,7 @@ from orbiflow.density.data.doubts import (
     doubts_of_torus,
     is_identifier,
     place_doubts,
-    refuse_no_angles,
-    refuse_no_places,
+    refuse_codes,
 )
 from orbiflow.density.data.names import (
     AZIMUTHS,
@@ -114,7 +113,7 @@ def check_values(
         own, more = _angles(space, values, called, unit, cure)
         return own, doubts + more
     if space in DIRECTIONS and values.shape[1] == 2:
-        refuse_no_places(values, called, cure)
+        refuse_codes(space, values, called, "degrees", cure)
         doubts += place_doubts(space, values, called, unit)
     return "radians", doubts
 
@@ -206,7 +205,7 @@ def _angles(
     """Return the unit of angles (N, k), and doubts; refuse codes and values of no known unit."""
     refuse_foreign_units(names, values, unit)
     own, doubts = _unit_of(names, unit)
-    refuse_no_angles(values, names, own or "degrees", cure)
+    refuse_codes(space, values, names, own or "degrees", cure)
     if own is None:
         own = _radians(values, names)
         text = "no unit was given and all values are within 2 pi: they were read as radians"

@@ -1,6 +1,5 @@
 from .angles import at_observed as at_observed
 from .angles import axes_named as axes_named
-from .angles import chart_of_observed as chart_of_observed
 from .angles import chart_of_rows as chart_of_rows
 from .angles import check_torus as check_torus
 from .angles import given_named as given_named

@@ -138,13 +138,9 @@ def at_observed(density: Density, points: Tensor, *, measure: str = CHART) -> Te
     return found
 
 
-def chart_of_observed(space: Space, data: ArrayLike) -> Tensor:
-    """Return angles (N, k) in the space's unit, missing ones NaN, as points (N, k) of the torus."""
-    torus = check_torus(space, "densities of rows that lack angles")
-    values = observed_rows(data, "data", torus)
-    return torus.project(torch.as_tensor(values / torus.period))
-
-
 def chart_of_rows(space: Space, data: ArrayLike, *, may_lack: bool) -> Tensor:
-    """Return data (N, k) of any space as points, with missing angles if they `may_lack` some."""
-    return chart_of_observed(space, data) if may_lack else space.to_chart(data)
+    """Return data (N, k) as points; on tori they `may_lack` angles, which are NaN."""
+    if not may_lack:
+        return space.to_chart(data)
+    torus = check_torus(space, "densities of rows that lack angles")
+    return torus.project(observed_rows(data, "data", torus) / torus.period)

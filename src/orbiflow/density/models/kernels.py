@@ -16,7 +16,7 @@ from orbiflow.arguments import as_tensor
 from orbiflow.arrays import Array
 from orbiflow.density.models.density import Density, Pixel, Restriction, Split, Weighted
 from orbiflow.density.models.sums import Terms, log_sum_exp, near_log_sum, shares_of
-from orbiflow.density.spaces import Space, Torus, rectangle
+from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import fft, special
 
@@ -190,7 +190,7 @@ def _terms(space: Space, features: Tensor, kappa: Tensor, weights: Tensor) -> Te
         moved = np.abs(frame.inverse_lattice @ frame.linear_parts[:own] @ frame.lattice).round()
         turns = torch.as_tensor(moved).to(kappa)
         every = torch.cat([turn @ kappa.mT for turn in turns], dim=1)
-        peaks = -(special.i0e(kappa) * rectangle(space).to(kappa)).log().sum(dim=1)
+        peaks = -(special.i0e(kappa) * space.sides.to(kappa)).log().sum(dim=1)
     return Terms(features, every, (peaks + weights.log()).repeat(images))
 
 
@@ -223,7 +223,7 @@ def kernel_rows(space: Space, centers: Tensor, kappa: Tensor) -> tuple[Tensor, T
     if space.is_round:
         k = kappa[:, 0]
         return kappa * centers, _round_peaks(k, space.dim) - k
-    scaled = special.i0e(kappa) * rectangle(space).to(kappa)
+    scaled = special.i0e(kappa) * space.sides.to(kappa)
     return torch.cat([kappa, kappa], dim=1) * centers, -(scaled.log() + kappa).sum(dim=1)
 
 

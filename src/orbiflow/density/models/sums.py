@@ -191,8 +191,8 @@ def lengths2(offset: Tensor, factors: int) -> Tensor:
     return (offset**2).reshape(-1, factors, offset.shape[1]).sum(dim=0)
 
 
-LOG_TOLERANCE = math.log(1e-12)
-"""Logarithm of the share of a sum that may be left out."""
+LOG_TOLERANCE = math.log(1e-13)
+"""Logarithm of the share of a sum that may be left out in each of some ten halvings of a tile."""
 
 ROUNDING = 1e-15
 """Rounding error of squared distances between unit vectors, which bounds allow for."""
@@ -282,19 +282,6 @@ class Tile:
         return torch.addmm(square, rows, terms.centers)
 
 
-class _Left(NamedTuple):
-    """What is left to sum in a tile.
-
-    - `terms`: The terms.
-    - `lost`: The logarithm of what has been left out at most.
-    - `idle`: How many times in a row nothing has been left out.
-    """
-
-    terms: Terms
-    lost: float = -math.inf
-    idle: int = 0
-
-
 class _Walk:
     """Logarithms (N,) of sums, and their gradients (m, N) in the features if they are wanted."""
 
@@ -305,21 +292,27 @@ class _Walk:
         self.log_sum = torch.full_like(features[0], -math.inf)
         self.slope = torch.zeros_like(features) if slope else None
         if len(self.log_sum):
-            self._add(torch.arange(len(self.log_sum)), features, _Left(terms))
+            self._add(torch.arange(len(self.log_sum)), features, terms)
 
-    def _add(self, at: Tensor, features: Tensor, left: _Left) -> None:
-        """Sum terms at points, by their numbers (N,) and features (m, N), or in both halves of them."""
-        tile, count, given = Tile(features, left.terms.factors), len(at), left.terms.size
-        least, largest = tile.bounds(left.terms)
-        bottom = log_add(self.floor, least)
-        far, lost = _negligible(largest, left.lost, bottom + LOG_TOLERANCE)
-        if far is not None:
-            left = left._replace(terms=left.terms.only(~far), lost=lost)
-        terms = left.terms
-        left = left._replace(idle=0 if terms.size < LESS_SHARE * given else left.idle + 1)
-        if count > FEW_POINTS and count * terms.size > FEW_PAIRS and left.idle <= MAX_IDLE_HALVINGS:
-            for half in _halves(features, tile):
-                self._add(at[half], _gathered(features, half), left)
+    def _add(self, at: Tensor, features: Tensor, terms: Terms, idle: int = 0) -> None:
+        """Sum terms at points, by their numbers (N,) and features (m, N), or in both halves of them.
+
+        `idle` is how many times in a row hardly any term has been left out.
+        """
+        tile, count, given = Tile(features, terms.factors), len(at), terms.size
+        least, largest = tile.bounds(terms)
+        bottom = float(np.logaddexp(self.floor, float(log_sum_exp(least))))
+        far = largest < bottom + LOG_TOLERANCE - math.log(given)
+        if bool(far.any()):
+            terms = terms.only(~far)
+        idle = 0 if terms.size < LESS_SHARE * given else idle + 1
+        if count > FEW_POINTS and count * terms.size > FEW_PAIRS and idle <= MAX_IDLE_HALVINGS:
+            # halves across the longest side; a gather is four times as fast as an index
+            along = features[int(tile.sides.argmax())].numpy()
+            order = torch.as_tensor(np.argpartition(along, count // 2))
+            for half in (order[: count // 2], order[count // 2 :]):
+                inside = features.gather(1, half.expand(len(features), -1))
+                self._add(at[half], inside, terms, idle)
             return
         slope, parts = self.slope is not None, list[tuple[Tensor, Tensor | None]]()
         sharp = terms.sharp(tile.radius)
@@ -342,42 +335,3 @@ class _Walk:
             for log, slope in parts:
                 assert slope is not None
                 self.slope[:, at] += slope * (log - total).exp().nan_to_num_(0.0)
-
-
-def _negligible(logs: Tensor, lost: float, most: float) -> tuple[Tensor | None, float]:
-    """Return which (K,) of the exponentials of logarithms may be lost, if any, and what is lost then.
-
-    With exp(`lost`) they sum to less than exp(`most`): the smallest ones, whose sum is half of what
-    is still allowed, so that something is left for smaller tiles.
-    """
-    if most == -math.inf:
-        return None, lost
-    ordered = np.sort(logs.numpy())
-    before = math.exp(min(lost - most, 0.0))
-    sums = np.exp(np.minimum(ordered - most, 1.0)).cumsum()
-    count = int(np.searchsorted(sums, (1 - before) / 2))
-    if not count:
-        return None, lost
-    lost = most + math.log(sums[count - 1] + before + 1e-300)
-    return logs < (float(ordered[count]) if count < len(ordered) else math.inf), lost
-
-
-def log_add(one: float, logs: Tensor) -> float:
-    """Return the logarithm of exp(`one`) and all exponentials of logarithms (K,) together."""
-    top = float(logs.max())
-    if top == -math.inf:
-        return one
-    total = float((logs - top).mul_(LOG2_E).exp2_().sum())
-    return float(np.logaddexp(one, top + math.log(total)))
-
-
-def _halves(features: Tensor, tile: Tile) -> tuple[Tensor, Tensor]:
-    """Return the numbers of the points in both halves, across the tile's longest side."""
-    along = features[int(tile.sides.argmax())].numpy()
-    order = torch.as_tensor(np.argpartition(along, len(along) // 2))
-    return order[: len(along) // 2], order[len(along) // 2 :]
-
-
-def _gathered(table: Tensor, which: Tensor) -> Tensor:
-    """Return columns of a table (m, N) by their numbers (n,), four times as fast as by an index."""
-    return table.gather(1, which.expand(len(table), -1))
