@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from orbiflow.density.data.names import (
+from orbiflow.density.data.column_names import (
     FROM_POLE,
     HOURS,
     LATITUDES,

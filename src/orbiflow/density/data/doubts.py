@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
 from orbiflow.density.data.columns import DIRECTIONS
-from orbiflow.density.data.names import (
+from orbiflow.density.data.column_names import (
     AXIAL,
     is_angle_named,
     is_count_named,

@@ -21,7 +21,7 @@ from orbiflow.density.data.doubts import (
     place_doubts,
     refuse_codes,
 )
-from orbiflow.density.data.names import (
+from orbiflow.density.data.column_names import (
     AZIMUTHS,
     FROM_VERTICAL,
     HOURS,
