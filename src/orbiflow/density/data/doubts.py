@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbiflow.arrays import Array
-from orbiflow.density.data.columns import DIRECTIONS
 from orbiflow.density.data.column_names import (
     AXIAL,
     is_angle_named,
@@ -19,6 +18,7 @@ from orbiflow.density.data.column_names import (
     is_other_quantity,
     words_of,
 )
+from orbiflow.density.data.columns import DIRECTIONS
 from orbiflow.density.data.units import TURN_TOLERANCE, TURNS, is_angular
 from orbiflow.errors import SettingError, literal
 

@@ -10,17 +10,6 @@ from typing import cast
 import numpy as np
 
 from orbiflow.arrays import Array
-from orbiflow.density.data.columns import DIRECTIONS, ROTATIONS, Arrangement, check_columns
-from orbiflow.density.data.doubts import (
-    FEW_ROWS,
-    FULL_SHARE_OF_TURN,
-    Doubt,
-    doubts_of_angle,
-    doubts_of_torus,
-    is_identifier,
-    place_doubts,
-    refuse_codes,
-)
 from orbiflow.density.data.column_names import (
     AZIMUTHS,
     FROM_VERTICAL,
@@ -32,6 +21,17 @@ from orbiflow.density.data.column_names import (
     pairs_of,
     unit_named,
     words_of,
+)
+from orbiflow.density.data.columns import DIRECTIONS, ROTATIONS, Arrangement, check_columns
+from orbiflow.density.data.doubts import (
+    FEW_ROWS,
+    FULL_SHARE_OF_TURN,
+    Doubt,
+    doubts_of_angle,
+    doubts_of_torus,
+    is_identifier,
+    place_doubts,
+    refuse_codes,
 )
 from orbiflow.density.data.units import TURN_TOLERANCE, TURNS, Unit, check_unit, is_angular
 from orbiflow.errors import DataWarning, SettingError, literal
@@ -75,16 +75,11 @@ def _unit_to_convert(name: str, least: float, most: float, unit: str | None) -> 
         return None
     if "grad" in words and unit == "degrees" and 360 * (1 + TURN_TOLERANCE) < most <= 400:
         return "gon"
-    if _says_hours(words):
+    if words & HOURS and words != {"h"}:  # alone it may be a hue
         converted = unit in ("radians", "turns") and most <= TURNS[unit] * (1 + TURN_TOLERANCE)
         return "hours" if least >= 0 and most <= HOURS_PER_DAY and not converted else None
     found = foreign_unit(name)
     return None if found == "cycles" and unit == "turns" else found
-
-
-def _says_hours(words: set[str]) -> bool:
-    """Return whether words of a name say hours; an h alone may be a hue."""
-    return bool(words & HOURS) and words != {"h"}
 
 
 def check_values(

@@ -25,11 +25,11 @@ from .kernels import AdaptiveKernels as AdaptiveKernels
 from .kernels import kernel_rows as kernel_rows
 from .kernels import kernels_for as kernels_for
 from .mixture import Mixture as Mixture
+from .mixture import PartialDensity as PartialDensity
 from .mixture import mixture_of as mixture_of
 from .network import VonMisesNetwork as VonMisesNetwork
 from .network import averaged_networks as averaged_networks
 from .network import log_conditional as log_conditional
-from .part import PartialDensity as PartialDensity
 from .sums import FAINT_LOG as FAINT_LOG
 from .sums import LOG2_E as LOG2_E
 from .sums import log_sum_exp as log_sum_exp

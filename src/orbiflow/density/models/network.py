@@ -86,15 +86,11 @@ class VonMisesNetwork(Density, kind="network"):
         self.factors = tuple(factors)
 
     def log_chart(self, points: Tensor) -> Tensor:
-        return in_blocks(self._log_product, points, BLOCK_POINTS)
+        def log_product(some: Tensor) -> Tensor:
+            logs = [log_conditional(chains, some[:, list(axes)]) for axes, chains in self.factors]
+            return torch.stack(logs).sum(dim=0)
 
-    def _log_product(self, points: Tensor) -> Tensor:
-        angles = points.unbind(dim=1)
-        logs = [
-            log_conditional(chains, torch.stack([angles[axis] for axis in axes], dim=1))
-            for axes, chains in self.factors
-        ]
-        return torch.stack(logs).sum(dim=0)
+        return in_blocks(log_product, points, BLOCK_POINTS)
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         return self.space.project(self._drawn(count, {}, generator).points)

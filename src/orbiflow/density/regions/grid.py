@@ -179,8 +179,10 @@ def with_islands(
                 drawn[k], inner, level, budget - spent, depth - 1, least
             )
             spent, left = spent + more, left + lost
-    boxes = shapely.union_all(shapely.box(*lows.T, *(lows + grid.step).T))
-    return shapely.union_all([shapely.difference(shape, boxes), *drawn]), spent, left
+    corners = np.concatenate([lows, lows + grid.step], axis=1).tolist()
+    boxes: list[shapely.Geometry] = [shapely.box(*corner) for corner in corners]
+    rest = shapely.difference(shape, shapely.union_all(boxes))
+    return shapely.union_all([rest, *drawn]), spent, left
 
 
 def _crowded(
@@ -263,11 +265,14 @@ def all_filled(
     """
     rings = [_rings(block.values, level) for block in blocks]
     pairs = zip(rings, blocks, strict=True)
-    sides = [_Sides.of(np.concatenate(own), block) for own, block in pairs if own]
-    moved, off = _on_level(sides, level, function)
-    found = iter(moved)
-    shapes = [_area(own, next(found)) if own else shapely.MultiPolygon() for own in rings]
-    return shapes, off
+    parts = [_sides(np.concatenate(own), block) for own, block in pairs if own]
+    if not parts:
+        return [shapely.MultiPolygon() for _ in blocks], 0.0
+    vertices, inside, a, b, fa, fb = (np.concatenate(column) for column in zip(*parts, strict=True))
+    vertices[inside], off = _on_level(a, b, fa, fb, level, function)
+    ends = np.cumsum([len(part[0]) for part in parts])[:-1]
+    moved = iter(np.split(vertices, ends))
+    return [_area(own, next(moved)) if own else shapely.MultiPolygon() for own in rings], off
 
 
 def _rings(values: Array, level: float) -> list[Array]:
@@ -286,38 +291,29 @@ def _area(rings: list[Array], vertices: Array) -> shapely.Geometry:
     return shapely.make_valid(shapely.build_area(shapely.GeometryCollection(closed)))
 
 
-class _Sides(NamedTuple):
-    """Vertices (V, 2), and of those inside, (R,), the ends (R, 2) of their sides and values there."""
+def _sides(at: Array, block: Block) -> tuple[Array, Flags, Array, Array, Array, Array]:
+    """Return a block's vertices (V, 2), which lie inside, and of these the sides of cells they lie on.
 
-    vertices: Array
-    inside: NDArray[np.int64]
-    ends: tuple[Array, Array]
-    values: tuple[Array, Array]
-
-    @classmethod
-    def of(cls, at: Array, block: Block) -> _Sides:
-        """Return the sides on which vertices (V, 2) of a block lie, in cells."""
-        most = np.array(block.values.shape) - 1
-        inside = ((at >= 0) & (at <= most)).all(axis=1)
-        at = np.clip(at, 0, most)
-        start, end = np.floor(at), np.ceil(at)
-        inside &= (start != end).any(axis=1)  # else it lies on a node
-        rows = np.flatnonzero(inside)
-        nodes = start[rows], end[rows]
-        a, b = (block.low + node * block.step for node in nodes)
-        fa, fb = (block.values[tuple(node.T.astype(int))] for node in nodes)
-        return cls(block.low + at * block.step, rows, (a, b), (fa, fb))
+    Vertices are given in cells. Sides are two ends (R, 2) each, and the values (R,) there.
+    """
+    most = np.array(block.values.shape) - 1
+    inside = ((at >= 0) & (at <= most)).all(axis=1)
+    at = np.clip(at, 0, most)
+    start, end = np.floor(at), np.ceil(at)
+    inside &= (start != end).any(axis=1)  # else it lies on a node
+    nodes = start[inside], end[inside]
+    a, b = (block.low + node * block.step for node in nodes)
+    fa, fb = (block.values[tuple(node.T.astype(int))] for node in nodes)
+    return block.low + at * block.step, inside, a, b, fa, fb
 
 
 def _on_level(
-    sides: Sequence[_Sides], level: float, function: Function
-) -> tuple[list[Array], float]:
-    """Return vertices (V, 2) by false position between nodes (the Illinois algorithm)."""
-    counts = [len(own.inside) for own in sides]
-    if not sum(counts):
-        return [own.vertices for own in sides], 0.0
-    a, b = (np.concatenate([own.ends[k] for own in sides]) for k in (0, 1))
-    fa, fb = (np.concatenate([own.values[k] for own in sides]) - level for k in (0, 1))
+    a: Array, b: Array, fa: Array, fb: Array, level: float, function: Function
+) -> tuple[Array, float]:
+    """Return points (R, 2) between ends by false position (the Illinois algorithm), and how far off."""
+    fa, fb = fa - level, fb - level
+    if not len(a):
+        return a, 0.0
     off, found = np.full(len(a), np.inf), a.copy()
     todo, last = np.arange(len(a)), np.zeros(len(a))
     for _ in range(MAX_STEPS):
@@ -338,7 +334,4 @@ def _on_level(
         todo = todo[abs(off[todo]) > TOLERANCE]
         if not len(todo):
             break
-    parts = np.split(found, np.cumsum(counts)[:-1])
-    for own, part in zip(sides, parts, strict=True):
-        own.vertices[own.inside] = part
-    return [own.vertices for own in sides], float(np.sqrt(np.mean(off**2)))
+    return found, float(np.sqrt(np.mean(off**2)))

@@ -153,11 +153,6 @@ class Layout:
     marks: Marks
 
     @property
-    def is_header_comment(self) -> bool:
-        """Whether the header is a comment."""
-        return self.header_line is not None and self.header_line < self.first
-
-    @property
     def decimal(self) -> Mark:
         """The mark before decimals."""
         return self.marks.decimal
