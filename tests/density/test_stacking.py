@@ -175,7 +175,8 @@ def test_folds_part_the_rows(seed: int, count: int, together: bool) -> None:
     folds = folds_of(Rows(points), together=together, generator=generator)
     assert torch.equal(folds.rows.points.sort(dim=0).values, points.sort(dim=0).values)
     assert sum(len(folds.held(k)) for k in range(FOLDS)) == count
-    for train, held in folds:
+    for number in range(folds.used):
+        train, held = folds.train(number), folds.held(number)
         assert len(train) + len(held) == count
         if together:
             apart = (train.points[:, None] != held.points).any(dim=-1)
@@ -224,7 +225,7 @@ def test_groups_are_held_out_whole(seed: int, count: int, rows: int) -> None:
         of[group].add(fold)
     assert all(len(found) == 1 for found in of.values())
     assert set(folds.fold.tolist()) == set(range(min(10, count)))
-    held = torch.cat([rows.points for _, rows in folds])
+    held = torch.cat([folds.held(k).points for k in range(folds.used)])
     assert torch.equal(held.sort(dim=0).values, points.sort(dim=0).values)
 
 

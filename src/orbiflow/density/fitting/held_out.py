@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,10 +46,6 @@ class Folds:
         """Return the rows of a fold, `MOST_HELD` at most."""
         return self.rows[self.fold == number][:MOST_HELD]
 
-    def __iter__(self) -> Iterator[tuple[Rows, Rows]]:
-        for number in range(self.used):
-            yield self.train(number), self.held(number)
-
 
 def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds:
     """Return random tenths of the rows, of which 10 or more are different.
@@ -80,7 +75,7 @@ def folds_of(rows: Rows, *, together: bool, generator: torch.Generator) -> Folds
     found = Folds(rows, group % folds, min(used, folds))
     if rows.groups is None:
         return found
-    left = min(len(places(train.points)[0]) for train, _ in found)
+    left = min(len(places(found.train(number).points)[0]) for number in range(found.used))
     if left < LEAST_PLACES:
         raise OrbiflowError(
             f"groups: where whole groups are held out, {left} different rows are left to fit to, and "
