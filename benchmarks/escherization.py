@@ -41,7 +41,7 @@ def search(target: Target, effort: str, seed: int) -> tuple[list[EscherTile], fl
     found = escherize(target, own, method=method)
     assert not found.failures, found.failures
     assert all(result.certificate.valid for result in found.tiles)
-    return sorted(found.tiles, key=lambda r: -r.metrics.iou), time.perf_counter() - begin
+    return sorted(found.tiles, key=lambda r: -r.likeness.metrics.iou), time.perf_counter() - begin
 
 
 def main() -> None:
@@ -68,13 +68,13 @@ def main() -> None:
     for name, target in targets.items():
         results, seconds = search(target, effort, options.seed)
         best, known = results[0], figures[name]
-        ious.append(best.metrics.iou)
+        ious.append(best.likeness.metrics.iou)
         need = max(known["paper_ours"], known["paper_arap"], known["est_best_dice"])
-        met = best.metrics.iou >= known["est_best"] and best.metrics.dice >= need
+        met = best.likeness.metrics.iou >= known["est_best"] and best.likeness.metrics.dice >= need
         row = (
-            f"{name:14}{best.name:6}{best.metrics.iou:7.4f}{best.metrics.dice:7.4f}"
-            f"{best.recognisability.score:7.3f}{seconds:9.1f}"
-            f"{sum(r.starts for r in results):7}{sum(r.dropped for r in results):8} |"
+            f"{name:14}{best.name:6}{best.likeness.metrics.iou:7.4f}{best.likeness.metrics.dice:7.4f}"
+            f"{best.likeness.recognisability.score:7.3f}{seconds:9.1f}"
+            f"{sum(r.search.starts for r in results):7}{sum(r.search.dropped for r in results):8} |"
             f"{known['paper_ours']:7.3f}{known['paper_arap']:8.3f} |"
             f"{known['est_best']:9.4f}{known['est_best_dice']:7.4f}|{known['arap_rank0']:7.3f} |"
         )
@@ -84,7 +84,7 @@ def main() -> None:
             row += f"{arap['iou']:14.4f}{arap['recognisability']:7.3f} |"
             row += f" {'met' if met else f'Dice below {need}'}"
         print(row, flush=True)
-        by_class = {r.name: r.metrics.iou for r in results}
+        by_class = {r.name: r.likeness.metrics.iou for r in results}
         lines.append(f"{name:14}" + "".join(f"{by_class[kind]:8.4f}" for kind in CLASSES))
     print(f"mean IoU {np.mean(ious):.4f}\n\nIoU of each class\n{'':14}", end="")
     print("".join(f"{name:>8}" for name in CLASSES))

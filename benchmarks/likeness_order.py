@@ -27,7 +27,7 @@ from scipy.optimize import nnls
 from scipy.stats import spearmanr
 
 from orbiflow.tiles import Fidelity, Rating
-from orbiflow.tiles.likeness.ranking import STAR_WORDS
+from orbiflow.tiles.likeness.rating import STAR_WORDS
 
 GOOD = 6.5
 """The least mark that is good."""

@@ -221,7 +221,7 @@ def _draw(canvas: Canvas, extent: Extent, values: list[Any]) -> Findings:
 
 def _numbers(tile: EscherTile) -> dict[str, float]:
     error = equivariance_error(placed_field(as_model(tile)), tile.normal_tile.group.cosets)
-    measures = {"iou": tile.metrics.iou, "edge_mismatch": tile.certificate.edge_mismatch}
+    measures = {"iou": tile.likeness.metrics.iou, "edge_mismatch": tile.certificate.edge_mismatch}
     return {**measures, "symmetry_error": error}
 
 
@@ -333,7 +333,7 @@ def _rings(outcome: Any) -> list[Array]:
 
 
 def _iou(outcome: Any) -> float:
-    return outcome.metrics.iou if isinstance(outcome, EscherTile) else np.nan
+    return outcome.likeness.metrics.iou if isinstance(outcome, EscherTile) else np.nan
 
 
 def _length(outcome: Any) -> float:

@@ -107,7 +107,7 @@ def _tiles(
 
 
 def _rank(result: EscherTile, objective: Objective) -> float:
-    return result.score if objective == "likeness" else result.metrics.iou
+    return result.score if objective == "likeness" else result.likeness.metrics.iou
 
 
 def _by_goal(values: list[EscherTile | None]) -> list[dict[str, EscherTile | None]]:
@@ -168,7 +168,7 @@ def _draw_tiles(canvas: Canvas, _extent: Extent, values: list[Any]) -> Findings:
         "ARAP and EST: computed with Nagata and Imahori's program (MIT) on the same goals.",
     )
     certified = sum(one is not None and one.certificate.valid for one in values)
-    ours = [one.metrics.iou for one in overlap.values() if one is not None]
+    ours = [one.likeness.metrics.iou for one in overlap.values() if one is not None]
     est, arap = (_mean(key) for key in ("est_largest", "arap_largest"))
     mean = float(np.mean(ours)) if ours else float("nan")
     return Findings(
@@ -239,7 +239,7 @@ MEASURES = ("iou", "dice", "pixel_accuracy")
 
 
 def _overlaps(tile: EscherTile | None) -> list[float]:
-    return [getattr(tile.metrics, name) if tile else np.nan for name in MEASURES]
+    return [getattr(tile.likeness.metrics, name) if tile else np.nan for name in MEASURES]
 
 
 def _row(

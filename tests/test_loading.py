@@ -192,7 +192,7 @@ def test_a_tile_that_is_saved_is_loaded_the_same(folders: Path, tmp_path: Path) 
     plain = EscherTile(bare.tile)
     assert np.isnan(plain.score)
     orbiflow.save(plain, tmp_path / "plain")
-    assert np.isnan(read_result(tmp_path / "plain").metrics.iou)
+    assert np.isnan(read_result(tmp_path / "plain").likeness.metrics.iou)
     with pytest.raises(OutputError, match="holds"):
         orbiflow.save(found, folders / "turtle")
 

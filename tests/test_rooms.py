@@ -13,8 +13,18 @@ import pytest
 
 HOME = Path(__file__).parents[1] / "src" / "orbiflow"
 
-TILES = ["geometry", "tilings", "silhouette", "likeness", "tile", "result_file"]
-TILES += ["search", "flowing", "page", "write", "pictures", "motifs", "make", "solids"]
+TILES = ["geometry", "tilings", "silhouette", "likeness", "tile_map", "tile"]
+TILES += [
+    "result_file",
+    "search",
+    "flowing",
+    "page",
+    "write",
+    "pictures",
+    "motifs",
+    "make",
+    "solids",
+]
 TILES += ["motion", "run_folder"]
 DENSITY = ["data", "spaces", "models", "inference", "fitting"]
 DENSITY += [

@@ -81,7 +81,7 @@ def test_the_narrowest_figure_has_room() -> None:
 
 
 @pytest.mark.parametrize(
-    ("space", "width"), zip(SPACES, ("single", "double", "double", "single"), strict=True)
+    ("space", "width"), list(zip(SPACES, ("single", "double", "double", "single"), strict=True))
 )
 def test_density_figures_have_room_and_letters_of_7_to_8_points(space: Any, width: Any) -> None:
     density, sheet = example(space), coarse(width)

@@ -207,8 +207,8 @@ def test_a_goal_gives_a_certified_tile_at_either_aspect() -> None:
         found = goal_tile("penguin", objective, "fast", ("IH6",))
         assert found is not None
         assert found.certificate.valid
-        assert found.metrics.iou > 0.8
-        assert found.metrics.iou < found.metrics.dice
+        assert found.likeness.metrics.iou > 0.8
+        assert found.likeness.metrics.iou < found.likeness.metrics.dice
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ SMALL = """
 from orbiflow.cli.app import main
 from orbiflow.studio import work_queue
 
-work_queue.WARM += ("runtime.small_process",)
+work_queue.WARM_MODULES += ("runtime.small_process",)
 main()
 """
 BOOT = b"[[0, 0], [60, 0], [60, 20], [30, 25], [28, 70], [0, 70]]"

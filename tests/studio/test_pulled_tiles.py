@@ -103,7 +103,7 @@ def test_the_map_goes_where_its_outline_went(name: str, y_down: bool, tmp_path: 
     share = np.random.default_rng(0).random((len(after), 1))
     between = [(1 - share) * ring + share * np.roll(ring, -1, axis=0) for ring in (before, after)]
     assert np.abs(found.inverse(between[1]) - tile.inverse(between[0])).max() < 1e-6
-    assert found.fidelity is not None
+    assert found.likeness.fidelity is not None
     assert found.rating is not None
     loaded = read_result(save_tiles([found], tmp_path / "tile"))
     assert np.array_equal(loaded.tile.polygon, after)

@@ -14,7 +14,9 @@ from orbiflow.errors import CertificationError, OrbiflowError
 from orbiflow.tiles import (
     Bending,
     EscherTile,
+    Likeness,
     Rating,
+    SearchFacts,
     TileMap,
     TileVariations,
     arc_lengths,
@@ -115,7 +117,7 @@ def pulled(tile: EscherTile, parameters: Any) -> EscherTile:
         y_down=tile.y_down,
         silhouette=tile.silhouette,
         notes=("its outline was pulled by hand",),
-        min_neck=tile.min_neck,
+        likeness=Likeness(min_neck=tile.likeness.min_neck),
     )
     if not found.certificate.valid:
         raise CertificationError("; ".join(found.certificate.reasons))
@@ -125,7 +127,9 @@ def pulled(tile: EscherTile, parameters: Any) -> EscherTile:
         from orbiflow.tiles import with_map  # which needs torch
 
         before = with_map(tile)
-    return _with_map(found.changed(thinnest=thinnest), before, space)
+    return _with_map(
+        found.changed(likeness=replace(found.likeness, thinnest=thinnest)), before, space
+    )
 
 
 def _check(space: TileVariations, parameters: Array) -> None:
@@ -150,14 +154,14 @@ def _with_map(found: EscherTile, before: EscherTile, space: TileVariations) -> E
     except OrbiflowError as error:
         return found.changed(map_source=TileMap(frame=frame), no_map=str(error))
     rest, images = _outlines(bending)
-    cost = before.fidelity.cost if before.fidelity else 0.0
+    cost = before.likeness.fidelity.cost if before.likeness.fidelity else 0.0
     kept = fidelity(complex_points(rest), complex_points(images), cost)
     found = found.changed(
         map_source=TileMap(frame=frame, bending=bending),
-        objective="likeness",
-        fidelity=kept,
-        rest=frame.to_input(rest),
-        bent=frame.to_input(images),
+        search=SearchFacts(objective="likeness"),
+        likeness=replace(
+            found.likeness, fidelity=kept, rest=frame.to_input(rest), bent=frame.to_input(images)
+        ),
     )
     return replace(found, rating=Rating.of_likeness(found.score))
 

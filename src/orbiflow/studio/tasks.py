@@ -103,7 +103,7 @@ def search(
         on_event=as_part(on_event, 1 - len(left) / len(names)),
         cancel=cancel,
     )
-    if rounded := sum(tile.smoothed > 0 for tile in result.tiles):
+    if rounded := sum(tile.likeness.smoothed > 0 for tile in result.tiles):
         on_event(
             Note(
                 f"The thinnest parts are rounded off in {rounded} of {len(result.tiles)} tiles: let "

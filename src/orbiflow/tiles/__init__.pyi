@@ -30,6 +30,7 @@ from .geometry import subdivided as subdivided
 from .likeness.faithful import Fidelity as Fidelity
 from .likeness.faithful import faithfulness as faithfulness
 from .likeness.faithful import fidelity as fidelity
+from .likeness.likeness import Likeness as Likeness
 from .likeness.metrics import Overlap as Overlap
 from .likeness.metrics import Region as Region
 from .likeness.metrics import Shape as Shape
@@ -48,9 +49,9 @@ from .likeness.necks import narrowest_slit as narrowest_slit
 from .likeness.necks import slit_share as slit_share
 from .likeness.own_symmetry import NearSymmetry as NearSymmetry
 from .likeness.own_symmetry import near_symmetry as near_symmetry
-from .likeness.ranking import Rating as Rating
 from .likeness.ranking import diverse as diverse
 from .likeness.ranking import rank_score as rank_score
+from .likeness.rating import Rating as Rating
 from .likeness.recognition import Recognisability as Recognisability
 from .likeness.recognition import Recogniser as Recogniser
 from .likeness.recognition import recognisability as recognisability
@@ -143,7 +144,8 @@ from .solids.picture import read_solid as read_solid
 from .solids.picture import solid_picture as solid_picture
 from .solids.settings import SolidSettings as SolidSettings
 from .tile import EscherTile as EscherTile
-from .tile import TileMap as TileMap
+from .tile import SearchFacts as SearchFacts
+from .tile_map import TileMap as TileMap
 from .tilings.certificate import Certificate as Certificate
 from .tilings.certificate import certify as certify
 from .tilings.colourings import Colouring as Colouring

@@ -133,16 +133,16 @@ def _words(tile: EscherTile) -> dict[str, str]:
 
 def _figures(tile: EscherTile) -> dict[str, str]:
     """The same in figures."""
-    mismatch, bent = tile.certificate.edge_mismatch, tile.deformation
+    mismatch, bent = tile.certificate.edge_mismatch, tile.likeness.deformation
     return {
         "class": f"{tile.name} ({tile.group_name})",
         "score": f"{tile.score:.3f}",
         "bent": "-" if bent is None else f"{bent:.3f}",
-        "IoU": f"{tile.metrics.iou:.4f}",
-        "recognised": f"{tile.recognisability.score:.3f}",
+        "IoU": f"{tile.likeness.metrics.iou:.4f}",
+        "recognised": f"{tile.likeness.recognisability.score:.3f}",
         "certified": "yes" if tile.certificate.valid else "NO",
         "edges": f"{mismatch:.0e}" if mismatch < float("inf") else "-",
-        "s": f"{tile.seconds:.1f}",
+        "s": f"{tile.search.seconds:.1f}",
     }
 
 
@@ -177,18 +177,18 @@ def _measures(tile: EscherTile) -> dict[str, Any]:
     return {
         "class": tile.isohedral_class,
         "group": tile.group_name,
-        "objective": tile.objective,
-        "deformation": tile.deformation,
+        "objective": tile.search.objective,
+        "deformation": tile.likeness.deformation,
         "arrangement": tile.arrangement,
         "stars": tile.rating and tile.rating.stars,
         "word": tile.rating and tile.rating.word,
         "score": tile.score,
-        "iou": tile.metrics.iou,
-        "dice": tile.metrics.dice,
-        "recognised": tile.recognisability.score,
+        "iou": tile.likeness.metrics.iou,
+        "dice": tile.likeness.metrics.dice,
+        "recognised": tile.likeness.recognisability.score,
         "certified": tile.certificate.valid,
         "edge_mismatch": mismatch if mismatch < float("inf") else None,
-        "seconds": tile.seconds,
+        "seconds": tile.search.seconds,
     }
 
 

@@ -24,8 +24,15 @@ from orbiflow.runtime import (
     write_json,
 )
 from orbiflow.symmetry import CrystallographicGroup, Isometry, checked_lattice
-from orbiflow.tiles.likeness import Fidelity, Rating, Recognisability, ShapeMetrics, Thinnest
-from orbiflow.tiles.tile import EscherTile, TileSource
+from orbiflow.tiles.likeness import (
+    Fidelity,
+    Likeness,
+    Rating,
+    Recognisability,
+    ShapeMetrics,
+    Thinnest,
+)
+from orbiflow.tiles.tile import EscherTile, SearchFacts, TileSource
 from orbiflow.tiles.tilings import ISOHEDRAL_TYPES, Tile, isohedral_class
 
 RESULT, TILE_MODEL = "result.json", "model.safetensors"
@@ -67,7 +74,9 @@ def read_result(path: str | Path, which: str | int | None = None) -> EscherTile:
             y_down=bool(silhouette["y_down"]),
             rank=index + 1,
             silhouette=silhouette,
-            **_measurements(entry),
+            likeness=_likeness(entry),
+            rating=Rating(entry["rating"]["stars"]) if entry.get("rating") else None,
+            search=SearchFacts(**{name: entry[name] for name in _SEARCH if name in entry}),
         )
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise InputFileError(f"{file}: tile {index + 1} cannot be read: {error}") from error
@@ -230,31 +239,32 @@ def group_json(group: CrystallographicGroup) -> dict[str, Any]:
 
 def tile_json(tile: EscherTile) -> dict[str, Any]:
     """Return one entry of `tiles`: polygon and group in the input's own coordinates."""
-    thin, rating = tile.thinnest, tile.rating
+    own, search, rating = tile.likeness, tile.search, tile.rating
+    thin = own.thinnest
     return {
         "class": tile.isohedral_class,
         "arrangement": tile.arrangement,
         "rating": rating and {"stars": rating.stars, "word": rating.word},
         "score": _or_none(tile.score),
-        "objective": tile.objective,
-        "smoothed": tile.smoothed,
+        "objective": search.objective,
+        "smoothed": own.smoothed,
         "metrics": {
-            **_or_none(tile.metrics.as_dict()),
-            "deformation": tile.deformation,
-            "bent_iou": tile.bent_iou,
-            "pinned": tile.pinned,
-            "fidelity": None if tile.fidelity is None else asdict(tile.fidelity),
+            **_or_none(own.metrics.as_dict()),
+            "deformation": own.deformation,
+            "bent_iou": own.bent_iou,
+            "pinned": own.pinned,
+            "fidelity": None if own.fidelity is None else asdict(own.fidelity),
         },
-        "recognisability": _or_none(tile.recognisability.as_dict()),
+        "recognisability": _or_none(own.recognisability.as_dict()),
         "certificate": tile.certificate.as_dict(),
         "polygon": _closed(tile.tile.polygon),
-        "bent": None if tile.bent is None else _closed(tile.bent),
+        "bent": None if own.bent is None else _closed(own.bent),
         "thinnest": thin if thin is None else {**thin._asdict(), "ends": thin.ends.tolist()},
         "corners": list(tile.tile.corners),
         "group": group_json(tile.tile.group),
-        "starts": tile.starts,
-        "dropped": tile.dropped,
-        "seconds": round(tile.seconds, 3),
+        "starts": search.starts,
+        "dropped": search.dropped,
+        "seconds": round(search.seconds, 3),
     }
 
 
@@ -271,11 +281,11 @@ def _closed(ring: Array) -> list[list[float]]:
     return np.concatenate([ring, ring[:1]]).tolist()
 
 
-def _measurements(entry: dict[str, Any]) -> dict[str, Any]:
-    """Return the fields of an `EscherTile` that an entry states; those that it lacks are left out."""
+def _likeness(entry: dict[str, Any]) -> Likeness:
+    """Return the measures that an entry states; those that it lacks are left out."""
     metrics = dict(entry.get("metrics") or {})
     own = ("deformation", "bent_iou", "pinned")
-    found = {name: metrics.pop(name, None) for name in own}
+    found: dict[str, Any] = {name: metrics.pop(name, None) for name in own}
     fidelity = metrics.pop("fidelity", None)
     if fidelity is not None:
         found["fidelity"] = Fidelity(**{**fidelity, "pieces": tuple(fidelity["pieces"])})
@@ -284,20 +294,16 @@ def _measurements(entry: dict[str, Any]) -> dict[str, Any]:
     recognised = entry.get("recognisability")
     if recognised and recognised["score"] is not None:
         found["recognisability"] = Recognisability(**recognised)
-    if entry.get("rating"):
-        found["rating"] = Rating(entry["rating"]["stars"])
     thinnest, bent = entry.get("thinnest"), entry.get("bent")
     if thinnest is not None:
         ends = np.array(thinnest["ends"], dtype=np.float64)
         found["thinnest"] = Thinnest(thinnest["width"], thinnest["share"], ends)
     if bent is not None:
         found["bent"] = np.array(bent, dtype=np.float64)[:-1]
-    known = {name: entry[name] for name in _PLAIN if name in entry}
-    return {"known_score": entry.get("score"), **found, **known}
+    return Likeness(known_score=entry.get("score"), smoothed=entry.get("smoothed", 0.0), **found)
 
 
-# Fields of an `EscherTile` that an entry states under the same name
-_PLAIN = ("objective", "smoothed", "starts", "dropped", "seconds")
+_SEARCH = ("objective", "starts", "dropped", "seconds")  # fields of `SearchFacts` in an entry
 
 
 def _tile(entry: dict[str, Any]) -> Tile:

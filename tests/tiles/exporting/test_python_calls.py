@@ -213,7 +213,9 @@ def test_measures_are_read_whole_or_not_at_all(tmp_path: Path) -> None:
     kept |= {"moved": 0.01, "merged": 0.05, "cost": 0.3, "length": 6.0}
     entry["metrics"] = {"fidelity": kept}
     (run / "result.json").write_text(json.dumps(document))
-    assert read_result(run).fidelity == Fidelity((0.1, 0.2), 0.2, 0.1, 3.0, 0.01, 0.05, 0.3, 6.0)
+    assert read_result(run).likeness.fidelity == Fidelity(
+        (0.1, 0.2), 0.2, 0.1, 3.0, 0.01, 0.05, 0.3, 6.0
+    )
     del kept["length"]
     (run / "result.json").write_text(json.dumps(document))
     with pytest.raises(InputFileError, match=r"tile 1 cannot be read: .*length"):

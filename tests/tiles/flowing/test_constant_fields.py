@@ -40,7 +40,7 @@ def test_a_fit_of_pose_and_lattice_is_certified(name: str, method: str, tmp_path
     result = escherize_class(TARGET, name, SETTINGS[method])
     assert not isinstance(result, ClassFailure)
     assert result.certificate.valid
-    assert result.metrics.iou > 0.3
+    assert result.likeness.metrics.iou > 0.3
     path = tmp_path / "model.safetensors"
     assert result.map is not None
     path.write_bytes(result.map.to_bytes())

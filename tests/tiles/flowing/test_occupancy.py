@@ -226,4 +226,4 @@ def test_a_real_silhouette() -> None:
     result = best_tiles(target, Fit(model, 16, 0, model.size))[0]
     assert result.certificate.valid
     assert result.certificate.edge_mismatch < 1e-12
-    assert result.metrics.iou > 0.78
+    assert result.likeness.metrics.iou > 0.78

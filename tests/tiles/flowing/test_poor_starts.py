@@ -21,7 +21,7 @@ def test_a_square_stays_a_square() -> None:
     result = escherize_class(square, "IH1", FAST)
     assert not isinstance(result, ClassFailure)
     assert result.certificate.valid
-    assert result.metrics.iou > 0.9999
+    assert result.likeness.metrics.iou > 0.9999
 
 
 def test_templates_join_where_the_outline_gives_poor_starts() -> None:
@@ -33,7 +33,7 @@ def test_templates_join_where_the_outline_gives_poor_starts() -> None:
     comb = Target(np.array([(0.0, 0.0), *teeth[1:], (20.0, 1.0), (20.0, 0.0)][::-1]), y_down=False)
     result = escherize_class(comb, "IH1", FAST)
     assert not isinstance(result, ClassFailure)
-    assert result.metrics.iou > 0.2
+    assert result.likeness.metrics.iou > 0.2
 
 
 def test_regions_of_many_vertices_are_simplified_for_choosing() -> None:

@@ -15,7 +15,7 @@ from safetensors.numpy import save
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles import CLASSES, Bending, Frame, TileMap, TileModel, as_map, as_model, load_model
 from orbiflow.tiles.flowing.tile_model import extract_tile
-from orbiflow.tiles.tile import BENDING, FORMAT, MAX_BYTES
+from orbiflow.tiles.tile_map import BENDING, FORMAT, MAX_BYTES
 from sealed import sealed
 from strategies import seeds
 

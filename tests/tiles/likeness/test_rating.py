@@ -17,8 +17,17 @@ from scipy.stats import spearmanr
 from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry import wallpaper_group
-from orbiflow.tiles import EscherTile, Fidelity, Rating, SearchResult, Target, Tile, rank_score
-from orbiflow.tiles.likeness.ranking import STAR_WORDS
+from orbiflow.tiles import (
+    EscherTile,
+    Fidelity,
+    Likeness,
+    Rating,
+    SearchResult,
+    Target,
+    Tile,
+    rank_score,
+)
+from orbiflow.tiles.likeness.rating import STAR_WORDS
 from orbiflow.tiles.search.finished_tiles import rated
 
 DATA = Path(__file__).parents[3] / "benchmarks" / "data"
@@ -56,7 +65,10 @@ def test_scores_span_the_stars() -> None:
 def test_a_blob_for_a_spider_is_poor() -> None:
     target = Target.from_polygon([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2, 2.8], [0.8, 2.5]])
     scores = (0.99, 0.9, 0.8, rank_score(0.64, 0.36))
-    tiles = [EscherTile(Tile(target.outline, wallpaper_group("p1")), known_score=s) for s in scores]
+    tiles = [
+        EscherTile(Tile(target.outline, wallpaper_group("p1")), likeness=Likeness(known_score=s))
+        for s in scores
+    ]
     words = [tile.rating and tile.rating.word for tile in SearchResult(target, tiles).tiles]
     assert words == ["excellent", "good", "fair", "poor"]
 
@@ -137,6 +149,6 @@ def test_words_agree_with_marks_as_the_docs_say(shown: list[Marked]) -> None:
 
 def test_a_line_never_has_stars() -> None:
     line = Target.from_polygon([[0, 0], [100, 0], [100, 2], [0, 2]])
-    tile = EscherTile(Tile(line.outline, wallpaper_group("p1")), known_score=0.9)
+    tile = EscherTile(Tile(line.outline, wallpaper_group("p1")), likeness=Likeness(known_score=0.9))
     (own,) = rated([tile], line)
     assert own.rating == Rating(1)

@@ -179,13 +179,22 @@ def test_figures_are_those_that_were_taken(
     target: Target, bent: EscherTile, flowed: EscherTile
 ) -> None:
     of_bent, of_flowed = (
-        Page(index_page([tile.changed(pinned=pinned)], target, ["IH4"])).words
+        Page(
+            index_page(
+                [tile.changed(likeness=replace(tile.likeness, pinned=pinned))], target, ["IH4"]
+            )
+        ).words
         for tile, pinned in ((bent, 0.0042), (flowed, None))
     )
-    for figure in ("Deformation", f"{bent.deformation:.3f}", "Pinned parts", "0.0042"):
+    for figure in ("Deformation", f"{bent.likeness.deformation:.3f}", "Pinned parts", "0.0042"):
         assert figure in of_bent
         assert figure not in of_flowed
-    for figure in ("Score", f"{flowed.score:.3g}", f"{flowed.metrics.iou:.3f}", "Thinnest neck"):
+    for figure in (
+        "Score",
+        f"{flowed.score:.3g}",
+        f"{flowed.likeness.metrics.iou:.3f}",
+        "Thinnest neck",
+    ):
         assert figure in of_flowed
 
 

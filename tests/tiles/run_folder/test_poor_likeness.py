@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +20,7 @@ from orbiflow.tiles import (
     run_folder,
     search,
 )
-from orbiflow.tiles.likeness import Recognisability, compare
+from orbiflow.tiles.likeness import Likeness, Recognisability, compare
 from orbiflow.tiles.operations import escherize
 from orbiflow.tiles.search import why_poor
 
@@ -32,9 +31,12 @@ STRETCHED = Fidelity((0.1, 0.1), 0.9, 0.9, 7.5, 0.005, 0.15, 0.9, 6.0)
 LEGS = Fidelity((0.6, 0.5), 0.02, 0.1, 7.5, 0.005, 0.15, 0.9, 9.0)
 
 
-def tile(kept: Fidelity | None = None, **changes: Any) -> EscherTile:
+def tile(
+    kept: Fidelity | None = None, known_score: float | None = None, rating: Rating | None = None
+) -> EscherTile:
     own = Tile(TARGET.outline, wallpaper_group("p1"), "IH1")
-    return EscherTile(own, fidelity=kept, metrics=SAME, recognisability=KNOWN, **changes)
+    likeness = Likeness(SAME, KNOWN, fidelity=kept, known_score=known_score)
+    return EscherTile(own, likeness=likeness, rating=rating)
 
 
 def test_what_is_good_needs_no_words() -> None:

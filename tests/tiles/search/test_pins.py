@@ -18,10 +18,13 @@ CLASSES = ["IH5", "IH7"]
 
 def head_misfit(result: EscherTile, pins: Pins) -> tuple[float, float]:
     """How far the head's outline is from similar to what it was, and its turn in radians."""
-    assert result.rest is not None
-    assert result.bent is not None
-    held = pins.holds(SQUIRREL.to_normal(result.rest))
-    x, z = (SQUIRREL.to_normal(ring)[held] @ [1, 1j] for ring in (result.rest, result.bent))
+    assert result.likeness.rest is not None
+    assert result.likeness.bent is not None
+    held = pins.holds(SQUIRREL.to_normal(result.likeness.rest))
+    x, z = (
+        SQUIRREL.to_normal(ring)[held] @ [1, 1j]
+        for ring in (result.likeness.rest, result.likeness.bent)
+    )
     x, z = x - x.mean(), z - z.mean()
     a = np.vdot(x, z) / np.vdot(x, x)
     return float(np.sqrt((abs(z - a * x) ** 2).sum() / (abs(z) ** 2).sum())), float(np.angle(a))
@@ -42,22 +45,22 @@ def test_a_pinned_head_keeps_its_shape(free: list[EscherTile], pinned: list[Esch
     assert len(free) == len(pinned) == 2
     for result in pinned:
         assert result.certificate.valid
-        assert result.pinned is not None
-        assert result.pinned < 0.02
+        assert result.likeness.pinned is not None
+        assert result.likeness.pinned < 0.02
     worst = max(head_misfit(result, pins)[0] for result in pinned)
     best = min(head_misfit(result, pins)[0] for result in free)
     assert worst < best / 5
-    assert {result.pinned for result in free} == {None}
+    assert {result.likeness.pinned for result in free} == {None}
 
 
 def test_the_tile_itself_has_the_head(pinned: list[EscherTile]) -> None:
     """Not only the bent silhouette: the certified polygon holds a copy of the pinned outline."""
     pins = Pins.at(SQUIRREL, [HEAD])
     for result in pinned:
-        assert result.rest is not None
-        assert result.bent is not None
-        held = pins.holds(SQUIRREL.to_normal(result.rest))
-        x, z = (ring[held] @ [1, 1j] for ring in (result.rest, result.bent))
+        assert result.likeness.rest is not None
+        assert result.likeness.bent is not None
+        held = pins.holds(SQUIRREL.to_normal(result.likeness.rest))
+        x, z = (ring[held] @ [1, 1j] for ring in (result.likeness.rest, result.likeness.bent))
         a = np.vdot(x - x.mean(), z - z.mean()) / np.vdot(x - x.mean(), x - x.mean())
         copy = a * (x - x.mean()) + z.mean()
         boundary = shapely.Polygon(result.tile.polygon).exterior
@@ -70,7 +73,9 @@ def test_a_pinned_head_keeps_its_angle() -> None:
     held, _ = searched(SQUIRREL, CLASSES, QUICK, pins=pins)
     assert len(held) == 2
     assert max(abs(head_misfit(result, pins)[1]) for result in held) < np.radians(5)
-    assert all(result.pinned is not None and result.pinned < 0.02 for result in held)
+    assert all(
+        result.likeness.pinned is not None and result.likeness.pinned < 0.02 for result in held
+    )
 
 
 def test_a_head_that_would_turn_does_not() -> None:

@@ -1,5 +1,6 @@
 """The choice among finalists."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,8 @@ def best_tile(
     target: Target, model: TileModel, *, starts: int, seconds: float, force: bool = False
 ) -> EscherTile:
     fit = Fit(model, starts, 0, model.size)
-    return best_tiles(target, fit, force=force)[0].changed(seconds=seconds)
+    found = best_tiles(target, fit, force=force)[0]
+    return found.changed(search=replace(found.search, seconds=seconds))
 
 
 def finalists(*shapes: float, angles: tuple[float, ...] | None = None) -> TileModel:
@@ -52,11 +54,12 @@ def test_the_best_of_the_certified_wins(y_down: bool) -> None:
     model = finalists(2.0, 0.0, 0.02, -0.02, angles=(0.0, 0.4, 0.1, 0.9))
     result = best_tile(target, model, starts=24, seconds=1.5)
     single = [
-        best_tile(target, model.take([i]), starts=24, seconds=1.5).metrics.iou for i in (1, 2, 3)
+        best_tile(target, model.take([i]), starts=24, seconds=1.5).likeness.metrics.iou
+        for i in (1, 2, 3)
     ]
-    assert result.metrics.iou == max(single)
+    assert result.likeness.metrics.iou == max(single)
     assert min(single) < max(single)
-    assert (result.dropped, result.starts, result.seconds) == (1, 24, 1.5)
+    assert (result.search.dropped, result.search.starts, result.search.seconds) == (1, 24, 1.5)
     assert (result.name, result.group_name) == ("IH21", "p6")
     assert result.certificate.valid
     # the same tile in both frames
@@ -66,7 +69,7 @@ def test_the_best_of_the_certified_wins(y_down: bool) -> None:
     assert certify(result.normal_tile).valid
     tile, goal = shapely.Polygon(result.tile.polygon), shapely.Polygon(target.outline)
     iou = tile.intersection(goal).area / tile.union(goal).area
-    assert result.metrics.iou == pytest.approx(iou, abs=1e-12)
+    assert result.likeness.metrics.iou == pytest.approx(iou, abs=1e-12)
 
 
 def test_no_certified_finalist() -> None:
@@ -81,7 +84,7 @@ def test_force_keeps_the_uncertified_and_says_so() -> None:
     result = best_tile(target, finalists(2.0), starts=1, seconds=0.0, force=True)
     assert not result.certificate.valid
     assert "not simple" in result.certificate.reasons[0]
-    assert 0 < result.metrics.iou < 1
+    assert 0 < result.likeness.metrics.iou < 1
 
 
 def test_force_prefers_the_certified() -> None:
@@ -93,8 +96,8 @@ def test_force_prefers_the_certified() -> None:
     worse = best_tile(target, model.take([0]), starts=1, seconds=0.0, force=True)
     result = best_tile(target, model, starts=1, seconds=0.0, force=True)
     assert result.certificate.valid
-    assert result.metrics.iou < worse.metrics.iou
-    assert result.dropped == 0
+    assert result.likeness.metrics.iou < worse.likeness.metrics.iou
+    assert result.search.dropped == 0
 
 
 @pytest.mark.parametrize("name", ["IH4", "IH6", "IH28"])

@@ -52,7 +52,7 @@ def test_the_same_tiles_whatever_the_number_of_workers() -> None:
     here, none = searched(TARGET, ["ih4", "28", "IH4"], QUICK, on_event=events.append)
     assert none == []
     assert sorted(r.name for r in here) == ["IH28", "IH4"]
-    assert here[0].metrics.iou > here[1].metrics.iou > 0.7
+    assert here[0].likeness.metrics.iou > here[1].likeness.metrics.iou > 0.7
     for name in ("IH4", "IH28"):
         *steps, last, outcome = of_class(events, name)
         assert isinstance(outcome, TileFound)
@@ -64,7 +64,7 @@ def test_the_same_tiles_whatever_the_number_of_workers() -> None:
     for one, other in zip(here, elsewhere, strict=True):
         assert one.name == other.name
         assert np.array_equal(one.tile.polygon, other.tile.polygon)
-        assert one.metrics == other.metrics
+        assert one.likeness.metrics == other.likeness.metrics
         assert (one.map and one.map.settings) == (other.map and other.map.settings)
 
 

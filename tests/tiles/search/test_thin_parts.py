@@ -80,13 +80,13 @@ def searched(highest: float) -> SearchResult:
 
 def test_such_a_class_gets_a_tile_of_what_is_left(found: SearchResult) -> None:
     assert found.failures == []
-    assert [tile.smoothed for tile in found.tiles] == [ROUNDED_SHARES[0]] * 2
+    assert [tile.likeness.smoothed for tile in found.tiles] == [ROUNDED_SHARES[0]] * 2
     assert all(tile.certificate.valid for tile in found.tiles)
 
 
 def test_a_class_with_a_tile_of_the_whole_silhouette_keeps_it() -> None:
     tiles = searched(100).tiles
-    assert [tile.smoothed for tile in tiles] == [0, 0]
+    assert [tile.likeness.smoothed for tile in tiles] == [0, 0]
     assert rounded_for(tiles) == ""
 
 
@@ -102,7 +102,7 @@ def test_a_tile_of_the_whole_silhouette_goes_first_whichever_was_found_first(
     found: SearchResult,
 ) -> None:
     rounded = found.tiles[0]
-    whole = rounded.changed(smoothed=0.0, known_score=0.0)
+    whole = rounded.changed(likeness=replace(rounded.likeness, smoothed=0.0, known_score=0.0))
     for count in (1, 2):
         assert best_of(rounded, whole, count) is whole
         assert best_of(whole, rounded, count) is whole
@@ -116,7 +116,7 @@ def test_it_is_said_and_kept(found: SearchResult, tmp_path: Path) -> None:
         found.tiles, HAIR, ["IH4", "IH6"]
     )
     save_tiles(found.tiles[:1], tmp_path / "tile")
-    assert read_result(tmp_path / "tile").smoothed == ROUNDED_SHARES[0]
+    assert read_result(tmp_path / "tile").likeness.smoothed == ROUNDED_SHARES[0]
 
 
 def test_a_blob_is_no_good_likeness_of_a_spider() -> None:
@@ -136,8 +136,8 @@ def test_a_blob_is_no_good_likeness_of_a_spider() -> None:
     (rated,) = best_tiles(rounded, fit, original=spider, smoothed=0.04)
     assert Rating.of_likeness(blind.score).stars > 3
     assert Rating.of_likeness(rated.score).stars == 1
-    assert rated.metrics.iou == pytest.approx(iou(rated.tile.polygon, spider.outline))
-    assert rated.recognisability.limbs < 0.3 < 0.7 < blind.recognisability.limbs
+    assert rated.likeness.metrics.iou == pytest.approx(iou(rated.tile.polygon, spider.outline))
+    assert rated.likeness.recognisability.limbs < 0.3 < 0.7 < blind.likeness.recognisability.limbs
     assert why_poor(rated.changed(rating=Rating.of_likeness(rated.score)))
 
 

@@ -20,6 +20,7 @@ from orbiflow.tiles import (
     escherize,
     searched_classes,
 )
+from orbiflow.tiles.likeness import Likeness
 from orbiflow.tiles.search.search_record import best_of
 from outlines import animal
 
@@ -75,7 +76,7 @@ def test_all_classes_are_sketched_before_any_is_finished(workers: int) -> None:
         own = last[
             tile.name
         ]  # of the whole silhouette, where it has been found, whatever its score
-        assert (own.smoothed, -own.score) <= (tile.smoothed, -tile.score)
+        assert (own.likeness.smoothed, -own.score) <= (tile.likeness.smoothed, -tile.score)
     outcomes = [event for event in events if isinstance(event, TileFound | ClassFailed)]
     assert len(outcomes) == len(NAMES)
     shares = [event.share for event in events if isinstance(event, Progress)]
@@ -116,7 +117,7 @@ def test_levels_are_the_whole_search(
 
 def test_the_better_of_two_outcomes_is_kept() -> None:
     good, poor = (
-        EscherTile(tile.tile, known_score=score)
+        EscherTile(tile.tile, likeness=Likeness(known_score=score))
         for (_, tile), score in zip(watched_once(1)[1][:2], (0.8, 0.2), strict=True)
     )
     none = ClassFailure(good.name, "all cross themselves")

@@ -17,7 +17,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import NEVER, Cancel, one_blas_thread, one_thread
 from orbiflow.tiles.geometry import signed_area
-from orbiflow.tiles.likeness import narrowest_neck
+from orbiflow.tiles.likeness import Likeness, narrowest_neck
 from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.search import MAX_POINTS, TileVariations, divided_tile
 from orbiflow.tiles.tile import EscherTile, TileSource
@@ -98,7 +98,7 @@ def refine(
         silhouette=start.silhouette,
         no_map="its outline was changed by a loss of one's own",
         notes=(descent.note(),),
-        thinnest=narrowest_neck(found.polygon),
+        likeness=Likeness(thinnest=narrowest_neck(found.polygon)),
     )
 
 

@@ -23,7 +23,8 @@ from orbiflow.flows import Flow
 from orbiflow.symmetry import CrystallographicGroup
 from orbiflow.tiles.search import Candidates, Prototiles, StillTiles, simplest_tile
 from orbiflow.tiles.silhouette import Bending, Frame
-from orbiflow.tiles.tile import EscherTile, TileMap, naming_file
+from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tile_map import TileMap, naming_file
 from orbiflow.tiles.tilings import IsohedralClass, Tile
 from orbiflow.tiles.tilings import isohedral_class as class_of
 from orbiflow.typed_torch import linalg, listed

@@ -8,6 +8,7 @@ from .faithful import fidelity_to_original as fidelity_to_original
 from .faithful import kept_of as kept_of
 from .faithful import mark_gradient as mark_gradient
 from .gaps import missing_gaps as missing_gaps
+from .likeness import Likeness as Likeness
 from .measures import Measures as Measures
 from .metrics import Overlap as Overlap
 from .metrics import Region as Region
@@ -32,11 +33,11 @@ from .necks import neck_up_to as neck_up_to
 from .necks import slit_share as slit_share
 from .own_symmetry import NearSymmetry as NearSymmetry
 from .own_symmetry import near_symmetry as near_symmetry
-from .ranking import MOST_STARS as MOST_STARS
-from .ranking import Rating as Rating
 from .ranking import diverse as diverse
 from .ranking import mutual_iou as mutual_iou
 from .ranking import rank_score as rank_score
+from .rating import MOST_STARS as MOST_STARS
+from .rating import Rating as Rating
 from .recognition import Recognisability as Recognisability
 from .recognition import Recogniser as Recogniser
 from .recognition import recognisability as recognisability

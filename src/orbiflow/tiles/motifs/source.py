@@ -17,7 +17,8 @@ from orbiflow.tiles.motifs.raster import Grid, bilinear, polygon_sides, region_s
 from orbiflow.tiles.result_file import as_tile
 from orbiflow.tiles.search import matched
 from orbiflow.tiles.silhouette import Covered, Frame, Target, open_image
-from orbiflow.tiles.tile import EscherTile, TileMap, TileSource
+from orbiflow.tiles.tile import EscherTile, TileSource
+from orbiflow.tiles.tile_map import TileMap
 
 
 def with_map(source: TileSource, target: Target | None = None) -> EscherTile:

@@ -146,10 +146,10 @@ def comparison(
 ) -> ScenePicture:
     """Return how the silhouette bent into a tile, or the tile over it where it did not bend."""
     tile, y_down = result.tile, target.y_down
-    if result.bent is None or result.rest is None:
+    if result.likeness.bent is None or result.likeness.rest is None:
         return overlay_picture(tile, target.outline, y_down=y_down, label=label, sheet=sheet)
-    text = label and f"{label}  IoU {result.metrics.iou:.3f}"
-    rest, bent = result.rest, result.bent
+    text = label and f"{label}  IoU {result.likeness.metrics.iou:.3f}"
+    rest, bent = result.likeness.rest, result.likeness.bent
     return bending_picture(tile, rest, bent, y_down=y_down, label=text, thick=thick, sheet=sheet)
 
 

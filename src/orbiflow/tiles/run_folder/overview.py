@@ -201,7 +201,11 @@ def _draw_star(pen: ImageDraw.ImageDraw, left: float, middle: float, share: floa
 
 def _small(result: EscherTile, target: Target) -> Image.Image:
     """Draw a tile and its silhouette, without a legend."""
-    bent = [] if result.bent is None or result.rest is None else [result.rest, result.bent]
+    bent = (
+        []
+        if result.likeness.bent is None or result.likeness.rest is None
+        else [result.likeness.rest, result.likeness.bent]
+    )
     width = _fitting(window_of([result.tile.polygon, *(bent or [target.outline])]))
     return comparison(result, target, thick=3.5, sheet=Sheet.screen(width)).image(width)
 

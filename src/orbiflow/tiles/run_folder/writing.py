@@ -27,7 +27,8 @@ from orbiflow.tiles.run_folder.html_page import TILE_FILES, index_page
 from orbiflow.tiles.run_folder.overview import is_read_png, overview_png
 from orbiflow.tiles.search import SearchResult, report
 from orbiflow.tiles.silhouette import Target, doubts
-from orbiflow.tiles.tile import EscherTile, TileMap
+from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tile_map import TileMap
 from orbiflow.tiles.tilings import Colouring, colouring
 
 FIELD_FILES = ("field.png", "field.pdf")

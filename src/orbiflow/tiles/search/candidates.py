@@ -15,7 +15,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import CertificationError
 from orbiflow.tiles.geometry import kept_vertices, plane_points, subdivided
 from orbiflow.tiles.search.tile_space import NearestTiles
-from orbiflow.tiles.tile import TileMap
+from orbiflow.tiles.tile_map import TileMap
 from orbiflow.tiles.tilings import IsohedralClass, Tile
 
 if TYPE_CHECKING:

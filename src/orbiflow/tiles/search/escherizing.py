@@ -330,7 +330,7 @@ def _outcome(task: _Task, kind: IsohedralClass, progress: OnProgress, cancel: Ca
     except CertificationError as error:
         return ClassFailure(kind.name, str(error))
     seconds = time.perf_counter() - begin
-    best, *others = (tile.changed(seconds=seconds) for tile in chosen)
+    best, *others = (tile.changed(search=replace(tile.search, seconds=seconds)) for tile in chosen)
     return best.changed(others=tuple(others))
 
 
@@ -373,7 +373,7 @@ def _chosen_tiles(
 def report(result: SearchResult) -> dict[str, Any]:
     """Return the whole document, ready for JSON, tiles best first."""
     tiles, method, near = result.tiles, result.method, result.near_symmetry
-    core_seconds = sum({tile.isohedral_class: tile.seconds for tile in tiles}.values())
+    core_seconds = sum({tile.isohedral_class: tile.search.seconds for tile in tiles}.values())
     return {
         "schema_version": SCHEMA_VERSION,
         "method": method.method_name,

@@ -15,6 +15,7 @@ from orbiflow.arrays import Array
 from orbiflow.errors import Advice, CertificationError, OrbiflowError
 from orbiflow.runtime import one_blas_thread, one_thread
 from orbiflow.tiles.likeness import (
+    Likeness,
     Pinned,
     Rating,
     Recogniser,
@@ -27,7 +28,7 @@ from orbiflow.tiles.search.bending import PlacedBent
 from orbiflow.tiles.search.bent_map import map_of_bent
 from orbiflow.tiles.search.candidates import Candidates, Fit
 from orbiflow.tiles.silhouette import Target, is_mere_line
-from orbiflow.tiles.tile import EscherTile
+from orbiflow.tiles.tile import EscherTile, SearchFacts
 
 # How a target is made, for messages
 HOW_TO_GET_A_TARGET = "Target.read, Target.from_mask and Target.from_polygon make one"
@@ -61,7 +62,8 @@ def best_tiles(
     for index in range(fit.candidates.size):
         try:
             result = _result(target, fit, index, original, force=force)
-            result = result.changed(min_neck=min_neck, smoothed=smoothed)
+            known = replace(result.likeness, min_neck=min_neck, smoothed=smoothed)
+            result = result.changed(likeness=known)
             if not force:
                 result.certificate.require()
             if fit.bent:
@@ -74,7 +76,8 @@ def best_tiles(
     if not found:
         raise CertificationError("; ".join(dict.fromkeys(reasons)))
     found.sort(key=lambda r: (not r.certificate.valid, -r.score))
-    return [result.changed(dropped=fit.crossed + len(reasons)) for result in found]
+    dropped = fit.crossed + len(reasons)
+    return [result.changed(search=replace(result.search, dropped=dropped)) for result in found]
 
 
 def _result(target: Target, fit: Fit, index: int, original: Target, *, force: bool) -> EscherTile:
@@ -87,10 +90,12 @@ def _result(target: Target, fit: Fit, index: int, original: Target, *, force: bo
         silhouette=original.report(),
         map_source=replace(flow, frame=target.frame),
         normal=tile,
-        metrics=compare(region, original.outline),
-        recognisability=recogniser(original)(region),
-        starts=fit.starts,
-        thinnest=narrowest_neck(placed.polygon) if simple else None,
+        likeness=Likeness(
+            metrics=compare(region, original.outline),
+            recognisability=recogniser(original)(region),
+            thinnest=narrowest_neck(placed.polygon) if simple else None,
+        ),
+        search=SearchFacts(starts=fit.starts),
     )
 
 
@@ -105,22 +110,26 @@ def _with_bent(
 ) -> EscherTile:
     rest, outline, ends = (target.frame.to_input(ring) for ring in placed.outlines)
     kept = placed.bent.fidelity
-    if result.smoothed:
-        near = result.smoothed * float(np.ptp(original.normal, axis=0).max())
+    if smoothed := result.likeness.smoothed:
+        near = smoothed * float(np.ptp(original.normal, axis=0).max())
         rings = original.without_fur, original.to_normal(rest), original.to_normal(ends)
         kept = fidelity_to_original(*rings, near, kept.cost)
     tile, simple = _region(result.tile.polygon)
     body, maps, bending = placed.bent.orientation.fine, result.map, None
     with contextlib.suppress(OrbiflowError):  # hairs that no triangulation follows
         bending = map_of_bent(*placed, result.normal_tile)
-    return result.changed(
-        objective="likeness",
+    likeness = replace(
+        result.likeness,
         rest=rest,
         bent=outline,
         bent_iou=iou(_region(outline)[0], tile) if simple else None,
         deformation=kept.cost,
         fidelity=kept,
         pinned=body.misfit(placed.bent.points[: body.size]) if isinstance(body, Pinned) else None,
+    )
+    return result.changed(
+        likeness=likeness,
+        search=replace(result.search, objective="likeness"),
         map_source=None if maps is None else replace(maps, bending=bending),
     )
 
@@ -137,7 +146,7 @@ def rated(tiles: Sequence[EscherTile], target: Target) -> list[EscherTile]:
         return [tile.changed(rating=Rating(1)) for tile in tiles]
     return [
         tile.changed(
-            rating=(Rating.of_likeness if tile.fidelity else Rating.of_overlap)(tile.score)
+            rating=(Rating.of_likeness if tile.likeness.fidelity else Rating.of_overlap)(tile.score)
         )
         for tile in tiles
     ]
@@ -149,7 +158,7 @@ LONG_OUTLINE_LENGTH = 8.5  # in square roots of the area: long thin limbs, such 
 
 def why_poor(best: EscherTile) -> str:
     """Return why few people would find a run's best tile good, and what to try; "" if many would."""
-    kept = best.fidelity
+    kept = best.likeness.fidelity
     share = best.score if kept else 1.0
     if share >= POOR_SCORE and not (best.rating and best.rating.word == "poor"):
         return ""
@@ -168,8 +177,8 @@ def rounded_for(tiles: Sequence[EscherTile]) -> Advice:
     """Return which tiles are of the silhouette with thin parts rounded off; "" if none are."""
     shares: dict[float, list[str]] = {}
     for tile in tiles:
-        if tile.smoothed:
-            shares.setdefault(tile.smoothed, []).append(tile.isohedral_class)
+        if share := tile.likeness.smoothed:
+            shares.setdefault(share, []).append(tile.isohedral_class)
     lines = (
         f"no tile of {', '.join(dict.fromkeys(names))} has all of the silhouette's thin parts: what is "
         f"narrower than {100 * share:g} % of its length was rounded off first; "

@@ -56,7 +56,7 @@ class Record:
         """Keep a tile that the search is going to improve on."""
         self.firsts[tile.name] = tile
         seconds = time.perf_counter() - self.begin
-        self.on_event(Preview(tile.name, tile.metrics.iou, seconds))
+        self.on_event(Preview(tile.name, tile.likeness.metrics.iou, seconds))
 
     def progress(self, name: str, share: float, loss: float = math.nan) -> None:
         """Report how far a class is, which never falls."""
@@ -97,7 +97,7 @@ class Record:
         if isinstance(found, ClassFailure):
             self.on_event(ClassFailed(found.name, found.reason))
         else:
-            iou, certified = found.metrics.iou, found.certificate.valid
+            iou, certified = found.likeness.metrics.iou, found.certificate.valid
             self.on_event(TileFound(found.name, iou, found.score, certified))
 
     def finish(self) -> tuple[list[EscherTile], list[ClassFailure], frozenset[str]]:
@@ -126,9 +126,9 @@ def best_of(earlier: Outcome | None, later: Outcome, count: int) -> Outcome:
     """
     if not isinstance(earlier, EscherTile):
         return later
-    if isinstance(later, ClassFailure) or earlier.smoothed < later.smoothed:
+    if isinstance(later, ClassFailure) or earlier.likeness.smoothed < later.likeness.smoothed:
         return earlier
-    if later.smoothed < earlier.smoothed:
+    if later.likeness.smoothed < earlier.likeness.smoothed:
         return later
     tiles = [tile.changed(others=()) for tile in (*earlier.family(), *later.family())]
     tiles.sort(key=lambda tile: (not tile.certificate.valid, -tile.score))
