@@ -95,27 +95,21 @@ class CvOverview:
     def _report(
         self, found: HeldOut, done: Sequence[tuple[Fit, batch.Entry]], waiting: int
     ) -> bytes:
-        rows, cv, density = self.splits[0].rows, self.asked.cv, self.asked.density
+        asked, rows, cv = self.asked, self.splits[0].rows, self.asked.cv
         states = [entry.state for _, entry in done]
         comparison = self.comparison
         document: dict[str, Any] = {
             "kind": "cross-validation",
             "version": __version__,
-            "data": str(self.asked.data),
+            "data": str(asked.data),
             "space": {"name": rows.space.name, "unit": rows.space.unit},
             "columns": list(rows.table.columns),
             "settings": {
-                "folds": cv.folds,
-                "times": cv.times,
-                "group": self.asked.rows.group,
-                "missing": self.asked.rows.missing,
-                "weights": self.asked.rows.weights,
-                "repeats": density.repeats,
-                "level": cv.level,
-                "bootstrap": cv.bootstrap,
-                "seed": density.seed,
+                **{name: getattr(cv, name) for name in ("folds", "times", "level", "bootstrap")},
+                **{name: getattr(asked.rows, name) for name in ("group", "missing", "weights")},
+                **{name: getattr(asked.density, name) for name in ("repeats", "seed")},
             },
-            "components": self.asked.settings,
+            "components": asked.settings,
             "rows": len(rows.table.values),
             "groups": None if rows.labels is None else len(np.unique(rows.labels)),
             "uniform": -math.log(rows.space.volume),

@@ -227,7 +227,7 @@ BARS = "#b9c4d0"
 PIXELS, MAP_PIXELS = 120, 14_000
 """Points along a side at which a density is evaluated, and of a map in all."""
 
-SAMPLES, SEED = 4_000, 0
+SMALL_SAMPLES, SMALL_SEED = 4_000, 0
 MAX_PAIRS = 6
 """Number of angles up to which pairs are drawn, instead of stripes."""
 
@@ -247,7 +247,7 @@ def density_thumbnail(density: Density, data: ArrayLike) -> bytes:
     elif space.has_square and space.dim == 1:
         _draw_angle(figure, density, whole)
     else:
-        drawn = density.sample((SAMPLES,), torch.Generator().manual_seed(SEED))
+        drawn = density.sample((SMALL_SAMPLES,), torch.Generator().manual_seed(SMALL_SEED))
         places = view_of(space).places(drawn) if space.has_chart else (drawn.numpy() + 1) / 2
         if space.has_chart and not space.has_square:
             places = (places - places.min(axis=0)) / np.ptp(places, axis=0)

@@ -71,7 +71,8 @@ def read_text(path: Path, reading: Reading) -> Table:
     values.extend(numbers.of(cells, lines))
     check_count(path, len(lines), reading.max_rows, "rows")
     rows, at = np.frombuffer(values).reshape(-1, len(picked)), np.frombuffer(lines, dtype=np.int64)
-    table = tables.finished(path, rows, at, names, reading, notes, layout.of_table())
+    whole = Table(rows, names, at, tuple(notes), **layout.of_table())
+    table = tables.finished(path, whole, reading)
     return replace(table, notes=(*table.notes, *_notes(layout, reading, names, comments)))
 
 
