@@ -150,7 +150,7 @@ def folder_names(
 def _names(path: str) -> Iterator[str]:
     """Possible names, from the best to those that are as good as unique."""
     whole = PurePosixPath(path)
-    plain, ending = _plain(str(whole.with_suffix(""))), _plain(whole.suffix[1:])
+    plain, ending = _plain(str(whole.parent / whole.stem)), _plain(whole.suffix[1:])
     yield plain
     yield f"{plain}-{ending}"
     code = hashlib.sha256(path.encode("utf-8", "surrogateescape")).hexdigest()

@@ -75,6 +75,7 @@ class Store:
         if version == 0:
             self._data.executescript(f"BEGIN; {TABLES} PRAGMA user_version={VERSION}; COMMIT;")
         elif version != VERSION:
+            self._data.close()
             raise OrbiflowError(
                 f"{folder} was written by another version of orbiflow; give another folder as data"
             )
