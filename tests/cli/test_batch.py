@@ -109,7 +109,7 @@ def test_tables(tmp_path: Path, orbiflow) -> None:
         (("nowhere",), "there is no such folder; give a folder of files"),
         (("file.png",), "it is a file; give a folder of files"),
         (("empty",), "no file to read; wanted are names that end in .png"),
-        (("in", "--out", "in/out"), "choose an --out somewhere else"),
+        (("in", "--out", "in/out"), "choose a folder somewhere else"),
         (("in", "--workers", "0"), "--workers must be at least 1"),
         (
             ("in", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"),

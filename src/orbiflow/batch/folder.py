@@ -264,7 +264,7 @@ class BatchFolder:
             except Timeout as error:
                 raise OutputError(
                     f"another {self.overview.what} is at work in {self.path}: wait for it or choose "
-                    "another --out"
+                    "another folder"
                 ) from error
         self.journal = Journal(self.path / self.overview.journal)  # as the last one left it
         self._open.enter_context(self.journal)
@@ -312,7 +312,7 @@ class BatchFolder:
     def _check(self) -> None:
         """Raise an `OutputError` for a folder that holds something other than a batch."""
         what = f"cannot write into {self.path}"
-        with system_errors(OutputError, what, "choose another --out"):
+        with system_errors(OutputError, what, "choose another folder"):
             if not self.path.exists() or (self.path / self.overview.journal).exists():
                 return
             known = (*LITTER, LOCK)
@@ -320,14 +320,14 @@ class BatchFolder:
         if found is not None:
             raise OutputError(
                 f"{self.path} holds {found.name}, which is of no earlier {self.overview.what}: "
-                "choose another --out or move it"
+                "choose another folder or move it"
             )
 
 
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:
     for name, data in files.items():
         path = folder / PurePosixPath(name)
-        what, cure = f"cannot write {name} into {folder}", "free the disk or choose another --out"
+        what, cure = f"cannot write {name} into {folder}", "free the disk or choose another folder"
         with system_errors(OutputError, what, cure):
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
@@ -389,7 +389,7 @@ class Journal:
                         self.entries[entry.file] = entry
         if len(lines) > 1 and not self.entries:
             raise OutputError(
-                f"{self.path} is no journal of a batch; move it or choose another --out"
+                f"{self.path} is no journal of a batch; move it or choose another folder"
             )
 
 

@@ -19,7 +19,14 @@ from orbiflow import __version__
 from orbiflow.batch.executors import WorkSettings, executor_for
 from orbiflow.batch.folder import PAGE, RESERVED, TABLE, BatchFolder, ContactSheet, Entry, Kind
 from orbiflow.batch.parcels import Answer, Parcel
-from orbiflow.errors import InputFileError, OrbiflowError, SettingError, system_errors
+from orbiflow.errors import (
+    Advice,
+    InputFileError,
+    OrbiflowError,
+    SettingError,
+    literal,
+    system_errors,
+)
 from orbiflow.runtime import (
     Call,
     Cancel,
@@ -89,7 +96,7 @@ def listed(folder: Path, endings: Collection[str], match: str | None, out: Path)
         raise InputFileError(f"{folder}: {why}; give a folder of files")
     if out.resolve().is_relative_to(folder.resolve()):
         raise InputFileError(
-            f"{out} is inside {folder}, whose files are read: choose an --out somewhere else"
+            f"{out} is inside {folder}, whose files are read: choose a folder somewhere else"
         )
     names = sorted(name for name in _files(folder) if PurePosixPath(name).suffix.lower() in endings)
     if not names:
@@ -198,7 +205,7 @@ class Counts:
             tell(Note(text, warning=True))
         elif without:
             text = f"{without} without a result, for the reasons in {table}"
-            tell(Note(f"{text}; --retry-failed does them again", warning=True))
+            tell(Note(Advice(f"{literal(text)}; {{retry_failed}} does them again"), warning=True))
         state: State = "cancelled" if self.left else "done" if self.done else "nothing found"
         return Outcome({**summary, **asdict(self)}, state, without)
 
@@ -234,7 +241,7 @@ def run_files(
             )
             for file, name in ((file, names[file]) for file in files)
         ]
-        left_out = f" or that --match {match} leaves out" if match else ""
+        left_out = f" or that {match} leaves out" if match else ""
         gone = f"of files that are not in {source}{left_out}"
         counts = run_items(items, settings, folder, tell, cancel, gone=gone)
     table, page = out / TABLE, out / PAGE
@@ -296,8 +303,8 @@ def _said_before(
         failed = states["failed"] + states["nothing found"]
         text = f"{len(items)} {folder.kind.items}: {states['done']} are done already"
         if failed:
-            text += f", {failed} have failed before (--retry-failed does them again)"
-        yield f"{text}, {len(todo)} to do"
+            text += f", {failed} have failed before ({{retry_failed}} does them again)"
+        yield Advice(f"{text}, {len(todo)} to do")
     known = set(folder.keys)
     others = sorted(entry.name for key, entry in entries.items() if key not in known)
     if others:

@@ -299,7 +299,7 @@ def require_one_space(spaces: Mapping[str, Space]) -> None:
         if one.unit != other.unit:
             raise OrbiflowError(
                 f"{first} has angles in {one.unit}, {name} in {other.unit}: their densities are in "
-                "different units; fit both with one --unit"
+                "different units; fit both with one unit"
             )
 
 

@@ -24,6 +24,7 @@ from orbiflow.density.fitting.rounding import (
     step_of,
 )
 from orbiflow.density.spaces import Space, Torus, whole_turn
+from orbiflow.errors import Advice, literal
 
 SAME_PLACE = 1e-13
 """Difference of chart coordinates within which points are the same: far below what kernels resolve."""
@@ -90,17 +91,17 @@ class Repeats:
         """Return what was found and assumed, in words; `taken_for` is "places" or "rounding"."""
         if not self.rows and not self.can_be_undone:
             return []
-        assumed = "new rows are taken to repeat them as often (--repeats rounding: not to)"
+        assumed = "new rows are taken to repeat them as often ({repeats} rounding: not to)"
         if taken_for == "rounding":
             assumed = "they are taken for an accident: equal rows were held out together"
             if self.can_be_undone:
                 assumed = (
                     "they are taken for an accident: each value was spread evenly over its step of "
-                    "rounding before the fit (--repeats places: not to)"
+                    "rounding before the fit ({repeats} places: not to)"
                 )
         elif self.can_be_undone:
-            assumed = "new rows are taken to be rounded as well (--repeats rounding: not to)"
-        return [f"{self._found()}; {assumed}"]
+            assumed = "new rows are taken to be rounded as well ({repeats} rounding: not to)"
+        return [Advice(f"{literal(self._found())}; {assumed}")]
 
     def warnings(self, repeats: str) -> list[str]:
         """Return what to warn of where a setting leaves it to the data what repeats are."""

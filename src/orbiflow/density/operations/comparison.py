@@ -18,7 +18,7 @@ from orbiflow.density.operations.drawing import require_ending
 from orbiflow.density.operations.fitting import space_of
 from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import SpaceSettings, TableSettings
-from orbiflow.errors import DataWarning, OrbiflowError, SettingError
+from orbiflow.errors import DataWarning, OrbiflowError, SettingError, literal
 from orbiflow.settings import DefaultText, Option, Repeated
 
 if TYPE_CHECKING:
@@ -216,9 +216,10 @@ def _columns_of_models(
         }
     for name, other in others:
         if sorted(wanted) != sorted(other):
-            raise OrbiflowError(
-                f"{first} was fitted to {', '.join(wanted)}, {name} to {', '.join(other)}: are they "
-                "the same quantities? Then specify with --columns which columns they are"
+            fitted = f"{first} was fitted to {', '.join(wanted)}, {name} to {', '.join(other)}"
+            raise SettingError(
+                f"{literal(fitted)}: are they the same quantities? Then specify with {{columns}} which "
+                "columns they are"
             )
     settings = with_columns_of(read.settings, data, dict(extras[first]), read.tell)
     if settings.columns is not None:
@@ -243,10 +244,8 @@ def _common_columns(data: Sequence[Path], space: str, read: _Reader) -> Columns:
     if all(len(arrangements(space, names)) == 1 for names in (one, other)):
         return None
     if sorted(n.casefold() for n in one) != sorted(n.casefold() for n in other):
-        raise OrbiflowError(
-            f"{data[0]} has the columns {', '.join(one)}, {data[1]} {', '.join(other)}: specify with "
-            "--columns which to compare"
-        )
+        held = f"{data[0]} has the columns {', '.join(one)}, {data[1]} {', '.join(other)}"
+        raise SettingError(f"{literal(held)}: specify with {{columns}} which to compare")
     group = (read.group or "").strip().casefold()
     return tuple(name for name in one if name.casefold() != group)
 

@@ -14,7 +14,7 @@ from orbiflow.density.pictures import PlotSettings
 from orbiflow.density.regions import RegionSettings
 from orbiflow.density.run_folder import write_file
 from orbiflow.density.tables import TableSettings, check_table_name
-from orbiflow.errors import OrbiflowError, SettingError
+from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.settings import DefaultText, Option, Range
 
 if TYPE_CHECKING:
@@ -255,10 +255,10 @@ def patches(
     found = tables.read_rows(data, table, on_event).table
     width = len(found.columns)
     if width not in PATCH_WIDTHS:
-        raise OrbiflowError(
-            f"{data}: a patch has 9 pixel values or 8 DCT coordinates, and there "
+        raise SettingError(
+            f"{literal(str(data))}: a patch has 9 pixel values or 8 DCT coordinates, and there "
             f"{'is' if width == 1 else 'are'} {_counted(width, 'column')} "
-            f"({tables.listing(found.columns)}): choose with --columns"
+            f"({literal(tables.listing(found.columns))}): choose with {{columns}}"
         )
     with runtime.one_thread():
         angles, distances = spaces.to_klein(found.values, unit=unit)

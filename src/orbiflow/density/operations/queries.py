@@ -10,7 +10,7 @@ from orbiflow import runtime
 from orbiflow.density import comparing, fitting, models, regions, spaces, tables
 from orbiflow.density.run_folder import write_file, written_files
 from orbiflow.density.tables import RowSettings, check_table_name
-from orbiflow.errors import literal
+from orbiflow.errors import Advice, literal
 from orbiflow.settings import DefaultText, Needs, Option, Range, SettingError, Settings
 
 if TYPE_CHECKING:
@@ -181,12 +181,12 @@ def mean_of_whole(scores: Array, weights: Array | None, whole: NDArray[Any]) -> 
     return fitting.mean_of(rows.points[:, 0], rows.weights)
 
 
-def _region_note(samples: int) -> str:
+def _region_note(samples: int) -> Advice:
     """Return how far `hdr` can be trusted, in words."""
     low, high = regions.resolvable_masses(samples)
-    return (
+    return Advice(
         "hdr: the mass of the smallest highest-density region that holds the row, by "
-        f"{samples} samples (--samples): ± {0.5 / math.sqrt(samples):.2g} at most; what is below "
+        f"{samples} samples ({{samples}}): ± {0.5 / math.sqrt(samples):.2g} at most; what is below "
         f"{low:g} or above {high:.10g} they do not tell apart"
     )
 

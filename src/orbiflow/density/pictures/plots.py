@@ -137,7 +137,7 @@ def refuse_foreign_files(out: Path) -> None:
     if foreign and old:
         raise OutputError(
             f"{out} holds {old[0]}, which would be removed, beside {foreign[0]}, which orbiflow did "
-            "not write: choose another --out or move it"
+            "not write: choose another folder or move it"
         )
 
 

@@ -29,7 +29,7 @@ from orbiflow.density.data import (
 from orbiflow.density.tables.files import column_names, read_labels, read_table
 from orbiflow.density.tables.settings import RowSettings
 from orbiflow.density.tables.table import Table, TableError
-from orbiflow.errors import literal
+from orbiflow.errors import Advice, literal
 from orbiflow.runtime import Note, Sink
 
 _HEMISPHERES = {"N", "S", "E", "W", "NORTH", "SOUTH", "EAST", "WEST"}
@@ -77,12 +77,11 @@ def tell_of_calm(path: Path, table: Table, rows: RowSettings, tell: Sink) -> Non
     if not both.all() or np.isin(still, table.lines).sum() != len(zero):
         return
     several = "s" * (len(zero) > 1)
-    text = (
+    text = literal(
         f"WARNING: {table.columns[0]!r} is 0 in just the {len(zero)} row{several} in which "
-        f"{beside[0]!r} is 0: calm has no direction; leave it out with --missing-codes 0 "
-        "--drop-missing"
+        f"{beside[0]!r} is 0: calm has no direction; "
     )
-    tell(Note(text))
+    tell(Note(Advice(f"{text}leave it out with {{missing_codes}} 0 {{drop_missing}}")))
 
 
 def tell_of_counts(path: Path, table: Table, header: bool | None, tell: Sink) -> None:
@@ -93,11 +92,11 @@ def tell_of_counts(path: Path, table: Table, header: bool | None, tell: Sink) ->
         return
     steps = np.diff(np.sort(table.values[:, 0]))
     if len(steps) > 1 and steps.min() > 0 and bool(np.isclose(steps, steps.min(), rtol=0.01).all()):
-        text = (
+        text = literal(
             f"the values of {table.columns[0]!r} are evenly spaced, as the middles of bins are: if "
-            f"{beside[0]!r} says how many rows are in each, give --counts {beside[0]}"
+            f"{beside[0]!r} says how many rows are in each, give "
         )
-        tell(Note(text))
+        tell(Note(Advice(f"{text}{{counts}} {literal(beside[0])}")))
 
 
 MOST_ANGLES = 7

@@ -36,7 +36,7 @@ from orbiflow.density.tables.files import column_names, read_labels, read_table
 from orbiflow.density.tables.guesses import check_hemispheres, tell_of_calm, tell_of_counts
 from orbiflow.density.tables.settings import SPACES, RowSettings, SpaceSettings, TableSettings
 from orbiflow.density.tables.table import MissingCellsError, Table, TableError, find, listing, quote
-from orbiflow.errors import SettingError, literal
+from orbiflow.errors import Advice, SettingError, literal
 from orbiflow.runtime import Note, Sink
 
 MAX_ROWS = 20_000_000
@@ -258,9 +258,10 @@ def _angles_alone(table: Table, tell: Sink) -> Table:
         is_count = is_count_named(name)
         if (is_count or is_other_quantity(name)) and len(table.columns) > 1:
             table = table.without(table.columns.index(name))
-            why = "which says how much or how often each row counts; --weights or --counts uses it"
+            why = "which says how much or how often each row counts; {weights} or {counts} uses it"
             other = "which is no angle, by its name; name all columns to keep it"
-            tell(Note(f"left out the column {name!r}, {why if is_count else other}"))
+            left_out = literal(f"left out the column {name!r}")
+            tell(Note(Advice(f"{left_out}, {why if is_count else other}")))
     return table
 
 
@@ -278,10 +279,10 @@ def _tell_of_weights(weighing: Table, tell: Sink) -> None:
     whole = bool((values == np.round(values)).all()) and float(np.ptp(values)) > 0
     if whole and is_count_named(name) and "weight" not in name.casefold():
         text = (
-            f"of weights only the ratios matter: if {name!r} says how many rows are alike, give "
-            f"--counts {name}, for intervals and tests that know of all of them"
+            f"of weights only the ratios matter: if {literal(repr(name))} says how many rows are "
+            f"alike, give {{counts}} {literal(name)}, for intervals and tests that know of all of them"
         )
-        tell(Note(text))
+        tell(Note(Advice(text)))
 
 
 def _check_width(
@@ -351,8 +352,8 @@ def angle_unit(where: SpaceSettings, table: Table, tell: Sink) -> Unit:
     if where.cell is not None and not where.fractional:
         doubts += fraction_doubts(table.values, where.cell[: len(table.columns)])
     for doubt in doubts:
-        words = doubt.text.replace("(fractional)", "(--fractional)")
-        tell(Note(f"WARNING: {words}" if doubt.is_serious else words))
+        words = literal(doubt.text).replace("(fractional)", "({fractional})")
+        tell(Note(Advice(f"WARNING: {words}" if doubt.is_serious else words)))
     return unit
 
 
