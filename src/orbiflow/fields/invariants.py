@@ -216,6 +216,14 @@ class InvariantField(nn.Module, ABC):
         """Return the basis in the coefficients that the field evaluates, as (row, column, value)."""
 
     @abstractmethod
+    def bound(self) -> Callable[[Tensor], Tensor]:
+        """Return the field as a function for many evaluations at its present parameters."""
+
+    def forward(self, points: Tensor) -> Tensor:
+        """Return V at points (..., d): vectors of the same shape."""
+        return self.bound()(points)
+
+    @abstractmethod
     def adjoint(self, points: Tensor, forces: Tensor) -> Tensor:
         """Return the gradient (P,) of sum forces . V(points) in the parameters; inputs (N, d)."""
 

@@ -97,7 +97,9 @@ def assert_equivariant(
         if worst is None or not largest <= worst[0]:
             at = points[int(errors.reshape(len(points), -1).amax(dim=1).argmax())]
             worst = (largest, number, element, at)
-    allowed = _least(group, kind) if atol is None else atol
+    size = group.cell_volume ** (1 / group.dim)
+    least = {"map": 1e-9 * size, "field": ROUNDING * size, "invariant": ROUNDING}[kind]
+    allowed = least if atol is None else atol
     allowed += rtol * float(values.abs().max())
     if worst is not None and not worst[0] <= allowed:
         error, number, element, at = worst
@@ -107,12 +109,6 @@ def assert_equivariant(
             element,
             error,
         )
-
-
-def _least(group: CrystallographicGroup, kind: Kind) -> float:
-    """Return the deviation that is accepted where values vanish."""
-    size = group.cell_volume ** (1 / group.dim)
-    return {"map": 1e-9 * size, "field": ROUNDING * size, "invariant": ROUNDING}[kind]
 
 
 def _elements(

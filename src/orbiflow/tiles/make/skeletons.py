@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
-from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.make.layout import Layout, line_style
 from orbiflow.tiles.page import Curve, Layer, Scene, clipped, rectangle
@@ -153,42 +151,11 @@ def _without_joints(circuit: Trail, count: int) -> list[Trail]:
 
 def in_short_order(curves: list[Curve]) -> list[Curve]:
     """Return curves in the order and direction of a way from each to the nearest end that is left."""
-    if not curves:
-        return []
-    nearest = _Nearest(np.array([[curve.start, curve.end] for curve in curves]))
+    left = np.array([point for curve in curves for point in (curve.start, curve.end)])
     place, ordered = np.zeros(2), []
     for _ in curves:
-        number, side = nearest.take(place)
+        number, side = divmod(int(np.square(left - place).sum(axis=1).argmin()), 2)
         ordered.append(curves[number].reversed() if side else curves[number])
-        place = nearest.ends[number, 1 - side]
+        place = left[2 * number + 1 - side].copy()
+        left[2 * number : 2 * number + 2] = np.inf
     return ordered
-
-
-class _Nearest:
-    """The ends (n, 2, 2) of curves, with a tree that finds the nearest of those that are left."""
-
-    def __init__(self, ends: Array) -> None:
-        self.ends = ends
-        self.left = np.ones(len(ends), dtype=bool)
-        self._build_tree()
-
-    def _build_tree(self) -> None:
-        self.numbers = np.flatnonzero(self.left)
-        self.tree = KDTree(self.ends[self.numbers].reshape(-1, 2))
-        self.taken = 0
-
-    def take(self, place: Array) -> tuple[int, int]:
-        """Take the curve with the end nearest to `place`; return its number and which end it is."""
-        if 2 * self.taken > len(self.numbers):
-            self._build_tree()
-        size = 2 * len(self.numbers)
-        count = min(8, size)
-        while True:
-            _, found = self.tree.query(place, k=count)
-            for hit in np.atleast_1d(found).tolist():
-                number, side = int(self.numbers[hit // 2]), hit % 2
-                if self.left[number]:
-                    self.left[number] = False
-                    self.taken += 1
-                    return number, side
-            count = min(4 * count, size)

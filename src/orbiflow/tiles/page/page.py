@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -11,8 +11,8 @@ import numpy as np
 
 from orbiflow.arrays import Array, Integers, Window, checked_window
 from orbiflow.drawing import Palette
-from orbiflow.symmetry import Isometry
-from orbiflow.tiles.page.placing import edge_margin, inset, longer_side, place_on_page
+from orbiflow.symmetry import Isometry, rotation_matrix
+from orbiflow.tiles.page.placing import edge_margin, inset, longer_side, shift_to_most_whole
 from orbiflow.tiles.page.scene import (
     Box,
     Curve,
@@ -98,11 +98,15 @@ class Page:
         size = settings.page
         box = box or Box(0.0, 0.0, *size)
         tiling = as_tiling(tile)
-        longer = scale * longer_side(tiling.prototiles[0].polygon)
-        margin = None if centred else edge_margin(longer)
-        place = place_on_page(tiling, scale, box, y_down, rotate=settings.rotate, margin=margin)
-        moved = tiling.transformed(*place)
-        return cls(size, box, moved, Place(*place), whole, settings.colour)
+        turn = rotation_matrix(-np.radians(settings.rotate))  # y points down on the page
+        linear = scale * turn @ np.diag([1.0, 1.0 if y_down else -1.0])
+        middle = np.array([(box.left + box.right) / 2, (box.top + box.bottom) / 2])
+        place = Place(linear, middle - linear @ tiling.center)
+        if not centred:
+            within = inset(box, edge_margin(scale * longer_side(tiling.prototiles[0].polygon)))
+            shift = shift_to_most_whole(tiling.transformed(*place), within)
+            place = place._replace(offset=place.offset + shift)
+        return cls(size, box, tiling.transformed(*place), place, whole, settings.colour)
 
     @classmethod
     def of_window(
@@ -243,7 +247,7 @@ class Page:
         layers += self._tile_layers(chosen, line, clipped, seam, drawn=bool(motifs))
         return Scene(*self.size, tuple(layers), symbols, self.box, motifs=motifs, **more)
 
-    def empty(self, layers: Sequence[Layer], **more: Any) -> Scene:
+    def empty(self, layers: Iterable[Layer], **more: Any) -> Scene:
         """Return the page as a scene of other layers."""
         return Scene(*self.size, tuple(layers), window=self.box, **more)
 

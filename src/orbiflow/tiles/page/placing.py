@@ -6,7 +6,6 @@ import numpy as np
 import shapely
 
 from orbiflow.arrays import Array
-from orbiflow.symmetry import rotation_matrix
 from orbiflow.tiles.page.scene import Box
 from orbiflow.tiles.page.settings import MARKS_EDGE, USUAL_WIDTH, usual_tolerance
 from orbiflow.tiles.tilings import Tiling, copies_inside
@@ -15,29 +14,6 @@ from orbiflow.tiles.tilings import Tiling, copies_inside
 SHIFTS = 10
 # Number of tiles on a page beyond which a few more are not worth looking for
 MOST_TILES_TO_SHIFT = 1000
-
-
-def place_on_page(
-    tiling: Tiling,
-    scale: float,
-    page: Box,
-    y_down: bool,
-    *,
-    rotate: float = 0.0,
-    margin: float | None = None,
-) -> tuple[Array, Array]:
-    """Return the map, linear part and offset, from a tiling's units to the middle of a page.
-
-    `rotate` is in degrees counterclockwise. With the `margin` that whole tiles keep from the page's
-    edge, the tiling is moved nearby to where most are whole.
-    """
-    turn = rotation_matrix(-np.radians(rotate))  # y points down on the page
-    linear = scale * turn @ np.diag([1.0, 1.0 if y_down else -1.0])
-    middle = np.array([(page.left + page.right) / 2, (page.top + page.bottom) / 2])
-    offset = middle - linear @ tiling.center
-    if margin is not None:
-        offset = offset + _shift(tiling.transformed(linear, offset), inset(page, margin))
-    return linear, offset
 
 
 def edge_margin(tile_size: float) -> float:
@@ -64,7 +40,7 @@ def mark_corners(page: tuple[float, float]) -> list[Box]:
     ]
 
 
-def _shift(tiling: Tiling, box: Box) -> Array:
+def shift_to_most_whole(tiling: Tiling, box: Box) -> Array:
     """Return the shift after which most tiles are whole in a box; none if it is best."""
     if box.width * box.height > MOST_TILES_TO_SHIFT * tiling.tile_area:
         return np.zeros(2)
