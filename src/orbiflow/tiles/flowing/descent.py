@@ -377,20 +377,9 @@ def _best_first(target: Target, goal: shapely.Polygon, soft: SoftTarget, descent
 def _starts(
     target: Target, kind: IsohedralClass, settings: OverlapSearch, cancel: Cancel
 ) -> Starts:
-    phase = float(np.random.default_rng(settings.seed).random()) if settings.seed else 0.0
     found: Starts | None = None
     if settings.starts == "outline":
-        found = outline_starts(
-            target,
-            kind,
-            count=settings.candidates,
-            resolutions=settings.resolutions,
-            projected=settings.projected,
-            measured=settings.measured,
-            vertices=settings.boundary,
-            phase=phase,
-            cancel=cancel,
-        )
+        found = outline_starts(target, kind, settings, cancel=cancel)
         if len(found.prototiles) >= MIN_STARTS and found.iou.max() >= MIN_START_IOU:
             return found
     templates = template_starts(
@@ -398,7 +387,7 @@ def _starts(
         turns=settings.turns,
         stretch=settings.stretch if settings.lattice else 0.0,
         vertices=settings.boundary,
-        phase=phase,
+        phase=settings.phase,
     )
     # their overlap is not known: 0 says that any result is better
     plain = Starts(templates, np.zeros(len(templates)))
