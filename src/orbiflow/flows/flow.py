@@ -108,11 +108,11 @@ class Flow(nn.Module):
         self.segments = nn.ModuleList(
             f if isinstance(f, nn.Module) else _FunctionSegment(f) for f in listed
         )
-        self.duration = as_number(duration, "duration")
+        self._duration = as_number(duration, "duration")
         self._steps = as_whole(steps, "steps", 1)
         self.integrator: RungeKutta = runge_kutta(method)
         self._step_check = StepCheck() if warn and not bijective else None
-        self.bijective = bool(bijective)
+        self._bijective = bool(bijective)
         _ = self.steps  # a mistake in the fields is told at once
 
     @property
@@ -124,6 +124,16 @@ class Flow(nn.Module):
         if not self.bijective:
             return self._steps
         return max([self._steps, *map(self._injective_steps, self.fields())])
+
+    @property
+    def bijective(self) -> bool:
+        """Whether each step is injective, and log-determinants are those of the steps."""
+        return self._bijective
+
+    @property
+    def duration(self) -> float:
+        """Length of time of each segment."""
+        return self._duration
 
     @property
     def method(self) -> str:

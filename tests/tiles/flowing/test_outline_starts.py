@@ -12,16 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orbiflow.arrays import Array
-from orbiflow.tiles import (
-    CLASSES,
-    OverlapSearch,
-    Target,
-    Tile,
-    TileModel,
-    certify,
-    resampled,
-    subdivided,
-)
+from orbiflow.tiles import CLASSES, OverlapSearch, Target, Tile, TileModel, certify, resampled
 from orbiflow.tiles.flowing.starts import nearest_tiles, outline_starts, template_starts
 from orbiflow.tiles.search import template_symmetries
 from orbiflow.tiles.search.candidates import Prototiles
@@ -32,6 +23,7 @@ from orbiflow.tiles.search.tile_space import (
     best_placements,
     edge_lengths,
 )
+from strategies import divided_start
 
 BOOT = np.array([[0, 0], [3, 0], [3.4, 1.2], [2.2, 1.5], [2.0, 2.8], [0.8, 2.5], [-0.3, 1.2]])
 TARGET = Target.from_polygon(BOOT)
@@ -54,7 +46,7 @@ def exact_tile(name: str, seed: int) -> tuple[Array, Placements]:
         field.parameters_.copy_(0.04 * torch.randn_like(field.parameters_))
         model.log_scale.add_(0.3)
         model.stretch.normal_(std=0.1)
-        ring = model(subdivided(model.prototile()[0], pieces))[0].numpy()
+        ring = model(divided_start(model, pieces))[0].numpy()
         turn = float(model.angle) if kind.stretch_dim == 1 else 0.0
     lengths = np.full((1, len(kind.template())), pieces)
     return ring, Placements(lengths, np.zeros(1, int), np.array([turn]), np.ones(1))

@@ -200,7 +200,6 @@ def art_scene(art: Artwork) -> Scene:
         rasters = (carried_raster(art.picture, art.tile, art.density, page.count),)
     name = art.tile.isohedral_class or "a tile"
     return page.scene(
-        [Curve.polyline(page.ring, closed=True)],
         chosen,
         Style(None, chosen.outline, art.outline),
         clipped=True,

@@ -134,9 +134,9 @@ def tiling_scene(layout: Layout) -> Scene:
         line = settings.stroke or chosen.outline
     width = USUAL_WIDTH if settings.outline is None else settings.outline
     return page.scene(
-        [layout.outline.closed],
         chosen,
         Style(None, line, width),
+        outlines=[layout.outline.closed],
         clipped=settings.clip,
         seam=SEAM if motif is not None else None,
         motif=motif,

@@ -145,6 +145,11 @@ class Page:
         return self.tiling.prototiles[0].polygon
 
     @property
+    def polygons(self) -> list[Curve]:
+        """The polygon of each prototile, in its place, as a curve."""
+        return [Curve.polyline(own.polygon, closed=True) for own in self.tiling.prototiles]
+
+    @property
     def tile_size(self) -> float:
         """The longer side in mm of the smallest rectangle around the first prototile."""
         return longer_side(self.ring)
@@ -226,10 +231,10 @@ class Page:
 
     def scene(
         self,
-        outlines: Sequence[Curve],
         chosen: Palette | None,
         line: Style,
         *,
+        outlines: Sequence[Curve] | None = None,
         clipped: bool,
         seam: float | None = None,
         motif: Motif | None = None,
@@ -238,17 +243,16 @@ class Page:
         """Return the copies as a scene: symbols, a use of them for each copy, a layer for each colour.
 
         Args:
-            outlines: The outline of each prototile, on the page.
             chosen: The colours; None for lines alone.
             line: The lines around tiles, drawn around each; or above all, if hairlines `seam` mm wide
                 close the seams that viewers leave between neighbours.
+            outlines: The outline of each prototile, on the page. Default: its polygon.
             clipped: Whether tiles are cut off at the box.
             motif: What lies on the first prototile, on the page.
             more: Further fields of the scene.
         """
-        symbols = {
-            symbol_of(k): curve.moved(*self.about_middle(k)) for k, curve in enumerate(outlines)
-        }
+        given = enumerate(self.polygons if outlines is None else outlines)
+        symbols = {symbol_of(k): curve.moved(*self.about_middle(k)) for k, curve in given}
         motifs = {}
         if motif is not None and (motif.parts or motif.rasters):
             own = motif.moved(*self.about_middle())

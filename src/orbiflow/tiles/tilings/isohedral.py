@@ -31,7 +31,6 @@ from orbiflow.tiles.tilings.class_table import (
     Coefficients,
     OperatorRow,
     RotationRow,
-    TemplateKind,
     TypeRow,
 )
 from orbiflow.tiles.tilings.incidence import IncidenceSymbol
@@ -112,14 +111,6 @@ def pentagon(gauge: PentagonGauge, shape: Points) -> Points:
     p3 = p2 + turn(gauge.degrees_2, p1 - p2)
     p4 = turn(gauge.degrees_0, p1)
     return functions.stack([p0, p1, p2, p3, p4], -2)
-
-
-def template_vertices(kind: TemplateKind, shape: Points) -> Points:
-    """Return vertices (..., K, 2) for shape parameters, (..., 2) of a pentagon or (..., 0)."""
-    if kind == "hexagon":
-        vertices = cast_like(hexagon(), shape)
-        return array_functions(shape).broadcast_to(vertices, (*shape.shape[:-1], 6, 2))
-    return pentagon(PENTAGONS[kind], shape)
 
 
 _ROUNDING_ERROR = 1e-9
@@ -375,7 +366,11 @@ class PaperClass(IsohedralClass):
     @property
     def shape_dim(self) -> int:
         """Number of shape parameters of the template: 0 for hexagons, 2 for pentagons."""
-        return 0 if self.paper.template == "hexagon" else 2
+        return 2 if self._gauge else 0
+
+    @property
+    def _gauge(self) -> PentagonGauge | None:
+        return PENTAGONS.get(self.paper.template)
 
     def paper_operators(self) -> tuple[PaperOperator, ...]:
         """Return the paper's symmetrization operators, outermost first: V = O_1(O_2(...(F)))."""
@@ -383,7 +378,7 @@ class PaperClass(IsohedralClass):
 
     @cached_property
     def _default(self) -> Array:
-        return np.array(template_vertices(self.paper.template, np.zeros(self.shape_dim)))
+        return pentagon(self._gauge, np.zeros(2)) if self._gauge else hexagon()
 
     @cached_property
     def _group(self) -> CrystallographicGroup:
@@ -397,7 +392,7 @@ class PaperClass(IsohedralClass):
         return CrystallographicGroup.generate(basis, generators, name=self.row.group)
 
     def _shaped(self, shape: Any) -> Any:
-        return template_vertices(self.paper.template, shape)
+        return pentagon(self._gauge, shape) if self._gauge else super()._shaped(shape)
 
     def _point(self, coefficients: Coefficients) -> Array:
         terms = [c * self._default[k] for k, c in coefficients.items()]
