@@ -1,13 +1,12 @@
 """A check for tests: does a function commute with a crystallographic group?"""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from orbiflow.arrays import Array
 from orbiflow.errors import OrbiflowError
 from orbiflow.symmetry.elements import lattice_along
 from orbiflow.symmetry.group import CrystallographicGroup, checked_group
@@ -88,7 +87,9 @@ def assert_equivariant(
     values = _values(function, points, kind)
     lattice = group.lattice if along is None else lattice_along(group, along)
     worst: tuple[float, int, Isometry, Tensor] | None = None
-    for number, element in _elements(group, lattice, cells):
+    moves = [translation(sign * cells * vector) for vector in lattice.T for sign in (1, -1)]
+    cosets = enumerate(group.cosets, start=1)
+    for number, element in ((k, h) for k, g in cosets for h in (g, *(m @ g for m in moves))):
         moved = {"field": element.push, "map": element}.get(kind)
         expected = moved(values) if moved else values
         errors = (_values(function, element(points), kind) - expected).abs()
@@ -109,16 +110,6 @@ def assert_equivariant(
             element,
             error,
         )
-
-
-def _elements(
-    group: CrystallographicGroup, lattice: Array, cells: int
-) -> Iterator[tuple[int, Isometry]]:
-    """Yield each coset's number, from 1, with its representative and translates of it."""
-    moves = [translation(sign * cells * vector) for vector in lattice.T for sign in (1, -1)]
-    for number, coset in enumerate(group.cosets, start=1):
-        yield number, coset
-        yield from ((number, move @ coset) for move in moves)
 
 
 def _values(function: Callable[[Tensor], Tensor], points: Tensor, kind: Kind) -> Tensor:

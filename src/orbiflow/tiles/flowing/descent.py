@@ -318,17 +318,10 @@ def shared_soft_target(target: Target, emphasis: Emphasis | None) -> SoftTarget:
 
 def _with_start(model: TileModel, prototile: Prototiles) -> TileModel:
     """Return the candidates after a start that none of them beats, whose flow moves nothing."""
-    still = TileModel(
-        model.isohedral_class,
-        max_frequency=model.max_frequency,
-        smoothness=model.smoothness,
-        steps=model.flow.steps,
-        method=model.flow.method,
-        dtype=model.angle.dtype,
-        prototiles=prototile,
-    )
-    zero = torch.zeros_like(still.fourier_fields()[0].parameters_)
-    return TileModel.joined([still.with_fields([zero] * model.segments), model])
+    zero = torch.zeros_like(model.fourier_fields()[0].parameters_[:1])
+    start = model.with_fields([zero] * model.segments, [0])
+    start.start_from(prototile)
+    return TileModel.joined([start, model])
 
 
 def _polished(

@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
-from typing import Any, NamedTuple, cast, overload
+from typing import Any, NamedTuple, TypeVar, cast, overload
 
 import numpy as np
 
@@ -37,11 +37,12 @@ from orbiflow.tiles.tilings.incidence import IncidenceSymbol
 from orbiflow.tiles.tilings.tile_edges import (
     EdgeClass,
     EdgeIdentification,
+    EdgeImage,
     Edges,
     edge_classes,
     edges,
 )
-from orbiflow.tiles.tilings.tiling import Tile
+from orbiflow.tiles.tilings.tiling import Tile, coset_and_cell
 
 
 class PentagonGauge(NamedTuple):
@@ -179,6 +180,9 @@ def _cosh_sinhc(square: Any) -> tuple[Any, Any]:
         own.where(small, cosh, hyperbolic_cosh(root)),
         own.where(small, sinhc, hyperbolic_sinh(root) / root),
     )
+
+
+EdgePair = TypeVar("EdgePair", EdgeIdentification, EdgeImage)
 
 
 class PaperOperator(NamedTuple):
@@ -362,6 +366,27 @@ class PaperClass(IsohedralClass):
     """One of the paper's nine classes, with template and operators as the paper gives them."""
 
     paper: ClassRow
+
+    @cached_property
+    def identified_edges(self) -> tuple[EdgeIdentification, ...]:
+        """Which edge of the template (edge k from p_k to p_{k+1}) is mapped onto which, and by what."""
+        return tuple(map(self._exact, super().identified_edges))
+
+    @cached_property
+    def edge_classes(self) -> tuple[EdgeClass, ...]:
+        """The template's edges, those that are images of each other together."""
+        return tuple(
+            EdgeClass(
+                own.edge, tuple(map(self._exact, own.folds)), tuple(map(self._exact, own.images))
+            )
+            for own in super().edge_classes
+        )
+
+    def _exact(self, pair: EdgePair) -> EdgePair:
+        """Return an image with the isometry that the group has: searches feel the last digits."""
+        coset, cell = coset_and_cell(self._group, pair.isometry)
+        shift = np.array(cell) @ self._group.lattice.T + self._group.translations[coset]
+        return pair._replace(isometry=Isometry(self._group.linear_parts[coset], shift))
 
     @property
     def shape_dim(self) -> int:
