@@ -70,7 +70,7 @@ def subdivided(ring: Array, pieces: int) -> Array:
     sides = np.roll(ring, -1, axis=-2) - ring
     shares = (np.arange(pieces) / pieces)[:, None]
     points = ring[..., :, None, :] + shares * sides[..., :, None, :]
-    return points.reshape(*ring.shape[:-2], -1, 2)
+    return points.reshape(*ring.shape[:-2], ring.shape[-2] * pieces, 2)
 
 
 def _crosses(local: AnyRing) -> AnyRing:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from orbiflow.errors import OrbiflowError
 from orbiflow.tiles.make.layout import Layout, line_style
@@ -151,11 +152,23 @@ def _without_joints(circuit: Trail, count: int) -> list[Trail]:
 
 def in_short_order(curves: list[Curve]) -> list[Curve]:
     """Return curves in the order and direction of a way from each to the nearest end that is left."""
-    left = np.array([point for curve in curves for point in (curve.start, curve.end)])
-    place, ordered = np.zeros(2), []
+    ends = np.array([[curve.start, curve.end] for curve in curves])
+    left, taken = np.ones(len(ends), dtype=bool), 0
+    place, ordered, numbers, tree = np.zeros(2), [], np.zeros(0, dtype=np.int64), None
     for _ in curves:
-        number, side = divmod(int(np.square(left - place).sum(axis=1).argmin()), 2)
+        if tree is None or 2 * taken > len(
+            numbers
+        ):  # most of the tree's curves are taken: a new one
+            numbers, taken = np.flatnonzero(left), 0
+            tree = KDTree(ends[numbers].reshape(-1, 2))
+        number, side, count = -1, 0, min(8, 2 * len(numbers))
+        while number < 0:
+            for hit in np.atleast_1d(tree.query(place, k=count)[1]).tolist():
+                if left[numbers[hit // 2]]:
+                    number, side = int(numbers[hit // 2]), hit % 2
+                    break
+            count = min(4 * count, 2 * len(numbers))
+        left[number], taken = False, taken + 1
         ordered.append(curves[number].reversed() if side else curves[number])
-        place = left[2 * number + 1 - side].copy()
-        left[2 * number : 2 * number + 2] = np.inf
+        place = ends[number, 1 - side]
     return ordered

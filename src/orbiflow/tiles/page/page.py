@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -285,7 +285,7 @@ class Page:
             style = line._replace(fill=fill) if seam is None else Style(fill, fill, seam)
             layers.append(Layer(name, "tiles", style, tuple(filter(len, own)), clipped))
             if drawn:
-                on = (own[0].of(MOTIF),)
+                on = (replace(own[0], symbol=MOTIF),)
                 ink = chosen.ink(colour)
                 layers.append(Layer(f"drawing on {name}", "drawing", Style(), on, clipped, ink))
         if seam is not None and line.width > 0:
