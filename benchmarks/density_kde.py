@@ -12,7 +12,7 @@ from scipy.special import ive
 
 from orbiflow.density import to_vectors
 from orbiflow.density.models import log_sum_exp
-from orbiflow.density.models.terms import BLOCK_ENTRIES
+from orbiflow.density.models.sums import BLOCK_ENTRIES
 
 Data = NDArray[np.float64]
 WIDTHS = np.geomspace(2.0, 1e7, 48)

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from orbiflow.density import AdaptiveKernels, DensityEstimator, Mixture, log_density_gradient
 from orbiflow.density.models import kernel_rows, log_sum_exp
-from orbiflow.density.models.terms import BLOCK_ENTRIES
+from orbiflow.density.models.sums import BLOCK_ENTRIES
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane", "three angles")
 DENSE = 2_000

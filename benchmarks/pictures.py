@@ -41,7 +41,7 @@ from orbiflow.tiles import (
     write_gallery,
 )
 from orbiflow.tiles.make.art import png_of
-from orbiflow.tiles.motifs.source import Picture
+from orbiflow.tiles.motifs.carried import Picture
 
 
 def print_files(found: SearchResult, *, figures: bool) -> None:

@@ -85,8 +85,8 @@ from .tiles.make.art import render_artwork as render_artwork
 from .tiles.make.art_settings import ArtSettings as ArtSettings
 from .tiles.make.export_settings import ExportSettings as ExportSettings
 from .tiles.make.exporting import scenes as scenes
-from .tiles.motifs.drawings import read_over as read_over
-from .tiles.motifs.source import with_map as with_map
+from .tiles.motifs.carried import read_over as read_over
+from .tiles.motifs.carried import with_map as with_map
 from .tiles.motion.settings import AnimationSettings as AnimationSettings
 from .tiles.operations import animate as animate
 from .tiles.operations import art as art

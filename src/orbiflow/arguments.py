@@ -16,7 +16,7 @@ import numbers as abstract
 import operator
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import EllipsisType, UnionType
@@ -52,37 +52,33 @@ class Range:
     below: float | None = None
 
     def __contains__(self, value: float) -> bool:
-        return (
-            (isinstance(value, int) or math.isfinite(value))
-            and (self.least is None or value >= self.least)
-            and (self.most is None or value <= self.most)
-            and (self.above is None or value > self.above)
-            and (self.below is None or value < self.below)
-        )
+        is_finite = isinstance(value, int) or math.isfinite(value)
+        return is_finite and all(fits(value, bound) for bound, (fits, *_) in self._bounds())
 
     def __str__(self) -> str:
         if self.least is not None and self.most is not None:
             return f"from {_plainly(self.least)} to {_plainly(self.most)}"
-        bounds = {
-            "at least": self.least,
-            "above": self.above,
-            "at most": self.most,
-            "below": self.below,
-        }
-        given = [f"{word} {_plainly(bound)}" for word, bound in bounds.items() if bound is not None]
-        return " and ".join(given)
+        return " and ".join(f"{word} {_plainly(bound)}" for bound, (_, word, _) in self._bounds())
 
     @property
     def schema(self) -> dict[str, float]:
         """The keywords of JSON Schema for these bounds."""
-        bounds = {
-            "minimum": self.least,
-            "maximum": self.most,
-            "exclusiveMinimum": self.above,
-            "exclusiveMaximum": self.below,
-        }
-        return {name: bound for name, bound in bounds.items() if bound is not None}
+        return {keyword: bound for bound, (*_, keyword) in self._bounds()}
 
+    def _bounds(self) -> Iterator[tuple[float, tuple[Callable[[float, float], bool], str, str]]]:
+        """Yield each bound that there is, with what is known of its kind."""
+        for name, kind in _BOUNDS.items():
+            if (bound := getattr(self, name)) is not None:
+                yield bound, kind
+
+
+_BOUNDS: dict[str, tuple[Callable[[float, float], bool], str, str]] = {
+    "least": (operator.ge, "at least", "minimum"),
+    "above": (operator.gt, "above", "exclusiveMinimum"),
+    "most": (operator.le, "at most", "maximum"),
+    "below": (operator.lt, "below", "exclusiveMaximum"),
+}
+"""Of each kind of bound: the comparison that holds, its words, and its keyword in JSON Schema."""
 
 ANY = Range()
 

@@ -1,5 +1,4 @@
 """The operations of orbiflow by name, and where each is: "module:function"."""
-# ruff: noqa: E501 - a table with a line for each command
 
 OPERATIONS = {
     "escherize": "orbiflow.tiles.operations:escherize",
@@ -23,30 +22,6 @@ OPERATIONS = {
     "density batch": "orbiflow.density.operations.fitting:batch",
     "studio": "orbiflow.studio.operations:studio",
 }
-
-SUMMARIES = {
-    "escherize": "Find tiles that look like a silhouette and tile the plane, and prove it.",
-    "batch": "Find tiles for every silhouette of a folder, here or on a Dask cluster.",
-    "export": "Write a tiling in real size: to print, to cut with a laser, to draw, to put on a page.",
-    "art": "Carry a picture of the silhouette onto its tile and repeat it over the plane.",
-    "solid": "Make a solid to print in 3D: a tile, cookie cutter, stamp, mould or puzzle.",
-    "animate": "Write an animation: a tiling becoming animals, a silhouette bending, a tiling that grows.",
-    "classes": "List isohedral classes: their groups, the symmetry of their tiles, and how edges are identified.",
-    "density summary": "Summarise angles, directions or axes: means with intervals, spread, correlations, tests.",
-    "density fit": "Fit a density: angles (torus), lat,lon or x,y,z (sphere), axes (projective plane) or theta,phi.",
-    "density score": "Add a column log_prob, in nats, to a table.",
-    "density sample": "Draw samples in the units of the data.",
-    "density marginal": "Find the density of some of a torus' angles, whatever the others are.",
-    "density conditional": "Find the density of a torus' other angles where some are known.",
-    "density plot": "Draw a density: density, flow, samples as PNG, PDF or SVG, and surface.html, to turn in 3-D.",
-    "density compare": "Which model suits held-out rows better, or do two data sets differ? With its uncertainty.",
-    "density region": "Find the smallest regions that hold a mass: threshold, size, and boundary as closed polygons.",
-    "density cv": "Cross-validate: how well does a density predict rows that its fit has not seen?",
-    "density patches": "Turn image patches into theta,phi on the Klein bottle, for `fit --space klein-bottle`.",
-    "density batch": "Fit a density to every table of a folder, here or on a Dask cluster.",
-    "studio": "Make tiles and densities in a browser: a web page that this very machine serves.",
-}
-"""The first sentence of each one's docstring, so that a list of all commands imports none of them."""
 
 WORK = {
     "density fold": "orbiflow.density.cross_validation.operations:fold",

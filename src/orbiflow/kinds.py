@@ -307,26 +307,23 @@ def kind_of(annotation: Any) -> Kind:
     >>> kind_of(Literal["svg", "pdf"] | None).wanted
     'svg or pdf'
     """
-    metadata: tuple[Any, ...] = ()
+    found: dict[type, Any] = {}
     if typing.get_origin(annotation) is typing.Annotated:
-        annotation, *extra = typing.get_args(annotation)
-        metadata = tuple(extra)
-    unit = next((entry.name for entry in metadata if isinstance(entry, Unit)), "")
-    allowed = next((entry for entry in metadata if isinstance(entry, Range)), ANY)
-    repeated = any(isinstance(entry, Repeated) for entry in metadata)
-    saved = next((entry for entry in metadata if isinstance(entry, InMemory)), None)
-    table = next((entry for entry in metadata if isinstance(entry, OneOf)), None)
-    if table is not None:
-        return ChoiceKind(tuple(table.names))
-    kind = SavedKind(saved.wanted) if saved else _plain_kind(annotation, allowed, unit, repeated)
-    parsed = next((entry for entry in metadata if isinstance(entry, Parsed)), None)
-    return kind if parsed is None else ParsedKind(parsed, kind)
+        annotation, *metadata = typing.get_args(annotation)
+        found = {type(entry): entry for entry in metadata}
+    if OneOf in found:
+        return ChoiceKind(tuple(found[OneOf].names))
+    saved = found.get(InMemory)
+    kind = SavedKind(saved.wanted) if saved else _plain_kind(annotation, found)
+    return ParsedKind(found[Parsed], kind) if Parsed in found else kind
 
 
-def _plain_kind(annotation: Any, allowed: Range, unit: str, repeated: bool) -> Kind:
+def _plain_kind(annotation: Any, found: Mapping[type, Any]) -> Kind:
+    """Return the kind that a type asks for, given what is annotated, by its class."""
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
+    unit, repeated = found[Unit].name if Unit in found else "", Repeated in found
     if annotation in (int, float):
-        return NumberKind(allowed, unit, whole=annotation is int)
+        return NumberKind(found.get(Range, ANY), unit, whole=annotation is int)
     simple = {str: TextKind, Path: PathKind, bool: FlagKind}
     if annotation in simple:
         return simple[annotation]()
@@ -339,7 +336,7 @@ def _plain_kind(annotation: Any, allowed: Range, unit: str, repeated: bool) -> K
     if origin in (Union, types.UnionType) and len(arguments) == 2 and type(None) in arguments:
         (part,) = (part for part in arguments if part is not type(None))
         is_own = typing.get_origin(part) is typing.Annotated
-        kind = kind_of(part) if is_own else _plain_kind(part, allowed, unit, repeated)
+        kind = kind_of(part) if is_own else _plain_kind(part, found)
         if isinstance(kind, ListKind):  # None is for nothing
             kind = ListKind(kind.item, repeated=kind.repeated, may_be_empty=False)
         return OptionalKind(kind)

@@ -23,7 +23,7 @@ from orbiflow.density import (
 )
 from orbiflow.density.fitting.kernels import NARROWEST, narrowest_for
 from orbiflow.density.models import MAX_CONCENTRATION
-from orbiflow.density.models.near_sums import near_log_sum
+from orbiflow.density.models.sums import near_log_sum
 from orbiflow.errors import DataWarning
 
 EARTH = 6_371_000.0

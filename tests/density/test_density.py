@@ -21,7 +21,6 @@ from orbiflow.density import (
     UniformDensity,
 )
 from orbiflow.density.models import kl_by_quadrature, midpoints
-from orbiflow.density.models.tensors import neighbourhoods
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import FourierField
 from orbiflow.flows import Flow
@@ -192,14 +191,6 @@ def test_large_batches_are_the_same_in_blocks(monkeypatch) -> None:
         draws = [density.sample((4, 5), torch.Generator().manual_seed(3)) for _ in range(2)]
     assert torch.equal(*draws)
     assert draws[0].shape == (4, 5, 2)
-
-
-@given(st.integers(1, 200), st.integers(1, 40), st.integers(0, 2**31))
-def test_neighbourhoods_hold_each_point_once(count: int, size: int, seed: int) -> None:
-    points = torch.rand(count, 3, generator=torch.Generator().manual_seed(seed))
-    parts = neighbourhoods(points, size)
-    assert torch.equal(torch.cat(parts).sort().values, torch.arange(count))
-    assert all(0 < len(at) <= size for at in parts)
 
 
 @pytest.mark.parametrize("count", [1, 3])

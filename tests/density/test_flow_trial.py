@@ -27,12 +27,11 @@ from orbiflow.density.fitting.flow_trial import (
     flow_beside,
     try_flow,
 )
-from orbiflow.density.fitting.folds import Folds, folds_of
+from orbiflow.density.fitting.held_out import Folds, folds_of, stacked, supported_weights
 from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence
 from orbiflow.density.fitting.rows import Gain
 from orbiflow.density.fitting.settings import Component
-from orbiflow.density.fitting.stacking import stacked, supported_weights
 from orbiflow.errors import OrbiflowError
 from orbiflow.fields import SplineField
 from orbiflow.flows import Flow

@@ -8,9 +8,8 @@ import torch
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from orbiflow.density.models import near_sums
-from orbiflow.density.models.near_sums import near_log_sum
-from orbiflow.density.models.terms import Terms
+from orbiflow.density.models import sums as near_sums
+from orbiflow.density.models.sums import Terms, near_log_sum
 
 SHAPES = {"one angle": (1, 2), "two angles": (2, 2), "three angles": (3, 2), "sphere": (1, 3)}
 shapes, seeds = st.sampled_from(sorted(SHAPES)), st.integers(0, 2**31)

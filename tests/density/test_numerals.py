@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from orbiflow.density import TableError, read_table
 from orbiflow.density.tables import append_columns
-from orbiflow.density.tables.numerals import Mark
+from orbiflow.density.tables.cells import Mark
 from orbiflow.errors import InputFileError
 from table_files import PROPERTY, write
 

@@ -36,7 +36,7 @@ from orbiflow.density import (
 )
 from orbiflow.density.models import midpoints
 from orbiflow.density.pictures import density_thumbnail
-from orbiflow.density.pictures.cell import Cell
+from orbiflow.density.pictures.square import Cell
 from orbiflow.errors import GroupError, OrbiflowError
 from orbiflow.fields import FourierField, SplineField, has_even_grid
 from orbiflow.flows import Flow

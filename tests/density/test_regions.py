@@ -24,7 +24,7 @@ from orbiflow.density import (
 )
 from orbiflow.density.regions import boundaries, to_geojson
 from orbiflow.density.regions import levels as region_levels
-from orbiflow.density.regions.grid import Block, LevelGrid, filled
+from orbiflow.density.regions.grid import Block, filled, refined
 from orbiflow.errors import OrbiflowError
 
 SPACES = ("torus", "sphere", "klein-bottle", "projective-plane")
@@ -39,9 +39,10 @@ def test_a_disc_on_the_grid_is_a_disc(x: float, y: float, radius: float, level: 
 
     levels = np.array([level])
     low, high = np.zeros(2), np.ones(2)
-    grid = LevelGrid(function, low, high, (16, 16), levels, NO_SEEDS, 4, 10**6)
-    assert grid.evaluations < 6000  # of 66,049 nodes
-    shape, off = filled(Block(grid.values, grid.low, grid.step), level, function)
+    coarse = Block(np.zeros((17, 17)), low, (high - low) / 16)
+    grid, evaluations = refined(function, coarse, levels, NO_SEEDS, 4, 10**6)
+    assert evaluations < 6000  # of 66,049 nodes
+    shape, off = filled(grid, level, function)
     assert off < 2e-3
     assert shapely.area(shape) == pytest.approx(math.pi * radius**2, rel=2e-3)
     vertices = shapely.get_coordinates(shape)
@@ -53,8 +54,9 @@ def test_a_region_is_cut_at_the_border_and_may_have_holes() -> None:
         return np.sin(2 * math.pi * points[:, 0])  # half of the window, at its left edge
 
     low, high = np.zeros(2), np.ones(2)
-    grid = LevelGrid(function, low, high, (8, 8), np.zeros(1), NO_SEEDS, 3, 10**6)
-    shape, _ = filled(Block(grid.values, low, grid.step), 0.0, function)
+    coarse = Block(np.zeros((9, 9)), low, (high - low) / 8)
+    grid, _ = refined(function, coarse, np.zeros(1), NO_SEEDS, 3, 10**6)
+    shape, _ = filled(grid, 0.0, function)
     assert shapely.area(shape) == pytest.approx(0.5, abs=1e-9)
     assert shapely.bounds(shape) == pytest.approx((0, 0, 0.5, 1), abs=1e-9)
     everything, _ = filled(Block(np.ones((4, 4)), low, np.full(2, 1 / 3)), 0.0, function)
@@ -66,8 +68,9 @@ def test_a_region_is_cut_at_the_border_and_may_have_holes() -> None:
     def ring(points: np.ndarray) -> np.ndarray:
         return 0.1 - abs(np.hypot(*(points - 0.5).T) - 0.3)
 
-    grid = LevelGrid(ring, low, high, (16, 16), np.zeros(1), NO_SEEDS, 3, 10**6)
-    shape, _ = filled(Block(grid.values, low, grid.step), 0.0, ring)
+    coarse = Block(np.zeros((17, 17)), low, (high - low) / 16)
+    grid, _ = refined(ring, coarse, np.zeros(1), NO_SEEDS, 3, 10**6)
+    shape, _ = filled(grid, 0.0, ring)
     assert isinstance(shape, shapely.Polygon)
     assert len(shape.interiors) == 1
     assert shape.area == pytest.approx(math.pi * (0.4**2 - 0.2**2), rel=1e-3)

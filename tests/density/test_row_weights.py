@@ -14,10 +14,10 @@ from density.blends import flow_of
 from orbiflow.density import DensityEstimator, density_to_bytes, make_space, weighed
 from orbiflow.density.fitting import mean_of
 from orbiflow.density.fitting.chains import fit_chain_mixture, spread_chains
+from orbiflow.density.fitting.held_out import sparse_weights, stacked, stacking_weights
 from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
 from orbiflow.density.fitting.likelihood import Objective, merged
 from orbiflow.density.fitting.rows import Rows, effective_rows, gain_of
-from orbiflow.density.fitting.stacking import sparse_weights, stacked, stacking_weights
 from orbiflow.errors import OrbiflowError
 
 seeds = st.integers(0, 2**31)

@@ -17,17 +17,18 @@ from orbiflow.density import (
     make_space,
 )
 from orbiflow.density.fitting import group_numbers
-from orbiflow.density.fitting.folds import FOLDS, folds_of
-from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
-from orbiflow.density.fitting.repeats import repeats_of
-from orbiflow.density.fitting.rows import Rows, gain_of
-from orbiflow.density.fitting.stacking import (
+from orbiflow.density.fitting.held_out import (
+    FOLDS,
     TOLERANCE_NATS,
+    folds_of,
     sparse_weights,
     stacked,
     stacking_weights,
     supported_weights,
 )
+from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
+from orbiflow.density.fitting.repeats import repeats_of
+from orbiflow.density.fitting.rows import Rows, gain_of
 from orbiflow.density.models import midpoints
 from orbiflow.errors import OrbiflowError
 
@@ -174,7 +175,8 @@ def test_folds_part_the_rows(seed: int, count: int, together: bool) -> None:
     folds = folds_of(Rows(points), together=together, generator=generator)
     assert torch.equal(folds.rows.points.sort(dim=0).values, points.sort(dim=0).values)
     assert sum(len(folds.held(k)) for k in range(FOLDS)) == count
-    for train, held in folds:
+    for number in range(folds.used):
+        train, held = folds.train(number), folds.held(number)
         assert len(train) + len(held) == count
         if together:
             apart = (train.points[:, None] != held.points).any(dim=-1)
@@ -215,7 +217,7 @@ def test_groups_are_held_out_whole(seed: int, count: int, rows: int) -> None:
     points = torch.tensor(rng.uniform(size=(rows, 2)))
     own = Rows(points, None, torch.as_tensor(group_numbers([f"g{k}" for k in labels], rows)))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("orbiflow.density.fitting.folds.USED", ((600, 10),))
+        patch.setattr("orbiflow.density.fitting.held_out.USED", ((600, 10),))
         folds = folds_of(own, together=False, generator=torch.Generator().manual_seed(seed))
     assert folds.used == min(10, count)
     of = {int(g): set() for g in folds.rows.groups}  # type: ignore[union-attr]
@@ -223,7 +225,7 @@ def test_groups_are_held_out_whole(seed: int, count: int, rows: int) -> None:
         of[group].add(fold)
     assert all(len(found) == 1 for found in of.values())
     assert set(folds.fold.tolist()) == set(range(min(10, count)))
-    held = torch.cat([rows.points for _, rows in folds])
+    held = torch.cat([folds.held(k).points for k in range(folds.used)])
     assert torch.equal(held.sort(dim=0).values, points.sort(dim=0).values)
 
 

@@ -10,14 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orbiflow.density import ProjectivePlane, Sphere
-from orbiflow.density.spaces.uniformization import (
-    NULL3,
-    K,
-    from_sphere,
-    log_area,
-    thetas,
-    to_sphere,
-)
+from orbiflow.density.spaces.round import NULL3, K, from_sphere, log_area, thetas, to_sphere
 
 SPACES = (Sphere(), ProjectivePlane())
 seeds = st.integers(0, 2**32 - 1)

@@ -34,7 +34,8 @@ from orbiflow.density import (
     make_space,
     read_density,
 )
-from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates, round_concentration
+from orbiflow.density.fitting.chains import concentration
+from orbiflow.density.fitting.kernels import fit_mixture, kernel_estimates
 from orbiflow.density.fitting.rows import Rows
 from orbiflow.density.spaces import UnitVectorSpace
 from orbiflow.errors import InputFileError, OrbiflowError
@@ -164,7 +165,7 @@ def test_concentrations_come_back_from_mean_cosines(dim: int, log: float) -> Non
         half = mpmath.mpf(dim + 1) / 2
         cosine = float(mpmath.besseli(half, kappa) / mpmath.besseli(half - 1, kappa))
     if 1e-4 <= cosine <= 1 - 1e-8:  # beyond, they are held
-        found = float(round_concentration(torch.tensor([cosine], dtype=torch.float64), dim))
+        found = float(concentration(torch.tensor([cosine], dtype=torch.float64), dim))
         assert found == pytest.approx(kappa, rel=1e-6 + 1e-15 * kappa)
 
 

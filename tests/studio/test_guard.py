@@ -86,7 +86,7 @@ def test_a_token_is_asked_for_where_others_may_come(tmp_path: Path) -> None:
         assert client.get("/api/projects", headers=bearer).status_code == 200
         welcome = client.get("/?token=secret", follow_redirects=False)
         assert (welcome.status_code, welcome.headers["location"]) == (303, "/")
-        assert "HttpOnly; SameSite=Strict" in welcome.headers["set-cookie"]
+        assert "HttpOnly; Path=/; SameSite=strict" in welcome.headers["set-cookie"]
         assert client.get("/api/projects").status_code == 200  # by the cookie
 
 

@@ -58,7 +58,7 @@ def test_the_newest_reading_is_the_last_to_end(tmp_path: Path) -> None:
     project, other = bench.project(), bench.project()
     tasks = [bench.queue.submit(project, "read", {}) for _ in range(2)]
     assert bench.states(*tasks) == ["running", "waiting"]  # not side by side
-    bench.queue.replace_waiting(project, "read")
+    bench.queue.forget(project, "read", state="waiting")
     tasks.append(bench.queue.submit(project, "read", {}))
     beside = bench.queue.submit(other, "read", {})
     assert bench.states(*tasks, beside) == ["running", "cancelled", "waiting", "running"]

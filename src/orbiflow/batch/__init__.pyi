@@ -1,11 +1,11 @@
 from .executors import LocalProcesses as LocalProcesses
 from .executors import WorkSettings as WorkSettings
 from .folder import BatchFolder as BatchFolder
-from .overview import Column as Column
-from .overview import Entry as Entry
-from .overview import Kind as Kind
-from .overview import Summary as Summary
-from .overview import csv_bytes as csv_bytes
+from .folder import Column as Column
+from .folder import Entry as Entry
+from .folder import Kind as Kind
+from .folder import Summary as Summary
+from .folder import csv_bytes as csv_bytes
 from .parcels import Answer as Answer
 from .parcels import Executor as Executor
 from .parcels import Parcel as Parcel

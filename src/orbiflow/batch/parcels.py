@@ -75,8 +75,7 @@ class Answer:
     def from_worker(cls, key: str, text: str, files: Mapping[str, bytes]) -> Answer:
         """Return the answer that a worker gave in `carry_out`.
 
-        Raises:
-            OrbiflowError: If it is none, or has a file that would be written elsewhere.
+        Raises `OrbiflowError` if it is none, or has a file that would be written elsewhere.
         """
         end = event_from_json(json.loads(text))
         if not isinstance(end, Finished | Failed):

@@ -17,8 +17,7 @@ from typing import Any
 
 from orbiflow import __version__
 from orbiflow.batch.executors import WorkSettings, executor_for
-from orbiflow.batch.folder import RESERVED, BatchFolder
-from orbiflow.batch.overview import PAGE, TABLE, ContactSheet, Entry, Kind
+from orbiflow.batch.folder import PAGE, RESERVED, TABLE, BatchFolder, ContactSheet, Entry, Kind
 from orbiflow.batch.parcels import Answer, Parcel
 from orbiflow.errors import InputFileError, OrbiflowError, SettingError, system_errors
 from orbiflow.runtime import (
@@ -151,7 +150,7 @@ def folder_names(
 def _names(path: str) -> Iterator[str]:
     """Possible names, from the best to those that are as good as unique."""
     whole = PurePosixPath(path)
-    plain, ending = _plain(str(whole.with_suffix(""))), _plain(whole.suffix[1:])
+    plain, ending = _plain(str(whole.parent / whole.stem)), _plain(whole.suffix[1:])
     yield plain
     yield f"{plain}-{ending}"
     code = hashlib.sha256(path.encode("utf-8", "surrogateescape")).hexdigest()

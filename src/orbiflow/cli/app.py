@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
+from functools import cache
 from inspect import Parameter as Argument
 from inspect import Signature
 from itertools import pairwise
@@ -18,7 +20,7 @@ from rich.markup import escape
 
 from orbiflow import __version__
 from orbiflow.arguments import meant
-from orbiflow.commands import OPERATIONS, SUMMARIES
+from orbiflow.commands import OPERATIONS
 from orbiflow.errors import OrbiflowError, SettingError, literal
 from orbiflow.kinds import FlagKind, ListKind, PathKind
 from orbiflow.runtime import Cancelled, Operation, Polled, find, use_one_thread
@@ -91,7 +93,7 @@ def app_for(words: Sequence[str]) -> App:
         home.command(
             _command(find(name)) if whole else lambda: None,
             name=command,
-            help=None if whole else SUMMARIES[name],
+            help=None if whole else summary(name),
             help_epilogue="",
             sort_key=place,
             group_arguments=ARGUMENTS,
@@ -100,6 +102,19 @@ def app_for(words: Sequence[str]) -> App:
     if asked is None:
         app.register_install_completion_command()  # pyright: ignore[reportUnknownMemberType]
     return app
+
+
+def summary(name: str) -> str:
+    """Return the first sentence of an operation's docstring from its source, which is not imported."""
+    module, function = OPERATIONS[name].split(":")
+    return " ".join(_docstrings(module)[function].partition("\n\n")[0].split())
+
+
+@cache
+def _docstrings(module: str) -> dict[str, str]:
+    file = Path(__file__).parents[1].joinpath(*module.split(".")[1:]).with_suffix(".py")
+    found = [n for n in ast.parse(file.read_bytes()).body if isinstance(n, ast.FunctionDef)]
+    return {node.name: ast.get_docstring(node) or "" for node in found}
 
 
 def _operation(words: Sequence[str]) -> Operation | None:

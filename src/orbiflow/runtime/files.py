@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import secrets
@@ -111,6 +112,8 @@ class ResultFolder:
         self.path, self._known = path, known
         try:
             self._real = path.resolve()
+            if self._real.is_symlink():  # what newer Pythons leave of links in a circle
+                raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
             if not self._real.exists():
                 self._real.parent.mkdir(parents=True, exist_ok=True)
             elif next(self._real.iterdir(), None) and not os.access(self._real, os.W_OK):

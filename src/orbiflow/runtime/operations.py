@@ -336,8 +336,7 @@ def as_part(send: Sink, begin: float = 0.0, end: float = 1.0) -> Sink:
 def find(name: str) -> Operation:
     """Return the operation that `orbiflow.commands` has under a name, importing its module.
 
-    Raises:
-        SettingError: If there is none.
+    Raises `SettingError` if there is none.
     """
     from orbiflow.commands import OPERATIONS, WORK
 
@@ -353,8 +352,7 @@ def find(name: str) -> Operation:
 def call_from_json(document: object) -> Call:
     """Return the call that a JSON object of `Call.to_json` describes.
 
-    Raises:
-        SettingError: If it is not such an object, or a setting in it is not allowed.
+    Raises `SettingError` if it is not such an object, or a setting in it is not allowed.
     """
     if not isinstance(document, dict):
         raise SettingError(f"expected a JSON object, got {literal(described(document))}")

@@ -104,12 +104,6 @@ class _Order:
 
 
 @dataclass(eq=False)
-class _Worker:
-    process: Any
-    order: _Order | None = None
-
-
-@dataclass(eq=False)
 class _Pool:
     function: Function
     items: Iterable[Any]
@@ -120,7 +114,8 @@ class _Pool:
     def __post_init__(self) -> None:
         self.left = (_Order(index, item) for index, item in enumerate(self.items))
         self.again: deque[_Order] = deque()
-        self.workers: dict[Connection, _Worker] = {}
+        self.processes: dict[Connection, Any] = {}
+        self.orders: dict[Connection, _Order] = {}
         self.ended: list[Any] = []
         self.stop_by: float | None = None
 
@@ -132,10 +127,9 @@ class _Pool:
 
     def news(self) -> Iterator[News]:
         while self._go_on():
-            for channel in wait(list(self.workers), POLL_SECONDS):
+            for channel in wait(list(self.processes), POLL_SECONDS):
                 assert isinstance(channel, Connection)
-                order = self.workers[channel].order
-                assert order is not None
+                order = self.orders[channel]
                 try:
                     what, value = channel.recv()
                 except (EOFError, OSError) as error:
@@ -153,7 +147,7 @@ class _Pool:
 
     def close(self) -> None:
         """End the workers without waiting for their work."""
-        for channel in list(self.workers):
+        for channel in list(self.processes):
             self._ended(channel)
         for process in self.ended:
             process.terminate()
@@ -170,7 +164,7 @@ class _Pool:
         ours, theirs = self.context.Pipe()
         # a fork inherits our ends: a worker would never learn that this process has gone
         method = self.context.get_start_method()
-        inherited = (ours, *self.workers) if method == "fork" else ()
+        inherited = (ours, *self.processes) if method == "fork" else ()
         process = self.context.Process(
             target=_serve, args=(theirs, inherited, self.function), daemon=True
         )
@@ -181,27 +175,27 @@ class _Pool:
             warnings.simplefilter("ignore", DeprecationWarning)
             process.start()
         theirs.close()
-        self.workers[ours] = _Worker(process)
+        self.processes[ours] = process
         return ours
 
     def _go_on(self) -> bool:
         self._listen()
-        return bool(self.workers) and (self.stop_by is None or time.monotonic() < self.stop_by)
+        return bool(self.processes) and (self.stop_by is None or time.monotonic() < self.stop_by)
 
     def _listen(self) -> None:
         """Tell the workers to stop, once, if this process was told to."""
         if self.cancel.cancelled and self.stop_by is None:
             self.stop_by = time.monotonic() + GRACE_SECONDS
-            for channel, worker in self.workers.items():
-                if worker.order is not None:
-                    _send(channel, None)
+            for channel in self.orders:
+                _send(channel, None)
 
     def _feed(self, channel: Connection, order: _Order | None) -> None:
         """Give a free worker its next item, or let it end."""
-        self.workers[channel].order = order
         _send(channel, None if order is None else (order.item,))
         if order is None:
             self._ended(channel)
+        else:
+            self.orders[channel] = order
 
     def _lost(self, channel: Connection, order: _Order, error: Exception) -> bool:
         """Whether the item that a worker died of is given up; otherwise another worker tries it."""
@@ -223,7 +217,8 @@ class _Pool:
         return given_up
 
     def _ended(self, channel: Connection) -> None:
-        self.ended.append(self.workers.pop(channel).process)
+        self.ended.append(self.processes.pop(channel))
+        self.orders.pop(channel, None)
         channel.close()
 
 

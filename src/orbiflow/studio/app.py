@@ -131,12 +131,10 @@ async def _error_answer(_request: Request, error: Exception) -> JSONResponse:
     """Answer what went wrong in words, without paths or insides."""
     if isinstance(error, Refused):
         return JSONResponse({"error": error.text}, error.status)
-    if isinstance(error, Missing):
-        return JSONResponse({"error": str(error)}, 404)
-    if isinstance(error, RefusedSetting):
-        return JSONResponse({"error": str(error), "setting": error.setting}, 422)
     if isinstance(error, OrbiflowError):
-        return JSONResponse({"error": str(error)}, 422)
+        about = {"setting": error.setting} if isinstance(error, RefusedSetting) else {}
+        status = 404 if isinstance(error, Missing) else 422
+        return JSONResponse({"error": str(error), **about}, status)
     if isinstance(error, HTTPException):
         words = {404: "there is nothing here; go back to the start page"}
         text = words.get(error.status_code, "this request cannot be answered; reload the page")

@@ -233,8 +233,7 @@ def ending_of(name: str) -> str:
 def fit_folder(project: Path, number: int | None = None) -> Path:
     """Return the folder of a fit that is complete, the newest if there is no number.
 
-    Raises:
-        OrbiflowError: If there is none.
+    Raises `OrbiflowError` if there is none.
     """
     done = [int(view.parent.name) for view in project.glob(f"fits/[0-9]*/{VIEW}")]
     if number is None and done:
@@ -252,8 +251,7 @@ def map_file(fit: Path, axes: tuple[int, ...]) -> Path:
 def table_view(path: Path) -> dict[str, Any]:
     """Return what a page shows of a table before anything is fitted.
 
-    Raises:
-        OrbiflowError: If it is no table of numbers, or too large.
+    Raises `OrbiflowError` if it is no table of numbers, or too large.
     """
     from orbiflow.density import TableError, code_notes, read_table, seen_columns
 

@@ -8,13 +8,12 @@ and carry a header that other pages cannot set; and bodies are bounded in size, 
 from __future__ import annotations
 
 import asyncio
-import json
 import secrets
-from collections.abc import Iterable
-from http.cookies import CookieError, SimpleCookie
 from time import monotonic
-from urllib.parse import parse_qs
 
+from starlette.datastructures import MutableHeaders
+from starlette.requests import Request
+from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from orbiflow.studio.settings import LOOPBACK, Limits
@@ -69,67 +68,60 @@ class Guard:
             if scope["type"] == "lifespan":
                 await self.app(scope, receive, send)
             return
-        headers = {
-            name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]
-        }
-        begun = False
+        request, begun = Request(scope), False
 
         async def guarded_send(message: Message) -> None:
             nonlocal begun
             if message["type"] == "http.response.start":
                 begun = True
-                message["headers"] = [*_added(message["headers"]), *message["headers"]]
+                headers = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    headers.setdefault(name, value)
             await send(message)
 
         try:
-            self._check(scope, headers)
-            if (cookie := self._welcome(scope)) is not None:
-                await _answer(guarded_send, 303, "", [("location", "/"), ("set-cookie", cookie)])
-                return
-            await self._with_body(scope, headers, receive, guarded_send)
+            self._check(request)
+            if self.token and scope["path"] == "/" and "token" in request.query_params:
+                # the address needs it no more
+                answer: Response = RedirectResponse("/", 303)
+                answer.set_cookie(COOKIE, self.token, httponly=True, samesite="strict")
+                await answer(scope, receive, guarded_send)
+            elif request.method in SAFE:
+                await self.app(scope, receive, guarded_send)
+            else:
+                await self._with_body(request, receive, guarded_send)
         except Refused as refused:
             if not begun:
-                await _answer(guarded_send, refused.status, refused.text, [("connection", "close")])
+                said = {"error": refused.text}
+                answer = JSONResponse(said, refused.status, {"connection": "close"})
+                await answer(scope, receive, guarded_send)
 
-    def _check(self, scope: Scope, headers: dict[str, str]) -> None:
+    def _check(self, request: Request) -> None:
+        headers = request.headers
         host = headers.get("host", "").lower()
         if not self.token and host not in self.hosts:
             raise Refused(421, "this is not the address of the studio; use the one that it printed")
         origin = headers.get("origin")
-        if origin is not None and origin.partition("://")[2] != host:
-            raise Refused(403, "the request comes from another site's page; open the studio itself")
+        is_elsewhere = origin is not None and origin.partition("://")[2] != host
         if headers.get("sec-fetch-site", "none") not in ("same-origin", "none") and not (
-            scope["path"] == "/" and headers.get("sec-fetch-mode") == "navigate"
+            request.scope["path"] == "/" and headers.get("sec-fetch-mode") == "navigate"
         ):
+            is_elsewhere = True
+        if is_elsewhere:
             raise Refused(403, "the request comes from another site's page; open the studio itself")
-        if scope["method"] not in SAFE and "x-orbiflow" not in headers:
+        if request.method not in SAFE and "x-orbiflow" not in headers:
             raise Refused(403, "a request that changes something needs the header X-Orbiflow: 1")
-        if self.token and not self._knows_token(scope, headers):
+        brought = [
+            headers.get("authorization", "").removeprefix("Bearer "),
+            *request.query_params.getlist("token"),
+            request.cookies.get(COOKIE, ""),
+        ]
+        own = self.token.encode()
+        if own and not any(secrets.compare_digest(one.encode(), own) for one in brought):
             raise Refused(401, "open the address that the studio printed, with its token")
 
-    def _knows_token(self, scope: Scope, headers: dict[str, str]) -> bool:
-        brought = [headers.get("authorization", "").removeprefix("Bearer ")]
-        brought += parse_qs(scope["query_string"].decode("latin-1")).get("token", [])
-        try:
-            cookies = SimpleCookie(headers.get("cookie", ""))
-        except CookieError:
-            cookies = SimpleCookie()
-        brought += [cookies[COOKIE].value] if COOKIE in cookies else []
-        return any(secrets.compare_digest(one.encode(), self.token.encode()) for one in brought)
-
-    def _welcome(self, scope: Scope) -> str | None:
-        """Return the cookie for who came with the token in the address, which then leaves it."""
-        if not self.token or scope["path"] != "/" or b"token=" not in scope["query_string"]:
-            return None
-        return f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
-
-    async def _with_body(
-        self, scope: Scope, headers: dict[str, str], receive: Receive, send: Send
-    ) -> None:
-        if scope["method"] in SAFE:
-            await self.app(scope, receive, send)
-            return
-        most = self.limits.message
+    async def _with_body(self, request: Request, receive: Receive, send: Send) -> None:
+        headers, most = request.headers, self.limits.message
         if headers.get("content-type", "").split(";")[0] != "application/json":
             most = self.limits.upload
         length = headers.get("content-length", "0")
@@ -140,7 +132,7 @@ class Guard:
         self._uploads += 1
         body = _Body(receive, self.limits, most)
         try:
-            await self.app(scope, body.receive, send)
+            await self.app(request.scope, body.receive, send)
         finally:
             self._uploads -= 1
 
@@ -172,20 +164,3 @@ class _Body:
         if late > 0 and self._size < late * self._limits.slowest:
             raise Refused(408, "the file comes too slowly; try again")
         return message
-
-
-def _added(headers: Iterable[tuple[bytes, bytes]]) -> list[tuple[bytes, bytes]]:
-    own = {name.lower() for name, _ in headers}
-    return [
-        (name.encode(), value.encode())
-        for name, value in HEADERS.items()
-        if name.encode() not in own
-    ]
-
-
-async def _answer(send: Send, status: int, text: str, headers: list[tuple[str, str]]) -> None:
-    body = json.dumps({"error": text}).encode()
-    own = [("content-type", "application/json"), ("content-length", str(len(body))), *headers]
-    raw = [(name.encode(), value.encode()) for name, value in own]
-    await send({"type": "http.response.start", "status": status, "headers": raw})
-    await send({"type": "http.response.body", "body": body})

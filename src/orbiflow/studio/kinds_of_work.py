@@ -33,11 +33,7 @@ class Kind:
     makes: str = ""
 
     def call(self, home: Path, task: int, settings: Mapping[str, Any]) -> Call:
-        """Return the call of a task.
-
-        Raises:
-            SettingError: For settings that cannot be used.
-        """
+        """Return the call of a task. Raises `SettingError` for settings that cannot be used."""
         place = {"project": home, "task": task}
         if not self.makes:
             if taken := [name for name in place if name in settings]:
@@ -135,8 +131,7 @@ def presets(makes: str) -> dict[str, dict[str, dict[str, Any]]]:
 def making_call(makes: str, settings: Mapping[str, Any], result: Path, **files: Any) -> Call:
     """Return the call that writes a take-away with settings from a browser.
 
-    Raises:
-        SettingError: For a setting that the studio does not take, or a value that is not allowed.
+    Raises `SettingError` for a setting that the studio does not take, or a value that is not allowed.
     """
     made = find(makes)
     known = {entry.name for entry in own_fields(made)}

@@ -32,9 +32,11 @@ def studio(
         for name in PACKAGES:
             import_module(name)
     token = "" if settings.is_local else secrets.token_urlsafe(24)
-    folder = settings.data or _usual_folder()
 
     from filelock import FileLock, Timeout
+    from platformdirs import user_data_path
+
+    folder = settings.data or user_data_path("orbiflow") / "studio"
 
     make_folder(folder, "give another folder as data")
     try:
@@ -45,12 +47,6 @@ def studio(
             f"another studio is using {folder}; open its page, or give another folder as data"
         ) from None
     return Outcome({"folder": str(folder)})
-
-
-def _usual_folder() -> Path:
-    from platformdirs import user_data_path
-
-    return user_data_path("orbiflow") / "studio"
 
 
 def _serve(

@@ -110,8 +110,7 @@ def open_project(path: str | Path) -> StudioProject:
 def unpack(path: Path, home: Path) -> dict[str, Any]:
     """Unpack what is known of a project's file into an empty folder; return what project.json says.
 
-    Raises:
-        InputFileError: If it is not such a file, is damaged, or is too large.
+    Raises `InputFileError` if it is not such a file, is damaged, or is too large.
     """
     cure = "give a file that the studio saved"
     with system_errors(InputFileError, f"{path.name}: cannot be read", cure):

@@ -209,7 +209,7 @@ async def _read_anew(here: Studio, project: str) -> dict[str, Any]:
     whole = here.store.project(project)
     if whole["input"] is None:
         raise OrbiflowError("there is no picture yet; choose one first")
-    await run_in_threadpool(here.queue.replace_waiting, project, "read")
+    await run_in_threadpool(here.queue.forget, project, "read", state="waiting")
     return await here.submit(
         project, "read", {"called": whole["input"]["name"], **whole["reading"]}
     )

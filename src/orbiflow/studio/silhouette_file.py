@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw
 
-from orbiflow.arrays import Array
 from orbiflow.drawing import png_bytes
 from orbiflow.errors import InputFileError
 from orbiflow.runtime import write_atomic, write_json
@@ -69,18 +68,6 @@ def _stored(target: Target) -> dict[str, Any]:
     return {"outline": target.outline.tolist(), **{name: getattr(target, name) for name in names}}
 
 
-def _to_backdrop(target: Target, points: Array, size: tuple[int, int]) -> Array:
-    return target.covered.shares(points) * size
-
-
-def _from_backdrop(target: Target, pixels: Array, size: tuple[int, int]) -> Array:
-    low, high, _, y_down = target.covered
-    at = pixels / size
-    if not y_down:
-        at = (at - (0, 1)) * (1, -1)
-    return at * (high - low) + low
-
-
 def _picture(target: Target, content: FileContent) -> Image.Image:
     """Return the picture that the user is shown below the silhouette."""
     if target.kind == "image":
@@ -103,7 +90,7 @@ def _drawn(target: Target, size: tuple[int, int], mode: str, ink: Any, paper: An
 
     def points(ring: Any) -> list[tuple[float, ...]]:
         # Pillow's whole numbers are the middles of pixels
-        return list(map(tuple, (_to_backdrop(target, np.asarray(ring), finer) - 0.5).tolist()))
+        return list(map(tuple, (target.covered.shares(np.asarray(ring)) * finer - 0.5).tolist()))
 
     for part in [] if target.seen is None else polygons_in(target.seen):
         draw.polygon(points(part.exterior.coords), fill=ink)
@@ -128,19 +115,16 @@ def _mended(target: Target, home: Path, size: tuple[int, int]) -> Target:
     if not mask.any():
         raise InputFileError("nothing of the picture is left; paint some of it back")
     found = Target.from_mask(mask, source=target.source)
-
-    def placed(ring: Array) -> Array:
-        return _from_backdrop(target, ring - 1, size)
-
+    outline = target.covered.at((found.outline - 1) / size)
     notes = tuple(note for note in target.notes if not note.startswith("kept the largest"))
-    return replace(target, outline=placed(found.outline), notes=notes, seen=None)
+    return replace(target, outline=outline, notes=notes, seen=None)
 
 
 def _shown(target: Target, size: tuple[int, int]) -> dict[str, Any]:
     """Return what a browser needs of the silhouette, in pixels of the backdrop."""
 
     def pixels(ring: Any) -> list[list[float]]:
-        return np.round(_to_backdrop(target, np.asarray(ring), size), 2).tolist()
+        return np.round(target.covered.shares(np.asarray(ring)) * size, 2).tolist()
 
     lost, doubted = parts_left_out(target), [page_words(text) for text in doubts(target)]
     # what the page says of these in other words

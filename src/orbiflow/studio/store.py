@@ -75,6 +75,7 @@ class Store:
         if version == 0:
             self._data.executescript(f"BEGIN; {TABLES} PRAGMA user_version={VERSION}; COMMIT;")
         elif version != VERSION:
+            self._data.close()
             raise OrbiflowError(
                 f"{folder} was written by another version of orbiflow; give another folder as data"
             )
@@ -138,11 +139,7 @@ class Store:
         return self._rows(SUMMARY)
 
     def create(self, kind: str, name: str, most: int) -> str:
-        """Return the id of a new project.
-
-        Raises:
-            OrbiflowError: If there are `most` already.
-        """
+        """Return the id of a new project. Raises `OrbiflowError` if there are `most` already."""
         project = secrets.token_urlsafe(9)
         with self._changing(project) as data:
             (count,) = data.execute("SELECT count(*) FROM projects").fetchone()
@@ -224,8 +221,7 @@ class Store:
     ) -> int:
         """Return the number of a new task.
 
-        Raises:
-            OrbiflowError: If the project has `most` that are not done.
+        Raises `OrbiflowError` if the project has `most` that are not done.
         """
         with self._changing(project) as data:
             self.project(project)

@@ -11,7 +11,7 @@ import shapely
 
 from orbiflow.arguments import as_array, as_number
 from orbiflow.arrays import Array
-from orbiflow.drawing import png_bytes
+from orbiflow.drawing import draw_line, png_bytes, rgb
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list, is_object, write_atomic
 from orbiflow.tiles import Bending, EscherTile, Frame, TileMap, open_image, orient, triangulate
@@ -94,11 +94,11 @@ def _stroke(given: Any) -> Stroke:
 
 def drawing_svg(strokes: list[Stroke], tile: EscherTile) -> str:
     """Return the lines as an SVG that covers what the silhouette's picture covers."""
-    low, high = tile.covered[:2]
-    wide, tall = high - low
+    covered = tile.covered
+    wide, tall = size = covered.high - covered.low
     parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {wide:.9g} {tall:.9g}">']
     for stroke in strokes:
-        points = _on_page(stroke.points, tile)
+        points = covered.shares(stroke.points) * size
         ends = points if len(points) > 1 else np.stack([points[0], points[0] + 1e-3])
         path = "L".join(f"{x:.6g} {y:.6g}" for x, y in ends)
         parts.append(
@@ -108,26 +108,16 @@ def drawing_svg(strokes: list[Stroke], tile: EscherTile) -> str:
     return "\n".join([*parts, "</svg>\n"])
 
 
-def _on_page(points: Array, tile: EscherTile) -> Array:
-    """Return points of the silhouette from the upper left corner of what its picture covers."""
-    low, high, _, down = tile.covered
-    return points - low if down else np.array([0.0, 1.0]) * (high - low) + (points - low) * (1, -1)
-
-
 def _png(strokes: list[Stroke], tile: EscherTile, picture: Path) -> bytes:
     """Return a picture with the lines drawn over it."""
     from PIL import Image, ImageDraw
 
-    low, high = tile.covered[:2]
     image = open_image(picture)[0].convert("RGBA")
     layer = Image.new("RGBA", (SUPERSAMPLING * image.width, SUPERSAMPLING * image.height))
-    pen, scale = ImageDraw.Draw(layer), layer.width / float(high[0] - low[0])
+    covered, pen = tile.covered, ImageDraw.Draw(layer)
+    scale = layer.width / float(covered.high[0] - covered.low[0])
     for stroke in strokes:
-        points, radius = scale * _on_page(stroke.points, tile), scale * stroke.width / 2
-        if len(points) > 1:
-            ends = [tuple(p) for p in points.tolist()]
-            pen.line(ends, stroke.colour, max(1, round(2 * radius)), joint="curve")
-        for x, y in points[[0, -1]].tolist():  # round ends
-            pen.ellipse((x - radius, y - radius, x + radius, y + radius), stroke.colour)
+        points = covered.shares(stroke.points) * layer.size
+        draw_line(pen, points, scale * stroke.width, (*rgb(stroke.colour), 255))
     image.alpha_composite(layer.resize(image.size))
     return png_bytes(image)

@@ -37,8 +37,7 @@ def best_stage(home: Path, number: int) -> Path | None:
 def tile_folder(home: Path, number: int) -> Path:
     """Return the folder of a tile, as `read_result` takes it.
 
-    Raises:
-        OrbiflowError: If there is none.
+    Raises `OrbiflowError` if there is none.
     """
     found = best_stage(home, number)
     if found is None:

@@ -8,7 +8,6 @@ import numpy as np
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import cell_ring
-from orbiflow.runtime import is_list
 from orbiflow.symmetry import CrystallographicGroup, symmetry_elements
 from orbiflow.tiles import EscherTile, Rating, as_tiling, border, colouring, narrowest_neck
 
@@ -54,9 +53,7 @@ def tile_card(
 def _rounded(ring: Array) -> list[list[float]]:
     """Return points with as many digits as show."""
     size = float(abs(ring).max()) or 1.0
-    points: list[list[float]] = ring.tolist()
-    assert is_list(points)
-    return [[float(f"{value / size:.6f}") * size for value in point] for point in points]
+    return (np.round(ring / size, 6) * size).tolist()
 
 
 def tile_view(card: dict[str, Any], tile: EscherTile) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import threading
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -122,20 +123,13 @@ class WorkQueue:
     ) -> int:
         """Put a task at the end of the queue and return its number.
 
-        Raises:
-            OrbiflowError: For settings that cannot be used, or too many tasks.
+        Raises `OrbiflowError` for settings that cannot be used, or too many tasks.
         """
         kind = kind_of_work(operation)
         kind.call(self.store.home(project), 1, settings)
         task = self.store.add_task(project, operation, settings, kind.lane, most)
         self._schedule()
         return task
-
-    def replace_waiting(self, project: str, operation: str) -> None:
-        """Drop the tasks of a kind that wait, and that a newer one makes useless."""
-        for task in self.store.undone(project):
-            if task["operation"] == operation and task["state"] == "waiting":
-                self.cancel(task["id"])
 
     def pause(self, task: int) -> None:
         """Hold a task; its process waits in memory, where there is room for it."""
@@ -174,10 +168,10 @@ class WorkQueue:
             process.kill()
         self._schedule()
 
-    def forget(self, project: str, *operations: str) -> None:
-        """End the tasks of a project: of some kinds, or all."""
+    def forget(self, project: str, *operations: str, state: str = "") -> None:
+        """End the tasks of a project: of some kinds, or all; those in a state, or in any."""
         for task in self.store.undone(project):
-            if not operations or task["operation"] in operations:
+            if (not operations or task["operation"] in operations) and state in ("", task["state"]):
                 self.cancel(task["id"])
 
     def _schedule(self) -> None:
@@ -253,7 +247,10 @@ class WorkQueue:
                 return True
             if (process := self._ready()) is None:
                 return False
-            self._start(number, project, process, call)
+            self._running[number] = process
+            self.store.change_task(number, state="running", pid=process.pid, share=0.0)
+            follow = partial(self._follow, number, project, process, call)
+            threading.Thread(target=follow, daemon=True, name=f"task {number}").start()
         else:
             self._running[number] = held
             self.store.change_task(number, state="running")
@@ -262,16 +259,6 @@ class WorkQueue:
         self._turns[project] = self._turn
         self._lanes[number] = project, task["lane"], task["operation"]
         return True
-
-    def _start(self, number: int, project: str, process: CallProcess, call: Call) -> None:
-        self._running[number] = process
-        self.store.change_task(number, state="running", pid=process.pid, share=0.0)
-        threading.Thread(
-            target=self._follow,
-            args=(number, project, process, call),
-            daemon=True,
-            name=f"task {number}",
-        ).start()
 
     def _follow(self, number: int, project: str, process: CallProcess, call: Call) -> None:
         """Give a process its call and record its events, to its end."""

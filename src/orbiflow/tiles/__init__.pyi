@@ -65,9 +65,9 @@ from .make.export_settings import ExportSettings as ExportSettings
 from .make.exporting import Exported as Exported
 from .make.exporting import scenes as scenes
 from .make.exporting import sheet_content as sheet_content
-from .motifs.drawings import Over as Over
-from .motifs.drawings import read_over as read_over
-from .motifs.source import with_map as with_map
+from .motifs.carried import Over as Over
+from .motifs.carried import read_over as read_over
+from .motifs.carried import with_map as with_map
 from .motion.settings import AnimationSettings as AnimationSettings
 from .motion.writers import animation as animation
 from .operations import animate as animate

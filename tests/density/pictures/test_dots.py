@@ -22,8 +22,8 @@ from orbiflow.density import (
     density_picture,
     make_space,
 )
+from orbiflow.density.pictures.grounds import MAX_COVER, uncrowded
 from orbiflow.density.pictures.maps import Map
-from orbiflow.density.pictures.overlays import MAX_COVER, uncrowded
 from orbiflow.density.pictures.projections import chosen_map
 from orbiflow.drawing import Picture, Sheet
 

@@ -10,7 +10,7 @@ from PIL import Image
 
 from orbiflow.density import DensityEstimator
 from orbiflow.density.pictures import density_thumbnail
-from orbiflow.density.pictures.thumbnail import SIZE
+from orbiflow.density.pictures.plots import SIZE
 
 SPACES = {
     "one angle": ("torus", 1),

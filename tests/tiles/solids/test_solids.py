@@ -30,7 +30,7 @@ from orbiflow.tiles import (
 )
 from orbiflow.tiles.make import ExportSettings, dark_parts, laid_out
 from orbiflow.tiles.page import Curve, Motif, Part, Style, longer_side
-from orbiflow.tiles.solids.shapes import Level, Plan, shape, stacked
+from orbiflow.tiles.solids.making import Level, Plan, shape, stacked
 from solids_read import read_3mf, read_stl, section
 
 Kind: TypeAlias = Literal["tile", "cutter", "stamp", "mould", "puzzle"]

@@ -203,17 +203,16 @@ def mmd_test(
     kept = chosen_rows(first, groups, MAX_ROWS, seed)
     points, first = points[torch.as_tensor(kept)], first[kept]
     groups = Groups.of(groups.index[kept] if groups.given else None, len(kept))
-    sides = _Sides.of(first, groups)
-    sides.require(level, permutations)
+    alike = _are_alike(first, groups, level, permutations)
     rng = np.random.default_rng(seed)
-    draw = _permuted if sides.alike else _flipped
+    draw = _permuted if alike else _flipped
     labels = draw(first, groups, permutations, rng)
     index = torch.as_tensor(groups.index)
     apart = index[:, None] != index[None, :]
     images = space.features(points)
     dots = [images[0] @ image.mT for image in images]  # their exponentials are kernels
     top = float(dots[0].diagonal().mean())
-    counts = np.maximum(_pair_sums(apart.double(), labels), 1) if sides.alike else None
+    counts = np.maximum(_pair_sums(apart.double(), labels), 1) if alike else None
     found: list[Array] = []
     for scale in _scales(top - dots[0], apart, rng):
         kernel = sum(((dot - top) / scale).exp() for dot in dots)
@@ -227,58 +226,40 @@ def mmd_test(
     spread = table.std(axis=1, keepdims=True)
     largest = ((table - table.mean(axis=1, keepdims=True)) / np.maximum(spread, 1e-300)).max(axis=0)
     p = float((largest >= largest[0] - 1e-12).mean())
-    return TestResult(p, float(largest[0]), permutations, len(points), sides.alike)
+    return TestResult(p, float(largest[0]), permutations, len(points), alike)
 
 
-@dataclass(frozen=True, eq=False)
-class _Sides:
-    """Numbers of rows (G,) that each group has in the first data set and in the second."""
+def _are_alike(first: Array, groups: Groups, level: float, permutations: int) -> bool:
+    """Return whether groups can change sides and leave everything else as it is.
 
-    own: Array
-    other: Array
-    what: str
-
-    @classmethod
-    def of(cls, first: Array, groups: Groups) -> _Sides:
-        own, other = (np.bincount(groups.index, side, groups.count) for side in (first, ~first))
-        return cls(own, other, groups.what)
-
-    @property
-    def both(self) -> Array:
-        """Which groups (G,) have rows in both data sets."""
-        return (self.own > 0) & (self.other > 0)
-
-    @property
-    def alike(self) -> bool:
-        """Whether sides can be changed and leave everything else as it is."""
-        alone = (self.own + self.other)[~self.both]
-        halved = (self.own == self.other)[self.both]
-        return bool(halved.all() and (alone == alone[:1]).all())
-
-    def require(self, level: float, permutations: int) -> None:
-        """Check that a difference, however large, can be told from chance at this level."""
-        highest, both = 1 - level + 1e-12, int(self.both.sum())
-        one, two = (int((side > 0).sum()) - both for side in (self.own, self.other))
-        common = 1 + math.ceil(-math.log2(highest))
-        each = common
-        if self.alike:
-            each = next(n for n in range(3, common + 3) if 2 / math.comb(2 * n, n) <= highest)
-            # two rows that happen to be far from all others show no density of their own
-            ways = math.comb(one + two, one) if min(one, two) > 2 else 1
-            enough = (1 + (one == two)) / (ways << both) <= highest
-        else:
-            enough = both + min(one, two) >= common
-        if not enough:
-            raise OrbiflowError(
-                f"the data sets have {one} and {two} {self.what} of their own and {both} in common: "
-                f"too few to tell a difference from chance at level {level:g}, which takes {each} of "
-                f"each data set's own or {common} in common"
-            )
-        if highest * (1 + permutations) < 1:
-            raise OrbiflowError(
-                f"{permutations} permutations are too few for level {level:g}: ask for at least "
-                f"{math.ceil(1 / highest) - 1}"
-            )
+    Check that a difference, however large, can be told from chance at this level.
+    """
+    own, other = (np.bincount(groups.index, side, groups.count) for side in (first, ~first))
+    shared = (own > 0) & (other > 0)
+    alone = (own + other)[~shared]
+    alike = bool((own == other)[shared].all() and (alone == alone[:1]).all())
+    highest, both = 1 - level + 1e-12, int(shared.sum())
+    one, two = (int((side > 0).sum()) - both for side in (own, other))
+    common = each = 1 + math.ceil(-math.log2(highest))
+    if alike:
+        each = next(n for n in range(3, common + 3) if 2 / math.comb(2 * n, n) <= highest)
+        # two rows that happen to be far from all others show no density of their own
+        ways = math.comb(one + two, one) if min(one, two) > 2 else 1
+        enough = (1 + (one == two)) / (ways << both) <= highest
+    else:
+        enough = both + min(one, two) >= common
+    if not enough:
+        raise OrbiflowError(
+            f"the data sets have {one} and {two} {groups.what} of their own and {both} in common: too "
+            f"few to tell a difference from chance at level {level:g}, which takes {each} of each data "
+            f"set's own or {common} in common"
+        )
+    if highest * (1 + permutations) < 1:
+        raise OrbiflowError(
+            f"{permutations} permutations are too few for level {level:g}: ask for at least "
+            f"{math.ceil(1 / highest) - 1}"
+        )
+    return alike
 
 
 def chosen_rows(first: Array, groups: Groups, most: int, seed: int = 0) -> Array:

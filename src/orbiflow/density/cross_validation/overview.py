@@ -95,27 +95,21 @@ class CvOverview:
     def _report(
         self, found: HeldOut, done: Sequence[tuple[Fit, batch.Entry]], waiting: int
     ) -> bytes:
-        rows, cv, density = self.splits[0].rows, self.asked.cv, self.asked.density
+        asked, rows, cv = self.asked, self.splits[0].rows, self.asked.cv
         states = [entry.state for _, entry in done]
         comparison = self.comparison
         document: dict[str, Any] = {
             "kind": "cross-validation",
             "version": __version__,
-            "data": str(self.asked.data),
+            "data": str(asked.data),
             "space": {"name": rows.space.name, "unit": rows.space.unit},
             "columns": list(rows.table.columns),
             "settings": {
-                "folds": cv.folds,
-                "times": cv.times,
-                "group": self.asked.rows.group,
-                "missing": self.asked.rows.missing,
-                "weights": self.asked.rows.weights,
-                "repeats": density.repeats,
-                "level": cv.level,
-                "bootstrap": cv.bootstrap,
-                "seed": density.seed,
+                **{name: getattr(cv, name) for name in ("folds", "times", "level", "bootstrap")},
+                **{name: getattr(asked.rows, name) for name in ("group", "missing", "weights")},
+                **{name: getattr(asked.density, name) for name in ("repeats", "seed")},
             },
-            "components": self.asked.settings,
+            "components": asked.settings,
             "rows": len(rows.table.values),
             "groups": None if rows.labels is None else len(np.unique(rows.labels)),
             "uniform": -math.log(rows.space.volume),
@@ -337,12 +331,17 @@ LETTER_PX = 7.6
 
 def strips(lines: Sequence[Strip], label: str, *, zero: bool = False) -> dict[str, Any] | None:
     """Return what the template draws and where, in pixels; None if there is nothing to draw."""
+    from matplotlib.ticker import MaxNLocator
+
     values = [v for _, dots, known in lines for v in (*dots, *known) if math.isfinite(v)]
     values += [0.0] if zero else []
     if not values:
         return None
-    ticks = _ticks(min(values), max(values))
-    low, high = min(ticks[0], *values), max(ticks[-1], *values)
+    low, high = min(values), max(values)
+    size = max(abs(high), 1.0)
+    spread = high - low if high - low > 1e-9 * size else 1e-3 * size  # equal but for rounding
+    ticks = MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(low, low + spread)
+    low, high = min(ticks[0], low), max(ticks[-1], high)
     names = min(NAMES, 30 + LETTER_PX * max(len(name) for name, *_ in lines))
     room = int((names - 20) / LETTER_PX)
     decimals = max(0, -math.floor(math.log10(ticks[1] - ticks[0]) + 1e-9))
@@ -369,17 +368,3 @@ def strips(lines: Sequence[Strip], label: str, *, zero: bool = False) -> dict[st
             for k, (name, dots, known) in enumerate(lines)
         ],
     }
-
-
-def _ticks(low: float, high: float) -> list[float]:
-    """Return four to eight round numbers that span both.
-
-    >>> _ticks(-9.44, -9.21)
-    [-9.45, -9.4, -9.35, -9.3, -9.25, -9.2]
-    """
-    span, size = high - low, max(abs(high), 1.0)
-    span = span if span > 1e-9 * size else 1e-3 * size  # equal but for rounding
-    power = 10.0 ** math.floor(math.log10(span / 4))
-    step = next(m * power for m in (1, 2, 5, 10) if span / (m * power) <= 6)
-    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
-    return [round(k * step, 12) for k in range(first, max(last, first + 1) + 1)]

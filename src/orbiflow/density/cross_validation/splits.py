@@ -19,7 +19,7 @@ from orbiflow.density import comparing
 from orbiflow.density.cross_validation.settings import SCORES, UNIFORM, CrossValidation
 from orbiflow.density.data import Unit
 from orbiflow.density.fitting import LEAST_PLACES, places, weighed
-from orbiflow.density.inference import chart_of_observed
+from orbiflow.density.inference import chart_of_rows
 from orbiflow.density.spaces import Space, space_for
 from orbiflow.density.tables import TableRows, angle_unit, read_rows, read_table
 from orbiflow.errors import InputFileError, OrbiflowError
@@ -114,9 +114,8 @@ def cv_rows(asked: CrossValidation, tell: Sink) -> CvRows:
         cell=where.cell,
         fractional=where.fractional,
     )
-    marginalise = asked.rows.missing == "marginalise"
-    points = chart_of_observed(space, table.values) if marginalise else space.to_chart(table.values)
-    counts, place = places(points)
+    may_lack = asked.rows.missing == "marginalise"
+    counts, place = places(chart_of_rows(space, table.values, may_lack=may_lack))
     if len(counts) <= LEAST_PLACES:
         raise OrbiflowError(
             f"{asked.data}: {len(counts)} different rows; a cross-validation needs more than the "

@@ -6,13 +6,12 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from orbiflow.density.data.names import (
+from orbiflow.density.data.column_names import (
     FROM_POLE,
     HOURS,
     LATITUDES,
     LONGITUDES,
     UNITS,
-    Pair,
     foreign_unit,
     pairs_of,
     unit_named,
@@ -71,7 +70,8 @@ def arrangements(space: str, names: Sequence[str], width: int | None = None) -> 
 def _directions(names: Sequence[str]) -> list[Arrangement]:
     pairs = pairs_of(names)
     if pairs:
-        return [_of_pair(pair) for pair in pairs]
+        words = "latitude and longitude"
+        return [Arrangement((own.north, own.east), words, note=own.family.note) for own in pairs]
     if found := _lettered(names, ("xyz",), "unit vectors"):
         return found
     if found := _of_maps(names):
@@ -90,10 +90,6 @@ def _of_maps(names: Sequence[str]) -> list[Arrangement]:
         if first in own and tuple(second if word == first else word for word in own) == other
     ]
     return [Arrangement(pair, "latitude and longitude", is_sure=False) for pair in pairs]
-
-
-def _of_pair(pair: Pair) -> Arrangement:
-    return Arrangement((pair.north, pair.east), "latitude and longitude", note=pair.family.note)
 
 
 def _half_known(names: Sequence[str]) -> list[Arrangement]:
@@ -236,7 +232,8 @@ def _check_forms(space: str, names: Sequence[str]) -> None:
                 wrong.append((name, f"is in {unit_named(name)}: convert it to degrees"))
             if words & HOURS:
                 wrong.append((name, "is in hours: convert it to degrees (15 for each hour)"))
-    if space == "rotation-space" and len(names) == 3 and (_euler(names) or _is_airborne(split)):
+    airborne = all(words & {"roll", "pitch", "yaw", "heading"} for words in split)
+    if space == "rotation-space" and len(names) == 3 and (_euler(names) or airborne):
         how = (
             "are Euler angles, and three columns on the rotation-space are a rotation vector: convert "
             "them (scipy.spatial.transform.Rotation.from_euler), or take cubic-orientations or "
@@ -248,7 +245,3 @@ def _check_forms(space: str, names: Sequence[str]) -> None:
         wrong.append((", ".join(names), f"are too many columns: give '{pair}' alone"))
     for name, how in wrong:
         raise SettingError(literal(f"{name} {how}"))
-
-
-def _is_airborne(split: Sequence[set[str]]) -> bool:
-    return all(words & {"roll", "pitch", "yaw", "heading"} for words in split)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from orbiflow.arrays import Array
+from orbiflow.density.data.column_names import words_of
 from orbiflow.density.data.columns import DIRECTIONS
 from orbiflow.density.data.frames import Data, as_data
-from orbiflow.density.data.names import words_of
 from orbiflow.errors import DataWarning
 
 DIP_DIRECTION = "dip_direction"

@@ -1,4 +1,4 @@
-"""What the values of columns say: codes for missing ones, radians among degrees, fractions of cells."""
+"""What the values of columns say: codes, other units, radians among degrees, fractions of cells."""
 
 from __future__ import annotations
 
@@ -10,7 +10,18 @@ from typing import cast
 import numpy as np
 
 from orbiflow.arrays import Array
-from orbiflow.density.data.codes import refuse_no_angles, refuse_no_places
+from orbiflow.density.data.column_names import (
+    AZIMUTHS,
+    FROM_VERTICAL,
+    HOURS,
+    LATITUDES,
+    foreign_unit,
+    is_count_named,
+    is_other_quantity,
+    pairs_of,
+    unit_named,
+    words_of,
+)
 from orbiflow.density.data.columns import DIRECTIONS, ROTATIONS, Arrangement, check_columns
 from orbiflow.density.data.doubts import (
     FEW_ROWS,
@@ -20,19 +31,55 @@ from orbiflow.density.data.doubts import (
     doubts_of_torus,
     is_identifier,
     place_doubts,
-)
-from orbiflow.density.data.foreign_units import refuse_foreign_units
-from orbiflow.density.data.names import (
-    AZIMUTHS,
-    FROM_VERTICAL,
-    LATITUDES,
-    is_other_quantity,
-    pairs_of,
-    unit_named,
-    words_of,
+    refuse_codes,
 )
 from orbiflow.density.data.units import TURN_TOLERANCE, TURNS, Unit, check_unit, is_angular
 from orbiflow.errors import DataWarning, SettingError, literal
+
+CURES = {
+    "gon": "multiply by 0.9 for degrees",
+    "arcminutes": "divide by 60 for degrees",
+    "arcseconds": "divide by 3600 for degrees",
+    "milliradians": "divide by 1000 for radians",
+    "mils, 6400 to a turn": "multiply by 0.05625 for degrees",
+    "cycles": "these are turns, give {unit} turns",
+    "hours": "multiply by 15 for degrees",
+}
+"""What to do with angles in other units than those that are read."""
+
+HOURS_PER_DAY = 24.0
+
+
+def refuse_foreign_units(names: Sequence[str], values: Array, unit: str | None) -> None:
+    """Refuse columns of angles (N, k) whose names say a unit that must be converted first.
+
+    `unit` is the one that was given. Of hours and "grad", values may show that they were converted.
+    """
+    for name, column in zip(names, values.T, strict=True):
+        most = float(np.nanmax(column, initial=0.0))
+        least = float(np.nanmin(column, initial=0.0))
+        if foreign := _unit_to_convert(name, least, most, unit):
+            renamed = "" if foreign == "cycles" else ", and call the column otherwise"
+            said = literal(f"{name!r} is in {foreign}, by its name: ")
+            raise SettingError(said + CURES[foreign] + renamed)
+        if "grad" in words_of(name) and unit is None:
+            raise SettingError(
+                literal(f"{name!r} is in degrees or in gon, by its name: ")
+                + "give {unit} degrees, or multiply by 0.9 if they are gon"
+            )
+
+
+def _unit_to_convert(name: str, least: float, most: float, unit: str | None) -> str | None:
+    words = set(words_of(name))
+    if is_count_named(name):
+        return None
+    if "grad" in words and unit == "degrees" and 360 * (1 + TURN_TOLERANCE) < most <= 400:
+        return "gon"
+    if words & HOURS and words != {"h"}:  # alone it may be a hue
+        converted = unit in ("radians", "turns") and most <= TURNS[unit] * (1 + TURN_TOLERANCE)
+        return "hours" if least >= 0 and most <= HOURS_PER_DAY and not converted else None
+    found = foreign_unit(name)
+    return None if found == "cycles" and unit == "turns" else found
 
 
 def check_values(
@@ -61,7 +108,7 @@ def check_values(
         own, more = _angles(space, values, called, unit, cure)
         return own, doubts + more
     if space in DIRECTIONS and values.shape[1] == 2:
-        refuse_no_places(values, called, cure)
+        refuse_codes(space, values, called, "degrees", cure)
         doubts += place_doubts(space, values, called, unit)
     return "radians", doubts
 
@@ -153,7 +200,7 @@ def _angles(
     """Return the unit of angles (N, k), and doubts; refuse codes and values of no known unit."""
     refuse_foreign_units(names, values, unit)
     own, doubts = _unit_of(names, unit)
-    refuse_no_angles(values, names, own or "degrees", cure)
+    refuse_codes(space, values, names, own or "degrees", cure)
     if own is None:
         own = _radians(values, names)
         text = "no unit was given and all values are within 2 pi: they were read as radians"

@@ -1,7 +1,7 @@
 from .automatic import fit_automatic as fit_automatic
 from .flow import fit_density as fit_density
-from .folds import LEAST_PLACES as LEAST_PLACES
-from .folds import lightest_folds as lightest_folds
+from .held_out import LEAST_PLACES as LEAST_PLACES
+from .held_out import lightest_folds as lightest_folds
 from .repeats import places as places
 from .report import FitReport as FitReport
 from .report import Progress as Progress

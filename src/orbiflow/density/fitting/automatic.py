@@ -37,7 +37,13 @@ from orbiflow.density.fitting.flow_trial import (
     flow_settings,
     try_flow,
 )
-from orbiflow.density.fitting.folds import LEAST_PLACES, Folds, folds_of
+from orbiflow.density.fitting.held_out import (
+    LEAST_PLACES,
+    Folds,
+    folds_of,
+    stacked,
+    supported_weights,
+)
 from orbiflow.density.fitting.kernels import limit_notes, narrowest_for
 from orbiflow.density.fitting.likelihood import Budget, training
 from orbiflow.density.fitting.repeats import Repeats, repeats_of, spread_evenly
@@ -66,7 +72,6 @@ from orbiflow.density.fitting.rows import (
     weights_of,
 )
 from orbiflow.density.fitting.settings import COMPONENTS, DensitySettings
-from orbiflow.density.fitting.stacking import stacked, supported_weights
 from orbiflow.density.models import MOST_DIM, Mixture, flow_obstacle
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import DataWarning, OrbiflowError
@@ -129,7 +134,10 @@ def fit_automatic(
             f"a density needs at least {LEAST_PLACES} different points{whole}, got {found.places} "
             f"among {len(rows)}"
         )
-    rows, together = _without_rounding(space, rows, found, taken_for, settings.seed)
+    together = taken_for == "rounding" and not found.can_be_undone
+    if taken_for == "rounding" and found.can_be_undone:  # as they may have been before
+        noise = torch.Generator().manual_seed(settings.seed)
+        rows = replace(rows, points=spread_evenly(space, rows.points, found, noise))
     generator = torch.Generator().manual_seed(settings.seed)
     folds = folds_of(rows, together=together, generator=generator)
     narrowest, crowded = narrowest_for(space, rows[is_whole(rows)].points)
@@ -137,7 +145,8 @@ def fit_automatic(
     if together and found.step is not None:  # a deviation of one step
         narrowest = min(narrowest, 1 / space.step_angle(found.step) ** 2)
     families = _families(space, folds, settings, together, narrowest)
-    flows = _wants_flow(space, folds, settings)
+    enough = len(folds.rows) >= LEAST_FLOW_ROWS or settings.allowed == ("flow",)
+    flows = "flow" in settings.allowed and not flow_obstacle(space) and enough
     total = work_of(len(families), folds.used) + FLOW_WORK * flows
     course = Course(lambda done, what: say(BEFORE_END * done, what), total)
     with SideBySide(waiting=1) as beside, Rivals() as rivals:
@@ -169,17 +178,6 @@ def fit_automatic(
         *steps_note(report.steps, report.integration_error),
     )
     return density, replace(report, notes=(*notes, *after))
-
-
-def _without_rounding(
-    space: Space, rows: Rows, found: Repeats, taken_for: str, seed: int
-) -> tuple[Rows, bool]:
-    """Return rows as they may have been before they were rounded, and if equal ones stay together."""
-    if taken_for != "rounding" or not found.can_be_undone:
-        return rows, taken_for == "rounding"
-    generator = torch.Generator().manual_seed(seed)
-    points = spread_evenly(space, rows.points, found, generator)
-    return replace(rows, points=points), False
 
 
 def _flow_fits(
@@ -263,11 +261,6 @@ def _families(
             f"network for more than {MOST_DIM}, a flow for {MOST_DIM} at most"
         )
     return chosen
-
-
-def _wants_flow(space: Space, folds: Folds, settings: DensitySettings) -> bool:
-    enough = len(folds.rows) >= LEAST_FLOW_ROWS or settings.allowed == ("flow",)
-    return "flow" in settings.allowed and not flow_obstacle(space) and enough
 
 
 def _untried_note(folds: Folds, settings: DensitySettings, flows: bool) -> list[str]:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import torch
+from scipy.special import ive
 from torch import Tensor
 
 from orbiflow.density.fitting.rows import Rows, gain_of
@@ -270,18 +271,23 @@ def _local(center: Tensor) -> Tensor:
     return local
 
 
-def concentration(resultant: Tensor) -> Tensor:
-    """Return kappa of mean cosines I1(kappa) / I0(kappa): Best and Fisher (1981), then Newton."""
+def concentration(resultant: Tensor, dim: int = 1) -> Tensor:
+    """Return kappa of von Mises-Fisher densities on S^dim that have these mean cosines.
+
+    Banerjee et al. (2005), then Newton. On the circle the mean cosine is I1(kappa) / I0(kappa), on the
+    sphere coth(kappa) - 1 / kappa.
+    """
     r = resultant.clamp(1e-6, 1 - 1e-8)
-    kappa = torch.where(
-        r < 0.53,
-        2 * r + r**3 + 5 * r**5 / 6,
-        torch.where(r < 0.85, -0.4 + 1.39 * r + 0.43 / (1 - r), 1 / (r**3 - 4 * r**2 + 3 * r)),
-    )
-    for _ in range(3):
-        ratio = special.i1e(kappa) / special.i0e(kappa)
-        kappa = kappa - (ratio - r) / (1 - ratio / kappa - ratio**2)
-        kappa = kappa.clamp(1e-6, 1e8)
+    kappa = r * (dim + 1 - r**2) / (1 - r**2)
+    for _ in range(4):
+        if dim == 1:
+            ratio = special.i1e(kappa) / special.i0e(kappa)
+        elif dim == 2:
+            ratio = 1 / torch.tanh(kappa) - 1 / kappa
+        else:
+            upper, lower = (ive((dim + k) / 2, kappa.numpy()) for k in (1, -1))
+            ratio = torch.as_tensor(upper / lower)
+        kappa = (kappa - (ratio - r) / (1 - ratio**2 - dim * ratio / kappa)).clamp(1e-6, 1e8)
     return kappa
 
 

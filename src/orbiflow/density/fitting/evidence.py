@@ -12,11 +12,10 @@ import torch
 from torch import Tensor
 
 from orbiflow.density.fitting.families import Family
-from orbiflow.density.fitting.folds import Folds
+from orbiflow.density.fitting.held_out import Folds, sparse_weights, stacked, stacking_weights
 from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence, Progress
 from orbiflow.density.fitting.rows import Gain, Rows, gain_of, mean_of
-from orbiflow.density.fitting.stacking import sparse_weights, stacked, stacking_weights
 from orbiflow.density.inference import at_observed
 from orbiflow.density.models import Density, Mixture, UniformDensity, mixture_of
 from orbiflow.density.spaces import Space

@@ -18,9 +18,9 @@ from orbiflow.density.fitting.chains import (
     network_shapes,
     spread_chains,
 )
+from orbiflow.density.fitting.held_out import stacking_weights
 from orbiflow.density.fitting.kernels import NARROWEST, fit_mixture, kernel_estimates
 from orbiflow.density.fitting.rows import Rows, gain_of, is_whole, with_incomplete
-from orbiflow.density.fitting.stacking import stacking_weights
 from orbiflow.density.inference import at_observed
 from orbiflow.density.models import MOST_DIM, Density, UniformDensity, averaged_networks
 from orbiflow.density.spaces import Space, Torus

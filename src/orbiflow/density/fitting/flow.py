@@ -137,7 +137,9 @@ def _stage(
         watch=watch,
         hopeless=hopeless,
     )
-    if not stage.best or not _exploits(density, held, stage):
+    finer = density.with_steps(4 * density.flow.steps)
+    honest = mean_nll(finer, held.points, held.weights) if stage.best else -math.inf
+    if honest <= stage.validation[0] + MASS_TOLERANCE:
         return stage
     with torch.no_grad():
         for parameter, value in zip(density.flow.parameters(), before, strict=True):
@@ -154,12 +156,6 @@ def _refined_on(train: Rows, validation: Rows, max_frequency: int) -> tuple[Rows
     if held.weights is not None:
         held = replace(held, weights=held.weights / held.weights.sum())
     return train.to(DTYPE), held.to(DTYPE)
-
-
-def _exploits(density: FlowDensity, held: Rows, stage: Refinement) -> bool:
-    finer = density.with_steps(4 * density.flow.steps)
-    honest = mean_nll(finer, held.points, held.weights)
-    return not honest <= stage.validation[0] + MASS_TOLERANCE
 
 
 MOST_STEPS = 256

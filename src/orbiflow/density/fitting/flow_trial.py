@@ -12,12 +12,11 @@ from torch import Tensor
 
 from orbiflow.density.fitting.evidence import Candidates
 from orbiflow.density.fitting.flow import Outdone, fit_density
-from orbiflow.density.fitting.folds import Folds
+from orbiflow.density.fitting.held_out import Folds, stacked, stacking_weights
 from orbiflow.density.fitting.likelihood import Budget
 from orbiflow.density.fitting.report import ComponentEvidence, FitReport
 from orbiflow.density.fitting.rows import Gain, Rows, gain_of, mean_of
 from orbiflow.density.fitting.settings import FlowSettings
-from orbiflow.density.fitting.stacking import stacked, stacking_weights
 from orbiflow.density.inference import at_observed
 from orbiflow.density.models import MOST_DIM, Density, FlowDensity
 from orbiflow.density.spaces import Space

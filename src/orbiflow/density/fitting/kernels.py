@@ -5,12 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Collection, Iterator, Sequence
-from functools import partial
 
 import numpy as np
 import torch
 from scipy.spatial import KDTree
-from scipy.special import ive
 from torch import Tensor
 
 from orbiflow.density.fitting.chains import PRIOR_POINTS, PRIOR_RESULTANT, concentration, far_apart
@@ -228,14 +226,14 @@ def fit_mixture(
     width = 1 if space.is_round else space.dim
     kappa = mean.new_full((components, width), 10.0)
     weights = mean.new_full((components,), 1 / components)
-    of_mean = partial(round_concentration, dim=space.dim) if space.is_round else concentration
+    sphere = space.dim if space.is_round else 1
     last = -math.inf
     for _ in range(iterations):
         count, known, total, score = _expectation(space, every, mean, kappa, weights)
         weights = (count + 0.01) / (count + 0.01).sum()
         mean, length = _directions(space, total)
         resultant = (length + PRIOR_POINTS * PRIOR_RESULTANT) / (known + PRIOR_POINTS)
-        kappa = of_mean(resultant).clamp(WIDEST / 100, narrowest)
+        kappa = concentration(resultant, sphere).clamp(WIDEST / 100, narrowest)
         if score - last < MIN_GAIN_NATS * len(train):
             break
         last = score
@@ -285,23 +283,3 @@ def _directions(space: Space, total: Tensor) -> tuple[Tensor, Tensor]:
     length = linalg.vector_norm(parts, dim=-1)
     unit = parts / length.clamp_min(1e-300)[..., None]
     return (unit[:, 0] if space.is_round else torch.cat(unit.unbind(dim=-1), dim=1)), length
-
-
-def round_concentration(resultant: Tensor, dim: int) -> Tensor:
-    """Return kappa of von Mises-Fisher densities on S^dim that have these mean cosines.
-
-    Banerjee et al. (2005), then Newton. On the sphere the mean cosine is coth(kappa) - 1 / kappa.
-    """
-    r = resultant.clamp(1e-4, 1 - 1e-8)
-    kappa = r * (dim + 1 - r**2) / (1 - r**2)
-    for _ in range(4):
-        ratio = _mean_cosine(kappa, dim)
-        kappa = (kappa - (ratio - r) / (1 - ratio**2 - dim * ratio / kappa)).clamp(1e-3, 1e8)
-    return kappa
-
-
-def _mean_cosine(kappa: Tensor, dim: int) -> Tensor:
-    if dim == 2:
-        return 1 / torch.tanh(kappa) - 1 / kappa
-    upper, lower = (ive((dim + k) / 2, kappa.numpy()) for k in (1, -1))
-    return torch.as_tensor(upper / lower)

@@ -163,7 +163,11 @@ def repeats_of(space: Space, points: Tensor) -> Repeats:
         return found
     turns = [_turn(space, k) for k in range(data.shape[1])]
     steps = [step_of(own, turn) for own, turn in zip(data.T, turns, strict=True)]
-    if len(counts) < FEWEST_VALUES and not _are_parts(data, steps, turns):
+    columns = list(zip(data.T, steps, turns, strict=True))
+    if len(counts) < FEWEST_VALUES and not all(  # few may be states, but not parts of a turn
+        step is not None and known_step(step, turn) > 0 and are_parts_of(own, step, turn)
+        for own, step, turn in columns
+    ):
         return found
     moving = np.ptp(data, axis=0) > 0
     if heaps := _heaps(data, steps, turns):
@@ -187,14 +191,6 @@ def repeats_of(space: Space, points: Tensor) -> Repeats:
     else:
         return found
     return replace(found, spread=tuple(spread))
-
-
-def _are_parts(data: Array, steps: list[float | None], turns: list[float]) -> bool:
-    """Return whether all columns of data (N, k) are multiples of parts of a turn, which are no few."""
-    return all(
-        step is not None and known_step(step, turn) > 0 and are_parts_of(own, step, turn)
-        for own, step, turn in zip(data.T, steps, turns, strict=True)
-    )
 
 
 def _heaps(

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance, as_points
-from orbiflow.density.fitting.folds import LEAST_PLACES
+from orbiflow.density.fitting.held_out import LEAST_PLACES
 from orbiflow.density.fitting.likelihood import Refinement
 from orbiflow.density.fitting.repeats import Repeats, places
 from orbiflow.density.fitting.rounding import Heap

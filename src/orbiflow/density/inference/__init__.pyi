@@ -1,13 +1,12 @@
+from .angles import at_observed as at_observed
 from .angles import axes_named as axes_named
+from .angles import chart_of_rows as chart_of_rows
 from .angles import check_torus as check_torus
 from .angles import given_named as given_named
+from .angles import log_prob_observed as log_prob_observed
+from .angles import observed_rows as observed_rows
 from .doubts import data_doubts as data_doubts
 from .doubts import data_unit as data_unit
 from .doubts import given_doubts as given_doubts
-from .observed import at_observed as at_observed
-from .observed import chart_of_observed as chart_of_observed
-from .observed import chart_of_rows as chart_of_rows
-from .observed import log_prob_observed as log_prob_observed
-from .observed import observed_rows as observed_rows
 from .partial import conditional as conditional
 from .partial import marginal as marginal

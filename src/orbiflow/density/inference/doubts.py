@@ -18,7 +18,7 @@ from orbiflow.density.data import (
     refuse_codes,
     seeming_unit,
 )
-from orbiflow.density.inference.observed import at_observed
+from orbiflow.density.inference.angles import at_observed
 from orbiflow.density.models import Density
 from orbiflow.density.spaces import Space
 from orbiflow.errors import OrbiflowError, SettingError, literal
@@ -55,8 +55,9 @@ def data_doubts(
     found: list[str] = []
     if not is_angular(space.name, width):
         found = [doubt.text for doubt in place_doubts(space.name, values, called, unit)]
-    other = _likelier_unit(density, values, unit)
-    if other is None:
+    other = seeming_unit(values, unit)
+    few = unit != "radians" and len(values) < FEW_ROWS
+    if other is None or few or not _is_likelier(density, values, TURNS[unit] / TURNS[other]):
         return found
     if unit == "degrees":
         what = "angles are" if is_angular(space.name, width) else "latitudes and longitudes are"
@@ -66,14 +67,6 @@ def data_doubts(
         return [*found, f"{text}, convert them"]
     most = np.nanmax(np.abs(values), axis=0, initial=0.0)
     return [_beyond(called[int(most.argmax())], float(most.max()), unit, other)]
-
-
-def _likelier_unit(density: Density, values: Array, unit: str) -> str | None:
-    """Return another unit in which values (N, k) may be by their size, and are likelier, or None."""
-    other = seeming_unit(values, unit)
-    if other is None or (unit != "radians" and len(values) < FEW_ROWS):
-        return None
-    return other if _is_likelier(density, values, TURNS[unit] / TURNS[other]) else None
 
 
 def given_doubts(space: Space, given: Mapping[str, float]) -> list[str]:

@@ -132,7 +132,7 @@ def _restricted(
     accuracy = as_number(accuracy, "accuracy")
     if not 0 < accuracy <= MOST_OFF:
         raise OrbiflowError(f"accuracy must be above 0 and at most {MOST_OFF}, got {accuracy}")
-    say = progress or _silent
+    say: Progress = progress or (lambda _share, _what: None)
     closed, left = density.restricted(split, space)
     error = Error(0.0, 0.0)
     if left and space.dim > MOST_TABULATED:
@@ -157,10 +157,6 @@ def _restricted(
     # of a ratio of the joint density and that of what is given, both may be off
     whole.largest_error = error.largest + density.largest_error * (2 if split.given else 1)
     return whole
-
-
-def _silent(share: float, what: str) -> None:
-    del share, what
 
 
 def _inherited(density: Density, split: Split) -> float:

@@ -7,7 +7,7 @@ import math
 import torch
 from torch import Tensor
 
-from orbiflow.density.models.terms import LOG2_E
+from orbiflow.density.models.sums import LOG2_E
 
 SCALES = (1.0, 4.0, 16.0)
 """A component's concentrations are divided by these, each with its own weight: heavy tails.

@@ -14,13 +14,18 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_tensor
-from orbiflow.density.models.chain_nodes import MAX_NODES, MAX_NODES_ALONE, node_counts, nodes_of
+from orbiflow.density.models.chain_integrals import (
+    MAX_NODES,
+    MAX_NODES_ALONE,
+    chain_tables,
+    node_counts,
+    nodes_of,
+)
 from orbiflow.density.models.chain_sums import SCALES, ChainFits, ChainSum
-from orbiflow.density.models.chain_tables import chain_tables
 from orbiflow.density.models.density import Density, Restriction, Split, Weighted
-from orbiflow.density.models.lattice import lattice_kernels
+from orbiflow.density.models.kernels import lattice_kernels
+from orbiflow.density.models.sums import log_sum_exp, shares_of
 from orbiflow.density.models.tensors import in_blocks
-from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.typed_torch import listed, special, unique

@@ -14,7 +14,7 @@ from torch import Tensor
 from torch.distributions import Distribution, constraints
 
 from orbiflow.arguments import as_instance, as_points
-from orbiflow.density.models.tensors import destination, moved, neighbourhoods, shape_of, source_of
+from orbiflow.density.models.tensors import destination, moved, shape_of, source_of
 from orbiflow.density.spaces import CHART, Space, Torus, check_measure
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import SideBySide, Tell, one_thread
@@ -273,25 +273,24 @@ class Density(Distribution):
         own = points.to(self.dtype)
         if torch.is_grad_enabled() or own[..., 0].numel() <= BLOCK_POINTS:
             return self._log_prob(own, measure).to(points.dtype)
-        flat = own.reshape(-1, own.shape[-1])
-        values = own.new_empty(len(flat))
 
         @torch.no_grad()
-        def evaluate(at: Tensor, _tell: Tell) -> None:
-            values[at] = self._log_prob(flat[at], measure)
+        def evaluate(block: Tensor, _tell: Tell) -> Tensor:
+            return self._log_prob(block, measure)
 
+        blocks = torch.split(own.reshape(-1, own.shape[-1]), BLOCK_POINTS)
         with SideBySide() as beside:
-            for result in [
-                beside.begin(partial(evaluate, at)) for at in neighbourhoods(flat, BLOCK_POINTS)
-            ]:
-                result()
+            results = [beside.begin(partial(evaluate, block)) for block in blocks]
+            values = torch.cat([result() for result in results])
         return values.reshape(own.shape[:-1]).to(points.dtype)
 
     def _log_prob(self, points: Tensor, measure: str) -> Tensor:
         check_measure(measure)
         if measure == CHART:
             return self.log_chart(points)
-        return self.log_density(points) + log_area_factor(self.space, measure)
+        volume = math.log(self.space.volume)
+        natural = 0.0 if self.space.is_round else -volume
+        return self.log_density(points) + natural + (volume if measure == "uniform" else 0.0)
 
     def sample(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, sample_shape: Any = (), generator: torch.Generator | None = None
@@ -405,10 +404,3 @@ class Restriction(NamedTuple):
 
     closed: list[Weighted]
     left: list[tuple[float, Density, Split]]
-
-
-def log_area_factor(space: Space, measure: str) -> float:
-    """Return what makes a `Density.log_density` one of another measure than the chart's area."""
-    volume = math.log(space.volume)
-    natural = 0.0 if space.is_round else -volume
-    return natural + (volume if measure == "uniform" else 0.0)

@@ -15,8 +15,8 @@ from torch import Tensor
 from orbiflow.density.models.chain_sums import SCALES
 from orbiflow.density.models.chains import Factor, VonMisesChains, waves
 from orbiflow.density.models.density import Split
-from orbiflow.density.models.lattice import KERNEL_STEP, sharpest_on
-from orbiflow.density.models.terms import FAINT_LOG, LOG2_E, log_sum_exp
+from orbiflow.density.models.kernels import KERNEL_STEP, sharpest_on
+from orbiflow.density.models.sums import FAINT_LOG, LOG2_E, log_sum_exp
 from orbiflow.typed_torch import special
 
 STEP_DEVIATIONS = 0.9
@@ -54,7 +54,10 @@ def grids_for(factors: Sequence[Factor], split: Split, level: int) -> Grids | No
         bent = (chains.concentrations[:, :, None] * slopes).amax(dim=1)
         kappa = torch.maximum(chains.concentrations, bent)[..., None] / torch.tensor(SCALES)
         for k, axis in enumerate(axes):
-            wanted[axis] = max(wanted[axis], _quantile(kappa[:, k], chains.log_weights.exp()))
+            ordered, order = kappa[:, k].flatten().sort()
+            below = chains.log_weights.exp().flatten()[order].cumsum(0)
+            sharp = ordered[int((below < SHARP_SHARE * below[-1]).sum())]
+            wanted[axis] = max(wanted[axis], float(sharp))
     sizes: dict[int, int] = {}
     for axis, kappa in wanted.items():
         step = KERNEL_STEP if axis in split.kept else STEP_DEVIATIONS
@@ -69,13 +72,6 @@ def grids_for(factors: Sequence[Factor], split: Split, level: int) -> Grids | No
         else torch.arange(size, dtype=torch.float64) / size
         for axis, size in sizes.items()
     }
-
-
-def _quantile(kappa: Tensor, weights: Tensor) -> float:
-    """Return what a share `SHARP_SHARE` of the weights is not above."""
-    ordered, order = kappa.flatten().sort()
-    below = weights.flatten()[order].cumsum(0)
-    return float(ordered[int((below < SHARP_SHARE * below[-1]).sum())])
 
 
 def eliminated(

@@ -50,7 +50,7 @@ def _checked_space(space: Space) -> Space:
         again is None
         or type(again) is not type(space)
         or again.settings() != space.settings()
-        or (space.has_chart and not is_same_group(again.group, space.group))
+        or (space.has_chart and not is_of_group(group_header(again.group), space.group))
     ):
         raise OrbiflowError(
             f"the space is a {type(space).__name__}, which `make_space` does not make again: give the "
@@ -77,12 +77,12 @@ def read_density(path: str | Path) -> tuple[Density, dict[str, Any]]:
 
 
 def _restored(header: dict[str, Any], tensors: dict[str, Tensor]) -> Density:
-    for module in ("mixture", "network", "part"):  # now all kinds are known
+    for module in ("mixture", "network"):  # now all kinds are known
         import_module(f"orbiflow.density.models.{module}")
     options = dict(header["space"])
     space = make_space(str(options.pop("name")), **options)
-    if space.has_chart:
-        check_group(header["group"], space.group)
+    if space.has_chart and not is_of_group(header["group"], space.group):
+        raise OrbiflowError(f"its group is not {space.group!r}, which its space has here")
     return density_from(space, header["density"], tensors)
 
 
@@ -137,28 +137,14 @@ TOLERANCE = 1e-9
 """Difference of matrices and translations up to which they are read as equal."""
 
 
-def is_same_group(one: CrystallographicGroup, other: CrystallographicGroup) -> bool:
-    """Return whether lattice *basis* and coset representatives agree.
+def is_of_group(header: Any, group: CrystallographicGroup) -> bool:
+    """Return whether `header`, from `group_header`, describes this group, its lattice *basis* included.
 
     Another basis of the same lattice numbers the frequencies otherwise: the same parameters would be
     another field.
     """
-    return (
-        one.lattice.shape == other.lattice.shape
-        and one.order == other.order
-        and np.allclose(one.lattice, other.lattice, rtol=0, atol=TOLERANCE)
-        and all(other.contains(coset, TOLERANCE) for coset in one.cosets)
-    )
-
-
-def check_group(header: Any, group: CrystallographicGroup) -> None:
-    """Check that `header`, from `group_header`, describes this group."""
     try:
         tables = [(np.array(header[n], float), np.array(v)) for n, v in group_header(group).items()]
-        same = all(
-            a.shape == b.shape and np.allclose(a, b, rtol=0, atol=TOLERANCE) for a, b in tables
-        )
     except (KeyError, TypeError, ValueError, OverflowError):
-        same = False
-    if not same:
-        raise OrbiflowError(f"its group is not {group!r}, which its space has here")
+        return False
+    return all(a.shape == b.shape and np.allclose(a, b, rtol=0, atol=TOLERANCE) for a, b in tables)

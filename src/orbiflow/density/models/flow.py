@@ -146,17 +146,16 @@ class FlowDensity(Density, kind="flow"):
             )
         if not hidden:
             return self._at_nodes(points, axes, hidden, points.new_zeros(1, 0))[:, 0]
-        sums, count = None, FIRST_NODES[len(hidden)]
-        now: Tensor | None = None
+        count, last = FIRST_NODES[len(hidden)], points.new_full((len(points),), math.inf)
         while True:
-            fresh = _nodes(count, len(hidden), all_of_them=sums is None)
-            total = self._at_nodes(points, axes, hidden, fresh).logsumexp(dim=1)
-            sums = total if sums is None else torch.logaddexp(sums, total)
-            last, now = now, sums - len(hidden) * math.log(count)
-            settled = last is not None and float((now - last).abs().mean()) < SETTLED_NATS
+            lines = [torch.arange(count, dtype=torch.float64) / count for _ in hidden]
+            nodes = torch.cartesian_prod(*lines).reshape(-1, len(hidden))
+            now = self._at_nodes(points, axes, hidden, nodes).logsumexp(dim=1)
+            now -= math.log(len(nodes))
+            settled = float((now - last).abs().mean()) < SETTLED_NATS
             if settled or count >= MOST_NODES[len(hidden)]:
                 return now
-            count *= 2
+            count, last = 2 * count, now
 
     def terms_at(self, axes: list[int]) -> int | None:
         hidden = self.space.dim - len(axes)
@@ -198,15 +197,6 @@ class FlowDensity(Density, kind="flow"):
 
     def __repr__(self) -> str:
         return f"FlowDensity({self.space!r}, {type(self.base).__name__}, {self.flow})"
-
-
-def _nodes(count: int, axes: int, *, all_of_them: bool) -> Tensor:
-    """Return an even grid (Q, axes) of `count` nodes an axis, or what half as many do not have."""
-    k = torch.arange(count)
-    grid = torch.cartesian_prod(*[k] * axes).reshape(-1, axes)
-    if not all_of_them:
-        grid = grid[(grid % 2 == 1).any(dim=1)]
-    return grid.double() / count
 
 
 class UniformDensity(Density, kind="uniform"):

@@ -12,16 +12,15 @@ import torch
 from torch import Tensor
 
 from orbiflow.arguments import as_instance
-from orbiflow.density.models.chain_nodes import quantiles
+from orbiflow.density.models.chain_integrals import quantiles
 from orbiflow.density.models.chain_sums import SCALES
 from orbiflow.density.models.chains import Factor, VonMisesChains, waves
 from orbiflow.density.models.density import Density, Split, Weighted
 from orbiflow.density.models.elimination import eliminated, grids_for
 from orbiflow.density.models.files import within
-from orbiflow.density.models.kernels import AdaptiveKernels
-from orbiflow.density.models.lattice import lattice_kernels
+from orbiflow.density.models.kernels import AdaptiveKernels, lattice_kernels
+from orbiflow.density.models.sums import log_sum_exp, shares_of
 from orbiflow.density.models.tensors import in_blocks
-from orbiflow.density.models.terms import log_sum_exp, shares_of
 from orbiflow.density.spaces import Space, Torus
 from orbiflow.errors import OrbiflowError
 from orbiflow.runtime import is_list, is_object
@@ -87,15 +86,11 @@ class VonMisesNetwork(Density, kind="network"):
         self.factors = tuple(factors)
 
     def log_chart(self, points: Tensor) -> Tensor:
-        return in_blocks(self._log_product, points, BLOCK_POINTS)
+        def log_product(some: Tensor) -> Tensor:
+            logs = [log_conditional(chains, some[:, list(axes)]) for axes, chains in self.factors]
+            return torch.stack(logs).sum(dim=0)
 
-    def _log_product(self, points: Tensor) -> Tensor:
-        angles = points.unbind(dim=1)
-        logs = [
-            log_conditional(chains, torch.stack([angles[axis] for axis in axes], dim=1))
-            for axes, chains in self.factors
-        ]
-        return torch.stack(logs).sum(dim=0)
+        return in_blocks(log_product, points, BLOCK_POINTS)
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
         return self.space.project(self._drawn(count, {}, generator).points)

@@ -7,7 +7,6 @@ import numbers
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor, nn
 
@@ -19,24 +18,6 @@ def in_blocks(function: Callable[[Tensor], Tensor], points: Tensor, size: int) -
     flat = points.reshape(-1, points.shape[-1])
     parts = [function(block) for block in torch.split(flat, size)]
     return torch.cat(parts).reshape(points.shape[:-1])
-
-
-def neighbourhoods(points: Tensor, size: int) -> list[Tensor]:
-    """Return numbers of points (N, d) that lie together, at most `size` of them in each part.
-
-    Sums of kernels are the faster, the smaller the box around the points.
-    """
-    table = np.ascontiguousarray(points.detach().cpu().numpy().T)
-    parts, found = [np.arange(len(points))], list[Tensor]()
-    while parts:
-        at = parts.pop()
-        if len(at) <= size:
-            found.append(torch.as_tensor(at).to(points.device))
-            continue
-        some = table.take(at, axis=1)
-        order = np.argpartition(some[np.ptp(some, axis=1).argmax()], len(at) // 2)
-        parts += [at[order[len(at) // 2 :]], at[order[: len(at) // 2]]]
-    return found
 
 
 def destination(*wanted: Any) -> tuple[torch.device | None, torch.dtype | None]:

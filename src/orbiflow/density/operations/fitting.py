@@ -232,7 +232,7 @@ DENSITIES = Kind(
     most_bytes=256 * 2**20,
     reads="data",
     writes="out",
-    modules=("orbiflow.density.estimator", "orbiflow.density.pictures.thumbnail"),
+    modules=("orbiflow.density.estimator", "orbiflow.density.pictures.plots"),
     columns=(
         Column("rows", "rows", "d"),
         Column("log_likelihood", "mean log density", ".4f"),

@@ -16,6 +16,7 @@ from .plots import REPORT as REPORT
 from .plots import TABLE as TABLE
 from .plots import THUMBNAIL as THUMBNAIL
 from .plots import Plotted as Plotted
+from .plots import density_thumbnail as density_thumbnail
 from .plots import is_one_file as is_one_file
 from .plots import plot_density as plot_density
 from .roses import Rose as Rose
@@ -28,4 +29,3 @@ from .surfaces import density_page as density_page
 from .surfaces import immersion as immersion
 from .surfaces import surface_data as surface_data
 from .surfaces import viewpoint as viewpoint
-from .thumbnail import density_thumbnail as density_thumbnail

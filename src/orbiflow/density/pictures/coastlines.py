@@ -47,17 +47,13 @@ _ROUNDING = 1e-3
 def coastlines_for(space: Space, settings: PlotSettings) -> list[Array]:
     """Return the lines that settings ask for, which only the sphere can have."""
     if settings.coastlines is None:
-        return earth() if settings.earth and _is_earth(space, settings) else []
+        name = (settings.names or space.columns)[0].casefold()  # of latitudes, or without one
+        on_earth = space.name == "sphere" and space.columns[0] == "lat"
+        named = re.match(r"lat|column\d", name)
+        return earth() if settings.earth and on_earth and named else []
     if space.name != "sphere":
         raise SettingError(f"{{coastlines}} apply to the sphere, not to the {space.name}")
     return read_coastlines(settings.coastlines)
-
-
-def _is_earth(space: Space, settings: PlotSettings) -> bool:
-    """Return whether columns are latitude and longitude, by their names or without names."""
-    name = (settings.names or space.columns)[0].casefold()
-    on_earth = space.name == "sphere" and space.columns[0] == "lat"
-    return on_earth and bool(re.match(r"lat|column\d", name))
 
 
 @cache

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density, Pixel, midpoints
-from orbiflow.density.spaces import Space, rectangle
+from orbiflow.density.spaces import Space
 
 COLOURS = "viridis"
 
@@ -57,7 +57,7 @@ def density_over(density: Density, points: Tensor, measure: str, pixel: Pixel) -
 def square_pixel(space: Space, side: float) -> Pixel:
     """Return how large a pixel is whose side is a share of the chart's square."""
     if not space.is_round:
-        sides = 2 * math.pi * side / rectangle(space)
+        sides = 2 * math.pi * side / space.sides
         return lambda _points: sides
     # the chart is conformal: a small square stays a square
     return lambda points: side * (space.log_area(off_cones(points)) / 2).exp()[:, None]

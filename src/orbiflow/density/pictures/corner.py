@@ -15,7 +15,7 @@ from orbiflow.arrays import Array
 from orbiflow.density.models import Density
 from orbiflow.density.pictures import frames
 from orbiflow.density.pictures.colours import density_at
-from orbiflow.density.pictures.overlays import LIGHT, MAX_DOTS, draw_dots
+from orbiflow.density.pictures.grounds import LIGHT, MAX_DOTS, draw_dots
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.drawing import Picture, Sheet
 from orbiflow.errors import OrbiflowError

@@ -16,8 +16,7 @@ from PIL import Image
 from torch import Tensor
 
 from orbiflow.density.models import Density
-from orbiflow.density.pictures import frames, overlays
-from orbiflow.density.pictures.cell import Cell
+from orbiflow.density.pictures import frames, grounds
 from orbiflow.density.pictures.coastlines import coastlines_for
 from orbiflow.density.pictures.colours import bar_label, bar_ticks
 from orbiflow.density.pictures.frames import INK, chart_points, require_plane, space_title, view_of
@@ -25,7 +24,7 @@ from orbiflow.density.pictures.grounds import Ground
 from orbiflow.density.pictures.maps import Map
 from orbiflow.density.pictures.projections import chosen_map
 from orbiflow.density.pictures.settings import PlotSettings
-from orbiflow.density.pictures.square import Square
+from orbiflow.density.pictures.square import Cell, Square
 from orbiflow.density.regions import DensityRegion
 from orbiflow.density.spaces import Space
 from orbiflow.drawing import Picture, Sheet, draw_flow, draw_magnitude
@@ -85,15 +84,15 @@ def density_picture(
     """
     settings = settings or PlotSettings()
     sheet, ground = sheet or settings.sheet, _ground(ground, density.space, samples, settings)
-    regions = overlays.region_lines(density, settings) if regions is None else regions
+    regions = grounds.region_lines(density, settings) if regions is None else regions
     colouring = ground.colouring(density, settings)
     shade = colouring.shade
     label = bar_label(shade, ground.space, settings.measure)
     places = None if samples is None else ground.places(samples)
-    most = settings.samples or overlays.MAX_DOTS
+    most = settings.samples or grounds.MAX_DOTS
     masses = sorted(settings.regions or ())
-    notes = [*([] if places is None else [overlays.SMALLER]), colouring.reason]
-    notes += [overlays.region_note(masses)] if masses else []
+    notes = [*([] if places is None else [grounds.SMALLER]), colouring.reason]
+    notes += [grounds.region_note(masses)] if masses else []
     notes += [colouring.averaging] if colouring.averaging else []
     count = None if places is None else (min(most, len(places)), len(places))
     caption = ground.caption(notes, count)
@@ -105,7 +104,7 @@ def density_picture(
     colouring.draw_regions(frame.axes, regions, sheet)
     if places is not None:
         scale = _dot_scale(ground, sheet, frame.side)
-        overlays.draw_dots_over(
+        grounds.draw_dots_over(
             frame.axes, places, frame.side / ground.width, limit=most, scale=scale
         )
     ground.draw_axes(frame.axes, sheet, frame.side, frames.Panel())
@@ -135,7 +134,7 @@ def samples_picture(
     panels = {"data": data, "samples": samples}
     places = {n: ground.places(points) for n, points in panels.items() if points is not None}
     count = min(
-        [settings.samples or overlays.MAX_DOTS, *(len(own) for own in places.values() if len(own))]
+        [settings.samples or grounds.MAX_DOTS, *(len(own) for own in places.values() if len(own))]
     )
     colouring = ground.colouring(density, settings) if data is None else None
     bar = "from the least (dark) to the largest (light) density"
@@ -149,7 +148,7 @@ def samples_picture(
         else:
             ground.fill(axes)
             scale = _dot_scale(ground, sheet, side)
-            overlays.draw_dots(axes, places[name], 0.5, limit=count, fill=overlays.DOT, scale=scale)
+            grounds.draw_dots(axes, places[name], 0.5, limit=count, fill=grounds.DOT, scale=scale)
         panel = frames.Panel(False, stacked or axes is both[0], points is not None)
         ground.draw_axes(axes, sheet, side, panel)
         head = "density"

@@ -13,7 +13,7 @@ from orbiflow.arrays import Array
 from orbiflow.density.inference import log_prob_observed
 from orbiflow.density.models import Density
 from orbiflow.density.pictures import colours, frames
-from orbiflow.density.pictures.overlays import thinned
+from orbiflow.density.pictures.grounds import thinned
 from orbiflow.density.pictures.surfaces import packed
 from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors
 from orbiflow.errors import OrbiflowError

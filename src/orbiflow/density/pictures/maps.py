@@ -17,8 +17,7 @@ from orbiflow.density.models import Density
 from orbiflow.density.pictures import frames
 from orbiflow.density.pictures.colours import round_pixel
 from orbiflow.density.pictures.frames import INK, LETTER_EMS, chart_points, degrees_text
-from orbiflow.density.pictures.grounds import Ground, Pixels
-from orbiflow.density.pictures.overlays import LIGHT
+from orbiflow.density.pictures.grounds import LIGHT, Ground, Pixels
 from orbiflow.density.pictures.projections import Azimuthal, Mollweide, Projection, WorldMap
 from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors
 from orbiflow.drawing import Sheet

@@ -21,7 +21,7 @@ from orbiflow.arguments import as_whole
 from orbiflow.arrays import Array
 from orbiflow.density.models import Density
 from orbiflow.density.pictures import colours, frames
-from orbiflow.density.pictures.overlays import SMALLER, thinned, uncrowded
+from orbiflow.density.pictures.grounds import SMALLER, thinned, uncrowded
 from orbiflow.density.pictures.settings import PlotSettings
 from orbiflow.density.spaces import RoundSpace, Space, to_vectors
 from orbiflow.drawing import rendered

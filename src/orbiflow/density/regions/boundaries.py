@@ -16,7 +16,7 @@ from torch import Tensor
 from orbiflow.arrays import Array
 from orbiflow.batch import csv_bytes
 from orbiflow.density.models import Density
-from orbiflow.density.regions.grid import Block, LevelGrid, filled, with_islands
+from orbiflow.density.regions.grid import Block, filled, refined, with_islands
 from orbiflow.density.regions.levels import DensityLevels, DensityRegion
 from orbiflow.density.spaces import RoundSpace, Space, to_latlon, to_vectors, whole_turn
 from orbiflow.errors import OrbiflowError
@@ -126,18 +126,18 @@ def outlines(
     thresholds = np.array([region.log_prob for region in regions])
     points = np.concatenate([window.from_chart(levels.points), peaks])
     seeds = points, np.concatenate([levels.log_probs, function(peaks)])
-    grid = LevelGrid(
-        function, window.low, window.high, window.cells, thresholds, seeds, DOUBLINGS, budget
-    )
-    spent = grid.evaluations + len(peaks)
+    counts = np.array(window.cells)
+    coarse = Block(np.zeros(counts + 1), window.low, (window.high - window.low) / counts)
+    grid, spent = refined(function, coarse, thresholds, seeds, DOUBLINGS, budget)
+    spent += len(peaks)
     generator = torch.Generator().manual_seed(seed + 1)
     fresh = window.from_chart(levels.density.sample((CHECKED,), generator).double())
     found: list[Outline] = []
     for number, region in enumerate(regions):
         told(min(0.9, spent / budget), "drawing outlines")
-        shape, off = filled(Block(grid.values, grid.low, grid.step), region.log_prob, function)
+        shape, off = filled(grid, region.log_prob, function)
         left = (budget - spent) // (len(regions) - number)
-        shape, more, missed = with_islands(shape, grid, region.log_prob, left)
+        shape, more, missed = with_islands(shape, grid, function, seeds, region.log_prob, left)
         spent += more
         shape = _polygons(shape, float(grid.step.min()), MAX_SIDE if window.on_globe else np.inf)
         shape, inside, held = _large(shape, window, fresh, min_mass or 0.0)

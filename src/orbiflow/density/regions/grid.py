@@ -21,98 +21,78 @@ MAX_ROUNDS = 200
 """Rounds of evaluating what lies beside a crossing, at most, for each size of cells."""
 
 
-class LevelGrid:
-    """Values (n + 1, m + 1) at the nodes of n x m even cells between `low` and `high`.
+class Block(NamedTuple):
+    """Values (n + 1, m + 1) at the nodes of even cells, their lowest corner and their sides (2,)."""
 
-    They are evaluated everywhere on `cells`, which are then halved, `doublings` times or until `budget`
-    evaluations, where a level is crossed. Values are exact at both ends of every side of a cell whose
-    ends are on different sides of one of the levels (T,); elsewhere they are interpolated from coarser
-    cells.
-
-    - `seeds`: Points (S, 2) at which the function is known, and its values (S,) there, so that islands
-      between the nodes are found.
-    - `evaluations`: Number of evaluations of the function.
-    """
-
-    def __init__(
-        self,
-        function: Function,
-        low: Array,
-        high: Array,
-        cells: tuple[int, int],
-        levels: Array,
-        seeds: tuple[Array, Array],
-        doublings: int,
-        budget: int,
-    ) -> None:
-        self.function, self.low, self.high = function, low, high
-        self.levels, self.seeds = levels, seeds
-        self.values = np.zeros((cells[0] + 1, cells[1] + 1))
-        self.known = np.zeros(self.values.shape, dtype=bool)
-        self.evaluations = 0
-        self._evaluate(~self.known)
-        for _ in range(doublings):
-            if self.evaluations >= budget:
-                break
-            self._double()
-
-    @classmethod
-    def of(cls, block: Block, function: Function, seeds: tuple[Array, Array]) -> LevelGrid:
-        """Return a grid of values that are known, whose cells are not halved."""
-        new = cls.__new__(cls)
-        new.function, new.seeds, new.values, new.low = function, seeds, block.values, block.low
-        new.high = block.low + block.step * (np.array(block.values.shape) - 1)
-        return new
-
-    @property
-    def step(self) -> Array:
-        """The sides of a cell."""
-        return (self.high - self.low) / (np.array(self.values.shape) - 1)
-
-    def _double(self) -> None:
-        """Halve the cells, and evaluate around crossings and where seeds were missed."""
-        wanted = self._missed()
-        known = np.zeros(2 * np.array(self.known.shape) - 1, dtype=bool)
-        known[::2, ::2] = self.known
-        self.values, self.known = _doubled(self.values), known
-        self._evaluate(_corners(np.repeat(np.repeat(wanted, 2, axis=0), 2, axis=1)))
-        for _ in range(MAX_ROUNDS):
-            if not self._evaluate(_corners(self._mixed())):
-                return
+    values: Array
+    low: Array
+    step: Array
 
     def cells_of(self, points: Array) -> NDArray[np.int64]:
         """Return the cells (N, 2) that hold points (N, 2)."""
         most = np.array(self.values.shape) - 2
         return np.clip(np.floor((points - self.low) / self.step).astype(np.int64), 0, most)
 
-    def _missed(self) -> Flags:
-        """Return the cells (n, m) with a seed on the other side of a level than all their nodes."""
-        points, values = self.seeds
-        i, j = self.cells_of(points).T
-        found = np.zeros(np.array(self.values.shape) - 1, dtype=bool)
-        for level in self.levels:
-            least, most = _extremes(self.values >= level)
-            lost = np.where(values >= level, ~most[i, j], least[i, j])
-            found[i[lost], j[lost]] = True
-        return found
 
-    def _mixed(self) -> Flags:
-        """Return the cells (n, m) that cross a level."""
-        found = np.zeros(np.array(self.values.shape) - 1, dtype=bool)
-        for level in self.levels:
-            least, most = _extremes(self.values >= level)
-            found |= most & ~least
-        return found
+def refined(
+    function: Function,
+    block: Block,
+    levels: Array,
+    seeds: tuple[Array, Array],
+    doublings: int,
+    budget: int,
+) -> tuple[Block, int]:
+    """Return a block whose cells are halved where a level is crossed, and how often it was evaluated.
 
-    def _evaluate(self, wanted: Flags) -> int:
+    The function is evaluated at all nodes of the block; the cells are then halved, `doublings` times or
+    until `budget` evaluations. Values are exact at both ends of every side of a cell whose ends are on
+    different sides of one of the levels (T,); elsewhere they are interpolated from coarser cells.
+    `seeds` are points (S, 2) at which the function is known, and its values (S,) there, so that islands
+    between the nodes are found.
+    """
+    known, spent = np.zeros(block.values.shape, dtype=bool), 0
+
+    def evaluate(wanted: Flags) -> int:
         """Evaluate at wanted nodes that are not known, and return their number."""
-        index = np.argwhere(wanted & ~self.known)
+        index = np.argwhere(wanted & ~known)
         if len(index):
-            found = self.function(self.low + index * self.step)
-            self.values[tuple(index.T)] = found
-            self.known[tuple(index.T)] = True
-            self.evaluations += len(index)
+            block.values[tuple(index.T)] = function(block.low + index * block.step)
+            known[tuple(index.T)] = True
         return len(index)
+
+    spent += evaluate(~known)
+    for _ in range(doublings):
+        if spent >= budget:
+            break
+        wanted = _missed(block, levels, seeds)
+        coarse, known = known, np.zeros(2 * np.array(known.shape) - 1, dtype=bool)
+        known[::2, ::2] = coarse
+        block = Block(_doubled(block.values), block.low, block.step / 2)
+        more = evaluate(_corners(np.repeat(np.repeat(wanted, 2, axis=0), 2, axis=1)))
+        for _ in range(MAX_ROUNDS):
+            spent += more
+            more = evaluate(_corners(_mixed(block.values, levels)))
+            if not more:
+                break
+    return block, spent
+
+
+def _missed(block: Block, levels: Array, seeds: tuple[Array, Array]) -> Flags:
+    """Return the cells (n, m) with a seed on the other side of a level than all their nodes."""
+    points, values = seeds
+    i, j = block.cells_of(points).T
+    found = np.zeros(np.array(block.values.shape) - 1, dtype=bool)
+    for level in levels:
+        least, most = _extremes(block.values >= level)
+        lost = np.where(values >= level, ~most[i, j], least[i, j])
+        found[i[lost], j[lost]] = True
+    return found
+
+
+def _mixed(values: Array, levels: Array) -> Flags:
+    """Return the cells (n, m) that cross a level."""
+    sides = [_extremes(values >= level) for level in levels]
+    return np.logical_or.reduce([most & ~least for least, most in sides])
 
 
 def _extremes(above: Flags) -> tuple[Flags, Flags]:
@@ -143,90 +123,51 @@ often: to a metre on the globe."""
 PARTS = 12
 """Parts into which each side of a cell is cut."""
 
-ISLAND_ROUNDS = 4
-"""Rounds of following an island into neighbouring cells."""
-
-MIN_WRONG_PARTS = 2
-"""Parts of a cell's side on which the grid must be wrong for the neighbour to be drawn, too."""
-
-BLOCK = 500
-"""Cells evaluated at a time."""
-
 
 def with_islands(
     shape: shapely.Geometry,
-    grid: LevelGrid,
+    block: Block,
+    function: Function,
+    seeds: tuple[Array, Array],
     level: float,
     budget: int,
     depth: int = DEPTH,
     least: float | None = None,
 ) -> tuple[shapely.Geometry, int, int]:
-    """Draw a shape again in those of a grid's cells that have seeds on its wrong side.
+    """Draw a shape again in those of a block's cells that have seeds on its wrong side.
 
     Cells with the most seeds are first; those beyond the budget of evaluations are left as they are.
     Where `least` seeds, by default the share `CROWDED` of all, are on the wrong side of what is drawn
     in a cell, it is divided again, up to `depth` times. The numbers of evaluations and of cells left
     come after the shape.
     """
-    least = CROWDED * len(grid.seeds[0]) if least is None else least
+    points, values = seeds
+    least, of = CROWDED * len(points) if least is None else least, block.cells_of(points)
+    wrong = of[_on_wrong_side(shape, seeds, level)]
+    cells, counts = np.unique(wrong, axis=0, return_counts=True)
     most = max(1, budget // (PARTS + 1) ** 2)
-    cells = _wrong(shape, grid, level)
-    left = max(0, len(cells) - most)
-    done = np.zeros(np.array(grid.values.shape) - 1, dtype=bool)
-    finer = 0
-    drawn: list[shapely.Geometry] = []
-    for _ in range(ISLAND_ROUNDS):
-        cells = cells[: most - len(drawn)]
-        if not len(cells):
-            break
-        done[tuple(cells.T)] = True
-        blocks, fine = _evaluated(grid, cells), grid.step / PARTS
-        own = [
-            Block(block, grid.low + cell * grid.step, fine)
-            for cell, block in zip(cells, blocks, strict=True)
-        ]
-        shapes, _ = all_filled(own, level, grid.function)
-        for cell, block, piece in zip(cells, own, shapes, strict=True):
-            inner = _crowded(grid, cell, block, piece, level, least) if depth else None
-            if inner is not None:
-                room = budget - finer - len(drawn) * (PARTS + 1) ** 2
-                piece, more, lost = with_islands(piece, inner, level, room, depth - 1, least)
-                finer, left = finer + more, left + lost
-            drawn.append(piece)
-        cells = _beside(cells, blocks, level, done)
-    if not drawn:
+    left, cells = max(0, len(cells) - most), cells[np.argsort(-counts, kind="stable")][:most]
+    if not len(cells):
         return shape, 0, left
-    lows = grid.low + np.argwhere(done) * grid.step
-    corners = np.concatenate([lows, lows + grid.step], axis=1).tolist()
+    t, lows = np.arange(PARTS + 1) / PARTS, block.low + cells * block.step
+    inside = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1) * block.step
+    found = function((lows[:, None, None] + inside).reshape(-1, 2))
+    tables = found.reshape(len(cells), PARTS + 1, PARTS + 1)
+    finer = [Block(own, low, block.step / PARTS) for own, low in zip(tables, lows, strict=True)]
+    drawn, _ = all_filled(finer, level, function)
+    spent = len(found)
+    for k, (cell, inner) in enumerate(zip(cells, finer, strict=True)):
+        own = (of == cell).all(axis=1)
+        some = points[own], values[own]
+        if depth and _on_wrong_side(drawn[k], some, level).sum() >= least:
+            drawn[k], more, lost = with_islands(
+                drawn[k], inner, function, some, level, budget - spent, depth - 1, least
+            )
+            spent, left = spent + more, left + lost
+    corners = np.concatenate([lows, lows + block.step], axis=1).tolist()
     boxes: list[shapely.Geometry] = [shapely.box(*corner) for corner in corners]
-    merged = shapely.union_all([shapely.difference(shape, shapely.union_all(boxes)), *drawn])
-    return merged, len(drawn) * (PARTS + 1) ** 2 + finer, left
-
-
-def _crowded(
-    grid: LevelGrid,
-    cell: NDArray[np.int64],
-    block: Block,
-    shape: shapely.Geometry,
-    level: float,
-    least: float,
-) -> LevelGrid | None:
-    """Return the grid of a cell's block if `least` seeds are on the wrong side of what it draws."""
-    points, values = grid.seeds
-    own = (grid.cells_of(points) == cell).all(axis=1)
-    if own.sum() < least:
-        return None
-    seeds = points[own], values[own]
-    if _on_wrong_side(shape, seeds, level).sum() < least:
-        return None
-    return LevelGrid.of(block, grid.function, seeds)
-
-
-def _wrong(shape: shapely.Geometry, grid: LevelGrid, level: float) -> NDArray[np.int64]:
-    """Return cells (C, 2) with seeds on the wrong side, those with most first."""
-    wrong = grid.seeds[0][_on_wrong_side(shape, grid.seeds, level)]
-    cells, counts = np.unique(grid.cells_of(wrong), axis=0, return_counts=True)
-    return cells[np.argsort(-counts, kind="stable")]
+    rest = shapely.difference(shape, shapely.union_all(boxes))
+    return shapely.union_all([rest, *drawn]), spent, left
 
 
 def _on_wrong_side(shape: shapely.Geometry, seeds: tuple[Array, Array], level: float) -> Flags:
@@ -237,35 +178,6 @@ def _on_wrong_side(shape: shapely.Geometry, seeds: tuple[Array, Array], level: f
     return inside != (values >= level)
 
 
-def _evaluated(grid: LevelGrid, cells: NDArray[np.int64]) -> Array:
-    """Return values (C, P + 1, P + 1) in cells (C, 2)."""
-    t = np.arange(PARTS + 1) / PARTS
-    inside = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1)
-    found: list[Array] = []
-    for start in range(0, len(cells), BLOCK):
-        at = cells[start : start + BLOCK, None, None] + inside
-        values = grid.function((grid.low + at * grid.step).reshape(-1, 2))
-        found.append(values.reshape(at.shape[:-1]))
-    return np.concatenate(found)
-
-
-def _beside(
-    cells: NDArray[np.int64], blocks: Array, level: float, done: NDArray[np.bool_]
-) -> NDArray[np.int64]:
-    """Return neighbours of cells on whose common side the grid is wrong."""
-    t = np.arange(PARTS + 1) / PARTS
-    moves = ((-1, 0), (1, 0), (0, -1), (0, 1))
-    sides = (blocks[:, 0], blocks[:, -1], blocks[:, :, 0], blocks[:, :, -1])
-    found: list[Array] = []
-    for move, side in zip(moves, sides, strict=True):
-        drawn = side[:, :1] + t * (side[:, -1:] - side[:, :1])
-        off = ((side >= level) != (drawn >= level)).sum(axis=1) >= MIN_WRONG_PARTS
-        to = cells + move
-        fits = (to >= 0).all(axis=1) & (to < done.shape).all(axis=1) & off
-        found.append(to[fits][~done[tuple(to[fits].T)]])
-    return np.unique(np.concatenate(found), axis=0)
-
-
 TOLERANCE = 1e-3
 """Difference between the function at a vertex and the level that is good enough."""
 
@@ -273,14 +185,6 @@ MAX_STEPS = 8
 """Steps in which a vertex is found, at most."""
 
 FAR_BELOW = 1e12
-
-
-class Block(NamedTuple):
-    """Values (n + 1, m + 1) at the nodes of even cells, their lowest corner and their sides (2,)."""
-
-    values: Array
-    low: Array
-    step: Array
 
 
 def filled(block: Block, level: float, function: Function) -> tuple[shapely.Geometry, float]:
@@ -300,11 +204,14 @@ def all_filled(
     """
     rings = [_rings(block.values, level) for block in blocks]
     pairs = zip(rings, blocks, strict=True)
-    sides = [_Sides.of(np.concatenate(own), block) for own, block in pairs if own]
-    moved, off = _on_level(sides, level, function)
-    found = iter(moved)
-    shapes = [_area(own, next(found)) if own else shapely.MultiPolygon() for own in rings]
-    return shapes, off
+    parts = [_sides(np.concatenate(own), block) for own, block in pairs if own]
+    if not parts:
+        return [shapely.MultiPolygon() for _ in blocks], 0.0
+    vertices, inside, a, b, fa, fb = (np.concatenate(column) for column in zip(*parts, strict=True))
+    vertices[inside], off = _on_level(a, b, fa, fb, level, function)
+    ends = np.cumsum([len(part[0]) for part in parts])[:-1]
+    moved = iter(np.split(vertices, ends))
+    return [_area(own, next(moved)) if own else shapely.MultiPolygon() for own in rings], off
 
 
 def _rings(values: Array, level: float) -> list[Array]:
@@ -323,38 +230,29 @@ def _area(rings: list[Array], vertices: Array) -> shapely.Geometry:
     return shapely.make_valid(shapely.build_area(shapely.GeometryCollection(closed)))
 
 
-class _Sides(NamedTuple):
-    """Vertices (V, 2), and of those inside, (R,), the ends (R, 2) of their sides and values there."""
+def _sides(at: Array, block: Block) -> tuple[Array, Flags, Array, Array, Array, Array]:
+    """Return a block's vertices (V, 2), which lie inside, and of these the sides of cells they lie on.
 
-    vertices: Array
-    inside: NDArray[np.int64]
-    ends: tuple[Array, Array]
-    values: tuple[Array, Array]
-
-    @classmethod
-    def of(cls, at: Array, block: Block) -> _Sides:
-        """Return the sides on which vertices (V, 2) of a block lie, in cells."""
-        most = np.array(block.values.shape) - 1
-        inside = ((at >= 0) & (at <= most)).all(axis=1)
-        at = np.clip(at, 0, most)
-        start, end = np.floor(at), np.ceil(at)
-        inside &= (start != end).any(axis=1)  # else it lies on a node
-        rows = np.flatnonzero(inside)
-        nodes = start[rows], end[rows]
-        a, b = (block.low + node * block.step for node in nodes)
-        fa, fb = (block.values[tuple(node.T.astype(int))] for node in nodes)
-        return cls(block.low + at * block.step, rows, (a, b), (fa, fb))
+    Vertices are given in cells. Sides are two ends (R, 2) each, and the values (R,) there.
+    """
+    most = np.array(block.values.shape) - 1
+    inside = ((at >= 0) & (at <= most)).all(axis=1)
+    at = np.clip(at, 0, most)
+    start, end = np.floor(at), np.ceil(at)
+    inside &= (start != end).any(axis=1)  # else it lies on a node
+    nodes = start[inside], end[inside]
+    a, b = (block.low + node * block.step for node in nodes)
+    fa, fb = (block.values[tuple(node.T.astype(int))] for node in nodes)
+    return block.low + at * block.step, inside, a, b, fa, fb
 
 
 def _on_level(
-    sides: Sequence[_Sides], level: float, function: Function
-) -> tuple[list[Array], float]:
-    """Return vertices (V, 2) by false position between nodes (the Illinois algorithm)."""
-    counts = [len(own.inside) for own in sides]
-    if not sum(counts):
-        return [own.vertices for own in sides], 0.0
-    a, b = (np.concatenate([own.ends[k] for own in sides]) for k in (0, 1))
-    fa, fb = (np.concatenate([own.values[k] for own in sides]) - level for k in (0, 1))
+    a: Array, b: Array, fa: Array, fb: Array, level: float, function: Function
+) -> tuple[Array, float]:
+    """Return points (R, 2) between ends by false position (the Illinois algorithm), and how far off."""
+    fa, fb = fa - level, fb - level
+    if not len(a):
+        return a, 0.0
     off, found = np.full(len(a), np.inf), a.copy()
     todo, last = np.arange(len(a)), np.zeros(len(a))
     for _ in range(MAX_STEPS):
@@ -375,7 +273,4 @@ def _on_level(
         todo = todo[abs(off[todo]) > TOLERANCE]
         if not len(todo):
             break
-    parts = np.split(found, np.cumsum(counts)[:-1])
-    for own, part in zip(sides, parts, strict=True):
-        own.vertices[own.inside] = part
-    return [own.vertices for own in sides], float(np.sqrt(np.mean(off**2)))
+    return found, float(np.sqrt(np.mean(off**2)))

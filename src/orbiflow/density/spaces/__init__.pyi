@@ -16,7 +16,6 @@ from .space import SPACES as SPACES
 from .space import Space as Space
 from .space import check_measure as check_measure
 from .space import make_space as make_space
-from .space import rectangle as rectangle
 from .space import row_count as row_count
 from .space import space_for as space_for
 from .unit_vectors import CubicOrientations as CubicOrientations

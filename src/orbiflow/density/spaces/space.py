@@ -274,7 +274,7 @@ class Space(ABC):
 
     def step_angle(self, step: float) -> float:
         """Return, in radians of the kernels, a step in the unit of the data."""
-        return 2 * math.pi * step / (self.volume ** (1 / self.dim) * max(self.sides))
+        return 2 * math.pi * step / (self.volume ** (1 / self.dim) * float(self.sides.max()))
 
     def midpoints(self, resolution: int) -> Tensor:
         """Return points (resolution^d, d) at which a mean is an integral over the space, float64.
@@ -315,14 +315,14 @@ class Space(ABC):
         return hash((type(self), self.dim))
 
     @cached_property
-    def sides(self) -> list[float]:
-        """The lengths of the frame's sides, all made shorter alike if it is oblique.
+    def sides(self) -> Tensor:
+        """The lengths (d,) of the frame's sides, the kernels' periods, shorter alike if it is oblique.
 
         Their product is the volume of its cell.
         """
         lengths: Array = np.linalg.norm(self.frame.group.lattice, axis=0)
         share = self.frame.group.cell_volume / float(np.prod(lengths))
-        return (lengths * share ** (1 / self.dim)).tolist()
+        return torch.tensor(lengths * share ** (1 / self.dim))
 
     def __repr__(self) -> str:
         options = ", ".join(f"{k}={v!r}" for k, v in self.settings().items())
@@ -389,11 +389,6 @@ def check_measure(measure: str, space: Space | None = None) -> None:
             f"{{measure}} square is for spaces that have one ({', '.join(SPACES)}), not for the "
             f"{space.name}: choose natural or uniform"
         )
-
-
-def rectangle(space: Space) -> Tensor:
-    """Return `space.sides`, the lengths (d,) of the kernels' periods, float64."""
-    return torch.tensor(space.sides, dtype=torch.float64)
 
 
 def row_count(count: int) -> str:

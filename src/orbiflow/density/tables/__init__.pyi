@@ -1,3 +1,4 @@
+from .cells import with_minus as with_minus
 from .files import append_columns as append_columns
 from .files import column_names as column_names
 from .files import read_table as read_table
@@ -8,7 +9,6 @@ from .guesses import code_notes as code_notes
 from .guesses import guess as guess
 from .guesses import seen_column as seen_column
 from .guesses import seen_columns as seen_columns
-from .numerals import with_minus as with_minus
 from .rows import CURE as CURE
 from .rows import TableRows as TableRows
 from .rows import angle_unit as angle_unit

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from orbiflow.density.tables import text
-from orbiflow.density.tables.layout import layout_of
-from orbiflow.density.tables.lines import is_utf16, split_line, text_lines
-from orbiflow.density.tables.numerals import Mark
+from orbiflow.density.tables.cells import Mark
+from orbiflow.density.tables.layout import is_utf16, layout_of, split_line, text_lines
 from orbiflow.density.tables.table import (
     BLOCK,
     MAX_COLUMNS,
@@ -247,7 +246,9 @@ def read_npy(path: Path, reading: Reading) -> Table:
             values = np.stack([part.astype(np.float64) for part in parts], axis=1)
     except (OSError, ValueError, TypeError, IndexError, OverflowError) as exc:
         raise _damaged(path, exc) from exc
-    return finished(path, values, None, tuple(names[i] for i in picked), reading, notes)
+    lines = np.arange(1, len(values) + 1, dtype=np.int64)
+    table = Table(values, tuple(names[i] for i in picked), lines, tuple(notes))
+    return finished(path, table, reading)
 
 
 def _npy_header(path: Path) -> tuple[tuple[int, ...], np.dtype]:
@@ -314,7 +315,9 @@ def read_parquet(path: Path, reading: Reading) -> Table:
         for batch in file.iter_batches(BLOCK, columns=list(names)):
             cast = [batch.column(name).cast("float64", safe=False) for name in names]
             blocks.append(np.stack([c.to_numpy(zero_copy_only=False) for c in cast], axis=1))
-    return finished(path, np.concatenate(blocks), None, names, reading, notes)
+    values = np.concatenate(blocks)
+    lines = np.arange(1, len(values) + 1, dtype=np.int64)
+    return finished(path, Table(values, names, lines, tuple(notes)), reading)
 
 
 def _damaged(path: Path, exc: Exception) -> InputFileError:

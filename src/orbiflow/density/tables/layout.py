@@ -1,10 +1,13 @@
-"""How a text file is laid out: its delimiter, its header, and how its cells are written."""
+"""How a text file is laid out: its lines, their delimiter, the header, and how cells are written."""
 
 from __future__ import annotations
 
+import codecs
+import csv
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,22 +22,107 @@ from orbiflow.density.data import (
 from orbiflow.density.tables import table as tables
 from orbiflow.density.tables.cells import (
     COMPASS,
+    OTHER,
+    Mark,
+    Marks,
     are_times,
     bare,
     is_like_angle,
     is_time,
+    kind_of,
+    marks_of,
+    plain,
     unit_of_cell,
     unit_of_cells,
+    with_minus,
 )
-from orbiflow.density.tables.lines import SEPARATOR, check_length, split_line, text_lines
-from orbiflow.density.tables.numerals import Mark, Marks, kind_of, marks_of, plain, with_minus
-from orbiflow.density.tables.table import TableError, check_count
+from orbiflow.density.tables.table import TableError, check_count, quote
 from orbiflow.errors import InputFileError, literal
+
+MAX_LINE = 2**20
+"""Characters of a line at most."""
+
+_UNDECODED = re.compile("[\udc80-\udcff]")
+# what spreadsheets write in a cell without a value, which begins no comment
+_SHEET_ERROR = re.compile(r"#(?:N/?A|NULL!|DIV/0!|VALUE!|REF!|NAME\?|NUM!)", re.IGNORECASE)
+_SPACED = re.compile(r'"[^"]*"(?=\s|$)|\S+')
+"""Cells between spaces, which may be quoted."""
+
+SEPARATOR = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
+"""Excel's first line, which says what separates cells."""
+
+
+def is_utf16(head: bytes) -> bool:
+    """Return whether a file's first bytes are the byte-order mark of UTF-16, and not of UTF-32."""
+    return head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) and head[2:4] != b"\0\0"
+
+
+def encoding_of(path: Path) -> str:
+    """Return the encoding of a text file: UTF-16 if it has its byte-order mark, or else UTF-8."""
+    with path.open("rb") as file:
+        return "utf-16" if is_utf16(file.read(4)) else "utf-8-sig"
+
+
+def text_lines(path: Path) -> Iterator[tuple[int, str, bool]]:
+    """Yield the number and text of every line that is not blank, and whether it is a comment.
+
+    Excel's first line "sep=;" counts as one.
+    """
+    try:
+        with path.open(encoding=encoding_of(path), errors="surrogateescape") as file:
+            for number, line in enumerate(iter(partial(file.readline, MAX_LINE), ""), start=1):
+                if not line.isascii() and _UNDECODED.search(line):
+                    raise InputFileError(
+                        f"{path}: line {number}: not UTF-8 text; save the file as UTF-8"
+                    )
+                if len(line) == MAX_LINE and line[-1] != "\n":
+                    raise InputFileError(
+                        f"{path}: line {number} is longer than {MAX_LINE} characters; this is not "
+                        "a table of numbers, or its line ends are lost"
+                    )
+                text = line.strip()
+                if text:
+                    is_comment = (text[0] == "#" and not _SHEET_ERROR.match(text)) or (
+                        number == 1 and SEPARATOR.fullmatch(line.rstrip("\r\n"))
+                    )
+                    yield number, line.rstrip("\n"), bool(is_comment)
+    except UnicodeError as exc:
+        raise InputFileError(f"{path}: not UTF-16 text, as it begins; save it as UTF-8") from exc
+    except OSError as exc:
+        raise InputFileError(f"{path}: cannot be read ({exc.strerror}); check it") from exc
+
+
+def split_line(path: Path, number: int, line: str, delimiter: str) -> list[str]:
+    """Return the cells of a line, with plain minus signs before numbers."""
+    line = with_minus(line)
+    if delimiter == " ":
+        return [cell.strip('"') for cell in _SPACED.findall(line)] if '"' in line else line.split()
+    if '"' not in line:
+        return line.split(delimiter)
+    try:
+        return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True, strict=True))
+    except csv.Error as exc:
+        raise InputFileError(
+            f"{path}: line {number}: {quote(line)} has a quotation mark without its pair ({exc}); "
+            "a quoted cell must end on its line"
+        ) from exc
+
+
+def check_length(
+    path: Path, number: int, row: list[str], first: int, expected: int, delimiter: str
+) -> None:
+    """Check that a row has as many cells as the first line."""
+    if (n := len(row)) != expected:
+        spaced = "; a name with a space in it counts as two" if delimiter == " " else ""
+        raise InputFileError(
+            f"{path}: line {number} has {n} cell{'s' * (n != 1)} and line {first} has {expected}; "
+            f"give every line as many{spaced}"
+        )
+
 
 SAMPLE = 100
 """Rows looked at to find the layout."""
 
-DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
 _LONE_COMMA = re.compile(r"[+-]?\d+(\.\d{3})*(,\d+)?")
 _LEADING_ZERO = re.compile(r",0\d")
 _WHOLE = re.compile(r"[+-]?\d+")
@@ -63,11 +151,6 @@ class Layout:
     spoiled: Mapping[str, str]
     first: int
     marks: Marks
-
-    @property
-    def is_header_comment(self) -> bool:
-        """Whether the header is a comment."""
-        return self.header_line is not None and self.header_line < self.first
 
     @property
     def decimal(self) -> Mark:
@@ -249,50 +332,48 @@ def _has_header(
 def _delimiter(lines: list[str]) -> str:
     r"""Return the mark that splits all lines into as many cells, or else splits most of them.
 
-    The semicolon is tried before the comma, which may be a decimal one. It also stands for none, where
-    a single column has decimal commas.
+    Marks that make numbers of all cells are first. The semicolon is tried before the comma, which may
+    be a decimal one. It also stands for none, where a single column has decimal commas or units.
 
     >>> _delimiter(["lat;lon", "1,5;2"]), _delimiter(["1, 2", "3, 4"]), _delimiter(["1 2", "3\t4"])
     (';', ',', ' ')
-    >>> _delimiter(["angle", "1.025,2", "998,7"])
-    ';'
+    >>> _delimiter(["angle", "1.025,2", "998,7"]), _delimiter(["wind", "70.3 deg", "1.2 deg"])
+    (';', ';')
+    >>> _delimiter(["1,5 2", "3 4,25"]), _delimiter(["Direction (deg)", "10", "20.5"])
+    (' ', ';')
     """
-    first, *rest = lines
-    lone = all(_LONE_COMMA.fullmatch(line.strip()) for line in rest)
-    if lone and any("," in line for line in rest):
-        headed = "," not in first
-        # no second column of whole numbers has zeros in front
-        if headed or (
-            _LONE_COMMA.fullmatch(first.strip()) and _LEADING_ZERO.search(",".join(lines))
-        ):
-            return ";"
-    if _is_lone(lines[len(lines) > 1 :]) or _is_lone_under(first, rest):
+    # no second column of whole numbers has zeros in front
+    lone = all(_LONE_COMMA.fullmatch(line.strip()) for line in lines)
+    if lone and _LEADING_ZERO.search(",".join(lines)):
         return ";"
-    if _is_spaced(lines[len(lines) > 1 :]):
-        return " "
-    counts = {mark: [line.count(mark) for line in lines] for mark in "\t;|,"}
-    for mark, count in counts.items():
-        if count[0] and len(set(count)) == 1:
-            return mark
-    for mark, count in counts.items():
-        if 2 * sum(map(bool, count)) > len(lines):
+    words = lines[0].split()
+    units = [UNITS.keys() >= {*words_of(word)} for word in words]
+    several = len(words) > 1 and all(map(is_angle_named, words)) and not any(units)
+    several = several or re.search(r"[;,|\t]", lines[0]) is not None
+    even: list[str] = []
+    for mark in "\t;|, \n":
+        rows = [line.split(None if mark == " " else mark) for line in lines]
+        if len(set(map(len, rows))) > 1 or (len(rows[0]) == 1) != (mark == "\n"):
+            continue
+        even.append(mark)
+        if all(map(_is_value, (cell for row in rows[1:] or rows for cell in row))):
+            if mark != "\n":
+                return mark
+            if not several:
+                return ";"
+    if even and even[0] in "\t;|,":
+        return even[0]
+    for mark in "\t;|,":
+        if 2 * sum(mark in line for line in lines) > len(lines):
             return mark
     return " " if any(len(line.split()) > 1 for line in lines) else ","
 
 
-def _is_lone_under(name: str, lines: list[str]) -> bool:
-    """Return whether lines are single numbers under a name with spaces.
-
-    >>> _is_lone_under("Direction (deg)", ["10", "20.5", "NA"]), _is_lone_under("phi psi", ["1", "2"])
-    (True, False)
-    """
-    words = name.split()
-    is_unit = [UNITS.keys() >= {*words_of(word)} for word in words]
-    are_names = all(map(is_angle_named, words)) and not any(is_unit)
-    if len(words) < 2 or are_names or re.search(r"[;,|\t]", name):
-        return False
-    kinds = [kind_of(line) for line in lines]
-    return "number" in kinds and "word" not in kinds
+def _is_value(cell: str) -> bool:
+    """Return whether a cell is a number, with a unit or without, missing, or a time."""
+    known = unit_of_cell(cell) is not None or is_time(cell)
+    bared = cell.strip().strip('"')
+    return known or any(kind_of(plain(bared, mark)) != "word" for mark in OTHER)
 
 
 def _has_row_names(rows: Sequence[Sequence[str]]) -> bool:
@@ -313,27 +394,3 @@ def _has_row_names(rows: Sequence[Sequence[str]]) -> bool:
     names = [row[0] for row in rest]
     are_words = all(kind_of(name) == "word" or _WHOLE.fullmatch(name) for name in names)
     return are_words and len(set(names)) == len(names)
-
-
-def _is_lone(lines: list[str]) -> bool:
-    """Return whether lines are cells of a single column, some with a space before a unit.
-
-    >>> _is_lone(["70.3 deg", "1.2"]), _is_lone(["1, 70.3 deg", "2, 1.2"]), _is_lone(["1 2"])
-    (True, False, False)
-    """
-    whole = [unit_of_cell(line) is not None or is_time(line) for line in lines]
-    others = [line for line, own in zip(lines, whole, strict=True) if not own]
-    return any(whole) and not any(re.search(r"[;\t\s]", line.strip()) for line in others)
-
-
-def _is_spaced(lines: list[str]) -> bool:
-    """Return whether all lines are numbers separated by spaces, some with decimal commas.
-
-    >>> _is_spaced(["1,5 2", "3 4,25"]), _is_spaced(["1, 2", "3, 4"])
-    (True, False)
-    """
-    cells = [line.split() for line in lines]
-    flat = [cell for row in cells for cell in row]
-    numbers = all(DECIMAL_COMMA.fullmatch(cell) or _WHOLE.fullmatch(cell) for cell in flat)
-    some = any("," in cell for cell in flat)
-    return numbers and some and all(len(row) > 1 for row in cells) and "\t" not in "".join(lines)

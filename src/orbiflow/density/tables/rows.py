@@ -32,8 +32,8 @@ from orbiflow.density.data import (
     strike_note,
     unit_named,
 )
-from orbiflow.density.tables.beside import check_hemispheres, tell_of_calm, tell_of_counts
 from orbiflow.density.tables.files import column_names, read_labels, read_table
+from orbiflow.density.tables.guesses import check_hemispheres, tell_of_calm, tell_of_counts
 from orbiflow.density.tables.settings import SPACES, RowSettings, SpaceSettings, TableSettings
 from orbiflow.density.tables.table import MissingCellsError, Table, TableError, find, listing, quote
 from orbiflow.errors import SettingError, literal
@@ -111,14 +111,13 @@ def read_rows(
     Strikes beside dips become directions of dip on this space or on `model_space`, that of a model.
     """
     rows = settings if isinstance(settings, RowSettings) else RowSettings(**settings.to_json())
-    weighing, counting = (
-        _one_column(path, column, rows) for column in (rows.weights, getattr(rows, "counts", None))
-    )
+    reader = _Reader(path, rows, tell, space, width)
+    weighing, counting = map(reader.column, (rows.weights, getattr(rows, "counts", None)))
     others = [name for own in (weighing, counting) if own is not None for name in own.columns]
     if group is not None and rows.columns is None:
         others.append(_name(path, group, rows.header))
     try:
-        table = _data_columns(path, space, width, others, rows, tell)
+        table = reader.data(others)
     except MissingCellsError as error:
         if rows is not settings:  # the command has no way to keep them
             raise
@@ -140,36 +139,90 @@ def read_rows(
     return _weighed(TableRows(path, table, None, group, rows.header), weighing, counting)
 
 
-def _how(rows: RowSettings) -> dict[str, Any]:
-    """Return how `read_table` finds numbers."""
-    return {"has_header": rows.header, "decimal": rows.decimal}
+@dataclass(frozen=True)
+class _Reader:
+    """A table, how it is read, who is told, and the space that takes it with its number of columns."""
 
+    path: Path
+    rows: RowSettings
+    tell: Sink
+    space: str | None
+    width: int | None
 
-def _one_column(path: Path, column: str | None, rows: RowSettings) -> Table | None:
-    """Return a column of weights or counts, if one was named."""
-    if column is None:
-        return None
-    return read_table(path, columns=[column], width=1, **_how(rows), **_drop(rows))
+    @property
+    def missing(self) -> dict[str, Any]:
+        """What `read_table` does with rows that lack a value."""
+        dropped = self.rows.drop_missing or self.rows.missing == "drop"
+        return {"drop_missing": dropped, "keep_missing": self.rows.missing == "marginalise"}
 
+    def read(self, columns: Sequence[str] | None, width: int | None, **missing: Any) -> Table:
+        """Read columns of numbers."""
+        how: dict[str, Any] = {"has_header": self.rows.header, "decimal": self.rows.decimal}
+        return read_table(self.path, columns=columns, width=width, **how, **missing)
 
-def _data_columns(
-    path: Path,
-    space: str | None,
-    width: int | None,
-    others: Sequence[str],
-    rows: RowSettings,
-    tell: Sink,
-) -> Table:
-    """Return the columns that were asked for, or else those that the space takes beside `others`."""
-    columns = rows.columns
-    if columns is None and space is not None:
-        columns = _columns_by_name(path, space, width, others, rows.header, tell)
-    if columns is not None:
-        columns = columns_in(column_names(path, has_header=rows.header) or (), columns)
-    if columns is None:
-        return _all_columns(path, space, None if others else width, others, rows, tell)
-    how: dict[str, Any] = {**_how(rows), **_drop(rows), "missing_codes": rows.missing_codes}
-    return read_table(path, columns=list(columns), width=None, **how)
+    def column(self, name: str | None) -> Table | None:
+        """Return a column of weights or counts, if one was named."""
+        return None if name is None else self.read([name], 1, **self.missing)
+
+    def data(self, others: Sequence[str]) -> Table:
+        """Return the columns that were asked for, or those that the space takes beside `others`."""
+        names, columns = self.names(), self.rows.columns
+        if columns is None and self.space is not None:
+            columns = self._by_name(self.space, [name for name in names if name not in others])
+        if columns is None:
+            return self._all(others)
+        codes = self.rows.missing_codes
+        return self.read(columns_in(names, columns), None, **self.missing, missing_codes=codes)
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of all columns, if they have names."""
+        return column_names(self.path, has_header=self.rows.header) or ()
+
+    def _all(self, others: Sequence[str]) -> Table:
+        """Return all columns of numbers but those that are no data; then look at what is missing."""
+        width = None if others else self.width
+        try:
+            table = self.read(None, width, keep_missing=True)
+        except TableError as error:
+            # one more than wanted may be an identifier
+            table = self.read(None, None, keep_missing=True) if width is not None else None
+            if table is None or len((table := self._data_alone(table)).columns) != width:
+                raise error
+        for other in others:
+            if other in table.columns and len(table.columns) > 1:
+                table = table.without(table.columns.index(other))
+        if width is None:
+            table = self._data_alone(table)
+        if self.space == "torus":
+            table = _angles_alone(table, self.tell)
+            _tell_of_names(table, self.tell)
+        return table.complete(self.path, **self.missing, missing_codes=self.rows.missing_codes)
+
+    def _by_name(self, space: str, names: Sequence[str]) -> tuple[str, ...] | None:
+        """Return the columns that a space takes, in its order, if names say which they are."""
+        try:
+            found = chosen_arrangement(space, names, self.width)
+        except SettingError as error:
+            raise TableError(literal(f"{self.path}: ") + error.template) from error
+        if found is None:
+            return None
+        chosen = tuple(names[k] for k in found.columns)
+        if chosen != tuple(names):
+            self.tell(Note(f"took {', '.join(chosen)} as {found.words}"))
+        return chosen
+
+    def _data_alone(self, table: Table) -> Table:
+        """Return a table without the columns that number the rows."""
+        for column in reversed(range(len(table.columns))):
+            name = table.columns[column]
+            # what the header leaves empty is called "column1" by now
+            given = name if table.header is None or name in table.header else ""
+            known = table.values[~np.isnan(table.values[:, column]), column]
+            if len(table.columns) > 1 and is_identifier(given, known):
+                table = table.without(column)
+                text = f"left out the column {name!r}, which numbers the rows; name all to keep it"
+                self.tell(Note(text))
+        return table
 
 
 def columns_in(names: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
@@ -195,62 +248,6 @@ def _with_dip_directions(table: Table, rows: RowSettings, space: str | None, tel
     values[:, strike] = dip_directions(values[:, strike])
     columns = (*table.columns[:strike], DIP_DIRECTION, *table.columns[strike + 1 :])
     return replace(table, values=values, columns=columns)
-
-
-def _drop(rows: RowSettings) -> dict[str, Any]:
-    """Return what `read_table` does with rows that lack a value."""
-    dropped = rows.drop_missing or rows.missing == "drop"
-    return {"drop_missing": dropped, "keep_missing": rows.missing == "marginalise"}
-
-
-def _all_columns(
-    path: Path,
-    space: str | None,
-    width: int | None,
-    others: Sequence[str],
-    rows: RowSettings,
-    tell: Sink,
-) -> Table:
-    """Return all columns of numbers but those that are no data; then look at what is missing."""
-    how: dict[str, Any] = {**_how(rows), "keep_missing": True}
-    try:
-        table = read_table(path, columns=None, width=width, **how)
-    except TableError as error:
-        # one more than wanted may be an identifier
-        table = read_table(path, columns=None, width=None, **how) if width is not None else None
-        if table is None or len((table := _without_identifiers(table, tell)).columns) != width:
-            raise error
-    for other in others:
-        if other in table.columns and len(table.columns) > 1:
-            table = table.without(table.columns.index(other))
-    if width is None:
-        table = _without_identifiers(table, tell)
-    if space == "torus":
-        table = _angles_alone(table, tell)
-        _tell_of_names(table, tell)
-    return table.complete(path, **_drop(rows), missing_codes=rows.missing_codes)
-
-
-def _columns_by_name(
-    path: Path,
-    space: str,
-    width: int | None,
-    others: Sequence[str],
-    header: bool | None,
-    tell: Sink,
-) -> tuple[str, ...] | None:
-    """Return the columns that a space takes, in its order, if the table's names say which they are."""
-    names = [name for name in column_names(path, has_header=header) or () if name not in others]
-    try:
-        found = chosen_arrangement(space, names, width)
-    except SettingError as error:
-        raise TableError(literal(f"{path}: ") + error.template) from error
-    if found is None:
-        return None
-    chosen = tuple(names[k] for k in found.columns)
-    if list(chosen) != names:
-        tell(Note(f"took {', '.join(chosen)} as {found.words}"))
-    return chosen
 
 
 def _angles_alone(table: Table, tell: Sink) -> Table:
@@ -308,18 +305,6 @@ def _check_width(
             )
             + "; choose with {columns}"
         )
-
-
-def _without_identifiers(table: Table, tell: Sink) -> Table:
-    for column in reversed(range(len(table.columns))):
-        name = table.columns[column]
-        # what the header leaves empty is called "column1" by now
-        given = name if table.header is None or name in table.header else ""
-        known = table.values[~np.isnan(table.values[:, column]), column]
-        if len(table.columns) > 1 and is_identifier(given, known):
-            table = table.without(column)
-            tell(Note(f"left out the column {name!r}, which numbers the rows; name all to keep it"))
-    return table
 
 
 def _weighed(rows: TableRows, weighing: Table | None, counting: Table | None) -> TableRows:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orbiflow.density.tables.numerals import Mark
+from orbiflow.density.tables.cells import Mark
 from orbiflow.errors import InputFileError, SettingError, literal
 
 MAX_COLUMNS = 10_000
@@ -51,9 +51,9 @@ class Table:
     values: NDArray[np.float64]
     columns: tuple[str, ...]
     lines: NDArray[np.int64]
-    notes: tuple[str, ...]
-    header: tuple[str, ...] | None
-    delimiter: str | None
+    notes: tuple[str, ...] = ()
+    header: tuple[str, ...] | None = None
+    delimiter: str | None = None
     decimal: str = "."
     header_line: int | None = None
     units: Mapping[str, str] = field(default_factory=dict[str, str])
@@ -77,25 +77,12 @@ class Table:
         dropped = self.dropped | frozenset(self.lines[~kept].tolist())
         return replace(self, values=self.values[kept], lines=self.lines[kept], dropped=dropped)
 
-    def complete(
-        self,
-        path: Path,
-        *,
-        drop_missing: bool = False,
-        keep_missing: bool = False,
-        missing_codes: Sequence[float] = (),
-    ) -> Table:
-        """Return the table as `read_table` does, once it is known which columns are wanted."""
-        reading = Reading(
-            None,
-            len(self.columns),
-            drop_missing=drop_missing,
-            keep_missing=keep_missing,
-            missing_codes=missing_codes,
-        )
-        names = ("header", "header_line", "delimiter", "decimal", "units")
-        layout = {name: getattr(self, name) for name in names}
-        return finished(path, self.values, self.lines, self.columns, reading, self.notes, layout)
+    def complete(self, path: Path, **missing: Any) -> Table:
+        """Return the table as `read_table` does, once it is known which columns are wanted.
+
+        `missing` says what is done with missing values, as there.
+        """
+        return finished(path, self, Reading(None, len(self.columns), **missing))
 
     def without(self, column: int) -> Table:
         """Return the table without a column, by its number from 0."""
@@ -189,26 +176,14 @@ def check_count(path: Path, n: int, most: int, what: str) -> None:
         )
 
 
-def finished(
-    path: Path,
-    values: NDArray[np.float64],
-    lines: NDArray[np.int64] | None,
-    columns: tuple[str, ...],
-    reading: Reading,
-    notes: Sequence[str],
-    layout: Mapping[str, Any] | None = None,
-) -> Table:
-    """Return the table of values (N, k), NaN for missing ones, without the rows to leave out.
-
-    Lines (N,) number its rows in text; in other files these are numbered from 1.
-    """
-    unit = "line" if layout is not None and layout["delimiter"] is not None else "row"
-    lines = np.arange(1, len(values) + 1, dtype=np.int64) if lines is None else lines
-    dropped, notes = frozenset[int](), list(notes)
+def finished(path: Path, table: Table, reading: Reading) -> Table:
+    """Return a table, in which missing values are NaN, without the rows to leave out."""
+    unit = "row" if table.delimiter is None else "line"
+    values, lines, dropped = table.values, table.lines, table.dropped
     if reading.missing_codes:
         values = np.where(np.isin(values, list(reading.missing_codes)), np.nan, values)
-    values, columns, left_out = _with_values(path, values, columns, reading)
-    notes += left_out
+    values, columns, left_out = _with_values(path, values, table.columns, reading)
+    notes = [*table.notes, *left_out]
     if reading.drop_missing and len(values):
         whole = ~np.isnan(values).any(axis=1)
         if not whole.any():
@@ -232,8 +207,8 @@ def finished(
             )
             + "; fill them in or leave their rows out with {drop_missing}"
         )
-    named: dict[str, Any] = {"header": None, "delimiter": None, **(layout or {})}
-    return Table(values, columns, lines, tuple(notes), dropped=dropped, **named)
+    own: dict[str, Any] = {"values": values, "columns": columns, "lines": lines}
+    return replace(table, **own, notes=tuple(notes), dropped=dropped)
 
 
 def _with_values(

@@ -18,10 +18,17 @@ from pathlib import Path
 import numpy as np
 
 from orbiflow.density.tables import table as tables
-from orbiflow.density.tables.cells import COMPASS, bare, is_time, unit_of_cell
-from orbiflow.density.tables.layout import Layout, layout_of
-from orbiflow.density.tables.lines import check_length, split_line, text_lines
-from orbiflow.density.tables.numerals import OTHER, Marks, kind_of, plain
+from orbiflow.density.tables.cells import (
+    COMPASS,
+    OTHER,
+    Marks,
+    bare,
+    is_time,
+    kind_of,
+    plain,
+    unit_of_cell,
+)
+from orbiflow.density.tables.layout import Layout, check_length, layout_of, split_line, text_lines
 from orbiflow.density.tables.table import (
     BLOCK,
     Reading,
@@ -42,7 +49,9 @@ def read_text(path: Path, reading: Reading) -> Table:
     """Read a table from a text file."""
     layout = layout_of(path, reading.columns, reading.has_header, reading.decimal)
     picked, notes = tables.choose(path, layout.names, layout.numeric, reading)
-    _refuse_doubtful(path, layout, picked)
+    for column, cell in layout.marks.doubtful:
+        if column in picked:
+            raise _two_ways(path, layout.names[column], cell)
     names = tuple(layout.names[i] for i in picked)
     numbers = _Numbers(path, names, tuple(layout.units[i] for i in picked), layout.marks)
     values, lines, comments = array("d"), array("q"), 0
@@ -62,7 +71,8 @@ def read_text(path: Path, reading: Reading) -> Table:
     values.extend(numbers.of(cells, lines))
     check_count(path, len(lines), reading.max_rows, "rows")
     rows, at = np.frombuffer(values).reshape(-1, len(picked)), np.frombuffer(lines, dtype=np.int64)
-    table = tables.finished(path, rows, at, names, reading, notes, layout.of_table())
+    whole = Table(rows, names, at, tuple(notes), **layout.of_table())
+    table = tables.finished(path, whole, reading)
     return replace(table, notes=(*table.notes, *_notes(layout, reading, names, comments)))
 
 
@@ -85,18 +95,12 @@ def _notes(layout: Layout, reading: Reading, names: Sequence[str], comments: int
             for name, cell in layout.spoiled.items()
         ]
     if layout.header is not None:
-        where = "comment line" if layout.is_header_comment else "line"
+        is_comment = layout.header_line is not None and layout.header_line < layout.first
+        where = "comment line" if is_comment else "line"
         notes.append(f"took {where} {layout.header_line} as the header: {listing(layout.header)}")
     if comments:
         notes.append(f"skipped {comments} comment line{'s' * (comments > 1)}")
     return notes
-
-
-def _refuse_doubtful(path: Path, layout: Layout, picked: Sequence[int]) -> None:
-    """Refuse columns whose commas may be before decimals or thousands."""
-    for column, cell in layout.marks.doubtful:
-        if column in picked:
-            raise _two_ways(path, layout.names[column], cell)
 
 
 def _two_ways(path: Path, name: str, cell: str) -> TableError:

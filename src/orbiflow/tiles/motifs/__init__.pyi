@@ -1,9 +1,11 @@
-from .drawings import Over as Over
-from .drawings import carried_raster as carried_raster
-from .drawings import drawn_motif as drawn_motif
-from .drawings import paint_motif as paint_motif
-from .drawings import picture_paint as picture_paint
-from .drawings import read_over as read_over
+from .carried import Over as Over
+from .carried import Picture as Picture
+from .carried import carried_raster as carried_raster
+from .carried import drawn_motif as drawn_motif
+from .carried import paint_motif as paint_motif
+from .carried import picture_paint as picture_paint
+from .carried import read_over as read_over
+from .carried import with_map as with_map
 from .raster import NOWHERE as NOWHERE
 from .raster import Grid as Grid
 from .raster import Paint as Paint
@@ -13,5 +15,3 @@ from .raster import rgb_of as rgb_of
 from .raster import ring_sides as ring_sides
 from .raster import runs as runs
 from .settings import MotifSettings as MotifSettings
-from .source import Picture as Picture
-from .source import with_map as with_map

@@ -145,6 +145,12 @@ def runs(sides: Sides, top: int, rows: int, width: int) -> Runs:
     return Runs(label, row, begin, stop - begin)
 
 
+def inside_ring(ring: Array, rows: int, width: int) -> NDArray[np.bool_]:
+    """Return which samples (rows, width) lie in a ring (N, 2), in samples."""
+    found = runs(polygon_sides(ring), 0, rows, width)
+    return found.spread(found.label >= 0).reshape(rows, width)
+
+
 MARGIN = 3  # width in texels of the margin around the tile
 MOST_TEXELS = 20_000_000  # greatest number of texels in the rasters of all colours together
 # The neighbours of a texel, those that share a side last, for the last one counts
@@ -175,8 +181,7 @@ class Grid:
 
     def inside(self, ring: Array) -> NDArray[np.bool_]:
         """Return which texels (height, width) have their middle in the ring."""
-        found = runs(polygon_sides(self.texels(ring)), 0, self.height, self.width)
-        return found.spread(found.label >= 0).reshape(self.height, self.width)
+        return inside_ring(self.texels(ring), self.height, self.width)
 
 
 class Paint:

@@ -206,10 +206,7 @@ def _seen(
     page: Page,
 ) -> Copies:
     """Return the copies that come into the picture at any time, those nearest to its middle first."""
-    boxes, middle = (
-        np.array([_window(page, linear(look)) for look in LOOKS]),
-        np.array(page.size) / 2,
-    )
+    boxes = np.array([_window(page, linear(look)) for look in LOOKS])
     reach = own.radius
     low, high = center + boxes[:, :2].min(axis=0) - reach, center + boxes[:, 2:].max(axis=0) + reach
     copies = copies_meeting(own, (*low.tolist(), *high.tolist()))
@@ -222,7 +219,7 @@ def _seen(
         low, high = rings.min(axis=1) - room, rings.max(axis=1) + room
         seen |= ((low <= page.size) & (high >= 0)).all(axis=1)
     copies = copies.select(seen)
-    far = np.linalg.norm(places(1.0, copies).offset - middle, axis=1)
+    far = np.linalg.norm(places(1.0, copies).offset - np.array(page.size) / 2, axis=1)
     return copies.select(np.argsort(far, kind="stable"))
 
 
@@ -279,13 +276,6 @@ Share = TypeVar("Share", float, Array)
 REST, MOVE, SHOW = 0.07, 0.37, 0.19
 
 
-class Frame(NamedTuple):
-    """A picture of a loop: its `progress`, 0 to 1, and the `seconds` for which it is seen."""
-
-    progress: float
-    seconds: float
-
-
 def eased(share: Share) -> Share:
     """Return a share of a way, 0 to 1, slow at both ends.
 
@@ -295,13 +285,12 @@ def eased(share: Share) -> Share:
     return share * share * (3 - 2 * share)
 
 
-def frames(seconds: float, fps: float) -> list[Frame]:
-    """Return the pictures of a loop, there and back by the same; equal ones in a row are one."""
+def frames(seconds: float, fps: float) -> list[tuple[float, float]]:
+    """Return the progress of each picture of a loop, and the seconds for which it is seen.
+
+    The loop goes there and back by the same pictures; equal ones in a row are one.
+    """
     way = max(2, round(MOVE * seconds * fps))
-    there = [Frame(eased(k / way), MOVE * seconds / way) for k in range(1, way)]
-    return [
-        Frame(0.0, REST * seconds + MOVE * seconds / way),
-        *there,
-        Frame(1.0, SHOW * seconds + MOVE * seconds / way),
-        *reversed(there),
-    ]
+    step = MOVE * seconds / way
+    there = [(eased(k / way), step) for k in range(1, way)]
+    return [(0.0, REST * seconds + step), *there, (1.0, SHOW * seconds + step), *reversed(there)]

@@ -19,17 +19,7 @@ from PIL import Image
 from orbiflow.arrays import Array
 from orbiflow.drawing import Palette, limited, palette
 from orbiflow.errors import OrbiflowError
-from orbiflow.tiles.motion.kinds import (
-    MOVE,
-    REST,
-    SHOW,
-    Frame,
-    Motion,
-    Places,
-    eased,
-    frames,
-    motion,
-)
+from orbiflow.tiles.motion.kinds import MOVE, REST, SHOW, Motion, Places, eased, frames, motion
 from orbiflow.tiles.motion.settings import AnimationSettings
 from orbiflow.tiles.page import Curve, Layer, Part, Scene, Style, rectangle
 from orbiflow.tiles.result_file import as_tile
@@ -79,7 +69,7 @@ def write_gif(motion: Motion, settings: AnimationSettings, told: ProgressCall) -
     # few mixed colours, each of which costs bytes in every frame
     shown = list(_shown(motion, chosen, loop, told, lambda image: limited(image, colours, 3)))
     # a GIF counts in hundredths of a second
-    ends = [round(100 * end) for end in accumulate(frame.seconds for frame in loop)]
+    ends = [round(100 * end) for end in accumulate(seconds for _, seconds in loop)]
     lasting = np.maximum(np.diff([0, *ends]), 2) * 10
     buffer = io.BytesIO()
     how = {"duration": lasting.tolist(), "loop": 0, "disposal": 1, "optimize": False}
@@ -111,8 +101,8 @@ def write_mp4(motion: Motion, settings: AnimationSettings, told: ProgressCall) -
         command += ["-movflags", "+faststart", str(out)]
         shown = _shown(motion, chosen, loop, told, lambda image: image)
         content = b"".join(
-            image.tobytes() * max(1, round(frame.seconds * fps))
-            for image, frame in zip(shown, loop, strict=True)
+            image.tobytes() * max(1, round(seconds * fps))
+            for image, (_, seconds) in zip(shown, loop, strict=True)
         )
         done = subprocess.run(command, input=content, capture_output=True, check=False)
         if done.returncode or not out.is_file():
@@ -124,18 +114,18 @@ def write_mp4(motion: Motion, settings: AnimationSettings, told: ProgressCall) -
 def _shown(
     motion: Motion,
     chosen: Palette,
-    loop: list[Frame],
+    loop: list[tuple[float, float]],
     told: ProgressCall,
     made: Callable[[Image.Image], Image.Image],
 ) -> Iterator[Image.Image]:
     """Yield the pictures of a loop, each of which is drawn once."""
     known: dict[float, Image.Image] = {}
-    count = len({frame.progress for frame in loop})
-    for frame in loop:
-        if frame.progress not in known:
-            known[frame.progress] = made(scene_image(frame_scene(motion, chosen, frame.progress)))
+    count = len(dict(loop))
+    for progress, _ in loop:
+        if progress not in known:
+            known[progress] = made(scene_image(frame_scene(motion, chosen, progress)))
             told(len(known) / count)
-        yield known[frame.progress]
+        yield known[progress]
 
 
 _EASE, _EVEN = "0.42 0 0.58 1", "0 0 1 1"

@@ -52,8 +52,7 @@ def write_tile_folder(
 ) -> list[Path]:
     """Write the `TILE_FILES` of a tile into its folder, and the `FIGURE_FILES`, which take much longer.
 
-    Raises:
-        OutputError: If a file cannot be written.
+    Raises `OutputError` if a file cannot be written.
     """
     make_folder(folder)
     tile, colours, y_down = result.tile, colours or colouring(result.tile), target.y_down

@@ -47,33 +47,26 @@ def triangulate(ring: Array, spacing: float | None = None) -> Mesh:
     n = len(ring)
     spacing = spacing or polygon.exterior.length / n
     inside = _inside(polygon, spacing)
-    ends = np.stack([np.arange(n), (np.arange(n) + 1) % n], axis=1)
-    sides, low, high = np.arange(n), np.zeros(n), np.ones(n)
-    extra: Array = np.zeros((0, 2))
-    own_side: Integers = np.zeros(0, dtype=np.int64)
-    own_share: Array = np.zeros(0)
+    number, after = np.arange(n), (np.arange(n) + 1) % n
+    # pieces of sides: the indices of their ends, the side, and between which shares of its length
+    pieces = np.stack([number, after, number, np.zeros(n), np.ones(n)], axis=1)
+    extra, placed = np.zeros((0, 2)), np.zeros((0, 2))  # points on sides; their side and share
     for _ in range(MAX_HALVINGS):
         points = np.concatenate([ring, extra, inside])
         triangles = Delaunay(points).simplices.astype(np.int64)
-        missing = ~_are_sides(ends, triangles, len(points))
+        missing = ~_are_sides(pieces[:, :2].astype(np.int64), triangles, len(points))
         if not missing.any():
-            return _divided(_kept(Mesh(points, triangles, own_side, own_share, n), polygon))
-        middle = (low + high)[missing] / 2
+            sides = placed[:, 0].astype(np.int64)
+            return _divided(_kept(Mesh(points, triangles, sides, placed[:, 1], n), polygon))
+        start, end, side, low, high = pieces[missing].T
+        middle, at = (low + high) / 2, side.astype(np.int64)
         fresh = n + len(extra) + np.arange(len(middle))
-        at, after = ring[sides[missing]], ring[(sides[missing] + 1) % n]
-        extra = np.concatenate([extra, at + middle[:, None] * (after - at)])
-        own_side = np.concatenate([own_side, sides[missing]])
-        own_share = np.concatenate([own_share, middle])
+        extra = np.concatenate([extra, ring[at] + middle[:, None] * (ring[after[at]] - ring[at])])
+        placed = np.concatenate([placed, np.stack([side, middle], axis=1)])
         near = shapely.distance(shapely.points(inside), shapely.MultiPoint(extra))
         inside = inside[near > spacing / 4]
-        old = ends[missing]
-        halves = np.concatenate([np.stack([old[:, 0], fresh], 1), np.stack([fresh, old[:, 1]], 1)])
-        ends = np.concatenate([ends[~missing], halves])
-        low, high = (
-            np.concatenate([low[~missing], low[missing], middle]),
-            np.concatenate([high[~missing], middle, high[missing]]),
-        )
-        sides = np.concatenate([sides[~missing], sides[missing], sides[missing]])
+        halves = [(start, fresh, side, low, middle), (fresh, end, side, middle, high)]
+        pieces = np.concatenate([pieces[~missing], *(np.stack(half, axis=1) for half in halves)])
     raise OrbiflowError(
         "the silhouette is too thin somewhere to be triangulated: simplify or thicken it there"
     )

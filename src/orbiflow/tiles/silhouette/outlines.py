@@ -24,6 +24,7 @@ from orbiflow.tiles.geometry import (
 
 MAX_VERTICES = 100_000
 MAX_COORDINATE = 1e12
+MAX_HALVINGS = 10  # of a tolerance that makes an outline cross itself
 # Below these a shape has no digits left: relative to its distance from the origin, and absolute.
 MIN_RELATIVE_SIZE = 1e-9
 MIN_SIZE = 1e-100
@@ -129,6 +130,20 @@ def simplified(polygon: Polygon, tolerance: float) -> Polygon:
     """Return `polygon` with fewer vertices, moved by at most `tolerance`; may be invalid."""
     parts = polygons_in(polygon.simplify(tolerance))
     return max(parts, key=lambda part: part.area, default=Polygon())
+
+
+def thinned(polygon: Polygon, tolerance: float, most: int = MAX_VERTICES) -> tuple[Polygon, float]:
+    """Return a polygon with at most so many vertices, still simple, and how far it may have moved."""
+    simple = simplified(polygon, tolerance)
+    while len(simple.exterior.coords) > most:
+        tolerance *= 1.5
+        simple = simplified(polygon, tolerance)
+    for _ in range(MAX_HALVINGS):
+        if simple.is_valid and simple.area > 0:
+            return simple, tolerance
+        tolerance /= 2
+        simple = simplified(polygon, tolerance)
+    return polygon, 0.0
 
 
 def is_thread(shape: Polygon, length: float) -> bool:

@@ -58,6 +58,11 @@ class Covered(NamedTuple):
             found[..., 1] = 1 - found[..., 1]
         return found
 
+    def at(self, shares: Array) -> Array:
+        """Return the points (..., 2) that have these `shares`."""
+        own = shares if self.y_down else (shares - (0, 1)) * (1, -1)
+        return own * (self.high - self.low) + self.low
+
     def require_aspect(self, path: Path, what: str, size: Sequence[float]) -> None:
         """Refuse a picture, drawing or mask of this width and height unless its aspect is the same."""
         (width, height), (wide, high) = size, self.high - self.low

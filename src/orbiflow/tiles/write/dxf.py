@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Iterator
 from typing import Any
 
-from orbiflow.tiles.page import Layer, Scene, clipped, flattened
+from orbiflow.tiles.page import Curve, Layer, Scene, clipped, flattened
 from orbiflow.tiles.write.formats import TOLERANCE
 
 
@@ -36,8 +37,9 @@ def write_dxf(scene: Scene, *, tolerance: float = TOLERANCE) -> str:
         entry = document.layers.add(layer.name, linetype="CONTINUOUS")
         colour = layer.style.stroke or layer.style.fill or "#000000"
         entry.color, entry.rgb = ACI.get(colour, 7), RGB.from_hex(colour)
-        for points, closed in _polylines(scene, layer, tolerance):
-            space.add_lwpolyline(points, close=closed, dxfattribs={"layer": layer.name})
+        for part in _parts(scene, layer, tolerance):
+            points = [(x, scene.height - y) for x, y in part.flattened(tolerance).tolist()]
+            space.add_lwpolyline(points, close=part.closed, dxfattribs={"layer": layer.name})
     text = io.StringIO()
     document.write(text)
     return text.getvalue()
@@ -47,15 +49,10 @@ ACI = {"#ff0000": 1, "#0000ff": 5}
 """AutoCAD's numbers of colours, for readers without true colours; 7 is black on a light ground."""
 
 
-def _polylines(
-    scene: Scene, layer: Layer, tolerance: float
-) -> list[tuple[list[tuple[float, float]], bool]]:
-    found = []
+def _parts(scene: Scene, layer: Layer, tolerance: float) -> Iterator[Curve]:
+    """Yield the curves of a layer, cut by the page where the layer is."""
     for curve in scene.curves(layer):
-        kept = [curve]
         if layer.clipped:
-            kept = clipped(curve, scene.clip, tolerance, filled=curve.closed)
-        for part in kept:
-            points = part.flattened(tolerance)
-            found.append(([(x, scene.height - y) for x, y in points.tolist()], part.closed))
-    return found
+            yield from clipped(curve, scene.clip, tolerance, filled=curve.closed)
+        else:
+            yield curve

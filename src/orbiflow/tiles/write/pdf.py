@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from PIL import Image
 
-from orbiflow.tiles.page import Curve, Layer, Part, Raster, Scene, Style, Uses, Words, flattened
+from orbiflow.tiles.page import Curve, Layer, Part, Raster, Scene, Style, Words, flattened
 
 if TYPE_CHECKING:
     from reportlab.pdfgen.canvas import Canvas
@@ -75,12 +75,8 @@ class _Page:
             elif isinstance(item, Words):
                 self.words(item)
             else:
-                self.copies(item, scene.symbols[item.symbol], layer.style)
-
-    def copies(self, uses: Uses, symbol: Curve, style: Style) -> None:
-        """Draw copies of a curve."""
-        for curve in uses.curves(symbol):
-            self.curves([curve], style)
+                for curve in item.curves(scene.symbols[item.symbol]):
+                    self.curves([curve], layer.style)
 
     def curves(self, curves: Iterable[Curve], style: Style, opacity: float = 1.0) -> None:
         """Draw curves, filled together."""

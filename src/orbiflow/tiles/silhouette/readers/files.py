@@ -10,7 +10,7 @@ from shapely import Polygon
 from orbiflow.arguments import as_path
 from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.geometry import polygons_in
-from orbiflow.tiles.silhouette.outlines import is_thread, outer_outline, outer_ring, simplified
+from orbiflow.tiles.silhouette.outlines import is_thread, outer_outline, outer_ring, thinned
 from orbiflow.tiles.silhouette.readers.image_files import image_kind
 from orbiflow.tiles.silhouette.readers.pictures import read_image
 from orbiflow.tiles.silhouette.readers.point_lists import read_points
@@ -109,10 +109,8 @@ def _bridged(reading: Reading) -> Reading:
         f"up to {MAX_GAP_SHARE:.0%} of the drawing's size are closed"
     )
     kept = [other for other in reading.notes if not other.startswith("kept the largest")]
-    thin = simplified(body, MAX_GAP_SHARE * size / 50)
-    return replace(
-        reading, outline=outer_ring(thin if thin.is_valid else body), notes=(*kept, note)
-    )
+    thin, _ = thinned(body, MAX_GAP_SHARE * size / 50)
+    return replace(reading, outline=outer_ring(thin), notes=(*kept, note))
 
 
 def _kind(path: Source, head: bytes) -> str:

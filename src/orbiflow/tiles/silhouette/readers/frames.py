@@ -17,10 +17,8 @@ MIN_FRAME_SHARE = 0.5  # of the picture's: a frame's
 MIN_DRAWN_SHARE = 0.25  # of a frame's sides: what is drawn inside it
 MIN_CARD_COVERAGE = 0.94  # of its box: what a card fills, round corners apart
 MIN_CARD_SHARE = 0.85  # of the page's: a card's, which lies on another ground
-MAX_CARD_DISTANCE, MIN_DRAWN_DISTANCE = (
-    25,
-    75,
-)  # of 255: a card's colours are nearer, its drawing's farther
+# of 255: a card's colours are nearer, its drawing's farther
+MAX_CARD_DISTANCE, MIN_DRAWN_DISTANCE = 25, 75
 MAX_BETWEEN_SHARE = 0.05  # of a card's pixels: those between its colour and the drawing's
 SEARCH_SIDE_PIXELS = 500  # pixels a side, in which a card is looked for
 CARD_NOTE = "left out the card that the drawing lies on; if it is the shape, remove what lies on it"
@@ -41,7 +39,9 @@ def without_frame(channel: Array, above: _Mask) -> tuple[Array, list[str]]:
     frame = min(found, key=lambda frame: np.prod([s.stop - s.start for s in frame.box]))
     line = ndimage.binary_dilation(frame.line, _TOGETHER)  # with its own blurred edges
     if frame.has_marks:
-        line = line | ~_within(frame.box, line.shape)
+        beyond = np.ones(line.shape, bool)
+        beyond[frame.box] = False
+        line = line | beyond
     drawn = above if (above & frame.line).any() else ~above
     kept = np.where(line, np.median(channel[~drawn]), channel)
     pixels = f"{frame.width} pixel{'s' * (frame.width > 1)}"
@@ -56,12 +56,6 @@ class _Frame(NamedTuple):
     width: int
     line: _Mask
     has_marks: bool
-
-
-def _within(box: tuple[slice, ...], shape: tuple[int, ...]) -> _Mask:
-    inside = np.zeros(shape, bool)
-    inside[box] = True
-    return inside
 
 
 def _frames(part: _Mask) -> Iterator[_Frame]:
@@ -152,13 +146,8 @@ def _margin(rgb: NDArray[np.int_]) -> _Mask:
     labels = np.asarray(ndimage.label(alike)[0])
     at_border = np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))
     margin = np.isin(labels, at_border[at_border > 0])
-    width = int(MAX_LINE_SHARE * min(margin.shape))
-    edges = (
-        margin[: width + 1],
-        margin[-width - 1 :],
-        margin[:, : width + 1],
-        margin[:, -width - 1 :],
-    )
+    width = int(MAX_LINE_SHARE * min(margin.shape)) + 1
+    edges = (margin[:width], margin[-width:], margin[:, :width], margin[:, -width:])
     return margin if all(edge.all() for edge in edges) else np.zeros_like(margin)
 
 
@@ -178,15 +167,14 @@ def _card_colour(rgb: NDArray[np.int_], opaque: _Mask) -> tuple[int, ...] | None
     apart = abs(rgb - colour).max(axis=2)
     alike, other = apart[box] <= MAX_CARD_DISTANCE, apart[box] > MIN_DRAWN_DISTANCE
     is_parted = (alike | other)[inside].mean() > 1 - MAX_BETWEEN_SHARE
-    if is_parted and alike[rim].mean() > 0.9 and is_drawing(other & inside):
-        return tuple(colour.tolist())
-    return None
+    is_card = is_parted and alike[rim].mean() > 0.9 and _is_drawing(other & inside)
+    return tuple(colour.tolist()) if is_card else None
 
 
-def is_drawing(drawn: _Mask) -> bool:
+def _is_drawing(drawn: _Mask) -> bool:
     """Return whether the largest part of what is drawn on a card is neither a speck nor a rectangle."""
     labels = np.asarray(ndimage.label(drawn, _TOGETHER)[0])
-    if not labels.any():
+    if not drawn.any():
         return False
     largest = int(np.bincount(labels.ravel())[1:].argmax()) + 1
     box = ndimage.find_objects(labels)[largest - 1]

@@ -26,14 +26,8 @@ FULL_SCALES = (255.0, 1023.0, 4095.0, 16383.0, 65535.0)  # of 8, 10, 12, 14 and 
 STRIP_ROWS = 256  # rows of the shrunk image that are made at once
 MIN_COLOURS = 10  # of 255: a palette whose colours differ less shows nothing
 _STARTS = {
-    **{
-        b"\x89PNG\r\n\x1a\n": "PNG",
-        b"\xff\xd8\xff": "JPEG",
-        b"BM": "BMP",
-        b"GIF87a": "GIF",
-        b"GIF89a": "GIF",
-    },
-    **{b"II*\0": "TIFF", b"MM\0*": "big-endian TIFF"},
+    **{b"\x89PNG\r\n\x1a\n": "PNG", b"\xff\xd8\xff": "JPEG", b"BM": "BMP"},
+    **{b"GIF87a": "GIF", b"GIF89a": "GIF", b"II*\0": "TIFF", b"MM\0*": "big-endian TIFF"},
 }
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF")
 # What Pillow raises on a damaged file depends on the format.
@@ -41,10 +35,8 @@ _DAMAGED = (
     *(OSError, SyntaxError, ValueError, EOFError, KeyError, IndexError, TypeError),
     *(OverflowError, MemoryError, ArithmeticError, Image.DecompressionBombError),
 )
-_PNG_SCALES = {
-    "L;2": 85,
-    "L;4": 17,
-}  # by which Pillow scales these levels, but not the transparent one
+# by which Pillow scales these levels, but not the transparent one
+_PNG_SCALES = {"L;2": 85, "L;4": 17}
 # by EXIF orientation
 _TURNS = {
     2: Image.Transpose.FLIP_LEFT_RIGHT,
@@ -98,12 +90,7 @@ def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
     With `enough` pixels a side, a JPEG may be decoded to fewer than it has, which is faster.
     Raises `InputFileError` for one that is too large, before a pixel of it is decoded, or damaged.
     """
-    n_bytes = check_file(path)
-    if n_bytes > MAX_BYTES:
-        raise InputFileError(
-            f"{path}: {n_bytes / 2**20:.0f} MB, images over {MAX_BYTES / 2**20:.0f} MB are not "
-            "read; downscale it"
-        )
+    check_file(path)
     try:
         with warnings.catch_warnings():
             # Pillow warns of damaged metadata and of sizes that are refused here anyway.
@@ -115,10 +102,16 @@ def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
     except Image.DecompressionBombError as exc:
         n_pixels = max(map(int, re.findall(r"\d+", str(exc))), default=0)
         raise InputFileError(_too_large(path, f"{n_pixels / 1e6:.0f} megapixels")) from exc
-    except PermissionError as exc:
-        raise InputFileError(f"{path}: cannot be read; check its permissions") from exc
     except UnidentifiedImageError as exc:
-        raise InputFileError(f"{path}: {_unidentified(path)}") from exc
+        kind = image_kind(read_head(path, 12))
+        named = f"{kind} image".strip()
+        why = f"the {named} is damaged or cut short, or it is none; give a PNG, JPEG or WebP image"
+        if "TIFF" in kind:
+            why = (
+                "this kind of TIFF image (such as colours of floating-point numbers) is not read, or "
+                "it is damaged; save it as PNG"
+            )
+        raise InputFileError(f"{path}: {why}") from exc
     except _DAMAGED as exc:
         kind = image_kind(read_head(path, 12))
         raise InputFileError(
@@ -129,17 +122,6 @@ def decoded_image(path: Source, *, enough: int | None = None) -> DecodedImage:
 def _stream(path: Source) -> io.BytesIO:
     """Return a file's bytes: some TIFFs that are turned Pillow misreads where it is given a path."""
     return io.BytesIO(read_bytes(path, MAX_BYTES))
-
-
-def _unidentified(path: Source) -> str:
-    kind = image_kind(read_head(path, 12))
-    if "TIFF" in kind:
-        return (
-            "this kind of TIFF image (such as colours of floating-point numbers) is not read, or it is "
-            "damaged; save it as PNG"
-        )
-    named = f"{kind} image".strip()
-    return f"the {named} is damaged or cut short, or it is none; give a PNG, JPEG or WebP image"
 
 
 def check_size(path: Source, size: tuple[int, int], most: int = MAX_PIXELS_READ) -> None:
@@ -166,11 +148,8 @@ def _first_shown(path: Source, file: Any, enough: int | None) -> DecodedImage:
         pixels += file.width * file.height
         if first is not None and pixels > MAX_PIXELS_READ:
             break
-        which = (
-            "the first frame"
-            if number == 0
-            else f"frame {number + 1}, the first that shows anything,"
-        )
+        other = f"frame {number + 1}, the first that shows anything,"
+        which = other if number else "the first frame"
         notes = [f"took {which} of {n_frames}"] * (n_frames > 1)
         found = _frame(path, file, enough, notes)
         if n_frames == 1 or _shows_anything(found.image):
@@ -210,13 +189,12 @@ def _frame(path: Source, file: Any, enough: int | None, notes: list[str]) -> Dec
     turn = None if file.format == "TIFF" else _TURNS.get(orientation)
     levels = _levels(path, raw.image, notes) if raw.image.mode.startswith(("I", "F")) else None
     factor = max(1, round(shrunk * file.width / width))
-    raw = raw if turn is None or factor > 1 else raw.turned(turn)
     image = raw.shown(levels) if factor == 1 else _shrunk(raw, factor, levels)
-    if factor > 1 and turn is not None:
-        image = image.transpose(turn)
+    image = image if turn is None else image.transpose(turn)
     if shrunk > 1:
         return DecodedImage(image, size, shrunk, None, tuple(notes))
     palette = None
+    raw = raw if turn is None else raw._replace(image=raw.image.transpose(turn))
     if raw.image.mode == "P" and image.mode == "RGB":  # without transparent colours
         palette = np.array(raw.image.getpalette() or [0, 0, 0], dtype=np.int64).reshape(-1, 3)
     are_labels = palette is not None and is_of_labels(palette)
@@ -228,10 +206,6 @@ class _Raw(NamedTuple):
 
     image: Image.Image
     opaque: Image.Image | None = None
-
-    def turned(self, turn: Image.Transpose) -> "_Raw":
-        """Return it turned or mirrored."""
-        return _Raw(self.image.transpose(turn), self.opaque and self.opaque.transpose(turn))
 
     def rows(self, top: int, bottom: int) -> "_Raw":
         """Return some of the rows."""

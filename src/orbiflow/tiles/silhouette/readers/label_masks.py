@@ -93,11 +93,9 @@ def may_be_labels(indices: NDArray[np.integer[Any]], palette: NDArray[np.int64])
 
 def _are_as_in_voc(palette: NDArray[np.int64]) -> _Mask:
     """Whether colours are Pascal VOC's: bits of a number are red's, green's and blue's in turn."""
-    numbers, colours = np.arange(len(palette)), np.zeros_like(palette)
-    for k in range(8):
-        for channel in range(3):
-            colours[:, channel] |= (numbers >> (3 * k + channel) & 1) << (7 - k)
-    return abs(colours - palette).max(axis=1) <= COLOUR_ROUNDING
+    place = np.arange(8)[:, None]
+    bits = np.arange(len(palette))[:, None, None] >> (3 * place + np.arange(3)) & 1
+    return abs((bits << (7 - place)).sum(axis=1) - palette).max(axis=1) <= COLOUR_ROUNDING
 
 
 def _without_void(

@@ -18,10 +18,9 @@ from orbiflow.errors import InputFileError, OrbiflowError
 from orbiflow.tiles.silhouette.readers.frames import CARD_NOTE, without_card, without_frame
 from orbiflow.tiles.silhouette.readers.image_files import MAX_PIXELS, check_size, decoded_image
 from orbiflow.tiles.silhouette.readers.label_masks import label_mask
-from orbiflow.tiles.silhouette.readers.outline_drawings import outline_drawing
 from orbiflow.tiles.silhouette.readers.photographs import is_photograph, shape_in, threshold_of
 from orbiflow.tiles.silhouette.readers.reading import FileContent, Reading, Source
-from orbiflow.tiles.silhouette.readers.tracing import Level, trace
+from orbiflow.tiles.silhouette.readers.tracing import Level, middle_of_line, trace
 
 MAX_SIDE = 1500  # pixels; beyond this an image is averaged down before it is traced
 MAX_SIDE_OF_PHOTOGRAPH = 1000  # pixels, in the same way
@@ -30,8 +29,6 @@ MIN_TRANSPARENT = 0.005  # of the picture: less, such as rounded corners, cuts n
 MIN_CONTRAST = 0.04  # of full scale, between the shape's and the background's usual level
 # channels that say by themselves where the shape is: their high part and their low part
 _PARTS = {"alpha": ("opaque", "transparent"), "mask": ("marked", "unmarked")}
-_WHOLLY_TRANSPARENT = "the image is wholly transparent; there is no shape in it"
-_PLAIN = "cut it out, photograph it on a plain ground of another colour, or set a threshold"
 
 
 @dataclass(frozen=True)
@@ -84,8 +81,8 @@ def _traced(
         raise OrbiflowError(f"threshold must lie between 0 and 1, got {threshold}")
     level, notes = choose_shape(path, picture, threshold, invert)
     is_given = threshold is not None or picture.name == "photograph"
-    if (drawn := outline_drawing(level, is_given=is_given)) is not None:
-        level, width = drawn.level, drawn.width * picture.reduced
+    if (drawn := middle_of_line(level, is_given=is_given)) is not None:
+        level, width = drawn[0], drawn[1] * picture.reduced
         notes.append(
             f"an outline drawing: took the middle of its line, which is {width:.2g} pixels wide"
         )
@@ -118,7 +115,10 @@ def _photograph(path: Source, image: Image.Image, notes: Sequence[str]) -> Pictu
         return None
     channel = shape_in(rgb)
     if not (channel > 0.5).any():
-        raise InputFileError(f"{path}: no shape stands out in the photograph; {_PLAIN}")
+        raise InputFileError(
+            f"{path}: no shape stands out in the photograph; cut it out, photograph it on a plain "
+            "ground of another colour, or set a threshold"
+        )
     return Picture(channel, "photograph", image.size, reduced, (*notes, *averaging))
 
 
@@ -129,23 +129,17 @@ def _channel(path: Source, image: Image.Image) -> tuple[Image.Image, str, list[s
     alpha = image.getchannel("A")
     low, high = np.asarray(alpha.getextrema()).tolist()
     if high == 0:
-        raise InputFileError(f"{path}: {_WHOLLY_TRANSPARENT}{_hidden(image)}")
+        extrema: Any = image.convert("RGB").getextrema()
+        shows = any(least < most - MIN_CONTRAST * 255 for least, most in extrema)
+        cure = "; its colours have one: save it without transparency (without an alpha channel)"
+        text = "the image is wholly transparent; there is no shape in it"
+        raise InputFileError(f"{path}: {text}{cure * shows}")
     if low == 255:
         return image.convert("RGB").convert("L"), "luminance", []
     if low < 128 <= high:
         return alpha, "alpha", []
-    return (
-        _on_white(image).convert("L"),
-        "luminance",
-        ["laid the half-transparent image on white"],
-    )
-
-
-def _hidden(image: Image.Image) -> str:
-    """Return a hint where a transparent image has colours all the same."""
-    extrema: Any = image.convert("RGB").getextrema()
-    shows = any(high - low > MIN_CONTRAST * 255 for low, high in extrema)
-    return "; its colours have one: save it without transparency (without an alpha channel)" * shows
+    laid = ["laid the half-transparent image on white"]
+    return _on_white(image).convert("L"), "luminance", laid
 
 
 def _on_white(image: Image.Image) -> Image.Image:

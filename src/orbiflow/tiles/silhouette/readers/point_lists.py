@@ -347,10 +347,9 @@ def _split(
     keys = list(zip(*columns, strict=True))
     groups = [[k for k, own in enumerate(keys) if own == key] for key in dict.fromkeys(keys)]
     rings = [points[group] for group in groups if len(group) >= MIN_ROWS]
-    columns = " and ".join(map(quoted, names))
-    return rings or [points], [
-        f"took the largest part of {len(groups)} rings that {columns} distinguishes"
-    ]
+    named = " and ".join(map(quoted, names))
+    note = f"took the largest part of {len(groups)} rings that {named} distinguishes"
+    return rings or [points], [note]
 
 
 def _is_closed(ring: Array) -> bool:

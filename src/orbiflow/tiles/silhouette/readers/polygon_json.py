@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import shapely
 from shapely import Polygon
@@ -128,11 +128,8 @@ def _check_pairs(path: Source, points: Any) -> None:
             )
 
 
-class _Annotation(NamedTuple):
-    """One object that was outlined in a picture, as rings of pairs, and its name."""
-
-    rings: list[Any]
-    name: str
+_Annotation = tuple[list[Any], str]
+"""One object that was outlined in a picture, as rings of pairs, and its name."""
 
 
 def _coco(content: dict[str, Any], marked: list[Any]) -> Iterator[_Annotation]:
@@ -149,7 +146,7 @@ def _coco(content: dict[str, Any], marked: list[Any]) -> Iterator[_Annotation]:
             for part in parts
             if is_list(part) and len(part) >= 6
         ]
-        yield _Annotation(rings, names.get(json.dumps(one.get("category_id")), "") if rings else "")
+        yield rings, names.get(json.dumps(one.get("category_id")), "") if rings else ""
 
 
 def _labelme(_content: dict[str, Any], marked: list[Any]) -> Iterator[_Annotation]:
@@ -157,24 +154,24 @@ def _labelme(_content: dict[str, Any], marked: list[Any]) -> Iterator[_Annotatio
         points = one.get("points") if is_object(one) else None
         is_polygon = is_object(one) and one.get("shape_type") in (None, "polygon")
         rings = [points] if is_polygon and is_list(points) and len(points) > 2 else []
-        yield _Annotation(rings, str(one.get("label") or "") if rings else "")
+        yield rings, str(one.get("label") or "") if rings else ""
 
 
 def _annotated(path: Source, count: int, every: list[_Annotation]) -> Reading:
     """Return the object whose outline encloses most."""
-    found = [annotation for annotation in every if annotation.rings]
+    found = [(rings, name) for rings, name in every if rings]
     if not found:
         raise InputFileError(
             f"{path}: none of its {count} annotations is a polygon (they may be masks, boxes, circles, "
             "lines or points); give the mask as PNG, or outline the shape by a polygon"
         )
-    for ring in (ring for annotation in found for ring in annotation.rings):
+    for ring in (ring for rings, _ in found for ring in rings):
         _check_pairs(path, ring)
-    best = max(found, key=lambda annotation: sum(map(_area, annotation.rings)))
-    left, name = count - len(found), f", {quoted(best.name)}" if best.name else ""
+    best, name = max(found, key=lambda one: sum(map(_area, one[0])))
+    left, name = count - len(found), f", {quoted(name)}" if name else ""
     notes = [f"took the largest of {len(found)} annotated objects{name}"] * (len(found) > 1)
     notes += [f"left {left} annotation{'s' * (left > 1)} that are no polygons unread"] * (left > 0)
-    return _read_pairs(path, best.rings, True, notes)
+    return _read_pairs(path, best, True, notes)
 
 
 def _area(ring: list[Any]) -> float:

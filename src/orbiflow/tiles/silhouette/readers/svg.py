@@ -3,22 +3,24 @@
 # pyright: reportUnknownMemberType=false
 # shapely's stubs leave the keyword arguments of its functions of arrays without types.
 
+from collections.abc import Iterable
+from itertools import chain
+
 import numpy as np
 import shapely
 from shapely.errors import GEOSException
 from shapely.geometry.base import BaseGeometry
 
-from orbiflow.arrays import Array, Window
+from orbiflow.arrays import Array
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.geometry import polygons_in
 from orbiflow.tiles.silhouette.outlines import (
-    MAX_VERTICES,
     clean_ring,
     filled,
     outer_outline,
     outer_ring,
     percent,
-    simplified,
+    thinned,
 )
 from orbiflow.tiles.silhouette.readers.frames import (
     CARD_NOTE,
@@ -82,12 +84,13 @@ def read_svg(path: Source) -> Reading:
     if not seen.area > 0:
         raise InputFileError(f"{path}: the drawing encloses no area that shows at its size")
     shape, kept = outer_outline(seen)
-    outline, cleaned = clean_ring(_thinned(shape, size), str(path), InputFileError)
-    box = drawing.box
+    outline, cleaned = clean_ring(
+        outer_ring(thinned(shape, COLLINEAR_TOLERANCE * size)[0]), str(path), InputFileError
+    )
+    left, top, right, bottom = drawing.box or (0.0, 0.0, 0.0, 0.0)
+    size = (right - left, bottom - top) if drawing.box else None
     notes = (*notes, *drawing.left_out(), *kept, *cleaned)
-    if box is None:
-        return Reading(outline, True, "svg", None, notes, seen=seen)
-    return Reading(outline, True, "svg", (box[2] - box[0], box[3] - box[1]), notes, box[:2], seen)
+    return Reading(outline, True, "svg", size, notes, (left, top), seen)
 
 
 def _size(drawing: Drawing) -> float:
@@ -114,9 +117,10 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
     notes: list[str] = []
     if not any(layers):
         if regions.beyond > 0:
+            page = " ".join(f"{value:g}" for value in drawing.box or ())
             raise InputFileError(
-                f"{drawing.path}: nothing lies on the page {_numbers(drawing.box)} (the viewBox, or "
-                "width and height); fit the page to the drawing"
+                f"{drawing.path}: nothing lies on the page {page} (the viewBox, or width and "
+                "height); fit the page to the drawing"
             )
         fills = [regions.shown(shape, regions.fill(shape)) for shape in drawing.shapes]
         layers = [[Layer(region, BLACK)] for region in fills if region.area > 0]
@@ -124,7 +128,6 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
     layers = [own for own in layers if own]
     paper, grounds = _background(layers, drawing)
     n, card = len(grounds), _card(layers, grounds, drawing)
-    carded = [CARD_NOTE] * (card is not None)
     if card is not None:
         paper, grounds = layers[card][0].brush.colour, grounds | {card}
     shown = [layer for k, own in enumerate(layers) if k not in grounds for layer in own]
@@ -132,7 +135,7 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
         raise InputFileError(f"{drawing.path}: {_why_empty(drawing)}")
     noun = "a background rectangle" if n == 1 else f"{n} background rectangles"
     notes += [f"left out {noun} that cover{'s' * (n == 1)} the whole drawing"] * (n > 0)
-    notes += carded
+    notes += [CARD_NOTE] * (card is not None)
     shown, ruled = without_grid(shown, paper or PAPER_COLOUR)
     seen, decided = overlay(shown, paper)
     seen, framed = without_axes(seen)
@@ -140,12 +143,11 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
     colours = {layer.brush.colour for layer in shown if layer.brush.opacity >= MIN_VISIBLE_OPACITY}
     whole = solid(seen)
     if whole >= PAVED_SHARE * _page(layers, drawing).area:
+        all_but = "the silhouette is all but the whole page"
         if len(colours) > 1:
-            note = "the silhouette is all but the whole page; if that is a background, delete it"
-            notes.append(note)
+            notes.append(f"{all_but}; if that is a background, delete it")
         elif seen.area < (1 - MIN_HOLE_SHARE) * whole:
-            note = "the silhouette is all but the whole page; if the hole in it is the shape, fill that"
-            notes.append(note)
+            notes.append(f"{all_but}; if the hole in it is the shape, fill that")
     elif _is_badge(seen, shown):
         notes.append(
             "the silhouette is a disc with a drawing on it; if it is a background, delete it"
@@ -154,10 +156,6 @@ def _seen(drawing: Drawing, size: float) -> tuple[BaseGeometry, list[str]]:
     if cut > MIN_NOTED_SHARE:
         notes.append(f"left out what lies beyond the page: {percent(cut)} of what is painted")
     return seen, notes + decided
-
-
-def _numbers(box: Window | None) -> str:
-    return " ".join(f"{value:g}" for value in box or ())
 
 
 def _page(layers: list[list[Layer]], drawing: Drawing) -> shapely.Polygon:
@@ -209,17 +207,17 @@ def _paving(layers: list[list[Layer]], page: shapely.Polygon) -> int:
             break
         ground, count = ground.union(region), count + 1
         paved = ground.intersection(page).area >= PAVED_SHARE * page.area
-    on_it = [
-        layer
-        for own in layers[count:]
-        for layer in own
-        if layer.brush.opacity >= MIN_VISIBLE_OPACITY
-    ]
     widest = max(
         (own[0] for own in layers[:count]), key=lambda layer: layer.region.area, default=None
     )
-    others = widest and any(not alike(layer.brush.colour, widest.brush.colour) for layer in on_it)
-    return count if paved and others else 0
+    has_others = widest and _shown_on(widest.brush.colour, chain(*layers[count:]))
+    return count if paved and has_others else 0
+
+
+def _shown_on(colour: str, layers: Iterable[Layer]) -> list[Layer]:
+    """Return the layers that are no fainter than what is seen, and of another colour."""
+    visible = (layer for layer in layers if layer.brush.opacity >= MIN_VISIBLE_OPACITY)
+    return [layer for layer in visible if not alike(layer.brush.colour, colour)]
 
 
 def _card(layers: list[list[Layer]], grounds: set[int], drawing: Drawing) -> int | None:
@@ -228,10 +226,7 @@ def _card(layers: list[list[Layer]], grounds: set[int], drawing: Drawing) -> int
     if len(rest) < 2 or drawing.box is None:
         return None
     card, page = layers[rest[0]][0], shapely.box(*drawing.box)
-    on_it = [
-        layer for k in rest[1:] for layer in layers[k] if layer.brush.opacity >= MIN_VISIBLE_OPACITY
-    ]
-    on_it = [layer for layer in on_it if not alike(layer.brush.colour, card.brush.colour)]
+    on_it = _shown_on(card.brush.colour, chain(*(layers[k] for k in rest[1:])))
     region = _without_holes(card.region)
     drawn = shapely.union_all([layer.region for layer in on_it])
     is_card = (
@@ -254,12 +249,7 @@ def _is_badge(seen: BaseGeometry, layers: list[Layer]) -> bool:
     if abs(whole.area - np.pi / 4 * whole.envelope.area) > gap:
         return False
     disc = max(layers, key=lambda layer: layer.region.area)
-    on_it = [
-        layer.region
-        for layer in layers
-        if layer.brush.opacity >= MIN_VISIBLE_OPACITY
-        and not alike(layer.brush.colour, disc.brush.colour)
-    ]
+    on_it = [layer.region for layer in _shown_on(disc.brush.colour, layers)]
     is_round = whole.convex_hull.area - whole.area < gap and disc.region.area > whole.area - gap
     if not on_it or not is_round:
         return False
@@ -278,15 +268,6 @@ def _sides(region: BaseGeometry) -> Array:
 
 def _without_holes(region: BaseGeometry) -> BaseGeometry:
     return shapely.union_all([filled(part) for part in polygons_in(region)])
-
-
-def _thinned(shape: shapely.Polygon, size: float) -> Array:
-    tolerance = COLLINEAR_TOLERANCE * size
-    thin = simplified(shape, tolerance)
-    while len(thin.exterior.coords) > MAX_VERTICES:
-        tolerance *= 2
-        thin = simplified(shape, tolerance)
-    return outer_ring(thin if thin.is_valid else shape)
 
 
 def _why_empty(drawing: Drawing) -> str:

@@ -3,27 +3,36 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element
 
 import numpy as np
+from svgelements import Path, Polygon, Shape
 
 from orbiflow.arrays import Window
-from orbiflow.tiles.silhouette.readers.svg_css import Style
-from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
+from orbiflow.tiles.silhouette.readers.svg_paths import sub_paths
 from orbiflow.tiles.silhouette.readers.svg_shapes import (
+    BAD_VALUE,
     SHAPES,
     Clip,
     DrawnShape,
     Place,
     bounds_of,
+    ellipse,
     mapped,
-    shape_paths,
+    rectangle,
     unit_box_matrix,
 )
-from orbiflow.tiles.silhouette.readers.svg_transforms import origin_of, shift
-from orbiflow.tiles.silhouette.readers.svg_values import as_number, length
+from orbiflow.tiles.silhouette.readers.svg_values import (
+    REFERENCE,
+    as_number,
+    length,
+    origin_of,
+    shift,
+)
 from orbiflow.tiles.silhouette.readers.svg_xml import reference
 
 if TYPE_CHECKING:
@@ -97,7 +106,8 @@ class Clips:
             if not mask:
                 inner = inner.moved(self.drawing.own_transform(source, style, inner))
             content = inner.moved(unit_box_matrix(box)) if boxed and box else inner
-            found = [Clip(self._content(source, content), _kind(source, style))]
+            kind = style.get("mask-type", "luminance") if mask else "clip"
+            found = [Clip(self._content(source, content), kind)]
             if mask:
                 found.append(
                     window_clip(_mask_frame(source, inner, box if framed else None), inner)
@@ -128,23 +138,16 @@ class Clips:
                 found += drawing.visit(child, place)
             elif child.tag in ("g", "svg", "symbol", "switch", "a", "image"):
                 drawing.notes.add(f"a <{child.tag}> in a <clipPath> clips nothing and is left out")
-        return [shape for shape in found if not shape.decorates]
+        return [shape for shape in found if not shape.place.decorates]
 
 
 def window_clip(frame: Window, place: Place) -> Clip:
     """Return the rectangle x, y, width, height of a place as what cuts."""
-    x, y, width, height = (repr(float(value)) for value in frame)
-    return _as_clip("rect", {"x": x, "y": y, "width": width, "height": height}, place)
+    return _as_clip(rectangle(*frame), place)
 
 
 def _with(shapes: list[DrawnShape], clips: list[Clip]) -> list[DrawnShape]:
     return [replace(shape, clips=(*shape.clips, *clips)) for shape in shapes]
-
-
-def _kind(source: Element, style: Style) -> str:
-    if source.tag == "clipPath":
-        return "clip"
-    return style.get("mask-type", "luminance")
 
 
 def _mask_frame(source: Element, place: Place, box: Window | None) -> Window:
@@ -158,11 +161,10 @@ def _mask_frame(source: Element, place: Place, box: Window | None) -> Window:
     return box[0] + x * wide, box[1] + y * high, width * wide, height * high
 
 
-def _as_clip(tag: str, attributes: dict[str, str], place: Place, rule: str = "nonzero") -> Clip:
-    """Return one of SVG's own shapes as what cuts."""
-    inner = replace(place, style=attributes)
-    paths = shape_paths(Element(tag, attributes), inner)
-    return Clip([DrawnShape(paths, {"clip-rule": rule}, 1.0, place.matrix, 1.0, place)])
+def _as_clip(shape: Shape | None, place: Place, rule: str = "nonzero") -> Clip:
+    """Return a shape in the units of a place as what cuts."""
+    paths = [] if shape is None else sub_paths(shape, place.matrix)
+    return Clip([DrawnShape(paths, replace(place, style={"clip-rule": rule}), place.matrix)])
 
 
 def _basic(text: str, box: Window | None, place: Place) -> Clip | None:
@@ -171,15 +173,14 @@ def _basic(text: str, box: Window | None, place: Place) -> Clip | None:
     if found is None or box is None:
         return None
     xmin, ymin, xmax, ymax = box
-    inner = place.moved(shift(xmin, ymin))
-    size, content = (xmax - xmin, ymax - ymin), found[2].strip()
+    content = found[2].strip()
     rule = _RULE.match(content)
     content = content[rule.end() :] if rule else content
     try:
-        tag, attributes = _MAKERS[found[1]](content, size)
-    except (ValueError, IndexError):
+        shape = _MAKERS[found[1]](content, (xmax - xmin, ymax - ymin))
+        return _as_clip(shape, place.moved(shift(xmin, ymin)), rule[1] if rule else "nonzero")
+    except BAD_VALUE:
         return None
-    return _as_clip(tag, attributes, inner, rule[1] if rule else "nonzero")
 
 
 def _reference_box(text: str, shapes: list[DrawnShape], place: Place) -> Window | None:
@@ -194,7 +195,6 @@ def _reference_box(text: str, shapes: list[DrawnShape], place: Place) -> Window 
 
 
 _Size = tuple[float, float]
-_Made = tuple[str, dict[str, str]]  # the name of a shape and its attributes
 
 
 def _amount(word: str, relative: float) -> float:
@@ -204,74 +204,50 @@ def _amount(word: str, relative: float) -> float:
     return value
 
 
-def _at(words: list[str], size: _Size) -> _Size:
-    """Return the point after the word "at", or the middle."""
-    k = words.index("at") if "at" in words else len(words)
-    return origin_of(" ".join(words[k + 1 :]) or "center", size)
+def _round(text: str, size: _Size, *, is_circle: bool) -> Shape | None:
+    """Return a circle or ellipse of radii, each a length or the distance from a side, "at" a point."""
+    given, _, at = f" {' '.join(text.split())} ".partition(" at ")
+    x, y = origin_of(at or "center", size)
+    reach = [abs(x), abs(size[0] - x)], [abs(y), abs(size[1] - y)]
+    words = [*given.split(), "closest-side", "closest-side"]
+    if is_circle:
+        rx = ry = _radius(words[0], reach[0] + reach[1], float(np.hypot(*size)) / 2**0.5)
+    else:
+        rx, ry = (_radius(word, reach[k], size[k]) for k, word in enumerate(words[:2]))
+    return ellipse(x, y, rx, ry)
 
 
 def _radius(word: str, reach: list[float], relative: float) -> float:
-    """Return a radius: a length, or how far the sides are from the middle."""
     sides = {"closest-side": min, "farthest-side": max}
     return sides[word](reach) if word in sides else _amount(word, relative)
 
 
-def _circle(text: str, size: _Size) -> _Made:
-    words = text.split()
-    x, y = _at(words, size)
-    given = words[0] if words and words[0] != "at" else "closest-side"
-    reach = [abs(side) for side in (x, size[0] - x, y, size[1] - y)]
-    radius = _radius(given, reach, float(np.hypot(*size)) / 2**0.5)
-    return "circle", {"cx": repr(x), "cy": repr(y), "r": repr(radius)}
-
-
-def _ellipse(text: str, size: _Size) -> _Made:
-    words = text.split()
-    x, y = _at(words, size)
-    given = words[: words.index("at")] if "at" in words else words
-    first, second = (given + ["closest-side"] * 2)[:2]
-    rx = _radius(first, [abs(x), abs(size[0] - x)], size[0])
-    ry = _radius(second, [abs(y), abs(size[1] - y)], size[1])
-    return "ellipse", {"cx": repr(x), "cy": repr(y), "rx": repr(rx), "ry": repr(ry)}
-
-
-def _inset(text: str, size: _Size) -> _Made:
+def _inset(text: str, size: _Size) -> Shape | None:
     text, _, corner = text.partition("round")
-    top, right, bottom, left = _sides(text.split())
-    t, b = (_amount(word, size[1]) for word in (top, bottom))
-    r, left_side = (_amount(word, size[0]) for word in (right, left))
-    attributes = {
-        **{"x": repr(left_side), "y": repr(t)},
-        **{"width": repr(size[0] - left_side - r), "height": repr(size[1] - t - b)},
-    }
-    if corner.strip():  # of one radius; others are refused
-        (radius,) = corner.split()
-        attributes |= {"rx": repr(_amount(radius, size[0])), "ry": repr(_amount(radius, size[1]))}
-    return "rect", attributes
+    words = text.split()
+    # top, right, bottom and left of one to four words, as CSS repeats them
+    sides = [
+        words[k] for k in ((0, 0, 0, 0), (0, 1, 0, 1), (0, 1, 2, 1), (0, 1, 2, 3))[len(words) - 1]
+    ]
+    top, right, bottom, left = (_amount(word, size[k % 2 == 0]) for k, word in enumerate(sides))
+    radius = corner.split() or ["0"]  # of one radius; others are refused
+    (rx, ry) = (_amount(word, own) for word, own in zip(radius * 2, size, strict=True))
+    return rectangle(left, top, size[0] - left - right, size[1] - top - bottom, rx, ry)
 
 
-def _sides(words: list[str]) -> list[str]:
-    """Return top, right, bottom and left of one to four words, as CSS repeats them."""
-    if not 1 <= len(words) <= 4:
-        raise ValueError(words)
-    top, right = words[0], words[min(1, len(words) - 1)]
-    return [top, right, words[2] if len(words) > 2 else top, words[3] if len(words) > 3 else right]
-
-
-def _polygon(text: str, size: _Size) -> _Made:
+def _polygon(text: str, size: _Size) -> Shape:
     corners = [word.split() for word in text.split(",")]
-    points = [f"{_amount(x, size[0])!r},{_amount(y, size[1])!r}" for x, y in corners]
-    return "polygon", {"points": " ".join(points)}
+    return Polygon(*((_amount(x, size[0]), _amount(y, size[1])) for x, y in corners))
 
 
-def _path(text: str, size: _Size) -> _Made:  # noqa: ARG001
+def _path(text: str, _: _Size) -> Shape:
     found = _TEXT.fullmatch(text)
     if found is None:
         raise ValueError(text)
-    return "path", {"d": found[1]}
+    return Path({"d": found[1]})
 
 
-_MAKERS = {
-    **{"circle": _circle, "ellipse": _ellipse, "inset": _inset},
-    **{"polygon": _polygon, "path": _path},
+_MAKERS: dict[str, Callable[[str, _Size], Shape | None]] = {
+    **{name: partial(_round, is_circle=name == "circle") for name in ("circle", "ellipse")},
+    **{"inset": _inset, "polygon": _polygon, "path": _path},
 }

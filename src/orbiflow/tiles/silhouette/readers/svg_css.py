@@ -12,20 +12,22 @@ from tinycss2.ast import AtRule, Declaration, FunctionBlock, Node, QualifiedRule
 
 from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.reading import Source
-from orbiflow.tiles.silhouette.readers.svg_properties import (
+from orbiflow.tiles.silhouette.readers.svg_values import (
     ATTRIBUTES,
+    FONT_SIZE,
     INHERITED,
     WIDE,
     WITH_LENGTHS,
     checked,
+    font_size,
     longhands,
+    without_font_units,
 )
-from orbiflow.tiles.silhouette.readers.svg_values import FONT_SIZE, font_size, without_font_units
 from orbiflow.tiles.silhouette.readers.svg_xml import SVG, Notes
 
 MAX_STYLE = 200_000  # characters of all style sheets
 MAX_STYLES = 4_000_000  # characters of all attributes `style`
-MAX_BRACKETS = 50  # how deep brackets may nest
+MAX_BRACKETS = 50  # how deep brackets may nest: the recursion of serializing stands it
 MAX_SELECTORS = 5_000
 MAX_SELECTOR = 1_000  # characters
 MAX_STEPS = 5_000_000  # comparisons of elements with selectors, and steps from element to element
@@ -61,19 +63,49 @@ Style = Mapping[str, str]
 Declared = tuple[str, str, bool]  # a property, its value, and whether it is important
 
 
-class StyleSheets:
-    """What the style sheets and attributes of a drawing declare for its elements."""
+class Styles:
+    """The styles of a drawing's elements, by its style sheets, attributes and what is around each."""
 
     def __init__(self, path: Source, root: Element, notes: Notes) -> None:
         self.path, self.notes, self.matcher = path, notes, Matcher()
         self.selectors = self.characters = 0
-        sheets = [item for item in root.iter("style") if _is_css(item)]
-        self._read(sheets)
+        self._read([item for item in root.iter("style") if _is_css(item)])
         self.nodes: dict[Element, _Node] = {}
         if self.selectors:
             top = _Node(root, None, 0, None, False)
             self.nodes = {node.etree_element: node for node in top.iter_subtree()}
             top.budget.left = MAX_STEPS
+        self.parents = {child: parent for parent in root.iter() for child in parent}
+        self.rem = FONT_SIZE
+        self._declared: dict[Element, dict[str, str]] = {}
+        self._standing: dict[Element, Style] = {}
+        self.rem = self.em(self.standing(root))
+
+    def em(self, style: Style) -> float:
+        """Return the size of the font in user units."""
+        return float(style.get("font-size", FONT_SIZE))
+
+    def standing(self, element: Element) -> Style:
+        """Return the style of an element where it stands in the document."""
+        if element not in self._standing:
+            parent = self.parents.get(element)
+            around: Style = {} if parent is None else self.standing(parent)
+            self._standing[element] = self.computed(element, around)
+        return self._standing[element]
+
+    def computed(self, element: Element, around: Style) -> Style:
+        """Return the style of an element inside one that has the style `around`."""
+        if element not in self._declared:
+            self._declared[element] = self.declared(element)
+        declared = self._declared[element]
+        style = {
+            key: value for key, value in around.items() if key in INHERITED or key.startswith("--")
+        }
+        style.update((key, text) for key, text in declared.items() if key.startswith("--"))
+        plain = [key for key in declared if not key.startswith("--")]
+        for key in sorted(plain, key=lambda key: key != "font-size"):  # in which others may be
+            self._set(style, key, declared[key], around)
+        return style
 
     def declared(self, element: Element) -> dict[str, str]:
         """Return the properties that are declared for an element, by CSS's order of precedence.
@@ -92,6 +124,27 @@ class StyleSheets:
             found.update((key, value) for key, value, important in ruled if important == late)
         return found
 
+    def _set(self, style: dict[str, str], key: str, text: str, around: Style) -> None:
+        """Set one property of a style, with keywords, variables and sizes of the font resolved."""
+        if "var(" in text.lower():
+            filled = _with_variables(text, style)
+            value = None if filled is None else checked(key, filled)
+            if value is None:
+                self.notes.add(f"{key} {text[:40]!a} is not understood and left out")
+            text = value or "unset"
+        if text in WIDE:
+            inherits = text == "inherit" or (text != "initial" and key in INHERITED)
+            style.pop(key, None)
+            if inherits and key in around:
+                style[key] = around[key]
+            return
+        if key == "font-size":
+            style[key] = repr(font_size(text, self.em(around), self.rem))
+        elif key in WITH_LENGTHS and "url(" not in text:
+            style[key] = without_font_units(text, self.em(style), self.rem)
+        else:
+            style[key] = text
+
     def _matched(self, element: Element) -> Iterator[Declared]:
         node = self.nodes.get(element)
         if node is None:
@@ -100,9 +153,7 @@ class StyleSheets:
             node.budget.charge(self._candidates(node))
             matches = self.matcher.match(node)
         except _TooManySteps as exc:
-            raise InputFileError(
-                f"{self.path}: the style sheet takes too long to apply; save the drawing as plain SVG"
-            ) from exc
+            raise self._refusal("the style sheet takes too long to apply") from exc
         for _, _, pseudo, declarations in matches:
             if pseudo is None:
                 yield from declarations
@@ -123,12 +174,14 @@ class StyleSheets:
             return ()
         self.characters += len(text)
         if self.characters > MAX_STYLES:
-            reason = f"more than {MAX_STYLES} characters of style; save the drawing as plain SVG"
-            raise InputFileError(f"{self.path}: {reason}")
+            raise self._refusal(f"more than {MAX_STYLES} characters of style")
         found, wrong = _style(text)
         for key, value in wrong:
             self._misread(key, value)
         return found
+
+    def _refusal(self, what: str) -> InputFileError:
+        return InputFileError(f"{self.path}: {what}; save the drawing as plain SVG")
 
     def _misread(self, key: str, value: str) -> None:
         if value.strip().lower() not in _ABSENT:
@@ -136,16 +189,12 @@ class StyleSheets:
 
     def _read(self, sheets: list[Element]) -> None:
         texts = ["".join(sheet.itertext()) for sheet in sheets]
-        if sum(map(len, texts)) > MAX_STYLE:
-            raise InputFileError(
-                f"{self.path}: <style> of {sum(map(len, texts))} characters; save the drawing as "
-                "plain SVG"
-            )
+        if (count := sum(map(len, texts))) > MAX_STYLE:
+            raise self._refusal(f"<style> of {count} characters")
         for sheet, text in zip(sheets, texts, strict=True):
             if text.strip() and self._applies(sheet.get("media", "")):
                 if _too_nested(text):
-                    reason = "brackets nest too deeply in <style>; save the drawing as plain SVG"
-                    raise InputFileError(f"{self.path}: {reason}")
+                    raise self._refusal("brackets nest too deeply in <style>")
                 rules = tinycss2.parse_stylesheet(text, skip_comments=True, skip_whitespace=True)
                 self._add(rules, {})
 
@@ -167,8 +216,7 @@ class StyleSheets:
             return
         self.selectors += text.count(",") + 1
         if self.selectors > MAX_SELECTORS:
-            reason = f"more than {MAX_SELECTORS} selectors in <style>; save it as plain SVG"
-            raise InputFileError(f"{self.path}: {reason}")
+            raise self._refusal(f"more than {MAX_SELECTORS} selectors in <style>")
         try:
             if max(map(len, text.split(","))) > MAX_SELECTOR:
                 raise SelectorError
@@ -292,17 +340,10 @@ class _Node(ElementWrapper):
     """An element as selectors see it, with a bound on the steps that all of them take together."""
 
     def __init__(
-        self,
-        etree_element: Element,
-        parent: "_Node | None",
-        index: int,
-        previous: "_Node | None",
-        in_html_document: bool,
-        content_language: str | None = None,
+        self, etree_element: Element, parent: "_Node | None", *args: Any, **named: Any
     ) -> None:
         self.budget: _Budget = _Budget() if parent is None else parent.budget
-        args = (etree_element, parent, index, previous, in_html_document, content_language)
-        super().__init__(*args)
+        super().__init__(etree_element, parent, *args, **named)
         self.children: list[_Node] | None = None
         namespace, brace, name = etree_element.tag[1:].rpartition("}")
         self.local_name = name if brace else etree_element.tag
@@ -340,73 +381,11 @@ class _Node(ElementWrapper):
             yield child
 
 
-class Styles:
-    """The styles of a drawing's elements."""
-
-    def __init__(self, path: Source, root: Element, notes: Notes) -> None:
-        self.sheets, self.notes = StyleSheets(path, root, notes), notes
-        self.parents = {child: parent for parent in root.iter() for child in parent}
-        self.rem = FONT_SIZE
-        self._declared: dict[Element, dict[str, str]] = {}
-        self._standing: dict[Element, Style] = {}
-        self.rem = self.em(self.standing(root))
-
-    def em(self, style: Style) -> float:
-        """Return the size of the font in user units."""
-        return float(style.get("font-size", FONT_SIZE))
-
-    def standing(self, element: Element) -> Style:
-        """Return the style of an element where it stands in the document."""
-        if element not in self._standing:
-            parent = self.parents.get(element)
-            around: Style = {} if parent is None else self.standing(parent)
-            self._standing[element] = self.computed(element, around)
-        return self._standing[element]
-
-    def computed(self, element: Element, around: Style) -> Style:
-        """Return the style of an element inside one that has the style `around`."""
-        if element not in self._declared:
-            self._declared[element] = self.sheets.declared(element)
-        declared = self._declared[element]
-        style = {
-            key: value for key, value in around.items() if key in INHERITED or key.startswith("--")
-        }
-        for key in [key for key in declared if key.startswith("--")]:
-            style[key] = declared[key]
-        if "font-size" in declared:
-            self._set(style, "font-size", declared["font-size"], around)
-        for key, text in declared.items():
-            if key != "font-size" and not key.startswith("--"):
-                self._set(style, key, text, around)
-        return style
-
-    def _set(self, style: dict[str, str], key: str, text: str, around: Style) -> None:
-        """Set one property of a style, with keywords, variables and sizes of the font resolved."""
-        if "var(" in text.lower():
-            filled = _with_variables(text, style)
-            value = None if filled is None else checked(key, filled)
-            if value is None:
-                self.notes.add(f"{key} {text[:40]!a} is not understood and left out")
-            text = value or "unset"
-        if text in WIDE:
-            inherits = text == "inherit" or (text != "initial" and key in INHERITED)
-            style.pop(key, None)
-            if inherits and key in around:
-                style[key] = around[key]
-            return
-        if key == "font-size":
-            style[key] = repr(font_size(text, self.em(around), self.rem))
-        elif key in WITH_LENGTHS and "url(" not in text:
-            style[key] = without_font_units(text, self.em(style), self.rem)
-        else:
-            style[key] = text
-
-
 def _with_variables(text: str, style: Style) -> str | None:
     """Return a value with each `var(--name, fallback)` replaced, or None where that is impossible."""
     for _ in range(_MAX_NESTED):
         tokens = tinycss2.parse_component_value_list(text, skip_comments=True)
-        if not (len(text) <= MAX_VARIABLE and _balanced(text)):
+        if len(text) > MAX_VARIABLE or text.count("(") > MAX_BRACKETS:
             return None
         parts = [_replaced(token, style) for token in tokens]
         found = [part for part in parts if part is not None]
@@ -416,10 +395,6 @@ def _with_variables(text: str, style: Style) -> str | None:
         if "var(" not in text.lower():
             return text.strip()
     return None
-
-
-def _balanced(text: str) -> bool:
-    return text.count("(") <= 50  # which the recursion of serializing stands
 
 
 def _replaced(token: Node, style: Style) -> str | None:

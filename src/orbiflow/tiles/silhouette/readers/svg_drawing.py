@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import replace
+from itertools import islice
 from urllib.parse import unquote
 from xml.etree.ElementTree import Element
 
@@ -12,28 +13,34 @@ from orbiflow.errors import InputFileError
 from orbiflow.tiles.silhouette.readers.reading import Source, read_bytes
 from orbiflow.tiles.silhouette.readers.svg_clips import Clips, window_clip
 from orbiflow.tiles.silhouette.readers.svg_css import Style, Styles
-from orbiflow.tiles.silhouette.readers.svg_markers import Markers
-from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
+from orbiflow.tiles.silhouette.readers.svg_paths import corners
 from orbiflow.tiles.silhouette.readers.svg_shapes import (
+    MARKED,
     SHAPES,
     BadElement,
     DrawnShape,
     Place,
     bounds_of,
+    mapped,
     path_tokens,
     shape_paths,
     view_box,
     view_matrix,
 )
-from orbiflow.tiles.silhouette.readers.svg_transforms import (
+from orbiflow.tiles.silhouette.readers.svg_values import (
+    KEYWORDS,
     MAX_TRANSFORM,
+    REFERENCE,
     NotATransform,
+    angle,
+    as_number,
+    colour_of,
     origin_of,
+    quantity,
     shift,
     single_transforms,
     transform_matrix,
 )
-from orbiflow.tiles.silhouette.readers.svg_values import as_number, colour_of
 from orbiflow.tiles.silhouette.readers.svg_xml import MAX_DEPTH, Notes, is_own, parse_xml, reference
 
 MAX_BYTES = 16 * 2**20
@@ -80,7 +87,7 @@ class Drawing:
         for item in self.root.iter():
             if is_own(item) and (key := item.get("id")):
                 self.by_id.setdefault(key, item)
-        self.clips, self.markers = Clips(self), Markers(self)
+        self.clips = Clips(self)
         try:
             self._read()
         except BadElement as exc:
@@ -113,7 +120,8 @@ class Drawing:
 
     def _read(self) -> None:
         style = self.styles.standing(self.root)
-        self.box = self._box(style)
+        self.sides = [self._pixels(style, key) for key in ("width", "height")]
+        self.box, self.window, view = self._page()
         if any(item.tag in _ANIMATIONS for item in self.root.iter()):
             self.notes.add(_EFFECTS["animation"][0])
         if self.root.get("{}xml-stylesheet"):
@@ -121,7 +129,6 @@ class Drawing:
         xmin, ymin, xmax, ymax = self.box or (0.0, 0.0, 100.0, 100.0)
         size = xmax - xmin, ymax - ymin
         place = Place(np.eye(3), size, {}, self.styles.rem, depth=-1).styled(style)
-        self.window, view = self._window(style)
         self.view = view
         ground = colour_of(style.get("background-color", "transparent"))
         self.ground = ground.colour if ground and ground.opacity == 1 else None
@@ -130,29 +137,23 @@ class Drawing:
         found = [] if style.get("display") == "none" else self.children(self.root, inner)
         self.shapes = self._cut(found, style, inner)
 
-    def _box(self, style: Style) -> Window | None:
-        """Return the page in user units: the viewBox, or the size."""
+    def _page(self) -> tuple[Window | None, Window | None, Array]:
+        """Return the page in user units, the part of the plane that shows, and the map to pixels."""
         box = view_box(self.root)
-        if box is not None:
-            return box[0], box[1], box[0] + box[2], box[1] + box[3]
-        width, height = (self._pixels(style, key) for key in ("width", "height"))
-        if width is None or height is None or not (width > 0 and height > 0):
-            return None
-        return 0.0, 0.0, width, height
-
-    def _window(self, style: Style) -> tuple[Window | None, Array]:
-        """Return the part of the plane that shows, and the map (3, 3) from it to pixels."""
-        box, size = view_box(self.root), [self._pixels(style, key) for key in ("width", "height")]
-        width, height = (own if own and own > 0 else None for own in size)
-        if box is None or width is None or height is None:
-            return self.box, np.eye(3)
+        width, height = (side if side and side > 0 else None for side in self.sides)
+        if box is None:
+            page = None if width is None or height is None else (0.0, 0.0, width, height)
+            return page, page, np.eye(3)
+        page = box[0], box[1], box[0] + box[2], box[1] + box[3]
+        if width is None or height is None:
+            return page, page, np.eye(3)
         view = view_matrix(self.root, (0.0, 0.0, width, height))[0]
         if not np.isfinite(np.linalg.inv(view)).all():
-            return self.box, np.eye(3)
+            return page, page, np.eye(3)
         corners = np.array([[0.0, 0.0], [width, height]]) - view[:2, 2]
         (xmin, ymin), (xmax, ymax) = (corners / np.diag(view)[:2]).tolist()
         margin = PAGE_TOLERANCE * max(xmax - xmin, ymax - ymin)  # the page's own edge is not cut
-        return (xmin - margin, ymin - margin, xmax + margin, ymax + margin), view
+        return page, (xmin - margin, ymin - margin, xmax + margin, ymax + margin), view
 
     def _pixels(self, style: Style, key: str) -> float | None:
         """Return the width or height of the root in pixels, or None if it is a share or not given."""
@@ -164,11 +165,8 @@ class Drawing:
     def pixel(self) -> float:
         """Return the size of a pixel in user units."""
         xmin, ymin, xmax, ymax = self.box or (0.0, 0.0, 1.0, 1.0)
-        style, sizes = (
-            self.styles.standing(self.root),
-            {"width": xmax - xmin, "height": ymax - ymin},
-        )
-        return max(own / (self._pixels(style, key) or own) for key, own in sizes.items())
+        sizes = zip((xmax - xmin, ymax - ymin), self.sides, strict=True)
+        return max(own / (pixels or own) for own, pixels in sizes)
 
     def children(self, element: Element, place: Place) -> list[DrawnShape]:
         """Return the shapes that the elements inside one show."""
@@ -214,8 +212,9 @@ class Drawing:
         if tag == "svg":
             return self.viewport(element, self._frame(element, place.style, place), place)
         if tag == "switch":
-            chosen = [child for child in element if is_own(child) and self._chosen(child)][:1]
-            return self.visit(chosen[0], place) if chosen else []
+            drawn = _GROUPS | SHAPES | {"use", "text", "image"}
+            chosen = (child for child in element if child.tag in drawn and self._meant(child))
+            return [shape for child in islice(chosen, 1) for shape in self.visit(child, place)]
         if tag in _GROUPS:
             return self.children(element, place)
         if tag == "use":
@@ -263,10 +262,6 @@ class Drawing:
         if not (pure and (rows[3] == [0, 0, 0, 1, 0]).all()):
             return None
         return "#" + "".join("ff" if value >= 1 else "00" for value in rows[:3, 4])
-
-    def _chosen(self, child: Element) -> bool:
-        drawn = child.tag in _GROUPS | SHAPES | {"use", "text", "image"}
-        return drawn and self._meant(child)
 
     def _meant(self, element: Element) -> bool:
         """Return whether an element is meant for a program like this one and its language."""
@@ -330,14 +325,63 @@ class Drawing:
         matrix = place.matrix
         if place.style.get("vector-effect") == "non-scaling-stroke":
             matrix = np.diag([self.pixel()] * 2 + [1.0])
-        diagonal = float(np.hypot(*place.viewport)) / 2**0.5
         own = as_number(element.get("pathLength"), -1.0)
-        drawn = DrawnShape(
-            *(paths, place.style, place.opacity, matrix, diagonal, place),
-            path_length=own if own >= 0 else None,
-            decorates=place.decorates,
-        )
-        return self.markers.around(element, drawn, place)
+        drawn = DrawnShape(paths, place, matrix, own if own >= 0 else None)
+        return self._with_markers(element, drawn, place)
+
+    def _with_markers(self, element: Element, shape: DrawnShape, place: Place) -> list[DrawnShape]:
+        """Return a shape and its markers, in the order in which they are painted."""
+        if element.tag not in MARKED or place.style.get("visibility", "visible") != "visible":
+            return [shape]
+        named: dict[str, Element] = {}
+        for key in ("start", "mid", "end"):
+            text = place.style.get(f"marker-{key}", "none")
+            found = self.referred(text, f"marker-{key}") if text != "none" else None
+            if found is not None and found.tag == "marker":
+                named[key] = found
+        drawn = [
+            one
+            for key, (x, y), turn in corners(
+                shape.paths if named else [], np.linalg.inv(place.matrix)
+            )
+            if key in named
+            for one in self._marker(named[key], shape, place.moved(shift(x, y)), turn, key)
+        ]
+        order = place.style.get("paint-order", "").split()
+        return [*drawn, shape] if order[:1] == ["markers"] else [shape, *drawn]
+
+    def _marker(
+        self, marker: Element, shape: DrawnShape, place: Place, turn: float, key: str
+    ) -> list[DrawnShape]:
+        """Return what one marker shows with its reference point at the origin of a place."""
+        orient = marker.get("orient", "0").strip()
+        if not orient.startswith("auto"):
+            turn = angle(orient) or 0.0
+        elif orient == "auto-start-reverse" and key == "start":
+            turn += np.pi
+        scale = 1.0 if marker.get("markerUnits") == "userSpaceOnUse" else shape.width
+        x, y = scale * np.cos(turn), scale * np.sin(turn)
+        inner = place.moved(np.array([[x, -y, 0.0], [y, x, 0.0], [0, 0, 1.0]]))
+        context = place.style.get("fill", "#000000"), place.style.get("stroke", "none")
+        inner = replace(inner, context=context, decorates=True)
+        inner = inner.styled(self.styles.standing(marker))
+        if np.linalg.det(inner.matrix) == 0:
+            return []
+        box = view_box(marker)
+        size = replace(inner, viewport=box[2:] if box else inner.viewport)
+        sides = [(name, marker.get(name)) for name in ("markerWidth", "markerHeight")]
+        width, height = (size.length(marker, name, text, 3.0) for name, text in sides)
+        whole = box or (0.0, 0.0, width, height)
+        at: list[float] = []
+        for k, name in enumerate(("refX", "refY")):
+            text = (marker.get(name) or "0").strip()
+            if text in KEYWORDS:
+                at.append(whole[k] + as_number(KEYWORDS[text], 0.0) * whole[2 + k])
+            else:
+                at.append(size.length(marker, name, text if quantity(text) else "0"))
+        frame = (0.0, 0.0, width, height)
+        x, y = -mapped(view_matrix(marker, frame)[0], np.array([at]))[0]
+        return self.viewport(marker, (x, y, width, height), inner)
 
     def _own_box(self, element: Element, place: Place) -> Window:
         """Return the box of what an element holds, in the units of a place, without counting it."""

@@ -20,14 +20,15 @@ from orbiflow.tiles.silhouette.readers.svg_shapes import (
     mapped,
     unit_box_matrix,
 )
-from orbiflow.tiles.silhouette.readers.svg_transforms import can_transform, transform_matrix
 from orbiflow.tiles.silhouette.readers.svg_values import (
     CURRENT,
     Brush,
     as_number,
+    can_transform,
     colour_of,
     length,
     mean_colour,
+    transform_matrix,
 )
 from orbiflow.tiles.silhouette.readers.svg_xml import reference
 
@@ -65,8 +66,9 @@ class Gradient:
         corners = mapped(np.linalg.inv(self.matrix), corners)
         if not np.isfinite(corners).all():
             return region
-        spans = list(self._spans(values, least))
-        bands = self._rings(spans, corners) if self.radial else self._strips(spans, corners)
+        low, high = self._reach(corners)
+        spans = self._repeated(list(self._spans(values, least)), low, high)
+        bands = [self._band(a, b, corners) for a, b in spans]
         there = shapely.transform(shapely.union_all(bands), lambda xy: mapped(self.matrix, xy))
         return shapely.intersection(region, there)
 
@@ -101,34 +103,30 @@ class Gradient:
         cut = [(max(a, low), min(b, high)) for a, b in every]
         return [(a, b) for a, b in cut if b > a]
 
-    def _strips(self, spans: list[tuple[float, float]], corners: Array) -> list[BaseGeometry]:
-        start, along = self.ends[0, :2], self.ends[1, :2] - self.ends[0, :2]
-        across = np.array([-along[1], along[0]])
-        square = float(along @ along)
-        t, s = ((corners - start) @ side / square for side in (along, across))
-        wide = np.array([s.min() - 1, s.max() + 1])
-        return [
-            shapely.Polygon(
-                start + np.outer([a, b, b, a], along) + np.outer(wide[[0, 0, 1, 1]], across)
-            )
-            for a, b in self._repeated(spans, float(t.min()) - 1, float(t.max()) + 1)
-        ]
-
-    def _rings(self, spans: list[tuple[float, float]], corners: Array) -> list[BaseGeometry]:
-        """Return the rings of a gradient whose circles lie in each other, the first one within."""
+    def _reach(self, corners: Array) -> tuple[float, float]:
+        """Return offsets between which all of a region with these corners lies."""
         (x, y, radius), step = self.ends[0], self.ends[1] - self.ends[0]
-        growth = step[2] - float(np.hypot(*step[:2]))
-        reach = float(np.hypot(*(corners - [x, y]).T).max())
-        high = 1 + max(reach - radius, 0.0) / growth
+        if self.radial:
+            growth = step[2] - float(np.hypot(*step[:2]))
+            far = float(np.hypot(*(corners - [x, y]).T).max())
+            return 0.0, 1 + max(far - radius, 0.0) / growth
+        along = (corners - [x, y]) @ step[:2] / (step[:2] @ step[:2])
+        return float(along.min()) - 1, float(along.max()) + 1
 
-        def disc(t: float) -> BaseGeometry:
-            centre = Point(x + t * step[0], y + t * step[1])
-            return centre.buffer(max(radius + t * step[2], 0.0), quad_segs=_QUARTER_SEGMENTS)
-
-        return [
-            shapely.difference(disc(b), disc(a)) if a > 0 else disc(b)
-            for a, b in self._repeated([(a, b) for a, b in spans if b > 0], 0.0, high)
-        ]
+    def _band(self, a: float, b: float, corners: Array) -> BaseGeometry:
+        """Return what has offsets from `a` to `b`, of all that lies around a region."""
+        start, step = self.ends[0], self.ends[1] - self.ends[0]
+        if self.radial:
+            inner, outer = (
+                Point(x, y).buffer(max(radius, 0.0), quad_segs=_QUARTER_SEGMENTS)
+                for x, y, radius in (start + a * step, start + b * step)
+            )
+            return outer.difference(inner) if a > 0 else outer
+        along, across = step[:2], np.array([-step[1], step[0]])
+        sideways = (corners - start[:2]) @ across / (across @ across)
+        wide = np.array([sideways.min() - 1, sideways.max() + 1])
+        strip = np.outer([a, b, b, a], along) + np.outer(wide[[0, 0, 1, 1]], across)
+        return Polygon(start[:2] + strip)
 
 
 _Attribute = Callable[[str, str], str]  # the attribute of a gradient, or its usual value

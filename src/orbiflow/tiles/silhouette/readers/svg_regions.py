@@ -19,13 +19,12 @@ from orbiflow.errors import InputFileError
 from orbiflow.tiles.geometry import complex_points
 from orbiflow.tiles.silhouette.outlines import MAX_COORDINATE
 from orbiflow.tiles.silhouette.readers.svg_drawing import Drawing
-from orbiflow.tiles.silhouette.readers.svg_gradients import Gradient, gradient_of, references
-from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, TooManyPoints, fill
-from orbiflow.tiles.silhouette.readers.svg_properties import REFERENCE
+from orbiflow.tiles.silhouette.readers.svg_gradients import gradient_of, references
+from orbiflow.tiles.silhouette.readers.svg_paths import Line, SubPath, TooManyPoints, fill, stroked
 from orbiflow.tiles.silhouette.readers.svg_shapes import Clip, DrawnShape, Group
-from orbiflow.tiles.silhouette.readers.svg_strokes import Line, stroked
 from orbiflow.tiles.silhouette.readers.svg_values import (
     CURRENT,
+    REFERENCE,
     Brush,
     as_number,
     colour_of,
@@ -41,19 +40,11 @@ PATTERN_BRUSH = Brush("#808080", 1.0)
 _SAMPLES = np.linspace(0, 1, 257)
 
 
-class Paint(NamedTuple):
-    """What paints a fill or stroke: a colour, or the mean one of a gradient, and its opacity."""
-
-    colour: str
-    opacity: float  # without that of a gradient's stops
-    gradient: Gradient | None = None
-
-
-def paints(drawing: Drawing, shape: DrawnShape) -> dict[str, Paint]:
+def paints(drawing: Drawing, shape: DrawnShape) -> dict[str, Brush]:
     """Return what paints the "fill" and "stroke" of a shape, without what does not show, in order."""
     if shape.paint.get("visibility", "visible") != "visible":
         return {}
-    found: dict[str, Paint] = {}
+    found: dict[str, Brush] = {}
     order = [word for word in shape.paint.get("paint-order", "fill").split() if word != "markers"]
     for kind in ("stroke", "fill") if order[:1] == ["stroke"] else ("fill", "stroke"):
         text = shape.paint.get(kind, "#000000" if kind == "fill" else "none")
@@ -61,11 +52,11 @@ def paints(drawing: Drawing, shape: DrawnShape) -> dict[str, Paint]:
         if paint and (kind == "fill" or shape.width > 0):
             own = min(max(as_number(shape.paint.get(f"{kind}-opacity"), 1.0), 0.0), 1.0)
             paint = _tinted(paint, shape.tint) if shape.tint else paint
-            found[kind] = paint._replace(opacity=shape.opacity * paint.opacity * own)
+            found[kind] = paint._replace(opacity=shape.place.opacity * paint.opacity * own)
     return {kind: paint for kind, paint in found.items() if paint.opacity > 0}
 
 
-def _paint(text: str, drawing: Drawing, shape: DrawnShape) -> Paint | None:
+def _paint(text: str, drawing: Drawing, shape: DrawnShape) -> Brush | None:
     if text.lower() == "none" or not text:
         return None
     server = REFERENCE.match(text)
@@ -76,18 +67,18 @@ def _paint(text: str, drawing: Drawing, shape: DrawnShape) -> Paint | None:
     if brush and brush.colour == CURRENT:
         # without a colour it is the one that shows on what lies below
         brush = colour_of(shape.paint.get("color", CURRENT)) or brush
-    return Paint(*brush) if brush and brush.opacity > 0 else None
+    return brush if brush and brush.opacity > 0 else None
 
 
-def _tinted(paint: Paint, tint: str) -> Paint:
+def _tinted(paint: Brush, tint: str) -> Brush:
     """Return a paint in one colour, as opaque as before."""
     if paint.gradient is None:
         return paint._replace(colour=tint)
     brushes = [Brush(tint, brush.opacity) for brush in paint.gradient.brushes]
-    return Paint(tint, paint.opacity, replace(paint.gradient, brushes=brushes))
+    return Brush(tint, paint.opacity, replace(paint.gradient, brushes=brushes))
 
 
-def _served(element: Element | None, drawing: Drawing, shape: DrawnShape) -> Paint | None:
+def _served(element: Element | None, drawing: Drawing, shape: DrawnShape) -> Brush | None:
     """Return the paint that a gradient gives; a pattern is an even gray."""
     if element is None:
         return None
@@ -95,14 +86,14 @@ def _served(element: Element | None, drawing: Drawing, shape: DrawnShape) -> Pai
         if not any(len(one) for one in references(drawing, element)):
             return None
         drawing.notes.add("took a pattern for an even gray")
-        return Paint(*PATTERN_BRUSH)
+        return PATTERN_BRUSH
     if element.tag not in ("linearGradient", "radialGradient"):
         drawing.notes.add(f"paint by a <{element.tag[:40]}> is left out")
         return None
     gradient = gradient_of(drawing, element, shape)
     if gradient is None or isinstance(gradient, Brush):
-        return gradient and Paint(*gradient)
-    return Paint(mean_colour(gradient.brushes).colour, 1.0, gradient)
+        return gradient
+    return Brush(mean_colour(gradient.brushes).colour, 1.0, gradient)
 
 
 class Layer(NamedTuple):
@@ -161,8 +152,7 @@ class Regions:
         back = np.linalg.inv(linear).T
         lines: list[Line] = []
         for points, path in self.lines(shape, STROKE_REFINEMENT):
-            ends = np.array([path.start, *(curve.end for curve in path.curves)])
-            corners = np.isin(complex_points(points), complex_points(ends))
+            corners = np.isin(complex_points(points), complex_points(path.ends))
             lines.append(Line((points - offset) @ back, corners, path.closed))
         region = stroked(lines, shape)
         return shapely.transform(region, lambda points: points @ linear.T + offset)
@@ -195,7 +185,7 @@ class Regions:
         whole = self.stroke(shape)
         return self.shown(shape, whole) is whole
 
-    def layer(self, shape: DrawnShape, kind: str, paint: Paint) -> Layer:
+    def layer(self, shape: DrawnShape, kind: str, paint: Brush) -> Layer:
         """Return what the "fill" or "stroke" of a shape covers, and its colour.
 
         Of a gradient that fades it is the part that is at least half visible, if there is one.
@@ -203,7 +193,7 @@ class Regions:
         whole = self.fill(shape) if kind == "fill" else self.stroke(shape)
         region = self.shown(shape, whole)
         if paint.gradient is None:
-            return Layer(region, Brush(paint.colour, paint.opacity))
+            return Layer(region, paint)
         values = paint.opacity * np.array([brush.opacity for brush in paint.gradient.brushes])
         along = np.interp(_SAMPLES, paint.gradient.offsets, values)
         part = paint.gradient.part(values, MIN_VISIBLE_OPACITY, region)
@@ -245,7 +235,7 @@ class Regions:
             for values, sign in ((opaque, -1), (shown, 1)):
                 part = gradient.part(values, MIN_VISIBLE_OPACITY, region) if gradient else region
                 if gradient or values[0] >= MIN_VISIBLE_OPACITY:
-                    yield Layer(part, Brush(paint.colour, paint.opacity)), sign
+                    yield Layer(part, paint), sign
 
 
 def _is_within(bounds: Array, page: BaseGeometry) -> bool:

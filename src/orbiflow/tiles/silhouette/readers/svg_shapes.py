@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element
 
@@ -13,11 +13,11 @@ from orbiflow.arrays import Array, Window
 from orbiflow.tiles.silhouette.outlines import MAX_COORDINATE
 from orbiflow.tiles.silhouette.readers.svg_css import Style
 from orbiflow.tiles.silhouette.readers.svg_paths import SubPath, sub_paths
-from orbiflow.tiles.silhouette.readers.svg_transforms import shift
 from orbiflow.tiles.silhouette.readers.svg_values import (
     FONT_SIZE,
     as_number,
     length,
+    shift,
     without_font_units,
 )
 
@@ -25,9 +25,8 @@ MAX_DASHES = 1000  # lengths in one pattern
 BOX_FLATNESS = 1e-4  # of the size of a shape: how exact its bounding box is
 SHAPES = {"path", "line", "rect", "circle", "ellipse", "polygon", "polyline"}
 MARKED = {"path", "line", "polygon", "polyline"}
-_BAD_VALUE = (ValueError, TypeError, IndexError, AttributeError, ZeroDivisionError, OverflowError)
+BAD_VALUE = (ValueError, TypeError, IndexError, AttributeError, ZeroDivisionError, OverflowError)
 _TOKEN = re.compile(r"[A-Za-z]|\.?\d+")
-Number = Callable[..., float]  # the length that an attribute is, or the usual one
 
 
 class BadElement(Exception):
@@ -44,15 +43,16 @@ class DrawnShape:
     """One element's sub-paths in the drawing's user units, and how they are painted."""
 
     paths: list[SubPath]
-    paint: Style  # the properties that apply to it
-    opacity: float  # its own times that of the groups around it
-    matrix: Array  # the map (3, 3) from the units of its pen to the drawing's
-    diagonal: float  # what percentages of the pen refer to, in units of the pen
     place: "Place"
+    matrix: Array  # the map (3, 3) from the units of its pen to the drawing's
     path_length: float | None = None  # what its author takes for the length of its paths
-    decorates: bool = False  # as a marker does, which is not part of the shape's box
     clips: tuple["Clip", ...] = ()  # what cuts it: it shows where all of these are
     tint: str | None = None  # the colour that a filter gives it, whatever its paint
+
+    @property
+    def paint(self) -> Style:
+        """The properties that apply to it."""
+        return self.place.style
 
     @property
     def scale(self) -> float:
@@ -69,12 +69,12 @@ class DrawnShape:
     def dashes(self) -> list[float]:
         """The lengths of dashes and gaps in turn, an even number of them; none for a whole line."""
         words = self.paint.get("stroke-dasharray", "none").replace(",", " ").split()
-        found = [as_number(word, -1.0, self.diagonal) for word in words[:MAX_DASHES]]
+        found = [as_number(word, -1.0, self.place.diagonal) for word in words[:MAX_DASHES]]
         return found * (1 + len(found) % 2) if sum(found) > 0 and min(found) >= 0 else []
 
     def number(self, key: str, usual: float) -> float:
         """Read a property as a length in units of the pen, or return the usual one."""
-        return as_number(self.paint.get(key), usual, self.diagonal)
+        return as_number(self.paint.get(key), usual, self.place.diagonal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,12 @@ class Place:
     depth: int = 0
     groups: tuple[Group, ...] = ()  # those around that are not opaque, the outermost first
     context: tuple[str, str] = ("none", "none")  # the fill and stroke around a marker or <use>
-    decorates: bool = False
+    decorates: bool = False  # as a marker does, which is not part of a shape's box
+
+    @property
+    def diagonal(self) -> float:
+        """What percentages refer to that are of neither side."""
+        return float(np.hypot(*self.viewport)) / 2**0.5
 
     @property
     def opacity(self) -> float:
@@ -129,11 +134,10 @@ class Place:
         if text is None or text.strip().lower() == "auto":
             return usual
         text = without_font_units(text, float(self.style.get("font-size", FONT_SIZE)), self.rem)
-        width, height = self.viewport
         along_x = key in {"x", "width", "cx", "rx", "x1", "x2", "refX", "markerWidth"}
         along_y = key in {"y", "height", "cy", "ry", "y1", "y2", "refY", "markerHeight"}
-        across = float(np.hypot(width, height)) / 2**0.5
-        found = length(text, width if along_x else height if along_y else across)
+        width, height = self.viewport
+        found = length(text, width if along_x else height if along_y else self.diagonal)
         if found is None:
             reason = f"{key} {text[:40]!a} is not a length in px, mm, in, pt, em or %"
             raise BadElement(element, reason)
@@ -150,8 +154,8 @@ def shape_paths(element: Element, place: Place) -> list[SubPath]:
     """Return the sub-paths of an element in the drawing's user units; none of what has no size."""
     try:
         shape = _shape(element, place)
-        return [] if shape is None else sub_paths(svgelements.Path(shape), place.matrix[:2])
-    except _BAD_VALUE as exc:
+        return [] if shape is None else sub_paths(shape, place.matrix)
+    except BAD_VALUE as exc:
         raise BadElement(element, "its geometry cannot be read; redraw or delete it") from exc
 
 
@@ -168,35 +172,31 @@ def _shape(element: Element, place: Place) -> svgelements.Shape | None:
         return place.length(element, key, text, usual)
 
     if tag == "line":
-        ends = {key: number(key) for key in ("x1", "y1", "x2", "y2")}
-        return svgelements.SimpleLine(_written(ends))
-    if tag == "rect":
-        return _rectangle({key: number(key) for key in ("x", "y", "width", "height")}, number)
-    middle = {key: number(key) for key in ("cx", "cy")}
+        return svgelements.SimpleLine(*map(number, ("x1", "y1", "x2", "y2")))
     if tag == "circle":
-        radius = number("r")
-        return svgelements.Circle(_written({**middle, "r": radius})) if radius > 0 else None
-    rx, ry = _radii(number)
-    size = {"rx": rx, "ry": ry}
-    return svgelements.Ellipse(_written({**middle, **size})) if rx > 0 and ry > 0 else None
-
-
-def _rectangle(box: dict[str, float], number: Number) -> svgelements.Shape | None:
-    if not (box["width"] > 0 and box["height"] > 0):
-        return None
-    rx, ry = _radii(number)
-    rounded = {"rx": min(rx, box["width"] / 2), "ry": min(ry, box["height"] / 2)}
-    return svgelements.Rect(_written({**box, **(rounded if rx > 0 and ry > 0 else {})}))
-
-
-def _radii(number: Number) -> tuple[float, float]:
-    """Return rx and ry, each of which is the other where it is not given."""
+        return ellipse(number("cx"), number("cy"), number("r"), number("r"))
     rx, ry = number("rx", -1.0), number("ry", -1.0)
-    return (rx if rx >= 0 else max(ry, 0.0)), (ry if ry >= 0 else max(rx, 0.0))
+    # each is the other where it is not given
+    rx, ry = (rx if rx >= 0 else max(ry, 0.0)), (ry if ry >= 0 else max(rx, 0.0))
+    if tag == "ellipse":
+        return ellipse(number("cx"), number("cy"), rx, ry)
+    x, y, width, height = map(number, ("x", "y", "width", "height"))
+    return rectangle(x, y, width, height, rx, ry)
 
 
-def _written(values: dict[str, float]) -> dict[str, str]:
-    return {key: f"{value!r}" for key, value in values.items()}
+def ellipse(x: float, y: float, rx: float, ry: float) -> svgelements.Shape | None:
+    """Return an ellipse by its middle and radii, if it has a size."""
+    return svgelements.Ellipse(x, y, rx, ry) if rx > 0 and ry > 0 else None
+
+
+def rectangle(
+    x: float, y: float, width: float, height: float, rx: float = 0.0, ry: float = 0.0
+) -> svgelements.Shape | None:
+    """Return a rectangle with round corners, if it has a size."""
+    if not (width > 0 and height > 0):
+        return None
+    corner = (min(rx, width / 2), min(ry, height / 2)) if rx > 0 and ry > 0 else ()
+    return svgelements.Rect(x, y, width, height, *corner)
 
 
 def bounds_of(shapes: Iterable[DrawnShape], matrix: Array) -> Window | None:
@@ -207,7 +207,7 @@ def bounds_of(shapes: Iterable[DrawnShape], matrix: Array) -> Window | None:
     back = np.linalg.inv(matrix)
     found: list[Array] = []
     for shape in shapes:
-        for path in () if shape.decorates else shape.paths:
+        for path in () if shape.place.decorates else shape.paths:
             reach = path.reach()
             size = float(np.ptp(reach, axis=0).max())
             exact = 0 < size < MAX_COORDINATE  # not NaN, either

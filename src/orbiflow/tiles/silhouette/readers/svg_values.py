@@ -1,17 +1,23 @@
-"""Numbers, lengths, angles and colours as SVG and CSS write them."""
+"""Values as SVG and CSS write them: numbers, colours and transforms, and which a property takes."""
+
+from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import tinycss2.color4
+from svgelements import Matrix
 
 from orbiflow.arrays import Array
 from orbiflow.drawing import rgb
 
-PIXELS_PER_INCH = 96
+if TYPE_CHECKING:
+    from orbiflow.tiles.silhouette.readers.svg_gradients import Gradient
+
 MAX_NUMBER = 1e9  # the largest width or opacity that is believed
 FONT_SIZE = 16.0  # pixels, by default
 _PIXELS = {
@@ -106,10 +112,14 @@ def font_size(text: str, parent: float, rem: float) -> float:
 
 
 class Brush(NamedTuple):
-    """A colour, #rrggbb or `CURRENT`, and its opacity, 0 to 1."""
+    """A colour, #rrggbb or `CURRENT`, and its opacity, 0 to 1.
+
+    With a `gradient` it is its mean colour, and the opacity is without that of its stops.
+    """
 
     colour: str
     opacity: float
+    gradient: Gradient | None = None
 
 
 @lru_cache(4096)
@@ -161,3 +171,266 @@ def _hexadecimal(channels: Array) -> str:
         raise ValueError
     red, green, blue = (channels.clip(0, 1) * 255).round().astype(int)
     return f"#{red:02x}{green:02x}{blue:02x}"
+
+
+MAX_TRANSFORM = 2000  # characters
+_CALL = re.compile(r"\s*,?\s*([a-zA-Z0-9]+)\s*\(([^()]*)\)")
+_ARGUMENT = re.compile(rf"\s*,?\s*({NUMBER}(?:[a-z]+|%)?)", re.IGNORECASE)
+# a list of transforms as SVG's attributes write it: six names with plain numbers
+_ATTRIBUTE = re.compile(
+    r"(?:[\s,]*(?:matrix|translate|scale|rotate|skewX|skewY)\s*\([-+.,\s\deE]*\))*[\s,]*"
+)
+KEYWORDS = {"left": "0%", "top": "0%", "center": "50%", "right": "100%", "bottom": "100%"}
+_Size = tuple[float, float]  # what percentages refer to
+
+
+class NotATransform(ValueError):
+    """The text is no list of transforms in the plane."""
+
+
+def transform_matrix(text: str, size: _Size, *, css: bool = False) -> Array:
+    """Return the matrix of a list of transforms such as "translate(10,20) rotate(30deg)".
+
+    Percentages are those of `size`. With `css` units are needed, as in a style. Raises `NotATransform`.
+    """
+    if len(text) > MAX_TRANSFORM or _CALL.sub("", text).strip(" \t\r\n,"):
+        raise NotATransform(text[:60])
+    matrix = np.eye(3)
+    for name, arguments in _CALL.findall(text):
+        if _ARGUMENT.sub("", arguments).strip():
+            raise NotATransform(text)
+        words: list[str] = _ARGUMENT.findall(arguments)
+        kinds, counts, make = _RULES.get(name.lower(), ("", (), Matrix))
+        if len(words) not in counts or (css and kinds == "axy" and len(words) == 3):
+            raise NotATransform(name)
+        values = (_value(kind, word, size, css) for kind, word in zip(kinds, words, strict=False))
+        made = make(*values)
+        matrix = matrix @ [[made.a, made.c, made.e], [made.b, made.d, made.f], [0, 0, 1]]
+    return matrix
+
+
+def can_transform(text: str, *, css: bool) -> bool:
+    """Return whether a text is a list of plane transforms as CSS or an attribute of SVG writes it."""
+    if not css and _ATTRIBUTE.fullmatch(text) is None:
+        return False
+    try:
+        transform_matrix(text, (1.0, 1.0), css=css)
+    except NotATransform:
+        return False
+    return True
+
+
+def origin_of(text: str, size: _Size) -> _Size:
+    """Return the point that a `transform-origin` names, relative to the corner of its box."""
+    words = text.replace(",", " ").lower().split()[:2]
+    if len(words) == 1:
+        words = ["center", words[0]] if words[0] in ("top", "bottom") else [words[0], "center"]
+    if words and (words[0] in ("top", "bottom") or words[1] in ("left", "right")):
+        words = words[::-1]
+    found = [length(KEYWORDS.get(word, word), own) for word, own in zip(words, size, strict=False)]
+    if len(found) < 2 or found[0] is None or found[1] is None:
+        raise NotATransform(text)
+    return found[0], found[1]
+
+
+def single_transforms(translate: str, rotate: str, scale: str, size: _Size) -> Array:
+    """Return the matrix of the properties `translate`, `rotate` and `scale` of CSS; "none" is none."""
+    calls = {"translate": translate.split()[:2], "rotate": [rotate], "scale": scale.split()[:2]}
+    given = {name: ",".join(words) for name, words in calls.items() if words != ["none"]}
+    return transform_matrix(
+        "".join(f"{name}({text})" for name, text in given.items()), size, css=True
+    )
+
+
+def shift(x: float, y: float = 0.0) -> Array:
+    """Return the matrix that moves by (x, y)."""
+    return np.array([[1.0, 0.0, x], [0.0, 1.0, y], [0.0, 0.0, 1.0]])
+
+
+def _value(kind: str, word: str, size: _Size, css: bool) -> float:
+    """Return an argument: a plain number or a share "n", an angle "a", or a length along "x" or "y"."""
+    found = quantity(word)
+    number, unit = found or (0.0, "")
+    if kind == "n":
+        value = {"": number, "%": number / 100}.get(unit)
+    elif kind == "a":
+        value = angle(word)
+    else:
+        # in sizes of the font: checked before that is known
+        value = 0.0 if unit in FONT_UNITS else length(word, size[kind == "y"])
+    if found is None or value is None or (css and kind != "n" and not unit and number):
+        raise NotATransform(word)
+    return value
+
+
+def _rotated(turn: float, x: float = 0.0, y: float = 0.0) -> Matrix:
+    made = Matrix()
+    made.post_rotate(turn, x, y)
+    return made
+
+
+_RULES: dict[str, tuple[str, tuple[int, ...], Callable[..., Matrix]]] = {
+    "matrix": ("nnnnnn", (6,), Matrix),
+    "translate": ("xy", (1, 2), Matrix.translate),
+    "translatex": ("x", (1,), Matrix.translate_x),
+    "translatey": ("y", (1,), Matrix.translate_y),
+    "translate3d": ("xy", (3,), Matrix.translate),
+    "scale": ("nn", (1, 2), Matrix.scale),
+    "scalex": ("n", (1,), Matrix.scale_x),
+    "scaley": ("n", (1,), Matrix.scale_y),
+    "rotate": ("axy", (1, 3), _rotated),
+    "rotatez": ("a", (1,), _rotated),
+    "skew": ("aa", (1, 2), Matrix.skew),
+    "skewx": ("a", (1,), Matrix.skew_x),
+    "skewy": ("a", (1,), Matrix.skew_y),
+}
+"""The kinds of each transform's arguments, how many it may have, and what makes its matrix of them."""
+
+
+WIDE = {"inherit", "initial", "unset", "revert", "revert-layer"}  # values of every property
+MAX_VALUE = 20_000  # characters
+REFERENCE = re.compile(r"""url\(\s*(?:"([^"]*)"|'([^']*)'|([^"')]*))\s*\)""", re.IGNORECASE)
+_PATH = re.compile(r"""path\(\s*(?:(?:nonzero|evenodd)\s*,\s*)?(["'])(.*)\1\s*\)""", re.DOTALL)
+_ICC = re.compile(r"\s*icc-color\([^)]*\)\s*$", re.IGNORECASE)
+_FUNCTION = re.compile(r"[a-z-]+\(.*\)", re.DOTALL | re.IGNORECASE)
+_UNIT = "(?:px|pt|pc|in|cm|mm|q|em|ex|ch|rem|%)"
+_LENGTH = f"{NUMBER}{_UNIT}?"
+_WIDTH = f"(?!-){_LENGTH}"
+_SHARE, _WORDS, _ANYTHING = f"{NUMBER}%?", "[a-z][a-z0-9 -]*", "(?s:.*)"
+
+
+def _paint(text: str, css: bool) -> str | None:
+    text = _ICC.sub("", text)
+    if text.lower() in ("none", "context-fill", "context-stroke"):
+        return text.lower()
+    found = REFERENCE.match(text)
+    if found:
+        rest = text[found.end() :].strip()
+        return text if not rest or _paint(rest, css) else None
+    return text if colour_of(text) else None
+
+
+def _colour(text: str, _: bool) -> str | None:
+    text = _ICC.sub("", text)
+    return text if colour_of(text) else None
+
+
+def _miter_limit(text: str, _: bool) -> str | None:
+    found = quantity(text)
+    return text if found and not found[1] and found[0] >= 1 else None
+
+
+def _dashes(text: str, _: bool) -> str | None:
+    words = text.replace(",", " ").split()
+    are_widths = words and all(re.fullmatch(_WIDTH, word, re.IGNORECASE) for word in words)
+    return " ".join(words) if are_widths or text.lower() == "none" else None
+
+
+def _geometry(text: str, css: bool) -> str | None:
+    """Return a shape's length, which needs a unit in CSS; attributes are checked where they count."""
+    with_unit = re.fullmatch(f"auto|{NUMBER}{_UNIT}|[-+]?0*[.]?0+", text, re.IGNORECASE)
+    return text if with_unit or not css else None
+
+
+def _path_data(text: str, css: bool) -> str | None:
+    """Return path data: in CSS the text in `path("...")`."""
+    if not css:
+        return text
+    found = _PATH.fullmatch(text)
+    return found[2] if found else "" if text.lower() == "none" else None
+
+
+def _reference(text: str, _: bool) -> str | None:
+    if text.lower() == "none":
+        return "none"
+    return text if REFERENCE.match(text) or _FUNCTION.search(text) else None
+
+
+def _transform(text: str, css: bool) -> str | None:
+    return text if text.lower() == "none" or can_transform(text, css=css) else None
+
+
+_CHECKS: dict[str, str | Callable[[str, bool], str | None]] = {
+    **dict.fromkeys(("fill", "stroke"), _paint),
+    **dict.fromkeys(("color", "stop-color", "background-color"), _colour),
+    **dict.fromkeys(("opacity", "fill-opacity", "stroke-opacity", "stop-opacity"), _SHARE),
+    **dict.fromkeys(("fill-rule", "clip-rule"), "nonzero|evenodd"),
+    "stroke-width": _WIDTH,
+    "stroke-dashoffset": _LENGTH,
+    "stroke-dasharray": _dashes,
+    "stroke-miterlimit": _miter_limit,
+    "stroke-linecap": "butt|round|square",
+    "stroke-linejoin": "miter|round|bevel|miter-clip|arcs",
+    "visibility": "visible|hidden|collapse",
+    **dict.fromkeys(("overflow", "display", "paint-order", "vector-effect"), _WORDS),
+    **dict.fromkeys(("color-interpolation", "mix-blend-mode"), _WORDS),
+    "mask-type": "luminance|alpha",
+    "transform-box": "view-box|fill-box|stroke-box|content-box|border-box",
+    **dict.fromkeys(("x", "y", "cx", "cy", "r", "rx", "ry", "width", "height"), _geometry),
+    "d": _path_data,
+    **dict.fromkeys(("clip-path", "mask", "filter"), _reference),
+    **dict.fromkeys(("marker-start", "marker-mid", "marker-end"), _reference),
+    "transform": _transform,
+    **dict.fromkeys(("transform-origin", "translate", "rotate", "scale", "font-size"), _ANYTHING),
+    **dict.fromkeys(("offset-path", "animation", "animation-name", "mask-image"), _ANYTHING),
+}
+"""What the value of each property must be: a pattern for the whole text, in any case; or a function
+that returns the value, or None for what is not valid, given whether it is of CSS."""
+
+INHERITED = frozenset(
+    {
+        *("fill", "fill-rule", "fill-opacity", "clip-rule", "color", "visibility", "paint-order"),
+        *("stroke", "stroke-width", "stroke-opacity", "stroke-linecap", "stroke-linejoin"),
+        *("stroke-miterlimit", "stroke-dasharray", "stroke-dashoffset"),
+        *("marker-start", "marker-mid", "marker-end", "font-size"),
+        "color-interpolation",
+    }
+)
+# properties of CSS alone: an attribute of such a name says nothing
+_NO_ATTRIBUTES = {
+    *("translate", "rotate", "scale", "mix-blend-mode", "offset-path", "animation", "mask-image"),
+    *("animation-name", "background-color"),
+}
+ATTRIBUTES = frozenset(_CHECKS) - _NO_ATTRIBUTES
+# properties whose lengths may be in sizes of the font
+WITH_LENGTHS = frozenset(
+    {
+        *("x", "y", "cx", "cy", "r", "rx", "ry", "width", "height", "transform", "translate"),
+        *("stroke-width", "stroke-dashoffset", "stroke-dasharray", "transform-origin", "clip-path"),
+    }
+)
+_PREFIXED = {"-webkit-transform", "-webkit-transform-origin", "-webkit-clip-path", "-webkit-mask"}
+
+
+def checked(name: str, text: str, *, css: bool = True) -> str | None:
+    """Return the value of a property from its text, or None if the text is not valid for it."""
+    text = text.strip()
+    if len(text) > MAX_VALUE and name != "d":
+        return None
+    if text.lower() in WIDE:
+        return text.lower()
+    if css and "var(" in text.lower():
+        return text
+    check = _CHECKS[name]
+    if not isinstance(check, str):
+        return check(text, css)
+    found = re.fullmatch(check, text, re.IGNORECASE)
+    return found and (text if check is _ANYTHING else text.lower())
+
+
+def longhands(name: str, text: str) -> list[tuple[str, str]]:
+    """Return the properties, of those that are read, which a declaration sets, with their texts."""
+    if name.startswith("--"):
+        return [(name, text)]
+    name = name.lower()
+    if name in _PREFIXED:
+        name = name.removeprefix("-webkit-")
+    if name == "marker":
+        return [(f"marker-{where}", text) for where in ("start", "mid", "end")]
+    if name == "background":
+        return [("background-color", word) for word in text.split()[:1] if colour_of(word)]
+    if name == "font":
+        sizes = [word for word in text.partition("/")[0].split() if quantity(word)]
+        sizes = [word for word in sizes if quantity(word)[1]]  # type: ignore[index]  # no weights
+        return [("font-size", sizes[-1])] if sizes else []
+    return [(name, text)] if name in _CHECKS else []

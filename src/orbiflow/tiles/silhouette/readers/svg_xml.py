@@ -1,7 +1,6 @@
 """The elements of an SVG document, read within bounds; other names than SVG's keep their namespace."""
 
 from collections import Counter
-from collections.abc import Iterator
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
@@ -95,18 +94,16 @@ class _BoundedTree:
             self._refuse(f"more than {MAX_ELEMENTS} elements; keep only the silhouette")
         if len(self.scopes) > MAX_DEPTH + 1:
             self._refuse(f"elements nested more than {MAX_DEPTH} deep; ungroup the drawing")
-        declared = dict(_declared(attributes))
+        scoping = [key for key in attributes if key.partition(":")[0] == "xmlns"]
+        declared = {key[6:]: attributes.pop(key).strip() for key in scoping}
         self.scopes.append({**self.scopes[-1], **declared} if declared else self.scopes[-1])
         if self.count == 1:
             self._check_root(tag)
-        own = {
-            self._named(key): value
-            for key, value in attributes.items()
-            if not key.startswith("xmlns:") and key != "xmlns"
-        }
+        # attributes without a prefix have no namespace
+        own = {self._named(k) if ":" in k else k: text for k, text in attributes.items()}
         if self.count == 1 and self.sheets:
             own["{}xml-stylesheet"] = self.sheets
-        self.names.append(self._element(tag))
+        self.names.append(self._named(tag, self.own))
         self.builder.start(self.names[-1], own)
 
     def end(self, _: str) -> None:
@@ -129,8 +126,7 @@ class _BoundedTree:
             self.sheets = data
 
     def _check_root(self, tag: str) -> None:
-        prefix, _, name = tag.rpartition(":")
-        namespace = self.scopes[-1].get(prefix, prefix)
+        namespace, _, name = self._named(tag)[1:].rpartition("}")
         if name != "svg":
             self._refuse(f"the XML is a <{name[:40]}>, not an <svg> drawing", line=False)
         if namespace not in ("", SVG):
@@ -138,23 +134,12 @@ class _BoundedTree:
             self._refuse(reason)
         self.own = namespace
 
-    def _element(self, tag: str) -> str:
-        prefix, _, name = tag.rpartition(":")
+    def _named(self, text: str, plain: str | None = None) -> str:
+        """Return a name with its namespace, unless that is the one whose names are plain."""
+        prefix, _, name = text.rpartition(":")
         namespace = self.scopes[-1].get(prefix, prefix)
-        return name if namespace == self.own else f"{{{namespace}}}{name}"
-
-    def _named(self, key: str) -> str:
-        """Return the name of an attribute; one without a prefix has no namespace."""
-        prefix, colon, name = key.rpartition(":")
-        return f"{{{self.scopes[-1].get(prefix, prefix)}}}{name}" if colon else name
+        return name if namespace == plain else f"{{{namespace}}}{name}"
 
     def _refuse(self, reason: str, *, line: bool = True) -> None:
         where = f"line {self.parser.CurrentLineNumber}: " if line else ""
         raise InputFileError(f"{self.path}: {where}{reason}")
-
-
-def _declared(attributes: dict[str, str]) -> Iterator[tuple[str, str]]:
-    """Yield the prefix and namespace that each attribute `xmlns` or `xmlns:prefix` declares."""
-    for key, value in attributes.items():
-        if key == "xmlns" or key.startswith("xmlns:"):
-            yield key[6:], value.strip()

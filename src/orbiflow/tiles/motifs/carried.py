@@ -1,0 +1,381 @@
+"""What every copy of a tile carries: a picture of pixels, or a drawing in curves from an SVG file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+from PIL import Image
+from scipy.ndimage import distance_transform_edt
+from shapely.errors import GEOSException
+from shapely.geometry.base import BaseGeometry
+
+from orbiflow.arguments import as_path
+from orbiflow.arrays import Array
+from orbiflow.drawing import Palette, png_bytes
+from orbiflow.errors import InputFileError, OrbiflowError
+from orbiflow.tiles.geometry import polygons_in, triangle_sides
+from orbiflow.tiles.motifs.engraving import engraved, eye
+from orbiflow.tiles.motifs.raster import Grid, Paint, bilinear, inside_ring, region_sides, runs
+from orbiflow.tiles.motifs.settings import MotifSettings
+from orbiflow.tiles.page import INK, Curve, Motif, Part, Raster, Style, boundary
+from orbiflow.tiles.result_file import as_tile
+from orbiflow.tiles.search import matched
+from orbiflow.tiles.silhouette import (
+    Covered,
+    Drawing,
+    DrawnShape,
+    Frame,
+    Regions,
+    SubPath,
+    Target,
+    TooManyPoints,
+    TooTangled,
+    check_file,
+    open_image,
+    paints,
+    read_head,
+)
+from orbiflow.tiles.tile import EscherTile, TileSource
+from orbiflow.tiles.tile_map import TileMap
+from orbiflow.tiles.write import Sheet, painted, shape_of
+
+
+def with_map(source: TileSource, target: Target | None = None) -> EscherTile:
+    """Return a tile with a map from its silhouette, or with the reason why there is none.
+
+    The map is the one that the search saved. Where there is none, as after a search for overlap,
+    the outlines of the silhouette and of the tile over it are matched: that of the search's
+    `target`, for a tile in memory, or the silhouette that a tile out of a file names, read again.
+
+    Raises:
+        OrbiflowError: If `source` holds no tile.
+        InputFileError: As `read_result`, and if a model belongs to another tile.
+    """
+    tile = as_tile(source)
+    if tile.no_map or (tile.bending is not None and tile.frame is not None):
+        return tile
+    frame, bending, known = tile.frame, None, tile.map or TileMap()
+    said: dict[str, Any] = {}
+    try:
+        if tile.rank is not None and tile.silhouette is not None:  # out of a file
+            target = _silhouette(tile.silhouette)
+        if target is None:
+            raise OrbiflowError(
+                "there is no map of the silhouette; give the search's target as well"
+            )
+        frame = target.frame
+        bending = matched(target.normal, frame.to_normal(tile.tile.polygon))
+        note = "the search left no map of the silhouette; its outline was matched with the tile's"
+        said["notes"] = (*tile.notes, note)
+    except OrbiflowError as error:
+        said["no_map"] = str(error)
+    if frame is None:
+        size = np.sqrt(abs(tile.tile.signed_area))
+        frame = Frame(size * np.diag([1.0, -1.0 if tile.y_down else 1.0]), np.zeros(2))
+    return tile.changed(map_source=TileMap(known.settings, known.arrays, frame, bending), **said)
+
+
+def _silhouette(own: dict[str, Any]) -> Target:
+    """Return the silhouette of a run, read again, unless it is missing or has changed."""
+    source = Path(str(own["source"]))
+    if not source.is_file():
+        raise InputFileError(
+            f"the run saved no map, and its silhouette {source} is not there; run from the folder "
+            "that the search ran in, or search again"
+        )
+    target = Target.read(source)
+    # it may have been read with another threshold, or edited since
+    area = own.get("area")
+    same = isinstance(area, int | float) and np.isclose(target.area, area)
+    if not same or len(target.outline) != own.get("vertices"):
+        raise InputFileError(
+            f"the run saved no map, and {source} is not the silhouette that it was; search again"
+        )
+    return target
+
+
+# Width in pixels of the strip inside the outline that its background may have mixed with
+FRINGE = 1.5
+# Distance in pixels from what the fringe leaves beyond which pixels are kept: thin limbs
+THIN = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A picture of the silhouette."""
+
+    image: Image.Image  # the image: RGBA, straight, 8 bits
+    covered: Covered  # the rectangle that it covers in the silhouette's coordinates
+    notes: tuple[str, ...] = ()  # what was decided for the user
+
+    def reduced(self, pixel: float) -> Picture:
+        """Return the picture averaged to pixels no smaller than `pixel` in the silhouette's units."""
+        area = (self.covered.high - self.covered.low).prod()
+        share = float(np.sqrt(area / (self.image.width * self.image.height))) / pixel
+        if share >= 0.9:
+            return self
+        size = [max(1, round(side * share)) for side in self.image.size]
+        # averaged with their opacity, for transparent pixels have no colour
+        premultiplied = self.image.convert("RGBa")
+        small = premultiplied.resize((size[0], size[1]), Image.Resampling.BOX, reducing_gap=3.0)
+        return Picture(small.convert("RGBA"), self.covered, self.notes)
+
+
+def read_picture(path: Path, tile: EscherTile) -> Picture:
+    """Read a picture of a tile's silhouette from a file; it must have the silhouette's aspect."""
+    image, notes = open_image(path)
+    image, covered = image.convert("RGBA"), tile.covered
+    covered.require_aspect(path, "picture", image.size)
+    wide, high = covered.high - covered.low
+    width, height = image.size
+    if (width, height) != (round(wide), round(high)):
+        notes.append(
+            f"laid the picture ({width} x {height} pixels) over {covered.name} "
+            f"({wide:.6g} x {high:.6g})"
+        )
+    return Picture(image, covered, tuple(notes))
+
+
+def carried_picture(picture: Picture, tile: EscherTile, grid: Grid) -> tuple[Array, Array]:
+    """Carry a picture onto a tile's raster; its colours extend a little beyond the outline.
+
+    Returns colours (height, width, 3) times their opacity, and the opacity (height, width).
+    """
+    small = picture.reduced(1 / grid.density)
+    places = _places(tile, grid)
+    straight = np.asarray(small.image, dtype=np.float32) / 255
+    straight[..., :3] *= straight[..., 3:]
+    straight = _spread(straight, small.covered.shares(tile.silhouette_outline) * small.image.size)
+    at = (small.covered.shares(places) * small.image.size).astype(np.float32)
+    result = bilinear(straight, at.reshape(-1, 2)).reshape(*places.shape[:2], 4)
+    return result[..., :3], result[..., 3]
+
+
+def _spread(colours: Array, outline: Array) -> Array:
+    """Extend the colours (height, width, 4) just inside an outline, in pixels, to all outside it.
+
+    So neither the background of a cut-out shows nor the outline's pixels that it mixed with.
+    """
+    inside = inside_ring(outline, *colours.shape[:2])
+    # beyond the picture is outside, too
+    depth = np.asarray(distance_transform_edt(np.pad(inside, 1)))[1:-1, 1:-1]
+    kept = depth > FRINGE
+    if kept.any():
+        kept |= (depth > 1) & (np.asarray(distance_transform_edt(~kept)) > THIN)
+    else:
+        kept = inside
+    if not kept.any():
+        return colours
+    rows, columns = np.asarray(
+        distance_transform_edt(~kept, return_distances=False, return_indices=True)
+    )
+    return colours[rows, columns]
+
+
+def _places(tile: EscherTile, grid: Grid) -> Array:
+    """Return the point (height, width, 2) that is carried to each texel; any, outside the tile."""
+    bending, frame = tile.require_map()
+    images = grid.texels(frame.to_input(bending.images))
+    rest = frame.to_input(bending.rest)
+    triangles = bending.triangles
+    found = runs(region_sides(images, triangles), 0, grid.height, grid.width)
+    linear = triangle_sides(rest, triangles) @ np.linalg.inv(triangle_sides(images, triangles))
+    first = triangles[:, 0]
+    offset = rest[first] - np.einsum("tij,tj->ti", linear, images[first])
+    own = np.maximum(found.label, 0)
+    columns = np.tile(np.arange(grid.width) + 0.5, grid.height)
+    # along a run only x changes
+    start = offset[own] + linear[own, :, 1] * (found.row + 0.5)[:, None]
+    places = np.stack(
+        [found.spread(start[:, k]) + found.spread(linear[own, k, 0]) * columns for k in (0, 1)],
+        axis=-1,
+    )
+    return places.reshape(grid.height, grid.width, 2)
+
+
+# Greatest distance of flattened curves from the drawing's, in sizes of the silhouette
+FLATNESS = 1 / 4000
+# Longest straight piece that is carried, in sizes of the silhouette: lines bend with the tile
+LONGEST = 1 / 150
+MOST_CARRIED = 400_000  # greatest number of points that are carried in all
+FARTHEST = 1e6  # greatest reach of a drawing, in sizes of the silhouette
+
+
+def read_drawing(path: Path, tile: EscherTile) -> tuple[Motif, tuple[str, ...]]:
+    """Read an SVG file and carry its fills and strokes onto a tile, in the tile's units, with notes."""
+    drawing = Drawing(path)
+    carry = _Carry(path, drawing, tile)
+    regions = Regions(drawing, lambda _: carry.tolerance, 2 * MOST_CARRIED)
+    parts: list[Part] = []
+    for shape in drawing.shapes:
+        try:
+            parts += _parts(shape, regions, carry)
+        except (TooManyPoints, TooTangled, GEOSException) as error:
+            raise InputFileError(
+                f"{path}: the drawing is too intricate to be carried, or much too long; simplify it"
+            ) from error
+    if not parts:
+        raise InputFileError(f"{path}: draws nothing that is filled or stroked")
+    return Motif(tuple(parts)), tuple(drawing.left_out())
+
+
+class _Carry:
+    """The map from a drawing to the tile, point by point."""
+
+    def __init__(self, path: Path, drawing: Drawing, tile: EscherTile) -> None:
+        self.tile, self.box, self.count = tile, drawing.box, 0
+        self.size, self.scale = float(np.sqrt(abs(tile.tile.signed_area))), 1.0
+        if self.box is not None:
+            covered, extent = tile.covered, np.subtract(self.box[2:], self.box[:2])
+            covered.require_aspect(path, "drawing", extent.tolist())
+            self.scale = float(np.sqrt(np.prod((covered.high - covered.low) / extent)))
+        self.tolerance = FLATNESS * self.size / self.scale
+
+    def __call__(self, points: Array, *, closed: bool) -> Array:
+        here = points
+        if self.box is not None:
+            low, high = self.box[:2], self.box[2:]
+            here = self.tile.covered.at((points - low) / np.subtract(high, low))
+        line = shapely.LinearRing(here) if closed else shapely.LineString(here)
+        # before any point is made
+        if line.length / (LONGEST * self.size) > MOST_CARRIED:
+            raise TooManyPoints
+        fine = shapely.get_coordinates(shapely.segmentize(line, LONGEST * self.size))
+        self.count += len(fine)
+        if self.count > MOST_CARRIED:
+            raise TooManyPoints
+        return self.tile.forward(fine[:-1] if closed else fine)
+
+
+def _parts(shape: DrawnShape, regions: Regions, carry: _Carry) -> list[Part]:
+    drawing = regions.drawing
+    reach = np.concatenate([path.reach() for path in shape.paths] or [np.zeros((1, 2))])
+    painted = paints(drawing, shape)
+    if painted and not (np.abs(reach) < FARTHEST * carry.size / carry.scale).all():  # NaN, too
+        raise InputFileError(
+            f"{drawing.path}: a path reaches much too far beyond the page; delete or shorten it"
+        )
+    found: list[Part] = []
+    for kind, paint in painted.items():
+        if kind == "stroke" and paint.gradient is None and regions.has_plain_stroke(shape):
+            width = shape.width * shape.scale * carry.scale
+            style, opacity = Style(None, paint.colour, width), paint.opacity
+            lines = regions.lines(shape)
+            curves = [_line(carry, points, path) for points, path in lines if len(points) > 1]
+        else:
+            region, (colour, opacity, _), _ = regions.layer(shape, kind, paint)
+            style, curves = Style(colour), _area(region, carry)
+        if curves:
+            found.append(Part(tuple(curves), style, opacity))
+    return found
+
+
+def _area(region: BaseGeometry, carry: _Carry) -> list[Curve]:
+    curves: list[Curve] = []
+    for polygon in polygons_in(region):
+        rings = [
+            shapely.get_coordinates(ring)[:-1] for ring in (polygon.exterior, *polygon.interiors)
+        ]
+        outer, *holes = (carry(ring, closed=True) for ring in rings)
+        curves += boundary(shapely.Polygon(outer, holes))
+    return curves
+
+
+def _line(carry: _Carry, points: Array, path: SubPath) -> Curve:
+    if path.closed and len(points) > 2 and np.allclose(points[0], points[-1]):
+        points = points[:-1]
+    closed = path.closed and len(points) > 2
+    return Curve.polyline(carry(points, closed=closed), closed=closed)
+
+
+class Over(NamedTuple):
+    """What lies over the silhouette, a picture or a drawing; and what was decided for the user."""
+
+    picture: Picture | None = None
+    drawing: Motif | None = None
+    notes: tuple[str, ...] = ()
+
+
+def read_over(path: str | Path, tile: EscherTile) -> Over:
+    """Read the picture or drawing in a file, whichever its content is, over a tile with a map."""
+    tile.require_map()
+    path = as_path(path, "the picture's file")
+    check_file(path)
+    head = read_head(path, 4096).lstrip(b"\xef\xbb\xbf \t\r\n")
+    if head.startswith(b"<") or (path.suffix.lower() == ".svg" and b"\0" not in head[:64]):
+        drawing, notes = read_drawing(path, tile)
+        return Over(None, drawing, notes)
+    picture = read_picture(path, tile)
+    return Over(picture, None, picture.notes)
+
+
+def paint_motif(paint: Paint, motif: Motif) -> None:
+    """Draw a motif, antialiased, over a painting."""
+    grid = paint.grid
+    placed = motif.moved(grid.density * np.eye(2), -grid.density * grid.corner)
+    for inked, parts in groupby(placed.parts, key=lambda part: INK in part.style):
+        canvas = _canvas(list(parts), grid)
+        alpha = canvas[..., 3]
+        if inked:
+            paint.ink(alpha)
+        else:
+            paint.lay(canvas[..., :3] * alpha[..., None], alpha)
+
+
+def _canvas(parts: list[Part], grid: Grid) -> Array:
+    """Return parts drawn as RGBA (height, width, 4), straight, 0 to 1."""
+    shapes = []
+    for part in parts:
+        fill, stroke = ("#000000" if colour == INK else colour for colour in part.style[:2])
+        shapes.append(shape_of(part._replace(style=Style(fill, stroke, part.style.width))))
+    drawn = painted([Sheet(tuple(shapes))], (grid.width, grid.height))
+    return np.asarray(drawn, dtype=np.float32) / 255
+
+
+def drawn_motif(
+    tile: EscherTile,
+    settings: MotifSettings,
+    palette: Palette,
+    drawing: Motif | None = None,
+    *,
+    hairlines: bool = False,
+) -> Motif:
+    """Return what is drawn on a tile, in its units: a drawing, engraved lines, then eyes.
+
+    Engraved lines are regions that swell and taper, or `hairlines` along their middle.
+    """
+    if drawing is not None or settings.eyes:
+        tile.require_map()
+    parts = () if drawing is None else drawing.parts
+    around = [eye(tile, given, palette) for given in settings.eyes]
+    if settings.strokes is not None:
+        parts += engraved(tile, settings.strokes, around, hairlines=hairlines)
+    return Motif(parts + tuple(part for one in around for part in one.parts))
+
+
+def picture_paint(
+    picture: Picture | None, tile: EscherTile, density: float, colours: int = 1
+) -> Paint:
+    """Paint a tile's raster of `density` texels along its unit with a picture alone."""
+    polygon = tile.tile.polygon
+    paint = Paint(Grid.over(polygon, density, colours))
+    if picture is not None:
+        paint.lay(*carried_picture(picture, tile, paint.grid))
+        paint.bleed(paint.grid.inside(polygon))
+    return paint
+
+
+def carried_raster(picture: Picture, tile: EscherTile, density: float, colours: int = 1) -> Raster:
+    """Return a picture carried onto a tile, in its units, with `density` pixels along one."""
+    paint = picture_paint(picture, tile, density, colours)
+    values, grid = paint.values, paint.grid
+    alpha = 1 - values[..., 3:4]
+    straight = values[..., :3] / np.maximum(alpha, 1e-6)
+    both = np.concatenate([straight, alpha], axis=2)
+    image = Image.fromarray((both * 255 + 0.5).clip(0, 255).astype(np.uint8), "RGBA")
+    return Raster(png_bytes(image), image.size, np.eye(2) / grid.density, grid.corner)
